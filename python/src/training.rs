@@ -11,6 +11,7 @@ use decoupler_core::{
     job::Job,
     network::{Quantity, ScalingChoice},
     scene::RowModel,
+    settings::Value,
     training::{EpochRecord, Method, StoppingRules},
 };
 use decoupler_files::machine::memory_budget;
@@ -83,15 +84,7 @@ impl Settings {
     }
 
     fn method(&self) -> PyResult<Method> {
-        let all = Method::all();
-        let found = all.into_iter().find(|method| method.short_name() == self.method);
-        found.ok_or_else(|| {
-            let names = all.map(|method| method.short_name()).join(", ");
-            value_error(format!(
-                "'{}' is not a training method: give one of {names}",
-                self.method
-            ))
-        })
+        Method::named(&self.method).map_err(value_error)
     }
 
     /// `true` if intervals are to be calibrated.
@@ -134,20 +127,13 @@ pub fn quantity(name: &str) -> PyResult<Quantity> {
 /// Changes a setting of a method by its name, with spaces, dashes or underscores.
 fn set(method: &mut Method, name: &str, value: f64) -> PyResult<()> {
     let underscored = |name: &str| name.replace([' ', '-'], "_");
-    let short_name = method.short_name();
     let mut settings = method.settings();
-    let names = Vec::from_iter(settings.iter().map(|setting| underscored(setting.name)));
-    match settings
-        .iter_mut()
-        .find(|setting| underscored(setting.name) == underscored(name))
-    {
-        Some(setting) => {
-            *setting.value = value;
-            Ok(())
-        }
+    match settings.find(|setting| setting.word("_") == underscored(name)) {
+        Some(setting) => setting.set(method, &Value::Number(value)).map_err(value_error),
         None => Err(value_error(format!(
-            "method_settings: {short_name} has no setting '{name}'; it has {}",
-            names.join(", ")
+            "method_settings: {} has no setting '{name}'; it has {}",
+            method.short_name(),
+            Vec::from_iter(method.settings().map(|setting| setting.word("_"))).join(", ")
         ))),
     }
 }

@@ -129,7 +129,7 @@ def test_parameters_are_stored_unchanged_and_settings_reach_the_training(curve):
         ({"hidden_nodes": 0}, "hidden_nodes is 0"),
         ({"hidden_nodes": 1.5}, "hidden_nodes is 1.5"),
         ({"hidden_nodes": 10_000}, "hidden nodes: 10000 is not possible, give from 1 to"),
-        ({"method": "adam"}, "'adam' is not a training method: give one of lm"),
+        ({"method": "adam"}, "'adam' is not a training method: give lm"),
         ({"method_settings": {"nu": 1}}, "lm has no setting 'nu'; it has mu"),
         ({"method_settings": {"mu": -1}}, "mu"),
         ({"epochs": 0}, "epochs is 0"),

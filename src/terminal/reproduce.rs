@@ -12,8 +12,8 @@ use decoupler_core::{
     evaluation::{
         CrossValidation, MAX_STARTS,
         experiments::{
-            Axis, CellSummary, Experiment, ExperimentResults, Figure, PaperTable, SummaryErrors, TrialSamples,
-            run_experiments, worker_threads,
+            Axis, AxisKind, CellSummary, Experiment, ExperimentResults, Figure, PaperTable, SummaryErrors,
+            TrialSamples, run_experiments, worker_threads,
         },
     },
     network::LARGEST_HIDDEN,
@@ -185,9 +185,14 @@ impl Reproduce {
         if let Some(starts) = self.starts {
             experiment.base.starts = starts;
         }
-        match &mut experiment.axis {
-            Axis::Hidden(hidden) if !self.hidden.is_empty() => hidden.clone_from(&self.hidden),
-            Axis::Array(arrays) if !self.arrays.is_empty() => arrays.clone_from(&self.arrays),
+        match experiment.axis.kind() {
+            AxisKind::Hidden if !self.hidden.is_empty() => {
+                let hidden = self.hidden.iter().map(|&hidden| hidden as u64);
+                experiment.axis = Axis::integers(AxisKind::Hidden, hidden);
+            }
+            AxisKind::Array if !self.arrays.is_empty() => {
+                experiment.axis = Axis::names(AxisKind::Array, &self.arrays);
+            }
             _ => {}
         }
         if let Some(cross_validation) = &mut experiment.cross_validation {

@@ -11,6 +11,7 @@ use decoupler_core::{
     },
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
+    settings::Value,
     training::{Method, StoppingRules, TrainingSettings},
 };
 use decoupler_files::{export::RecipeSource, import::Setup};
@@ -273,12 +274,11 @@ impl TrainingArguments {
         let mut method = self.method.filter(|method| !same(method)).unwrap_or(current.method);
         for (name, value) in &self.set {
             let short_name = method.short_name();
-            let mut settings = method.settings();
-            let names = settings.iter().map(|setting| dashed(setting.name)).collect::<Vec<_>>();
-            match settings.iter_mut().find(|setting| dashed(setting.name) == *name) {
-                Some(setting) => *setting.value = *value,
+            match method.settings().find(|setting| setting.word("-") == *name) {
+                Some(setting) => setting.set(&mut method, &Value::Number(*value))?,
                 None => {
-                    let names = names.join(", ");
+                    let names = method.settings().map(|setting| setting.word("-"));
+                    let names = names.collect::<Vec<_>>().join(", ");
                     let message = format!("--set {name}: {short_name} has no such setting; it has {names}");
                     return Err(Failure::Arguments(message));
                 }
@@ -325,10 +325,7 @@ pub(super) fn refuse_with_recordings(are_given: [bool; 4]) -> Result<(), Failure
 
 pub(super) fn method() -> impl TypedValueParser<Value = Method> {
     let names = Method::all().map(|method| method.short_name());
-    PossibleValuesParser::new(names).map(|name| {
-        let mut methods = Method::all().into_iter();
-        methods.find(|method| method.short_name() == name).unwrap_or_default()
-    })
+    PossibleValuesParser::new(names).map(|name| Method::named(&name).unwrap_or_default())
 }
 
 fn assignment(text: &str) -> Result<(String, f64), String> {
@@ -337,25 +334,21 @@ fn assignment(text: &str) -> Result<(String, f64), String> {
     Ok((name.trim().to_owned(), value))
 }
 
-/// Name of a setting in the terminal.
-fn dashed(name: &str) -> String {
-    name.replace(' ', "-")
-}
-
 fn settings_help() -> String {
-    let of = |mut method: Method| {
-        let mut recorded = method;
-        if method == Method::bayesian_regularization() {
-            recorded = Method::recorded_regularization();
-        }
-        let settings = method.settings();
-        let list = settings.iter().zip(recorded.settings()).map(|(setting, recorded)| {
-            let (name, default, recorded) = (dashed(setting.name), setting.default, *recorded.value);
-            if recorded == default {
+    let of = |method: Method| {
+        let recorded = if method == Method::bayesian_regularization() {
+            Method::recorded_regularization()
+        } else {
+            method
+        };
+        let list = method.settings().filter_map(|setting| {
+            let (name, default) = (setting.word("-"), setting.number(&method)?);
+            let recorded = setting.number(&recorded)?;
+            Some(if recorded == default {
                 format!("{name} (default {default})")
             } else {
                 format!("{name} (default {default}; {recorded} for a recording)")
-            }
+            })
         });
         let list = list.collect::<Vec<_>>().join(", ");
         format!("{} has {list}", method.short_name())

@@ -42,7 +42,7 @@ pub fn groups() -> Vec<Group> {
         hint: definition,
     };
     let methods = Method::all().into_iter();
-    let methods = methods.map(|method| described(method.name(), method.description()));
+    let methods = methods.map(|method| described(method.name(), method.summary()));
     let decoders = DecoderKind::ALL.map(|kind| described(kind.name(Precision::Double), kind.meaning()));
     [
         ("Sensor", SENSOR_TERMS.to_vec()),

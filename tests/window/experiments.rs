@@ -6,7 +6,7 @@ use decoupler::window::Phase;
 use decoupler_core::{
     evaluation::{
         RunSettings,
-        experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments},
+        experiments::{Axis, AxisKind, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments},
     },
     machine::MemoryBudget,
 };
@@ -34,7 +34,7 @@ pub(crate) fn tiny(driver: &mut Driver) -> Experiment {
     driver.enter("Epochs", "3");
     driver.enter("Starts", "1");
     let mut wanted = PaperTable::HiddenNodes.experiment();
-    wanted.axis = Axis::Hidden(vec![2, 4]);
+    wanted.axis = Axis::integers(AxisKind::Hidden, [2, 4]);
     (wanted.seeds, wanted.base.starts) = (1, 1);
     wanted.base.training.stopping.epochs = 3;
     let typed = driver.views().experiments.form().experiment();

@@ -16,6 +16,7 @@
 //! | [`scene`] | what happens to the sensor: rows, movement, loading, noise |
 //! | [`dataset`] | samples with their row-wire and snapshot, simulated or recorded; frames, folds, splits |
 //! | [`network`] | the three-layer network, its initialisation and scaling |
+//! | [`settings`] | the table of settings: name, help, range and access of each |
 //! | [`training`] | methods, the stepped [`training::Trainer`], stop reasons |
 //! | [`decoupling`] | readings to deformation by every decoder, behind one trait |
 //! | [`surface`] | smooth surfaces through the nodes |
@@ -135,6 +136,7 @@ pub mod network;
 mod numerics;
 pub mod scene;
 pub mod sensor;
+pub mod settings;
 pub mod surface;
 pub mod text;
 pub mod training;

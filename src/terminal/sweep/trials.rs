@@ -380,10 +380,9 @@ mod tests {
         dataset::Seed,
         evaluation::{
             RunSettings,
-            experiments::{Axis, Experiment, PaperTable},
+            experiments::{Axis, AxisKind, Experiment, PaperTable},
         },
         scene::Noise,
-        training::Method,
     };
     use decoupler_files::export::sweep_specification;
 
@@ -398,13 +397,16 @@ mod tests {
         base.seed = Seed(7);
         template.base = base.into();
         let experiments = [
-            (Axis::Hidden(vec![3, 5]), Some(Axis::Samples(vec![40, 60]))),
             (
-                Axis::Method(Method::all()[..3].to_vec()),
-                Some(Axis::Epochs(vec![2, 3])),
+                Axis::integers(AxisKind::Hidden, [3, 5]),
+                Some(Axis::integers(AxisKind::Samples, [40, 60])),
             ),
-            (Axis::Array(vec!["4x3_2x6".parse().unwrap()]), None),
-            (Axis::Seed(vec![Seed(1), Seed(u64::MAX)]), None),
+            (
+                Axis::names(AxisKind::Method, ["lm", "br", "scg"]),
+                Some(Axis::integers(AxisKind::Epochs, [2, 3])),
+            ),
+            (Axis::names(AxisKind::Array, ["4×3_2×6"]), None),
+            (Axis::integers(AxisKind::Seed, [1, u64::MAX]), None),
         ];
         for (axis, second_axis) in experiments {
             let experiment = Experiment {

@@ -12,7 +12,7 @@ use decoupler_core::{
     decoupling::DecoderKind,
     evaluation::{
         CrossValidation, Preset, Run, RunSets, SimulatedSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint,
-        experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments},
+        experiments::{Axis, AxisKind, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments},
         measure_trade_off,
     },
     identifiability::Identifiability,
@@ -175,14 +175,14 @@ fn figures_of_a_training_are_the_same_on_screen_and_in_print() {
 #[test]
 fn figures_of_experiments_are_the_same_on_screen_and_in_print() {
     let mut table_1 = PaperTable::HiddenNodes.experiment();
-    table_1.axis = Axis::Hidden(vec![2, 10]);
+    table_1.axis = Axis::integers(AxisKind::Hidden, [2, 10]);
     let hidden = same("Table 1", experiment_figure(&results(table_1.clone())));
     assert!(
         hidden.words.contains("Eq. (12)") && hidden.words.contains("Eq. (13)"),
         "{hidden:?}"
     );
     let mut table_2 = PaperTable::CrossValidation.experiment();
-    table_2.axis = Axis::Samples(vec![40, 100]);
+    table_2.axis = Axis::integers(AxisKind::Samples, [40, 100]);
     table_2.cross_validation = Some(CrossValidation {
         folds: 2,
         repeats: 2,
@@ -196,7 +196,7 @@ fn figures_of_experiments_are_the_same_on_screen_and_in_print() {
             .words
             .contains("10×8_4×24")
     );
-    table_1.second_axis = Some(Axis::Samples(vec![40, 50]));
+    table_1.second_axis = Some(Axis::integers(AxisKind::Samples, [40, 50]));
     let map = same("sweep", experiment_figure(&results(table_1)));
     assert!(map.words.contains("median Z error (%)") && map.words.contains("samples"));
 }

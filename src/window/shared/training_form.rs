@@ -2,6 +2,7 @@ use std::{path::PathBuf, sync::Arc};
 
 use decoupler_core::{
     evaluation::{Combination, MAX_STARTS, RunSettings, SimulatedSettings},
+    settings::{Field, Kind},
     training::{Method, StoppingRules, TrainerState},
 };
 use decoupler_files::{
@@ -31,7 +32,7 @@ pub fn method_choice_ui(ui: &mut Ui, method: &mut Method) {
             let is_selected = option.short_name() == method.short_name();
             let choice = ui
                 .selectable_label(is_selected, option.name())
-                .on_hover_text(option.description());
+                .on_hover_text(option.summary());
             if choice.clicked() && !is_selected {
                 *method = option;
             }
@@ -39,18 +40,31 @@ pub fn method_choice_ui(ui: &mut Ui, method: &mut Method) {
     });
     shown.response.labelled_by(label.id);
     let dim = Theme::of(ui).palette.dim;
-    ui.label(RichText::new(method.description()).size(type_size().note).color(dim));
+    ui.label(RichText::new(method.summary()).size(type_size().note).color(dim));
 }
 
 /// The settings of the chosen method, the number of starts, and how they become one network; changes all. A paused
 /// training (`is_new` is false) keeps its starts.
 pub fn method_settings_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, is_new: bool) {
-    for setting in settings.training.method.settings() {
-        let hint = format!("{} Default {}.", setting.meaning, input_text(setting.default));
-        let limits = usually(setting.default, setting.range);
-        quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, limits, "");
-        if setting.is_whole {
-            *setting.value = setting.value.round();
+    let method = &mut settings.training.method;
+    let usual = method.with_defaults();
+    for setting in method.settings() {
+        let (Some(default), Some(range)) = (setting.number(&usual), setting.range()) else {
+            continue;
+        };
+        let hint = format!("{} Default {}.", setting.help, input_text(default));
+        if let Some(Field::Number(value)) = (setting.field)(method) {
+            quantity_ui(
+                ui,
+                &capitalised(setting.name),
+                &hint,
+                value,
+                usually(default, range),
+                "",
+            );
+            if matches!(setting.kind, Kind::Integer(..)) {
+                *value = value.round();
+            }
         }
     }
     let hint = format!("{} Default 1.", glossary::STARTS.hint);

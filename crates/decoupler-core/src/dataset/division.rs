@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{Dataset, DatasetError, Seed, Stream};
+use crate::text::{Named, UnknownName};
 
 /// Division of a measured set into training, validation and test samples.
 ///
@@ -268,27 +269,30 @@ pub enum SplitBy {
     Random,
 }
 
-/// Error for an unknown name of a division rule.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{0}' is not a split: give time, group or random")]
-pub struct SplitByError(String);
+impl Named for SplitBy {
+    const WHAT: &'static str = "a split";
+    const ALL: &'static [Self] = &SplitBy::ALL;
 
-impl fmt::Display for SplitBy {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
+    fn name(self) -> &'static str {
+        match self {
             Self::Time => "time",
             Self::Group => "group",
             Self::Random => "random",
-        })
+        }
+    }
+}
+
+impl fmt::Display for SplitBy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
     }
 }
 
 impl FromStr for SplitBy {
-    type Err = SplitByError;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, SplitByError> {
-        let found = Self::ALL.into_iter().find(|by| by.to_string() == text.trim());
-        found.ok_or_else(|| SplitByError(text.to_owned()))
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        Self::parse(text)
     }
 }
 

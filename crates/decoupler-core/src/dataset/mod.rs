@@ -19,7 +19,7 @@ mod simulation;
 mod span;
 
 pub use continuation::{Continuation, Place, RowOrder, Series};
-pub use division::{DividedSamples, Division, DivisionError, Split, SplitBy, SplitByError};
+pub use division::{DividedSamples, Division, DivisionError, Split, SplitBy};
 pub use folds::Folds;
 pub use frames::{Frames, FramesError, PerRow};
 pub use history::{History, MemoryStream};

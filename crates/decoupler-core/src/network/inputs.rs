@@ -2,13 +2,15 @@ use std::{fmt, str::FromStr};
 
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::{
     ChannelNoise, MinMax, Quantity, ReadingRange, ScalingError, Whitening,
     quantity::{root_mean_square, rounding},
 };
-use crate::scene::{NoiseSource, RelativeNoise};
+use crate::{
+    scene::{NoiseSource, RelativeNoise},
+    text::{Named, UnknownName},
+};
 
 /// Choice of the input quantity and its scaling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -68,28 +70,29 @@ pub enum InputScaling {
     Whitening(Whitening),
 }
 
-/// Error for an unknown scaling.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{0}' is not a scaling: give minmax or whiten")]
-pub struct ScalingChoiceError(String);
+impl Named for ScalingChoice {
+    const WHAT: &'static str = "a scaling";
+    const ALL: &'static [Self] = &[Self::MinMax, Self::Whitening];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::MinMax => "minmax",
+            Self::Whitening => "whiten",
+        }
+    }
+}
 
 impl fmt::Display for ScalingChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::MinMax => "minmax",
-            Self::Whitening => "whiten",
-        })
+        f.pad(self.name())
     }
 }
 
 impl FromStr for ScalingChoice {
-    type Err = ScalingChoiceError;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, ScalingChoiceError> {
-        let found = [Self::MinMax, Self::Whitening]
-            .into_iter()
-            .find(|choice| choice.to_string() == text.trim());
-        found.ok_or_else(|| ScalingChoiceError(text.to_owned()))
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        Self::parse(text)
     }
 }
 

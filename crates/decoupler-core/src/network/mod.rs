@@ -12,10 +12,10 @@ mod tanh;
 mod whitening;
 
 pub(crate) use inputs::channel_noise;
-pub use inputs::{InputChoice, InputScaling, Inputs, ScalingChoice, ScalingChoiceError};
+pub use inputs::{InputChoice, InputScaling, Inputs, ScalingChoice};
 pub use mlp::{Mlp, Shape, nguyen_widrow};
 pub use networks::{DecouplingNetwork, HiddenSuggestions, LARGEST_HIDDEN, NetworkError, Networks};
-pub use quantity::{ChannelNoise, Quantity, QuantityError};
+pub use quantity::{ChannelNoise, Quantity};
 pub use scaling::{MinMax, ReadingRange, ScalingError};
 pub(crate) use tanh::{exp, tanh, tanh_single};
 pub use tanh::{tanh_in_place, tanh_in_place_single};

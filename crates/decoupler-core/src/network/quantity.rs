@@ -2,7 +2,8 @@ use std::{fmt, str::FromStr};
 
 use ndarray::{Array2, ArrayView1, ArrayView2, CowArray, Ix2};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
+
+use crate::text::{Named, UnknownName};
 
 use super::ScalingError;
 
@@ -23,11 +24,6 @@ pub enum Quantity {
 
 /// Largest relative error of a resistance towards 0, so that it stays above 0.
 const MAX_RELATIVE_ERROR: f64 = 1.0 - 1e-6;
-
-/// Error for an unknown input quantity.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{0}' is not an input: give resistance, conductance or log")]
-pub struct QuantityError(String);
 
 impl Quantity {
     /// All quantities of a resistance, in the order offered to the user.
@@ -93,25 +89,31 @@ impl Quantity {
     }
 }
 
-impl fmt::Display for Quantity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
+impl Named for Quantity {
+    const WHAT: &'static str = "an input";
+    const ALL: &'static [Self] = &Quantity::ALL;
+
+    fn name(self) -> &'static str {
+        match self {
             Self::Resistance => "resistance",
             Self::Conductance => "conductance",
             Self::LogResistance => "log",
             Self::Raw => "raw",
-        })
+        }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
     }
 }
 
 impl FromStr for Quantity {
-    type Err = QuantityError;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, QuantityError> {
-        let found = Self::ALL
-            .into_iter()
-            .find(|quantity| quantity.to_string() == text.trim());
-        found.ok_or_else(|| QuantityError(text.to_owned()))
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        Self::parse(text)
     }
 }
 

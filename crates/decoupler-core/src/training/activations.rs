@@ -3,13 +3,13 @@
 
 use std::ops::Range;
 
-use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
+use faer::{Mat, MatMut, MatRef};
 use pulp::{Simd, WithSimd};
 
 use super::{
     Evaluation, Examples,
     examples::{BLOCK, Block, column, column_mut},
-    parallel::{for_each_part, parts},
+    parallel::{accumulate, for_each_part, parts, product},
 };
 use crate::network::{Mlp, Shape, tanh_in_place};
 
@@ -45,19 +45,12 @@ impl Activations {
         let w = MatRef::from_row_major_slice(w, shape.inputs + 1, shape.hidden);
         let v = MatRef::from_row_major_slice(v, shape.hidden + 1, shape.outputs);
         let mut hidden = self.hidden.as_mut().subrows_mut(0, samples);
-        matmul(
-            hidden.as_mut().subcols_mut(0, shape.hidden),
-            Accum::Replace,
-            &block.inputs,
-            w,
-            1.0,
-            Par::Seq,
-        );
+        product(hidden.as_mut().subcols_mut(0, shape.hidden), block.inputs.as_ref(), w);
         for node in 0..shape.hidden {
             tanh_in_place(column_mut(hidden.as_mut(), node));
         }
         let mut errors = self.errors.as_mut().subrows_mut(0, samples);
-        matmul(errors.as_mut(), Accum::Replace, hidden.as_ref(), v, 1.0, Par::Seq);
+        product(errors.as_mut(), hidden.as_ref(), v);
         let mut squares = 0.0;
         for output in 0..shape.outputs {
             let targets = column(block.targets.as_ref(), output);
@@ -137,20 +130,11 @@ impl KeptActivations {
     }
 
     fn run(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
-        let mut buffers = self.buffers.as_mut_slice();
-        let part = |blocks: Range<usize>| {
-            let count = if self.recomputed { 1 } else { blocks.len() };
-            let (own, others) = std::mem::take(&mut buffers).split_at_mut(count);
-            buffers = others;
-            (blocks, own, 0.0)
-        };
-        let mut parts: Vec<_> = parts(examples.blocks().len(), self.parts).map(part).collect();
-        for_each_part(&mut parts, |(numbers, own, squares)| {
-            for (index, number) in numbers.clone().enumerate() {
-                *squares += own[index % own.len()].forward(mlp, &examples.blocks()[number]);
-            }
+        let mut squares = vec![0.0; self.parts];
+        self.for_each_part(examples, &mut squares, |squares, number, activations| {
+            *squares += activations.forward(mlp, &examples.blocks()[number]);
         });
-        parts.iter().map(|(.., squares)| squares).sum()
+        squares.iter().sum()
     }
 
     /// Calls `work` for every block at the weights last evaluated, which are those of `mlp`. The samples are divided
@@ -162,27 +146,43 @@ impl KeptActivations {
         sums: &mut [S],
         work: impl Fn(&mut S, &BlockNow<'_>) + Sync + Send,
     ) {
-        let numbers = parts(examples.blocks().len(), sums.len());
-        if self.recomputed {
-            let mut parts: Vec<_> = numbers.zip(sums).zip(&mut self.buffers).collect();
-            for_each_part(&mut parts, |((numbers, sums), activations)| {
-                for number in numbers.clone() {
-                    let block = &examples.blocks()[number];
-                    activations.forward(mlp, block);
-                    work(sums, &BlockNow::new(number, block, activations));
-                }
-            });
-        } else {
-            let mut parts: Vec<_> = numbers.zip(sums).collect();
-            for_each_part(&mut parts, |(numbers, sums)| {
-                for number in numbers.clone() {
-                    work(
-                        sums,
-                        &BlockNow::new(number, &examples.blocks()[number], &self.buffers[number]),
-                    );
-                }
-            });
-        }
+        let recomputed = self.recomputed;
+        self.for_each_part(examples, sums, |sums, number, activations| {
+            let block = &examples.blocks()[number];
+            if recomputed {
+                activations.forward(mlp, block);
+            }
+            let now = BlockNow {
+                number,
+                block,
+                activations,
+            };
+            work(sums, &now);
+        });
+    }
+
+    /// Divides the blocks into as many parts as there are `sums`; calls `work` with the sums of the part, the number of
+    /// each block, and its buffer.
+    fn for_each_part<S: Send>(
+        &mut self,
+        examples: &Examples,
+        sums: &mut [S],
+        work: impl Fn(&mut S, usize, &mut Activations) + Sync + Send,
+    ) {
+        let mut buffers = self.buffers.as_mut_slice();
+        let part = |(blocks, sums): (Range<usize>, _)| {
+            let count = if self.recomputed { 1 } else { blocks.len() };
+            let (own, others) = std::mem::take(&mut buffers).split_at_mut(count);
+            buffers = others;
+            (blocks, own, sums)
+        };
+        let divided = parts(examples.blocks().len(), sums.len()).zip(sums);
+        let mut parts: Vec<_> = divided.map(part).collect();
+        for_each_part(&mut parts, |(blocks, own, sums)| {
+            for (index, number) in blocks.clone().enumerate() {
+                work(sums, number, &mut own[index % own.len()]);
+            }
+        });
     }
 }
 
@@ -199,15 +199,7 @@ pub(super) struct BlockNow<'a> {
     activations: &'a Activations,
 }
 
-impl<'a> BlockNow<'a> {
-    fn new(number: usize, block: &'a Block, activations: &'a Activations) -> Self {
-        Self {
-            number,
-            block,
-            activations,
-        }
-    }
-
+impl BlockNow<'_> {
     /// H̃: samples × (hidden + 1).
     pub(super) fn hidden(&self) -> MatRef<'_, f64> {
         self.activations.hidden.as_ref().subrows(0, self.block.samples())
@@ -350,38 +342,13 @@ impl Backpropagation {
             squares += self.activations.forward(mlp, block);
             let hidden = self.activations.hidden.as_ref().subrows(0, samples);
             let errors = self.activations.errors.as_ref().subrows(0, samples);
-            matmul(
-                gradient_v.as_mut(),
-                Accum::Add,
-                hidden.transpose(),
-                errors,
-                per_error,
-                Par::Seq,
-            );
+            accumulate(gradient_v.as_mut(), hidden.transpose(), errors, per_error);
             let mut delta = self.delta.as_mut().subrows_mut(0, samples);
-            let v_without_bias = v.subrows(0, shape.hidden);
-            matmul(
-                delta.as_mut(),
-                Accum::Replace,
-                errors,
-                v_without_bias.transpose(),
-                1.0,
-                Par::Seq,
-            );
+            product(delta.as_mut(), errors, v.subrows(0, shape.hidden).transpose());
             for node in 0..shape.hidden {
-                let outputs = column(hidden, node);
-                for (delta, h) in column_mut(delta.as_mut(), node).iter_mut().zip(outputs) {
-                    *delta *= 1.0 - h * h;
-                }
+                multiply_by_tanh_slopes(column_mut(delta.as_mut(), node), column(hidden, node));
             }
-            matmul(
-                gradient_w.as_mut(),
-                Accum::Add,
-                block.inputs.transpose(),
-                delta.as_ref(),
-                per_error,
-                Par::Seq,
-            );
+            accumulate(gradient_w.as_mut(), block.inputs.transpose(), delta.as_ref(), per_error);
         }
         Evaluation {
             mse: squares / examples.errors(),

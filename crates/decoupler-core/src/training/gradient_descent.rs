@@ -8,219 +8,100 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Evaluation, Examples, SettingError, StopReason,
+    AdaptiveDescentSettings, Evaluation, Examples, ResilientSettings, StopReason,
     activations::Backpropagation,
-    method::{Algorithm, Checked, Description},
-    setting::{MAX_MOMENTUM, check_limit, settings},
+    method::{Algorithm, MethodState},
 };
 use crate::network::Mlp;
 
-settings! {
-    /// Settings of gradient descent, with the field's usual default (`traingd`).
-    pub struct GradientDescentSettings {
-        learning_rate: "learning rate" = 0.01, in f64::MIN_POSITIVE..=1e300,
-            "Step length relative to the length of the gradient.";
-    }
+/// What a step of gradient descent mixes in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mixed {
+    /// Nothing: conventional back-propagation of the paper, Eq. (5)-(10), in batch form: `v(N+1) = v(N) + α g(N)`, where
+    /// g is the negative gradient of the mean squared error over all samples. Eq. (8)-(9) are written for a sigmoid; the
+    /// derivative of our layers is 1 − h² for the tanh nodes and 1 for the linear outputs.
+    Nothing,
+    /// The previous **gradient**, Eq. (11) of the paper: `v(N+1) = v(N) + α[(1−η) g(N) + η g(N−1)]`. In the first step
+    /// g(N−1) = g(N).
+    Gradient,
+    /// The previous **step** (Rumelhart, Hinton and Williams 1986; `traingdm`): `dX = mc·dXprev + lr·(1 − mc)·g`; dXprev
+    /// is 0 before the first step.
+    Step,
 }
 
-/// Conventional back-propagation of the paper, Eq. (5)-(10), in batch form: `v(N+1) = v(N) + α g(N)`, where g is the
-/// negative gradient of the mean squared error over all samples. Eq. (8)-(9) are written for a sigmoid; the derivative
-/// of our layers is 1 − h² for the tanh nodes and 1 for the linear outputs.
+/// Gradient descent with a fixed learning rate.
 pub(super) struct GradientDescent {
-    settings: GradientDescentSettings,
+    mixed: Mixed,
+    learning_rate: f64,
+    /// Share of the previous gradient or step; 0 if nothing is mixed in.
+    momentum: f64,
     backpropagation: Backpropagation,
+    /// Previous gradient or step.
+    previous: Vec<f64>,
+}
+
+impl GradientDescent {
+    pub(super) fn new(
+        mixed: Mixed,
+        learning_rate: f64,
+        momentum: f64,
+        mlp: &Mlp,
+        examples: &Examples,
+    ) -> (Self, Evaluation) {
+        let mut backpropagation = Backpropagation::new(mlp);
+        let evaluation = backpropagation.evaluate(mlp, examples);
+        let mut previous = backpropagation.gradient.clone();
+        if mixed == Mixed::Step {
+            previous.fill(0.0);
+        }
+        let method = Self {
+            mixed,
+            learning_rate,
+            momentum,
+            backpropagation,
+            previous,
+        };
+        (method, evaluation)
+    }
 }
 
 impl Algorithm for GradientDescent {
-    type Settings = GradientDescentSettings;
-    type State = ();
-
-    const DESCRIPTION: Description = Description {
-        short_name: "gd",
-        name: "Gradient descent",
-        summary: "Conventional back-propagation, Eq. (5)-(10): a step down the gradient each epoch.",
-        parameter_name: "learning rate",
-        remedy: "change the learning rate, run more epochs, or try another method",
-    };
-
-    fn new(settings: GradientDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut backpropagation = Backpropagation::new(mlp);
-        let evaluation = backpropagation.evaluate(mlp, examples);
-        let method = Self {
-            settings,
-            backpropagation,
-        };
-        (method, evaluation)
-    }
-
-    fn restore(&mut self, (): ()) {}
-
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
-        for (weight, slope) in mlp.weights_mut().iter_mut().zip(&self.backpropagation.gradient) {
-            *weight -= self.settings.learning_rate * slope;
+        let (rate, momentum) = (self.learning_rate, self.momentum);
+        let slopes = self.backpropagation.gradient.iter().zip(&mut self.previous);
+        for (weight, (slope, previous)) in mlp.weights_mut().iter_mut().zip(slopes) {
+            if self.mixed == Mixed::Step {
+                *previous = momentum * *previous - rate * (1.0 - momentum) * slope;
+                *weight += *previous;
+            } else {
+                *weight -= rate * ((1.0 - momentum) * slope + momentum * *previous);
+                *previous = *slope;
+            }
         }
         self.backpropagation.evaluate(mlp, examples).if_finite()
     }
 
     fn parameter(&self) -> f64 {
-        self.settings.learning_rate
+        self.learning_rate
     }
 
-    fn state(&self) {}
-}
-
-settings! {
-    /// Settings of gradient descent with momentum, with the field's usual defaults.
-    pub struct MomentumSettings {
-        learning_rate: "learning rate" = 0.01, in f64::MIN_POSITIVE..=1e300,
-            "Step length relative to the length of the gradient (alpha).";
-        momentum: "momentum" = 0.9, in 0.0..=1.0,
-            "Share of the previous gradient in each step (eta), from 0 to 1.";
-    }
-}
-
-/// Gradient descent that mixes in the previous **gradient**, Eq. (11) of the paper:
-/// `v(N+1) = v(N) + α[(1−η) g(N) + η g(N−1)]`, where g is the negative gradient. (The field's `traingdm` mixes in the
-/// previous step instead.) In the first step g(N−1) = g(N).
-#[derive(Debug)]
-pub(super) struct Momentum {
-    settings: MomentumSettings,
-    backpropagation: Backpropagation,
-    previous_gradient: Vec<f64>,
-}
-
-impl Algorithm for Momentum {
-    type Settings = MomentumSettings;
-    type State = Vec<f64>;
-
-    const DESCRIPTION: Description = Description {
-        short_name: "gdm",
-        name: "Momentum, Eq. (11)",
-        summary: "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does.",
-        parameter_name: "learning rate",
-        remedy: "change the learning rate, run more epochs, or try another method",
-    };
-
-    fn new(settings: MomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut backpropagation = Backpropagation::new(mlp);
-        let evaluation = backpropagation.evaluate(mlp, examples);
-        let previous_gradient = backpropagation.gradient.clone();
-        let method = Self {
-            settings,
-            backpropagation,
-            previous_gradient,
-        };
-        (method, evaluation)
-    }
-
-    fn restore(&mut self, previous_gradient: Vec<f64>) {
-        self.previous_gradient = previous_gradient;
-    }
-
-    fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
-        let MomentumSettings {
-            learning_rate,
-            momentum,
-        } = self.settings;
-        let gradients = self.backpropagation.gradient.iter().zip(&self.previous_gradient);
-        for (weight, (now, before)) in mlp.weights_mut().iter_mut().zip(gradients) {
-            *weight -= learning_rate * ((1.0 - momentum) * now + momentum * before);
+    fn state(&self) -> MethodState {
+        match self.mixed {
+            Mixed::Nothing => MethodState::GradientDescent,
+            Mixed::Gradient => MethodState::Momentum(self.previous.clone()),
+            Mixed::Step => MethodState::StepMomentum(self.previous.clone()),
         }
-        self.previous_gradient.copy_from_slice(&self.backpropagation.gradient);
-        self.backpropagation.evaluate(mlp, examples).if_finite()
     }
 
-    fn parameter(&self) -> f64 {
-        self.settings.learning_rate
-    }
-
-    fn state(&self) -> Vec<f64> {
-        self.previous_gradient.clone()
-    }
-}
-
-settings! {
-    /// Settings of gradient descent with momentum of steps, with the field's usual defaults (`traingdm`).
-    pub struct StepMomentumSettings {
-        learning_rate: "learning rate" = 0.01, in f64::MIN_POSITIVE..=1e300,
-            "Step length relative to the length of the gradient.";
-        momentum: "momentum" = 0.9, in 0.0..=MAX_MOMENTUM,
-            "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.";
-    }
-}
-
-/// Gradient descent that mixes in the previous **step** (Rumelhart, Hinton and Williams 1986; `traingdm`):
-/// `dX = mc·dXprev + lr·(1 − mc)·g`, where g is the negative gradient; dXprev is 0 before the first step. (The paper's
-/// Eq. (11) mixes in the previous gradient instead: `gdm`.)
-pub(super) struct StepMomentum {
-    settings: StepMomentumSettings,
-    backpropagation: Backpropagation,
-    step: Vec<f64>,
-}
-
-impl Algorithm for StepMomentum {
-    type Settings = StepMomentumSettings;
-    type State = Vec<f64>;
-
-    const DESCRIPTION: Description = Description {
-        short_name: "gdms",
-        name: "Momentum of steps",
-        summary: "Gradient descent that mixes the previous step into each step, as traingdm does.",
-        parameter_name: "learning rate",
-        remedy: "change the learning rate, run more epochs, or try another method",
-    };
-
-    fn new(settings: StepMomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut backpropagation = Backpropagation::new(mlp);
-        let evaluation = backpropagation.evaluate(mlp, examples);
-        let method = Self {
-            settings,
-            backpropagation,
-            step: vec![0.0; mlp.weights().len()],
-        };
-        (method, evaluation)
-    }
-
-    fn restore(&mut self, step: Vec<f64>) {
-        self.step = step;
-    }
-
-    fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
-        let StepMomentumSettings {
-            learning_rate,
-            momentum,
-        } = self.settings;
-        let steps = self.step.iter_mut().zip(&self.backpropagation.gradient);
-        for (weight, (step, slope)) in mlp.weights_mut().iter_mut().zip(steps) {
-            *step = momentum * *step - learning_rate * (1.0 - momentum) * slope;
-            *weight += *step;
+    fn restore(&mut self, state: MethodState) -> bool {
+        match (self.mixed, state) {
+            (Mixed::Nothing, MethodState::GradientDescent) => {}
+            (Mixed::Gradient, MethodState::Momentum(previous)) | (Mixed::Step, MethodState::StepMomentum(previous)) => {
+                self.previous = previous;
+            }
+            _ => return false,
         }
-        self.backpropagation.evaluate(mlp, examples).if_finite()
-    }
-
-    fn parameter(&self) -> f64 {
-        self.settings.learning_rate
-    }
-
-    fn state(&self) -> Vec<f64> {
-        self.step.clone()
-    }
-}
-
-settings! {
-    /// Settings of gradient descent with momentum and an adaptive learning rate, with the field's usual defaults
-    /// (`traingdx`).
-    pub struct AdaptiveDescentSettings {
-        learning_rate: "learning rate" = 0.01, in f64::MIN_POSITIVE..=1e300,
-            "Initial step length relative to the length of the gradient; it adapts from there.";
-        momentum: "momentum" = 0.9, in 0.0..=MAX_MOMENTUM,
-            "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.";
-        rate_increase: "rate increase" = 1.05, in 1.0..=1e3,
-            "Factor on the learning rate after a step that lowers the error.";
-        rate_decrease: "rate decrease" = 0.7, in 1e-6..=0.999,
-            "Factor on the learning rate after a rejected step.";
-        largest_error_increase: "largest error increase" = 1.04, in 1.0..=1e6,
-            "A step that raises the error by more than this factor is rejected.";
+        true
     }
 }
 
@@ -257,25 +138,15 @@ pub struct AdaptiveState {
     step: Vec<f64>,
 }
 
-impl Checked for AdaptiveState {
-    fn vectors(&self) -> Vec<&[f64]> {
-        vec![&self.step]
+impl AdaptiveState {
+    /// The previous step, with an entry for each weight.
+    pub(super) fn step(&self) -> &[f64] {
+        &self.step
     }
 }
 
-impl Algorithm for AdaptiveDescent {
-    type Settings = AdaptiveDescentSettings;
-    type State = AdaptiveState;
-
-    const DESCRIPTION: Description = Description {
-        short_name: "gdx",
-        name: "Adaptive rate with momentum",
-        summary: "Gradient descent with momentum whose learning rate grows while the error falls.",
-        parameter_name: "learning rate",
-        remedy: "lower the learning rate, run more epochs, or try another seed",
-    };
-
-    fn new(settings: AdaptiveDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+impl AdaptiveDescent {
+    pub(super) fn new(settings: AdaptiveDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);
         let now = backpropagation.evaluate(mlp, examples);
         let method = Self {
@@ -291,11 +162,9 @@ impl Algorithm for AdaptiveDescent {
         };
         (method, now)
     }
+}
 
-    fn restore(&mut self, state: AdaptiveState) {
-        self.state = state;
-    }
-
+impl Algorithm for AdaptiveDescent {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let AdaptiveState { learning_rate, step } = &mut self.state;
         let momentum = self.settings.momentum;
@@ -326,22 +195,16 @@ impl Algorithm for AdaptiveDescent {
         self.state.learning_rate
     }
 
-    fn state(&self) -> AdaptiveState {
-        self.state.clone()
+    fn state(&self) -> MethodState {
+        MethodState::AdaptiveDescent(self.state.clone())
     }
-}
 
-settings! {
-    /// Settings of resilient back-propagation, with the field's usual defaults (`trainrp`).
-    pub struct ResilientSettings {
-        first_length: "first step length" = 0.07, in f64::MIN_POSITIVE..=1e300,
-            "Step length of every weight in the first epoch (delta0).";
-        length_increase: "length increase" = 1.2, in 1.0..=1e3,
-            "Factor on a weight's step length while its slope keeps its sign.";
-        length_decrease: "length decrease" = 0.5, in 1e-6..=0.999,
-            "Factor on a weight's step length when its slope changes sign.";
-        largest_length: "largest step length" = 50.0, in f64::MIN_POSITIVE..=1e300,
-            "Largest step of a weight in one epoch (deltamax).";
+    fn restore(&mut self, state: MethodState) -> bool {
+        let MethodState::AdaptiveDescent(state) = state else {
+            return false;
+        };
+        self.state = state;
+        true
     }
 }
 
@@ -363,32 +226,15 @@ pub struct ResilientState {
     lengths: Vec<f64>,
 }
 
-impl Checked for ResilientState {
-    fn vectors(&self) -> Vec<&[f64]> {
-        vec![&self.previous_gradient, &self.lengths]
+impl ResilientState {
+    /// Vectors with an entry for each weight.
+    pub(super) fn vectors(&self) -> [&[f64]; 2] {
+        [&self.previous_gradient, &self.lengths]
     }
 }
 
-impl Algorithm for Resilient {
-    type Settings = ResilientSettings;
-    type State = ResilientState;
-
-    const DESCRIPTION: Description = Description {
-        short_name: "rp",
-        name: "Resilient back-propagation",
-        summary: "Each weight has its own step length and uses only the sign of its slope.",
-        parameter_name: "mean step length",
-        remedy: "lower the first and the largest step length, or try another seed",
-    };
-
-    fn check(settings: &ResilientSettings) -> Result<(), SettingError> {
-        check_limit(
-            ("first step length", settings.first_length),
-            ("largest step length", settings.largest_length),
-        )
-    }
-
-    fn new(settings: ResilientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+impl Resilient {
+    pub(super) fn new(settings: ResilientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);
         let evaluation = backpropagation.evaluate(mlp, examples);
         let weights = mlp.weights().len();
@@ -402,11 +248,9 @@ impl Algorithm for Resilient {
         };
         (method, evaluation)
     }
+}
 
-    fn restore(&mut self, state: ResilientState) {
-        self.state = state;
-    }
-
+impl Algorithm for Resilient {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let settings = self.settings;
         for (index, weight) in mlp.weights_mut().iter_mut().enumerate() {
@@ -437,8 +281,16 @@ impl Algorithm for Resilient {
         self.state.lengths.iter().sum::<f64>() / self.state.lengths.len() as f64
     }
 
-    fn state(&self) -> ResilientState {
-        self.state.clone()
+    fn state(&self) -> MethodState {
+        MethodState::Resilient(self.state.clone())
+    }
+
+    fn restore(&mut self, state: MethodState) -> bool {
+        let MethodState::Resilient(state) = state else {
+            return false;
+        };
+        self.state = state;
+        true
     }
 }
 
@@ -453,7 +305,7 @@ mod tests {
         let start = mlp.clone();
         let mut backpropagation = Backpropagation::new(&mlp);
         backpropagation.evaluate(&mlp, &examples);
-        let (mut method, _) = GradientDescent::new(GradientDescentSettings { learning_rate: 0.5 }, &mlp, &examples);
+        let (mut method, _) = GradientDescent::new(Mixed::Nothing, 0.5, 0.0, &mlp, &examples);
         method.step(&mut mlp, &examples).unwrap();
         for ((moved, weight), slope) in mlp.weights().iter().zip(start.weights()).zip(&backpropagation.gradient) {
             assert_eq!(*moved, weight - 0.5 * slope);
@@ -463,16 +315,12 @@ mod tests {
     #[test]
     fn steps_follow_equation_11() {
         let (mut mlp, examples) = (random_mlp(3, 2, 2, 1), random_examples(50, 3, 2, 2));
-        let settings = MomentumSettings {
-            learning_rate: 0.1,
-            momentum: 0.7,
-        };
         let gradient = |mlp: &Mlp| {
             let mut backpropagation = Backpropagation::new(mlp);
             backpropagation.evaluate(mlp, &examples);
             backpropagation.gradient
         };
-        let (mut method, _) = Momentum::new(settings, &mlp, &examples);
+        let (mut method, _) = GradientDescent::new(Mixed::Gradient, 0.1, 0.7, &mlp, &examples);
         let (start, g0) = (mlp.weights().to_vec(), gradient(&mlp));
         method.step(&mut mlp, &examples).unwrap();
         let (first, g1) = (mlp.weights().to_vec(), gradient(&mlp));
@@ -512,7 +360,7 @@ mod tests {
         let (mut method, start) = AdaptiveDescent::new(settings, &mlp, &examples);
         let gradient = method.gradient.clone();
         assert_eq!(method.step(&mut mlp, &examples), Ok(start), "the step is rejected");
-        for (step, slope) in method.state().step.iter().zip(&gradient) {
+        for (step, slope) in method.state.step.iter().zip(&gradient) {
             assert_eq!(*step, -700.0 * slope);
         }
     }

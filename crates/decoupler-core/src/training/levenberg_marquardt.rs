@@ -3,11 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Evaluation, Examples, NormalEquations, SettingError, StopReason,
-    method::{Algorithm, Checked, Description, add_step},
-    setting::{check_limit, settings},
+    Damping, Evaluation, Examples, StopReason,
+    method::{Algorithm, MethodState, add_step},
+    normal_equations::{NormalEquations, Plan},
 };
-use crate::network::{Mlp, Shape};
+use crate::{network::Mlp, settings::MIN_MU};
 
 /// Levenberg-Marquardt (Hagan and Menhaj 1994). After a rejected step only the damped equations are solved again, with
 /// a larger mu; the products are gathered once per epoch.
@@ -26,39 +26,10 @@ pub struct DampedState {
     mu: f64,
 }
 
-impl Checked for DampedState {
-    fn vectors(&self) -> Vec<&[f64]> {
-        Vec::new()
-    }
-}
-
-impl Algorithm for LevenbergMarquardt {
-    type Settings = Damping;
-    type State = DampedState;
-
-    const DESCRIPTION: Description = Description {
-        short_name: "lm",
-        name: "Levenberg-Marquardt",
-        summary: "Damped Gauss-Newton steps: the fewest epochs, and here also the shortest training time.",
-        parameter_name: "mu",
-        remedy: "try another seed, more samples, or fewer hidden nodes",
-    };
-
-    fn check(settings: &Damping) -> Result<(), SettingError> {
-        settings.check()
-    }
-
-    fn equations_bytes(shape: Shape, samples: usize) -> usize {
-        NormalEquations::cheapest_bytes(shape, samples)
-    }
-
-    fn epoch_multiplications(shape: Shape, samples: usize) -> f64 {
-        NormalEquations::cheapest_multiplications(shape, samples)
-    }
-
-    fn new(damping: Damping, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut equations = NormalEquations::cheapest(mlp.shape(), examples);
-        let evaluation = equations.gather(mlp, examples);
+impl LevenbergMarquardt {
+    pub(super) fn new(damping: Damping, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+        let mut equations = NormalEquations::new(&Plan::cheapest(mlp.shape(), examples.samples()), examples);
+        let evaluation = equations.gather(mlp, &[], examples);
         let method = Self {
             damping,
             mu: damping.mu,
@@ -69,56 +40,40 @@ impl Algorithm for LevenbergMarquardt {
         };
         (method, evaluation)
     }
+}
 
-    fn restore(&mut self, state: DampedState) {
-        self.mu = state.mu;
-    }
-
+impl Algorithm for LevenbergMarquardt {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let before = self.mse;
         self.mse = self.damping.search(&mut self.mu, |mu| {
-            self.equations.solve(mlp, examples, mu, &mut self.step)?;
+            self.equations.solve(mlp, examples, [mu; 4], &[], &mut self.step)?;
             add_step(&mut self.candidate, mlp, &self.step);
             let mse = self.equations.mse(&self.candidate, examples);
             // False for NaN.
             (mse < before).then_some(mse)
         })?;
         std::mem::swap(mlp, &mut self.candidate);
-        Ok(self.equations.gather(mlp, examples))
+        Ok(self.equations.gather(mlp, &[], examples))
     }
 
     fn parameter(&self) -> f64 {
         self.mu
     }
 
-    fn state(&self) -> DampedState {
-        DampedState { mu: self.mu }
+    fn state(&self) -> MethodState {
+        MethodState::LevenbergMarquardt(DampedState { mu: self.mu })
+    }
+
+    fn restore(&mut self, state: MethodState) -> bool {
+        let MethodState::LevenbergMarquardt(DampedState { mu }) = state else {
+            return false;
+        };
+        self.mu = mu;
+        true
     }
 }
-
-settings! {
-    /// Settings of the damping mu (Hagan and Menhaj 1994), with the field's usual defaults.
-    pub struct Damping {
-        mu: "mu" = 1e-3, in MIN_MU..=1e300,
-            "Initial damping. Large: short steps down the gradient; small: full Gauss-Newton steps.";
-        mu_decrease: "mu decrease" = 0.1, in 1e-6..=0.999,
-            "Factor on mu after a step that lowers the error.";
-        mu_increase: "mu increase" = 10.0, in 1.001..=1e6,
-            "Factor on mu after a step that does not lower the error.";
-        mu_max: "largest mu" = 1e10, in MIN_MU..=1e300,
-            "Training ends when mu exceeds this: no step lowers the error any more.";
-    }
-}
-
-/// Smaller values of mu are lost in rounding when added to the diagonal.
-const MIN_MU: f64 = 1e-20;
 
 impl Damping {
-    /// Checks that mu does not exceed its limit.
-    pub(super) fn check(&self) -> Result<(), SettingError> {
-        check_limit(("mu", self.mu), ("largest mu", self.mu_max))
-    }
-
     /// Tries steps with growing damping until one is accepted; `mu` is then decreased for the next epoch.
     ///
     /// `attempt` returns `Some` if it accepts the step at the given damping, and `None` if there is no step or the step

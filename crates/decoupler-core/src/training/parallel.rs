@@ -27,29 +27,14 @@ const MAX_PIECES: usize = 16;
 /// Minimum number of rows or columns of a piece; narrower ones waste SIMD lanes.
 const MIN_WIDTH: usize = 16;
 
-/// Maximum number of parts of the samples; each part needs memory for its own sums.
-const MAX_PARTS: usize = 8;
-/// Maximum memory for those sums.
-const MAX_PARTS_BYTES: usize = 32 << 20;
-
-/// Amount of work on a number of blocks of samples.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Work {
-    /// Number of blocks.
-    pub(super) blocks: usize,
-    /// Multiplications per block.
-    pub(super) multiplications: usize,
-    /// Memory that each part needs.
-    pub(super) bytes: usize,
-}
-
-impl Work {
-    /// Number of parts to split the samples into, each with at least `smallest` multiplications.
-    pub(super) fn parts(self, smallest: usize) -> usize {
-        let worth = self.blocks.saturating_mul(self.multiplications) / smallest;
-        let affordable = MAX_PARTS_BYTES / self.bytes.max(1);
-        worth.min(self.blocks).min(affordable).clamp(1, MAX_PARTS)
-    }
+/// Number of parts to split the samples into, each with at least `smallest` multiplications and `bytes` of memory of
+/// its own.
+pub(super) fn number_of_parts(blocks: usize, multiplications_per_block: usize, smallest: usize, bytes: usize) -> usize {
+    const MAX_PARTS: usize = 8;
+    const MAX_BYTES: usize = 32 << 20;
+    let worth = blocks.saturating_mul(multiplications_per_block) / smallest;
+    let affordable = MAX_BYTES / bytes.max(1);
+    worth.min(blocks).min(affordable).clamp(1, MAX_PARTS)
 }
 
 /// Returns the blocks of each part.
@@ -77,7 +62,23 @@ pub(super) fn pieces(multiplications: usize) -> usize {
     1 << pieces.ilog2()
 }
 
-/// Computes `sum += factor · left · right`.
+/// Computes `result = left · right` on this thread.
+pub(super) fn product(result: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>) {
+    matmul(result, Accum::Replace, left, right, 1.0, Par::Seq);
+}
+
+/// Computes `sum += factor · left · right` on this thread.
+pub(super) fn accumulate(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>, factor: f64) {
+    matmul(sum, Accum::Add, left, right, factor, Par::Seq);
+}
+
+/// Computes the lower triangle of `sum += factor · left · right` on this thread.
+pub(super) fn accumulate_lower(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>, factor: f64) {
+    let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+    triangular::matmul(sum, lower, Accum::Add, left, full, right, full, factor, Par::Seq);
+}
+
+/// Computes `sum += factor · left · right`, on all threads if it is large.
 pub(super) fn add_product(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>, factor: f64) {
     let pieces = pieces(sum.nrows() * left.ncols() * sum.ncols());
     add_in_pieces(sum, left, right, factor, pieces);
@@ -87,19 +88,17 @@ pub(super) fn add_product(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: Ma
 fn add_in_pieces(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>, factor: f64, pieces: usize) {
     let (rows, columns) = (sum.nrows(), sum.ncols());
     if pieces == 1 || rows.max(columns) < 2 * MIN_WIDTH {
-        matmul(sum, Accum::Add, left, right, factor, Par::Seq);
+        accumulate(sum, left, right, factor);
     } else if rows > columns {
-        let half = middle(rows);
-        let (above, below) = sum.split_at_row_mut(half);
-        let (left_above, left_below) = left.split_at_row(half);
+        let (above, below) = sum.split_at_row_mut(half(rows));
+        let (left_above, left_below) = left.split_at_row(half(rows));
         rayon::join(
             || add_in_pieces(above, left_above, right, factor, pieces / 2),
             || add_in_pieces(below, left_below, right, factor, pieces / 2),
         );
     } else {
-        let half = middle(columns);
-        let (first, second) = sum.split_at_col_mut(half);
-        let (right_first, right_second) = right.split_at_col(half);
+        let (first, second) = sum.split_at_col_mut(half(columns));
+        let (right_first, right_second) = right.split_at_col(half(columns));
         rayon::join(
             || add_in_pieces(first, left, right_first, factor, pieces / 2),
             || add_in_pieces(second, left, right_second, factor, pieces / 2),
@@ -108,23 +107,6 @@ fn add_in_pieces(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, 
 }
 
 /// Returns half of `length`, rounded up to whole SIMD registers.
-fn middle(length: usize) -> usize {
+pub(super) fn half(length: usize) -> usize {
     (length / 2).next_multiple_of(MIN_WIDTH)
-}
-
-/// Subtracts F Fᵀ from the lower triangle of `matrix`.
-pub(super) fn subtract_square(matrix: MatMut<'_, f64>, f: MatRef<'_, f64>) {
-    let order = matrix.nrows();
-    if !is_large(order * order * f.ncols()) {
-        let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-        triangular::matmul(matrix, lower, Accum::Add, f, full, f.transpose(), full, -1.0, Par::Seq);
-        return;
-    }
-    let half = middle(order);
-    let (above, _, below, corner) = matrix.split_at_mut(half, half);
-    let (first, second) = f.split_at_row(half);
-    rayon::join(
-        || add_product(below, second, first.transpose(), -1.0),
-        || rayon::join(|| subtract_square(above, first), || subtract_square(corner, second)),
-    );
 }

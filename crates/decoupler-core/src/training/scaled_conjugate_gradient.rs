@@ -3,26 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Evaluation, Examples, StopReason,
+    Evaluation, Examples, ScaledConjugateGradientSettings, StopReason,
     activations::Backpropagation,
-    method::{Algorithm, Checked, Description},
-    setting::settings,
+    method::{Algorithm, MethodState},
 };
-use crate::network::{Mlp, Shape};
-
-settings! {
-    /// Settings of the scaled conjugate gradient, with the field's usual defaults (`trainscg`). Files from before a
-    /// setting existed get its default.
-    #[serde(default)]
-    pub struct ScaledConjugateGradientSettings {
-        sigma: "sigma" = 5e-5, in 1e-12..=1.0,
-            "Length of the finite difference from which the curvature is estimated.";
-        lambda: "lambda" = 5e-7, in f64::MIN_POSITIVE..=1e300,
-            "Initial scale of the curvature: it shortens steps where the error is not convex.";
-        decay: "weight decay" = 0.0, in 0.0..=1e12,
-            "Penalty on large weights: this times the sum of the squared weights is added to the sum of the squared errors.";
-    }
-}
+use crate::network::Mlp;
 
 /// The scaled conjugate gradient (Møller 1993, the steps of his section 4 in order; `trainscg`). Along the direction p
 /// the curvature δ = pᵀs is estimated from two gradients, s = (E′(w + σp/|p|) − E′(w)) |p|/σ, and raised by λ|p|² until
@@ -57,13 +42,37 @@ pub struct ConjugateState {
     since_restart: usize,
 }
 
-impl Checked for ConjugateState {
-    fn vectors(&self) -> Vec<&[f64]> {
-        vec![&self.p, &self.r]
+impl ConjugateState {
+    /// Vectors with an entry for each weight.
+    pub(super) fn vectors(&self) -> [&[f64]; 2] {
+        [&self.p, &self.r]
     }
 }
 
 impl ScaledConjugateGradient {
+    pub(super) fn new(settings: ScaledConjugateGradientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+        let mut backpropagation = Backpropagation::new(mlp);
+        let (now, objective) = penalized(&mut backpropagation, settings.decay, mlp, examples);
+        let r: Vec<f64> = backpropagation.gradient.iter().map(|slope| -slope).collect();
+        let method = Self {
+            settings,
+            state: ConjugateState {
+                p: r.clone(),
+                r,
+                delta: 0.0,
+                lambda: settings.lambda,
+                lambda_bar: 0.0,
+                success: true,
+                since_restart: 0,
+            },
+            now,
+            objective,
+            backpropagation,
+            moved: mlp.clone(),
+        };
+        (method, now)
+    }
+
     /// Evaluates E and its gradient at `length` along p from `mlp`.
     fn evaluate_along(&mut self, mlp: &Mlp, length: f64, examples: &Examples) -> (Evaluation, f64) {
         let moved = mlp.weights().iter().zip(&self.state.p);
@@ -102,49 +111,6 @@ impl ScaledConjugateGradient {
 }
 
 impl Algorithm for ScaledConjugateGradient {
-    type Settings = ScaledConjugateGradientSettings;
-    type State = ConjugateState;
-
-    const DESCRIPTION: Description = Description {
-        short_name: "scg",
-        name: "Scaled conjugate gradient",
-        summary: "Conjugate directions, step length from the curvature: little memory, for very large networks.",
-        parameter_name: "lambda",
-        remedy: "try another seed, or Levenberg-Marquardt (lm)",
-    };
-
-    /// Two evaluations of error and gradient: one for the curvature, one after the step.
-    fn epoch_multiplications(shape: Shape, samples: usize) -> f64 {
-        4.0 * samples as f64 * shape.weights() as f64
-    }
-
-    fn new(settings: ScaledConjugateGradientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut backpropagation = Backpropagation::new(mlp);
-        let (now, objective) = penalized(&mut backpropagation, settings.decay, mlp, examples);
-        let r: Vec<f64> = backpropagation.gradient.iter().map(|slope| -slope).collect();
-        let method = Self {
-            settings,
-            state: ConjugateState {
-                p: r.clone(),
-                r,
-                delta: 0.0,
-                lambda: settings.lambda,
-                lambda_bar: 0.0,
-                success: true,
-                since_restart: 0,
-            },
-            now,
-            objective,
-            backpropagation,
-            moved: mlp.clone(),
-        };
-        (method, now)
-    }
-
-    fn restore(&mut self, state: ConjugateState) {
-        self.state = state;
-    }
-
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let square = dot(&self.state.p, &self.state.p);
         if square == 0.0 {
@@ -204,8 +170,16 @@ impl Algorithm for ScaledConjugateGradient {
         self.state.lambda
     }
 
-    fn state(&self) -> ConjugateState {
-        self.state.clone()
+    fn state(&self) -> MethodState {
+        MethodState::ScaledConjugateGradient(self.state.clone())
+    }
+
+    fn restore(&mut self, state: MethodState) -> bool {
+        let MethodState::ScaledConjugateGradient(state) = state else {
+            return false;
+        };
+        self.state = state;
+        true
     }
 }
 

@@ -7,34 +7,13 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    Examples, Method, SettingError, StopReason, StoppingRules, activations::Activations, examples::column,
-    method::Running,
+    Examples, Method, SettingError, StopReason, TrainingSettings, activations::Activations, examples::column,
+    method::Algorithm,
 };
 use crate::{
     machine::MemoryBudget,
     network::{Mlp, Shape},
 };
-
-/// Method and stopping rules of a training.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TrainingSettings {
-    /// Method with its settings.
-    pub method: Method,
-    /// Stopping rules.
-    pub stopping: StoppingRules,
-}
-
-impl TrainingSettings {
-    /// Checks the ranges of all settings.
-    ///
-    /// # Errors
-    /// The first setting out of range.
-    pub fn check(&self) -> Result<(), SettingError> {
-        self.method.check()?;
-        self.stopping.check()
-    }
-}
 
 /// Scaled training, validation and test sets.
 #[derive(Clone, Debug)]
@@ -112,12 +91,13 @@ pub fn check_width(
 pub struct Trainer {
     pub(super) settings: TrainingSettings,
     pub(super) problem: Problem,
-    pub(super) algorithm: Running,
+    pub(super) algorithm: Box<dyn Algorithm>,
     pub(super) mlp: Mlp,
     pub(super) best: Best,
     pub(super) history: Vec<EpochRecord>,
     pub(super) stages: Vec<Stage>,
-    /// Epochs since the last best validation error or since the current method began, see [`StoppingRules::max_fail`].
+    /// Epochs since the last best validation error or since the current method began, see
+    /// [`StoppingRules::max_fail`](super::StoppingRules::max_fail).
     pub(super) validation_failures: usize,
     pub(super) stop_reason: Option<StopReason>,
     pub(super) elapsed: Duration,

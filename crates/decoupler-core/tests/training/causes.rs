@@ -1,7 +1,8 @@
 //! Failed trainings report the cause and what to change.
 
-use decoupler_core::training::{
-    Method, SettingError, StopReason, StoppingRules, Trainer, TrainingDefect, TrainingSettings,
+use decoupler_core::{
+    settings::Value,
+    training::{Method, SettingError, StopReason, StoppingRules, Trainer, TrainingDefect, TrainingSettings},
 };
 
 use crate::problems::{problem, start};
@@ -11,12 +12,10 @@ type Values = &'static [(&'static str, f64)];
 
 /// The method of this short name with these settings.
 fn method(short_name: &str, values: &[(&str, f64)]) -> Method {
-    let mut methods = Method::all().into_iter();
-    let mut method = methods.find(|method| method.short_name() == short_name).unwrap();
+    let mut method = Method::named(short_name).unwrap();
     for (name, value) in values {
-        let mut settings = method.settings();
-        let setting = settings.iter_mut().find(|setting| setting.name == *name).unwrap();
-        *setting.value = *value;
+        let setting = method.settings().find(|setting| setting.name == *name).unwrap();
+        setting.set(&mut method, &Value::Number(*value)).unwrap();
     }
     method
 }
@@ -106,7 +105,6 @@ fn stalled_or_diverged_trainings_report_cause_and_remedy() {
         assert!(text.contains(words), "{name}: {text}");
         let has_rate = method(name, &[])
             .settings()
-            .iter()
             .any(|setting| setting.name == "learning rate");
         assert!(has_rate || !text.contains("learning rate"), "{name}: {text}");
     }
@@ -157,9 +155,9 @@ fn late_divergence_names_the_epoch_and_keeps_the_best_weights() {
 #[test]
 fn remedies_name_only_settings_of_the_method() {
     for reason in [StopReason::Diverged, StopReason::MuLarge, StopReason::LambdaLarge] {
-        for mut method in Method::all() {
+        for method in Method::all() {
             let text = format!("{reason} {}", reason.remedy(&method));
-            let names: Vec<&str> = method.settings().iter().map(|setting| setting.name).collect();
+            let names: Vec<&str> = method.settings().map(|setting| setting.name).collect();
             for word in ["learning rate", "step length"] {
                 let has_it = names.iter().any(|name| name.contains(word));
                 assert!(has_it || !text.contains(word), "{method}: {text}");

@@ -4,6 +4,7 @@
 use decoupler_core::{
     machine::{MemoryBudget, MemorySource},
     network::{Mlp, Shape},
+    settings::Value,
     training::{Examples, Method, Problem, StopReason, StoppingRules, Trainer, TrainingSettings, check_width},
 };
 use ndarray::Array2;
@@ -160,20 +161,19 @@ fn extreme_cases_stop_with_a_reason_and_without_nan() {
     ];
     for (what, examples, scale) in table {
         for method in Method::all() {
-            for first in [None, Some(1e-300), Some(1e12), Some(1e300)] {
+            for first in [None, Some(1e-300_f64), Some(1e12), Some(1e300)] {
                 let mut method = method;
-                let mut settings = method.settings();
-                let setting = &mut settings[0];
-                let value = first.map_or(setting.default, |value| {
-                    f64::clamp(value, *setting.range.start(), *setting.range.end())
-                });
-                *setting.value = value;
+                let rows = Vec::from_iter(method.settings());
+                let (value, range) = (rows[0].number(&method).unwrap(), rows[0].range().unwrap());
+                let value = first.map_or(value, |value| value.clamp(*range.start(), *range.end()));
+                rows[0].set(&mut method, &Value::Number(value)).unwrap();
                 // An initial value above its limit is refused.
-                for limit in settings
-                    .iter_mut()
+                for limit in rows
+                    .iter()
                     .filter(|limit| ["largest mu", "largest step length"].contains(&limit.name))
                 {
-                    *limit.value = limit.value.max(value);
+                    let raised = limit.number(&method).unwrap().max(value);
+                    limit.set(&mut method, &Value::Number(raised)).unwrap();
                 }
                 let weights = start().weights().iter().map(|weight| scale * weight).collect();
                 let start = Mlp::from_weights(start().shape(), weights);

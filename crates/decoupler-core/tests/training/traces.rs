@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use decoupler_core::{
     network::{Mlp, Shape},
+    settings::Value,
     training::{Examples, Method, Problem, StoppingRules, Trainer, TrainingSettings},
 };
 use ndarray::Array2;
@@ -57,10 +58,16 @@ impl Traces {
     }
 }
 
+/// Changes the first setting of the method.
+fn set_first(method: &mut Method, value: f64) {
+    let setting = method.settings().next().unwrap();
+    setting.set(method, &Value::Number(value)).unwrap();
+}
+
 /// The fixture's learning rate, if it differs from the default.
 fn with_the_fixtures_settings(mut method: Method) -> Method {
     if ["gd", "gdms", "gdx"].contains(&method.short_name()) {
-        *method.settings()[0].value = 0.1;
+        set_first(&mut method, 0.1);
     }
     method
 }
@@ -110,7 +117,7 @@ fn iterates_with_rejected_steps_agree_with_independent_programs() {
     for (name, case) in &traces.rejecting {
         let method = Method::all().into_iter().find(|method| method.short_name() == name);
         let mut method = method.expect("it is offered");
-        *method.settings()[0].value = case.first_setting;
+        set_first(&mut method, case.first_setting);
         let mut trainer = traces.trainer(method, &case.start);
         assert!(case.rejected.contains(&true), "{name}");
         for (epoch, (expected, rejected)) in (1..).zip(case.weights.iter().zip(&case.rejected)) {

@@ -13,7 +13,8 @@ use decoupler_core::{
     evaluation::{
         TestErrors,
         experiments::{
-            Axis, CellResults, CellSummary, Experiment, ExperimentResults, Figure as Measured, SummaryErrors, Trial,
+            Axis, AxisKind, CellResults, CellSummary, Experiment, ExperimentResults, Figure as Measured, SummaryErrors,
+            Trial,
         },
     },
     network::HiddenSuggestions,
@@ -83,15 +84,15 @@ fn heat_map(results: &ExperimentResults, summaries: &[CellSummary], rows: &Axis)
 
 /// Position of a cell on the axis: the value itself, or its index in the list.
 fn position(axis: &Axis, index: usize, cell: &CellSummary) -> f64 {
-    match axis {
-        Axis::Hidden(_) => cell.hidden as f64,
+    match axis.kind() {
+        AxisKind::Hidden => cell.hidden as f64,
         _ => index as f64,
     }
 }
 
 fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure {
     let axis = &results.experiment.axis;
-    let is_number = matches!(axis, Axis::Hidden(_));
+    let is_number = axis.kind() == AxisKind::Hidden;
     let mut cells: Vec<(f64, &CellSummary)> = summaries
         .iter()
         .enumerate()
@@ -316,7 +317,7 @@ mod tests {
         let mut experiment = PaperTable::CrossValidation.experiment();
         experiment.base.training.stopping.epochs = 1;
         experiment.base.hidden = 1;
-        experiment.axis = Axis::Samples(vec![40]);
+        experiment.axis = Axis::integers(AxisKind::Samples, [40]);
         (experiment.seeds, experiment.base.seed) = (2, Seed(7));
         experiment.cross_validation = Some(CrossValidation {
             folds: 2,
@@ -367,7 +368,7 @@ mod tests {
     #[test]
     fn a_sweep_is_a_heat_map_with_rows_and_columns_named() {
         let mut experiment = PaperTable::ArrayScales.experiment();
-        experiment.second_axis = Some(Axis::Hidden(vec![7, 9]));
+        experiment.second_axis = Some(Axis::integers(AxisKind::Hidden, [7, 9]));
         let Figure::HeatMap(map) = experiment_figure(&ExperimentResults::new(experiment)) else {
             panic!("two axes make a heat map");
         };

@@ -16,7 +16,8 @@ use decoupler_core::{
     evaluation::{
         Begin, CrossValidation, Measured, Run, RunSets, RunSettings, SimulatedSettings, Simulation, TestErrors,
         experiments::{
-            Axis, Experiment, ExperimentError, ExperimentResults, SummaryErrors, Trial, TrialSamples, run_experiments,
+            Axis, AxisKind, Experiment, ExperimentError, ExperimentResults, SummaryErrors, Trial, TrialSamples,
+            run_experiments,
         },
     },
     job::Job,
@@ -66,7 +67,7 @@ fn cross_validated(unit: SplitBy) -> Experiment {
             repeats: 2,
             by: unit,
         }),
-        ..small(Axis::Samples(vec![40, 20]))
+        ..small(Axis::integers(AxisKind::Samples, [40, 20]))
     }
 }
 
@@ -116,8 +117,8 @@ fn timeless(results: &[ExperimentResults]) -> Vec<Vec<Trial>> {
 fn results_are_the_same_on_any_number_of_threads() {
     let experiments = [
         Experiment {
-            second_axis: Some(Axis::Method(Method::all()[..4].to_vec())),
-            ..small(Axis::Hidden(vec![2, 5]))
+            second_axis: Some(Axis::names(AxisKind::Method, ["lm", "br", "scg", "rp"])),
+            ..small(Axis::integers(AxisKind::Hidden, [2, 5]))
         },
         cross_validated(SplitBy::Random),
         cross_validated(SplitBy::Group),
@@ -131,7 +132,7 @@ fn results_are_the_same_on_any_number_of_threads() {
 
 #[test]
 fn a_trial_equals_the_run_with_its_settings() {
-    let experiment = small(Axis::Hidden(vec![2, 4]));
+    let experiment = small(Axis::integers(AxisKind::Hidden, [2, 4]));
     for cell in &run(std::slice::from_ref(&experiment), 2)[0].cells {
         let mut z_percent = Vec::new();
         for (trial, seed) in cell.trials.iter().zip(0..3) {
@@ -182,7 +183,7 @@ fn cross_validation_decouples_every_sample_with_a_network_that_was_not_trained_o
 
 #[test]
 fn cancelling_keeps_finished_trials() {
-    let experiment = small(Axis::Hidden(vec![2, 3, 4]));
+    let experiment = small(Axis::integers(AxisKind::Hidden, [2, 3, 4]));
     let trials_after = |asked_at_most: usize| {
         let asked = AtomicUsize::new(0);
         let mut results = ExperimentResults::new(experiment.clone());
@@ -219,7 +220,7 @@ fn cancelling_keeps_finished_trials() {
 
 #[test]
 fn cancelling_does_not_wait_for_a_training_to_end() {
-    let mut experiment = small(Axis::Hidden(vec![3]));
+    let mut experiment = small(Axis::integers(AxisKind::Hidden, [3]));
     experiment.base.training.stopping.epochs = 1_000_000;
     experiment.base.training.stopping.max_fail = 1_000_000;
     experiment.base.training.method = Method::all()[7];
@@ -248,7 +249,7 @@ fn cancelling_does_not_wait_for_a_training_to_end() {
 fn a_cell_that_cannot_be_trained_gives_the_reason_and_the_others_continue() {
     let mut settings = small_settings();
     settings.source.sensor = SensorModel::new("1x32_5x96".parse().unwrap());
-    let mut experiment = small(Axis::Hidden(vec![2, 512]));
+    let mut experiment = small(Axis::integers(AxisKind::Hidden, [2, 512]));
     experiment.base = settings.into();
     experiment.base.starts = 1;
     let by_name = |method: &Method| method.to_string().contains("Bayesian");
@@ -267,7 +268,7 @@ fn a_cell_that_cannot_be_trained_gives_the_reason_and_the_others_continue() {
 
 #[test]
 fn cells_with_networks_worse_than_the_mean_are_named() {
-    let mut experiment = small(Axis::Epochs(vec![1, 60]));
+    let mut experiment = small(Axis::integers(AxisKind::Epochs, [1, 60]));
     let by_name = |method: &Method| method.short_name() == "gd";
     experiment.base.training.method = Method::all().into_iter().find(by_name).unwrap();
     let results = &run(&[experiment], 2)[0];
@@ -351,14 +352,8 @@ fn run_on(experiment: &Experiment, samples: &TrialSamples, thread_count: usize) 
 fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
     let folder = tempfile::tempdir().unwrap();
     let setup = recording(folder.path());
-    let method = |name: &str| {
-        Method::all()
-            .into_iter()
-            .find(|method| method.short_name() == name)
-            .unwrap()
-    };
-    let methods = Axis::Method(vec![Method::recorded_regularization(), method("lm")]);
-    let splits = Axis::Split(SplitBy::ALL.to_vec());
+    let methods = Axis::names(AxisKind::Method, ["br", "lm"]);
+    let splits = Axis::names(AxisKind::Split, SplitBy::ALL);
     let experiment = on_recording(&setup, methods, Some(splits));
     let results = run_on(&experiment, &samples_of(&setup), 2);
     assert!(results.is_complete());
@@ -375,7 +370,7 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
             assert_eq!(sets.split.validation.is_some(), place % 2 == 1);
             let mut settings = *setup.settings();
             settings.seed = seed;
-            settings.training.method = [Method::recorded_regularization(), method("lm")][place % 2];
+            settings.training.method = [Method::recorded_regularization(), Method::default()][place % 2];
             let mut alone = Run::with_baselines(
                 settings,
                 RunSets::new(sets.split, sets.test),
@@ -433,7 +428,7 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
 fn a_cancelled_experiment_on_a_recording_keeps_finished_trials() {
     let folder = tempfile::tempdir().unwrap();
     let setup = recording(folder.path());
-    let experiment = on_recording(&setup, Axis::Hidden(vec![2, 3, 4]), None);
+    let experiment = on_recording(&setup, Axis::integers(AxisKind::Hidden, [2, 3, 4]), None);
     let samples = samples_of(&setup);
     let trials_after = |asked_at_most: usize| {
         let asked = AtomicUsize::new(0);
@@ -463,15 +458,15 @@ fn axes_belong_to_their_source() {
     let mut setup = recording(folder.path());
     let message = |experiment: &Experiment| experiment.check().unwrap_err().to_string();
     for axis in [
-        Axis::Samples(vec![10]),
-        Axis::Noise(vec![0.1]),
-        Axis::Array(vec![ArrayScale::default()]),
+        Axis::integers(AxisKind::Samples, [10]),
+        Axis::numbers(AxisKind::Noise, [0.1]),
+        Axis::names(AxisKind::Array, [ArrayScale::default()]),
     ] {
         let name = axis.name();
         let expected = format!("recordings have no setting '{name}': vary another one");
         assert_eq!(message(&on_recording(&setup, axis, None)), expected);
     }
-    let split = Axis::Split(vec![SplitBy::Time, SplitBy::Group]);
+    let split = Axis::names(AxisKind::Split, [SplitBy::Time, SplitBy::Group]);
     let array = small(split.clone());
     assert_eq!(
         message(&array),
@@ -483,7 +478,7 @@ fn axes_belong_to_their_source() {
     plan.import.group = None;
     setup = Setup::recording(*setup.settings(), plan);
     assert!(message(&on_recording(&setup, split, None)).contains("no column of groups"));
-    let hidden = Axis::Hidden(vec![2]);
+    let hidden = Axis::integers(AxisKind::Hidden, [2]);
     for (experiment, samples) in [
         (
             on_recording(&setup, hidden.clone(), None),
@@ -500,7 +495,7 @@ fn axes_belong_to_their_source() {
 fn tables_of_a_recording_have_its_error_measures_and_target_names() {
     let folder = tempfile::tempdir().unwrap();
     let setup = recording(folder.path());
-    let experiment = on_recording(&setup, Axis::Hidden(vec![2, 4]), None);
+    let experiment = on_recording(&setup, Axis::integers(AxisKind::Hidden, [2, 4]), None);
     let samples = samples_of(&setup);
     let mut results = run_on(&experiment, &samples, 2);
     let TrialSamples::Recorded(recorded) = &samples else {

@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::{Dataset, Seed, SplitBy, Stream},
     evaluation::{
         CrossValidation, Errors, SimulatedSettings, Simulation,
-        experiments::{Axis, Experiment, ExperimentError, ExperimentResults, TrialSamples, run_experiments},
+        experiments::{Axis, AxisKind, Experiment, ExperimentError, ExperimentResults, TrialSamples, run_experiments},
         reference_errors,
     },
     machine::MemoryBudget,
@@ -39,7 +39,7 @@ fn experiment_on(settings: SimulatedSettings, folds: usize, unit: SplitBy) -> Ex
     Experiment {
         base: settings.into(),
         recording: None,
-        axis: Axis::Hidden(vec![2]),
+        axis: Axis::integers(AxisKind::Hidden, [2]),
         second_axis: None,
         seeds: 1,
         cross_validation: Some(CrossValidation {

@@ -11,6 +11,7 @@ use decoupler_core::{
     evaluation::{Begin, Measured, Run, RunSettings, SimulatedSettings, Simulation, TargetErrors, TestErrors},
     job::Job,
     scene::RowModel,
+    settings::Value,
 };
 use decoupler_files::{
     export::{
@@ -49,11 +50,11 @@ fn settings() -> RunSettings {
     settings.hidden = 5;
     settings.training.stopping.epochs = 30;
     // This also measures the correlation of neighbouring errors.
-    let mut measured_at = settings.training.method.settings();
-    let setting = measured_at
-        .iter_mut()
-        .find(|setting| setting.name == "correlation epoch");
-    *setting.unwrap().value = 10.0;
+    let mut rows = settings.training.method.settings();
+    let setting = rows.find(|setting| setting.name == "correlation epoch").unwrap();
+    setting
+        .set(&mut settings.training.method, &Value::Number(10.0))
+        .unwrap();
     settings
 }
 

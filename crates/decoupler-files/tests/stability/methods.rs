@@ -2,6 +2,7 @@
 
 use decoupler_core::{
     network::{Mlp, Shape},
+    settings::Value,
     training::{Examples, Method, Problem, StopReason, StoppingRules, Trainer, TrainingDefect, TrainingSettings},
 };
 use ndarray::{Array2, Axis, Slice};
@@ -247,18 +248,13 @@ pub(crate) fn jobs() -> Vec<Job> {
                 judge(&task, settings)
             }));
         }
-        let count = { method.clone().settings().len() };
-        for index in 0..count {
+        for row in method.settings() {
             let mut asked = method;
-            let (setting, default, ends) = {
-                let settings = asked.settings();
-                (
-                    settings[index].name,
-                    settings[index].default,
-                    settings[index].range.clone(),
-                )
-            };
-            let (least, most) = ends.into_inner();
+            let (setting, default) = (
+                row.name,
+                row.number(&method).expect("the settings of methods are numbers"),
+            );
+            let (least, most) = row.range().expect("the settings of methods are numbers").into_inner();
             for value in [
                 least,
                 most,
@@ -275,7 +271,7 @@ pub(crate) fn jobs() -> Vec<Job> {
                 f64::NAN,
                 f64::INFINITY,
             ] {
-                *asked.settings()[index].value = value;
+                row.set(&mut asked, &Value::Number(value)).expect("it takes numbers");
                 for has_validation in [true, false] {
                     let task = Task {
                         has_validation,

@@ -1,11 +1,6 @@
-use std::{fmt::Display, str::FromStr};
-
 use decoupler_core::{
-    dataset::{Seed, SplitBy},
     evaluation::experiments::{Axis, AxisKind, Experiment, ExperimentError, PaperTable},
-    network::{Quantity, ScalingChoice},
-    sensor::{ArrayScale, ArrayScaleError},
-    training::Method,
+    settings::{Kind, SettingError},
 };
 use decoupler_files::import::{Plan, Setup};
 use thiserror::Error;
@@ -93,17 +88,6 @@ impl Form {
         AxisKind::of_source(&self.template.base.source)
     }
 
-    /// Adapts the settings of training methods to a recording, if the base is one.
-    fn adapted(&self, axis: Axis) -> Axis {
-        let Axis::Method(mut methods) = axis else { return axis };
-        if self.plan.is_some() {
-            let recorded = Method::recorded_regularization();
-            let is_same = |method: &&mut Method| method.short_name() == recorded.short_name();
-            methods.iter_mut().filter(is_same).for_each(|method| *method = recorded);
-        }
-        Axis::Method(methods)
-    }
-
     /// Returns the experiment, validated as far as possible without running it.
     ///
     /// # Errors
@@ -111,7 +95,7 @@ impl Form {
     pub fn experiment(&self) -> Result<Experiment, FormError> {
         let mut axes = Vec::new();
         for axis in &self.axes {
-            axes.push(self.adapted(axis.parse()?));
+            axes.push(axis.parse()?);
         }
         let cells = axes
             .iter()
@@ -144,20 +128,15 @@ pub struct AxisForm {
 #[non_exhaustive]
 pub enum ListError {
     /// Not a number.
-    #[error("{name}: '{text}' is not {of}; write a list such as {example}")]
+    #[error("{name}: {message}; write a list such as {example}")]
     Number {
         /// The axis.
         name: &'static str,
-        /// Text that was typed.
-        text: String,
-        /// Kind of numbers that the axis takes.
-        of: &'static str,
+        /// Error message.
+        message: String,
         /// Example of a valid list.
         example: &'static str,
     },
-    /// Not an array scale.
-    #[error(transparent)]
-    Array(#[from] ArrayScaleError),
     /// Not a valid value of the axis.
     #[error("{name}: {message}")]
     Word {
@@ -166,14 +145,9 @@ pub enum ListError {
         /// Error message, with the valid values.
         message: String,
     },
-    /// Not a method.
-    #[error("'{text}' is not a method: write {known}")]
-    Method {
-        /// Text that was typed.
-        text: String,
-        /// The valid names.
-        known: String,
-    },
+    /// A value out of range.
+    #[error(transparent)]
+    Value(#[from] SettingError),
 }
 
 /// Returns the label of a setting.
@@ -233,60 +207,19 @@ impl AxisForm {
     /// # Errors
     /// The first value that cannot be parsed.
     pub fn parse(&self) -> Result<Axis, ListError> {
-        Ok(match self.kind {
-            AxisKind::Hidden => Axis::Hidden(self.numbers()?),
-            AxisKind::Array => Axis::Array(self.words().map(str::parse).collect::<Result<Vec<ArrayScale>, _>>()?),
-            AxisKind::Samples => Axis::Samples(self.numbers()?),
-            AxisKind::Noise => Axis::Noise(self.parsed("a number")?),
-            AxisKind::Inputs => Axis::Inputs(self.chosen::<Quantity>()?),
-            AxisKind::Scaling => Axis::Scaling(self.chosen::<ScalingChoice>()?),
-            AxisKind::Starts => Axis::Starts(self.numbers()?),
-            AxisKind::Split => Axis::Split(self.chosen::<SplitBy>()?),
-            AxisKind::Method => Axis::Method(self.words().map(method).collect::<Result<_, _>>()?),
-            AxisKind::Epochs => Axis::Epochs(self.numbers()?),
-            AxisKind::Seed => Axis::Seed(self.numbers()?.into_iter().map(Seed).collect()),
-        })
-    }
-
-    fn words(&self) -> impl Iterator<Item = &str> {
         let is_between = |letter: char| letter == ',' || letter == ';' || letter.is_whitespace();
-        self.values.split(is_between).filter(|word| !word.is_empty())
-    }
-
-    fn numbers<N: FromStr>(&self) -> Result<Vec<N>, ListError> {
-        self.parsed("a whole number")
-    }
-
-    fn chosen<C: FromStr<Err: Display>>(&self) -> Result<Vec<C>, ListError> {
-        let choice = |word: &str| {
-            word.parse().map_err(|error: C::Err| ListError::Word {
-                name: axis_label(self.kind),
-                message: error.to_string(),
-            })
-        };
-        self.words().map(choice).collect()
-    }
-
-    fn parsed<N: FromStr>(&self, of: &'static str) -> Result<Vec<N>, ListError> {
-        let number = |word: &str| {
-            word.parse().map_err(|_| ListError::Number {
-                name: axis_label(self.kind),
-                of,
-                text: word.to_owned(),
-                example: axis_example(self.kind),
-            })
-        };
-        self.words().map(number).collect()
-    }
-}
-
-fn method(word: &str) -> Result<Method, ListError> {
-    let mut all = Method::all().into_iter();
-    all.find(|method| method.short_name().eq_ignore_ascii_case(word))
-        .ok_or_else(|| ListError::Method {
-            text: word.to_owned(),
-            known: Method::all().map(|method| method.short_name()).join(", "),
+        let words = self.values.split(is_between).filter(|word| !word.is_empty());
+        Axis::parse(self.kind, words).map_err(|error| {
+            let SettingError::Text { message, .. } = error else {
+                return ListError::Value(error);
+            };
+            let (name, example) = (axis_label(self.kind), axis_example(self.kind));
+            match self.kind.setting().kind {
+                Kind::Choice | Kind::Text => ListError::Word { name, message },
+                Kind::Number(..) | Kind::Integer(..) => ListError::Number { name, message, example },
+            }
         })
+    }
 }
 
 #[cfg(test)]
@@ -294,6 +227,7 @@ mod tests {
     use decoupler_core::{
         evaluation::{Measured, RunSettings, SimulatedSettings},
         scene::RowModel,
+        training::Method,
     };
 
     use super::*;
@@ -326,10 +260,9 @@ mod tests {
             kind: AxisKind::Method,
             values: "lm br".to_owned(),
         };
-        let Some(Axis::Method(methods)) = form.experiment().unwrap().second_axis else {
-            panic!("the second axis is of methods");
-        };
-        assert_eq!(methods[1], Method::recorded_regularization());
+        let cells = form.experiment().unwrap().cells();
+        let last = cells.last().unwrap().settings.training.method;
+        assert_eq!(last, Method::recorded_regularization());
         form.axes[1] = AxisForm::new(AxisKind::Split);
         assert_eq!(form.experiment().unwrap().cells().len(), 8);
         form.axes[1].values = "group".to_owned();
@@ -386,7 +319,7 @@ mod tests {
         };
         assert_eq!(
             parse(AxisKind::Hidden, " 6;8\n10,,12 "),
-            Ok(Axis::Hidden(vec![6, 8, 10, 12]))
+            Ok(Axis::integers(AxisKind::Hidden, [6, 8, 10, 12]))
         );
         let cases = [
             (
@@ -402,7 +335,11 @@ mod tests {
                 "time daily",
                 "Split: 'daily' is not a split: give time",
             ),
-            (AxisKind::Method, "lm magic", "'magic' is not a method: write lm"),
+            (
+                AxisKind::Method,
+                "lm magic",
+                "'magic' is not a training method: give lm",
+            ),
         ];
         for (kind, values, expected) in cases {
             let message = parse(kind, values).unwrap_err().to_string();

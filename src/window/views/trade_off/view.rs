@@ -370,8 +370,7 @@ fn fields_ui(ui: &mut Ui, form: &mut TradeOffForm, source: SourceKind) {
         SourceKind::Recording => {
             section_heading_ui(ui, "Training methods");
             for (method, is_chosen) in Method::all().iter().zip(&mut form.methods) {
-                ui.checkbox(is_chosen, method.name())
-                    .on_hover_text(method.description());
+                ui.checkbox(is_chosen, method.name()).on_hover_text(method.summary());
             }
         }
     }

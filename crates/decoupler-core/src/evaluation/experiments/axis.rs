@@ -2,49 +2,29 @@ use serde::{Deserialize, Serialize};
 
 use super::Cell;
 use crate::{
-    dataset::{Seed, SplitBy},
-    evaluation::{Simulation, Source},
-    network::{Quantity, ScalingChoice},
-    sensor::ArrayScale,
+    dataset::{Division, LARGEST_SAMPLES},
+    evaluation::{MAX_STARTS, SimulatedSettings, Simulation, Source},
+    network::LARGEST_HIDDEN,
+    settings::{EPOCHS, Field, Kind, Setting, SettingError, Value},
     training::Method,
 };
 
 /// A setting that an experiment varies, with its values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Axis {
-    /// Numbers of hidden nodes.
-    Hidden(Vec<usize>),
-    /// Array scales.
-    Array(Vec<ArrayScale>),
-    /// Numbers of training samples; in a cross-validation, of all samples.
-    Samples(Vec<usize>),
-    /// Relative noise of the resistances.
-    Noise(Vec<f64>),
-    /// Quantities computed from the resistances.
-    Inputs(Vec<Quantity>),
-    /// Scalings of the inputs.
-    Scaling(Vec<ScalingChoice>),
-    /// Training methods with their settings.
-    Method(Vec<Method>),
-    /// Maximum numbers of epochs.
-    Epochs(Vec<usize>),
-    /// Numbers of starts.
-    Starts(Vec<usize>),
-    /// Rules by which a recording is divided.
-    Split(Vec<SplitBy>),
-    /// Seeds of the run.
-    Seed(Vec<Seed>),
+pub struct Axis {
+    kind: AxisKind,
+    values: Vec<Value>,
 }
 
 /// Setting that an axis varies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum AxisKind {
     /// Number of hidden nodes.
     Hidden,
     /// Array scale.
     Array,
-    /// Number of training samples.
+    /// Number of training samples; in a cross-validation, of all samples.
     Samples,
     /// Relative noise of the resistances.
     Noise,
@@ -64,6 +44,61 @@ pub enum AxisKind {
     Seed,
 }
 
+/// Rows of the settings of a cell, in the order of [`AxisKind::ALL`].
+static ROWS: [Setting<Cell>; 11] = [
+    row("hidden nodes", Kind::Integer(1, LARGEST_HIDDEN as u64), |cell| {
+        Some(Field::Count(&mut cell.settings.hidden))
+    }),
+    row("array", Kind::Text, |cell| {
+        simulation(cell).map(|source| Field::Text(&mut source.sensor.scale))
+    }),
+    row("samples", Kind::Integer(1, LARGEST_SAMPLES as u64), |cell| {
+        simulation(cell).map(|source| Field::Count(&mut source.samples))
+    }),
+    row("noise", Kind::Number("", 0.0, f64::MAX), |cell| {
+        simulation(cell).map(|source| Field::Number(&mut source.scene.noise.relative))
+    }),
+    row("inputs", Kind::Choice, |cell| {
+        let is_simulated = simulation(cell).is_some();
+        is_simulated.then_some(Field::Text(&mut cell.settings.inputs.quantity))
+    }),
+    row("scaling", Kind::Choice, |cell| {
+        Some(Field::Text(&mut cell.settings.inputs.scaling))
+    }),
+    row("method", Kind::Choice, |cell| {
+        Some(Field::Text(&mut cell.settings.training.method))
+    }),
+    row(EPOCHS.name, EPOCHS.kind, |cell| {
+        (EPOCHS.field)(&mut cell.settings.training.stopping)
+    }),
+    row("starts", Kind::Integer(1, MAX_STARTS as u64), |cell| {
+        Some(Field::Count(&mut cell.settings.starts))
+    }),
+    row("split", Kind::Choice, |cell| {
+        cell.division.as_mut().map(|division| Field::Text(&mut division.by))
+    }),
+    row("seed", Kind::Integer(0, u64::MAX), |cell| {
+        Some(Field::Integer(&mut cell.settings.seed.0))
+    }),
+];
+
+const fn row(name: &'static str, kind: Kind, field: fn(&mut Cell) -> Option<Field<'_>>) -> Setting<Cell> {
+    Setting {
+        name,
+        heading: "Axes",
+        help: "",
+        kind,
+        field,
+    }
+}
+
+fn simulation(cell: &mut Cell) -> Option<&mut Simulation> {
+    match &mut cell.settings.source {
+        Source::Simulated(simulation) => Some(simulation),
+        Source::Measured(_) => None,
+    }
+}
+
 impl AxisKind {
     /// All settings, in the order offered to the user.
     pub const ALL: [Self; 11] = [
@@ -80,76 +115,97 @@ impl AxisKind {
         Self::Seed,
     ];
 
-    /// Returns the settings of runs on `source`, in the order offered to the user.
-    pub fn of_source(source: &Source) -> impl Iterator<Item = Self> + use<> {
-        let is_simulated = source.simulation().is_some();
-        Self::ALL.into_iter().filter(move |kind| match kind {
-            Self::Array | Self::Samples | Self::Noise | Self::Inputs => is_simulated,
-            Self::Split => !is_simulated,
-            Self::Hidden | Self::Scaling | Self::Method | Self::Epochs | Self::Starts | Self::Seed => true,
-        })
+    /// Returns the row of the table of settings.
+    pub fn setting(self) -> &'static Setting<Cell> {
+        &ROWS[self as usize]
     }
 
     /// Name of the setting.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Hidden => "hidden nodes",
-            Self::Array => "array",
-            Self::Samples => "samples",
-            Self::Noise => "noise",
-            Self::Inputs => "inputs",
-            Self::Scaling => "scaling",
-            Self::Method => "method",
-            Self::Epochs => "epochs",
-            Self::Starts => "starts",
-            Self::Split => "split",
-            Self::Seed => "seed",
-        }
+        self.setting().name
+    }
+
+    /// Returns the settings of runs on `source`, in the order offered to the user.
+    pub fn of_source(source: &Source) -> impl Iterator<Item = Self> + use<> {
+        let mut cell = any_cell();
+        cell.settings.source = *source;
+        cell.division = source.simulation().is_none().then(Division::default);
+        Self::ALL.into_iter().filter(move |kind| kind.setting().applies(&cell))
+    }
+}
+
+/// Returns a cell that has every setting.
+fn any_cell() -> Cell {
+    Cell {
+        column: 0,
+        row: 0,
+        settings: SimulatedSettings::default().into(),
+        division: Some(Division::default()),
+        published: None,
     }
 }
 
 impl Axis {
-    /// The setting that the axis varies, and its values as text.
-    fn described(&self) -> (AxisKind, Vec<String>) {
-        fn texts<T: ToString>(values: &[T]) -> Vec<String> {
-            values.iter().map(ToString::to_string).collect()
+    /// Creates an axis of integers.
+    pub fn integers(kind: AxisKind, values: impl IntoIterator<Item = u64>) -> Self {
+        let values = values.into_iter().map(Value::Integer).collect();
+        Self { kind, values }
+    }
+
+    /// Creates an axis of numbers.
+    pub fn numbers(kind: AxisKind, values: impl IntoIterator<Item = f64>) -> Self {
+        let values = values.into_iter().map(Value::Number).collect();
+        Self { kind, values }
+    }
+
+    /// Creates an axis of names.
+    pub fn names(kind: AxisKind, values: impl IntoIterator<Item: ToString>) -> Self {
+        let values = values.into_iter().map(|value| Value::Text(value.to_string()));
+        Self {
+            kind,
+            values: values.collect(),
         }
-        match self {
-            Self::Hidden(values) => (AxisKind::Hidden, texts(values)),
-            Self::Array(values) => (AxisKind::Array, texts(values)),
-            Self::Samples(values) => (AxisKind::Samples, texts(values)),
-            Self::Noise(values) => (AxisKind::Noise, texts(values)),
-            Self::Inputs(values) => (AxisKind::Inputs, texts(values)),
-            Self::Scaling(values) => (AxisKind::Scaling, texts(values)),
-            Self::Method(values) => {
-                let names = values.iter().map(|method| method.short_name().to_owned());
-                (AxisKind::Method, names.collect())
-            }
-            Self::Epochs(values) => (AxisKind::Epochs, texts(values)),
-            Self::Starts(values) => (AxisKind::Starts, texts(values)),
-            Self::Split(values) => (AxisKind::Split, texts(values)),
-            Self::Seed(values) => (AxisKind::Seed, texts(values)),
-        }
+    }
+
+    /// Creates an axis from text.
+    ///
+    /// # Errors
+    /// The first text that is not a value of the setting.
+    pub fn parse<'a>(kind: AxisKind, texts: impl IntoIterator<Item = &'a str>) -> Result<Self, SettingError> {
+        let (setting, mut cell) = (kind.setting(), any_cell());
+        let value = |text: &str| {
+            let value = setting.parse(text)?;
+            setting.set(&mut cell, &value)?;
+            // As the program writes it.
+            Ok(setting.get(&cell).unwrap_or(value))
+        };
+        let values = texts.into_iter().map(value).collect::<Result<_, SettingError>>()?;
+        Ok(Self { kind, values })
     }
 
     /// Returns the setting that the axis varies.
     pub fn kind(&self) -> AxisKind {
-        self.described().0
+        self.kind
     }
 
     /// Returns the name of the setting.
     pub fn name(&self) -> &'static str {
-        self.kind().name()
+        self.kind.name()
+    }
+
+    /// Returns the values.
+    pub fn values(&self) -> &[Value] {
+        &self.values
     }
 
     /// Number of values.
     pub fn len(&self) -> usize {
-        self.described().1.len()
+        self.values.len()
     }
 
     /// Returns `true` if there are no values.
     pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.values.is_empty()
     }
 
     /// Returns value `index` as text.
@@ -157,47 +213,29 @@ impl Axis {
     /// # Panics
     /// If `index` is out of range.
     pub fn label(&self, index: usize) -> String {
-        self.described().1.swap_remove(index)
+        self.values[index].to_string()
     }
 
-    /// Writes value `index` to `cell`. A validation share that follows from the method is updated for a new method.
+    /// Writes value `index` to `cell`. A method has its usual settings for the source, and a validation share that
+    /// follows from the method is updated for a new one.
+    ///
+    /// # Errors
+    /// If the value is none of the setting.
     ///
     /// # Panics
     /// If `index` is out of range.
-    pub(super) fn apply(&self, index: usize, cell: &mut Cell) {
-        let Cell { settings, division, .. } = cell;
-        let simulate = |source: &mut Source, change: &dyn Fn(&mut Simulation)| {
-            if let Source::Simulated(simulation) = source {
-                change(simulation);
+    pub(super) fn apply(&self, index: usize, cell: &mut Cell) -> Result<(), SettingError> {
+        let usual = cell.settings.validation_fraction();
+        self.kind.setting().set(cell, &self.values[index])?;
+        if let Some(division) = cell.division.as_mut().filter(|_| self.kind == AxisKind::Method) {
+            let method = &mut cell.settings.training.method;
+            if *method == Method::bayesian_regularization() {
+                *method = Method::recorded_regularization();
             }
-        };
-        match self {
-            Self::Hidden(values) => settings.hidden = values[index],
-            Self::Array(values) => simulate(&mut settings.source, &|source| source.sensor.scale = values[index]),
-            Self::Samples(values) => simulate(&mut settings.source, &|source| source.samples = values[index]),
-            Self::Noise(values) => simulate(&mut settings.source, &|source| {
-                source.scene.noise.relative = values[index];
-            }),
-            Self::Inputs(values) => settings.inputs.quantity = values[index],
-            Self::Scaling(values) => settings.inputs.scaling = values[index],
-            Self::Method(values) => {
-                let usual = settings.validation_fraction();
-                settings.training.method = values[index];
-                if let Some(division) = division
-                    .as_mut()
-                    .filter(|division| division.validation_fraction == usual)
-                {
-                    division.validation_fraction = settings.validation_fraction();
-                }
+            if division.validation_fraction == usual {
+                division.validation_fraction = cell.settings.validation_fraction();
             }
-            Self::Epochs(values) => settings.training.stopping.epochs = values[index],
-            Self::Starts(values) => settings.starts = values[index],
-            Self::Split(values) => {
-                if let Some(division) = division {
-                    division.by = values[index];
-                }
-            }
-            Self::Seed(values) => settings.seed = values[index],
         }
+        Ok(())
     }
 }

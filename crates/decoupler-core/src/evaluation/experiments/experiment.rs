@@ -126,9 +126,9 @@ impl Experiment {
             division: self.recording.as_ref().map(|recording| recording.division),
             published: None,
         };
-        self.axis.apply(column, &mut cell);
-        if let Some(axis) = &self.second_axis {
-            axis.apply(row, &mut cell);
+        for (axis, index) in self.axes().zip([column, row]) {
+            // A value that the setting does not have is refused by `check`.
+            let _ = axis.apply(index, &mut cell);
         }
         cell.published = self.published(&cell.settings);
         cell
@@ -150,7 +150,7 @@ impl Experiment {
 
     /// Returns the seeds of the cell with these settings.
     pub fn seeds_of(&self, settings: &RunSettings) -> impl Iterator<Item = Seed> + use<> {
-        let seeds = if self.axes().any(|axis| matches!(axis, Axis::Seed(_))) {
+        let seeds = if self.axes().any(|axis| axis.kind() == AxisKind::Seed) {
             1
         } else {
             self.seeds
@@ -215,6 +215,8 @@ impl Experiment {
             if !AxisKind::of_source(&self.base.source).any(|kind| kind == axis.kind()) {
                 return Err(ExperimentError::NoSetting { axis: axis.name(), of });
             }
+            let mut cell = self.cell(0, 0);
+            (0..axis.len()).try_for_each(|index| axis.apply(index, &mut cell))?;
         }
         Ok(())
     }
@@ -311,12 +313,12 @@ impl PaperTable {
             }
         };
         match self {
-            Self::HiddenNodes => with(Axis::Hidden(vec![6, 8, 10, 12, 14, 16]), 300, 3, None),
+            Self::HiddenNodes => with(Axis::integers(AxisKind::Hidden, [6, 8, 10, 12, 14, 16]), 300, 3, None),
             Self::CrossValidation => {
-                let sizes = Axis::Samples(vec![1000, 100]);
+                let sizes = Axis::integers(AxisKind::Samples, [1000, 100]);
                 with(sizes, 80, 1, Some(CrossValidation::default()))
             }
-            Self::ArrayScales => with(Axis::Array(ArrayScale::PRESETS.to_vec()), 300, 3, None),
+            Self::ArrayScales => with(Axis::names(AxisKind::Array, ArrayScale::PRESETS), 300, 3, None),
         }
     }
 }
@@ -347,7 +349,7 @@ mod tests {
     #[test]
     fn cells_are_the_product_of_the_axes() {
         let experiment = Experiment {
-            second_axis: Some(Axis::Method(Method::all()[..2].to_vec())),
+            second_axis: Some(Axis::names(AxisKind::Method, ["lm", "br"])),
             ..PaperTable::ArrayScales.experiment()
         };
         let cells = experiment.cells();
@@ -368,10 +370,16 @@ mod tests {
             experiment.check().unwrap_err().to_string()
         };
         let cases = [
-            (table(|e| e.axis = Axis::Hidden(vec![])), "no values for hidden nodes"),
-            (table(|e| e.axis = Axis::Hidden(vec![6, 0])), "hidden nodes: 0"),
             (
-                table(|e| e.second_axis = Some(Axis::Samples(vec![10]))),
+                table(|e| e.axis = Axis::integers(AxisKind::Hidden, [])),
+                "no values for hidden nodes",
+            ),
+            (
+                table(|e| e.axis = Axis::integers(AxisKind::Hidden, [6, 0])),
+                "hidden nodes: 0",
+            ),
+            (
+                table(|e| e.second_axis = Some(Axis::integers(AxisKind::Samples, [10]))),
                 "both axes vary samples",
             ),
             (table(|e| e.seeds = 0), "seeds: 0"),
@@ -389,7 +397,7 @@ mod tests {
             ),
             (
                 table(|e| {
-                    e.axis = Axis::Hidden((1..=500).collect());
+                    e.axis = Axis::integers(AxisKind::Hidden, 1..=500);
                     e.seeds = 1000;
                 }),
                 "50000000 trainings",
@@ -403,7 +411,7 @@ mod tests {
     #[test]
     fn a_seed_axis_replaces_the_seeds() {
         let experiment = Experiment {
-            axis: Axis::Seed(vec![Seed(4), Seed(9)]),
+            axis: Axis::integers(AxisKind::Seed, [4, 9]),
             ..PaperTable::HiddenNodes.experiment()
         };
         for (cell, seed) in experiment.cells().iter().zip([4, 9]) {

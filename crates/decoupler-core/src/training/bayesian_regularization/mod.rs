@@ -1,25 +1,22 @@
-//! Bayesian regularisation (`trainbr`): `state` is what a checkpoint keeps, `weighting` estimates it from the data, and
-//! `settings` are what users choose.
+//! Bayesian regularisation (`trainbr`): `state` is what a checkpoint keeps, and `weighting` estimates it from the data.
 
-mod settings;
 mod state;
 #[cfg(test)]
 mod tests;
 mod weighting;
 
-pub use settings::RegularizationSettings;
 pub use state::BayesianState;
 
 use state::{GroupState, TargetState};
 use weighting::{OutputParameters, scale_outputs, weighted_mse};
 
 use super::{
-    Damping, Evaluation, Examples, FactoredEquations, SettingError, StopReason,
-    method::{Algorithm, Description, add_step},
-    normal_equations::{Decay, PerClass, class_sizes},
+    Damping, Evaluation, Examples, RegularizationSettings, StopReason,
+    method::{Algorithm, MethodState, add_step},
+    normal_equations::{Classes, NormalEquations, Plan, class_sizes, decay_slopes},
     trainer::correlation_time,
 };
-use crate::network::{Mlp, Shape};
+use crate::network::Mlp;
 
 /// Levenberg-Marquardt on `F = β Σe² + α Σw²`, with α and β estimated from the data (MacKay 1992; Foresee and Hagan
 /// 1997; `trainbr`). After every accepted step, with N weights and n errors,
@@ -59,7 +56,7 @@ pub(super) struct BayesianRegularization {
     /// Epoch after which the correlation of errors is measured; 0 for never.
     correlation_epoch: usize,
     /// Group of each class of weights.
-    group_of: PerClass<usize>,
+    group_of: Classes<usize>,
     /// Means of the targets, if output biases are drawn towards them.
     means: Vec<f64>,
     state: BayesianState,
@@ -67,7 +64,7 @@ pub(super) struct BayesianRegularization {
     roots: Vec<f64>,
     /// γ of the output weights of each target, once measured; empty if all have the same noise level.
     of_outputs: Vec<OutputParameters>,
-    equations: FactoredEquations,
+    equations: NormalEquations,
     examples: Examples,
     /// Mean squared error.
     mse: f64,
@@ -83,37 +80,23 @@ pub(super) struct BayesianRegularization {
 /// Maximum lag in samples; the sum of the correlations ends at the first that is not positive.
 const MAX_LAG: usize = 50;
 
-impl Algorithm for BayesianRegularization {
-    type Settings = RegularizationSettings;
-    type State = BayesianState;
-
-    const DESCRIPTION: Description = Description {
-        short_name: "br",
-        name: "Bayesian regularisation",
-        summary: "Levenberg-Marquardt with a penalty on the weights whose strength is estimated from the data: for few or \
-                  noisy samples.",
-        parameter_name: "mu",
-        remedy: "try another seed, more samples, or Levenberg-Marquardt (lm)",
-    };
-
-    fn check(settings: &RegularizationSettings) -> Result<(), SettingError> {
-        settings.damping().check()
+/// Group of each class of weights, from 0, for this number of groups.
+fn group_of_classes(groups: f64) -> Classes<usize> {
+    match groups as usize {
+        ..=1 => [0, 0, 0, 0],
+        2 => [0, 0, 1, 1],
+        3 => [0, 1, 2, 2],
+        _ => [0, 1, 2, 3],
     }
+}
 
-    fn equations_bytes(shape: Shape, samples: usize) -> usize {
-        FactoredEquations::factored_bytes(shape, samples).saturating_add(FactoredEquations::inverse_bytes(shape))
-    }
-
-    fn epoch_multiplications(shape: Shape, samples: usize) -> f64 {
-        FactoredEquations::factored_multiplications(shape, samples) + FactoredEquations::trace_multiplications(shape)
-    }
-
+impl BayesianRegularization {
     /// Starts with γ = N, as if the data determined all weights.
-    fn new(settings: RegularizationSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut equations = FactoredEquations::factored(mlp.shape(), examples);
-        let evaluation = equations.gather(mlp, examples);
+    pub(super) fn new(settings: RegularizationSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+        let mut equations = NormalEquations::new(&Plan::factored(mlp.shape(), examples.samples()), examples);
+        let evaluation = equations.gather(mlp, &[], examples);
         let weights = mlp.weights().len();
-        let group_of = settings.group_of_classes();
+        let group_of = group_of_classes(settings.groups);
         let mut method = Self {
             damping: settings.damping(),
             group_of,
@@ -154,8 +137,8 @@ impl Algorithm for BayesianRegularization {
             scaled_candidate: mlp.clone(),
         };
         method.state.further = {
-            let sizes = class_sizes(mlp.shape()).values();
-            let classes = group_of.values().into_iter().zip(sizes);
+            let sizes = class_sizes(mlp.shape());
+            let classes = group_of.into_iter().zip(sizes);
             let size = |group| {
                 classes
                     .clone()
@@ -174,36 +157,21 @@ impl Algorithm for BayesianRegularization {
         let evaluation = method.regularized();
         (method, evaluation)
     }
+}
 
-    fn restore(&mut self, state: BayesianState) {
-        let fresh = std::mem::replace(&mut self.state, state);
-        // A state has as many groups and targets as the settings it was saved with, unless it is damaged.
-        let missing = fresh.further.get(self.state.further.len()..).unwrap_or_default();
-        self.state.further.extend_from_slice(missing);
-        self.state.further.truncate(fresh.further.len());
-        let missing = fresh.targets.get(self.state.targets.len()..).unwrap_or_default();
-        self.state.targets.extend_from_slice(missing);
-        self.state.targets.truncate(fresh.targets.len());
-        if !self.state.targets.is_empty() {
-            // Before the first step, the candidate is the network.
-            let mlp = self.candidate.clone();
-            self.scale_targets(&mlp);
-            self.gather(&mlp);
-        }
-    }
-
+impl Algorithm for BayesianRegularization {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let weighting = self.state.clone();
         let (precisions, means, errors) = (self.precisions(), self.scaled_means(), self.errors());
         let (beta, prior) = (weighting.beta, (self.group_of, &means[..]));
         let alphas = weighting.decays(self.group_of);
         let objective = weighting.objective(self.weighted_mse, errors, &self.scaled, prior);
+        let decay = decay_slopes(&self.scaled, alphas.map(|alpha| alpha / beta), prior.1);
         let hidden_weights = mlp.shape().hidden_weights();
         self.damping.search(&mut self.state.mu, |mu| {
             let damping = alphas.map(|alpha| (mu + alpha) / beta);
-            let decay = Decay::new(alphas.map(|alpha| alpha / beta), prior.1);
             self.equations
-                .solve_with_decay(&self.scaled, examples, damping, decay, &mut self.step)?;
+                .solve(&self.scaled, examples, damping, &decay, &mut self.step)?;
             if !self.roots.is_empty() {
                 let outputs = self.step[hidden_weights..].iter_mut().zip(self.roots.iter().cycle());
                 outputs.for_each(|(step, root)| *step /= root);
@@ -235,7 +203,28 @@ impl Algorithm for BayesianRegularization {
         Some(self.state.effective_parameters)
     }
 
-    fn state(&self) -> BayesianState {
-        self.state.clone()
+    fn state(&self) -> MethodState {
+        MethodState::BayesianRegularization(self.state.clone())
+    }
+
+    fn restore(&mut self, state: MethodState) -> bool {
+        let MethodState::BayesianRegularization(state) = state else {
+            return false;
+        };
+        let fresh = std::mem::replace(&mut self.state, state);
+        // A state has as many groups and targets as the settings it was saved with, unless it is damaged.
+        let missing = fresh.further.get(self.state.further.len()..).unwrap_or_default();
+        self.state.further.extend_from_slice(missing);
+        self.state.further.truncate(fresh.further.len());
+        let missing = fresh.targets.get(self.state.targets.len()..).unwrap_or_default();
+        self.state.targets.extend_from_slice(missing);
+        self.state.targets.truncate(fresh.targets.len());
+        if !self.state.targets.is_empty() {
+            // Before the first step, the candidate is the network.
+            let mlp = self.candidate.clone();
+            self.scale_targets(&mlp);
+            self.gather(&mlp);
+        }
+        true
     }
 }

@@ -4,10 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     network::Mlp,
-    training::{
-        method::Checked,
-        normal_equations::{PerClass, class_squares},
-    },
+    training::normal_equations::{Classes, class_squares},
 };
 
 /// State of Bayesian regularisation.
@@ -53,12 +50,6 @@ pub(super) struct GroupState {
     pub(super) effective_parameters: f64,
 }
 
-impl Checked for BayesianState {
-    fn vectors(&self) -> Vec<&[f64]> {
-        Vec::new()
-    }
-}
-
 impl BayesianState {
     /// Returns `true` if there is one α and one β.
     pub(super) fn is_plain(&self) -> bool {
@@ -66,7 +57,7 @@ impl BayesianState {
     }
 
     /// α of each class of weights.
-    pub(super) fn decays(&self, group_of: PerClass<usize>) -> PerClass {
+    pub(super) fn decays(&self, group_of: Classes<usize>) -> Classes {
         group_of.map(|group| match group {
             0 => self.alpha,
             group => self.further[group - 1].alpha,
@@ -79,13 +70,13 @@ impl BayesianState {
         mse: f64,
         errors: f64,
         mlp: &Mlp,
-        (group_of, means): (PerClass<usize>, &[f64]),
+        (group_of, means): (Classes<usize>, &[f64]),
     ) -> f64 {
         let of_weights = if self.is_plain() {
             self.alpha * sum_of_squares(mlp)
         } else {
-            let squares = class_squares(mlp, means).values();
-            let products = self.decays(group_of).values().into_iter().zip(squares);
+            let squares = class_squares(mlp, means);
+            let products = self.decays(group_of).into_iter().zip(squares);
             products.map(|(decay, squares)| decay * squares).sum()
         };
         self.beta * mse * errors + of_weights

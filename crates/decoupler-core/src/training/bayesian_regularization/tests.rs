@@ -4,8 +4,8 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use super::*;
 use crate::{
-    network::nguyen_widrow,
-    training::{Method, Problem, StoppingRules, Trainer, TrainingSettings, method::Running, normal_equations::dense},
+    network::{Shape, nguyen_widrow},
+    training::{Method, Problem, StoppingRules, Trainer, TrainingSettings, normal_equations::tests::dense},
 };
 
 /// Returns the effective number of parameters after 60 epochs on a curve with autoregressive noise.
@@ -176,10 +176,10 @@ fn noise_levels_and_decay_maximise_the_evidence() {
         ..RegularizationSettings::default()
     };
     let trainer = trained(problem(&inputs, targets.view()), 4, settings, 400);
-    let Running::BayesianRegularization(method) = &trainer.algorithm else {
+    let MethodState::BayesianRegularization(state) = trainer.algorithm.state() else {
         panic!("another method");
     };
-    let (mlp, state) = (trainer.present(), &method.state);
+    let mlp = trainer.present();
     let examples = Examples::new(inputs.view(), targets.view());
     let (jacobian, errors) = (dense::jacobian(mlp, &examples), dense::errors(mlp, &examples));
     let (weights, hidden_weights, outputs) = (mlp.weights().len(), mlp.shape().hidden_weights(), 3);

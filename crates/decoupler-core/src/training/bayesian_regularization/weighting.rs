@@ -7,8 +7,11 @@ use super::{
 use crate::{
     network::{Mlp, Shape},
     training::{
-        Evaluation, Examples, FactoredEquations,
-        normal_equations::{Decay, OutputTraces, PerClass, Traces, class_sizes, class_squares},
+        Evaluation, Examples,
+        normal_equations::{
+            Classes, HIDDEN_BIASES, HIDDEN_WEIGHTS, NormalEquations, OUTPUT_BIASES, OUTPUT_WEIGHTS, OutputTraces,
+            Traces, class_sizes, class_squares, decay_slopes,
+        },
     },
 };
 
@@ -71,13 +74,7 @@ impl BayesianRegularization {
     /// In units of its noise, a target without information has small weights that the data determine well. In a common
     /// α, it would shrink the weights of the others.
     fn alpha_of_outputs(&self, group: usize) -> Option<f64> {
-        let PerClass {
-            hidden_weights,
-            hidden_biases,
-            output_weights,
-            output_biases,
-        } = self.group_of;
-        if group == hidden_weights || group == hidden_biases {
+        if group == self.group_of[HIDDEN_WEIGHTS] || group == self.group_of[HIDDEN_BIASES] {
             return None;
         }
         let Shape { hidden, outputs, .. } = self.scaled.shape();
@@ -85,7 +82,7 @@ impl BayesianRegularization {
         let (nodes, biases) = weights.split_at(hidden * outputs);
         let of_target = |(target, parameters): (usize, &OutputParameters)| {
             let (mut gamma, mut squares) = (0.0, 0.0);
-            if group == output_weights {
+            if group == self.group_of[OUTPUT_WEIGHTS] {
                 gamma += parameters.weights;
                 squares += nodes
                     .iter()
@@ -94,7 +91,7 @@ impl BayesianRegularization {
                     .map(|weight| weight * weight)
                     .sum::<f64>();
             }
-            if group == output_biases {
+            if group == self.group_of[OUTPUT_BIASES] {
                 gamma += parameters.bias;
                 squares += (biases[target] - means.get(target).unwrap_or(&0.0)).powi(2);
             }
@@ -156,14 +153,14 @@ impl BayesianRegularization {
     /// Gathers the equations at the weights of `mlp`.
     pub(super) fn gather(&mut self, mlp: &Mlp) {
         let precisions = self.precisions();
-        self.mse = self.equations.gather_weighted(mlp, &precisions, &self.examples).mse;
+        self.mse = self.equations.gather(mlp, &precisions, &self.examples).mse;
         self.weighted_mse = weighted_mse(&mut self.equations, mlp, &precisions, &self.examples);
     }
 
     /// Sums over the classes of each group.
-    fn by_group<T: Copy>(&self, classes: PerClass<T>, value: impl Fn(T) -> f64) -> Vec<f64> {
+    fn by_group<T: Copy>(&self, classes: Classes<T>, value: impl Fn(T) -> f64) -> Vec<f64> {
         let mut sums = vec![0.0; 1 + self.state.further.len()];
-        for (group, class) in self.group_of.values().into_iter().zip(classes.values()) {
+        for (group, class) in self.group_of.into_iter().zip(classes) {
             sums[group] += value(class);
         }
         sums
@@ -184,7 +181,8 @@ impl BayesianRegularization {
             return;
         };
         let sizes = self.by_group(class_sizes(self.scaled.shape()), |size| size as f64);
-        let decayed = decays.times(traces.classes());
+        let classes = traces.classes();
+        let decayed = std::array::from_fn(|class| decays[class] * classes[class]);
         let decayed = self.by_group(decayed, |decayed| decayed);
         let groups: Vec<f64> = sizes
             .iter()
@@ -199,14 +197,14 @@ impl BayesianRegularization {
     }
 
     /// Shares γ out among the targets that have their own noise level.
-    fn share_out(&mut self, decays: PerClass, traces: &Traces) {
+    fn share_out(&mut self, decays: Classes, traces: &Traces) {
         let Shape {
             inputs,
             hidden,
             outputs,
         } = self.scaled.shape();
-        let of_inputs = (inputs * hidden) as f64 - decays.hidden_weights * traces.hidden_weights;
-        let of_hidden = (of_inputs + hidden as f64 - decays.hidden_biases * traces.hidden_biases).max(0.0);
+        let of_inputs = (inputs * hidden) as f64 - decays[HIDDEN_WEIGHTS] * traces.hidden_weights;
+        let of_hidden = (of_inputs + hidden as f64 - decays[HIDDEN_BIASES] * traces.hidden_biases).max(0.0);
         let mut shares = vec![0.0; outputs];
         let output_weights = &self.scaled.layers().1[..hidden * outputs];
         for (index, weight) in output_weights.iter().enumerate() {
@@ -214,8 +212,8 @@ impl BayesianRegularization {
         }
         let sum: f64 = shares.iter().sum();
         let of_output = |traces: &OutputTraces| OutputParameters {
-            weights: (hidden as f64 - decays.output_weights * traces.weights).max(0.0),
-            bias: (1.0 - decays.output_biases * traces.bias).max(0.0),
+            weights: (hidden as f64 - decays[OUTPUT_WEIGHTS] * traces.weights).max(0.0),
+            bias: (1.0 - decays[OUTPUT_BIASES] * traces.bias).max(0.0),
         };
         self.of_outputs.clear();
         if self.state.targets.is_empty() {
@@ -233,7 +231,9 @@ impl BayesianRegularization {
         let beta = self.state.beta;
         let decays = self.state.decays(self.group_of).map(|alpha| alpha / beta);
         let means = self.scaled_means();
-        let length = self.equations.gradient_length(&self.scaled, Decay::new(decays, &means));
+        let length = self
+            .equations
+            .gradient_length(&decay_slopes(&self.scaled, decays, &means));
         Evaluation {
             mse: self.mse,
             gradient_norm: 2.0 * length / self.errors(),
@@ -253,12 +253,7 @@ pub(super) fn scale_outputs(scaled: &mut Mlp, mlp: &Mlp, roots: &[f64]) {
 }
 
 /// Returns the mean of ρe², or of e² without precisions.
-pub(super) fn weighted_mse(
-    equations: &mut FactoredEquations,
-    mlp: &Mlp,
-    precisions: &[f64],
-    examples: &Examples,
-) -> f64 {
+pub(super) fn weighted_mse(equations: &mut NormalEquations, mlp: &Mlp, precisions: &[f64], examples: &Examples) -> f64 {
     if precisions.is_empty() {
         return equations.mse(mlp, examples);
     }

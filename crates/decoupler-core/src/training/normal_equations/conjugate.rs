@@ -1,31 +1,24 @@
-//! Interface of solvers for the hidden layer's equations, and the solver by preconditioned conjugate gradients.
+//! Solver by preconditioned conjugate gradients.
 
-use faer::{
-    Accum, Mat, MatMut, MatRef, Par,
-    linalg::matmul::{
-        matmul,
-        triangular::{self, BlockStructure},
-    },
-};
+use faer::{Mat, MatMut, MatRef};
 
 use super::{
-    Cost,
-    cholesky::{Cholesky, Elimination, output_weights, substitute},
-    equations::Sums,
-    schur::PerClass,
+    Classes,
+    cholesky::{Cholesky, substitute},
+    classes::{HIDDEN_BIASES, HIDDEN_WEIGHTS},
+    elimination::{Elimination, output_weights},
+    products::Sums,
 };
 use crate::{
     network::{Mlp, Shape},
     training::{
         Examples,
-        activations::{BlockNow, KeptActivations, add_scaled, multiply_by_tanh_slopes, multiply_into, scale},
-        examples::{BLOCK, PairsBuffer, column, column_mut},
-        parallel::{LARGE, Work, for_each_part},
+        activations::{BlockNow, KeptActivations, add_scaled, multiply_by_tanh_slopes, scale},
+        examples::{BLOCK, column, column_mut},
+        parallel::{LARGE, accumulate, accumulate_lower, for_each_part, number_of_parts, product},
     },
 };
 
-/// Assumed number of iterations per step: 30 to 70 were observed in training, more at its end.
-const ITERATIONS: f64 = 100.0;
 /// Relative residual at convergence, in the norm of the preconditioner's inverse. The relative error of the step, in
 /// the norm of S, is at most this times the square root of the condition number of the preconditioned matrix; this does
 /// not bound the error of single weights when the damping is small.
@@ -48,8 +41,9 @@ const MAX_RESIDUAL: f64 = 1e-3;
 /// so a product costs two products with the samples and needs memory only for vectors. The preconditioner consists of
 /// the factored diagonal blocks of S, one for each hidden node: the coupling between nodes has low rank, so a few tens
 /// of iterations are enough.
-pub(in crate::training) struct ConjugateGradient {
+pub(super) struct ConjugateGradient {
     shape: Shape,
+    damping: Classes,
     /// V̄V̄ᵀ.
     mixing: Mat<f64>,
     /// Cholesky factors of the diagonal blocks of S: n1 × h·n1.
@@ -75,16 +69,26 @@ struct PartBuffers {
     hidden: [Mat<f64>; 2],
 }
 
-impl HiddenSolver for ConjugateGradient {
-    fn new(shape: Shape, examples: &Examples) -> Self {
+/// Number of multiplications of one iteration per sample.
+pub(super) fn multiplications_per_sample(shape: Shape) -> usize {
+    2 * shape.hidden_weights() + shape.hidden * shape.hidden
+}
+
+impl ConjugateGradient {
+    /// Allocates for a network of this shape and this many blocks of samples.
+    pub(super) fn new(shape: Shape, blocks: usize) -> Self {
         let (h, n1, order) = (shape.hidden, shape.inputs + 1, shape.hidden_weights());
+        // Iterations follow each other so quickly that threads stay awake, so that it is worth dividing less work than
+        // elsewhere.
+        let bytes = size_of::<f64>() * (order + 2 * BLOCK * h);
+        let parts = number_of_parts(blocks, BLOCK * multiplications_per_sample(shape), LARGE / 8, bytes);
         let part = |_| PartBuffers {
             sum: Mat::zeros(n1, h),
-            hidden: [const { BLOCK }; 2].map(|block| Mat::zeros(block, h)),
+            hidden: [BLOCK; 2].map(|block| Mat::zeros(block, h)),
         };
-        let parts = parts(shape, examples.blocks().len());
         Self {
             shape,
+            damping: [0.0; 4],
             mixing: Mat::zeros(h, h),
             blocks: Mat::zeros(n1, order),
             f: Mat::zeros(n1, h * (h + 1)),
@@ -98,58 +102,47 @@ impl HiddenSolver for ConjugateGradient {
         }
     }
 
-    /// Gathering BᵀB takes n1²/2 · h multiplications per sample; solving, with order = h·n1, S samples and k
-    /// iterations, k (S (2 n1 h + h²) + order (2 (h+1) + n1)).
-    fn cost(shape: Shape, samples: usize) -> Cost {
-        let (n1, h) = (shape.inputs + 1, shape.hidden);
-        let order = shape.hidden_weights();
-        let [n1_, h_, order_] = [n1, h, order].map(|size| size as f64);
-        let iteration = samples as f64 * iteration_per_sample(shape) as f64 + order_ * (2.0 * (h_ + 1.0) + n1_);
-        Cost {
-            shape,
-            samples,
-            gram_per_sample: n1_ * n1_ * h_ / 2.0,
-            solving: ITERATIONS * iteration,
-            entries: order.saturating_mul(2 * (h + 1) + n1),
-            gram: (n1, order),
-            pairs: 0,
-        }
-    }
-
-    fn parts(&self) -> usize {
+    /// Number of parts of the samples that are processed in parallel.
+    pub(super) fn parts(&self) -> usize {
         self.parts.len()
     }
 
-    /// Adds AᵀDᵢ²A to the blocks.
-    fn add_gram(
-        &self,
-        gram: &mut Mat<f64>,
-        now: &BlockNow<'_>,
-        slopes: MatRef<'_, f64>,
-        columns: MatMut<'_, f64>,
-        _: &mut PairsBuffer,
-    ) {
-        let inputs = now.block.inputs.as_ref();
-        let n1 = inputs.ncols();
-        let mut weighted = columns.subcols_mut(0, n1);
-        for i in 0..slopes.ncols() {
-            for a in 0..n1 {
-                multiply_into(column_mut(weighted.as_mut(), a), column(slopes, i), column(inputs, a));
+    /// Gathers F by nodes, and factors the diagonal blocks of S; `None` if one of them is not numerically positive
+    /// definite.
+    pub(super) fn factor(&mut self, sums: &Sums, elimination: &Elimination, mlp: &Mlp, damping: Classes) -> Option<()> {
+        let (h1, n1) = (self.shape.hidden + 1, self.shape.inputs + 1);
+        let v = output_weights(mlp);
+        product(self.mixing.as_mut(), v, v.transpose());
+        self.damping = damping;
+        self.blocks.copy_from(&sums.gram);
+        for node in 0..self.shape.hidden {
+            let mut block = self.blocks.as_mut().subcols_mut(node * n1, n1);
+            let weight = self.mixing[(node, node)];
+            let largest = (0..n1).fold(0.0, |largest: f64, index| largest.max(block[(index, index)]));
+            let mut f = self.f.as_mut().subcols_mut(node * h1, h1);
+            f.copy_from(elimination.f.as_ref().subrows(node * n1, n1));
+            accumulate_lower(block.as_mut(), f.as_ref(), f.as_ref().transpose(), -1.0);
+            for index in 0..n1 {
+                scale(&mut column_mut(block.as_mut(), index)[index..], weight);
+                let class = if index + 1 == n1 { HIDDEN_BIASES } else { HIDDEN_WEIGHTS };
+                block[(index, index)] += damping[class] + RIDGE * weight * largest;
             }
-            let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-            let sum = gram.as_mut().subcols_mut(i * n1, n1);
-            let (left, right) = (weighted.as_ref().transpose(), weighted.as_ref());
-            triangular::matmul(sum, lower, Accum::Add, left, full, right, full, 1.0, Par::Seq);
+            self.cholesky.factor(block)?;
         }
+        Some(())
     }
 
-    fn solve(&mut self, system: System<'_>, kept: &mut KeptActivations, right: &mut [f64]) -> Option<()> {
-        let v = output_weights(system.mlp);
-        matmul(self.mixing.as_mut(), Accum::Replace, v, v.transpose(), 1.0, Par::Seq);
+    /// Replaces the right-hand side of the hidden layer by its solution. Returns `None`, with `solution` unspecified, if
+    /// it is not accurate enough: a larger damping is needed.
+    pub(super) fn solve(
+        &mut self,
+        mlp: &Mlp,
+        examples: &Examples,
+        kept: &mut KeptActivations,
+        solution: &mut [f64],
+    ) -> Option<()> {
         // A rejected candidate may have been evaluated since.
-        kept.evaluate(system.mlp, system.examples);
-        self.factor_blocks(system)?;
-        let solution = right;
+        kept.evaluate(mlp, examples);
         self.residual.copy_from_slice(solution);
         solution.fill(0.0);
         let mut length = self.precondition();
@@ -159,7 +152,7 @@ impl HiddenSolver for ConjugateGradient {
             if length <= goal {
                 return Some(());
             }
-            self.apply(system, kept);
+            self.apply(mlp, examples, kept);
             let product = self.parts[0].sum.as_ref();
             let product = || product.col_iter().flat_map(|column| column.iter());
             let curvature: f64 = product().zip(&self.direction).map(|(a, b)| a * b).sum();
@@ -184,32 +177,14 @@ impl HiddenSolver for ConjugateGradient {
         let worst = MAX_RESIDUAL / TOLERANCE;
         (length <= worst * worst * goal).then_some(())
     }
-}
 
-/// Number of parts into which the samples are divided for each iteration. Iterations follow each other so quickly that
-/// threads stay awake, so it is worth dividing less work than elsewhere.
-fn parts(shape: Shape, blocks: usize) -> usize {
-    let work = Work {
-        blocks,
-        multiplications: BLOCK * iteration_per_sample(shape),
-        bytes: size_of::<f64>() * (shape.hidden_weights() + 2 * BLOCK * shape.hidden),
-    };
-    work.parts(LARGE / 8)
-}
-
-/// Number of multiplications of one iteration per sample.
-fn iteration_per_sample(shape: Shape) -> usize {
-    2 * shape.hidden_weights() + shape.hidden * shape.hidden
-}
-
-impl ConjugateGradient {
     /// Writes S·direction to the first part's sum.
-    fn apply(&mut self, system: System<'_>, kept: &mut KeptActivations) {
+    fn apply(&mut self, mlp: &Mlp, examples: &Examples, kept: &mut KeptActivations) {
         let (h, h1, n1) = (self.shape.hidden, self.shape.hidden + 1, self.shape.inputs + 1);
         let direction = MatRef::from_column_major_slice(&self.direction, n1, h);
         let mixing = self.mixing.as_ref();
         for_each_part(&mut self.parts, |part| part.sum.fill(0.0));
-        kept.for_each_block(system.mlp, system.examples, &mut self.parts, |part, now| {
+        kept.for_each_block(mlp, examples, &mut self.parts, |part, now| {
             part.add(now, direction, mixing);
         });
         let (first, others) = self.parts.split_at_mut(1);
@@ -218,58 +193,18 @@ impl ConjugateGradient {
         let f = |node: usize| self.f.as_ref().subcols(node * h1, h1);
         let [reduced, mixed] = &mut self.eliminated;
         for node in 0..h {
-            let (f, p) = (f(node), direction.subcols(node, 1));
-            let reduced = reduced.as_mut().subcols_mut(node, 1);
-            matmul(reduced, Accum::Replace, f.transpose(), p, 1.0, Par::Seq);
+            let p = direction.subcols(node, 1);
+            product(reduced.as_mut().subcols_mut(node, 1), f(node).transpose(), p);
         }
-        matmul(mixed.as_mut(), Accum::Replace, reduced.as_ref(), mixing, 1.0, Par::Seq);
+        product(mixed.as_mut(), reduced.as_ref(), mixing);
         for node in 0..h {
             let mut sum = sum.as_mut().subcols_mut(node, 1);
-            let (f, mixed) = (f(node), mixed.as_ref().subcols(node, 1));
-            matmul(sum.as_mut(), Accum::Add, f, mixed, -1.0, Par::Seq);
-            let (sum, direction) = (column_mut(sum, 0), column(direction, node));
-            let PerClass {
-                hidden_weights,
-                hidden_biases,
-                ..
-            } = system.damping;
-            let bias = direction.len() - 1;
-            add_scaled(&mut sum[..bias], hidden_weights, &direction[..bias]);
-            add_scaled(&mut sum[bias..], hidden_biases, &direction[bias..]);
+            accumulate(sum.as_mut(), f(node), mixed.as_ref().subcols(node, 1), -1.0);
+            let (weights, biases) = column_mut(sum, 0).split_at_mut(n1 - 1);
+            let (p, p_biases) = column(direction, node).split_at(n1 - 1);
+            add_scaled(weights, self.damping[HIDDEN_WEIGHTS], p);
+            add_scaled(biases, self.damping[HIDDEN_BIASES], p_biases);
         }
-    }
-
-    /// Gathers F by nodes, and factors the diagonal blocks of S; `None` if one of them is not numerically positive
-    /// definite.
-    fn factor_blocks(&mut self, system: System<'_>) -> Option<()> {
-        let (h1, n1) = (self.shape.hidden + 1, self.shape.inputs + 1);
-        self.blocks.copy_from(&system.sums.gram);
-        for node in 0..self.shape.hidden {
-            let mut block = self.blocks.as_mut().subcols_mut(node * n1, n1);
-            let weight = self.mixing[(node, node)];
-            let largest = (0..n1).fold(0.0, |largest: f64, index| largest.max(block[(index, index)]));
-            let mut f = self.f.as_mut().subcols_mut(node * h1, h1);
-            f.copy_from(system.elimination.f.as_ref().subrows(node * n1, n1));
-            let f = f.as_ref();
-            let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-            triangular::matmul(
-                block.as_mut(),
-                lower,
-                Accum::Add,
-                f,
-                full,
-                f.transpose(),
-                full,
-                -1.0,
-                Par::Seq,
-            );
-            for index in 0..n1 {
-                scale(&mut column_mut(block.as_mut(), index)[index..], weight);
-                block[(index, index)] += system.damping.of_input(index, n1 - 1) + RIDGE * weight * largest;
-            }
-            self.cholesky.factor(block)?;
-        }
-        Some(())
     }
 
     /// Applies the inverse of the preconditioner to the residual; returns the product of the residual with the result.
@@ -293,102 +228,36 @@ impl PartBuffers {
         let mut pushed = pushed.as_mut().subrows_mut(0, samples);
         let mut mixed = mixed.as_mut().subrows_mut(0, samples);
         let slope = |mut values: MatMut<'_, f64>| {
-            for node in 0..mixing.ncols() {
+            for node in 0..values.ncols() {
                 multiply_by_tanh_slopes(column_mut(values.as_mut(), node), column(now.hidden(), node));
             }
         };
-        matmul(pushed.as_mut(), Accum::Replace, inputs, p, 1.0, Par::Seq);
+        product(pushed.as_mut(), inputs, p);
         slope(pushed.as_mut());
-        matmul(mixed.as_mut(), Accum::Replace, pushed.as_ref(), mixing, 1.0, Par::Seq);
+        product(mixed.as_mut(), pushed.as_ref(), mixing);
         slope(mixed.as_mut());
-        matmul(
-            self.sum.as_mut(),
-            Accum::Add,
-            inputs.transpose(),
-            mixed.as_ref(),
-            1.0,
-            Par::Seq,
-        );
+        accumulate(self.sum.as_mut(), inputs.transpose(), mixed.as_ref(), 1.0);
     }
-}
-
-/// Solver of S δ = r, which also gathers the entries of BᵀB that it needs.
-pub(in crate::training) trait HiddenSolver: Send + Sync {
-    /// Allocates for a network of this shape and these examples.
-    fn new(shape: Shape, examples: &Examples) -> Self
-    where
-        Self: Sized;
-
-    /// Cost for a network of this shape and this many samples.
-    fn cost(shape: Shape, samples: usize) -> Cost
-    where
-        Self: Sized;
-
-    /// Number of parts of the samples that are processed in parallel while solving.
-    fn parts(&self) -> usize {
-        1
-    }
-
-    /// Allocates the buffer for [`Self::add_gram`].
-    fn pairs_buffer(&self) -> PairsBuffer {
-        PairsBuffer::default()
-    }
-
-    /// Adds one block of samples to the entries of BᵀB that the solver needs; `gram` has the size [`Cost::gram`].
-    /// `slopes` is D of the block, samples × h; `columns` and `pairs` are buffers with the same number of rows, whose
-    /// contents are unspecified.
-    fn add_gram(
-        &self,
-        gram: &mut Mat<f64>,
-        now: &BlockNow<'_>,
-        slopes: MatRef<'_, f64>,
-        columns: MatMut<'_, f64>,
-        pairs: &mut PairsBuffer,
-    );
-
-    /// Replaces the right-hand side r by the solution δ. Returns `None`, with `right` unspecified, if S is not
-    /// numerically positive definite or the solution is not accurate enough: a larger damping is needed.
-    fn solve(&mut self, system: System<'_>, kept: &mut KeptActivations, right: &mut [f64]) -> Option<()>;
-}
-
-/// Terms of the matrix S = damping on the diagonal + (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − F Fᵀ).
-#[derive(Clone, Copy)]
-pub(in crate::training) struct System<'a> {
-    pub(super) mlp: &'a Mlp,
-    pub(super) examples: &'a Examples,
-    pub(super) sums: &'a Sums,
-    pub(super) elimination: &'a Elimination,
-    pub(super) damping: PerClass,
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::training::{
-        examples::tests::{random_examples, random_mlp},
-        normal_equations::{Decay, cholesky::Elimination, products::Products},
+    use super::{
+        super::{NormalEquations, Plan, Solver},
+        *,
     };
+    use crate::training::examples::tests::{random_examples, random_mlp};
 
     /// Solves at damping 1e-3 within this many iterations.
     fn solve(max_iterations: usize) -> Option<()> {
         let (mlp, examples) = (random_mlp(8, 12, 2, 1), random_examples(40, 8, 2, 2));
-        let shape = mlp.shape();
-        let mut solver = ConjugateGradient::new(shape, &examples);
-        solver.max_iterations = max_iterations;
-        let mut products = Products::new(&solver, &ConjugateGradient::cost(shape, 40), 1);
-        let mut kept = KeptActivations::new(shape, &examples, 1);
-        products.gather(&solver, &mlp, &[], &examples, &mut kept);
-        let (mut elimination, mut right) = (Elimination::new(shape), vec![0.0; shape.hidden_weights()]);
-        elimination.factor(products.sums(), PerClass::all(1e-3))?;
-        elimination.reduce(products.sums(), &mlp, Decay::NONE, &mut right);
-        let system = System {
-            mlp: &mlp,
-            examples: &examples,
-            sums: products.sums(),
-            elimination: &elimination,
-            damping: PerClass::all(1e-3),
-        };
-        solver.solve(system, &mut kept, &mut right)
+        let mut equations = NormalEquations::new(&Plan::iterated(mlp.shape(), 40), &examples);
+        if let Solver::Iterated(solver) = &mut equations.solver {
+            solver.max_iterations = max_iterations;
+        }
+        equations.gather(&mlp, &[], &examples);
+        let mut step = vec![0.0; mlp.weights().len()];
+        equations.solve(&mlp, &examples, [1e-3; 4], &[], &mut step)
     }
 
     #[test]

@@ -8,127 +8,185 @@
 //! S = μI + (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − C G⁻¹ Cᵀ),   G = H̃ᵀH̃ + μI       (Schur complement on W)
 //! ```
 //!
-//! Two implementations of [`HiddenSolver`](conjugate::HiddenSolver) solve with S. For most networks S is formed and
-//! factored. Its order is h·n1, so for wide networks conjugate gradients, which never form S, are cheaper. The choice
-//! depends on the number of multiplications, which follows from sizes alone, so that it is the same on every machine
-//! and for a resumed training.
+//! `products` sums BᵀB, C, H̃ᵀH̃ and Jᵀe over blocks of samples, `elimination` eliminates V, and one of two solvers
+//! finds the step of W: `schur` forms and factors S. Its order is h·n1, so for wide networks `conjugate`, which never
+//! forms S, is cheaper. The choice depends on the number of multiplications, which follows from sizes alone, so that it
+//! is the same on every machine and for a resumed training.
 //!
 //! Hidden weights are numbered node by node here: weight (i, a) is i·n1 + a.
 
 mod cholesky;
+mod classes;
 mod conjugate;
-mod equations;
+mod elimination;
+mod plan;
 mod products;
 mod schur;
+#[cfg(test)]
+pub(super) mod tests;
 
-pub(super) use equations::{FactoredEquations, NormalEquations};
-pub(super) use schur::{Decay, OutputTraces, PerClass, Traces, class_sizes, class_squares};
+pub(super) use classes::{
+    Classes, HIDDEN_BIASES, HIDDEN_WEIGHTS, OUTPUT_BIASES, OUTPUT_WEIGHTS, class_sizes, class_squares, decay_slopes,
+};
+pub(super) use plan::Plan;
+pub(super) use schur::{OutputTraces, Traces};
 
-use conjugate::{ConjugateGradient, HiddenSolver};
+use conjugate::ConjugateGradient;
+use elimination::Elimination;
+use plan::Solution;
+use products::Sums;
 use schur::SchurComplement;
 
-use crate::{
-    network::Shape,
-    training::{
-        activations::KeptActivations,
-        examples::{BLOCK, InputPairs},
-        parallel::{LARGE, Work},
-    },
-};
+use super::{Evaluation, Examples, activations::KeptActivations, parallel::for_each_part};
+use crate::network::Mlp;
 
-/// Speed of the large products of the factored solver relative to the small ones of conjugate gradients.
-const SPEED: f64 = 2.0;
-
-/// Returns `true` if factoring is cheaper than conjugate gradients.
-pub(super) fn factoring_is_cheaper(shape: Shape, samples: usize) -> bool {
-    let factored = SchurComplement::cost(shape, samples);
-    let iterated = ConjugateGradient::cost(shape, samples);
-    factored.total() <= SPEED * iterated.total()
+/// Normal equations of a network and its examples: evaluated, gathered, and solved for any damping.
+pub(super) struct NormalEquations {
+    activations: KeptActivations,
+    /// Sums for each part of the samples; once gathered, the first contains the total.
+    parts: Vec<Sums>,
+    elimination: Elimination,
+    /// Right-hand side of the hidden layer, then its negative step, node by node.
+    right: Vec<f64>,
+    solver: Solver,
 }
 
-/// Cost of a solver for one network and number of samples.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::training) struct Cost {
-    pub(super) shape: Shape,
-    pub(super) samples: usize,
-    /// Multiplications per sample to gather BᵀB.
-    pub(super) gram_per_sample: f64,
-    /// Multiplications to solve once.
-    pub(super) solving: f64,
-    /// Entries of the solver's matrices.
-    pub(super) entries: usize,
-    /// Rows and columns of the entries of BᵀB that are gathered.
-    pub(super) gram: (usize, usize),
-    /// Entries per sample of the buffer for pairs of inputs.
-    pub(super) pairs: usize,
+/// Solver of S δ = r on W.
+enum Solver {
+    Factored(Box<SchurComplement>),
+    Iterated(Box<ConjugateGradient>),
 }
 
-/// Number of columns filled at a time, so that they stay in the cache.
-pub(super) const CHUNK: usize = 512;
-
-impl Cost {
-    /// Multiplications per sample to gather all products.
-    fn gathering_per_sample(&self) -> f64 {
-        let (n1, h) = (self.shape.inputs as f64 + 1.0, self.shape.hidden as f64);
-        self.gram_per_sample + n1 * h * (h + 1.0)
-    }
-
-    /// Multiplications to gather and to solve once.
-    pub(super) fn total(&self) -> f64 {
-        self.samples as f64 * self.gathering_per_sample() + self.solving
-    }
-
-    /// Number of parts of the samples in which the products are gathered.
-    pub(super) fn gathering_parts(&self, blocks: usize) -> usize {
-        let work = Work {
-            blocks,
-            multiplications: BLOCK * self.gathering_per_sample() as usize,
-            bytes: self.part_bytes(),
+impl NormalEquations {
+    /// Allocates for these examples.
+    pub(super) fn new(plan: &Plan, examples: &Examples) -> Self {
+        let (shape, blocks) = (plan.shape, examples.blocks().len());
+        let gathering = plan.gathering_parts(blocks);
+        let (solver, solving) = match plan.solution {
+            Solution::Factored => (Solver::Factored(Box::new(SchurComplement::new(shape))), 1),
+            Solution::Iterated => {
+                let solver = ConjugateGradient::new(shape, blocks);
+                let parts = solver.parts();
+                (Solver::Iterated(Box::new(solver)), parts)
+            }
         };
-        work.parts(LARGE)
-    }
-
-    /// Approximate memory in bytes of the equations, without the samples.
-    pub(super) fn bytes(&self) -> usize {
-        let matrices = self.entries.saturating_mul(size_of::<f64>());
-        let kept = KeptActivations::bytes(self.shape, self.samples)
-            + match self.pairs {
-                0 => 0,
-                _ => InputPairs::kept_bytes(self.shape.inputs, self.samples),
-            };
-        matrices.saturating_add(self.part_bytes()).saturating_add(kept)
-    }
-
-    /// Approximate memory in bytes of the products for each part of the samples.
-    fn part_bytes(&self) -> usize {
-        let (h, n1) = (self.shape.hidden, self.shape.inputs + 1);
-        let (rows, columns) = self.gram;
-        let buffers = BLOCK * (CHUNK.min(h * h) + 3 * h + n1 + self.pairs);
-        size_of::<f64>() * (rows * columns + self.shape.hidden_weights() * (h + 1) + buffers)
-    }
-}
-
-#[cfg(test)]
-pub(super) mod dense;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn typical_networks_are_factored_and_wide_ones_iterated() {
-        let is_factored = |inputs, hidden, outputs, samples| {
-            let shape = Shape {
-                inputs,
-                hidden,
-                outputs,
-            };
-            factoring_is_cheaper(shape, samples)
-        };
-        for samples in [100, 1000, 100_000] {
-            assert!(is_factored(30, 12, 20, samples), "{samples} samples");
+        Self {
+            activations: KeptActivations::new(shape, examples, gathering.max(solving)),
+            parts: (0..gathering).map(|_| Sums::new(plan, examples)).collect(),
+            elimination: Elimination::new(shape),
+            right: vec![0.0; shape.hidden_weights()],
+            solver,
         }
-        assert!(!is_factored(96, 64, 64, 2000));
-        assert!(!is_factored(1536, 512, 1024, 10_000));
+    }
+
+    /// Returns the mean squared error at the weights of `mlp`. Gathering at the same weights next does not run the
+    /// network a second time.
+    pub(super) fn mse(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
+        self.activations.evaluate(mlp, examples) / examples.errors()
+    }
+
+    /// Returns the sum of squared errors of each target at the weights of `mlp`.
+    pub(super) fn squares_of_targets(&mut self, mlp: &Mlp, examples: &Examples) -> Vec<f64> {
+        self.activations.squares_of_outputs(mlp, examples)
+    }
+
+    /// Gathers all products at the weights of `mlp`. If `precisions` ρ of the targets are given, they are the products
+    /// of the equations in which errors and output weights of target t are multiplied by √ρₜ: to solve them, pass a
+    /// network whose output weights are multiplied, too.
+    pub(super) fn gather(&mut self, mlp: &Mlp, precisions: &[f64], examples: &Examples) -> Evaluation {
+        let squares = self.activations.evaluate(mlp, examples);
+        // Of all products, only Jᵀe depends on the precisions.
+        let mut v = mlp.layers().1.to_vec();
+        for (weight, precision) in v.iter_mut().zip(precisions.iter().cycle()) {
+            *weight *= precision;
+        }
+        for_each_part(&mut self.parts, Sums::clear);
+        self.activations
+            .for_each_block(mlp, examples, &mut self.parts, |sums, now| {
+                sums.add_block(&v, now, examples);
+            });
+        let (sums, others) = self.parts.split_first_mut().expect("there is at least one part");
+        others.iter().for_each(|other| sums.add(other));
+        sums.scale_outputs(precisions);
+        let length = sums.gradient_w.squared_norm_l2() + sums.gradient_v.squared_norm_l2();
+        Evaluation {
+            mse: squares / examples.errors(),
+            gradient_norm: 2.0 * length.sqrt() / examples.errors(),
+        }
+    }
+
+    /// Solves `(JᵀJ + damping·I) δ = −(Jᵀe + decay)` from the products last gathered, at the same `mlp`, and writes the
+    /// step δ in the order of [`Mlp::weights`]. `decay` has the [`decay_slopes`] of all weights, or is empty. Returns
+    /// `None`, with `step` unspecified, if the damped equations are numerically singular: a larger damping is needed.
+    pub(super) fn solve(
+        &mut self,
+        mlp: &Mlp,
+        examples: &Examples,
+        damping: Classes,
+        decay: &[f64],
+        step: &mut [f64],
+    ) -> Option<()> {
+        let (sums, elimination, right) = (&self.parts[0], &mut self.elimination, &mut self.right);
+        elimination.factor(sums, damping)?;
+        elimination.reduce(sums, mlp, decay, right);
+        match &mut self.solver {
+            Solver::Factored(schur) => {
+                schur.factor(sums, elimination, mlp, damping)?;
+                schur.solve(right);
+            }
+            Solver::Iterated(conjugate) => {
+                conjugate.factor(sums, elimination, mlp, damping)?;
+                conjugate.solve(mlp, examples, &mut self.activations, right)?;
+            }
+        }
+        elimination.complete(sums, mlp, decay, right, step);
+        step.iter().all(|value| value.is_finite()).then_some(())
+    }
+
+    /// Returns the length of Jᵀe + `decay` from the products last gathered.
+    pub(super) fn gradient_length(&self, decay: &[f64]) -> f64 {
+        let sums = &self.parts[0];
+        // `hypot` avoids overflow of the squares when the error is negligible compared with the decay.
+        let w = (0..sums.gradient_w.ncols())
+            .flat_map(|node| (0..sums.gradient_w.nrows()).map(move |input| sums.right_w(decay, input, node)))
+            .fold(0.0, f64::hypot);
+        let v = (0..sums.gradient_v.ncols())
+            .flat_map(|output| (0..sums.gradient_v.nrows()).map(move |node| sums.right_v(decay, node, output)))
+            .fold(0.0, f64::hypot);
+        w.hypot(v)
+    }
+
+    /// Returns tr (JᵀJ + damping·I)⁻¹ from the products last gathered. Returns `None` if the matrix is not numerically
+    /// positive definite, or if it is not factored.
+    pub(super) fn trace_of_inverse(&mut self, mlp: &Mlp, damping: f64) -> Option<f64> {
+        let trace = self.of_inverse(mlp, [damping; 4], |schur, elimination| {
+            schur.trace_of_inverse(elimination, mlp)
+        })?;
+        trace.is_finite().then_some(trace)
+    }
+
+    /// Returns the contributions of weights to [`Self::trace_of_inverse`], with one damping per class.
+    pub(super) fn traces_of_inverse(&mut self, mlp: &Mlp, damping: Classes) -> Option<Traces> {
+        let traces = self.of_inverse(mlp, damping, |schur, elimination| {
+            schur.traces_of_inverse(elimination, mlp)
+        })?;
+        let is_finite = traces.classes().iter().all(|trace| trace.is_finite());
+        is_finite.then_some(traces)
+    }
+
+    /// Factors the matrix and computes what its inverse is needed for.
+    fn of_inverse<T>(
+        &mut self,
+        mlp: &Mlp,
+        damping: Classes,
+        compute: impl FnOnce(&mut SchurComplement, &mut Elimination) -> T,
+    ) -> Option<T> {
+        let (sums, elimination) = (&self.parts[0], &mut self.elimination);
+        let Solver::Factored(schur) = &mut self.solver else {
+            return None;
+        };
+        elimination.factor(sums, damping)?;
+        schur.factor(sums, elimination, mlp, damping)?;
+        Some(compute(schur, elimination))
     }
 }

@@ -1,172 +1,176 @@
-//! The products of which the equations consist, gathered from the samples block by block.
+//! The products of which the equations consist, summed over blocks of samples.
 
-use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
+use faer::{Mat, MatMut, MatRef};
 
-use super::{CHUNK, Cost, conjugate::HiddenSolver, equations::Sums};
+use super::plan::{CHUNK, Plan, Solution};
 use crate::{
-    network::{Mlp, Shape},
+    network::Shape,
     training::{
-        Evaluation, Examples,
-        activations::{BlockNow, KeptActivations, multiply, multiply_into, scale, tanh_slopes_into},
+        Examples,
+        activations::{BlockNow, multiply, multiply_into, scale, tanh_slopes_into},
         examples::{BLOCK, PairsBuffer, column, column_mut},
-        parallel::{add_product, for_each_part},
+        parallel::{accumulate_lower, add_product, product},
     },
 };
 
-/// Products summed over all samples.
-pub(super) struct Products {
-    /// Sums for each part of the samples; once gathered, the first contains the total.
-    parts: Vec<(Sums, BlockBuffers)>,
-}
-
-/// Buffers for one block of samples.
-struct BlockBuffers {
+/// Sums over samples, with buffers for one block of them.
+pub(super) struct Sums {
+    shape: Shape,
+    solution: Solution,
+    /// Entries of BᵀB that the solver needs: [`Plan::gram`].
+    pub(super) gram: Mat<f64>,
+    /// C: h·n1 × (h+1), column by column without gaps, so that it is also n1 × h(h+1).
+    c: Vec<f64>,
+    /// H̃ᵀH̃.
+    pub(super) g: Mat<f64>,
+    /// Jwᵀe: n1 × h.
+    pub(super) gradient_w: Mat<f64>,
+    /// Jvᵀe: (h+1) × outputs.
+    pub(super) gradient_v: Mat<f64>,
+    /// Pairs of inputs, if they are not kept.
     pairs: PairsBuffer,
     /// D: block × h.
     slopes: Mat<f64>,
-    /// Columns of a product: block × up to [`CHUNK`] or slightly more.
+    /// Columns of a product: block × up to [`CHUNK`].
     columns: Mat<f64>,
     /// Error at the hidden nodes' net input: block × h.
     delta: Mat<f64>,
 }
 
-impl BlockBuffers {
-    fn new(shape: Shape, pairs: PairsBuffer) -> Self {
-        let (h, n1) = (shape.hidden, shape.inputs + 1);
+impl Sums {
+    pub(super) fn new(plan: &Plan, examples: &Examples) -> Self {
+        let shape = plan.shape;
+        let (h, n1, h1) = (shape.hidden, shape.inputs + 1, shape.hidden + 1);
+        let (rows, columns) = plan.gram();
         Self {
-            pairs,
+            shape,
+            solution: plan.solution,
+            gram: Mat::zeros(rows, columns),
+            c: vec![0.0; h * n1 * h1],
+            g: Mat::zeros(h1, h1),
+            gradient_w: Mat::zeros(n1, h),
+            gradient_v: Mat::zeros(h1, shape.outputs),
+            pairs: match plan.solution {
+                Solution::Factored => examples.pairs_buffer(),
+                Solution::Iterated => PairsBuffer::unused(),
+            },
             slopes: Mat::zeros(BLOCK, h),
-            columns: Mat::zeros(BLOCK, (h * (h + 1)).min(CHUNK + h).max(n1)),
+            columns: Mat::zeros(BLOCK, (h * h1).min(CHUNK).max(n1)),
             delta: Mat::zeros(BLOCK, h),
         }
     }
-}
 
-impl Products {
-    /// Allocates for samples in this many `parts`.
-    pub(super) fn new<S: HiddenSolver + ?Sized>(solver: &S, cost: &Cost, parts: usize) -> Self {
-        let part = |_| {
-            let buffers = BlockBuffers::new(cost.shape, solver.pairs_buffer());
-            (Sums::new(cost.shape, cost.gram), buffers)
-        };
-        Self {
-            parts: (0..parts).map(part).collect(),
+    /// C: h·n1 × (h+1).
+    pub(super) fn c(&self) -> MatRef<'_, f64> {
+        MatRef::from_column_major_slice(&self.c, self.shape.hidden_weights(), self.shape.hidden + 1)
+    }
+
+    /// Entry of Jwᵀe + `decay`, which has an entry for each weight or is empty.
+    pub(super) fn right_w(&self, decay: &[f64], input: usize, node: usize) -> f64 {
+        let decay = decay.get(input * self.shape.hidden + node);
+        self.gradient_w[(input, node)] + decay.copied().unwrap_or_default()
+    }
+
+    /// Entry of Jvᵀe + `decay`, which has an entry for each weight or is empty.
+    pub(super) fn right_v(&self, decay: &[f64], node: usize, output: usize) -> f64 {
+        let decay = decay.get(self.shape.hidden_weights() + node * self.shape.outputs + output);
+        self.gradient_v[(node, output)] + decay.copied().unwrap_or_default()
+    }
+
+    fn sums(&mut self) -> [&mut Mat<f64>; 4] {
+        [&mut self.gram, &mut self.g, &mut self.gradient_w, &mut self.gradient_v]
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.c.fill(0.0);
+        self.sums().into_iter().for_each(|sum| sum.fill(0.0));
+    }
+
+    /// Adds the sums of another part.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.c.iter_mut().zip(&other.c).for_each(|(sum, value)| *sum += value);
+        let others = [&other.gram, &other.g, &other.gradient_w, &other.gradient_v];
+        self.sums()
+            .into_iter()
+            .zip(others)
+            .for_each(|(sum, other)| *sum += other);
+    }
+
+    /// Multiplies Jvᵀe by the roots of the targets' precisions.
+    pub(super) fn scale_outputs(&mut self, precisions: &[f64]) {
+        for (target, precision) in precisions.iter().enumerate() {
+            scale(column_mut(self.gradient_v.as_mut(), target), precision.sqrt());
         }
     }
 
-    /// Returns the sums last gathered.
-    pub(super) fn sums(&self) -> &Sums {
-        &self.parts[0].0
-    }
+    /// Adds a block of samples, with the weights `v` of the output layer from errors to hidden nodes.
+    pub(super) fn add_block(&mut self, v: &[f64], now: &BlockNow<'_>, examples: &Examples) {
+        let Shape {
+            inputs,
+            hidden: h,
+            outputs,
+        } = self.shape;
+        let (a, hidden, errors) = (now.block.inputs.as_ref(), now.hidden(), now.errors());
+        let mut slopes = self.slopes.as_mut().subrows_mut(0, now.block.samples());
+        let mut delta = self.delta.as_mut().subrows_mut(0, now.block.samples());
+        let mut columns = self.columns.as_mut().subrows_mut(0, now.block.samples());
+        for node in 0..h {
+            tanh_slopes_into(column_mut(slopes.as_mut(), node), column(hidden, node));
+        }
+        let slope = |node| column(slopes.as_ref(), node);
 
-    /// Gathers all products at the weights of `mlp`, block by block of samples. If `precisions` is not empty, they are
-    /// the products of the equations in which the errors and output weights of target t are multiplied by √ρₜ; only
-    /// Jᵀe depends on it.
-    pub(super) fn gather<S: HiddenSolver + ?Sized>(
-        &mut self,
-        solver: &S,
-        mlp: &Mlp,
-        precisions: &[f64],
-        examples: &Examples,
-        kept: &mut KeptActivations,
-    ) -> Evaluation {
-        let squares = kept.evaluate(mlp, examples);
-        let (Shape { hidden, outputs, .. }, v) = (mlp.shape(), &mlp.layers().1);
-        let weighted: Vec<f64> = if precisions.is_empty() {
-            Vec::new()
-        } else {
-            v.iter()
-                .zip(precisions.iter().cycle())
-                .map(|(v, precision)| v * precision)
-                .collect()
-        };
-        let v = if precisions.is_empty() { v } else { &weighted[..] };
-        let v = MatRef::from_row_major_slice(v, hidden + 1, outputs).subrows(0, hidden);
-        for_each_part(&mut self.parts, |(sums, _)| sums.clear());
-        kept.for_each_block(mlp, examples, &mut self.parts, |(sums, buffers), now| {
-            sums.add_second_order(solver, now, buffers);
-            sums.add_gradient(now, v, buffers);
-        });
-        if let [(sums, _), others @ ..] = self.parts.as_mut_slice() {
-            others.iter().for_each(|(other, _)| sums.add(other));
-            for (target, precision) in precisions.iter().enumerate() {
-                scale(column_mut(sums.gradient_v.as_mut(), target), precision.sqrt());
+        match self.solution {
+            Solution::Factored => {
+                let pairs = examples.input_pairs(now.number, &mut self.pairs);
+                let nodes = (0..h).flat_map(|i| (0..=i).map(move |j| (i, j)));
+                let factors = nodes.map(|(i, j)| (slope(i), slope(j)));
+                add_products(self.gram.as_mut(), pairs, columns.as_mut(), factors);
+            }
+            Solution::Iterated => {
+                // AᵀDᵢ²A for each node i.
+                for node in 0..h {
+                    let mut weighted = columns.as_mut().subcols_mut(0, inputs + 1);
+                    for input in 0..=inputs {
+                        multiply_into(column_mut(weighted.as_mut(), input), slope(node), column(a, input));
+                    }
+                    let sum = self.gram.as_mut().subcols_mut(node * (inputs + 1), inputs + 1);
+                    accumulate_lower(sum, weighted.as_ref().transpose(), weighted.as_ref(), 1.0);
+                }
             }
         }
-        let sums = self.sums();
-        let length = sums.gradient_w.squared_norm_l2() + sums.gradient_v.squared_norm_l2();
-        Evaluation {
-            mse: squares / examples.errors(),
-            gradient_norm: 2.0 * length.sqrt() / examples.errors(),
-        }
-    }
-}
-
-impl Sums {
-    /// Adds a block to BᵀB, C and H̃ᵀH̃; leaves its slopes in their buffer.
-    fn add_second_order<S: HiddenSolver + ?Sized>(
-        &mut self,
-        solver: &S,
-        now: &BlockNow<'_>,
-        buffers: &mut BlockBuffers,
-    ) {
-        let (hidden, samples) = (now.hidden(), now.block.samples());
-        let mut slopes = buffers.slopes.as_mut().subrows_mut(0, samples);
-        for i in 0..self.shape.hidden {
-            tanh_slopes_into(column_mut(slopes.as_mut(), i), column(hidden, i));
-        }
-        let slopes = slopes.as_ref();
-        let mut columns = buffers.columns.as_mut().subrows_mut(0, samples);
-        solver.add_gram(&mut self.gram, now, slopes, columns.as_mut(), &mut buffers.pairs);
-        self.add_c(now.block.inputs.as_ref(), hidden, slopes, columns);
+        // Column q·h + i of C has the factors Dᵢ and H̃_q.
+        let c = MatMut::from_column_major_slice_mut(&mut self.c, inputs + 1, h * (h + 1));
+        let nodes = (0..=h).flat_map(|q| (0..h).map(move |i| (i, q)));
+        let factors = nodes.map(|(i, q)| (slope(i), column(hidden, q)));
+        add_products(c, a.transpose(), columns, factors);
         add_product(self.g.as_mut(), hidden.transpose(), hidden, 1.0);
-    }
 
-    /// Adds to C column by column: Dᵢ∘H̃_q is column q·h + i.
-    fn add_c(
-        &mut self,
-        inputs: MatRef<'_, f64>,
-        hidden: MatRef<'_, f64>,
-        slopes: MatRef<'_, f64>,
-        mut columns: MatMut<'_, f64>,
-    ) {
-        let (h, h1, n1) = (self.shape.hidden, self.shape.hidden + 1, self.shape.inputs + 1);
-        let (mut first, mut filled) = (0, 0);
-        for q in 0..h1 {
-            for i in 0..h {
-                multiply_into(
-                    column_mut(columns.as_mut(), filled + i),
-                    column(slopes, i),
-                    column(hidden, q),
-                );
-            }
-            filled += h;
-            if filled >= CHUNK || q == h {
-                let c = MatMut::from_column_major_slice_mut(&mut self.c, n1, h * h1);
-                let sum = c.subcols_mut(first, filled);
-                add_product(sum, inputs.transpose(), columns.as_ref().subcols(0, filled), 1.0);
-                (first, filled) = (first + filled, 0);
-            }
-        }
-    }
-
-    /// Adds a block to Jwᵀe, with the weights `v` (h × outputs) from errors to hidden nodes, and to Jvᵀe; its slopes
-    /// must still be in their buffer.
-    fn add_gradient(&mut self, now: &BlockNow<'_>, v: MatRef<'_, f64>, buffers: &mut BlockBuffers) {
-        let (hidden, errors, samples) = (now.hidden(), now.errors(), now.block.samples());
         add_product(self.gradient_v.as_mut(), hidden.transpose(), errors, 1.0);
-        let mut delta = buffers.delta.as_mut().subrows_mut(0, samples);
-        matmul(delta.as_mut(), Accum::Replace, errors, v.transpose(), 1.0, Par::Seq);
-        let slopes = buffers.slopes.as_ref().subrows(0, samples);
-        for node in 0..self.shape.hidden {
-            multiply(column_mut(delta.as_mut(), node), column(slopes, node));
+        let v = MatRef::from_row_major_slice(v, h + 1, outputs).subrows(0, h);
+        product(delta.as_mut(), errors, v.transpose());
+        for node in 0..h {
+            multiply(column_mut(delta.as_mut(), node), slope(node));
         }
-        add_product(
-            self.gradient_w.as_mut(),
-            now.block.inputs.transpose(),
-            delta.as_ref(),
-            1.0,
-        );
+        add_product(self.gradient_w.as_mut(), a.transpose(), delta.as_ref(), 1.0);
+    }
+}
+
+/// Adds `left` times the matrix whose columns are the elementwise products of `factors`, as many columns at a time as
+/// the buffer `columns` has.
+fn add_products<'a>(
+    mut sum: MatMut<'_, f64>,
+    left: MatRef<'_, f64>,
+    mut columns: MatMut<'_, f64>,
+    mut factors: impl Iterator<Item = (&'a [f64], &'a [f64])>,
+) {
+    let width = columns.ncols();
+    for first in (0..sum.ncols()).step_by(width) {
+        let count = width.min(sum.ncols() - first);
+        for (index, (a, b)) in factors.by_ref().take(count).enumerate() {
+            multiply_into(column_mut(columns.as_mut(), index), a, b);
+        }
+        let right = columns.as_ref().subcols(0, count);
+        add_product(sum.as_mut().subcols_mut(first, count), left, right, 1.0);
     }
 }
 
@@ -174,29 +178,16 @@ impl Sums {
 mod tests {
     use super::{
         super::{
-            cholesky::output_weights,
-            conjugate::ConjugateGradient,
-            dense::{errors, jacobian},
-            schur::SchurComplement,
+            NormalEquations,
+            elimination::output_weights,
+            schur::unpack,
+            tests::dense::{errors, jacobian},
         },
         *,
     };
-    use crate::training::examples::{
-        InputPairs,
-        tests::{random_examples, random_mlp},
-    };
+    use crate::training::examples::tests::{random_examples, random_mlp};
 
-    /// Returns the products gathered for one of the solvers.
-    fn gathered<S: HiddenSolver>(mlp: &Mlp, examples: &Examples) -> Products {
-        let solver = S::new(mlp.shape(), examples);
-        let cost = S::cost(mlp.shape(), examples.samples());
-        let mut products = Products::new(&solver, &cost, 2);
-        let mut kept = KeptActivations::new(mlp.shape(), examples, 2);
-        products.gather(&solver, mlp, &[], examples, &mut kept);
-        products
-    }
-
-    /// Compares JᵀJ and Jᵀe entry by entry, for more than one block of samples in two parts.
+    /// Compares JᵀJ and Jᵀe entry by entry, for more than one block of samples.
     #[test]
     fn the_products_agree_with_the_dense_jacobian() {
         let (mlp, examples) = (random_mlp(5, 4, 3, 1), random_examples(2 * BLOCK + 44, 5, 3, 2));
@@ -210,17 +201,18 @@ mod tests {
                 "{what}: {ours} {dense}"
             );
         };
-        let (factored, iterated) = (
-            gathered::<SchurComplement>(&mlp, &examples),
-            gathered::<ConjugateGradient>(&mlp, &examples),
-        );
+        let [factored, iterated] = [Plan::factored, Plan::iterated].map(|plan| {
+            let mut equations = NormalEquations::new(&plan(mlp.shape(), examples.samples()), &examples);
+            equations.gather(&mlp, &[], &examples);
+            equations.parts.swap_remove(0)
+        });
         let v = output_weights(&mlp);
         let mixing = v * v.transpose();
         let (hidden, output) = (
             |i: usize, a: usize| a * h + i,
             |q: usize, t: usize| h * n1 + q * outputs + t,
         );
-        for sums in [factored.sums(), iterated.sums()] {
+        for sums in [&factored, &iterated] {
             for (i, a) in (0..h).flat_map(|i| (0..n1).map(move |a| (i, a))) {
                 close("gradient of W", sums.gradient_w[(a, i)], gradient[(hidden(i, a), 0)]);
                 for (q, t) in (0..h1).flat_map(|q| (0..outputs).map(move |t| (q, t))) {
@@ -237,16 +229,12 @@ mod tests {
         }
         let mut square = vec![0.0; n1 * n1];
         for (i, j) in (0..h).flat_map(|i| (0..=i).map(move |j| (i, j))) {
-            InputPairs::unpack(
-                column(factored.sums().gram.as_ref(), i * (i + 1) / 2 + j),
-                n1,
-                &mut square,
-            );
+            unpack(column(factored.gram.as_ref(), i * (i + 1) / 2 + j), n1, &mut square);
             for (a, b) in (0..n1).flat_map(|a| (0..n1).map(move |b| (a, b))) {
                 let dense = normal[(hidden(i, a), hidden(j, b))];
                 close("all of BᵀB", mixing[(i, j)] * square[b * n1 + a], dense);
                 if i == j && a >= b {
-                    let ours = mixing[(i, i)] * iterated.sums().gram[(a, i * n1 + b)];
+                    let ours = mixing[(i, i)] * iterated.gram[(a, i * n1 + b)];
                     close("blocks of BᵀB", ours, dense);
                 }
             }

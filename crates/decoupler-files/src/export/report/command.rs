@@ -264,19 +264,18 @@ impl Command {
         self.option("starts", settings.starts, default.starts);
         self.option("begin", settings.initialization, default.initialization);
         self.option("combine", settings.combine, default.combine);
-        let (mut method, mut usual_method) = (settings.training.method, default.training.method);
+        let (method, usual_method) = (settings.training.method, default.training.method);
         self.option("method", method.short_name(), usual_method.short_name());
-        let is_usual = method.short_name() == usual_method.short_name();
-        let usual_settings = usual_method.settings();
-        for (place, setting) in method.settings().into_iter().enumerate() {
-            // The default method of recordings has different settings.
-            let usual = if is_usual {
-                *usual_settings[place].value
-            } else {
-                setting.default
-            };
-            if setting.value.to_bits() != usual.to_bits() {
-                self.add("set", format!("{}={}", setting.name.replace(' ', "-"), setting.value));
+        // The default method of recordings has different settings.
+        let usual = if method.short_name() == usual_method.short_name() {
+            usual_method
+        } else {
+            method.with_defaults()
+        };
+        for setting in method.settings() {
+            let [value, usual] = [method, usual].map(|method| setting.number(&method).unwrap_or(f64::NAN));
+            if value.to_bits() != usual.to_bits() {
+                self.add("set", format!("{}={value}", setting.word("-")));
             }
         }
         let mut usual = *default;

@@ -8,6 +8,7 @@ use decoupler_core::{
         experiments::{Axis, AxisKind, Experiment},
     },
     scene::{NoisySets, RowModel, Rows},
+    settings,
     text::in_one_line,
     training::Method,
 };
@@ -191,22 +192,12 @@ fn option(kind: AxisKind) -> &'static str {
 }
 
 fn values(axis: &Axis) -> Value {
-    match axis {
-        Axis::Hidden(values) | Axis::Samples(values) | Axis::Epochs(values) | Axis::Starts(values) => {
-            values.iter().copied().collect()
-        }
-        Axis::Noise(values) => values.iter().copied().collect(),
-        Axis::Inputs(values) => texts(values),
-        Axis::Scaling(values) => texts(values),
-        Axis::Split(values) => texts(values),
-        Axis::Array(scales) => scales.iter().map(|scale| scale.to_string().replace('×', "x")).collect(),
-        Axis::Method(methods) => methods.iter().map(|method| method.short_name()).collect(),
-        Axis::Seed(seeds) => seeds.iter().map(|seed| seed.0).collect(),
-    }
-}
-
-fn texts(values: &[impl ToString]) -> Value {
-    values.iter().map(ToString::to_string).collect()
+    let value = |value: &settings::Value| match value {
+        settings::Value::Number(value) => Value::from(*value),
+        settings::Value::Integer(value) => Value::from(*value),
+        settings::Value::Text(value) => Value::from(value.replace('×', "x")),
+    };
+    axis.values().iter().map(value).collect()
 }
 
 /// Returns the decoders in the order in which they are offered, without duplicates: order and duplicates change no
@@ -320,11 +311,10 @@ fn text(value: &dyn ToString) -> Value {
     Value::from(value.to_string())
 }
 
-fn method_settings(mut method: Method) -> Value {
-    let settings = method.settings();
-    let pairs = settings.iter().map(|setting| {
-        let value = Value::from(*setting.value + 0.0);
-        format!("{}={value}", setting.name.replace(' ', "-"))
+fn method_settings(method: Method) -> Value {
+    let pairs = method.settings().filter_map(|setting| {
+        let value = number(setting.number(&method)?);
+        Some(format!("{}={value}", setting.word("-")))
     });
     pairs.collect()
 }

@@ -80,9 +80,9 @@ pub(super) fn chosen_training_ui(ui: &mut Ui, chosen: Option<&RunSettings>) {
     });
     fold_ui(ui, "Method settings", &summary(chosen.map(of_method)), |ui| {
         if let Some(settings) = chosen {
-            let mut method = settings.training.method;
+            let method = settings.training.method;
             for setting in method.settings() {
-                chosen_ui(ui, &capitalised(setting.name), Some(input_text(*setting.value)));
+                chosen_ui(ui, &capitalised(setting.name), setting.number(&method).map(input_text));
             }
         }
         chosen_ui(ui, "Starts", chosen.map(|settings| settings.starts.to_string()));

@@ -379,9 +379,9 @@ pub(super) fn of_stopping(training: &TrainingSettings) -> String {
 
 /// The first of the method's own settings, and the number of starts.
 pub(super) fn of_method<S>(settings: &RunSettings<S>) -> String {
-    let mut method = settings.training.method;
-    let first = method.settings().into_iter().next();
-    let first = first.map(|setting| format!("{} {}, ", setting.name, input_text(*setting.value)));
+    let method = settings.training.method;
+    let first = method.settings().next();
+    let first = first.and_then(|setting| Some(format!("{} {}, ", setting.name, input_text(setting.number(&method)?))));
     let starts = counted(settings.starts, "start");
     format!("{}{starts}", first.unwrap_or_default())
 }

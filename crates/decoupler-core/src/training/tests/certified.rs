@@ -1,7 +1,7 @@
 //! Test of the damping on problems with certified solutions: the nonlinear regressions of NIST's Statistical Reference
 //! Datasets, each from both of its starting points.
 //!
-//! Steps follow [`LevenbergMarquardt`](super::levenberg_marquardt), with the default damping and the same rule, until
+//! Steps follow [`LevenbergMarquardt`](crate::training::levenberg_marquardt), with the default damping and the same rule, until
 //! no step lowers the error. Only the equations differ: those of networks consist of products that other models lack,
 //! so here J is formed explicitly and the step is found by QR decomposition. The weights of a network are of order 1;
 //! so are these parameters, which are in units of their starting values.
@@ -17,7 +17,7 @@ use std::{
 use faer::{Mat, prelude::SolveLstsq};
 use serde::Deserialize;
 
-use super::{Damping, StopReason};
+use crate::training::{Damping, StopReason};
 
 #[derive(Deserialize)]
 struct Certified {
@@ -128,7 +128,7 @@ fn correct_digits(found: &[f64], certified: &[f64]) -> f64 {
 /// The best published solver reaches 9.4 digits on average.
 #[test]
 fn certified_parameters_are_found_to_more_than_nine_digits() {
-    let text = include_str!("../../tests/certified/nist_strd.json");
+    let text = include_str!("../../../tests/certified/nist_strd.json");
     let problems = serde_json::from_str::<Certified>(text).unwrap().problems;
     assert_eq!(problems.len(), 27);
     let mut table = String::new();
@@ -161,10 +161,10 @@ fn certified_parameters_are_found_to_more_than_nine_digits() {
 }
 
 /// A response from parameters and predictors.
-pub(super) type Model = fn(&[Dual], &[f64]) -> Dual;
+type Model = fn(&[Dual], &[f64]) -> Dual;
 
 /// Returns the model of the problem with this name.
-pub(super) fn model(name: &str) -> Model {
+fn model(name: &str) -> Model {
     match name {
         "Misra1a" | "BoxBOD" => |b, x| b[0] * (1.0 - (-b[1] * x[0]).exp()),
         "Misra1b" => |b, x| b[0] * (1.0 - 1.0 / (1.0 + b[1] * x[0] / 2.0).square()),
@@ -211,21 +211,21 @@ fn polynomial(coefficients: &[Dual], x: f64) -> Dual {
 }
 
 /// Maximum number of parameters of a problem.
-pub(super) const MAX_PARAMETERS: usize = 9;
+const MAX_PARAMETERS: usize = 9;
 
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Dual {
-    pub(super) value: f64,
-    pub(super) slopes: [f64; MAX_PARAMETERS],
+struct Dual {
+    value: f64,
+    slopes: [f64; MAX_PARAMETERS],
 }
 
 impl Dual {
-    pub(super) fn constant(value: f64) -> Self {
+    fn constant(value: f64) -> Self {
         let slopes = [0.0; MAX_PARAMETERS];
         Self { value, slopes }
     }
 
-    pub(super) fn parameter(index: usize, value: f64) -> Self {
+    fn parameter(index: usize, value: f64) -> Self {
         let mut parameter = Self::constant(value);
         parameter.slopes[index] = 1.0;
         parameter
@@ -242,28 +242,28 @@ impl Dual {
         Self { value, slopes }
     }
 
-    pub(super) fn exp(self) -> Self {
+    fn exp(self) -> Self {
         let value = self.value.exp();
         self.chain(value, value)
     }
 
-    pub(super) fn sin(self) -> Self {
+    fn sin(self) -> Self {
         self.chain(self.value.sin(), self.value.cos())
     }
 
-    pub(super) fn cos(self) -> Self {
+    fn cos(self) -> Self {
         self.chain(self.value.cos(), -self.value.sin())
     }
 
-    pub(super) fn atan(self) -> Self {
+    fn atan(self) -> Self {
         self.chain(self.value.atan(), 1.0 / (1.0 + self.value * self.value))
     }
 
-    pub(super) fn square(self) -> Self {
+    fn square(self) -> Self {
         self * self
     }
 
-    pub(super) fn pow(self, exponent: Self) -> Self {
+    fn pow(self, exponent: Self) -> Self {
         let value = self.value.powf(exponent.value);
         let by_base = exponent.value * self.value.powf(exponent.value - 1.0);
         self.combined(exponent, value, by_base, value * self.value.ln())

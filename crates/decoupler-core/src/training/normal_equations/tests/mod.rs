@@ -1,36 +1,32 @@
 use faer::linalg::solvers::DenseSolveCore;
 
-use super::{
-    super::dense::{DampedLeastSquares, distance, errors, jacobian},
-    *,
-};
-use crate::training::{
-    activations::Backpropagation,
-    examples::tests::{random_examples, random_mlp},
+pub(in crate::training) mod dense;
+
+use self::dense::{DampedLeastSquares, distance, errors, jacobian};
+use super::*;
+use crate::{
+    network::Shape,
+    training::{
+        activations::Backpropagation,
+        examples::tests::{random_examples, random_mlp},
+    },
 };
 
-/// Returns every solver with its name.
+/// Returns the equations with every solver, and its name.
 fn solvers(shape: Shape, examples: &Examples) -> [(&'static str, NormalEquations); 2] {
-    let samples = examples.samples();
-    let factored = NormalEquations::<dyn HiddenSolver>::with_solver(
-        Box::new(SchurComplement::new(shape, examples)),
-        &SchurComplement::cost(shape, samples),
-        examples,
-    );
-    let iterated = NormalEquations::<dyn HiddenSolver>::with_solver(
-        Box::new(ConjugateGradient::new(shape, examples)),
-        &ConjugateGradient::cost(shape, samples),
-        examples,
-    );
-    [("factored", factored), ("conjugate gradients", iterated)]
+    let plans = [
+        ("factored", Plan::factored(shape, examples.samples())),
+        ("conjugate gradients", Plan::iterated(shape, examples.samples())),
+    ];
+    plans.map(|(name, plan)| (name, NormalEquations::new(&plan, examples)))
 }
 
 /// Returns the step at damping `mu`, solved as after a rejected step: another network was evaluated in between.
 fn step(equations: &mut NormalEquations, mlp: &Mlp, examples: &Examples, mu: f64) -> Option<Vec<f64>> {
-    equations.gather(mlp, examples);
+    equations.gather(mlp, &[], examples);
     equations.mse(&Mlp::zeros(mlp.shape()), examples);
     let mut step = vec![0.0; mlp.weights().len()];
-    equations.solve(mlp, examples, mu, &mut step)?;
+    equations.solve(mlp, examples, [mu; 4], &[], &mut step)?;
     Some(step)
 }
 
@@ -86,12 +82,7 @@ fn every_class_of_weights_decays_at_its_own_rate() {
         random_mlp(inputs, hidden, outputs, 1),
         random_examples(300, inputs, outputs, 2),
     );
-    let rates = PerClass {
-        hidden_weights: 0.3,
-        hidden_biases: 7.0,
-        output_weights: 0.05,
-        output_biases: 40.0,
-    };
+    let rates = [0.3, 7.0, 0.05, 40.0];
     let (biases, damping) = ([0.5, -0.3, 0.1], rates.map(|rate| rate + 0.2));
     let class = |weight: usize| match weight {
         0..20 => 0,
@@ -103,24 +94,22 @@ fn every_class_of_weights_decays_at_its_own_rate() {
     let mut matrix = jacobian.transpose() * &jacobian;
     let mut right = jacobian.transpose() * &errors;
     for (index, weight) in mlp.weights().iter().enumerate() {
-        matrix[(index, index)] += damping.values()[class(index)];
+        matrix[(index, index)] += damping[class(index)];
         let towards = if index < 36 { 0.0 } else { biases[index - 36] };
-        right[(index, 0)] += rates.values()[class(index)] * (weight - towards);
+        right[(index, 0)] += rates[class(index)] * (weight - towards);
     }
     let inverse = matrix.partial_piv_lu().inverse();
     let step = &inverse * &right;
 
-    let mut equations = NormalEquations::factored(mlp.shape(), &examples);
-    equations.gather(&mlp, &examples);
-    let (decay, mut ours) = (Decay::new(rates, &biases), vec![0.0; mlp.weights().len()]);
-    equations
-        .solve_with_decay(&mlp, &examples, damping, decay, &mut ours)
-        .unwrap();
+    let mut equations = NormalEquations::new(&Plan::factored(mlp.shape(), examples.samples()), &examples);
+    equations.gather(&mlp, &[], &examples);
+    let (decay, mut ours) = (decay_slopes(&mlp, rates, &biases), vec![0.0; mlp.weights().len()]);
+    equations.solve(&mlp, &examples, damping, &decay, &mut ours).unwrap();
     let expected: Vec<f64> = (0..ours.len()).map(|index| -step[(index, 0)]).collect();
     assert!(distance(&ours, &expected) < 1e-11, "{:e}", distance(&ours, &expected));
-    let length = equations.gradient_length(&mlp, decay);
+    let length = equations.gradient_length(&decay);
     assert!((length / right.norm_l2() - 1.0).abs() < 1e-12, "{length}");
-    let traces = equations.traces_of_inverse(&mlp, damping).unwrap().classes().values();
+    let traces = equations.traces_of_inverse(&mlp, damping).unwrap().classes();
     let mut expected = [0.0; 4];
     (0..ours.len()).for_each(|index| expected[class(index)] += inverse[(index, index)]);
     for (ours, expected) in traces.iter().zip(expected) {
@@ -128,10 +117,9 @@ fn every_class_of_weights_decays_at_its_own_rate() {
     }
     let whole = equations.trace_of_inverse(&mlp, 0.7).unwrap();
     let parts: f64 = equations
-        .traces_of_inverse(&mlp, PerClass::all(0.7))
+        .traces_of_inverse(&mlp, [0.7; 4])
         .unwrap()
         .classes()
-        .values()
         .iter()
         .sum();
     assert!((whole / parts - 1.0).abs() < 1e-13);
@@ -143,10 +131,10 @@ fn parts_of_the_samples_add_up() {
     let (mlp, examples) = (random_mlp(20, 12, 5, 3), random_examples(40_000, 20, 5, 4));
     let expected = Backpropagation::new(&mlp).evaluate(&mlp, &examples);
     let blocks = examples.blocks().len();
-    assert!(SchurComplement::cost(mlp.shape(), 40_000).gathering_parts(blocks) > 1);
-    assert!(ConjugateGradient::cost(mlp.shape(), 40_000).gathering_parts(blocks) > 1);
+    assert!(Plan::factored(mlp.shape(), 40_000).gathering_parts(blocks) > 1);
+    assert!(Plan::iterated(mlp.shape(), 40_000).gathering_parts(blocks) > 1);
     let [factored, iterated] = solvers(mlp.shape(), &examples).map(|(name, mut equations)| {
-        let ours = equations.gather(&mlp, &examples);
+        let ours = equations.gather(&mlp, &[], &examples);
         assert!((ours.gradient_norm - expected.gradient_norm).abs() < 1e-13, "{name}");
         step(&mut equations, &mlp, &examples, 1.0).unwrap()
     });
@@ -159,7 +147,7 @@ fn parts_of_the_samples_add_up() {
 fn the_evaluation_agrees_with_back_propagation() {
     let mlp = random_mlp(6, 5, 4, 3);
     let examples = random_examples(400, 6, 4, 4);
-    let ours = NormalEquations::cheapest(mlp.shape(), &examples).gather(&mlp, &examples);
+    let ours = NormalEquations::new(&Plan::cheapest(mlp.shape(), 400), &examples).gather(&mlp, &[], &examples);
     let expected = Backpropagation::new(&mlp).evaluate(&mlp, &examples);
     assert!((ours.mse - expected.mse).abs() < 1e-14);
     assert!((ours.gradient_norm - expected.gradient_norm).abs() < 1e-14);

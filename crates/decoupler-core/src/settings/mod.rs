@@ -1,0 +1,14 @@
+//! The table of settings: each row names a setting, explains it, and gives access to its value. Options, fields, axes,
+//! reports and checks are loops over these rows, so a new setting is one row.
+
+mod method;
+mod rows;
+mod training;
+
+pub use method::{
+    AdaptiveDescentSettings, Damping, GradientDescentSettings, Method, MomentumSettings, RegularizationSettings,
+    ResilientSettings, ScaledConjugateGradientSettings, StepMomentumSettings,
+};
+pub use rows::{AsText, Field, Kind, Setting, SettingError, Value};
+pub(crate) use training::MIN_MU;
+pub use training::{EPOCHS, METHOD, STOPPING, StoppingRules, TrainingSettings};

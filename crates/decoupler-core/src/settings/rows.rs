@@ -1,0 +1,323 @@
+//! A row of the table, and the values it gives access to.
+
+use std::{
+    fmt::{self, Display},
+    ops::RangeInclusive,
+    str::FromStr,
+};
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::Method;
+use crate::sensor::short;
+
+/// A setting of `S`: a row of a table.
+#[derive(Clone, Copy, Debug)]
+pub struct Setting<S: 'static> {
+    /// Name in sentences, in lower case; options and keywords put dashes or underscores for its spaces.
+    pub name: &'static str,
+    /// Heading under which it is listed.
+    pub heading: &'static str,
+    /// Explanation, in one or two sentences.
+    pub help: &'static str,
+    /// Allowed values.
+    pub kind: Kind,
+    /// Gives access to the value; `None` where the setting does not apply.
+    pub field: fn(&mut S) -> Option<Field<'_>>,
+}
+
+/// Allowed values of a setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// Number with its unit (empty for none) and its smallest and largest value.
+    Number(&'static str, f64, f64),
+    /// Integer with its smallest and largest value.
+    Integer(u64, u64),
+    /// One of the names, as [`Field::Text`] lists them in its error.
+    Choice,
+    /// Text of a form of its own, such as an array scale.
+    Text,
+}
+
+/// Access to the value of a setting.
+pub enum Field<'a> {
+    /// Number; an integer if the [kind](Setting::kind) is [`Kind::Integer`].
+    Number(&'a mut f64),
+    /// Number of things.
+    Count(&'a mut usize),
+    /// Integer of 64 bits, such as a seed.
+    Integer(&'a mut u64),
+    /// Name or text.
+    Text(&'a mut dyn AsText),
+}
+
+/// Value that is read and written as text.
+pub trait AsText {
+    /// Returns the value as text.
+    fn text(&self) -> String;
+
+    /// Reads the value from text.
+    ///
+    /// # Errors
+    /// A sentence that says what is possible instead.
+    fn read(&mut self, text: &str) -> Result<(), String>;
+}
+
+impl AsText for Method {
+    fn text(&self) -> String {
+        self.short_name().to_owned()
+    }
+
+    fn read(&mut self, text: &str) -> Result<(), String> {
+        *self = Self::named(text).map_err(|error| error.to_string())?;
+        Ok(())
+    }
+}
+
+impl<T: Display + FromStr<Err: Display>> AsText for T {
+    fn text(&self) -> String {
+        self.to_string()
+    }
+
+    fn read(&mut self, text: &str) -> Result<(), String> {
+        *self = text.parse().map_err(|error: T::Err| error.to_string())?;
+        Ok(())
+    }
+}
+
+/// Value of a setting.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Value {
+    /// Integer.
+    Integer(u64),
+    /// Number.
+    Number(f64),
+    /// Name or text.
+    Text(String),
+}
+
+impl Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(value) => value.fmt(f),
+            Self::Integer(value) => value.fmt(f),
+            Self::Text(value) => f.pad(value),
+        }
+    }
+}
+
+/// Error for an invalid setting.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SettingError {
+    /// A setting is out of its range.
+    #[error("{name} is {}: it must be from {} to {}", short(*.value), short(*.range.start()), short(*.range.end()))]
+    Range {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Allowed values.
+        range: RangeInclusive<f64>,
+    },
+    /// An integer setting has a fraction.
+    #[error("{name} is {}: it must be a whole number", short(*.value))]
+    NotWhole {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// An initial value is above the largest that the method may reach.
+    #[error(
+        "{name} is {}, above {limit_name}, which is {}: lower {name}, or raise {limit_name}",
+        short(*.value), short(*.limit)
+    )]
+    AboveLimit {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Name of the setting that limits it.
+        limit_name: &'static str,
+        /// Value of the limit.
+        limit: f64,
+    },
+    /// A text is not a value of the setting.
+    #[error("{name}: {message}")]
+    Text {
+        /// Name of the setting.
+        name: &'static str,
+        /// What is wrong, and what is possible instead.
+        message: String,
+    },
+}
+
+impl<S: Clone> Setting<S> {
+    /// Returns `true` if `of` has this setting.
+    pub fn applies(&self, of: &S) -> bool {
+        (self.field)(&mut of.clone()).is_some()
+    }
+
+    /// Returns the value, if `of` has this setting.
+    pub fn get(&self, of: &S) -> Option<Value> {
+        Some(match (self.field)(&mut of.clone())? {
+            Field::Number(value) => Value::Number(*value),
+            Field::Count(value) => Value::Integer(*value as u64),
+            Field::Integer(value) => Value::Integer(*value),
+            Field::Text(value) => Value::Text(value.text()),
+        })
+    }
+
+    /// Returns the value of a numeric setting, if `of` has it.
+    pub fn number(&self, of: &S) -> Option<f64> {
+        match self.get(of)? {
+            Value::Number(value) => Some(value),
+            Value::Integer(value) => Some(value as f64),
+            Value::Text(_) => None,
+        }
+    }
+
+    /// Sets the value, unless `of` does not have this setting. The range of a number is checked by [`Self::check`].
+    ///
+    /// # Errors
+    /// If the value has another type, or is not one of the names.
+    pub fn set(&self, of: &mut S, value: &Value) -> Result<(), SettingError> {
+        match ((self.field)(of), value) {
+            (None, _) => {}
+            (Some(Field::Number(field)), Value::Number(value)) => *field = *value,
+            (Some(Field::Number(field)), Value::Integer(value)) => *field = *value as f64,
+            (Some(Field::Count(field)), Value::Integer(value)) => {
+                *field = usize::try_from(*value).unwrap_or(usize::MAX);
+            }
+            (Some(Field::Integer(field)), Value::Integer(value)) => *field = *value,
+            (Some(Field::Text(field)), Value::Text(text)) => {
+                let name = self.name;
+                field
+                    .read(text)
+                    .map_err(|message| SettingError::Text { name, message })?;
+            }
+            (Some(_), value) => {
+                let (name, message) = (self.name, format!("'{value}' is not {}", self.kind));
+                return Err(SettingError::Text { name, message });
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that the value is in range; NaN is always out of range.
+    ///
+    /// # Errors
+    /// If the value is out of range.
+    pub fn check(&self, of: &S) -> Result<(), SettingError> {
+        let Some((value, range)) = self.number(of).zip(self.range()) else {
+            return Ok(());
+        };
+        let name = self.name;
+        if !range.contains(&value) {
+            return Err(SettingError::Range { name, value, range });
+        }
+        if matches!(self.kind, Kind::Integer(..)) && value.fract() != 0.0 {
+            return Err(SettingError::NotWhole { name, value });
+        }
+        Ok(())
+    }
+}
+
+impl<S> Setting<S> {
+    /// Returns the allowed values of a number.
+    pub fn range(&self) -> Option<RangeInclusive<f64>> {
+        match self.kind {
+            Kind::Number(_, min, max) => Some(min..=max),
+            Kind::Integer(min, max) => Some(min as f64..=max as f64),
+            Kind::Choice | Kind::Text => None,
+        }
+    }
+
+    /// Returns the value that a text says.
+    ///
+    /// # Errors
+    /// If the setting is a number, and the text is not.
+    pub fn parse(&self, text: &str) -> Result<Value, SettingError> {
+        let value = match self.kind {
+            Kind::Number(..) => text.parse().ok().map(Value::Number),
+            Kind::Integer(..) => text.parse().ok().map(Value::Integer),
+            Kind::Choice | Kind::Text => Some(Value::Text(text.to_owned())),
+        };
+        value.ok_or_else(|| SettingError::Text {
+            name: self.name,
+            message: format!("'{text}' is not {}", self.kind),
+        })
+    }
+
+    /// Returns the name with `between` in place of its spaces, as an option or a keyword.
+    pub fn word(&self, between: &str) -> String {
+        self.name.replace(' ', between)
+    }
+}
+
+impl Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Number(..) => "a number",
+            Self::Integer(..) => "a whole number",
+            Self::Choice => "a name",
+            Self::Text => "a text",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Clone)]
+    struct Two {
+        length: f64,
+        seed: u64,
+        day: Option<usize>,
+    }
+
+    const LENGTH: Setting<Two> = Setting {
+        name: "step length",
+        heading: "Steps",
+        help: "Length.",
+        kind: Kind::Number("mm", 0.0, 2.0),
+        field: |two| Some(Field::Number(&mut two.length)),
+    };
+
+    #[test]
+    fn values_are_read_written_and_checked() {
+        let mut two = Two {
+            length: 1.0,
+            seed: 0,
+            day: None,
+        };
+        let seed = Setting::<Two> {
+            kind: Kind::Integer(0, u64::MAX),
+            field: |two| Some(Field::Integer(&mut two.seed)),
+            ..LENGTH
+        };
+        seed.set(&mut two, &seed.parse("18446744073709551615").unwrap())
+            .unwrap();
+        assert_eq!(seed.get(&two), Some(Value::Integer(u64::MAX)), "every digit is kept");
+        for (text, message) in [
+            ("x", "step length: 'x' is not a number"),
+            ("1,5", "step length: '1,5' is not a number"),
+        ] {
+            assert_eq!(LENGTH.parse(text).unwrap_err().to_string(), message);
+        }
+        for (length, is_valid) in [(0.0, true), (2.0, true), (2.1, false), (f64::NAN, false)] {
+            LENGTH.set(&mut two, &Value::Number(length)).unwrap();
+            assert_eq!(LENGTH.check(&two).is_ok(), is_valid, "{length}");
+        }
+        let day = Setting::<Two> {
+            field: |two| two.day.as_mut().map(Field::Count),
+            ..LENGTH
+        };
+        assert!(!day.applies(&two) && day.check(&two).is_ok() && day.get(&two).is_none());
+        assert_eq!(LENGTH.word("-"), "step-length");
+    }
+}

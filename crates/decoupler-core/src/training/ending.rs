@@ -1,0 +1,183 @@
+//! The reasons why a training ends, and defects of a training that has ended.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::{EpochRecord, Method, Trainer};
+use crate::text::counted;
+
+/// Defect of a training that has ended. Its text describes the problem and the remedy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrainingDefect {
+    /// Epoch from which on the error stayed above its initial value, if the training diverged.
+    pub diverged_in: Option<usize>,
+    /// `true` if the best network is hardly better than the random start: [`TrainingDefect::MIN_GAIN`].
+    pub is_at_start: bool,
+    /// Epoch of the best network.
+    pub best_epoch: usize,
+    /// Number of epochs run.
+    pub epochs: usize,
+    /// Reason why the training ended.
+    pub reason: StopReason,
+    /// The method with its settings.
+    pub method: Method,
+}
+
+impl TrainingDefect {
+    /// Relative decrease of the selection error (validation error, or training error if nothing is held out) from the
+    /// start at which the network counts as trained.
+    pub const MIN_GAIN: f64 = 0.01;
+
+    /// Returns the defect of a training; `None` if it has no defect or has not ended.
+    pub fn of(trainer: &Trainer) -> Option<Self> {
+        let reason = trainer.stop_reason()?;
+        let start = trainer.history().first()?;
+        let start_mse = start.validation_mse.unwrap_or(start.training_mse);
+        let enough = (1.0 - Self::MIN_GAIN) * start_mse;
+        let defect = Self {
+            diverged_in: diverged_in(trainer.history(), reason),
+            // False if the start has no error, which nothing can improve; true if its error is NaN.
+            is_at_start: start_mse != 0.0 && (trainer.best_mse() >= enough || enough.is_nan()),
+            best_epoch: trainer.best_epoch(),
+            epochs: trainer.latest().epoch,
+            reason,
+            method: trainer.settings().method,
+        };
+        (defect.diverged_in.is_some() || defect.is_at_start).then_some(defect)
+    }
+
+    /// Returns advice on the setting to change.
+    pub fn remedy(&self) -> String {
+        match self.reason {
+            StopReason::GoalReached => "set a lower goal".to_owned(),
+            StopReason::GradientSmall if self.diverged_in.is_none() => {
+                format!("set a lower smallest gradient; or {}", self.method.remedy())
+            }
+            StopReason::Stopped if self.diverged_in.is_none() => "let it run longer".to_owned(),
+            _ => self.method.remedy(),
+        }
+    }
+}
+
+/// Returns the first epoch from which on the training error is above its initial value; an epoch whose error was NaN is
+/// not in the history.
+fn diverged_in(history: &[EpochRecord], reason: StopReason) -> Option<usize> {
+    let start_mse = history.first()?.training_mse;
+    let is_below = |record: &EpochRecord| record.training_mse <= start_mse;
+    let after = history.iter().rposition(is_below).map_or(0, |last| last + 1);
+    (after < history.len() || reason == StopReason::Diverged).then_some(after)
+}
+
+impl fmt::Display for TrainingDefect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { epochs, best_epoch, .. } = self;
+        match (self.diverged_in, self.is_at_start) {
+            (Some(epoch), true) => write!(
+                f,
+                "training diverged in epoch {epoch}, and the network is no better than its random start"
+            )?,
+            (Some(epoch), false) => write!(
+                f,
+                "training diverged in epoch {epoch}; the network is the best before that, of epoch {best_epoch}"
+            )?,
+            (None, _) => write!(
+                f,
+                "the network is no better than its random start after {} ({})",
+                counted(*epochs, "epoch"),
+                self.reason
+            )?,
+        }
+        write!(f, ": {}", self.remedy())
+    }
+}
+
+/// Reason why a training ended: a result, not an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StopReason {
+    /// The maximum number of epochs was run.
+    EpochsReached,
+    /// The training error reached the goal.
+    GoalReached,
+    /// The length of the gradient reached its lower limit.
+    GradientSmall,
+    /// No step with a damping mu up to its limit lowers the error.
+    MuLarge,
+    /// The scale lambda of the scaled conjugate gradient overflowed: no step along its direction lowers the error.
+    LambdaLarge,
+    /// The validation error did not reach a new best for [`StoppingRules::max_fail`](super::StoppingRules::max_fail) epochs.
+    ValidationRose,
+    /// The error or its gradient was no longer finite, or the training error was above its initial value when the
+    /// validation failures reached their limit. The best weights before that are kept.
+    Diverged,
+    /// The user stopped the training.
+    Stopped,
+}
+
+impl StopReason {
+    /// Returns `true` if the training did not diverge.
+    pub fn was_successful(self) -> bool {
+        self != Self::Diverged
+    }
+
+    /// Returns advice for a training of this method that ended for this reason with a network that is not good enough.
+    pub fn remedy(self, method: &Method) -> String {
+        match self {
+            Self::Diverged => method.remedy(),
+            Self::EpochsReached | Self::Stopped => "train for more epochs, or with more hidden nodes".to_owned(),
+            Self::ValidationRose => {
+                "draw more training samples, or try another seed or another number of hidden nodes".to_owned()
+            }
+            Self::GoalReached => "set a lower goal".to_owned(),
+            Self::GradientSmall | Self::MuLarge | Self::LambdaLarge => {
+                "the training is stuck: try another seed, or more hidden nodes".to_owned()
+            }
+        }
+    }
+
+    /// Returns `true` if other stopping rules could have let the training continue, and `false` if the user stopped it
+    /// or the method found no further step.
+    pub(super) fn depends_on_rules(self) -> bool {
+        !matches!(self, Self::Stopped | Self::Diverged | Self::MuLarge | Self::LambdaLarge)
+    }
+}
+
+impl fmt::Display for StopReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::EpochsReached => "all epochs done",
+            Self::GoalReached => "goal reached",
+            Self::GradientSmall => "gradient below its limit: no further progress possible",
+            Self::MuLarge => "mu above its limit: no step lowers the error",
+            Self::LambdaLarge => "lambda above its limit: no step lowers the error",
+            Self::ValidationRose => "validation error no longer falls",
+            Self::Diverged => "diverged: the error grew above that of the start",
+            Self::Stopped => "stopped by you",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stop_reasons_have_fixed_names_in_files() {
+        let table = [
+            ("epochs_reached", StopReason::EpochsReached),
+            ("goal_reached", StopReason::GoalReached),
+            ("gradient_small", StopReason::GradientSmall),
+            ("mu_large", StopReason::MuLarge),
+            ("lambda_large", StopReason::LambdaLarge),
+            ("validation_rose", StopReason::ValidationRose),
+            ("diverged", StopReason::Diverged),
+            ("stopped", StopReason::Stopped),
+        ];
+        for (name, reason) in table {
+            let text = format!("\"{name}\"");
+            assert_eq!(serde_json::from_str::<StopReason>(&text).unwrap(), reason);
+            assert_eq!(serde_json::to_string(&reason).unwrap(), text);
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! Tests of training methods against independent solutions.
+
+mod certified;
