@@ -4,8 +4,8 @@ use std::sync::{Mutex, PoisonError};
 
 use decoupler_core::{
     dataset::{Dataset, PerRow, Seed, Stream},
-    decoupling::{AffineMap, Decoder, RadialBasisNetwork, TakagiSugeno},
-    network::{InputChoice, ScalingChoice, ScalingError},
+    decoupling::{Decoder, Program, ProgramDecoder},
+    network::{InputChoice, ScalingChoice},
     scene::{NoiseSource, RowModel},
     text::counted,
 };
@@ -15,7 +15,7 @@ use pyo3::{
     prelude::*,
     types::{PyBytes, PyTuple},
 };
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize};
 
 use crate::{
     arrays::{Matrix, Samples, decode, row_indices},
@@ -26,50 +26,22 @@ use crate::{
 /// A fitted decoder: one for all row-wires, or one for each.
 #[pyclass(frozen, module = "decoupler._native")]
 pub struct FittedDecoder {
-    kind: Kind,
     row_wires: Option<Vec<usize>>,
-    decoder: Mutex<Fitted>,
-}
-
-/// Kind of decoder.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-enum Kind {
-    Ridge,
-    RadialBasis,
-    Fuzzy,
-}
-
-/// Decoders of one kind.
-enum Fitted {
-    Ridge(PerRow<AffineMap>),
-    RadialBasis(PerRow<RadialBasisNetwork>),
-    Fuzzy(PerRow<TakagiSugeno>),
-}
-
-impl Fitted {
-    fn decoder(&mut self) -> &mut dyn Decoder {
-        match self {
-            Self::Ridge(decoders) => decoders,
-            Self::RadialBasis(decoders) => decoders,
-            Self::Fuzzy(decoders) => decoders,
-        }
-    }
+    decoder: Mutex<ProgramDecoder>,
 }
 
 /// Contents of a pickle.
 #[derive(Serialize, Deserialize)]
 struct State {
-    kind: Kind,
     row_wires: Option<Vec<usize>>,
-    decoders: serde_json::Value,
+    program: Program,
 }
 
 impl FittedDecoder {
-    fn new(kind: Kind, row_wires: Option<Vec<usize>>, decoder: Fitted) -> Self {
+    fn new(row_wires: Option<Vec<usize>>, program: Program) -> Self {
         Self {
-            kind,
             row_wires,
-            decoder: Mutex::new(decoder),
+            decoder: Mutex::new(ProgramDecoder::new(program)),
         }
     }
 }
@@ -89,16 +61,6 @@ pub fn fit_decoder(
     row_wires: Option<Vec<usize>>,
     groups: Option<Vec<usize>>,
 ) -> PyResult<FittedDecoder> {
-    let kind = match kind {
-        "ridge" => Kind::Ridge,
-        "rbf" => Kind::RadialBasis,
-        "fuzzy" => Kind::Fuzzy,
-        other => {
-            return Err(PyValueError::new_err(format!(
-                "'{other}' is not a decoder: give ridge, rbf or fuzzy"
-            )));
-        }
-    };
     let choice = InputChoice {
         quantity: quantity(inputs)?,
         scaling: scaling.parse::<ScalingChoice>().map_err(value_error)?,
@@ -116,24 +78,16 @@ pub fn fit_decoder(
     } else {
         RowModel::Shared
     };
-    let fitted = detached(py, || fit(kind, &set, model, choice, Seed(seed)))?;
-    Ok(FittedDecoder::new(kind, row_wires, fitted))
-}
-
-fn fit(kind: Kind, set: &Dataset, model: RowModel, choice: InputChoice, seed: Seed) -> Result<Fitted, ScalingError> {
     let unseen = NoiseSource::default();
-    let mut rng = seed.rng(Stream::Expectation);
-    Ok(match kind {
-        Kind::Ridge => Fitted::Ridge(PerRow::fit(set, model, |set| {
-            AffineMap::ridge(set, choice.quantity, unseen)
-        })?),
-        Kind::RadialBasis => Fitted::RadialBasis(PerRow::fit(set, model, |set| {
-            RadialBasisNetwork::fit(set, choice, unseen, &mut rng)
-        })?),
-        Kind::Fuzzy => Fitted::Fuzzy(PerRow::fit(set, model, |set| {
-            TakagiSugeno::fit(set, choice.quantity, unseen, &mut rng)
-        })?),
-    })
+    let mut rng = Seed(seed).rng(Stream::Expectation);
+    let mut fit = |set: &Dataset| match kind {
+        "ridge" => Program::ridge(set, choice.quantity, unseen).map_err(|error| error.to_string()),
+        "rbf" => Program::radial_basis(set, choice, unseen, &mut rng).map_err(|error| error.to_string()),
+        "fuzzy" => Program::fuzzy(set, choice.quantity, unseen, &mut rng).map_err(|error| error.to_string()),
+        other => Err(format!("'{other}' is not a decoder: give ridge, rbf or fuzzy")),
+    };
+    let programs = detached(py, || PerRow::fit(&set, model, &mut fit))?;
+    Ok(FittedDecoder::new(row_wires, Program::each(&programs)))
 }
 
 #[pymethods]
@@ -154,8 +108,7 @@ impl FittedDecoder {
         };
         let answers = detached(py, || {
             // A panic leaves only buffers behind, which the next call overwrites.
-            let mut fitted = self.decoder.lock().unwrap_or_else(PoisonError::into_inner);
-            let decoder = fitted.decoder();
+            let mut decoder = self.decoder.lock().unwrap_or_else(PoisonError::into_inner);
             let expected = decoder.channels();
             if found != expected {
                 return Err(format!(
@@ -163,22 +116,16 @@ impl FittedDecoder {
                     counted(found, "reading")
                 ));
             }
-            decode(decoder, view, indices.as_deref()).map_err(|error| error.to_string())
+            decode(&mut *decoder, view, indices.as_deref()).map_err(|error| error.to_string())
         })?;
         Ok(answers.into_pyarray(py))
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
-        let fitted = self.decoder.lock().unwrap_or_else(PoisonError::into_inner);
-        let decoders = match &*fitted {
-            Fitted::Ridge(decoders) => serde_json::to_value(decoders.values()),
-            Fitted::RadialBasis(decoders) => serde_json::to_value(decoders.values()),
-            Fitted::Fuzzy(decoders) => serde_json::to_value(decoders.values()),
-        };
+        let decoder = self.decoder.lock().unwrap_or_else(PoisonError::into_inner);
         let state = State {
-            kind: self.kind,
             row_wires: self.row_wires.clone(),
-            decoders: decoders.map_err(value_error)?,
+            program: decoder.program().clone(),
         };
         let bytes = PyBytes::new(py, &serde_json::to_vec(&state).map_err(value_error)?);
         let restore = py.get_type::<Self>().getattr("_restore")?;
@@ -187,24 +134,11 @@ impl FittedDecoder {
 
     #[staticmethod]
     fn _restore(state: &[u8]) -> PyResult<Self> {
-        let State {
-            kind,
-            row_wires,
-            decoders,
-        } = serde_json::from_slice(state).map_err(value_error)?;
-        let fitted = match kind {
-            Kind::Ridge => Fitted::Ridge(each(decoders)?),
-            Kind::RadialBasis => Fitted::RadialBasis(each(decoders)?),
-            Kind::Fuzzy => Fitted::Fuzzy(each(decoders)?),
-        };
-        Ok(Self::new(kind, row_wires, fitted))
+        let State { row_wires, program } = serde_json::from_slice(state).map_err(|error| {
+            PyValueError::new_err(format!(
+                "this pickle was written by another version of Decoupler, or is damaged ({error}): fit the decoder again"
+            ))
+        })?;
+        Ok(Self::new(row_wires, program))
     }
-}
-
-fn each<T: DeserializeOwned>(decoders: serde_json::Value) -> PyResult<PerRow<T>> {
-    let values: Vec<T> = serde_json::from_value(decoders).map_err(value_error)?;
-    if values.is_empty() {
-        return Err(PyValueError::new_err("the pickle contains no decoder"));
-    }
-    Ok(PerRow::each(values))
 }

@@ -7,7 +7,7 @@ use std::{
 
 use decoupler_core::{
     dataset::History,
-    decoupling::CompiledNetworks,
+    decoupling::ProgramDecoder,
     evaluation::{Channel, Intervals, Problem, RunSettings},
     network::Networks,
     text::counted,
@@ -37,7 +37,7 @@ pub struct Network {
     record: Record,
     /// The file that it was read from, with its scores and its record of the training.
     file: Option<NetworkFile>,
-    decoder: Mutex<CompiledNetworks<f64>>,
+    decoder: Mutex<ProgramDecoder>,
 }
 
 /// What a network needs to decode and to be exported.
@@ -75,9 +75,8 @@ enum State {
 
 impl Network {
     fn new(record: Record, file: Option<NetworkFile>) -> Self {
-        let rows = record.row_wires.as_ref().map_or(1, Vec::len);
         Self {
-            decoder: Mutex::new(CompiledNetworks::new(&record.networks, rows)),
+            decoder: Mutex::new(record.networks.decoder()),
             record,
             file,
         }

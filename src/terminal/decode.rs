@@ -9,7 +9,6 @@ use clap::Args;
 use decoupler_core::{
     calibration::PressLimits,
     dataset::{Dataset, Division, SimulationError, SplitBy, Stream},
-    decoupling::{CompiledNetworks, Decoder},
     evaluation::{Channel, Errors, Problem, TestErrors, fine_tune, press_limits, pressed_rows},
     job::Job,
     network::{DecouplingNetwork, Networks},
@@ -25,7 +24,7 @@ use decoupler_files::{
     machine::memory_budget,
 };
 use glam::DVec3;
-use ndarray::{Array2, ArrayView1, Axis, Slice};
+use ndarray::{Array2, ArrayView1};
 use serde::Serialize;
 
 use super::{
@@ -33,7 +32,7 @@ use super::{
     follow::Follow,
     import_arguments::ImportArguments,
     intervals::DriftWarnings,
-    output::{Readings, messages, print, print_object, progress_bar, read},
+    output::{messages, print, print_object, progress_bar, read},
     samples::{with_bar, working_folder},
 };
 
@@ -107,13 +106,13 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
     let mut drift = DriftWarnings::new(file, false);
     let mut values = Vec::new();
     let mut outside = OutsideTraining::new(&file.problem);
-    let mut compiled = CompiledNetworks::<f64>::new(&file.network, rows_read(file)?);
+    let mut decoder = file.network.decoder();
     read(file, input, &mut |readings| {
         if !std::mem::replace(&mut has_heading, true) {
             let kept = readings.kept.iter().map(|column| column.title.clone());
             write_heading(file, &kept.collect::<Vec<_>>(), 1, &mut written).map_err(refused)?;
         }
-        let answers = decoded(file, &mut compiled, &readings);
+        let answers = decoder.answers(&readings.row_indices, readings.values.view());
         let kept = &readings.kept;
         let lines = readings.lines.iter().zip(&readings.row_indices);
         let rows = readings.values.outer_iter().zip(answers.outer_iter());
@@ -165,38 +164,6 @@ pub(super) fn with_half_widths(file: &NetworkFile, answers: &[f64], values: &mut
         values.push(answer);
         values.extend(intervals.and_then(|intervals| intervals.half_width(index % targets, answer)));
     }
-}
-
-/// Decodes each line with the network of its row; a single network for all rows of an array uses one matrix product.
-/// Invalid answers are NaN.
-fn decoded(file: &NetworkFile, compiled: &mut CompiledNetworks<f64>, readings: &Readings) -> Array2<f64> {
-    let Readings {
-        values, row_indices, ..
-    } = readings;
-    let networks = &file.network;
-    if file.problem.has_nodes
-        && let Some(only) = networks.only()
-    {
-        return only.decouple(values.view());
-    }
-    let mut answers = Array2::zeros((row_indices.len(), file.problem.targets.len()));
-    for (line, &row_index) in row_indices.iter().enumerate() {
-        let mut answer = answers.row_mut(line);
-        if file.problem.has_nodes {
-            let of_line = networks
-                .at(row_index)
-                .decouple(values.slice_axis(Axis(0), Slice::from(line..=line)));
-            answer.assign(&of_line.row(0));
-            continue;
-        }
-        let readings = values.row(line);
-        let (readings, targets) = (readings.to_slice(), answer.as_slice_mut());
-        let (readings, targets) = readings.zip(targets).expect("rows of standard arrays are contiguous");
-        if compiled.decode_row(row_index, readings, targets).is_err() {
-            targets.fill(f64::NAN);
-        }
-    }
-    answers
 }
 
 // Readings of a real sensor with known presses.

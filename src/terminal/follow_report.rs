@@ -6,7 +6,7 @@ use std::{
 
 use clap::ValueEnum;
 use decoupler_core::{
-    decoupling::{CompiledNetworks, Decoder},
+    decoupling::{Decoder, ProgramDecoder},
     live::LeftOutDecoder,
     text::counted,
 };
@@ -166,7 +166,7 @@ pub(super) enum Form {
 /// Decodes lines and writes their answers to standard output; without allocation in steady state for CSV or an array.
 pub(super) struct Answers<'a> {
     file: &'a NetworkFile,
-    compiled: CompiledNetworks<f64>,
+    decoder: ProgramDecoder,
     rows: usize,
     answer: Vec<f64>,
     /// Answers with the half-widths of their intervals.
@@ -183,7 +183,7 @@ impl<'a> Answers<'a> {
         let rows = rows_read(file)?;
         Ok(Self {
             file,
-            compiled: CompiledNetworks::new(&file.network, rows),
+            decoder: file.network.decoder(),
             rows,
             answer: vec![0.0; rows * file.problem.targets.len()],
             values: Vec::new(),
@@ -218,7 +218,7 @@ impl<'a> Answers<'a> {
             } => (row_index, readings_ohm),
             ParsedLine::Snapshot(readings) => (Some(0), readings),
         };
-        let channels = self.compiled.channels();
+        let channels = self.decoder.channels();
         let rows = readings.len() / channels;
         let answer = &mut self.answer[..rows * outputs];
         // A wire can be left out only if the row is known.
@@ -236,7 +236,7 @@ impl<'a> Answers<'a> {
             _ => {
                 let mut rows = lines().zip(answer.chunks_exact_mut(outputs)).enumerate();
                 rows.try_for_each(|(row, (readings, answer))| {
-                    self.compiled.decode_row(first_row + row, readings, answer)
+                    self.decoder.decode_row(first_row + row, readings, answer)
                 })
             }
         };

@@ -12,7 +12,7 @@ use std::{
 use decoupler::window::Phase;
 use decoupler_core::{
     dataset::Seed,
-    decoupling::{CompiledNetworks, Decoder},
+    decoupling::Decoder,
     live::ZeroGains,
     scene::{Noise, Scene},
 };
@@ -70,7 +70,7 @@ fn displayed(driver: &Driver) -> Option<(f64, Vec<DVec3>)> {
 /// The frame decoded by the library.
 fn by_library(file: &NetworkFile, frame_ohm: &[f64]) -> Vec<DVec3> {
     let scale = file.settings.simulated().unwrap().source.sensor.scale;
-    let mut decoder = CompiledNetworks::<f64>::new(&file.network, scale.rows());
+    let mut decoder = file.network.decoder();
     let mut answer_mm = vec![0.0; scale.rows() * scale.coordinates_per_row()];
     decoder.decode(frame_ohm, &mut answer_mm).unwrap();
     answer_mm.chunks_exact(3).map(DVec3::from_slice).collect()
@@ -480,7 +480,7 @@ fn a_network_of_a_recording_decodes_a_file_by_the_names_of_its_columns() {
     let first = Vec::from_iter(reordered[1].split(',').map(|cell| cell.parse::<f64>().unwrap()));
     let mut expected = [0.0; 2];
     let file = driver.kept(0);
-    let mut compiled = CompiledNetworks::<f64>::new(&file.network, 1);
+    let mut compiled = file.network.decoder();
     compiled.decode_row(0, &[first[1], first[0]], &mut expected).unwrap();
     assert_eq!((*time_s, &values[..]), (0.0, &expected[..]));
     driver.wait("more of them", |driver| decoded(driver) > 5);

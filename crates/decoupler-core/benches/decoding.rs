@@ -14,10 +14,9 @@ mod untrained;
 use std::{hint::black_box, time::Instant};
 
 use decoupler_core::{
-    dataset::{Dataset, PerRow, Seed, Stream},
+    dataset::{Dataset, Seed, Stream},
     decoupling::{
-        AffineMap, CompiledNetworks, Decoder, Estimator, NewtonDecoder, PolishedDecoder, RadialBasisNetwork,
-        TakagiSugeno, TrainingMean,
+        Decoder, DecoderKind, Estimator, FitProblem, NewtonDecoder, PolishedDecoder, Precision, ProgramDecoder,
     },
     network::{InputChoice, Quantity, ScalingChoice, tanh_in_place, tanh_in_place_single},
     scene::{Noise, NoiseSource, RowModel, Rows, Scene},
@@ -138,36 +137,24 @@ fn print_scale(scale: ArrayScale) {
     let mut rng = Seed(0).rng(Stream::Training);
     let training = Dataset::simulate(&model, &scene, 300 * scale.rows(), &mut rng).unwrap();
     let frame = training.frames().unwrap().frame(0).to_vec();
-    let mut decoders: Vec<(String, Box<dyn Decoder>)> = vec![
-        ("mean".into(), Box::new(PerRow::shared(TrainingMean::fit(&training)))),
-        (
-            "ridge".into(),
-            Box::new(
-                PerRow::fit(&training, RowModel::Each, |set| {
-                    AffineMap::ridge(set, Quantity::Conductance, NoiseSource::default())
-                })
-                .unwrap(),
-            ),
-        ),
-        (
-            "fuzzy rules".into(),
-            Box::new(
-                PerRow::fit(&training, RowModel::Each, |set| {
-                    TakagiSugeno::fit(set, Quantity::Conductance, NoiseSource::default(), &mut rng)
-                })
-                .unwrap(),
-            ),
-        ),
-        (
-            "radial basis, 100 centres".into(),
-            Box::new(
-                PerRow::fit(&training, RowModel::Each, |set| {
-                    RadialBasisNetwork::fit(set, InputChoice::BEST, NoiseSource::default(), &mut rng)
-                })
-                .unwrap(),
-            ),
-        ),
+    let kinds = [
+        ("mean", DecoderKind::Mean),
+        ("ridge", DecoderKind::Ridge),
+        ("fuzzy rules", DecoderKind::Fuzzy),
+        ("radial basis, 100 centres", DecoderKind::RadialBasis),
     ];
+    let problem = FitProblem {
+        training: &training,
+        row_model: RowModel::Each,
+        inputs: InputChoice::BEST,
+        unseen: NoiseSource::default(),
+        sensor: None,
+        networks: None,
+        precision: Precision::Double,
+        seed: Seed(0),
+    };
+    let fitted = kinds.map(|(name, kind)| (name.to_owned(), kind.fit(&problem).unwrap().unwrap()));
+    let mut decoders: Vec<(String, Box<dyn Decoder>)> = fitted.into();
     for hidden in [6, 12, 24, 48] {
         for quantity in Quantity::ALL {
             let choice = InputChoice {
@@ -175,13 +162,13 @@ fn print_scale(scale: ArrayScale) {
                 scaling: ScalingChoice::Whitening,
             };
             let networks = untrained_networks(&training, choice, hidden);
-            let double = CompiledNetworks::<f64>::new(&networks, scale.rows());
-            let single = CompiledNetworks::<f32>::new(&networks, scale.rows());
+            let [double, single] = [Precision::Double, Precision::Single]
+                .map(|precision| ProgramDecoder::new(networks.program(precision)));
             decoders.push((format!("network, {hidden} hidden, {quantity}, f64"), Box::new(double)));
             decoders.push((format!("network, {hidden} hidden, {quantity}, f32"), Box::new(single)));
         }
     }
-    let first = CompiledNetworks::<f64>::new(&untrained_networks(&training, InputChoice::BEST, 12), scale.rows());
+    let first = untrained_networks(&training, InputChoice::BEST, 12).decoder();
     decoders.push((
         "polish, 1 step".into(),
         Box::new(PolishedDecoder::new(Box::new(first), &model, &scene, &rows, 1).unwrap()),

@@ -5,7 +5,7 @@
 use std::error::Error;
 
 use decoupler_core::{
-    decoupling::{CompiledNetworks, Decoder, NewtonDecoder},
+    decoupling::{Decoder, NewtonDecoder, Precision, ProgramDecoder},
     evaluation::{Preset, Run},
 };
 
@@ -17,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     while run.step().is_none() {}
     let frames = run.test().frames()?;
     let mut coordinates_mm = vec![0.0; frames.rows() * run.test().outputs()];
-    let mut network = CompiledNetworks::<f32>::new(&run.network(), frames.rows());
+    let mut network = ProgramDecoder::new(run.network().program(Precision::Single));
     network.decode(frames.frame(0), &mut coordinates_mm)?;
     println!("network: node 1 of row-wire 1 is at z = {:.6} mm", coordinates_mm[2]);
     let (source, rows) = (settings.source, Vec::from_iter(0..frames.rows()));

@@ -7,7 +7,7 @@ use std::error::Error;
 
 use decoupler_core::{
     dataset::{Seed, Stream},
-    decoupling::{CompiledNetworks, Decoder},
+    decoupling::Decoder,
     evaluation::{Preset, Run, SimulatedSettings},
     live::{FaultEvent, FaultyWire, LeftOutDecoder, WireCheck, equation_decoder},
     rand::{Rng, RngExt},
@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     settings.training.stopping.epochs = 50;
     let mut run = Run::prepare(settings)?;
     while run.step().is_none() {}
-    let mut network = CompiledNetworks::<f64>::new(&run.network(), settings.source.sensor.scale.rows());
+    let mut network = run.network().decoder();
     let mut tallies: [Tally; 5] = Default::default();
     let mut rng = Seed(1).rng(Stream::Live);
     for trial in 0..faults {

@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use decoupler_core::{
     dataset::{Dataset, Seed, Stream},
-    decoupling::{CompiledNetworks, Decoder, Estimator, NewtonDecoder, Solution},
+    decoupling::{Decoder, Estimator, NewtonDecoder, Precision, ProgramDecoder, Solution},
     network::{InputChoice, Networks, Quantity, ScalingChoice},
     scene::{Rows, Scene},
     sensor::{ArrayScale, SensorModel},
@@ -79,11 +79,8 @@ impl Array {
     /// Milliseconds per frame of networks with this many hidden nodes, in double and in single precision.
     pub(crate) fn network_ms(&self, hidden: usize) -> [f64; 2] {
         let networks = self.networks(hidden);
-        let rows = self.scale.rows();
-        [
-            self.decoding_ms(&mut CompiledNetworks::<f64>::new(&networks, rows)),
-            self.decoding_ms(&mut CompiledNetworks::<f32>::new(&networks, rows)),
-        ]
+        [Precision::Double, Precision::Single]
+            .map(|precision| self.decoding_ms(&mut ProgramDecoder::new(networks.program(precision))))
     }
 
     fn networks(&self, hidden: usize) -> Networks {

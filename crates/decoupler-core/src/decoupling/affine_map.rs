@@ -1,11 +1,11 @@
 use faer::{Mat, Side, linalg::solvers::Solve};
 use glam::DVec3;
-use ndarray::{Array1, Array2, Axis};
-use serde::{Deserialize, Serialize};
+use ndarray::{Array2, Axis};
 
 use super::{
-    AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed,
+    Precision,
     equations::Range,
+    program::{Builder, Program},
     ridge::{Regression, Standard, folds},
 };
 use crate::{
@@ -15,50 +15,54 @@ use crate::{
     sensor::{Axes, RowConductance, SensorModel},
 };
 
-/// An affine map from readings to targets, with the input and output scalings folded into its matrix.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AffineMap {
-    quantity: Quantity,
-    /// Centre of each channel, subtracted from its values.
-    centre: Vec<f64>,
-    /// Matrix from centred channels to targets (channels × varying targets), in standard layout.
-    matrix: Array2<f64>,
-    /// Targets for readings at the channel centres.
-    base: Vec<f64>,
-    /// Indices of the varying targets.
-    varying: Vec<usize>,
-    /// Buffer for the centred channels of one row.
-    values: Vec<f64>,
-    /// Buffer for the offsets of the varying targets in one row.
-    changes: Vec<f64>,
-}
+impl Program {
+    /// The mean targets over all samples, whatever the readings are: the baseline.
+    ///
+    /// # Panics
+    /// If there are no samples.
+    pub fn mean(training: &Dataset) -> Self {
+        let targets = training.targets();
+        // As the mean of deviations, so that a large offset does not hide small changes.
+        let first = targets.row(0);
+        let off = (&targets - &first).mean_axis(Axis(0));
+        let mean = off.expect("a training set has samples") + first;
+        Self::constant(training.channels(), &mean.to_vec())
+    }
 
-impl AffineMap {
-    /// Fits the map to `training` by least squares, on `quantity` of the readings. Of the maps that fit equally well it is
-    /// the one of minimum norm.
+    /// The same targets for all finite readings.
+    pub(super) fn constant(channels: usize, targets: &[f64]) -> Self {
+        let mut builder = Builder::new(channels);
+        let weights = Array2::zeros((channels, targets.len()));
+        let changes = builder.changes(Quantity::Raw, &vec![0.0; channels], Precision::Double);
+        let targets = builder.affine_of(&changes, weights, targets);
+        builder.finish(targets)
+    }
+
+    /// Fits an affine map to `training` by least squares, on `quantity` of the readings. Of the maps that fit equally well it
+    /// is the one of minimum norm.
     ///
     /// # Errors
     /// If values cannot be scaled.
     pub fn least_squares(training: &Dataset, quantity: Quantity) -> Result<Self, ScalingError> {
-        Self::fit(training, quantity, NoiseSource::default(), |regression| {
+        Self::affine(training, quantity, NoiseSource::default(), |regression| {
             regression.least_squares()
         })
     }
 
-    /// Fits the map to `training` by ridge regression on the standardised `quantity` of the readings, with the penalty of
-    /// each target chosen by cross-validation on blocks of samples, or on whole groups; `unseen` is as in
+    /// Fits an affine map to `training` by ridge regression on the standardised `quantity` of the readings, with the penalty
+    /// of each target chosen by cross-validation on blocks of samples, or on whole groups; `unseen` is as in
     /// [`Inputs::fit`](crate::network::Inputs::fit).
     ///
     /// # Errors
     /// If values cannot be scaled.
     pub fn ridge(training: &Dataset, quantity: Quantity, unseen: NoiseSource) -> Result<Self, ScalingError> {
         let folds = folds(training);
-        Self::fit(training, quantity, unseen, |regression| {
+        Self::affine(training, quantity, unseen, |regression| {
             Ok(regression.ridge(folds.as_ref())?.map)
         })
     }
 
-    fn fit(
+    fn affine(
         training: &Dataset,
         quantity: Quantity,
         unseen: NoiseSource,
@@ -83,78 +87,13 @@ impl AffineMap {
             },
             noise: channel_noise(quantity, readings, unseen).changes(&standard.scale),
         })?;
-        let mut base: Vec<f64> = ranges.iter().map(|range| range.0).collect();
-        for (output, &target) in varying.iter().enumerate() {
-            base[target] += map[[channels, output]] * ranges[target].1;
-        }
-        Ok(Self {
-            quantity,
-            values: vec![0.0; channels],
-            matrix: Array2::from_shape_fn((channels, varying.len()), |(channel, output)| {
-                map[[channel, output]] * standard.scale[channel] * ranges[varying[output]].1
-            }),
-            centre: standard.centre,
-            base,
-            changes: vec![0.0; varying.len()],
-            varying,
-        })
-    }
-}
-
-impl AffineMap {
-    /// Writes the centred channels. Returns `true` if all readings are valid; a separate pass for this check would
-    /// take 6 % more time.
-    #[inline(always)]
-    fn read(&mut self, readings: &[f64], of: impl Fn(f64) -> f64) -> bool {
-        let mut all_valid = true;
-        for ((value, &reading), centre) in self.values.iter_mut().zip(readings).zip(&self.centre) {
-            *value = of(reading) - centre;
-            all_valid &= self.quantity.accepts(reading);
-        }
-        all_valid
-    }
-}
-
-impl Decoder for AffineMap {
-    fn channels(&self) -> usize {
-        self.centre.len()
-    }
-
-    fn outputs(&self) -> usize {
-        self.base.len()
-    }
-
-    fn decode_row(&mut self, _row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        let all_valid = match self.quantity {
-            Quantity::Conductance => self.read(readings, |ohm| 1.0 / ohm),
-            quantity => self.read(readings, |reading| quantity.of(reading)),
-        };
-        if !all_valid {
-            DecodeError::check_for(self.quantity, readings)?;
-        }
-        self.changes.fill(0.0);
-        let width = self.changes.len();
-        let matrix = self.matrix.as_slice().expect("made in standard layout");
-        for (channel, value) in self.values.iter().enumerate() {
-            let row = &matrix[channel * width..(channel + 1) * width];
-            for (change, weight) in self.changes.iter_mut().zip(row) {
-                *change += value * weight;
-            }
-        }
-        targets.copy_from_slice(&self.base);
-        for (&target, change) in self.varying.iter().zip(&self.changes) {
-            targets[target] += change;
-        }
-        Ok(())
-    }
-
-    fn description(&self) -> Result<Description, NotDescribed> {
-        let map = AffineLayer::of_varying(&self.matrix, &self.varying, &self.base);
-        Ok(Description::of_maps(vec![LayeredMap {
-            quantity: self.quantity,
-            centre: self.centre.clone(),
-            layers: vec![Layer::Affine(map)],
-        }]))
+        let weight = |(channel, output): (usize, usize)| map[[channel, output]] * standard.scale[channel];
+        let weights = Array2::from_shape_fn((channels, varying.len()), weight);
+        let mut builder = Builder::new(channels);
+        let changes = builder.changes(quantity, &standard.centre, Precision::Double);
+        let scaled = builder.affine_of(&changes, weights, &map.row(channels).to_vec());
+        let targets = builder.restored(scaled, &outputs);
+        Ok(builder.finish(targets))
     }
 }
 
@@ -236,9 +175,9 @@ impl AffineStart {
         }
     }
 
-    /// Describes the coordinates (3·M2) of the nodes of row-wire `row` at the estimate, before they are clamped to
+    /// The program of the coordinates (3·M2) of the nodes of row-wire `row` at the estimate, before they are clamped to
     /// the stroke.
-    pub(super) fn description(&self, model: &SensorModel, row: usize) -> LayeredMap {
+    pub(super) fn program(&self, model: &SensorModel, row: usize) -> Program {
         let (readings, nodes) = (self.means_ohm.len(), model.scale.nodes_per_row());
         let middles = (0..nodes).flat_map(|node| model.displaced_mm(row, node, DVec3::Z * self.middle_mm).to_array());
         let weight = |(reading, coordinate): (usize, usize)| match coordinate % 3 {
@@ -246,14 +185,12 @@ impl AffineStart {
             2 => -self.gains_mm[coordinate / 3 * readings + reading] * self.means_ohm[reading],
             _ => 0.0,
         };
-        LayeredMap {
-            quantity: Quantity::Conductance,
-            centre: self.means_ohm.iter().map(|ohm| 1.0 / ohm).collect(),
-            layers: vec![Layer::Affine(AffineLayer {
-                weights: Array2::from_shape_fn((readings, 3 * nodes), weight),
-                biases: middles.collect(),
-            })],
-        }
+        let mut builder = Builder::new(readings);
+        let means = Vec::from_iter(self.means_ohm.iter().map(|ohm| 1.0 / ohm));
+        let changes = builder.changes(Quantity::Conductance, &means, Precision::Double);
+        let weights = Array2::from_shape_fn((readings, 3 * nodes), weight);
+        let coordinates = builder.affine_of(&changes, weights, &Vec::from_iter(middles));
+        builder.finish(coordinates)
     }
 
     /// Writes the estimate for readings in ohm, before it is clamped to the stroke.
@@ -267,57 +204,6 @@ impl AffineStart {
     }
 }
 
-/// Decoder that always answers the mean targets of the training set: the baseline.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrainingMean {
-    channels: usize,
-    targets: Array1<f64>,
-}
-
-impl TrainingMean {
-    /// Computes the mean targets over all samples.
-    ///
-    /// # Panics
-    /// If there are no samples.
-    pub fn fit(training: &Dataset) -> Self {
-        let targets = training.targets();
-        // As the mean of deviations, so that a large offset does not hide small changes.
-        let first = targets.row(0);
-        let off = (&targets - &first).mean_axis(Axis(0));
-        Self {
-            channels: training.channels(),
-            targets: off.expect("a training set has samples") + first,
-        }
-    }
-}
-
-impl Decoder for TrainingMean {
-    fn channels(&self) -> usize {
-        self.channels
-    }
-
-    fn outputs(&self) -> usize {
-        self.targets.len()
-    }
-
-    fn decode_row(&mut self, _row_index: usize, _readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        targets.copy_from_slice(self.targets.as_slice().expect("a mean is contiguous"));
-        Ok(())
-    }
-
-    fn description(&self) -> Result<Description, NotDescribed> {
-        let mean = AffineLayer {
-            weights: Array2::zeros((self.channels, self.targets.len())),
-            biases: self.targets.to_vec(),
-        };
-        Ok(Description::of_maps(vec![LayeredMap {
-            quantity: Quantity::Raw,
-            centre: vec![0.0; self.channels],
-            layers: vec![Layer::Affine(mean)],
-        }]))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use rand::{SeedableRng, rngs::ChaCha8Rng};
@@ -325,7 +211,7 @@ mod tests {
     use super::*;
     use crate::{
         dataset::{Dataset, Seed, Stream},
-        decoupling::decode_set,
+        decoupling::{ProgramDecoder, decode_set},
         scene::{Scene, standard_normal},
         sensor::SensorModel,
     };
@@ -336,6 +222,10 @@ mod tests {
     }
 
     /// Returns `set` with its third target replaced by a function of the readings.
+    fn answers(map: Program, set: &Dataset) -> Array2<f64> {
+        decode_set(&mut ProgramDecoder::new(map), set).unwrap()
+    }
+
     fn with_target(set: &Dataset, target: impl Fn(&[f64]) -> f64) -> Dataset {
         let mut targets = set.targets().to_owned();
         for sample in 0..set.samples() {
@@ -354,8 +244,7 @@ mod tests {
     #[test]
     fn an_affine_relation_is_found_exactly() {
         let set = with_target(&draw("10x6_3x18", 300), |ohm| 3.0 * ohm[0] - 0.5 * ohm[17] + 4.0);
-        let mut map = AffineMap::least_squares(&set, Quantity::Resistance).unwrap();
-        let answer = decode_set(&mut map, &set).unwrap();
+        let answer = answers(Program::least_squares(&set, Quantity::Resistance).unwrap(), &set);
         for (ours, truth) in answer.column(2).iter().zip(set.targets().column(2)) {
             assert!((ours - truth).abs() < 1e-10 * truth.abs());
         }
@@ -365,11 +254,10 @@ mod tests {
     fn too_few_or_duplicate_samples_give_a_finite_map() {
         let other = draw("10x6_3x18", 10);
         for set in [draw("1x6_3x18", 1), draw("1x6_3x18", 2), other.select(&[3; 50])] {
-            let least_squares = AffineMap::least_squares(&set, Quantity::Resistance).unwrap();
-            let ridge = AffineMap::ridge(&set, Quantity::Conductance, NoiseSource::default()).unwrap();
-            for mut map in [least_squares, ridge] {
-                let answer = decode_set(&mut map, &other).unwrap();
-                assert!(answer.iter().all(|value| value.is_finite()));
+            let least_squares = Program::least_squares(&set, Quantity::Resistance).unwrap();
+            let ridge = Program::ridge(&set, Quantity::Conductance, NoiseSource::default()).unwrap();
+            for map in [least_squares, ridge] {
+                assert!(answers(map, &other).iter().all(|value| value.is_finite()));
             }
         }
     }
@@ -377,8 +265,8 @@ mod tests {
     #[test]
     fn ridge_recovers_targets_affine_in_the_quantity() {
         let set = with_target(&draw("1x4_2x12", 60), |ohm| 4.0 + 20.0 / ohm[3] - 7.0 / ohm[8]);
-        let mut map = AffineMap::ridge(&set, Quantity::Conductance, NoiseSource::default()).unwrap();
-        let answer = decode_set(&mut map, &set).unwrap();
+        let map = Program::ridge(&set, Quantity::Conductance, NoiseSource::default()).unwrap();
+        let answer = answers(map, &set);
         for (answer, truth) in answer.rows().into_iter().zip(set.targets().rows()) {
             assert_eq!(answer[0], truth[0], "constant targets keep their value");
             assert!((answer[2] - truth[2]).abs() < 1e-6, "{} {}", answer[2], truth[2]);
@@ -391,28 +279,9 @@ mod tests {
         let targets = Array2::from_shape_fn((3, 1), |(s, _)| s as f64);
         let set = Dataset::new(readings, targets, None, vec![0, 1, 2]).unwrap();
         assert_eq!(
-            AffineMap::least_squares(&set, Quantity::Raw),
+            Program::least_squares(&set, Quantity::Raw),
             Err(ScalingError::NotConverged)
         );
-    }
-
-    #[test]
-    fn readings_outside_the_domain_are_refused() {
-        let set = draw("1x4_2x12", 30);
-        let mut readings = set.sample_readings(0).to_vec();
-        readings[5] = -1.0;
-        for (quantity, is_refused) in [
-            (Quantity::Resistance, true),
-            (Quantity::Conductance, true),
-            (Quantity::Raw, false),
-        ] {
-            let mut map = AffineMap::least_squares(&set, quantity).unwrap();
-            let result = map.decode(&readings, &mut [0.0; 12]);
-            assert_eq!(result.is_err(), is_refused, "{quantity}");
-            if let Err(error) = result {
-                assert!(error.to_string().starts_with("row 1, reading 6: -1"), "{error}");
-            }
-        }
     }
 
     /// Two channels that are constant apart from a rare pulse (one also from rounding) and their decaying averages: in
@@ -451,13 +320,13 @@ mod tests {
             Dataset::new(readings, targets, None, (0..samples).collect()).unwrap()
         };
         let (training, test) = (draw(1000, true, 1), draw(500, false, 2));
-        let mut map = AffineMap::ridge(&training, Quantity::Raw, NoiseSource::default()).unwrap();
-        let rmse = |decoder: &mut dyn Decoder| {
-            let off = decode_set(decoder, &test).unwrap() - test.targets();
+        let map = Program::ridge(&training, Quantity::Raw, NoiseSource::default()).unwrap();
+        let rmse = |program: Program| {
+            let off = answers(program, &test) - test.targets();
             off.mapv(|error| error * error).mean().unwrap().sqrt()
         };
         // The noise of the targets is 0.3.
-        let (ours, mean) = (rmse(&mut map), rmse(&mut TrainingMean::fit(&training)));
+        let (ours, mean) = (rmse(map), rmse(Program::mean(&training)));
         assert!(ours < mean, "{ours} {mean}");
     }
 

@@ -3,11 +3,11 @@ use std::{fmt, ops::AddAssign};
 use ndarray::{Array2, Axis};
 use thiserror::Error;
 
-use super::{Description, NotDescribed, Solution, equations::RowProblem};
+use super::{Program, RowProblemDescription, Solution, equations::RowProblem};
 use crate::{
-    dataset::{Dataset, PerRow},
-    network::Quantity,
+    dataset::Dataset,
     sensor::{Axes, SensorModel},
+    text::counted,
 };
 
 /// A method of decoding readings into targets; for a simulated array, resistances in ohm into coordinates of nodes in
@@ -86,6 +86,43 @@ pub trait Decoder: Send {
     }
 }
 
+/// What a decoder computes, for programs that decode without this one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Description {
+    /// From readings to targets.
+    pub program: Program,
+    /// Iteration on the equations of the sensor that starts from the answers of the program.
+    pub equations: Option<RowProblemDescription>,
+}
+
+/// Reason why a decoder cannot be described.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum NotDescribed {
+    /// The decoder uses the noise of the readings and the prior of the scene.
+    #[error(
+        "the readings of the scene have noise, for which this decoder computes a posterior by expectation propagation, which bundles do not support: take another decoder, or settings without noise"
+    )]
+    Posterior,
+    /// There are no more equations than unknowns.
+    #[error(
+        "a row has {} for {unknowns} unknown displacements, too few for the equations to have one solution: take another decoder",
+        counted(*.readings, "reading")
+    )]
+    Undetermined {
+        /// Number of readings of a row.
+        readings: usize,
+        /// Number of unknowns of a row.
+        unknowns: usize,
+    },
+    /// The decoder is a system of fuzzy rules.
+    #[error("fuzzy rules are only for comparison and cannot be exported: take another decoder, such as rbf or ridge")]
+    Rules,
+    /// The decoder cannot be described.
+    #[error("this decoder cannot be exported for other programs: take another decoder")]
+    Unknown,
+}
+
 /// Error for a reading that cannot be decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[error("row {}, reading {}: {value:?} cannot be decoded; give a finite number, above 0 for a resistance", .row_index + 1, .channel + 1)]
@@ -103,15 +140,6 @@ impl DecodeError {
     #[inline(always)]
     pub(crate) fn check(readings: &[f64]) -> Result<(), Self> {
         Self::check_that(readings, |value| (value > 0.0) & (value < f64::INFINITY))
-    }
-
-    /// Checks that `quantity` has a value for all readings of a row.
-    #[inline(always)]
-    pub(crate) fn check_for(quantity: Quantity, readings: &[f64]) -> Result<(), Self> {
-        match quantity {
-            Quantity::Raw => Self::check_that(readings, f64::is_finite),
-            Quantity::Resistance | Quantity::Conductance | Quantity::LogResistance => Self::check(readings),
-        }
     }
 
     /// Checks that `is_valid` holds for all readings of a row, in a single vectorised pass, since invalid readings
@@ -157,28 +185,6 @@ pub fn decode_set(decoder: &mut dyn Decoder, set: &Dataset) -> Result<Array2<f64
             })?;
     }
     Ok(answers)
-}
-
-impl<D: Decoder> Decoder for PerRow<D> {
-    fn channels(&self) -> usize {
-        self.at(0).channels()
-    }
-
-    fn outputs(&self) -> usize {
-        self.at(0).outputs()
-    }
-
-    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        self.at_mut(row_index).decode_row(row_index, readings, targets)
-    }
-
-    fn description(&self) -> Result<Description, NotDescribed> {
-        let mut maps = Vec::new();
-        for of_row in self.values() {
-            maps.extend(of_row.description()?.maps);
-        }
-        Ok(Description::of_maps(maps))
-    }
 }
 
 /// Root mean square of m/R − 1 over the readings m of a row, with R the model's resistances at the decoded coordinates.

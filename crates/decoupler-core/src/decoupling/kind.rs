@@ -1,12 +1,10 @@
 use std::{fmt, str::FromStr};
 
 use rand::rngs::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{
-    AffineMap, CompiledNetworks, Decoder, NewtonDecoder, PolishedDecoder, RadialBasisNetwork, TakagiSugeno,
-    TrainingMean,
-};
+use super::{Decoder, NewtonDecoder, PolishedDecoder, Program, ProgramDecoder};
 use crate::{
     dataset::{Dataset, PerRow, Seed, Stream},
     network::{InputChoice, Networks, ScalingError},
@@ -35,7 +33,7 @@ pub enum DecoderKind {
 }
 
 /// Floating-point precision in which a network computes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Precision {
     /// 64 bits.
     #[default]
@@ -245,39 +243,34 @@ impl FitProblem<'_> {
         self.seed.rng(Stream::Expectation)
     }
 
-    /// Fits one decoder to the samples of all row-wires, or one for each.
-    fn of_samples<D>(&self, fit: impl FnMut(&Dataset) -> Result<D, ScalingError>) -> Fit
-    where
-        PerRow<D>: Decoder + 'static,
-    {
-        Ok(Some(Box::new(PerRow::fit(self.training, self.row_model, fit)?)))
+    /// Fits one program to the samples of all row-wires, or one for each.
+    fn of_samples(&self, fit: impl FnMut(&Dataset) -> Result<Program, ScalingError>) -> Fit {
+        let programs = PerRow::fit(self.training, self.row_model, fit)?;
+        Ok(Some(Box::new(ProgramDecoder::new(Program::each(&programs)))))
     }
 }
 
 fn fit_mean(problem: &FitProblem<'_>) -> Fit {
-    problem.of_samples(|set| Ok(TrainingMean::fit(set)))
+    problem.of_samples(|set| Ok(Program::mean(set)))
 }
 
 fn fit_ridge(problem: &FitProblem<'_>) -> Fit {
-    problem.of_samples(|set| AffineMap::ridge(set, problem.inputs.quantity, problem.unseen))
+    problem.of_samples(|set| Program::ridge(set, problem.inputs.quantity, problem.unseen))
 }
 
 fn fit_radial_basis(problem: &FitProblem<'_>) -> Fit {
     let mut rng = problem.rng();
-    problem.of_samples(|set| RadialBasisNetwork::fit(set, problem.inputs, problem.unseen, &mut rng))
+    problem.of_samples(|set| Program::radial_basis(set, problem.inputs, problem.unseen, &mut rng))
 }
 
 fn fit_fuzzy(problem: &FitProblem<'_>) -> Fit {
     let mut rng = problem.rng();
-    problem.of_samples(|set| TakagiSugeno::fit(set, problem.inputs.quantity, problem.unseen, &mut rng))
+    problem.of_samples(|set| Program::fuzzy(set, problem.inputs.quantity, problem.unseen, &mut rng))
 }
 
 fn fit_network(problem: &FitProblem<'_>) -> Fit {
-    let rows = problem.training.row_count();
-    Ok(problem.networks.map(|networks| match problem.precision {
-        Precision::Double => Box::new(CompiledNetworks::<f64>::new(networks, rows)) as Box<dyn Decoder>,
-        Precision::Single => Box::new(CompiledNetworks::<f32>::new(networks, rows)),
-    }))
+    let program = problem.networks.map(|networks| networks.program(problem.precision));
+    Ok(program.map(|program| Box::new(ProgramDecoder::new(program)) as Box<dyn Decoder>))
 }
 
 fn fit_newton(problem: &FitProblem<'_>) -> Fit {

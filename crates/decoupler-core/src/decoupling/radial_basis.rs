@@ -4,62 +4,31 @@ use std::{borrow::Cow, ops::Range};
 
 use faer::{Mat, Side, linalg::solvers::Solve};
 use ndarray::{Array1, Array2, ArrayView1, Axis};
-use pulp::{Simd, WithSimd};
 use rand::Rng;
-use serde::{Deserialize, Serialize};
 
 use super::{
-    AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed,
-    compiled::PaddedLayer,
+    Precision,
+    program::{Builder, Function, Program},
     ridge::{Choice, folds},
 };
 use crate::{
     dataset::{Dataset, Folds},
-    network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, exp},
+    network::{InputChoice, Inputs, MinMax, ScalingChoice, ScalingError},
     scene::NoiseSource,
 };
 
-/// A radial-basis network (Broomhead and Lowe 1988): Gaussians around centres in the scaled inputs, and a linear
-/// output layer with a constant, fitted by kernel ridge regression.
-///
-/// Up to 4000 training samples are all centres, of more there are 1000 centres. The width of the Gaussians and the
-/// penalty of each target are chosen by cross-validation on folds of the training samples. Inputs that are scaled to
-/// [−1, 1] are divided by their standard deviation.
-///
-/// The scalings are folded into the layers, and decoding does not allocate.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct RadialBasisNetwork {
-    quantity: Quantity,
-    /// Centre of each channel, subtracted from its values.
-    channel_centres: Vec<f64>,
-    /// Maps centred channels to scaled inputs.
-    input_layer: PaddedLayer,
-    centres: usize,
-    gaussians: Gaussians,
-    /// Maps Gaussians to the offsets of the varying targets.
-    output_layer: PaddedLayer,
-    /// Targets to which the output layer adds its offsets.
-    middles: Vec<f64>,
-    /// Indices of the varying targets.
-    varying: Vec<usize>,
-    buffers: Buffers,
-}
-
-/// Buffers for one row.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct Buffers {
-    channels: Vec<f64>,
-    inputs: Vec<f64>,
-    gaussians: Vec<f64>,
-    changes: Vec<f64>,
-}
-
-impl RadialBasisNetwork {
-    /// Fits to a training set; `unseen` is as in [`Inputs::fit`]; `rng` draws the noise.
+impl Program {
+    /// Fits a radial-basis network (Broomhead and Lowe 1988) to a training set: Gaussians around centres in the scaled
+    /// inputs, and a linear output layer with a constant, by kernel ridge regression. `unseen` is as in [`Inputs::fit`];
+    /// `rng` draws the noise.
+    ///
+    /// Up to 4000 training samples are all centres, of more there are 1000 centres. The width of the Gaussians and the
+    /// penalty of each target are chosen by cross-validation on folds of the training samples. Inputs that are
+    /// scaled to [−1, 1] are divided by their standard deviation.
     ///
     /// # Errors
     /// If values cannot be scaled.
-    pub fn fit(
+    pub fn radial_basis(
         training: &Dataset,
         choice: InputChoice,
         unseen: NoiseSource,
@@ -77,202 +46,31 @@ impl RadialBasisNetwork {
         };
         let folds = |samples: &[usize]| folds(&training.select(samples));
         let kernel = KernelRidge::fit(&(x * &scales), &y, folds);
-        Ok(Self::folded(&inputs, &scales, &kernel, &outputs))
+        Ok(Self::of_kernel(&inputs, &scales, &kernel, &outputs))
     }
 
-    /// Folds the scalings into the layers; the inputs are multiplied by `scales`.
-    fn folded(inputs: &Inputs, scales: &Array1<f64>, kernel: &KernelRidge, outputs: &MinMax) -> Self {
+    /// The network of a fitted kernel; the inputs are multiplied by `scales`.
+    fn of_kernel(inputs: &Inputs, scales: &Array1<f64>, kernel: &KernelRidge, outputs: &MinMax) -> Self {
+        let double = Precision::Double;
         let KernelRidge {
             centres,
             sharpness,
             coefficients,
         } = kernel;
+        // Distances in units of the width: exp(−sharpness · |x − c|²).
+        let root = sharpness.sqrt();
         let (channel_centres, to_inputs) = inputs.affine();
-        let ranges = outputs.middles_and_half_widths();
-        let varying = outputs.varying();
-        let gaussians = Gaussians::new(centres, *sharpness);
-        let (channels, count, width) = (channel_centres.len(), centres.nrows(), gaussians.width());
-        let input_layer = PaddedLayer::new((channels, inputs.count()), |channel, input| {
-            channel.map_or(0.0, |channel| scales[input] * to_inputs[[input, channel]])
-        });
-        let output_layer = PaddedLayer::new((width, varying.len()), |centre, output| {
-            let half_width = ranges[varying[output]].1;
-            match centre {
-                None => coefficients[[count, output]] * half_width,
-                Some(centre) if centre < count => coefficients[[centre, output]] * half_width,
-                Some(_) => 0.0,
-            }
-        });
-        Self {
-            quantity: inputs.quantity(),
-            buffers: Buffers {
-                channels: vec![0.0; channels],
-                inputs: vec![0.0; input_layer.padded_outputs()],
-                gaussians: vec![0.0; width],
-                changes: vec![0.0; output_layer.padded_outputs()],
-            },
-            channel_centres,
-            input_layer,
-            centres: count,
-            gaussians,
-            output_layer,
-            middles: ranges.iter().map(|range| range.0).collect(),
-            varying,
-        }
-    }
-
-    /// Number of Gaussians.
-    pub fn centres(&self) -> usize {
-        self.centres
-    }
-}
-
-impl Decoder for RadialBasisNetwork {
-    fn channels(&self) -> usize {
-        self.channel_centres.len()
-    }
-
-    fn outputs(&self) -> usize {
-        self.middles.len()
-    }
-
-    fn decode_row(&mut self, _row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        assert_eq!((readings.len(), targets.len()), (self.channels(), self.outputs()));
-        DecodeError::check_for(self.quantity, readings)?;
-        pulp::Arch::new().dispatch(Decoding {
-            network: self,
-            readings,
-            targets,
-        });
-        Ok(())
-    }
-
-    fn description(&self) -> Result<Description, NotDescribed> {
-        let (root, centres) = self.gaussians.in_units_of_width(self.centres);
-        let inputs = self.input_layer.weights(self.channels()) * root;
-        let changes = self.output_layer.weights(self.centres);
-        let mut constants = self.middles.clone();
-        let of_varying = self.output_layer.constants().iter().zip(&self.varying);
-        of_varying.for_each(|(constant, &target)| constants[target] += constant);
-        Ok(Description::of_maps(vec![LayeredMap {
-            quantity: self.quantity,
-            centre: self.channel_centres.clone(),
-            layers: vec![
-                Layer::Affine(AffineLayer::linear(inputs)),
-                Layer::Gaussians { centres },
-                Layer::Affine(AffineLayer::of_varying(&changes, &self.varying, &constants)),
-            ],
-        }]))
-    }
-}
-
-/// A struct instead of a closure so that the body is inlined into the SIMD-dispatched function.
-struct Decoding<'a> {
-    network: &'a mut RadialBasisNetwork,
-    readings: &'a [f64],
-    targets: &'a mut [f64],
-}
-
-impl WithSimd for Decoding<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let RadialBasisNetwork {
-            quantity,
-            channel_centres,
-            input_layer,
-            gaussians,
-            output_layer,
-            middles,
-            varying,
-            buffers,
-            ..
-        } = self.network;
-        let values = buffers.channels.iter_mut().zip(self.readings).zip(&*channel_centres);
-        values.for_each(|((value, &reading), centre)| *value = quantity.of(reading) - centre);
-        input_layer.apply(&buffers.channels, &mut buffers.inputs);
-        gaussians.evaluate(&buffers.inputs[..input_layer.outputs()], &mut buffers.gaussians);
-        output_layer.apply(&buffers.gaussians, &mut buffers.changes);
-        self.targets.copy_from_slice(middles);
-        for (&target, change) in varying.iter().zip(&buffers.changes) {
-            self.targets[target] += change;
-        }
-    }
-}
-
-/// Gaussians of equal width around centres, laid out with centres side by side in vector registers.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct Gaussians {
-    /// Number of centres, padded to a multiple of [`LANES`].
-    width: usize,
-    /// Inputs × padded centres.
-    centres: Vec<f64>,
-    /// 1 / (2 · width²).
-    sharpness: f64,
-}
-
-/// The number of centres is padded to a multiple of this.
-const LANES: usize = 8;
-
-impl Gaussians {
-    /// Lays out `centres` (centres × inputs).
-    pub(super) fn new(centres: &Array2<f64>, sharpness: f64) -> Self {
-        let (count, inputs) = centres.dim();
-        let width = count.next_multiple_of(LANES);
-        let mut laid_out = vec![0.0; inputs * width];
-        for ((centre, input), &value) in centres.indexed_iter() {
-            laid_out[input * width + centre] = value;
-        }
-        Self {
-            width,
-            centres: laid_out,
-            sharpness,
-        }
-    }
-
-    /// Number of centres with padding.
-    pub(super) fn width(&self) -> usize {
-        self.width
-    }
-
-    /// Root of the sharpness, and centres (inputs × `count`) multiplied by it.
-    pub(super) fn in_units_of_width(&self, count: usize) -> (f64, Array2<f64>) {
-        let root = self.sharpness.sqrt();
-        let inputs = self.centres.len() / self.width.max(1);
-        let centre = |(input, centre): (usize, usize)| root * self.centres[input * self.width + centre];
-        (root, Array2::from_shape_fn((inputs, count), centre))
-    }
-
-    /// Writes the Gaussians at `x`, one for each centre; padding lanes are unspecified.
-    #[inline(always)]
-    pub(super) fn evaluate(&self, x: &[f64], values: &mut [f64]) {
-        let mut first = 0;
-        while first < self.width {
-            first += match self.width - first {
-                32.. => self.block::<32>(x, first, values),
-                16.. => self.block::<16>(x, first, values),
-                _ => self.block::<LANES>(x, first, values),
-            };
-        }
-    }
-
-    /// Writes the Gaussians `first..first + B` and returns B. Several registers are filled at once to hide the
-    /// latency of additions.
-    #[inline(always)]
-    fn block<const B: usize>(&self, x: &[f64], first: usize, values: &mut [f64]) -> usize {
-        let mut squares = [0.0; B];
-        for (&x, centres) in x.iter().zip(self.centres.chunks_exact(self.width)) {
-            let centres: &[f64; B] = centres[first..first + B].try_into().expect("B long");
-            for lane in 0..B {
-                let apart = x - centres[lane];
-                squares[lane] += apart * apart;
-            }
-        }
-        for lane in 0..B {
-            values[first + lane] = exp(-self.sharpness * squares[lane]);
-        }
-        B
+        let to_inputs = &to_inputs.t() * &(scales * root);
+        let mut builder = Builder::new(channel_centres.len());
+        let zeros = vec![0.0; inputs.count()];
+        let changes = builder.changes(inputs.quantity(), &channel_centres, double);
+        let scaled = builder.affine_of(&changes, to_inputs, &zeros);
+        let distances = builder.squared_distances(scaled, &centres.t() * root, double);
+        let gaussians = builder.map(Function::Gaussian, distances, double);
+        let (weights, constants) = coefficients.view().split_at(Axis(0), centres.nrows());
+        let changes = builder.affine(gaussians, weights.to_owned(), &constants.row(0).to_vec(), double);
+        let targets = builder.restored(changes, outputs);
+        builder.finish(targets)
     }
 }
 
@@ -498,7 +296,8 @@ mod tests {
     use super::*;
     use crate::{
         dataset::{Seed, Stream},
-        decoupling::{AffineMap, TakagiSugeno, decode_set},
+        decoupling::{Decoder, ProgramDecoder, decode_set},
+        network::Quantity,
         scene::{Rows, Scene, standard_normal},
         sensor::SensorModel,
     };
@@ -521,7 +320,8 @@ mod tests {
         let outputs = MinMax::fit(set.targets()).unwrap();
         let (x, y) = (inputs.of(set.readings()), outputs.scale(set.targets()));
         let kernel = KernelRidge::fit(&x, &y, |samples| folds(&set.select(samples)));
-        let mut network = RadialBasisNetwork::folded(&inputs, &Array1::ones(x.ncols()), &kernel, &outputs);
+        let program = Program::of_kernel(&inputs, &Array1::ones(x.ncols()), &kernel, &outputs);
+        let mut network = ProgramDecoder::new(program);
         let KernelRidge {
             centres,
             sharpness,
@@ -662,23 +462,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn centres_side_by_side_match_single_ones() {
-        for (count, inputs) in [(1, 1), (7, 3), (100, 30), (33, 0)] {
-            let centres = Array2::from_shape_fn((count, inputs), |(c, i)| (1.7 * c as f64 + 0.3 * i as f64).sin());
-            let x = Array2::from_shape_fn((1, inputs), |(_, i)| (0.9 * i as f64).cos());
-            let gaussians = Gaussians::new(&centres, 0.4);
-            let mut values = vec![0.0; gaussians.width()];
-            gaussians.evaluate(x.as_slice().unwrap(), &mut values);
-            for (centre, value) in centres.rows().into_iter().zip(&values) {
-                assert!(
-                    (value / gaussian(x.row(0), centre, 0.4) - 1.0).abs() < 1e-14,
-                    "{count} {inputs}"
-                );
-            }
-        }
-    }
-
     /// A case of `tests/fixtures/repeated_samples.py`.
     #[derive(Deserialize)]
     struct Case {
@@ -716,11 +499,12 @@ mod tests {
             let part = |samples: std::ops::Range<usize>| set.select(&samples.collect::<Vec<_>>());
             let (training, test) = (part(0..fitted), part(fitted..y.len()));
             let (choice, none) = (InputChoice::MEASURED, NoiseSource::default());
-            let ridge = r2(&mut AffineMap::ridge(&training, Quantity::Raw, none).unwrap(), &test);
+            let decoder = |program: Result<Program, ScalingError>| ProgramDecoder::new(program.unwrap());
+            let ridge = r2(&mut decoder(Program::ridge(&training, Quantity::Raw, none)), &test);
             assert!((ridge - r2_ridge).abs() < 0.01, "{name}: ridge {ridge}, {r2_ridge}");
             let mut rng = Seed(0).rng(Stream::Expectation);
-            let mut basis = RadialBasisNetwork::fit(&training, choice, none, &mut rng).unwrap();
-            let mut fuzzy = TakagiSugeno::fit(&training, Quantity::Raw, none, &mut rng).unwrap();
+            let mut basis = decoder(Program::radial_basis(&training, choice, none, &mut rng));
+            let mut fuzzy = decoder(Program::fuzzy(&training, Quantity::Raw, none, &mut rng));
             for (decoder, ours, close) in [
                 ("basis", r2(&mut basis, &test), 0.02),
                 ("fuzzy", r2(&mut fuzzy, &test), 0.05),

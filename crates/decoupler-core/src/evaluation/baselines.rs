@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use super::{Coverage, Errors, RunError, RunSets, RunSettings, Simulation, Source, TestErrors, run_sets::check_sets};
 use crate::{
     dataset::{Dataset, PerRow},
-    decoupling::{AffineMap, NewtonDecoder, TrainingMean, decode_set},
+    decoupling::{NewtonDecoder, Program, ProgramDecoder, decode_set},
     job::Job,
     network::Quantity,
     scene::{NoiseSource, RowModel, Rows},
@@ -140,18 +140,19 @@ pub(super) fn mean_and_linear(settings: &RunSettings, sets: &RunSets) -> Result<
 pub(super) fn fit_baselines(
     training: &Dataset,
     settings: &RunSettings,
-) -> Result<(PerRow<TrainingMean>, PerRow<AffineMap>), RunError> {
-    let mean = |set: &Dataset| Ok::<_, RunError>(TrainingMean::fit(set));
+) -> Result<(ProgramDecoder, ProgramDecoder), RunError> {
+    let mean = |set: &Dataset| Ok::<_, RunError>(Program::mean(set));
     let mean = PerRow::fit(training, settings.source.row_model(), mean)?;
     let ridge = |quantity| {
-        let of_set = move |set: &Dataset| AffineMap::ridge(set, quantity, NoiseSource::default());
+        let of_set = move |set: &Dataset| Program::ridge(set, quantity, NoiseSource::default());
         PerRow::fit(training, settings.source.row_model(), of_set)
     };
     let linear = match settings.source {
         Source::Simulated(simulation) if simulation.scene.rows == Rows::Known => ridge(Quantity::Resistance)?,
-        Source::Simulated(_) => PerRow::shared(AffineMap::least_squares(training, Quantity::Resistance)?),
+        Source::Simulated(_) => PerRow::shared(Program::least_squares(training, Quantity::Resistance)?),
         Source::Measured(_) => ridge(settings.inputs.quantity)?,
     };
+    let [mean, linear] = [mean, linear].map(|programs| ProgramDecoder::new(Program::each(&programs)));
     Ok((mean, linear))
 }
 

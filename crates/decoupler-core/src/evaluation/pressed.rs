@@ -293,7 +293,7 @@ mod tests {
     use super::*;
     use crate::{
         dataset::Dataset,
-        decoupling::{NewtonDecoder, TrainingMean},
+        decoupling::{NewtonDecoder, Program, ProgramDecoder},
         evaluation::{Errors, Run, SimulatedSettings},
         scene::{Indenter, Print, Scene},
     };
@@ -399,7 +399,7 @@ mod tests {
         let pressed = Pressed::new(&sensor(), &rows, &touch(), 1.0).unwrap();
         let targets = Array2::from_shape_vec((3, 18), pressed.coordinates_mm.clone()).unwrap();
         let set = Dataset::new(pressed.readings_ohm.clone(), targets, Some(&rows), vec![0; 3]).unwrap();
-        let mut mean = TrainingMean::fit(run.test());
+        let mut mean = ProgramDecoder::new(Program::mean(run.test()));
         let answer = pressed.answer(&mut mean, &|| false).unwrap().unwrap();
         let decoded = Array2::from_shape_vec((3, 18), answer.coordinates_mm.clone()).unwrap();
         let errors = Errors::measure(&set, &decoded, 1.0);

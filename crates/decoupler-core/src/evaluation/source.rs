@@ -434,7 +434,6 @@ mod tests {
 
     use super::*;
     use crate::{
-        decoupling::CompiledNetworks,
         evaluation::{Pressed, Run},
         scene::{Print, Touch},
     };
@@ -460,7 +459,7 @@ mod tests {
             ..Touch::default()
         };
         let pressed = Pressed::new(&sensor, &rows, &touch, 1.0).unwrap();
-        let mut decoder = CompiledNetworks::<f64>::new(&run.network(), rows.len());
+        let mut decoder = run.network().decoder();
         let answer = pressed.answer(&mut decoder, &|| false).unwrap().unwrap();
         let depths = pressed.nodes_mm().map(|node| sensor.geometry.height_mm - node.z);
         let nodes = pressed.nodes_mm().count() as f64;

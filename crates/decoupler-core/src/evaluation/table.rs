@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     dataset::Dataset,
-    decoupling::{CompiledNetworks, DecodeError, Decoder},
+    decoupling::{DecodeError, Decoder},
 };
 
 /// Error table with baselines and decoders as rows; the columns depend on the channels. Each target of a recording has
@@ -319,7 +319,7 @@ impl ErrorTable {
 /// Returns the time to decode a frame of the test set with the best network so far, in double precision on one thread;
 /// `None` if the test set has readings that cannot be decoded.
 pub fn network_frame_time(run: &Run) -> Option<Duration> {
-    let mut decoder = CompiledNetworks::<f64>::new(&run.network(), run.test().row_count());
+    let mut decoder = run.network().decoder();
     let microseconds = frame_us(&mut decoder, run.test()).ok()?;
     Some(Duration::from_secs_f64(1e-6 * microseconds))
 }

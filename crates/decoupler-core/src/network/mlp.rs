@@ -1,8 +1,6 @@
-use ndarray::{Array2, ArrayView1, ArrayView2};
+use ndarray::ArrayView2;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
-
-use super::tanh_in_place;
 
 /// Number of channels in each layer, not counting biases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -118,35 +116,6 @@ impl Mlp {
         let shape = (self.shape.hidden + 1, self.shape.outputs);
         ArrayView2::from_shape(shape, self.layers().1).expect("checked when built")
     }
-
-    /// Returns the outputs (samples × m) for `inputs` (samples × n).
-    pub fn forward(&self, inputs: ArrayView2<'_, f64>) -> Array2<f64> {
-        let mut outputs = Array2::zeros((inputs.nrows(), self.shape.outputs));
-        let mut hidden = vec![0.0; self.shape.hidden];
-        let (w, v) = self.layers();
-        for (input, mut output) in inputs.rows().into_iter().zip(outputs.rows_mut()) {
-            affine(w, input, &mut hidden);
-            tanh_in_place(&mut hidden);
-            let output = output.as_slice_mut().expect("a row of a standard array is contiguous");
-            affine(v, ArrayView1::from(&hidden), output);
-        }
-        outputs
-    }
-}
-
-/// Computes `output = [input, 1] · layer`, where the layer is stored row by row with its biases last.
-fn affine(layer: &[f64], input: ArrayView1<'_, f64>, output: &mut [f64]) {
-    let width = output.len();
-    let (rows, biases) = layer.split_at(input.len() * width);
-    output.copy_from_slice(biases);
-    if width == 0 {
-        return;
-    }
-    for (row, value) in rows.chunks_exact(width).zip(input) {
-        for (sum, weight) in output.iter_mut().zip(row) {
-            *sum += value * weight;
-        }
-    }
 }
 
 /// Returns a network with a random initialisation by Nguyen and Widrow (1990), which spreads the active regions of the
@@ -194,7 +163,7 @@ pub fn nguyen_widrow(shape: Shape, rng: &mut impl Rng) -> Mlp {
 
 #[cfg(test)]
 mod tests {
-    use ndarray::array;
+    use ndarray::{Array2, array};
 
     use super::*;
     use crate::dataset::{Seed, Stream};

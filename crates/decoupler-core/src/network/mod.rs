@@ -17,6 +17,6 @@ pub use mlp::{Mlp, Shape, nguyen_widrow};
 pub use networks::{DecouplingNetwork, HiddenSuggestions, LARGEST_HIDDEN, NetworkError, Networks};
 pub use quantity::{ChannelNoise, Quantity};
 pub use scaling::{MinMax, ReadingRange, ScalingError};
-pub(crate) use tanh::exp;
+pub(crate) use tanh::{exp, tanh, tanh_single};
 pub use tanh::{tanh_in_place, tanh_in_place_single};
 pub use whitening::Whitening;

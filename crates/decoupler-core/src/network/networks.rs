@@ -1,6 +1,5 @@
 use std::{fmt, ops::RangeInclusive};
 
-use ndarray::{Array2, ArrayView2};
 use serde::{
     Deserialize, Deserializer, Serialize, Serializer,
     de::{MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
@@ -8,7 +7,7 @@ use serde::{
 use thiserror::Error;
 
 use super::{InputScaling, Inputs, MinMax, Mlp, Quantity, ReadingRange, Shape};
-use crate::dataset::{Dataset, PerRow};
+use crate::dataset::PerRow;
 
 /// Trained networks: one shared by all row-wires read, or one per row-wire where the row is known.
 ///
@@ -19,27 +18,6 @@ impl PerRow<DecouplingNetwork> {
     /// Total number of weights in all networks.
     pub fn weights(&self) -> usize {
         self.values().iter().map(|network| network.mlp().weights().len()).sum()
-    }
-
-    /// Decodes each sample of `set` with the network of its row-wire. Returns samples × outputs, in the units of the
-    /// targets.
-    ///
-    /// # Panics
-    /// If the set has a different number of channels, or a row-wire without a network.
-    pub fn decouple(&self, set: &Dataset) -> Array2<f64> {
-        if let Some(only) = self.only() {
-            return only.decouple(set.readings());
-        }
-        let outputs = self.at(0).outputs().channels();
-        let mut answers = Array2::zeros((set.samples(), outputs));
-        for row_index in 0..set.row_count() {
-            let of_row = self.at(row_index).decouple(set.of_row(row_index).readings());
-            let samples = (0..set.samples()).filter(|&sample| set.row_index(sample) == row_index);
-            for (sample, answer) in samples.zip(of_row.rows()) {
-                answers.row_mut(sample).assign(&answer);
-            }
-        }
-        answers
     }
 }
 
@@ -76,8 +54,17 @@ impl<'de> Visitor<'de> for OneOrMany {
         while let Some(network) = sequence.next_element()? {
             all.push(network);
         }
-        if all.is_empty() {
+        let Some(first): Option<&DecouplingNetwork> = all.first() else {
             return Err(serde::de::Error::custom("the list of networks is empty"));
+        };
+        let shape = |network: &DecouplingNetwork| {
+            let inputs = &network.inputs;
+            (inputs.quantity(), inputs.channels(), network.outputs.channels())
+        };
+        if all.iter().any(|network| shape(network) != shape(first)) {
+            return Err(serde::de::Error::custom(
+                "the networks of the row-wires differ in their readings or targets",
+            ));
         }
         Ok(Networks::each(all))
     }
@@ -167,12 +154,6 @@ impl DecouplingNetwork {
     /// Returns the scaling of the coordinates.
     pub fn outputs(&self) -> &MinMax {
         &self.outputs
-    }
-
-    /// Returns the coordinates in millimetres (samples × 3·M2) for resistances in ohm (samples × M4).
-    pub fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
-        let scaled = self.inputs.of(resistances_ohm);
-        self.outputs.restore(self.mlp.forward(scaled.view()).view())
     }
 }
 

@@ -11,7 +11,7 @@ pub fn tanh_in_place(values: &mut [f64]) {
 }
 
 #[inline(always)]
-fn tanh(x: f64) -> f64 {
+pub(crate) fn tanh(x: f64) -> f64 {
     /// Beyond 2|x| = 40 the result rounds to ±1.
     const SATURATED: f64 = 40.0;
     let twice = 2.0 * x.abs();
@@ -33,7 +33,7 @@ pub fn tanh_in_place_single(values: &mut [f32]) {
 }
 
 #[inline(always)]
-fn tanh_single(x: f32) -> f32 {
+pub(crate) fn tanh_single(x: f32) -> f32 {
     /// ln 2 in two parts; products of the first with an integer up to 2¹⁵ are exact.
     const LN2_HIGH: f32 = 0.693_359_4;
     const LN2_LOW: f32 = -2.121_944_4e-4;

@@ -1,8 +1,8 @@
 //! Rows with noise that are solved side by side have the same answers as alone.
 
 use decoupler_core::{
-    dataset::{Dataset, PerRow, Seed, Stream},
-    decoupling::{Decoder, NewtonDecoder, PolishedDecoder, TrainingMean, decode_set},
+    dataset::{Dataset, Seed, Stream},
+    decoupling::{Decoder, NewtonDecoder, PolishedDecoder, Program, ProgramDecoder, decode_set},
     scene::{Noise, Rows, Scene},
     sensor::SensorModel,
 };
@@ -13,7 +13,7 @@ fn newton(model: &SensorModel, scene: &Scene) -> NewtonDecoder {
 }
 
 fn polished(model: &SensorModel, scene: &Scene, set: &Dataset, steps: usize) -> PolishedDecoder {
-    let first = Box::new(PerRow::shared(TrainingMean::fit(set)));
+    let first = Box::new(ProgramDecoder::new(Program::mean(set)));
     let rows: Vec<usize> = (0..model.scale.rows()).collect();
     PolishedDecoder::new(first, model, scene, &rows, steps).unwrap()
 }

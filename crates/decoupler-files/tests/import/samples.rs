@@ -2,11 +2,7 @@
 
 use std::{fs::File, io::BufReader, path::PathBuf};
 
-use decoupler_core::{
-    dataset::Seed,
-    decoupling::{CompiledNetworks, Decoder},
-    glam::DVec3,
-};
+use decoupler_core::{dataset::Seed, decoupling::Decoder, glam::DVec3};
 use decoupler_files::{
     export::NetworkFile,
     live::{Recording, Simulated},
@@ -27,7 +23,7 @@ fn the_network_decodes_the_recording() {
     let rows = Vec::from_iter(0..scale.rows());
     let reader = BufReader::new(File::open(sample("recording.csv")).unwrap());
     let recording = Recording::read(reader, &rows, scale.rows(), scale.columns()).unwrap();
-    let mut decoder = CompiledNetworks::<f64>::new(&file.network, rows.len());
+    let mut decoder = file.network.decoder();
     let mut truth = Simulated::new(&sensor, &source.scene, Seed(0), 15.0).unwrap();
     let mut frame_ohm = vec![0.0; truth.readings()];
     let mut coordinates_mm = vec![0.0; rows.len() * decoder.outputs()];

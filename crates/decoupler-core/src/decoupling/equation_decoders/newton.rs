@@ -1,13 +1,12 @@
 use glam::DVec3;
-use ndarray::Array2;
 
 use super::{check, solve_in_blocks};
 use crate::{
+    dataset::PerRow,
     decoupling::{
-        AffineLayer, DecodeError, Decoder, Description, Estimate, Estimator, Layer, LayeredMap, NotDescribed,
-        RowChoice, RowProblemDescription, Solution, SolvedRows, affine_map::AffineStart, ranges,
+        DecodeError, Decoder, Description, Estimate, Estimator, NotDescribed, Program, RowChoice,
+        RowProblemDescription, Solution, SolvedRows, affine_map::AffineStart, ranges,
     },
-    network::Quantity,
     scene::{RowModel, Scene},
     sensor::{Axes, SensorError, SensorModel},
 };
@@ -65,25 +64,18 @@ impl NewtonDecoder {
 
     /// Coordinates of the nodes of a row-wire at the start of the iteration: the affine estimate if nodes move along z
     /// only, and mid-range otherwise.
-    fn start_of(&self, row: usize) -> LayeredMap {
+    fn start_of(&self, row: usize) -> Program {
         let ranges = ranges(&self.model, &self.scene);
         let channels = self.model.scale.columns();
         if self.scene.movement.axes() == Axes::Z {
-            return AffineStart::new(&self.model, row, ranges[0]).description(&self.model, row);
+            return AffineStart::new(&self.model, row, ranges[0]).program(&self.model, row);
         }
         let nodes = 0..self.model.scale.nodes_per_row();
         let middles = nodes.zip(ranges.chunks_exact(3)).flat_map(|(node, ranges)| {
             let middle = DVec3::new(ranges[0].middle(), ranges[1].middle(), ranges[2].middle());
             self.model.displaced_mm(row, node, middle).to_array()
         });
-        LayeredMap {
-            quantity: Quantity::Conductance,
-            centre: vec![1.0; channels],
-            layers: vec![Layer::Affine(AffineLayer {
-                weights: Array2::zeros((channels, self.model.scale.coordinates_per_row())),
-                biases: middles.collect(),
-            })],
-        }
+        Program::constant(channels, &Vec::from_iter(middles))
     }
 }
 
@@ -195,7 +187,7 @@ impl Decoder for NewtonDecoder {
         };
         let of_scene = (&self.model, &self.scene);
         Ok(Description {
-            maps: self.rows.iter().map(|&row| self.start_of(row)).collect(),
+            program: Program::each(&PerRow::each(self.rows.iter().map(|&row| self.start_of(row)).collect())),
             equations: Some(RowProblemDescription::new(of_scene, (&self.rows, row_choice), None)),
         })
     }

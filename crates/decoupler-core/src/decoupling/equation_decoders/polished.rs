@@ -116,7 +116,7 @@ impl Decoder for PolishedDecoder {
         };
         let of_scene = (&self.model, &self.scene);
         Ok(Description {
-            maps: self.first.description()?.maps,
+            program: self.first.description()?.program,
             equations: Some(RowProblemDescription::new(
                 of_scene,
                 (&self.rows, row_choice),

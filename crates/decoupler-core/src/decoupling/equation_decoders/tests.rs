@@ -1,7 +1,7 @@
 use super::*;
 use crate::{
-    dataset::{Dataset, PerRow, Seed, Stream},
-    decoupling::{Decoder, Estimator, Solution, SolvedRows, TrainingMean, decode_set},
+    dataset::{Dataset, Seed, Stream},
+    decoupling::{Decoder, Estimator, Program, ProgramDecoder, Solution, SolvedRows, decode_set},
     scene::{Movement, Noise, Rows, Scene},
     sensor::SensorModel,
 };
@@ -14,7 +14,7 @@ fn solved(mut decoder: impl Decoder, set: &Dataset) -> SolvedRows {
 }
 
 fn polish(model: &SensorModel, scene: &Scene, set: &Dataset, steps: usize) -> PolishedDecoder {
-    let first = Box::new(PerRow::shared(TrainingMean::fit(set)));
+    let first = Box::new(ProgramDecoder::new(Program::mean(set)));
     let rows = Vec::from_iter(0..model.scale.rows());
     PolishedDecoder::new(first, model, scene, &rows, steps).unwrap()
 }

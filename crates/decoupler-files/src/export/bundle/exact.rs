@@ -1,12 +1,12 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use decoupler_core::{
-    decoupling::{AffineLayer, Layer},
-    network::Quantity,
-};
+use decoupler_core::network::Quantity;
 use ndarray::{Array1, Array2, ArrayView1};
 
-use super::portable::{FoldedMap, Portable};
+use super::{
+    layers::{AffineLayer, Layer},
+    portable::{FoldedMap, Portable},
+};
 
 /// Answer of a decoder to a reading, and its sensitivity to rounding.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 use decoupler_core::{
     dataset::{Dataset, Memory, PerRow, Seed, Stream},
-    decoupling::{CompiledNetworks, Decoder, DecoderKind, Description, Layer, Precision, decode_set},
+    decoupling::{Decoder, DecoderKind, Description, Precision, decode_set},
     evaluation::{
         Channel, DecoderSet, Problem, RunError, RunSets, RunSettings, SimulatedSettings, TargetErrors, TestErrors,
     },
@@ -11,6 +11,7 @@ use serde_json::{Map, Value, json};
 
 use super::{
     BundleDecoder, BundleError, BundlePrecision,
+    layers::Layer,
     meaning::Meaning,
     portable::{ChannelRanges, Portable},
 };
@@ -337,7 +338,7 @@ impl FittedDecoder {
             let outputs = network.outputs();
             (0..outputs.channels()).map(|output| outputs.extremes(output)).collect()
         });
-        let decoder = CompiledNetworks::<f64>::new(networks, networks.values().len());
+        let decoder = networks.decoder();
         Self {
             kind: BundleDecoder::Kind(DecoderKind::Network),
             description: decoder.description().expect("networks consist of layers"),

@@ -4,12 +4,13 @@ use std::fmt::Write;
 
 use super::{
     folder::{Call, Draft},
+    layers::Layer,
     meaning::Meaning,
     portable::Portable,
     report::{BundleCheck, BundleError},
     weights::{Arithmetic, Weights, names},
 };
-use decoupler_core::{decoupling::Layer, network::Quantity, text::counted};
+use decoupler_core::{network::Quantity, text::counted};
 
 /// Writes the function `name`. The matrices of the rows are stacked vertically.
 pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> String {

@@ -14,6 +14,7 @@ mod exporting;
 mod fixed_point;
 mod folder;
 mod iteration;
+mod layers;
 mod matlab;
 mod meaning;
 mod memory;

@@ -1,11 +1,13 @@
-use decoupler_core::{
-    decoupling::{AffineLayer, Layer, LayeredMap, RowProblemDescription},
-    network::Quantity,
-};
+use decoupler_core::{decoupling::RowProblemDescription, network::Quantity};
 use ndarray::Array2;
 use thiserror::Error;
 
-use super::{exact::Twofold, exported_decoder::ExportedDecoder, meaning::Meaning};
+use super::{
+    exact::Twofold,
+    exported_decoder::ExportedDecoder,
+    layers::{AffineLayer, Layer, LayeredMap},
+    meaning::Meaning,
+};
 use crate::export::format_number;
 
 /// Everything that a decoder computes, from readings (in ohm, or as the user has them) to outputs (in mm, or in the units of
@@ -65,23 +67,18 @@ pub enum FoldError {
         /// Number of the network, from 1.
         network: usize,
     },
-    /// The networks of a file read different quantities.
-    #[error("the networks of the rows read different quantities: train them together")]
-    Quantities,
 }
 
 impl Portable {
     /// Folds the scaling of the decoder of `exported` into its layers.
     ///
     /// # Errors
-    /// A folded weight is not a finite number, or the maps read different quantities.
+    /// A folded weight is not a finite number.
     pub(super) fn of(exported: &ExportedDecoder<'_>) -> Result<Self, FoldError> {
         let description = exported.description();
-        let quantity = description.maps[0].quantity;
-        if description.maps.iter().any(|map| map.quantity != quantity) {
-            return Err(FoldError::Quantities);
-        }
-        let mut maps: Vec<_> = description.maps.iter().map(FoldedMap::of).collect();
+        let layered = LayeredMap::of(&description.program).expect("decoders that are described are chains of layers");
+        let quantity = layered[0].quantity;
+        let mut maps: Vec<_> = layered.iter().map(FoldedMap::of).collect();
         if let Some(index) = maps.iter().position(|map| !is_finite(map, quantity)) {
             return Err(FoldError::NotFinite { network: index + 1 });
         }
@@ -206,11 +203,7 @@ impl FoldedMap {
     /// Folds neighbouring affine layers into one, and the quantity into the first.
     pub(super) fn of(map: &LayeredMap) -> Self {
         // Rounded to single precision: r − R₀ is the same number in both precisions; the biases absorb the difference.
-        let centre: Vec<f64> = map
-            .centre
-            .iter()
-            .map(|&value| f64::from(map.quantity.resistance_ohm(value) as f32))
-            .collect();
+        let centre: Vec<f64> = map.centre.iter().map(|&ohm| f64::from(ohm as f32)).collect();
         let mut pending = Some(of_changes(map, &centre));
         let mut layers = Vec::new();
         for layer in &map.layers {
@@ -246,22 +239,22 @@ impl FoldedMap {
     }
 }
 
-/// The centred values of the quantity as an affine map of the changes from `centre`.
+/// The changes from the centre of `map`, which its first layer takes, as an affine map of those from `centre`.
 fn of_changes(map: &LayeredMap, centre: &[f64]) -> AffineLayer<Twofold> {
     let channels = centre.len();
+    let one = Twofold::from(1.0);
     let mut weights = Array2::from_elem((channels, channels), Twofold::ZERO);
     let mut biases = Vec::new();
-    for (channel, (&ohm, &value)) in centre.iter().zip(&map.centre).enumerate() {
-        weights[[channel, channel]] = match map.quantity {
-            Quantity::Conductance => Twofold::from(1.0) / Twofold::from(ohm),
-            Quantity::Resistance | Quantity::LogResistance | Quantity::Raw => Twofold::from(1.0),
+    for (channel, (&to_ohm, &from_ohm)) in centre.iter().zip(&map.centre).enumerate() {
+        let (to, from) = (Twofold::from(to_ohm), Twofold::from(from_ohm));
+        let (weight, bias) = match map.quantity {
+            Quantity::Resistance | Quantity::Raw => (one, to - from),
+            // The program takes (r − R₀)/r.
+            Quantity::Conductance => (-(from / to), one - from / to),
+            Quantity::LogResistance => (one, to.ln() - from.ln()),
         };
-        let at_centre = match map.quantity {
-            Quantity::Resistance | Quantity::Raw => Twofold::from(ohm),
-            Quantity::Conductance => Twofold::from(1.0) / Twofold::from(ohm),
-            Quantity::LogResistance => Twofold::from(ohm).ln(),
-        };
-        biases.push(at_centre - Twofold::from(value));
+        weights[[channel, channel]] = weight;
+        biases.push(bias);
     }
     AffineLayer { weights, biases }
 }

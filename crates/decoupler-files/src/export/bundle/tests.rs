@@ -13,6 +13,7 @@ use super::{
     export_bundle,
     exported_decoder::ExportedDecoder,
     fixed_point::{FixedNetworks, HiddenWidth},
+    layers::Layer,
     matlab,
     meaning::Meaning,
     numpy, onnx,
@@ -22,7 +23,6 @@ use super::{
 };
 use crate::export::NetworkFile;
 use decoupler_core::{
-    decoupling::Layer,
     evaluation::Channel,
     evaluation::{Measured, Problem, Run, RunSettings, SimulatedSettings},
     network::{InputChoice, Quantity, ScalingChoice},

@@ -1,15 +1,13 @@
 //! Bundles as one JSON file with the numbers of a decoder, layer by layer.
 
-use decoupler_core::{
-    decoupling::{AffineLayer, Layer},
-    network::Quantity,
-};
+use decoupler_core::network::Quantity;
 use ndarray::ArrayView1;
 use serde_json::{Map, Value, json};
 
 use super::{
     exported_decoder::Metadata,
     folder::Draft,
+    layers::{AffineLayer, Layer},
     portable::{FoldedMap, Portable},
     report::{BundleCheck, BundleError},
     vectors::Vector,

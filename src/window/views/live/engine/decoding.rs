@@ -9,7 +9,7 @@ use super::{
 };
 use crate::window::test_view::Frame;
 use decoupler_core::{
-    decoupling::{CompiledNetworks, Decoder},
+    decoupling::{Decoder, ProgramDecoder},
     live::{ReZero, ZeroGains},
     scene::{Deformation, Scene},
     sensor::SensorModel,
@@ -22,7 +22,7 @@ use decoupler_files::export::NetworkFile;
 #[derive(Debug)]
 pub(super) struct Decoding {
     network: Arc<NetworkFile>,
-    compiled: CompiledNetworks<f64>,
+    decoder: ProgramDecoder,
     pub(super) sensor: SensorModel,
     pub(super) rows: Arc<[usize]>,
     pub(super) surface: Arc<SurfaceMap>,
@@ -72,7 +72,7 @@ impl Decoding {
             .map_err(|error| error.to_string())?;
         let answer_mm = vec![0.0; rows.len() * scale.coordinates_per_row()];
         Ok(Self {
-            compiled: CompiledNetworks::new(&network.network, rows.len()),
+            decoder: network.network.decoder(),
             network,
             sensor,
             surface,
@@ -122,7 +122,7 @@ impl Decoding {
         truth: Option<&Deformation>,
         now: Instant,
     ) -> Result<Option<f64>, String> {
-        let by_all = self.compiled.decode(frame_ohm, &mut self.by_all_mm);
+        let by_all = self.decoder.decode(frame_ohm, &mut self.by_all_mm);
         by_all.map_err(|error| error.to_string())?;
         if self.watch.check(frame_ohm, now) {
             self.since_named = Default::default();

@@ -8,7 +8,7 @@ use std::{
 };
 
 use decoupler_core::{
-    decoupling::{CompiledNetworks, Decoder},
+    decoupling::{Decoder, ProgramDecoder},
     evaluation::Problem,
     live::{DriftMonitor, NoDriftMonitor},
 };
@@ -38,7 +38,7 @@ pub(super) struct TargetSession {
     network: Arc<NetworkFile>,
     problem: Arc<Problem>,
     surface: Option<Arc<TargetSurface>>,
-    compiled: CompiledNetworks<f64>,
+    decoder: ProgramDecoder,
     source: TargetSource,
     tally: Tally,
     /// The last sample as received: index of its network, then the readings.
@@ -61,7 +61,7 @@ impl TargetSession {
         let surface = TargetSurface::new(&problem.positions, &problem.targets);
         let surface = surface.ok().filter(|_| !problem.positions.is_empty());
         Ok(Some(Self {
-            compiled: CompiledNetworks::new(&network.network, network.network.values().len()),
+            decoder: network.network.decoder(),
             source,
             tally: Tally::new(Instant::now()),
             sample: vec![0.0; 1 + problem.feature_count()],
@@ -80,7 +80,7 @@ impl TargetSession {
     fn decode(&mut self, arrived: Arrived) {
         self.has_events = true;
         let (row_index, readings) = (self.sample[0] as usize, &self.sample[1..]);
-        let is_answered = self.compiled.decode_row(row_index, readings, &mut self.answer) == Ok(());
+        let is_answered = self.decoder.decode_row(row_index, readings, &mut self.answer) == Ok(());
         if !is_answered || self.answer.iter().any(|value| !value.is_finite()) {
             let reason = "readings so far from the training range that the network has no answer";
             self.tally.bad(format!("sample at {:.3} s: {reason}", arrived.time_s));
@@ -413,8 +413,8 @@ mod tests {
         assert!(session.take_next(Instant::now(), &|_| ()).is_none());
         let shown = session.show();
         let mut expected = [0.0];
-        let mut compiled = CompiledNetworks::<f64>::new(&network.network, 1);
-        compiled.decode_row(0, &[3.0, 2.0], &mut expected).unwrap();
+        let mut decoder = network.network.decoder();
+        decoder.decode_row(0, &[3.0, 2.0], &mut expected).unwrap();
         let targets = shown.targets.unwrap();
         assert_eq!(targets.values(), expected);
         assert_eq!(targets.problem.targets[0].title(), "x (mm)");

@@ -1,7 +1,7 @@
 use std::{sync::Arc, time::Duration};
 
 use decoupler_core::{
-    decoupling::{CompiledNetworks, DecoderKind, Precision},
+    decoupling::{DecoderKind, Precision},
     evaluation::{Pressed, PressedAnswer},
     network::Networks,
     scene::Touch,
@@ -402,7 +402,7 @@ impl Question {
         let pressed = pressed.map_err(|error| error.to_string())?;
         let networks = self.subject.as_ref().map(|subject| &*subject.networks);
         let answer = networks.map(|networks| {
-            let mut decoder = CompiledNetworks::<f64>::new(networks, test.rows.len());
+            let mut decoder = networks.decoder();
             let answer = pressed.answer(&mut decoder, &|| false);
             let answer = answer.map_err(|error| error.to_string())?;
             answer.ok_or_else(|| "it was not decoded".to_owned())

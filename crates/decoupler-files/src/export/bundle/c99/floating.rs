@@ -3,11 +3,12 @@ use super::{
     iteration, number, push_array, type_name,
 };
 use crate::export::bundle::{
+    layers::Layer,
     meaning::Meaning,
     portable::Portable,
     weights::{Arithmetic, Digits, Weights, names},
 };
-use decoupler_core::{decoupling::Layer, network::Quantity};
+use decoupler_core::network::Quantity;
 
 /// Declarations of the interface in floating point.
 pub(super) fn header<'a>(

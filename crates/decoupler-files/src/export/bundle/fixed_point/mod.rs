@@ -10,13 +10,14 @@
 mod quantise;
 mod scaled;
 
-use decoupler_core::{decoupling::Layer, network::Quantity};
+use decoupler_core::network::Quantity;
 use ndarray::Array2;
 use thiserror::Error;
 
 pub(super) use self::quantise::{FixedNetwork, FixedNetworks, USUAL_BOUND};
 use crate::export::bundle::{
     exact::Twofold,
+    layers::Layer,
     meaning::Meaning,
     portable::{ChannelRanges, Portable},
 };

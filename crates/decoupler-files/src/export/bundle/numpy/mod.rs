@@ -3,13 +3,14 @@
 mod npz;
 
 use decoupler_core::{
-    decoupling::{Layer, RowChoice, RowProblemDescription},
+    decoupling::{RowChoice, RowProblemDescription},
     network::Quantity,
 };
 
 use self::npz::NamedArray;
 use super::{
     folder::{Call, Draft},
+    layers::Layer,
     meaning::Meaning,
     portable::Portable,
     report::{BundleCheck, BundleError},

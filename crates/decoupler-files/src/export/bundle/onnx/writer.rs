@@ -9,11 +9,12 @@ use super::{
 };
 use crate::export::bundle::{
     exported_decoder::Metadata,
+    layers::Layer,
     meaning::{Meaning, comment},
     portable::Portable,
     weights::{Arithmetic, Digits, Table, Weights, names},
 };
-use decoupler_core::{decoupling::Layer, evaluation::Channel, network::Quantity};
+use decoupler_core::{evaluation::Channel, network::Quantity};
 
 const OPSET: i64 = 13;
 /// The first version of the format with opset 13.

@@ -12,12 +12,13 @@ use crate::export::{
         choice::Taking,
         exact::decode_exactly,
         export_bundle,
+        layers::{AffineLayer, Layer, LayeredMap},
         portable::{FoldedMap, Portable},
         vectors::Vectors,
     },
 };
 use decoupler_core::{
-    decoupling::{AffineLayer, DecoderKind, Layer, LayeredMap},
+    decoupling::DecoderKind,
     evaluation::SimulatedSettings,
     job::Job,
     network::{Quantity, ScalingChoice},

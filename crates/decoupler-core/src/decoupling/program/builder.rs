@@ -1,0 +1,265 @@
+use ndarray::Array2;
+
+use super::{Domain, Function, Node, NodeId, Operation, Program};
+use crate::{
+    dataset::Memory,
+    decoupling::Precision,
+    network::{MinMax, Quantity},
+};
+
+/// Changes of the readings from the centres of their channels.
+#[derive(Clone, Debug)]
+pub struct Changes {
+    node: NodeId,
+    /// Derivative of the quantity by the change of each channel.
+    slopes: Vec<f64>,
+    precision: Precision,
+}
+
+/// Builds a program node by node.
+#[derive(Clone, Debug)]
+pub struct Builder {
+    nodes: Vec<Node>,
+}
+
+impl Builder {
+    /// Begins a program with the readings of a row, in double precision.
+    pub fn new(channels: usize) -> Self {
+        let mut builder = Self { nodes: Vec::new() };
+        builder.push(Operation::Readings, channels, Precision::Double);
+        builder
+    }
+
+    /// The node of the readings.
+    pub fn readings(&self) -> NodeId {
+        NodeId(0)
+    }
+
+    /// Ends the program with the node of its targets.
+    pub fn finish(mut self, output: NodeId) -> Program {
+        self.nodes.truncate(output.0 + 1);
+        Program {
+            nodes: self.nodes,
+            output,
+        }
+    }
+
+    pub(super) fn into_nodes(self) -> Vec<Node> {
+        self.nodes
+    }
+
+    /// Number of values of a node.
+    pub fn size(&self, of: NodeId) -> usize {
+        self.nodes[of.0].size
+    }
+
+    fn push(&mut self, operation: Operation, size: usize, precision: Precision) -> NodeId {
+        self.nodes.push(Node {
+            operation,
+            size,
+            precision,
+        });
+        NodeId(self.nodes.len() - 1)
+    }
+
+    /// Adds a table of constants, and the value to which it is padded when the programs of several row-wires are joined.
+    fn table(&mut self, table: Array2<f64>, padding: f64, precision: Precision) -> NodeId {
+        let size = table.len();
+        let tables = vec![table.as_standard_layout().into_owned()];
+        self.push(Operation::Select { tables, padding }, size, precision)
+    }
+
+    /// Adds a vector of constants.
+    pub fn constants(&mut self, values: &[f64], precision: Precision) -> NodeId {
+        self.table(row(values), 0.0, precision)
+    }
+
+    /// Adds the check that values are in a domain.
+    pub fn valid(&mut self, of: NodeId, domain: Domain) -> NodeId {
+        self.push(Operation::Valid { of, domain }, self.size(of), Precision::Double)
+    }
+
+    /// Adds a difference, value by value.
+    ///
+    /// # Panics
+    /// If the sizes differ.
+    pub fn subtract(&mut self, one: NodeId, other: NodeId, precision: Precision) -> NodeId {
+        assert_eq!(self.size(one), self.size(other));
+        self.push(Operation::Subtract(one, other), self.size(one), precision)
+    }
+
+    /// Adds a quotient, value by value.
+    ///
+    /// # Panics
+    /// If the sizes differ.
+    pub fn divide(&mut self, one: NodeId, other: NodeId, precision: Precision) -> NodeId {
+        assert_eq!(self.size(one), self.size(other));
+        self.push(Operation::Divide(one, other), self.size(one), precision)
+    }
+
+    /// Adds a function of each value.
+    pub fn map(&mut self, function: Function, of: NodeId, precision: Precision) -> NodeId {
+        self.push(Operation::Map(function, of), self.size(of), precision)
+    }
+
+    /// Adds an affine map with these weights (inputs × outputs) and biases (outputs).
+    ///
+    /// # Panics
+    /// If the sizes do not match.
+    pub fn affine(&mut self, of: NodeId, weights: Array2<f64>, biases: &[f64], precision: Precision) -> NodeId {
+        assert_eq!(weights.dim(), (self.size(of), biases.len()));
+        let weights = self.table(weights, 0.0, precision);
+        let biases = self.constants(biases, precision);
+        self.affine_by(of, weights, biases)
+    }
+
+    fn affine_by(&mut self, of: NodeId, weights: NodeId, biases: NodeId) -> NodeId {
+        let (size, precision) = (self.size(biases), self.nodes[weights.0].precision);
+        assert_eq!(self.size(weights), self.size(of) * size);
+        self.push(Operation::Affine { of, weights, biases }, size, precision)
+    }
+
+    /// Adds the squared distances to `points` (inputs × points).
+    ///
+    /// # Panics
+    /// If the sizes do not match.
+    pub fn squared_distances(&mut self, of: NodeId, points: Array2<f64>, precision: Precision) -> NodeId {
+        let (inputs, count) = points.dim();
+        assert_eq!(inputs, self.size(of));
+        let points = self.table(points, 0.0, precision);
+        self.push(Operation::SquaredDistances { of, points }, count, precision)
+    }
+
+    /// Adds the nearest values within limits.
+    ///
+    /// # Panics
+    /// If the sizes differ.
+    pub fn clip(&mut self, of: NodeId, [low, high]: [&[f64]; 2], precision: Precision) -> NodeId {
+        assert_eq!([low.len(), high.len()], [self.size(of); 2]);
+        let [low, high] = [low, high].map(|values| self.constants(values, precision));
+        self.push(Operation::Clip { of, low, high }, self.size(of), precision)
+    }
+
+    /// Adds the values of all parts, one after the other.
+    pub fn concatenate(&mut self, parts: &[NodeId]) -> NodeId {
+        let size = parts.iter().map(|&part| self.size(part)).sum();
+        self.push(Operation::Concatenate(parts.to_vec()), size, Precision::Double)
+    }
+
+    /// Adds the mean of the vectors `of`, with the softmax of `logits` as shares.
+    ///
+    /// # Panics
+    /// If there are not as many vectors as logits.
+    pub fn blend(&mut self, logits: NodeId, of: NodeId) -> NodeId {
+        let count = self.size(logits);
+        assert!(self.size(of).is_multiple_of(count));
+        self.push(
+            Operation::Blend { logits, of },
+            self.size(of) / count,
+            Precision::Double,
+        )
+    }
+
+    /// Adds values with their past, for a memory that was checked.
+    pub fn history(&mut self, of: NodeId, memory: &Memory) -> NodeId {
+        let size = memory.features(self.size(of));
+        let memory = memory.clone();
+        self.push(Operation::History { of, memory }, size, Precision::Double)
+    }
+
+    /// Adds the number of values outside limits.
+    ///
+    /// # Panics
+    /// If the sizes differ.
+    pub fn count_outside(&mut self, of: NodeId, [low, high]: [&[f64]; 2]) -> NodeId {
+        assert_eq!([low.len(), high.len()], [self.size(of); 2]);
+        let [low, high] = [low, high].map(|values| self.constants(values, Precision::Double));
+        self.push(Operation::CountOutside { of, low, high }, 1, Precision::Double)
+    }
+
+    /// Adds the changes of the readings from R₀, the readings whose `quantity` is `centre`. They are valid readings only.
+    ///
+    /// R − R₀ is computed in double precision and the change in `precision`, which loses no digits in single precision where
+    /// readings differ little:
+    ///
+    /// | quantity q | change | q − q₀ |
+    /// |---|---|---|
+    /// | resistance, raw | R − R₀ | the change |
+    /// | conductance | (R − R₀)/R | −1/R₀ times the change |
+    /// | logarithm | ln(1 + (R − R₀)/R₀), in double precision | the change |
+    pub fn changes(&mut self, quantity: Quantity, centre: &[f64], precision: Precision) -> Changes {
+        let domain = match quantity {
+            Quantity::Raw => Domain::Finite,
+            Quantity::Resistance | Quantity::Conductance | Quantity::LogResistance => Domain::Positive,
+        };
+        let centre = Vec::from_iter(centre.iter().map(|&value| quantity.resistance_ohm(value)));
+        let readings = self.valid(self.readings(), domain);
+        let reference = self.constants(&centre, Precision::Double);
+        let difference = self.subtract(readings, reference, Precision::Double);
+        let mut slopes = vec![1.0; centre.len()];
+        let node = match quantity {
+            Quantity::Resistance | Quantity::Raw => difference,
+            Quantity::Conductance => {
+                slopes = centre.iter().map(|ohm| -1.0 / ohm).collect();
+                self.divide(difference, readings, precision)
+            }
+            Quantity::LogResistance => {
+                let relative = self.divide(difference, reference, Precision::Double);
+                self.map(Function::Log1p, relative, Precision::Double)
+            }
+        };
+        Changes {
+            node,
+            slopes,
+            precision,
+        }
+    }
+
+    /// Adds an affine map of the quantity relative to its centre, with weights (channels × outputs) and biases, computed from
+    /// its changes and in their precision.
+    ///
+    /// # Panics
+    /// If the sizes do not match.
+    pub fn affine_of(&mut self, changes: &Changes, weights: Array2<f64>, biases: &[f64]) -> NodeId {
+        self.affine_padded(changes, weights, biases, 0.0)
+    }
+
+    /// As [`Self::affine_of`], with the value of outputs that only other row-wires have.
+    pub fn affine_padded(
+        &mut self,
+        changes: &Changes,
+        mut weights: Array2<f64>,
+        biases: &[f64],
+        padding: f64,
+    ) -> NodeId {
+        assert_eq!(weights.dim(), (changes.slopes.len(), biases.len()));
+        for (mut weights, slope) in weights.rows_mut().into_iter().zip(&changes.slopes) {
+            weights *= *slope;
+        }
+        let weights = self.table(weights, 0.0, changes.precision);
+        let biases = self.table(row(biases), padding, changes.precision);
+        self.affine_by(changes.node, weights, biases)
+    }
+
+    /// Adds the targets for scaled ones: constant targets are restored.
+    ///
+    /// # Panics
+    /// If there are not as many values as varying targets.
+    pub fn restored(&mut self, of: NodeId, outputs: &MinMax) -> NodeId {
+        let (middles, half_widths): (Vec<f64>, Vec<f64>) = outputs.middles_and_half_widths().into_iter().unzip();
+        let varying = outputs.varying();
+        let weight = |(output, target): (usize, usize)| {
+            if varying[output] == target {
+                half_widths[target]
+            } else {
+                0.0
+            }
+        };
+        let weights = Array2::from_shape_fn((varying.len(), middles.len()), weight);
+        self.affine(of, weights, &middles, Precision::Double)
+    }
+}
+
+fn row(values: &[f64]) -> Array2<f64> {
+    Array2::from_shape_fn((1, values.len()), |(_, index)| values[index])
+}
