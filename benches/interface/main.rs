@@ -17,7 +17,7 @@ use std::{
 
 use decoupler::window::{DecouplerWindow, Desktop, Effect, Phase, Shared};
 use decoupler_core::{
-    evaluation::SimulatedSettings,
+    evaluation::RunSettings,
     training::{EpochRecord, Method, ScaledConjugateGradientSettings},
 };
 use decoupler_files::figure::{EpochOutline, loss_figure};
@@ -131,13 +131,13 @@ impl Bench {
 const LARGE: &str = "100x80_40x240";
 
 /// Returns the settings of a training that does not end while it is measured.
-fn endless(scale: &str) -> SimulatedSettings {
-    let mut settings = SimulatedSettings::default();
+fn endless(scale: &str) -> RunSettings {
+    let mut settings = RunSettings::default();
     if scale == LARGE {
         // Its epochs last long enough with any method.
         settings.training.method = Method::ScaledConjugateGradient(ScaledConjugateGradientSettings::default());
     }
-    settings.source.sensor.scale = scale.parse().expect("a scale");
+    settings.simulation_mut().unwrap().sensor.scale = scale.parse().expect("a scale");
     settings.training.stopping.epochs = 1_000_000;
     settings.training.stopping.min_gradient = 0.0;
     settings.training.stopping.goal_mse = 0.0;
@@ -206,7 +206,7 @@ fn main() {
         bench.wait(|state| {
             state
                 .test()
-                .is_some_and(|test| test.sensor.scale == settings.source.sensor.scale)
+                .is_some_and(|test| test.sensor.scale == settings.simulation().unwrap().sensor.scale)
         });
         let points = bench.state().test().map_or([0, 0], |test| {
             let grid = test.surface.grid();

@@ -1,11 +1,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Coverage, Errors, NoReference, RunError, RunSets, RunSettings, SimulatedSettings, Source, TestErrors,
-    reference_errors, run_sets::check_sets,
+    Coverage, Errors, NoReference, RunError, RunSets, RunSettings, TestErrors, reference_errors, run_sets::check_sets,
 };
 use crate::{
-    dataset::{Dataset, PerRow, Stream},
+    dataset::{Dataset, PerRow, Simulation, Stream},
     decoupling::{AffineMap, TrainingMean, decode_set},
     job::Job,
     network::{InputChoice, Quantity},
@@ -52,11 +51,10 @@ impl Baselines {
     pub fn measure(settings: &RunSettings, sets: &RunSets, job: &Job<'_>) -> Result<Self, RunError> {
         let [mean, linear] = mean_and_linear(settings, sets)?;
         job.check()?;
-        let reference = match settings.simulated() {
-            Some(simulated) => {
-                let SimulatedSettings { source, seed, .. } = simulated;
-                let mut rng = seed.rng(Stream::Expectation);
-                Some(reference_errors(&source.sensor, &source.scene, &sets.test, &mut rng)?)
+        let reference = match &sets.problem.sensor {
+            Some(Simulation { sensor, scene, .. }) => {
+                let mut rng = settings.seed.rng(Stream::Expectation);
+                Some(reference_errors(sensor, scene, &sets.test, &mut rng)?)
             }
             None => None,
         };
@@ -111,7 +109,7 @@ impl Scores {
 pub(super) fn mean_and_linear(settings: &RunSettings, sets: &RunSets) -> Result<[TestErrors; 2], RunError> {
     check_sets(settings, sets)?;
     let (mut mean, mut linear) = fit_baselines(&sets.split.training, settings)?;
-    let errors = |answers| TestErrors::measure(&settings.source, &sets.test, &answers);
+    let errors = |answers| TestErrors::measure(&sets.problem, &sets.test, &answers);
     Ok([
         errors(decode_set(&mut mean, &sets.test)?),
         errors(decode_set(&mut linear, &sets.test)?),
@@ -132,10 +130,10 @@ pub(super) fn fit_baselines(
         let of_set = move |set: &Dataset| AffineMap::ridge(set, inputs, NoiseSource::default());
         PerRow::fit(training, settings.source.row_model(), of_set)
     };
-    let linear = match settings.source {
-        Source::Simulated(simulation) if simulation.scene.rows == Rows::Known => ridge(InputChoice::PAPER)?,
-        Source::Simulated(_) => PerRow::shared(AffineMap::least_squares(training, Quantity::Resistance)?),
-        Source::Measured(_) => ridge(settings.inputs)?,
+    let linear = match settings.simulation() {
+        Some(simulation) if simulation.scene.rows == Rows::Known => ridge(InputChoice::PAPER)?,
+        Some(_) => PerRow::shared(AffineMap::least_squares(training, Quantity::Resistance)?),
+        None => ridge(settings.inputs)?,
     };
     Ok((mean, linear))
 }
@@ -204,9 +202,9 @@ impl PublishedErrors {
 mod tests {
     use super::*;
     use crate::{
-        dataset::Stream,
+        dataset::{Simulation, Stream},
         decoupling::decode_set,
-        evaluation::{SimulatedSettings, Simulation},
+        evaluation::RunSettings,
         scene::Scene,
         sensor::SensorModel,
     };
@@ -214,23 +212,24 @@ mod tests {
     #[test]
     fn the_linear_map_knows_the_row_if_the_network_does() {
         let errors = |rows, samples| {
-            let mut settings = SimulatedSettings::default();
+            let mut settings = RunSettings::default();
             settings.source = Simulation {
                 sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
                 scene: Scene {
                     rows,
                     ..Scene::default()
                 },
-                ..settings.source
-            };
+                ..*settings.simulation().unwrap()
+            }
+            .into();
             let draw = |samples, stream| {
-                let Simulation { sensor, scene, .. } = &settings.source;
+                let Simulation { sensor, scene, .. } = settings.simulation().unwrap();
                 Dataset::simulate(sensor, scene, samples, &mut settings.seed.rng(stream)).unwrap()
             };
             let test = draw(200, Stream::Test);
             let training = draw(samples, Stream::Training);
-            let (mut mean, mut linear) = fit_baselines(&training, &settings.into()).unwrap();
-            let measured = |answers| Errors::measure(&test, &answers, settings.source.stroke_mm());
+            let (mut mean, mut linear) = fit_baselines(&training, &settings).unwrap();
+            let measured = |answers| Errors::measure(&test, &answers, settings.simulation().unwrap().stroke_mm());
             (
                 measured(decode_set(&mut mean, &test).unwrap()),
                 measured(decode_set(&mut linear, &test).unwrap()),

@@ -1,9 +1,6 @@
-use super::{
-    Begin, DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, SimulatedSettings,
-    Simulation, reference_errors,
-};
+use super::{Begin, DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, reference_errors};
 use crate::{
-    dataset::Stream,
+    dataset::{Simulation, Stream},
     decoupling::DecoderKind,
     identifiability::{Identifiability, IdentifiabilityError, IdentifiabilityWarning},
     job::Job,
@@ -77,16 +74,16 @@ pub fn measure_trade_off(
     mut on_point: impl FnMut(DecoderKind, Result<TradeOffPoint, RunError>, Option<&Run>),
 ) -> Result<(), RunError> {
     let mut set = DecoderSet::new(*settings, sets.split.training.clone(), None);
-    let reference = match settings.simulated() {
-        Some(SimulatedSettings { source, seed, .. }) => {
-            let mut rng = seed.rng(Stream::Expectation);
-            reference_errors(&source.sensor, &source.scene, &sets.test, &mut rng)?.ok()
+    let reference = match &sets.problem.sensor {
+        Some(Simulation { sensor, scene, .. }) => {
+            let mut rng = settings.seed.rng(Stream::Expectation);
+            reference_errors(sensor, scene, &sets.test, &mut rng)?.ok()
         }
         None => None,
     };
     let offered = decoders
         .iter()
-        .filter(|kind| settings.source.simulation().is_some() || !kind.needs_sensor());
+        .filter(|kind| sets.problem.sensor.is_some() || !kind.needs_sensor());
     let (with_network, without): (Vec<DecoderKind>, Vec<DecoderKind>) = offered.partition(|kind| kind.needs_network());
     let point = |settings: RunSettings, report: DecoderReport, training_seconds| TradeOffPoint {
         preset: None,

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use decoupler_core::{
-    dataset::Seed,
+    dataset::{Seed, Simulation},
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        Begin, DecoderSet, Outlook, Preset, Run, RunError, RunSets, SimulatedSettings, Simulation, TradeOffPoint,
-        fastest_under, measure_trade_off, most_accurate_under,
+        Begin, DecoderSet, Outlook, Preset, Run, RunError, RunSets, RunSettings, TradeOffPoint, fastest_under,
+        measure_trade_off, most_accurate_under,
     },
     job::Job,
     machine::MemoryBudget,
@@ -18,15 +18,16 @@ use decoupler_core::{
 use decoupler_files::{export::NetworkFile, import::Setup};
 
 /// Known rows of a small array, quick to train.
-fn small() -> SimulatedSettings {
-    let mut settings = SimulatedSettings {
+fn small() -> RunSettings {
+    let mut settings = RunSettings {
         source: Simulation {
             sensor: SensorModel::new("3x4_2x12".parse().unwrap()),
             samples: 900,
             validation_samples: 90,
             test_samples: 60,
-            ..Preset::Best.settings().source
-        },
+            ..*Preset::Best.settings().simulation().unwrap()
+        }
+        .into(),
         hidden: 6,
         ..Preset::Best.settings()
     };
@@ -34,7 +35,7 @@ fn small() -> SimulatedSettings {
     settings
 }
 
-fn trained(settings: SimulatedSettings) -> Run {
+fn trained(settings: RunSettings) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     run
@@ -43,14 +44,10 @@ fn trained(settings: SimulatedSettings) -> Run {
 fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
     let set = DecoderSet::new(
         *run.settings(),
-        RunSets::draw(
-            &run.settings().simulated().unwrap(),
-            MemoryBudget::UNLIMITED,
-            &Job::UNINTERRUPTED,
-        )
-        .unwrap()
-        .split
-        .training,
+        RunSets::draw(run.settings(), MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
+            .unwrap()
+            .split
+            .training,
         Some(run.network()),
     );
     let report = set.measure(kind, precision, run.test()).unwrap().unwrap();
@@ -58,7 +55,7 @@ fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
 }
 
 /// Resumes a run of these settings from saved states.
-fn resumed(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
+fn resumed(settings: RunSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
     let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
     Run::new(settings.into(), sets, Begin::Resume(states), &Job::UNINTERRUPTED)
 }
@@ -93,12 +90,12 @@ fn knowing_the_row_makes_small_networks_accurate_and_newton_makes_them_exact() {
 #[test]
 fn unknown_rows_are_identified() {
     let mut settings = small();
-    settings.source.scene.rows = Rows::All;
+    settings.simulation_mut().unwrap().scene.rows = Rows::All;
     settings.training.stopping.epochs = 20;
     let run = trained(settings);
     assert_eq!(run.network().values().len(), 1);
     assert!(z_percent(&run, DecoderKind::Newton, Precision::Double) < 1e-9);
-    settings.source.scene.noise = Noise::relative(1e-5);
+    settings.simulation_mut().unwrap().scene.noise = Noise::relative(1e-5);
     let set = DecoderSet::new(
         settings.into(),
         RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
@@ -107,7 +104,7 @@ fn unknown_rows_are_identified() {
             .training,
         None,
     );
-    let test = settings.source.draw_test(settings.seed).unwrap();
+    let test = settings.simulation().unwrap().draw_test(settings.seed).unwrap();
     let report = set
         .measure(DecoderKind::Newton, Precision::Double, &test)
         .unwrap()
@@ -126,26 +123,26 @@ fn unknown_rows_are_identified() {
 #[test]
 fn with_one_row_only_that_row_is_drawn_and_modelled() {
     let mut settings = small();
-    settings.source.scene.rows = Rows::One(2);
-    settings.source.samples = 300;
+    settings.simulation_mut().unwrap().scene.rows = Rows::One(2);
+    settings.simulation_mut().unwrap().samples = 300;
     let run = trained(settings);
     assert_eq!(run.test().row_count(), 1);
     assert_eq!(run.test().samples(), 60);
     assert!(run.test().targets().iter().step_by(3).all(|&x| x == 10.0));
-    let size = settings.source.model_size().unwrap();
+    let size = settings.simulation().unwrap().model_size().unwrap();
     assert_eq!((size.unknowns, size.equations, size.networks), (4, 12, 1));
     assert!(z_percent(&run, DecoderKind::Polish, Precision::Double) < 1e-9);
-    let known = small().source.model_size().unwrap();
+    let known = small().simulation().unwrap().model_size().unwrap();
     assert_eq!((known.unknowns, known.equations, known.networks), (12, 36, 3));
-    settings.source.scene.movement = Movement::SIDEWAYS;
-    assert_eq!(settings.source.model_size().unwrap().unknowns, 12);
-    settings.source.scene.rows = Rows::One(3);
+    settings.simulation_mut().unwrap().scene.movement = Movement::SIDEWAYS;
+    assert_eq!(settings.simulation().unwrap().model_size().unwrap().unknowns, 12);
+    settings.simulation_mut().unwrap().scene.rows = Rows::One(3);
     assert!(Run::prepare(settings).is_err(), "there is no fourth row");
 }
 
 #[test]
 fn known_rows_resume_from_saved_states_bit_for_bit() {
-    let mut settings = SimulatedSettings { starts: 2, ..small() };
+    let mut settings = RunSettings { starts: 2, ..small() };
     settings.training.stopping.epochs = 12;
     settings.training.stopping.max_fail = 1;
     let whole = trained(settings);
@@ -170,8 +167,8 @@ fn known_rows_resume_from_saved_states_bit_for_bit() {
     file.save(&path).unwrap();
     assert_eq!(NetworkFile::load(&path).unwrap(), file);
     let mut other = file;
-    let mut settings = other.settings.simulated().unwrap();
-    settings.source.scene.rows = Rows::All;
+    let mut settings = other.settings;
+    settings.simulation_mut().unwrap().scene.rows = Rows::All;
     other.settings = settings.into();
     let message = other.save(&path).unwrap_err().to_string();
     assert!(message.contains("3 of them"), "{message}");
@@ -182,7 +179,7 @@ fn known_rows_resume_from_saved_states_bit_for_bit() {
 #[test]
 fn with_noise_newton_comes_close_to_the_reference() {
     let mut settings = small();
-    settings.source.test_samples = 300;
+    settings.simulation_mut().unwrap().test_samples = 300;
     for (noise, loading) in [
         (1e-3, Loading::RandomNodes),
         (
@@ -192,8 +189,8 @@ fn with_noise_newton_comes_close_to_the_reference() {
             },
         ),
     ] {
-        settings.source.scene.noise = Noise::relative(noise);
-        settings.source.scene.loading = loading;
+        settings.simulation_mut().unwrap().scene.noise = Noise::relative(noise);
+        settings.simulation_mut().unwrap().scene.loading = loading;
         settings.training.stopping.epochs = 20;
         let run = trained(settings);
         let limit = run.baselines().unwrap().reference.as_ref().unwrap().percent().unwrap();
@@ -209,21 +206,22 @@ fn with_noise_newton_comes_close_to_the_reference() {
 #[test]
 fn sideways_movement_is_reported_as_ill_conditioned() {
     let mut settings = Preset::Best.settings();
-    let upright = Outlook::of(&settings.source).unwrap();
+    let upright = Outlook::of(settings.simulation().unwrap()).unwrap();
     assert!(upright.warnings.is_empty());
-    settings.source.scene.movement = Movement::SIDEWAYS;
-    let sideways = Outlook::of(&settings.source).unwrap();
+    settings.simulation_mut().unwrap().scene.movement = Movement::SIDEWAYS;
+    let sideways = Outlook::of(settings.simulation().unwrap()).unwrap();
     assert!(sideways.worst_row.condition() > 1e3 * upright.worst_row.condition());
     assert!(!sideways.warnings.is_empty());
 }
 
 #[test]
 fn a_trade_off_has_a_point_for_every_choice() {
-    let mut settings = SimulatedSettings {
+    let mut settings = RunSettings {
         source: Simulation {
             samples: 90,
-            ..small().source
-        },
+            ..*small().simulation().unwrap()
+        }
+        .into(),
         seed: Seed(3),
         ..small()
     };

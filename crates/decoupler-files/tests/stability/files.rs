@@ -3,7 +3,7 @@
 use std::{fmt::Display, fs, path::Path};
 
 use decoupler_core::{
-    evaluation::{Run, SimulatedSettings},
+    evaluation::{Run, RunSettings},
     sensor::SensorModel,
 };
 use decoupler_files::{
@@ -20,10 +20,10 @@ const ROOM: &str = "file";
 /// Number of places at which a file is damaged.
 const PLACES: usize = 100;
 
-fn small() -> SimulatedSettings {
+fn small() -> RunSettings {
     let mut settings = situations::ordinary();
-    settings.source.sensor = SensorModel::new("2x2_2x6".parse().unwrap());
-    settings.source.test_samples = 20;
+    settings.simulation_mut().unwrap().sensor = SensorModel::new("2x2_2x6".parse().unwrap());
+    settings.simulation_mut().unwrap().test_samples = 20;
     settings.hidden = 3;
     settings.training.stopping.epochs = 8;
     settings

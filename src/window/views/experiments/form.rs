@@ -90,7 +90,7 @@ impl Form {
 
     /// Returns the settings that an axis can vary.
     pub fn offered(&self) -> impl Iterator<Item = AxisKind> + use<> {
-        AxisKind::of_source(&self.template.base.source)
+        AxisKind::of_runs(&self.template.base)
     }
 
     /// Adapts the settings of training methods to a recording, if the base is one.
@@ -292,7 +292,7 @@ fn method(word: &str) -> Result<Method, ListError> {
 #[cfg(test)]
 mod tests {
     use decoupler_core::{
-        evaluation::{Measured, RunSettings, SimulatedSettings},
+        evaluation::{Measured, RunSettings},
         scene::RowModel,
     };
 
@@ -339,7 +339,7 @@ mod tests {
                 .to_string()
                 .contains("no column of groups")
         );
-        form.take(&SimulatedSettings::default().into());
+        form.take(&RunSettings::default().into());
         assert_eq!(form.axes[1].kind, AxisKind::Array);
         assert_eq!(form.template.recording, None);
     }

@@ -2,8 +2,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Cell;
 use crate::{
-    dataset::{Seed, SplitBy},
-    evaluation::{Simulation, Source},
+    dataset::{Seed, Simulation, SplitBy},
+    evaluation::RunSettings,
     network::{Quantity, ScalingChoice},
     sensor::ArrayScale,
     training::Method,
@@ -80,9 +80,9 @@ impl AxisKind {
         Self::Seed,
     ];
 
-    /// Returns the settings of runs on `source`, in the order offered to the user.
-    pub fn of_source(source: &Source) -> impl Iterator<Item = Self> + use<> {
-        let is_simulated = source.simulation().is_some();
+    /// Returns the settings of runs with the source of `settings`, in the order offered to the user.
+    pub fn of_runs(settings: &RunSettings) -> impl Iterator<Item = Self> + use<> {
+        let is_simulated = settings.simulation().is_some();
         Self::ALL.into_iter().filter(move |kind| match kind {
             Self::Array | Self::Samples | Self::Noise | Self::Inputs => is_simulated,
             Self::Split => !is_simulated,
@@ -175,18 +175,13 @@ impl Axis {
     /// If `index` is out of range.
     pub(super) fn apply(&self, index: usize, cell: &mut Cell) {
         let Cell { settings, division, .. } = cell;
-        let simulate = |source: &mut Source, change: &dyn Fn(&mut Simulation)| {
-            if let Source::Simulated(simulation) = source {
-                change(simulation);
-            }
-        };
         match self {
             Self::Hidden(values) => settings.hidden = values[index],
-            Self::Array(values) => simulate(&mut settings.source, &|source| source.sensor.scale = values[index]),
-            Self::Samples(values) => simulate(&mut settings.source, &|source| source.samples = values[index]),
-            Self::Noise(values) => simulate(&mut settings.source, &|source| {
-                source.scene.noise.relative = values[index];
-            }),
+            Self::Array(_) | Self::Samples(_) | Self::Noise(_) => {
+                if let Some(simulation) = settings.simulation_mut() {
+                    self.apply_to_simulation(index, simulation);
+                }
+            }
             Self::Inputs(values) => settings.inputs.quantity = values[index],
             Self::Scaling(values) => settings.inputs.scaling = values[index],
             Self::Method(values) => {
@@ -207,6 +202,15 @@ impl Axis {
                 }
             }
             Self::Seed(values) => settings.seed = values[index],
+        }
+    }
+
+    fn apply_to_simulation(&self, index: usize, simulation: &mut Simulation) {
+        match self {
+            Self::Array(values) => simulation.sensor.scale = values[index],
+            Self::Samples(values) => simulation.samples = values[index],
+            Self::Noise(values) => simulation.scene.noise.relative = values[index],
+            _ => {}
         }
     }
 }

@@ -1,10 +1,10 @@
 use std::path::Path;
 
 use decoupler_core::{
-    dataset::Division,
+    dataset::{Division, Simulation},
     decoupling::DecoderKind,
     evaluation::{
-        Combination, Initialization, RunSettings, Simulation, Source,
+        Combination, Initialization, RunSettings, Source,
         experiments::{Axis, AxisKind, Experiment},
     },
     scene::{NoisySets, RowModel, Rows},
@@ -137,8 +137,8 @@ pub fn sweep_specification(experiment: &Experiment, plan: Option<&Plan>) -> Resu
     if experiment.cross_validation.is_some() {
         return Err(SpecificationGap::CrossValidation);
     }
-    if let Some(settings) = experiment.base.simulated() {
-        train_command(&settings.into(), None).map_err(SpecificationGap::Setting)?;
+    if experiment.base.simulation().is_some() {
+        train_command(&experiment.base.into(), None).map_err(SpecificationGap::Setting)?;
     }
     let mut train = train_options(&experiment.base, &[DecoderKind::Network]);
     let mut axes = Map::new();
