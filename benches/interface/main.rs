@@ -17,6 +17,7 @@ use std::{
 
 use decoupler::window::{DecouplerWindow, Desktop, Effect, Phase, Shared};
 use decoupler_core::{
+    dataset::Simulation,
     evaluation::RunSettings,
     training::{EpochRecord, Method, ScaledConjugateGradientSettings},
 };
@@ -132,12 +133,13 @@ const LARGE: &str = "100x80_40x240";
 
 /// Returns the settings of a training that does not end while it is measured.
 fn endless(scale: &str) -> RunSettings {
-    let mut settings = RunSettings::default();
+    let mut simulation = Simulation::default();
+    simulation.sensor.scale = scale.parse().expect("a scale");
+    let mut settings = RunSettings::from(simulation);
     if scale == LARGE {
         // Its epochs last long enough with any method.
         settings.training.method = Method::ScaledConjugateGradient(ScaledConjugateGradientSettings::default());
     }
-    settings.simulation_mut().unwrap().sensor.scale = scale.parse().expect("a scale");
     settings.training.stopping.epochs = 1_000_000;
     settings.training.stopping.min_gradient = 0.0;
     settings.training.stopping.goal_mse = 0.0;
@@ -204,9 +206,8 @@ fn main() {
         let settings = endless(scale);
         bench.window.apply(Effect::Configure(Box::new(settings)));
         bench.wait(|state| {
-            state
-                .test()
-                .is_some_and(|test| test.sensor.scale == settings.simulation().unwrap().sensor.scale)
+            let shown = state.test().map(|test| test.sensor.scale);
+            shown.is_some() && shown == settings.simulation().map(|simulation| simulation.sensor.scale)
         });
         let points = bench.state().test().map_or([0, 0], |test| {
             let grid = test.surface.grid();

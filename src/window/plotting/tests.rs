@@ -218,7 +218,7 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
                 ..point.unwrap()
             });
         };
-        measure_trade_off(&settings.into(), &sets, &[3], &kinds, &Job::UNINTERRUPTED, on_point).unwrap();
+        measure_trade_off(&settings, &sets, &[3], &kinds, &Job::UNINTERRUPTED, on_point).unwrap();
     }
     let level = TradeOffLevel {
         noise: Some(0.0),

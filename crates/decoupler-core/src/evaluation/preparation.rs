@@ -250,7 +250,7 @@ mod tests {
     use ndarray::{Axis, Slice};
 
     use super::*;
-    use crate::{evaluation::RunSettings, network::InputChoice, scene::Noise};
+    use crate::{evaluation::Measured, network::InputChoice, scene::Noise};
 
     /// Returns a run of few samples, cancelled at poll number `poll` of the token, from 0, and the number of polls.
     fn cancelled_at(poll: usize, prepare: &dyn Fn(&Job<'_>) -> Result<Run, RunError>) -> (Option<Run>, usize) {
@@ -286,14 +286,14 @@ mod tests {
                 validation: split.validation,
             };
             let mut with_test = Run::with_baselines(
-                settings.into(),
+                settings,
                 RunSets::new(split_of_one.clone(), test).described(problem.clone()),
                 Begin::Initialize,
                 &Job::UNINTERRUPTED,
             )
             .unwrap();
             let mut without = Run::new(
-                settings.into(),
+                settings,
                 RunSets::without_test(split_of_one).described(problem.clone()),
                 Begin::Initialize,
                 &Job::UNINTERRUPTED,
@@ -304,6 +304,26 @@ mod tests {
             assert_eq!(with_test.network(), without.network());
             assert_eq!(without.leader().latest().test_mse, None);
         }
+    }
+
+    #[test]
+    fn sets_of_another_scene_and_draws_of_a_recording_are_refused() {
+        let mut settings = RunSettings {
+            hidden: 3,
+            ..RunSettings::default()
+        };
+        let simulation = settings.simulation_mut().unwrap();
+        simulation.sensor.scale = "4x4_2x12".parse().unwrap();
+        (simulation.samples, simulation.test_samples) = (40, 8);
+        let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+        let begin = |settings| Run::new(settings, sets.clone(), Begin::Initialize, &Job::UNINTERRUPTED).map(|_| ());
+        assert_eq!(begin(settings), Ok(()));
+        settings.simulation_mut().unwrap().scene.largest_compression = 0.1;
+        assert_eq!(begin(settings), Err(RunError::OtherSensor));
+        let recorded = RunSettings::from(Measured { rows: RowModel::Shared });
+        assert_eq!(begin(recorded), Err(RunError::OtherSensor));
+        let message = Run::prepare(recorded).err().unwrap().to_string();
+        assert!(message.contains("read, not drawn"), "{message}");
     }
 
     #[test]
@@ -336,7 +356,7 @@ mod tests {
         for begin in [Begin::Initialize, Begin::Resume(states)] {
             let prepare = |job: &Job<'_>| {
                 let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, job)?;
-                Run::with_baselines(settings.into(), sets, begin.clone(), job)
+                Run::with_baselines(settings, sets, begin.clone(), job)
             };
             let (run, parts) = cancelled_at(usize::MAX, &prepare);
             assert_eq!(run.map(|run| run.decouple_test()).as_ref(), Some(&answers_mm));
@@ -360,7 +380,7 @@ mod tests {
         };
         let RunSets { split, test, .. } =
             RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
-        let task = Task::new(&settings.into(), &split.training, None, &test).unwrap();
+        let task = Task::new(&settings, &split.training, None, &test).unwrap();
         task.scaling.0
     }
 

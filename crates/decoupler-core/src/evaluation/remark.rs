@@ -220,8 +220,8 @@ impl Remark {
     }
 }
 
-/// Returns the remarks on the rows of the error table of a simulated array, with the names of the rows: on the network, whose training ended
-/// for `reason`, and on the linear map.
+/// Returns the remarks on the rows of the error table of a simulated array, with the names of the rows: on the network,
+/// whose training ended for `reason`, and on the linear map.
 pub fn error_remarks(
     settings: &RunSettings,
     Scores { network, baselines, .. }: &Scores,
@@ -306,7 +306,7 @@ mod tests {
         settings.simulation_mut().unwrap().scene.noise = noise;
         let mean = errors(0.2, Some(5.0));
         let [ours, mean] = [*ours, mean].map(TestErrors::Nodes);
-        let remarks = Remark::on(kind, (&ours, &mean), &settings.into(), (samples, 30));
+        let remarks = Remark::on(kind, (&ours, &mean), &settings, (samples, 30));
         remarks.iter().map(ToString::to_string).collect()
     }
 

@@ -30,7 +30,7 @@ pub struct TrainingSize {
     pub samples: usize,
     /// Number of inputs.
     pub inputs: usize,
-    /// Number of targets that vary.
+    /// Number of targets; of an array, the coordinates that vary.
     pub targets: usize,
     /// Number of networks: 1, or one for each row-wire.
     pub networks: usize,

@@ -51,7 +51,7 @@ fn small_settings() -> RunSettings {
 
 fn small(axis: Axis) -> Experiment {
     Experiment {
-        base: small_settings().into(),
+        base: small_settings(),
         recording: None,
         axis,
         second_axis: None,
@@ -148,7 +148,7 @@ fn a_trial_equals_the_run_with_its_settings() {
             assert_eq!([&trial.mean, &trial.linear], [&baselines.mean, &baselines.linear]);
             let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
             let begin = Begin::Resume(trial.states.clone());
-            let taken_up = Run::new(settings.into(), sets, begin, &Job::UNINTERRUPTED).unwrap();
+            let taken_up = Run::new(settings, sets, begin, &Job::UNINTERRUPTED).unwrap();
             assert_eq!(taken_up.network(), alone.network());
             assert_eq!(taken_up.stop_reason(), alone.stop_reason());
             z_percent.push(alone.errors().percent().unwrap());
@@ -250,7 +250,7 @@ fn a_cell_that_cannot_be_trained_gives_the_reason_and_the_others_continue() {
     let mut settings = small_settings();
     settings.simulation_mut().unwrap().sensor = SensorModel::new("1x32_5x96".parse().unwrap());
     let mut experiment = small(Axis::Hidden(vec![2, 512]));
-    experiment.base = settings.into();
+    experiment.base = settings;
     experiment.base.starts = 1;
     let by_name = |method: &Method| method.to_string().contains("Bayesian");
     experiment.base.training.method = Method::all().into_iter().find(by_name).unwrap();

@@ -228,8 +228,10 @@ fn mismatched_sets_are_named() {
     };
     let message = run(RowModel::Each, &lacking, set.clone());
     assert!(message.contains("row 2 has no training samples"), "{message}");
-    let mut simulated: RunSettings = RunSettings::default();
-    simulated.hidden = 2;
+    let simulated = RunSettings {
+        hidden: 2,
+        ..RunSettings::default()
+    };
     let nameless = Dataset::new(Array2::zeros((4, 3)), Array2::zeros((4, 2)), None, vec![0; 4]).unwrap();
     let nameless = Split {
         training: nameless.clone(),

@@ -38,7 +38,7 @@ fn experiment(rows: Rows, folds: usize, unit: SplitBy) -> Experiment {
 
 fn experiment_on(settings: RunSettings, folds: usize, unit: SplitBy) -> Experiment {
     Experiment {
-        base: settings.into(),
+        base: settings,
         recording: None,
         axis: Axis::Hidden(vec![2]),
         second_axis: None,

@@ -54,7 +54,7 @@ fn bits(run: &Run) -> Vec<(Vec<u64>, usize, Option<StopReason>)> {
 /// Resumes a run of these settings from saved states.
 fn resumed(settings: RunSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
     let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
-    Run::new(settings.into(), sets, Begin::Resume(states), &Job::UNINTERRUPTED)
+    Run::new(settings, sets, Begin::Resume(states), &Job::UNINTERRUPTED)
 }
 
 #[test]

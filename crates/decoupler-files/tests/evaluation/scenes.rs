@@ -57,7 +57,7 @@ fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
 /// Resumes a run of these settings from saved states.
 fn resumed(settings: RunSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
     let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
-    Run::new(settings.into(), sets, Begin::Resume(states), &Job::UNINTERRUPTED)
+    Run::new(settings, sets, Begin::Resume(states), &Job::UNINTERRUPTED)
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn unknown_rows_are_identified() {
     assert!(z_percent(&run, DecoderKind::Newton, Precision::Double) < 1e-9);
     settings.simulation_mut().unwrap().scene.noise = Noise::relative(1e-5);
     let set = DecoderSet::new(
-        settings.into(),
+        settings,
         RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
             .unwrap()
             .split
@@ -169,7 +169,7 @@ fn known_rows_resume_from_saved_states_bit_for_bit() {
     let mut other = file;
     let mut settings = other.settings;
     settings.simulation_mut().unwrap().scene.rows = Rows::All;
-    other.settings = settings.into();
+    other.settings = settings;
     let message = other.save(&path).unwrap_err().to_string();
     assert!(message.contains("3 of them"), "{message}");
 }
@@ -230,15 +230,7 @@ fn a_trade_off_has_a_point_for_every_choice() {
     let keep = |_, point: Result<_, _>, _: Option<&_>| points.push(point.unwrap());
     let sets = Setup::from(settings).sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ());
     let sets = sets.unwrap().sets;
-    measure_trade_off(
-        &settings.into(),
-        &sets,
-        &[2, 3],
-        &DecoderKind::ALL,
-        &Job::UNINTERRUPTED,
-        keep,
-    )
-    .unwrap();
+    measure_trade_off(&settings, &sets, &[2, 3], &DecoderKind::ALL, &Job::UNINTERRUPTED, keep).unwrap();
     // Five without a network; network in two precisions and polish, each with two numbers of hidden nodes.
     assert_eq!(points.len(), 5 + 2 * 3);
     assert_eq!(points.iter().filter(|point| point.hidden() == Some(3)).count(), 3);
@@ -254,7 +246,7 @@ fn a_trade_off_has_a_point_for_every_choice() {
     let mut none = 0;
     let count = |_, _: Result<_, _>, _: Option<&_>| none += 1;
     let cancelled = Job::new(&|| true);
-    let measured = measure_trade_off(&settings.into(), &sets, &[2], &DecoderKind::ALL, &cancelled, count);
+    let measured = measure_trade_off(&settings, &sets, &[2], &DecoderKind::ALL, &cancelled, count);
     assert!(matches!(measured, Err(RunError::Cancelled(_))));
     assert_eq!(none, 0);
 }

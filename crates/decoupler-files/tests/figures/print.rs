@@ -242,7 +242,7 @@ fn hollow_marks_of_the_trade_off_mean_32_bits_and_nothing_else() {
         let kinds = [DecoderKind::Ridge, DecoderKind::Network];
         let sets = Setup::from(settings).sets("".as_ref(), &Job::UNINTERRUPTED, &mut |_| ());
         let sets = sets.unwrap().sets;
-        measure_trade_off(&settings.into(), &sets, &[3], &kinds, &Job::UNINTERRUPTED, on_point).unwrap();
+        measure_trade_off(&settings, &sets, &[3], &kinds, &Job::UNINTERRUPTED, on_point).unwrap();
     }
     let is_single = |single: bool| {
         let of_bits = points

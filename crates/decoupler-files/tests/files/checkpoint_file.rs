@@ -280,7 +280,7 @@ fn invalid_contents_are_refused() {
             |file| {
                 let mut settings = file.settings;
                 settings.simulation_mut().unwrap().sensor.scale = "2x3_2x9".parse().unwrap();
-                file.settings = settings.into();
+                file.settings = settings;
             },
             "the samples have",
         ),

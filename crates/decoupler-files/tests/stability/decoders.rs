@@ -66,7 +66,7 @@ fn measured(settings: &RunSettings) -> Result<Measured, Verdict> {
         &decoupler_core::job::Job::UNINTERRUPTED,
     );
     let training = sets.map_err(|error| refused(&error))?.split.training;
-    let set = DecoderSet::new((*settings).into(), training.clone(), Some(run.network()));
+    let set = DecoderSet::new(*settings, training.clone(), Some(run.network()));
     let mut answers = run.test().targets().to_owned();
     let shared = settings.simulation().unwrap().scene.rows == Rows::All;
     for sample in 0..run.test().samples() {

@@ -77,7 +77,7 @@ fn judge_network(damage: Damage, place: f64) -> Verdict {
         Ok(read) => {
             if read.network.decouple(run.test()) != run.decouple_test() {
                 wrong("a damaged network is read and answers differently")
-            } else if read.settings != small().into() || read.scores.network != run.errors() {
+            } else if read.settings != small() || read.scores.network != run.errors() {
                 wrong("a damaged network is read with other settings or errors")
             } else {
                 Verdict::Right

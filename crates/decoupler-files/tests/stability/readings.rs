@@ -33,7 +33,7 @@ fn judge(noise: Noise, changed: impl Fn(f64) -> f64, is_all: bool) -> Vec<(Strin
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     let set = DecoderSet::new(
-        settings.into(),
+        settings,
         RunSets::draw(
             &settings,
             MemoryBudget::UNLIMITED,

@@ -212,7 +212,7 @@ fn lengths() -> Vec<Situation> {
     }
     for exponent in [-300, -150, -12, -6, 6, 12, 150, 300] {
         let settings = changed(|settings| {
-            settings.simulation_mut().unwrap().sensor.resistivity_ohm_per_mm = 10_f64.powi(exponent)
+            settings.simulation_mut().unwrap().sensor.resistivity_ohm_per_mm = 10_f64.powi(exponent);
         });
         found.push(("resistance per mm", format!("1e{exponent} ohm a millimetre"), settings));
     }

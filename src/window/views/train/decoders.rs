@@ -455,7 +455,7 @@ mod tests {
         without_noise.simulation_mut().unwrap().scene.noise = Noise::default();
         // Fitted without the noise that the readings have.
         let set = DecoderSet::new(
-            without_noise.into(),
+            without_noise,
             RunSets::draw(&without_noise, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
                 .unwrap()
                 .split
@@ -496,7 +496,7 @@ mod tests {
         settings.simulation_mut().unwrap().samples = 100;
         settings.simulation_mut().unwrap().test_samples = 10;
         let set = DecoderSet::new(
-            settings.into(),
+            settings,
             RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
                 .unwrap()
                 .split

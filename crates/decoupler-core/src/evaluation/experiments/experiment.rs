@@ -301,7 +301,7 @@ impl PaperTable {
             base.training.stopping.max_fail = StoppingRules::MAX_EPOCHS;
             base.starts = starts;
             Experiment {
-                base: base.into(),
+                base,
                 recording: None,
                 axis,
                 second_axis: None,

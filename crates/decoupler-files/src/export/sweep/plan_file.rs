@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::{Division, Simulation},
     decoupling::DecoderKind,
     evaluation::{
-        Combination, Initialization, RunSettings, Source,
+        Combination, Initialization, RunSettings,
         experiments::{Axis, AxisKind, Experiment},
     },
     scene::{NoisySets, RowModel, Rows},
@@ -241,13 +241,13 @@ pub fn train_options(settings: &RunSettings, decoders: &[DecoderKind]) -> TrialO
     if settings.initialization != Initialization::default() {
         options.insert("begin".to_owned(), text(&settings.initialization));
     }
-    match &settings.source {
-        Source::Simulated(source) => {
+    match settings.simulation() {
+        Some(source) => {
             options.insert("inputs".to_owned(), text(&settings.inputs.quantity));
             options.extend(simulation_options(source));
         }
-        Source::Measured(source) => {
-            let rows = match source.rows {
+        None => {
+            let rows = match settings.source.row_model() {
                 RowModel::Shared => Rows::All,
                 RowModel::Each => Rows::Known,
             };

@@ -114,7 +114,7 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
         });
         if let Some(Simulation { sensor, .. }) = draft.simulation_mut() {
             fold_ui(ui, "Geometry", &of_geometry(&sensor.geometry), |ui| {
-                geometry_ui(ui, sensor)
+                geometry_ui(ui, sensor);
             });
         }
         fold_ui(ui, "Network inputs", &of_inputs(&draft.inputs), |ui| {
