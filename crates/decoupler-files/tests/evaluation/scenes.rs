@@ -167,9 +167,8 @@ fn known_rows_resume_from_saved_states_bit_for_bit() {
     file.save(&path).unwrap();
     assert_eq!(NetworkFile::load(&path).unwrap(), file);
     let mut other = file;
-    let mut settings = other.settings;
-    settings.simulation_mut().unwrap().scene.rows = Rows::All;
-    other.settings = settings;
+    other.settings.simulation_mut().unwrap().scene.rows = Rows::All;
+    other.problem.sensor = other.settings.simulation().copied();
     let message = other.save(&path).unwrap_err().to_string();
     assert!(message.contains("3 of them"), "{message}");
 }
