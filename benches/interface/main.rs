@@ -17,7 +17,8 @@ use std::{
 
 use decoupler::window::{DecouplerWindow, Desktop, Effect, Phase, Shared};
 use decoupler_core::{
-    evaluation::SimulatedSettings,
+    dataset::Simulation,
+    evaluation::RunSettings,
     training::{EpochRecord, Method, ScaledConjugateGradientSettings},
 };
 use decoupler_files::figure::{EpochOutline, loss_figure};
@@ -131,13 +132,14 @@ impl Bench {
 const LARGE: &str = "100x80_40x240";
 
 /// Returns the settings of a training that does not end while it is measured.
-fn endless(scale: &str) -> SimulatedSettings {
-    let mut settings = SimulatedSettings::default();
+fn endless(scale: &str) -> RunSettings {
+    let mut simulation = Simulation::default();
+    simulation.sensor.scale = scale.parse().expect("a scale");
+    let mut settings = RunSettings::from(simulation);
     if scale == LARGE {
         // Its epochs last long enough with any method.
         settings.training.method = Method::ScaledConjugateGradient(ScaledConjugateGradientSettings::default());
     }
-    settings.source.sensor.scale = scale.parse().expect("a scale");
     settings.training.stopping.epochs = 1_000_000;
     settings.training.stopping.min_gradient = 0.0;
     settings.training.stopping.goal_mse = 0.0;
@@ -204,9 +206,8 @@ fn main() {
         let settings = endless(scale);
         bench.window.apply(Effect::Configure(Box::new(settings)));
         bench.wait(|state| {
-            state
-                .test()
-                .is_some_and(|test| test.sensor.scale == settings.source.sensor.scale)
+            let shown = state.test().map(|test| test.sensor.scale);
+            shown.is_some() && shown == settings.simulation().map(|simulation| simulation.sensor.scale)
         });
         let points = bench.state().test().map_or([0, 0], |test| {
             let grid = test.surface.grid();

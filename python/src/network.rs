@@ -8,8 +8,9 @@ use std::{
 use decoupler_core::{
     dataset::History,
     decoupling::ProgramDecoder,
-    evaluation::{Channel, Intervals, Problem, RunSettings},
+    evaluation::{Intervals, RunSettings},
     network::Networks,
+    problem::{Channel, Problem},
     text::counted,
 };
 use decoupler_files::export::{
@@ -46,11 +47,29 @@ struct Record {
     networks: Networks,
     /// Row-wires with a network each, in ascending order.
     row_wires: Option<Vec<usize>>,
+    #[serde(with = "saved_problem")]
     problem: Problem,
     settings: RunSettings,
     intervals: Option<Intervals>,
     /// Record of the training; `None` for a network from a file, which has its own.
     origin: Option<Origin>,
+}
+
+/// The problem of a network that was trained in Python, which has no sensor.
+mod saved_problem {
+    use decoupler_core::problem::{Problem, SavedProblem};
+    use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer, de::Error as _};
+
+    pub(super) fn serialize<S: Serializer>(problem: &Problem, serializer: S) -> Result<S::Ok, S::Error> {
+        SavedProblem::from(problem.clone()).serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Problem, D::Error> {
+        let saved = SavedProblem::deserialize(deserializer)?;
+        saved
+            .with_sensor(None)
+            .ok_or_else(|| D::Error::custom("the network has no sensor model"))
+    }
 }
 
 /// Readings, targets, row-wires and groups of samples.

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler_core::{dataset::Seed, evaluation::Channel};
+use decoupler_core::{dataset::Seed, problem::Channel};
 use decoupler_files::{
     export::RecipeFile,
     import::{ImportError, Recording},

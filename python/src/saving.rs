@@ -8,9 +8,10 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Division, Split, SplitBy},
-    evaluation::{Begin, Channel, Intervals, Problem, Run, RunSettings, TestErrors},
+    evaluation::{Begin, Intervals, Run, RunSettings, TestErrors},
     job::Job,
     network::Networks,
+    problem::{Channel, Problem},
     training::{EpochRecord, Stage, StopReason},
 };
 use decoupler_files::{

@@ -2,7 +2,7 @@
 
 use decoupler_core::{
     dataset::{Dataset, Seed},
-    evaluation::{Preset, RunSets, SimulatedSettings},
+    evaluation::{Preset, RunSets, RunSettings},
     job::Job,
     scene::{Loading, Movement, Noise, NoisySets, Rows},
 };
@@ -36,7 +36,7 @@ struct Settings {
 
 impl Settings {
     /// Settings as the program makes them from the same values.
-    fn simulated(&self, sensor: &Sensor) -> PyResult<SimulatedSettings> {
+    fn run(&self, sensor: &Sensor) -> PyResult<RunSettings> {
         let noise = Noise {
             relative: self.noise,
             additive_ohm: self.noise_ohm,
@@ -50,10 +50,8 @@ impl Settings {
             },
         };
         let preset: Preset = self.preset.parse().map_err(value_error)?;
-        let mut settings = preset.settings_in(noise);
-        settings.source.sensor = sensor.0;
-        settings.seed = Seed(self.seed);
-        let source = &mut settings.source;
+        let mut source = preset.simulation_in(noise);
+        source.sensor = sensor.0;
         source.samples = self.samples.unwrap_or(source.samples);
         source.validation_samples = self.validation_samples.unwrap_or(source.validation_samples);
         source.test_samples = self.test_samples.unwrap_or(source.test_samples);
@@ -68,7 +66,11 @@ impl Settings {
             scene.loading = loading.parse::<Loading>().map_err(value_error)?;
         }
         scene.check().map_err(value_error)?;
-        Ok(settings)
+        Ok(RunSettings {
+            source: source.into(),
+            seed: Seed(self.seed),
+            ..preset.settings_in(noise)
+        })
     }
 }
 
@@ -94,13 +96,14 @@ pub fn simulate<'py>(
     sensor: &Sensor,
     settings: &Bound<'py, PyAny>,
 ) -> PyResult<(Bound<'py, PyDict>, Option<Bound<'py, PyDict>>, Bound<'py, PyDict>, f64)> {
-    let settings = settings.extract::<Settings>()?.simulated(sensor)?;
+    let settings = settings.extract::<Settings>()?.run(sensor)?;
+    let stroke_mm = settings.drawn().map_err(value_error)?.stroke_mm();
     let sets = detached(py, || RunSets::draw(&settings, memory_budget(), &Job::UNINTERRUPTED))?;
     let validation = sets.split.validation.as_ref();
     Ok((
         arrays(py, &sets.split.training)?,
         validation.map(|set| arrays(py, set)).transpose()?,
         arrays(py, &sets.test)?,
-        settings.source.stroke_mm(),
+        stroke_mm,
     ))
 }

@@ -5,11 +5,12 @@ use std::sync::{Mutex, PoisonError};
 use decoupler_core::{
     dataset::{Dataset, Seed, Split, SplitBy},
     evaluation::{
-        Begin, Channel, Combination, Initialization, Intervals, Measured, NoIntervals, Problem, RecordedSize, Run,
-        RunError, RunSets, RunSettings, Workload,
+        Begin, Combination, Initialization, Intervals, Measured, NoIntervals, Run, RunError, RunSets, RunSettings,
+        TrainingSize, Workload,
     },
     job::Job,
     network::{Quantity, ScalingChoice},
+    problem::{Channel, Problem},
     scene::RowModel,
     settings::Value,
     training::{EpochRecord, Method, StoppingRules},
@@ -79,7 +80,7 @@ impl Settings {
         settings.inputs.quantity = quantity(&self.inputs)?;
         settings.inputs.scaling = self.scaling.parse::<ScalingChoice>().map_err(value_error)?;
         settings.seed = Seed(self.seed);
-        settings.check_network().map_err(value_error)?;
+        settings.check_counts().map_err(value_error)?;
         Ok(settings)
     }
 
@@ -234,8 +235,8 @@ pub fn train(
     let problem = settings.problem(&split.training);
     let crc32 = samples_crc32(&split.training);
     let calibration = calibrates.then(|| split.training.clone());
-    let size = RecordedSize::of(&run_settings, &split.training);
-    Workload::of_recording(&run_settings, size)
+    let size = TrainingSize::of(&run_settings, &split.training);
+    Workload::of(&run_settings, size)
         .check_memory(memory_budget())
         .map_err(value_error)?;
     let mut run = detached(py, move || {

@@ -16,11 +16,12 @@ use super::{
 use decoupler_core::{
     dataset::{Division, Folds, SplitBy, Stream},
     evaluation::{
-        Begin, Channel, CrossValidated, ErrorTable, Problem, RecordedSize, Run, RunError, RunSets, RunSettings, Scores,
-        TestErrors, Workload,
+        Begin, CrossValidated, ErrorTable, Run, RunError, RunSets, RunSettings, Scores, TestErrors, TrainingSize,
+        Workload,
         recorded::{Determination, NonlinearGain, SplitComparison, channel_remarks},
     },
     job::Job,
+    problem::{Channel, Problem},
 };
 use decoupler_files::{
     export::{describe_channels, describe_determinacy, error_table},
@@ -71,7 +72,7 @@ impl Train {
         self.import.save_recipe(setup)?;
         let set = &recording.set;
         let by = plan.division.by;
-        Workload::of_recording(settings, RecordedSize::of(settings, set)).check_memory(memory_budget())?;
+        Workload::of(settings, TrainingSize::of(settings, set)).check_memory(memory_budget())?;
         let assigned = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));
         let assigned = assigned.map_err(|error| Failure::Arguments(error.to_string()))?;
         let validated = CrossValidated::on_folds(settings, set, assigned, &Job::UNINTERRUPTED)?;

@@ -9,9 +9,10 @@ use clap::Args;
 use decoupler_core::{
     calibration::PressLimits,
     dataset::{Dataset, Division, SimulationError, SplitBy, Stream},
-    evaluation::{Channel, Errors, Problem, TestErrors, fine_tune, press_limits, pressed_rows},
+    evaluation::{Errors, TestErrors, fine_tune, press_limits, pressed_rows},
     job::Job,
     network::{DecouplingNetwork, Networks},
+    problem::{Channel, Problem},
     sensor::SensorModel,
     text::{counted, inert},
     training::StoppingRules,
@@ -258,7 +259,7 @@ fn coordinates_of_depths(set: Dataset, row_wires: &[usize], sensor: &SensorModel
 
 /// Number of row-wires that the network of `file` reads; 1 for a recording whose row-wires share a network.
 pub(super) fn rows_read(file: &NetworkFile) -> Result<usize, Failure> {
-    match file.settings.source.simulation() {
+    match &file.problem.sensor {
         Some(simulation) => {
             let rows = simulation.scene.rows.read(simulation.sensor.scale.rows());
             Ok(rows.map_err(SimulationError::from)?.len())
@@ -271,7 +272,7 @@ pub(super) fn rows_read(file: &NetworkFile) -> Result<usize, Failure> {
 /// of its interval if it has one, and the counts of values outside the training range.
 pub(super) fn write_heading(file: &NetworkFile, kept: &[String], rows: usize, out: &mut dyn Write) -> io::Result<()> {
     let problem = &file.problem;
-    if problem.has_nodes {
+    if problem.has_nodes() {
         return write_decoded_header(rows * problem.targets.len() / 3, out);
     }
     let titles = problem.targets.iter().enumerate().flat_map(|(index, target)| {
@@ -450,10 +451,11 @@ impl FineTune {
             path: self.network.clone(),
             reason: "frames of known presses need a model of the sensor; give a network of train --sensor",
         };
-        let settings = file.settings.simulated().ok_or_else(no_array)?;
-        let limits = press_limits(&settings.source);
-        let frames = self.frames.read(&settings.source.sensor, limits, self.json)?;
-        let read = settings.source.scene.rows.read(settings.source.sensor.scale.rows());
+        let simulation = file.problem.sensor.ok_or_else(no_array)?;
+        let settings = file.settings;
+        let limits = press_limits(&simulation);
+        let frames = self.frames.read(&simulation.sensor, limits, self.json)?;
+        let read = simulation.scene.rows.read(simulation.sensor.scale.rows());
         let read = read.map_err(decoupler_core::dataset::SimulationError::from)?;
         let frames = frames
             .among_rows(&read)
@@ -472,9 +474,9 @@ impl FineTune {
         let tuned = fine_tune(&file.network, &split, training, memory_budget(), &Job::UNINTERRUPTED);
         bar.finish_and_clear();
         let tuned = tuned?;
-        let stroke_mm = settings.source.stroke_mm();
+        let stroke_mm = simulation.stroke_mm();
         let errors = |set: &Dataset, networks: &Networks| Errors::measure(set, &networks.decouple(set), stroke_mm);
-        let simulated = settings.source.draw_test(settings.seed)?;
+        let simulated = simulation.draw_test(settings.seed)?;
         let report = Report {
             training_samples: split.training.samples(),
             validation_samples: split.validation.as_ref().map_or(0, Dataset::samples),

@@ -2,9 +2,12 @@
 
 use std::io::{self, Write};
 
-use decoupler_core::evaluation::{
-    Channel, Combination, Coverage, Spread, StartRecord, TargetErrors, TestErrors, best_start,
-    recorded::{Determination, Undetermined},
+use decoupler_core::{
+    evaluation::{
+        Combination, Coverage, Spread, StartRecord, TargetErrors, TestErrors, best_start,
+        recorded::{Determination, Undetermined},
+    },
+    problem::Channel,
 };
 use decoupler_files::export::format_number;
 use serde::Serialize;

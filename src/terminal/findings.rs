@@ -12,7 +12,7 @@ use clap::{
 use decoupler_core::{
     dataset::{Dataset, Folds, Memory, Seed, SplitBy, Stream},
     evaluation::{
-        Channel, Measured, RecordedSize, RunError, RunSettings, TargetErrors, Workload,
+        Measured, RunError, RunSettings, TargetErrors, TrainingSize, Workload,
         recorded::{
             ChannelImportance, Determinacy, Determination, Findings, FittedModel, Interval, LearningCurve, MemoryGain,
             StudyStep,
@@ -20,6 +20,7 @@ use decoupler_core::{
     },
     job::Job,
     network::LARGEST_HIDDEN,
+    problem::Channel,
     scene::RowModel,
     text::capitalised,
 };
@@ -162,13 +163,13 @@ const LONGEST: f64 = 4.0;
 
 /// Returns the estimated time of the networks of a cross-validation on one thread.
 fn time_of_networks(settings: &RunSettings, set: &Dataset, folds: usize) -> Duration {
-    let size = RecordedSize {
+    let size = TrainingSize {
         samples: set.samples() - set.samples() / folds.max(1),
         inputs: set.channels(),
         targets: set.outputs(),
         networks: 1,
     };
-    Workload::of_recording(settings, size)
+    Workload::of(settings, size)
         .time()
         .all_epochs
         .saturating_mul(folds as u32)

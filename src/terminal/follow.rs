@@ -13,8 +13,7 @@ use std::{
 
 use clap::Args;
 use decoupler_core::{
-    dataset::{Place, SimulationError},
-    evaluation::Simulation,
+    dataset::{Place, Simulation, SimulationError},
     live::{FaultEvent, LeftOutDecoder, WireCheck, equation_decoder},
     scene::Noise,
 };
@@ -136,8 +135,8 @@ impl Follow {
 
     /// Decodes `input` with the network of `file` until it ends, or until Ctrl-C.
     pub(super) fn run(&self, input: &Path, file: &NetworkFile) -> Result<(), Failure> {
-        let simulated = file.settings.simulated();
-        if simulated.is_none() && self.noise.is_some() {
+        let sensor = file.problem.sensor.as_ref();
+        if sensor.is_none() && self.noise.is_some() {
             let reason =
                 "fault detection needs a sensor model, which the network of a recording does not have; leave it out";
             return Err(wrong("--noise", reason));
@@ -146,8 +145,8 @@ impl Follow {
         let keeping = source.keeping();
         let mut parser = Parser::new(file, keeping == Keeping::All)?;
         let mut answers = Answers::new(file, self.format.unwrap_or_default())?;
-        let mut faults = match &simulated {
-            Some(settings) => Faults::new(&settings.source, self.noise)?,
+        let mut faults = match sensor {
+            Some(simulation) => Faults::new(simulation, self.noise)?,
             None => Faults::none(),
         };
         let mut checked: Option<Instant> = None;
@@ -234,7 +233,7 @@ pub(super) enum ParseError {
 impl Parser {
     /// Prepares to parse lines for the network of `file`. `is_complete` is true if no line of the input is lost.
     pub(super) fn new(file: &NetworkFile, is_complete: bool) -> Result<Self, Failure> {
-        Ok(match file.settings.source.simulation() {
+        Ok(match &file.problem.sensor {
             Some(simulation) => {
                 let parser = LineParser::new(simulation.sensor.scale, simulation.scene.rows, is_complete);
                 Self::Array(Box::new(parser.map_err(SimulationError::from)?))

@@ -274,7 +274,7 @@ impl<'a> Answers<'a> {
                     &mut self.output,
                 )?;
             }
-            Form::Jsonl if problem.has_nodes => {
+            Form::Jsonl if problem.has_nodes() => {
                 write!(self.output, "{{\"line\":{line},\"coordinates_mm\":[")?;
                 for (index, coordinate) in answer.iter().enumerate() {
                     let separator = if index == 0 { "" } else { "," };

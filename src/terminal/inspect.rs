@@ -9,7 +9,8 @@ use std::{
 use clap::Args;
 use decoupler_core::{
     dataset::Dataset,
-    evaluation::{Channel, RunSets, TargetPosition},
+    evaluation::RunSets,
+    problem::{Channel, TargetPosition},
     text::counted,
 };
 use decoupler_files::{

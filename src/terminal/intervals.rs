@@ -4,9 +4,10 @@ use std::io::Write;
 
 use clap::ValueEnum;
 use decoupler_core::{
-    evaluation::{Channel, Intervals, Run},
+    evaluation::{Intervals, Run},
     job::Job,
     live::{Drift, DriftEvent, DriftMonitor},
+    problem::Channel,
 };
 use decoupler_files::{
     export::{NetworkFile, format_duration},
@@ -72,7 +73,7 @@ fn note(message: &str) {
 
 /// Reports why drift of the readings of a recording's network is not monitored, if it is not.
 pub(super) fn note_unmonitored(file: &NetworkFile) {
-    if let (Err(reason), None) = (&file.drift, file.settings.simulated()) {
+    if let (Err(reason), None) = (&file.drift, &file.problem.sensor) {
         note(&format!("Drift of the readings is not monitored: {reason}"));
     }
 }

@@ -8,8 +8,7 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::SimulationError,
-    evaluation::Simulation,
+    dataset::{Simulation, SimulationError},
     scene::RowModel,
     text::{is_unprintable, printable},
 };
@@ -92,7 +91,7 @@ pub(super) fn read(
     input: &Path,
     take: &mut dyn FnMut(Readings) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    match (&file.recorded, file.settings.source.simulation()) {
+    match (&file.recorded, file.settings.simulation()) {
         (Some(recorded), _) => take(read_columns(file, &recorded.plan.import, input)?),
         (None, Some(simulation)) => read_resistances(file, simulation, input, take),
         (None, None) => unreachable!("a file of a recording has its plan"),

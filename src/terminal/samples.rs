@@ -8,12 +8,9 @@ use std::{
 
 use clap::Args;
 use decoupler_core::{
-    dataset::{Dataset, LARGEST_SAMPLES, Seed, SimulationError, Stream},
+    dataset::{Dataset, LARGEST_SAMPLES, Seed, Simulation, SimulationError, Stream},
     decoupling::{Decoder, Precision, decode_set},
-    evaluation::{
-        DecoderSet, RecordedSize, Run, RunError, RunSets, RunSettings, SimulatedSettings, Simulation, Workload,
-        error_remarks,
-    },
+    evaluation::{DecoderSet, Run, RunError, RunSets, RunSettings, TrainingSize, Workload, error_remarks},
     job::Job,
     scene::{Fault, FaultySensor},
     sensor::{ArrayScale, SensorModel},
@@ -78,16 +75,16 @@ pub(super) fn working_folder() -> &'static Path {
 /// # Errors
 /// If the array lacks a row of the scene, or the machine has too little memory.
 pub(super) fn announce(settings: &RunSettings) -> Result<(), RunError> {
-    match settings.simulated() {
-        Some(settings) => announce_workload(&Workload::of(&settings)?),
-        None => Ok(()),
+    if settings.simulation().is_none() {
+        return Ok(());
     }
+    announce_workload(&Workload::of(settings, TrainingSize::drawn(settings)?))
 }
 
 /// Reports on standard error how long a training on a recording will take, if it is long.
 pub(super) fn announce_recording(setup: &Setup, sets: &SetupSets) {
     let settings = setup.settings();
-    let size = RecordedSize::of(settings, &sets.sets.split.training);
+    let size = TrainingSize::of(settings, &sets.sets.split.training);
     if setup.plan().is_some()
         && let Some(text) = describe_recorded_workload(settings, size)
     {
@@ -162,9 +159,11 @@ impl Simulate {
 
     fn write(&self, writer: &mut dyn Write, refused: impl Fn(std::io::Error) -> Failure) -> Result<(), Failure> {
         let mut settings = self.scene.settings()?;
-        settings.source.sensor = SensorModel::new(self.array);
+        if let Some(simulation) = settings.simulation_mut() {
+            simulation.sensor = SensorModel::new(self.array);
+        }
         settings.seed = Seed(self.seed);
-        let (Simulation { sensor, scene, .. }, seed) = (&settings.source, settings.seed);
+        let (Simulation { sensor, scene, .. }, seed) = (settings.drawn()?, settings.seed);
         let rows = scene.rows.read(self.array.rows()).map_err(SimulationError::from)?;
         let faulty = match self.fault {
             Some(fault) => {
@@ -202,7 +201,7 @@ impl Simulate {
     }
 
     /// The given decoder with trained networks; none if none is given.
-    fn decoder(&self, settings: &SimulatedSettings) -> Result<Option<Box<dyn Decoder>>, Failure> {
+    fn decoder(&self, settings: &RunSettings) -> Result<Option<Box<dyn Decoder>>, Failure> {
         self.scene.check_one_noise()?;
         let kind = match self.scene.decoder[..] {
             [] => return Ok(None),
@@ -210,7 +209,7 @@ impl Simulate {
             _ => return Err(Failure::Arguments("--decoder: give only one here".to_owned())),
         };
         let networks = if kind.needs_network() {
-            announce(&(*settings).into())?;
+            announce(settings)?;
             let mut run = Run::prepare(*settings)?;
             run.finish(&Job::UNINTERRUPTED).map_err(RunError::from)?;
             let scores = run.scores();
@@ -232,7 +231,7 @@ impl Simulate {
             None
         };
         let sets = RunSets::draw(settings, memory_budget(), &Job::UNINTERRUPTED)?;
-        let set = DecoderSet::new((*settings).into(), sets.split.training, networks);
+        let set = DecoderSet::new(*settings, sets.split.training, networks);
         Ok(set.decoder(kind, Precision::Double)?)
     }
 }

@@ -2,10 +2,11 @@ use clap::Args;
 
 use super::{count, failure::Failure, interruption::check_same, number};
 use decoupler_core::{
+    dataset::Simulation,
     decoupling::DecoderKind,
-    evaluation::{Measured, Preset, RunSettings, SimulatedSettings, Simulation},
-    network::{Quantity, ScalingChoice},
-    scene::{Loading, Movement, Noise, NoisySets, RowModel, Rows},
+    evaluation::{Measured, Preset, RunSettings},
+    network::{InputChoice, Quantity, ScalingChoice},
+    scene::{Loading, Movement, Noise, NoisySets, RowModel, Rows, Scene},
 };
 
 // Rows, movement, loading and noise of the scene, and its decoders. Arguments that are not given have the values of the
@@ -62,25 +63,21 @@ fn noisy_sets(text: &str) -> Result<NoisySets, String> {
 
 impl SceneArguments {
     /// Settings of the preset with the given scene and inputs, at the first given noise.
-    pub(super) fn settings(&self) -> Result<SimulatedSettings, Failure> {
+    pub(super) fn settings(&self) -> Result<RunSettings, Failure> {
         self.settings_at(self.preset.unwrap_or_default(), self.noise.first().copied())
     }
 
     /// Settings of the preset on this simulated array, with the given scene and inputs.
-    pub(super) fn settings_on(&self, source: Simulation) -> Result<SimulatedSettings, Failure> {
-        let settings = SimulatedSettings {
-            source,
+    pub(super) fn settings_on(&self, source: Simulation) -> Result<RunSettings, Failure> {
+        let settings = RunSettings {
+            source: source.into(),
             ..self.preset.unwrap_or_default().settings()
         };
         self.applied(settings, self.noise.first().copied())
     }
 
     /// Settings of this preset with the given scene and inputs, at this relative noise.
-    pub(super) fn settings_at(
-        &self,
-        preset: Preset,
-        relative_noise: Option<f64>,
-    ) -> Result<SimulatedSettings, Failure> {
+    pub(super) fn settings_at(&self, preset: Preset, relative_noise: Option<f64>) -> Result<RunSettings, Failure> {
         let noise = self.noise(Noise::default(), relative_noise);
         self.applied(preset.settings_in(noise), relative_noise)
     }
@@ -181,41 +178,50 @@ impl SceneArguments {
         }
     }
 
-    /// `settings` with the given scene and inputs.
-    fn applied(
-        &self,
-        mut settings: SimulatedSettings,
-        relative_noise: Option<f64>,
-    ) -> Result<SimulatedSettings, Failure> {
-        let scene = &mut settings.source.scene;
-        scene.rows = self.rows.unwrap_or(scene.rows);
-        scene.movement = self.axes.unwrap_or(scene.movement);
-        scene.loading = self.loading.unwrap_or(scene.loading);
-        scene.noise = self.noise(scene.noise, relative_noise);
-        settings.inputs.quantity = self.quantity()?.unwrap_or(settings.inputs.quantity);
-        settings.inputs.scaling = self.scaling.unwrap_or(settings.inputs.scaling);
+    /// `current` with the given parts of the scene.
+    fn scene(&self, current: &Scene, relative_noise: Option<f64>) -> Result<Scene, Failure> {
+        let scene = Scene {
+            rows: self.rows.unwrap_or(current.rows),
+            movement: self.axes.unwrap_or(current.movement),
+            loading: self.loading.unwrap_or(current.loading),
+            noise: self.noise(current.noise, relative_noise),
+            ..*current
+        };
         scene
             .check()
             .map_err(|impossible| Failure::Arguments(impossible.to_string()))?;
+        Ok(scene)
+    }
+
+    /// `settings` with the given scene and inputs.
+    fn applied(&self, mut settings: RunSettings, relative_noise: Option<f64>) -> Result<RunSettings, Failure> {
+        settings.inputs.quantity = self.quantity()?.unwrap_or(settings.inputs.quantity);
+        settings.inputs.scaling = self.scaling.unwrap_or(settings.inputs.scaling);
+        if let Some(Simulation { scene, .. }) = settings.simulation_mut() {
+            *scene = self.scene(scene, relative_noise)?;
+        }
         Ok(settings)
     }
 
-    /// Names the first given part of the scene that differs from `saved`.
-    pub(super) fn difference(&self, saved: &SimulatedSettings) -> Result<Option<&'static str>, Failure> {
-        let mut asked = *saved;
+    /// Names the first given part of the scene or of the inputs that differs from those of a saved run.
+    pub(super) fn difference(&self, scene: &Scene, inputs: InputChoice) -> Result<Option<&'static str>, Failure> {
+        let (mut asked, mut asked_inputs) = (*scene, inputs);
         if let Some(preset) = self.preset {
-            let of_preset = preset.settings();
-            asked.source.scene.rows = of_preset.source.scene.rows;
-            asked.inputs = of_preset.inputs;
+            asked.rows = preset.simulation_in(Noise::default()).scene.rows;
+            asked_inputs = preset.settings().inputs;
         }
-        let asked = self.applied(asked, self.noise.first().copied())?;
+        let asked = self.scene(&asked, self.noise.first().copied())?;
+        let quantity = self.quantity()?.unwrap_or(asked_inputs.quantity);
         let differs = [
-            (asked.source.scene.rows != saved.source.scene.rows, "rows"),
-            (asked.source.scene.movement != saved.source.scene.movement, "axes"),
-            (asked.source.scene.loading != saved.source.scene.loading, "loading"),
-            (asked.source.scene.noise != saved.source.scene.noise, "noise"),
-            (asked.inputs.quantity != saved.inputs.quantity, "inputs"),
-            (asked.inputs.scaling != saved.inputs.scaling, "scaling"),
+            (asked.rows != scene.rows, "rows"),
+            (asked.movement != scene.movement, "axes"),
+            (asked.loading != scene.loading, "loading"),
+            (asked.noise != scene.noise, "noise"),
+            (quantity != inputs.quantity, "inputs"),
+            (
+                self.scaling.unwrap_or(asked_inputs.scaling) != inputs.scaling,
+                "scaling",
+            ),
         ];
         Ok(differs.into_iter().find(|(differs, _)| *differs).map(|(_, what)| what))
     }

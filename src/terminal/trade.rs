@@ -2,11 +2,12 @@
 
 use clap::Args;
 use decoupler_core::{
-    dataset::{Dataset, LARGEST_SAMPLES, Seed},
+    dataset::{Dataset, LARGEST_SAMPLES, Seed, Simulation},
     decoupling::DecoderKind,
-    evaluation::{Preset, RunError, RunSets, SimulatedSettings, TradeOffPoint, Workload, measure_trade_off},
+    evaluation::{Preset, RunError, RunSets, RunSettings, TradeOffPoint, Workload, measure_trade_off},
     job::Job,
     network::LARGEST_HIDDEN,
+    scene::Noise,
     sensor::{ArrayScale, SensorModel},
     training::{Method, StoppingRules},
 };
@@ -215,11 +216,13 @@ impl Trade {
         Ok(cases)
     }
 
-    fn settings(&self, preset: Preset, noise: f64) -> Result<SimulatedSettings, Failure> {
+    fn settings(&self, preset: Preset, noise: f64) -> Result<RunSettings, Failure> {
         let mut settings = self.scene.settings_at(preset, Some(noise))?;
-        settings.source.sensor = SensorModel::new(self.array.unwrap_or_default());
-        settings.source.samples = self.samples.unwrap_or(settings.source.samples);
-        settings.source.test_samples = self.test_samples.unwrap_or(settings.source.test_samples);
+        if let Some(simulation) = settings.simulation_mut() {
+            simulation.sensor = SensorModel::new(self.array.unwrap_or_default());
+            simulation.samples = self.samples.unwrap_or(simulation.samples);
+            simulation.test_samples = self.test_samples.unwrap_or(simulation.test_samples);
+        }
         settings.seed = Seed(self.seed);
         let stopping = &mut settings.training.stopping;
         stopping.epochs = self.epochs.unwrap_or(stopping.epochs);
@@ -309,46 +312,50 @@ fn measure_levels(
 /// Command that trains with the settings of `point`, on the samples of `plan` if there is one; `None` for decoders of a
 /// recording that have no network.
 pub(super) fn command(point: &TradeOffPoint, plan: Option<&Plan>, import: &ImportArguments) -> Option<String> {
-    match (plan, point.settings.simulated()) {
+    match (plan, point.settings.simulation()) {
         (Some(plan), _) => on_recording(point, plan, import),
-        (None, Some(settings)) => Some(on_array(point, &settings)),
+        (None, Some(simulation)) => Some(on_array(point, simulation)),
         (None, None) => None,
     }
 }
 
-fn on_array(point: &TradeOffPoint, settings: &SimulatedSettings) -> String {
+fn on_array(point: &TradeOffPoint, simulation: &Simulation) -> String {
     let preset = point.preset.unwrap_or_default();
     // The defaults of `train` with this noise: its number of samples and epochs, but not the noise itself.
-    let mut of_preset = preset.settings_in(settings.source.scene.noise);
-    of_preset.source.scene = preset.settings().source.scene;
-    let array = settings.source.sensor.scale.to_string().replace('×', "x");
+    let settings_of_preset = preset.settings_in(simulation.scene.noise);
+    let simulation_of_preset = Simulation {
+        scene: preset.simulation_in(Noise::default()).scene,
+        ..preset.simulation_in(simulation.scene.noise)
+    };
+    let array = simulation.sensor.scale.to_string().replace('×', "x");
     let mut command = format!("decoupler train --preset {preset} --array {array}");
-    let mut add = |name: &str, value: &dyn Fn(&SimulatedSettings) -> String| {
-        if value(settings) != value(&of_preset) {
-            command += &format!(" --{name} {}", value(settings));
+    let mut add = |name: &str, value: &dyn Fn(&Simulation, &RunSettings) -> String| {
+        let value_of_point = value(simulation, &point.settings);
+        if value_of_point != value(&simulation_of_preset, &settings_of_preset) {
+            command += &format!(" --{name} {value_of_point}");
         }
     };
-    add("rows", &|settings| settings.source.scene.rows.to_string());
-    add("axes", &|settings| settings.source.scene.movement.to_string());
-    add("loading", &|settings| settings.source.scene.loading.to_string());
-    add("inputs", &|settings| settings.inputs.quantity.to_string());
-    add("scaling", &|settings| settings.inputs.scaling.to_string());
-    add("noise", &|settings| {
-        format!("{:e}", settings.source.scene.noise.relative)
+    add("rows", &|simulation, _| simulation.scene.rows.to_string());
+    add("axes", &|simulation, _| simulation.scene.movement.to_string());
+    add("loading", &|simulation, _| simulation.scene.loading.to_string());
+    add("inputs", &|_, settings| settings.inputs.quantity.to_string());
+    add("scaling", &|_, settings| settings.inputs.scaling.to_string());
+    add("noise", &|simulation, _| {
+        format!("{:e}", simulation.scene.noise.relative)
     });
-    add("noise-ohm", &|settings| {
-        format!("{:e}", settings.source.scene.noise.additive_ohm)
+    add("noise-ohm", &|simulation, _| {
+        format!("{:e}", simulation.scene.noise.additive_ohm)
     });
-    add("drift", &|settings| format!("{:e}", settings.source.scene.noise.drift));
-    add("adc-bits", &|settings| {
-        settings.source.scene.noise.converter_bits.unwrap_or(0).to_string()
+    add("drift", &|simulation, _| format!("{:e}", simulation.scene.noise.drift));
+    add("adc-bits", &|simulation, _| {
+        simulation.scene.noise.converter_bits.unwrap_or(0).to_string()
     });
-    add("noise-in", &|settings| {
-        format!("{:?}", settings.source.scene.noise.sets).to_lowercase()
+    add("noise-in", &|simulation, _| {
+        format!("{:?}", simulation.scene.noise.sets).to_lowercase()
     });
-    add("samples", &|settings| settings.source.samples.to_string());
-    add("epochs", &|settings| settings.training.stopping.epochs.to_string());
-    add("seed", &|settings| settings.seed.to_string());
+    add("samples", &|simulation, _| simulation.samples.to_string());
+    add("epochs", &|_, settings| settings.training.stopping.epochs.to_string());
+    add("seed", &|_, settings| settings.seed.to_string());
     if let Some(hidden) = point.hidden() {
         command += &format!(" --hidden {hidden}");
     }
@@ -368,9 +375,12 @@ mod tests {
 
     #[test]
     fn results_before_a_failure_are_kept_and_the_failure_names_its_case() {
-        let mut settings = SimulatedSettings::default();
-        settings.source.sensor.scale = "1x1_1x3".parse().unwrap();
-        (settings.source.samples, settings.source.test_samples) = (8, 4);
+        let mut settings = RunSettings::default();
+        settings.simulation_mut().unwrap().sensor.scale = "1x1_1x3".parse().unwrap();
+        (
+            settings.simulation_mut().unwrap().samples,
+            settings.simulation_mut().unwrap().test_samples,
+        ) = (8, 4);
         let cases = Vec::from_iter([0.0, 0.01, 0.1].into_iter().flat_map(|noise| {
             Preset::ALL.map(|preset| Case {
                 noise: Some(noise),

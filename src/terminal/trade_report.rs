@@ -12,9 +12,10 @@ use decoupler_core::{
     dataset::SplitBy,
     decoupling::Precision,
     evaluation::{
-        ErrorTable, Problem, RunSets, TradeOffCost, TradeOffLevel, TradeOffPoint, decoded_unit, fastest_under,
+        ErrorTable, RunSets, TradeOffCost, TradeOffLevel, TradeOffPoint, decoded_unit, fastest_under,
         most_accurate_under,
     },
+    problem::Problem,
     sensor::ArrayScale,
 };
 use decoupler_files::{

@@ -18,7 +18,7 @@ use super::{
 };
 use decoupler_core::{
     decoupling::DecoderKind,
-    evaluation::{Begin, DecoderReport, DecoderSet, Run, RunError, Source, auto::DEFAULT_BUDGET_S},
+    evaluation::{Begin, DecoderReport, DecoderSet, Run, RunError, auto::DEFAULT_BUDGET_S},
     job::Job,
     text::counted,
     training::TrainingSettings,
@@ -149,13 +149,11 @@ impl Train {
     fn setup(&self) -> Result<Setup, Failure> {
         let source = self.import.source(self.training.scene.columns())?;
         let setup = self.training.setup(source, self.import.holds_out())?;
-        match (&self.sensor, setup.simulated()) {
-            (Some(path), Some(mut settings)) => {
-                settings.source.sensor = SensorFile::load(path)?;
-                Ok(settings.into())
-            }
-            _ => Ok(setup),
+        let mut settings = *setup.settings();
+        if let (Some(path), Some(simulation)) = (&self.sensor, settings.simulation_mut()) {
+            simulation.sensor = SensorFile::load(path)?;
         }
+        Ok(setup.with_settings(settings))
     }
 
     /// Returns `true` if the settings of the run are to be chosen.
@@ -197,9 +195,10 @@ impl Train {
 
     /// Decoders to measure: those given, by default all for a simulated array and none for a recording.
     fn decoders(&self, run: &Run) -> Vec<DecoderKind> {
-        match run.settings().source {
-            Source::Simulated(_) => self.training.scene.decoders(),
-            Source::Measured(_) => self.training.scene.decoder.clone(),
+        if run.problem().sensor.is_some() {
+            self.training.scene.decoders()
+        } else {
+            self.training.scene.decoder.clone()
         }
     }
 

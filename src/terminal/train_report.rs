@@ -13,14 +13,15 @@ use super::{
     output::{print, print_object},
 };
 use decoupler_core::{
+    dataset::Simulation,
     evaluation::{
-        Baselines, Channel, Combination, DecoderReport, Errors, Outlook, Problem, Run, RunError, SimulatedSettings,
-        StartRecord, TestErrors,
+        Baselines, Combination, DecoderReport, Errors, Outlook, Run, RunError, StartRecord, TestErrors,
         auto::AutoRecord,
         best_start, error_remarks,
         recorded::{Determination, Extrapolation, HysteresisLoop, Undetermined},
     },
     network::InputChoice,
+    problem::{Channel, Problem},
     scene::{Noise, NoisySets, Scene},
     sensor::{ArrayScale, Geometry},
     text::counted,
@@ -164,8 +165,8 @@ impl<'a> Decoder<'a> {
 }
 
 impl<'a> ArrayReport<'a> {
-    fn new(file: &'a NetworkFile, settings: &SimulatedSettings, remarks: Vec<String>) -> Result<Self, RunError> {
-        let (source, training) = (&settings.source, &file.training);
+    fn new(file: &'a NetworkFile, source: &Simulation, remarks: Vec<String>) -> Result<Self, RunError> {
+        let (settings, training) = (&file.settings, &file.training);
         let best = training.history.get(training.best_epoch);
         let size = source.model_size()?;
         let best_start = best_start(&training.starts).and_then(|number| training.starts.get(number));
@@ -221,7 +222,7 @@ impl<'a> Trained<'a> {
         let Self { file, .. } = *self;
         let (settings, training, scores) = (&file.settings, &file.training, &file.scores);
         let determined = self.determined();
-        let source = match (&self.sets.recordings, settings.simulated()) {
+        let source = match (&self.sets.recordings, settings.simulation()) {
             (Some(recordings), _) => SourceReport::Recording(Box::new(RecordingFigures {
                 recording: RecordingReport::new(&self.sets.sets, recordings),
                 test_outside_training: self.extrapolation().map_or(0.0, |(found, _)| found.share()),
@@ -236,11 +237,13 @@ impl<'a> Trained<'a> {
                 ]),
                 hysteresis: self.loops(),
             })),
-            (None, Some(settings)) => SourceReport::Array(Box::new(ArrayReport::new(file, &settings, self.remarks())?)),
+            (None, Some(simulation)) => {
+                SourceReport::Array(Box::new(ArrayReport::new(file, simulation, self.remarks())?))
+            }
             (None, None) => unreachable!("sets are recorded or simulated"),
         };
         let decoder = |report: &DecoderReport| (report.name(), Decoder::new(&file.problem.targets, report));
-        let has_decoders = file.problem.has_nodes || !self.decoders.is_empty();
+        let has_decoders = file.problem.has_nodes() || !self.decoders.is_empty();
         Ok(Report {
             source,
             hidden: settings.hidden,
@@ -286,9 +289,8 @@ impl<'a> Trained<'a> {
 
     /// Warnings of the source and of the training.
     fn warnings(&self, determined: &[Result<Determination, Undetermined>]) -> Vec<String> {
-        let source = self.file.settings.simulated().map(|settings| settings.source);
         let NetworkFile { problem, scores, .. } = self.file;
-        let outlook = source.and_then(|source| Outlook::of(&source).ok());
+        let outlook = problem.sensor.as_ref().and_then(|sensor| Outlook::of(sensor).ok());
         let of_array = outlook.iter().flat_map(|outlook| &outlook.warnings);
         let of_import = self.sets.recordings.as_ref().map(import_warnings);
         of_array
@@ -311,10 +313,7 @@ impl<'a> Trained<'a> {
     /// Remarks on the rows of the error table.
     fn remarks(&self) -> Vec<String> {
         let (file, baselines) = (self.file, &self.file.scores.baselines);
-        let Some(settings) = file.settings.simulated() else {
-            return Vec::new();
-        };
-        let remarks = error_remarks(&settings, &file.scores, file.training.stop_reason);
+        let remarks = error_remarks(&file.settings, &file.scores, file.training.stop_reason);
         let remarks = remarks.iter().map(|(row, remark)| format!("{row}: {remark}"));
         remarks.chain(baselines.model_based_note().map(str::to_owned)).collect()
     }
@@ -322,9 +321,9 @@ impl<'a> Trained<'a> {
     fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let Self { file, .. } = *self;
         let (settings, training) = (&file.settings, &file.training);
-        match (&self.sets.recordings, settings.simulated()) {
+        match (&self.sets.recordings, settings.simulation()) {
             (Some(recordings), _) => RecordingReport::new(&self.sets.sets, recordings).write(out)?,
-            (None, Some(settings)) => write_array(file, &settings, out)?,
+            (None, Some(simulation)) => write_array(file, simulation, out)?,
             (None, None) => unreachable!("sets are recorded or simulated"),
         }
         if let Some(record) = search(file) {
@@ -379,12 +378,12 @@ impl<'a> Trained<'a> {
         write_warnings(&self.warnings(&self.determined()), out)?;
         write_warnings(&self.remarks(), out)?;
         self.write_decoders(out)?;
-        if let Some(settings) = settings.simulated() {
+        if let Some(simulation) = &file.problem.sensor {
             writeln!(
                 out,
                 "\nErrors in % are relative to the coordinate, as in the paper, or to the stroke where stated."
             )?;
-            let note = settings.source.sensor.scale.note();
+            let note = simulation.sensor.scale.note();
             for note in note.iter().map(String::as_str).chain([Geometry::ASSUMPTION]) {
                 writeln!(out, "{note}")?;
             }
@@ -416,7 +415,7 @@ impl<'a> Trained<'a> {
                 writeln!(out, "Warning: {name}: {remark}")?;
             }
         }
-        if self.file.problem.has_nodes {
+        if self.file.problem.has_nodes() {
             writeln!(
                 out,
                 "The residual is the rms relative difference between the readings and those of the decoded deformation; it \
@@ -460,12 +459,8 @@ fn condition(outlook: Option<&Outlook>) -> Option<f64> {
 }
 
 /// Writes the scene of an array, the size of its equations and of the network, and the numbers of samples.
-fn write_array(
-    file: &NetworkFile,
-    SimulatedSettings { source, inputs, .. }: &SimulatedSettings,
-    out: &mut dyn Write,
-) -> io::Result<()> {
-    let scene = &source.scene;
+fn write_array(file: &NetworkFile, source: &Simulation, out: &mut dyn Write) -> io::Result<()> {
+    let (scene, inputs) = (&source.scene, &file.settings.inputs);
     let Noise {
         relative,
         additive_ohm,

@@ -5,10 +5,8 @@ use clap::{
 
 use super::{count, failure::Failure, interruption::check_same, number, scene_arguments::SceneArguments, seed};
 use decoupler_core::{
-    dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{
-        Combination, Initialization, MAX_STARTS, RunSettings, SimulatedSettings, Simulation, Source, auto::AutoFixed,
-    },
+    dataset::{LARGEST_SAMPLES, Seed, Simulation},
+    evaluation::{Combination, Initialization, MAX_STARTS, RunSettings, auto::AutoFixed},
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     settings::Value,
@@ -143,27 +141,28 @@ impl TrainingArguments {
     }
 
     /// Settings of a new run on a simulated array.
-    pub(super) fn settings(&self) -> Result<SimulatedSettings, Failure> {
+    pub(super) fn settings(&self) -> Result<RunSettings, Failure> {
         self.settings_on(None)
     }
 
     /// Settings of a new run with the given arguments on this simulated array, by default that of the preset.
-    fn settings_on(&self, simulation: Option<Simulation>) -> Result<SimulatedSettings, Failure> {
+    fn settings_on(&self, simulation: Option<Simulation>) -> Result<RunSettings, Failure> {
         self.scene.check_one_noise()?;
         self.refuse_auto("settings are chosen for a recording (--data)")?;
-        let default = match simulation {
+        let mut default = match simulation {
             Some(simulation) => self.scene.settings_on(simulation)?,
             None => self.scene.settings()?,
         };
-        let source = default.source;
-        Ok(SimulatedSettings {
-            source: Simulation {
+        if let Some(source) = default.simulation_mut() {
+            *source = Simulation {
                 sensor: self.sensor().unwrap_or(source.sensor),
                 samples: self.samples.unwrap_or(source.samples),
                 validation_samples: self.validation_samples.unwrap_or(source.validation_samples),
                 test_samples: self.test_samples.unwrap_or(source.test_samples),
-                ..source
-            },
+                ..*source
+            };
+        }
+        Ok(RunSettings {
             hidden: self.hidden().unwrap_or(default.hidden),
             starts: self.starts.unwrap_or(default.starts),
             combine: self.combine.unwrap_or(default.combine),
@@ -232,10 +231,9 @@ impl TrainingArguments {
     /// Names the first given argument that differs.
     pub(super) fn resumed(&self, saved: &Setup) -> Result<TrainingSettings, Failure> {
         let settings = saved.settings();
-        match (&settings.source, saved.plan()) {
-            (Source::Simulated(source), _) => {
-                let simulated = saved.simulated().expect("the source is simulated");
-                if let Some(what) = self.scene.difference(&simulated)? {
+        match (settings.simulation(), saved.plan()) {
+            (Some(source), _) => {
+                if let Some(what) = self.scene.difference(&source.scene, settings.inputs)? {
                     return Err(Failure::Arguments(format!(
                         "the checkpoint has a different value of {what}: leave it out to resume, or start a new training \
                          with another --checkpoint"
@@ -246,7 +244,7 @@ impl TrainingArguments {
                 check_same("test-samples", self.test_samples, source.test_samples)?;
                 check_same("validation-samples", self.validation_samples, source.validation_samples)?;
             }
-            (Source::Measured(_), plan) => {
+            (None, plan) => {
                 let import = plan.map(|plan| &plan.import);
                 self.recorded_source(import.is_some_and(|import| import.row_wire.is_some()))?;
                 self.scene.check_resumed(settings)?;
@@ -373,12 +371,12 @@ mod tests {
 
     #[test]
     fn the_defaults_in_the_help_match_the_library() {
-        assert_eq!(parsed("train").settings().unwrap(), SimulatedSettings::default());
+        assert_eq!(parsed("train").settings().unwrap(), RunSettings::default());
         let line = "train --preset paper --rows all --axes z --loading random --inputs resistance --scaling minmax \
                     --noise 0 --noise-in both --array 10x10_5x30 --hidden 12 --starts 1 --method lm --epochs 1000 \
                     --goal 0 --max-fail 6 --min-gradient 1e-7 --samples 1000 --test-samples 100 --validation-samples \
                     200 --seed 0";
-        assert_eq!(parsed(line).settings().unwrap(), SimulatedSettings::default());
+        assert_eq!(parsed(line).settings().unwrap(), RunSettings::default());
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::{
     test_view::{TestView, TestViewError},
 };
 use decoupler_core::{
-    evaluation::{Baselines, RunSets, SimulatedSettings},
+    evaluation::{Baselines, RunSets, RunSettings},
     job::Job,
 };
 use decoupler_files::machine::memory_budget;
@@ -14,15 +14,15 @@ use decoupler_files::machine::memory_budget;
 #[derive(Debug)]
 pub enum PreviewEvent {
     /// Test set of these settings.
-    Drawn(Box<SimulatedSettings>, Result<TestView, TestViewError>),
+    Drawn(Box<RunSettings>, Result<TestView, TestViewError>),
     /// Baselines of these settings; `None` if they take long or cannot be computed, which a training would explain.
-    Compared(Box<SimulatedSettings>, Option<Baselines>),
+    Compared(Box<RunSettings>, Option<Baselines>),
     /// The thread ended without a result.
     Failed(JobError),
 }
 
 /// Draws the test set of these settings; replaces an earlier request.
-pub fn draw(job: &mut Background<PreviewEvent>, settings: SimulatedSettings) {
+pub fn draw(job: &mut Background<PreviewEvent>, settings: RunSettings) {
     job.start(
         move |_| PreviewEvent::Drawn(Box::new(settings), TestView::draw(&settings)),
         |drawn| drawn.unwrap_or_else(PreviewEvent::Failed),
@@ -30,7 +30,7 @@ pub fn draw(job: &mut Background<PreviewEvent>, settings: SimulatedSettings) {
 }
 
 /// Computes the baselines of these settings; replaces an earlier request.
-pub fn compare(job: &mut Background<PreviewEvent>, settings: SimulatedSettings) {
+pub fn compare(job: &mut Background<PreviewEvent>, settings: RunSettings) {
     job.start(
         move |report| {
             PreviewEvent::Compared(
@@ -43,16 +43,17 @@ pub fn compare(job: &mut Background<PreviewEvent>, settings: SimulatedSettings) 
 }
 
 /// Returns the baselines of the settings; `None` if computing them would delay the next request.
-fn baselines(settings: &SimulatedSettings, job: &Job<'_>) -> Option<Baselines> {
+fn baselines(settings: &RunSettings, job: &Job<'_>) -> Option<Baselines> {
     /// About a tenth of a second.
     const MAX_TERMS: usize = 50_000_000;
-    let scale = settings.source.sensor.scale;
-    let samples = settings.source.samples + settings.source.validation_samples + settings.source.test_samples;
+    let simulation = settings.simulation()?;
+    let scale = simulation.sensor.scale;
+    let samples = simulation.samples + simulation.validation_samples + simulation.test_samples;
     let resistances = scale.nodes_per_row() * scale.nodes_per_column() * scale.columns();
     let linear_map = scale.columns() * (scale.columns() + scale.coordinates_per_row());
     if samples.saturating_mul(resistances + linear_map) > MAX_TERMS {
         return None;
     }
     let sets = RunSets::draw(settings, memory_budget(), job).ok()?;
-    Baselines::measure(&(*settings).into(), &sets, job).ok()
+    Baselines::measure(settings, &sets, job).ok()
 }

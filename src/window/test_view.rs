@@ -3,10 +3,9 @@
 use std::{ops::RangeInclusive, sync::Arc};
 
 use decoupler_core::{
-    dataset::{Dataset, SplitBy},
-    evaluation::{
-        Channel, NodeAddress, Outlook, Pressed, Problem, Run, RunError, SimulatedSettings, recorded::HysteresisLoop,
-    },
+    dataset::{Dataset, Simulation, SplitBy},
+    evaluation::{NodeAddress, Outlook, Pressed, Run, RunError, RunSettings, recorded::HysteresisLoop},
+    problem::{Channel, Problem},
     scene::Touch,
     sensor::SensorModel,
     surface::{SurfaceError, SurfaceMap},
@@ -38,8 +37,8 @@ impl TestSet {
     /// # Errors
     /// If no surface can be interpolated through the nodes of the array.
     pub fn of(run: &Run, order: SplitBy) -> Result<Self, TestViewError> {
-        Ok(match run.settings().simulated() {
-            Some(settings) => Self::Array(TestView::of(&settings, Arc::clone(run.test()))?),
+        Ok(match &run.problem().sensor {
+            Some(simulation) => Self::Array(TestView::of(simulation, Arc::clone(run.test()))?),
             None => Self::Recording(RecordedTest::new(
                 Arc::clone(run.test()),
                 Arc::clone(run.problem()),
@@ -135,21 +134,22 @@ impl TestView {
     ///
     /// # Errors
     /// If the sensor, the scene or the number of samples is invalid.
-    pub fn draw(settings: &SimulatedSettings) -> Result<Self, TestViewError> {
-        Ok(Self::of(settings, Arc::new(settings.source.draw_test(settings.seed)?))?)
+    pub fn draw(settings: &RunSettings) -> Result<Self, TestViewError> {
+        let simulation = settings.drawn()?;
+        Ok(Self::of(simulation, Arc::new(simulation.draw_test(settings.seed)?))?)
     }
 
     /// Prepares the surface for an existing test set.
     ///
     /// # Errors
     /// If no surface can be interpolated through the nodes.
-    pub fn of(settings: &SimulatedSettings, set: Arc<Dataset>) -> Result<Self, SurfaceError> {
-        let sensor = settings.source.sensor;
+    pub fn of(simulation: &Simulation, set: Arc<Dataset>) -> Result<Self, SurfaceError> {
+        let sensor = simulation.sensor;
         let row_count = sensor.scale.rows();
         // There is no test set of a row that does not exist.
-        let rows = settings.source.scene.rows.read(row_count).unwrap_or_default();
+        let rows = simulation.scene.rows.read(row_count).unwrap_or_default();
         let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &rows);
-        let stroke_mm = settings.source.stroke_mm();
+        let stroke_mm = simulation.stroke_mm();
         let unloaded = Pressed::new(&sensor, &rows, &Touch::default(), stroke_mm);
         Ok(Self {
             unloaded_ohm: unloaded.ok().map(|unloaded| Arc::new(unloaded.readings_ohm().clone())),
@@ -159,7 +159,7 @@ impl TestView {
             sensor,
             rows,
             stroke_mm,
-            outlook: outlook(settings),
+            outlook: outlook(simulation),
         })
     }
 
@@ -242,17 +242,17 @@ impl TestView {
 }
 
 /// Returns the outlook if it can be computed quickly; the arrays of the paper take a millisecond.
-fn outlook(settings: &SimulatedSettings) -> Option<Outlook> {
+fn outlook(simulation: &Simulation) -> Option<Outlook> {
     /// About a third of a second.
     const MAX_PRODUCTS: usize = 500_000_000;
-    let scale = settings.source.sensor.scale;
-    let unknowns = settings.source.scene.unknowns_per_row(scale);
+    let scale = simulation.sensor.scale;
+    let unknowns = simulation.scene.unknowns_per_row(scale);
     let matrix = unknowns.saturating_mul(scale.columns().max(unknowns));
     let products = matrix.saturating_mul(unknowns).saturating_mul(scale.rows());
     if products > MAX_PRODUCTS {
         return None;
     }
-    Outlook::of(&settings.source).ok()
+    Outlook::of(simulation).ok()
 }
 
 /// Reasons why a test set cannot be drawn.

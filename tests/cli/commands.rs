@@ -3,8 +3,8 @@
 use std::{fs, path::Path};
 
 use decoupler_core::{
-    dataset::{Dataset, Seed, Stream},
-    evaluation::{Errors, SimulatedSettings},
+    dataset::{Dataset, Seed, Simulation, Stream},
+    evaluation::Errors,
     scene::Scene,
     sensor::{ArrayScale, SensorModel},
 };
@@ -217,7 +217,7 @@ fn simulate_and_decode_agree_with_the_library() {
             .map(|number| number.parse::<f64>().unwrap().to_bits());
         assert!(numbers.eq(row.iter().map(|number| number.to_bits())));
     }
-    let errors = Errors::measure(&truth, &decoded, SimulatedSettings::default().source.stroke_mm());
+    let errors = Errors::measure(&truth, &decoded, Simulation::default().stroke_mm());
     assert_eq!(file.scores.network.nodes(), Some(&errors));
     assert_eq!(
         serde_json::from_value::<Errors>(report["errors"].clone()).unwrap(),

@@ -339,7 +339,7 @@ fn threads_and_the_terminal_give_identical_networks() {
         );
     }
     let files = [1, 2, 3].map(|threads| network(&folder.path().join(format!("{threads}.json"))));
-    let mut run = Run::prepare(files[0].settings.simulated().unwrap()).unwrap();
+    let mut run = Run::prepare(files[0].settings).unwrap();
     while run.step().is_none() {}
     let mut library = NetworkFile::from_run(&run, None).unwrap();
     library.training.seconds = 0.0;

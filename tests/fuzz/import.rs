@@ -1,6 +1,6 @@
 use std::{collections::BTreeSet, fmt::Write, fs, ops::ControlFlow, path::Path};
 
-use decoupler_core::evaluation::TargetPosition;
+use decoupler_core::problem::TargetPosition;
 use decoupler_files::{
     import::{Cells, DialectChoice, Inspection, Recipe, Separator, Table, holds_positions, read_table, suggested_plan},
     machine::limit_memory,

@@ -5,7 +5,7 @@ use std::{fs, ops::ControlFlow, path::Path};
 
 use decoupler_core::{
     dataset::{Memory, MemoryStream, Span},
-    evaluation::{Channel, Problem},
+    problem::{Channel, Problem},
 };
 use decoupler_files::{
     import::{DialectChoice, Encoding, InputLine, InputLines, Recipe, Separator},
@@ -25,7 +25,7 @@ fn problem(inputs: &[&str], derive: &[&str], memory: Option<Memory>) -> (Recipe,
         targets: vec![channel(&"force")],
         memory: memory.clone(),
         positions: Vec::new(),
-        has_nodes: false,
+        sensor: None,
     };
     let recipe = Recipe {
         dialect: DialectChoice {

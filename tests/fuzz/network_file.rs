@@ -65,7 +65,7 @@ fn accepted_files_give_finite_answers_or_are_flagged() {
 /// loading.
 fn check(path: &Path, bytes: &[u8], rng: &mut impl RngExt) -> bool {
     let Some(file) = loaded(path, bytes) else { return false };
-    let Some(simulation) = file.settings.source.simulation() else {
+    let Some(simulation) = file.settings.simulation() else {
         return true;
     };
     let height_mm = simulation.sensor.geometry.height_mm;

@@ -1,14 +1,17 @@
 //! Small trainings whose files are mutated.
 
 use decoupler_core::{
-    evaluation::{Preset, Run, SimulatedSettings},
+    evaluation::{Preset, Run, RunSettings},
     network::InputChoice,
 };
 
-fn small(mut settings: SimulatedSettings) -> Run {
-    settings.source.sensor.scale = "2x2_2x6".parse().unwrap();
-    (settings.source.samples, settings.source.validation_samples) = (40, 10);
-    settings.source.test_samples = 10;
+fn small(mut settings: RunSettings) -> Run {
+    settings.simulation_mut().unwrap().sensor.scale = "2x2_2x6".parse().unwrap();
+    (
+        settings.simulation_mut().unwrap().samples,
+        settings.simulation_mut().unwrap().validation_samples,
+    ) = (40, 10);
+    settings.simulation_mut().unwrap().test_samples = 10;
     settings.hidden = 3;
     settings.training.stopping.epochs = 5;
     let mut run = Run::prepare(settings).unwrap();
@@ -21,5 +24,5 @@ pub(crate) fn trained() -> [Run; 2] {
     let mut starts = Preset::Best.settings();
     starts.inputs = InputChoice::BEST;
     starts.starts = 2;
-    [small(SimulatedSettings::default()), small(starts)]
+    [small(RunSettings::default()), small(starts)]
 }

@@ -146,7 +146,7 @@ fn a_training_saved_on_closing_resumes_where_it_stopped() {
     drop(driver);
     assert_eq!(files_in(folder.path()), ["kept.checkpoint"]);
     let file = CheckpointFile::load(&path).unwrap();
-    assert_eq!(file.settings, endless().into());
+    assert_eq!(file.settings, endless());
     let run = file.resume(&Job::UNINTERRUPTED, &mut |_| ()).unwrap().0;
     assert!(run.leader().latest().epoch >= shown && run.stop_reason().is_none());
 }

@@ -63,7 +63,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     driver.enter("Name of run 1", "Six hidden nodes");
     assert!(driver.has("Six hidden nodes as A"), "{:#?}", driver.texts());
 
-    let settings = [6, 4].map(|hidden| decoupler_core::evaluation::SimulatedSettings { hidden, ..small() });
+    let settings = [6, 4].map(|hidden| decoupler_core::evaluation::RunSettings { hidden, ..small() });
     let runs = settings.map(trained);
     let shown = runs.each_ref().map(|run| NetworkFile::from_run(run, None).unwrap());
     // The comparison is saved as displayed, with the names of the runs.
@@ -235,8 +235,8 @@ fn figures_of_the_paper_are_one_click() {
     let mut driver = Driver::open();
     driver.click("10×6, top view");
     let settings = driver.state().draft;
-    assert_eq!(settings.source.sensor.scale.to_string(), "10×6_3×18");
-    assert_eq!((settings.hidden, settings.source.samples), (12, 1000));
+    assert_eq!(settings.simulation().unwrap().sensor.scale.to_string(), "10×6_3×18");
+    assert_eq!((settings.hidden, settings.simulation().unwrap().samples), (12, 1000));
     assert_eq!(driver.state().look.mode, ViewMode::Top);
     driver.wait("its training", |driver| driver.state().phase == Phase::Training);
     assert!(!driver.is_enabled("10×10, top view"), "one at a time");

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use decoupler::window::{Effect, Phase};
 use decoupler_core::{
-    evaluation::{Run, SimulatedSettings},
+    evaluation::{Run, RunSettings},
     sensor::{ArrayScale, Geometry},
     training::Method,
 };
@@ -17,7 +17,7 @@ use crate::driver::{Driver, PATIENCE, small, table_of};
 fn the_window_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
     let mut driver = Driver::open();
     driver.settle();
-    assert_eq!(driver.state().draft, SimulatedSettings::default());
+    assert_eq!(driver.state().draft, RunSettings::default());
     assert!(driver.has("Ready: press Train"));
     assert!(driver.is_enabled("▶ Train"));
     assert!(!driver.is_enabled("■ Stop") && !driver.is_enabled("⏸ Pause"));
@@ -78,7 +78,7 @@ fn presets_set_the_array_and_its_surface_follows() {
     let mut driver = Driver::open();
     for scale in ArrayScale::PRESETS {
         driver.click(&format!("{}×{}", scale.rows(), scale.nodes_per_row()));
-        assert_eq!(driver.state().draft.source.sensor.scale, scale);
+        assert_eq!(driver.state().draft.simulation().unwrap().sensor.scale, scale);
         assert_eq!(driver.get("Array scale").value(), Some(scale.to_string()));
         driver.wait("its surface", |driver| {
             let frame = &driver.views().train.drawn.frames.actual;
@@ -92,7 +92,7 @@ fn presets_set_the_array_and_its_surface_follows() {
 fn any_array_can_be_typed_and_an_invalid_one_is_explained_and_rejected() {
     let mut driver = Driver::open();
     driver.enter("Array scale", "4x5_2x16");
-    let scale = driver.state().draft.source.sensor.scale;
+    let scale = driver.state().draft.simulation().unwrap().sensor.scale;
     assert_eq!(scale.to_string(), "4×5_2×16");
     assert!(driver.says("4 row-wires of 5 nodes over 16 column-wires of 2 nodes"));
     assert!(
@@ -108,7 +108,11 @@ fn any_array_can_be_typed_and_an_invalid_one_is_explained_and_rejected() {
         ("4x5_2x9999", "column-wires (M4) is 9999"),
     ] {
         driver.enter("Array scale", wrong);
-        assert_eq!(driver.state().draft.source.sensor.scale, scale, "{wrong}");
+        assert_eq!(
+            driver.state().draft.simulation().unwrap().sensor.scale,
+            scale,
+            "{wrong}"
+        );
         assert!(driver.says(reason), "{wrong}: {:#?}", driver.texts());
         assert_eq!(
             driver.get("Array scale").value(),
@@ -144,15 +148,23 @@ fn typed_numbers_are_kept_within_their_limits() {
     }
     let draft = driver.state().draft;
     assert_eq!(
-        (draft.hidden, draft.source.samples, draft.source.validation_samples),
+        (
+            draft.hidden,
+            draft.simulation().unwrap().samples,
+            draft.simulation().unwrap().validation_samples
+        ),
         (17, 330, 0),
         "{draft:?}"
     );
     assert_eq!(
-        (draft.source.test_samples, draft.training.stopping.epochs, draft.seed.0),
+        (
+            draft.simulation().unwrap().test_samples,
+            draft.training.stopping.epochs,
+            draft.seed.0
+        ),
         (40, 77, u64::MAX)
     );
-    assert_eq!(draft.source.scene.largest_compression, 0.125);
+    assert_eq!(draft.simulation().unwrap().scene.largest_compression, 0.125);
     let Method::LevenbergMarquardt(settings) = draft.training.method else {
         panic!("{draft:?}")
     };
@@ -203,7 +215,7 @@ fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_bac
         driver
             .state()
             .test()
-            .is_some_and(|test| test.sensor == driver.state().draft.source.sensor)
+            .is_some_and(|test| test.sensor == driver.state().draft.simulation().unwrap().sensor)
     });
     let x_mm: Vec<f64> = driver
         .views()
@@ -216,17 +228,26 @@ fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_bac
         .map(|node| node.x)
         .collect();
     assert!((x_mm[10] - x_mm[0] - 2.5).abs() < 1e-12, "rows are 2.5 mm apart");
-    assert_eq!(driver.state().draft.source.sensor.resistivity_ohm_per_mm, 1e3);
+    assert_eq!(
+        driver.state().draft.simulation().unwrap().sensor.resistivity_ohm_per_mm,
+        1e3
+    );
     assert!(
         driver.get("Actual surface").value().unwrap().contains("to 7.9")
             || driver.get("Actual surface").value().unwrap().contains("to 8")
     );
     driver.click("Reset to the assumed geometry");
-    assert_eq!(driver.state().draft.source.sensor.geometry, Geometry::default());
-    assert_eq!(driver.state().draft.source.sensor.resistivity_ohm_per_mm, 1e3);
+    assert_eq!(
+        driver.state().draft.simulation().unwrap().sensor.geometry,
+        Geometry::default()
+    );
+    assert_eq!(
+        driver.state().draft.simulation().unwrap().sensor.resistivity_ohm_per_mm,
+        1e3
+    );
     driver.enter("Hidden nodes", "3");
     driver.click(reset);
-    assert_eq!(driver.state().draft, SimulatedSettings::default());
+    assert_eq!(driver.state().draft, RunSettings::default());
     assert!(!driver.is_enabled(reset));
     driver.settle();
 }
@@ -248,9 +269,9 @@ fn changing_the_settings_hides_old_results_and_changing_them_back_restores_them(
 
     // Faster than the worker draws the other array.
     assert!(driver.becomes_idle());
-    let run = driver.state().run.as_ref().unwrap().simulated().unwrap();
+    let run = *driver.state().run.as_ref().unwrap().settings();
     let mut other = run;
-    other.source.sensor.scale = ArrayScale::PRESETS[1];
+    other.simulation_mut().unwrap().sensor.scale = ArrayScale::PRESETS[1];
     driver.window_mut().apply(Effect::Configure(Box::new(other)));
     driver.window_mut().apply(Effect::Configure(Box::new(run)));
     driver.wait_for_frame("the other array's surface", Instant::now() + PATIENCE);

@@ -4,7 +4,7 @@ use std::{fs, path::Path, time::Duration};
 
 use decoupler::window::{Notice, Phase};
 use decoupler_core::{
-    evaluation::{Run, SimulatedSettings, Spread, StartRecord},
+    evaluation::{Run, RunSettings, Spread, StartRecord},
     job::Job,
     training::{Method, MomentumSettings, StopReason, StoppingRules},
 };
@@ -39,7 +39,7 @@ fn save(driver: &mut Driver, button: &str, path: &Path) {
     driver.click("Dismiss");
 }
 
-fn momentum(epochs: usize) -> SimulatedSettings {
+fn momentum(epochs: usize) -> RunSettings {
     let mut settings = small();
     settings.training.method = Method::Momentum(MomentumSettings::default());
     settings.training.stopping.epochs = epochs;
@@ -63,7 +63,7 @@ fn pause(driver: &mut Driver) {
     assert_eq!(driver.state().phase, Phase::Paused);
 }
 
-fn stepped(settings: SimulatedSettings, epochs: usize) -> Run {
+fn stepped(settings: RunSettings, epochs: usize) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     (0..epochs).for_each(|_| {
         run.step();
@@ -136,7 +136,7 @@ fn the_spread_is_shown_while_the_starts_train() {
     assert!(driver.has("SPREAD OVER 3 STARTS") && driver.has("0 of 3 starts ended"));
     driver.click("■ Stop");
     ended(&mut driver);
-    let settings = SimulatedSettings {
+    let settings = RunSettings {
         starts: 3,
         ..momentum(1_000_000)
     };
@@ -205,7 +205,7 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
 fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_terminal() {
     let folder = tempfile::tempdir().unwrap();
     let [terminal, window] = ["terminal", "window"].map(|name| folder.path().join(name));
-    let settings = SimulatedSettings { starts: 3, ..small() };
+    let settings = RunSettings { starts: 3, ..small() };
     CheckpointFile::from_run(&stepped(settings, 7), None)
         .unwrap()
         .save(&terminal)
@@ -242,7 +242,7 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
 fn a_checkpoint_shows_the_wall_time_of_all_starts_or_none() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
-    let mut file = CheckpointFile::from_run(&stepped(SimulatedSettings { starts: 3, ..small() }, 6), None).unwrap();
+    let mut file = CheckpointFile::from_run(&stepped(RunSettings { starts: 3, ..small() }, 6), None).unwrap();
     for (saved, all, an_epoch) in [(Some(3600), "1 h 0 min", "10 min 0 s"), (None, "–", "–")] {
         file.wall_time = saved.map(Duration::from_secs);
         file.save(&path).unwrap();

@@ -2,7 +2,7 @@
 
 use decoupler::window::DecoderResult;
 use decoupler_core::{
-    evaluation::{DecoderSet, Run, RunSets, SimulatedSettings},
+    evaluation::{DecoderSet, Run, RunSets, RunSettings},
     job::Job,
     machine::MemoryBudget,
     scene::{Noise, Rows},
@@ -49,14 +49,10 @@ fn table(driver: &Driver) -> Vec<String> {
 fn table_of(run: &Run) -> Vec<String> {
     let set = DecoderSet::new(
         *run.settings(),
-        RunSets::draw(
-            &run.settings().simulated().unwrap(),
-            MemoryBudget::UNLIMITED,
-            &Job::UNINTERRUPTED,
-        )
-        .unwrap()
-        .split
-        .training,
+        RunSets::draw(run.settings(), MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
+            .unwrap()
+            .split
+            .training,
         Some(run.network()),
     );
     let model_based = run
@@ -78,17 +74,17 @@ fn table_of(run: &Run) -> Vec<String> {
         let cell = |(heading, value)| format!("{name}, {heading}: {}", format_number(value));
         figures.into_iter().flatten().map(cell).collect::<Vec<_>>()
     };
-    DecoderResult::pending(&run.settings().source)
+    DecoderResult::pending(run.problem())
         .into_iter()
         .zip(NAMES)
         .flat_map(of_decoder)
         .collect()
 }
 
-fn noisy() -> SimulatedSettings {
+fn noisy() -> RunSettings {
     let mut settings = small();
-    settings.source.scene.rows = Rows::Known;
-    settings.source.scene.noise = Noise::relative(1e-3);
+    settings.simulation_mut().unwrap().scene.rows = Rows::Known;
+    settings.simulation_mut().unwrap().scene.noise = Noise::relative(1e-3);
     settings
 }
 

@@ -12,7 +12,10 @@ use std::{
 };
 
 use decoupler::window::{DecouplerWindow, Desktop, Notice, Phase, Shared, SourceKind, Views, WindowFile};
-use decoupler_core::evaluation::{ErrorTable, Run, SimulatedSettings, Simulation};
+use decoupler_core::{
+    dataset::Simulation,
+    evaluation::{ErrorTable, Run, RunSettings},
+};
 use decoupler_files::export::{NetworkFile, format_number};
 use eframe::egui::{
     Context, Key, Modifiers, OutputCommand, Rect, Ui, UiBuilder, Vec2, ViewportCommand, ViewportEvent, ViewportId,
@@ -155,7 +158,9 @@ impl Driver {
         self.get("Hidden nodes").scroll_to_me();
         self.wait("the paper's surface", |driver| {
             let preview = driver.state().preview.as_ref();
-            preview.is_some_and(|preview| preview.settings.source.scene == driver.state().draft.source.scene)
+            preview.is_some_and(|preview| {
+                preview.settings.simulation().unwrap().scene == driver.state().draft.simulation().unwrap().scene
+            })
         });
     }
 
@@ -463,7 +468,7 @@ impl Driver {
             driver
                 .state()
                 .test()
-                .is_some_and(|test| test.sensor == wanted.source.sensor)
+                .is_some_and(|test| test.sensor == wanted.simulation().unwrap().sensor)
         });
     }
 
@@ -525,22 +530,23 @@ impl Driver {
 const ROWS: [&str; 5] = ["training mean", "linear map", "network", "model-based", "published"];
 
 /// Returns the settings of [`Driver::configure_small`].
-pub(crate) fn small() -> SimulatedSettings {
-    let mut settings = SimulatedSettings {
+pub(crate) fn small() -> RunSettings {
+    let mut settings = RunSettings {
         source: Simulation {
             samples: 200,
             ..Simulation::default()
-        },
+        }
+        .into(),
         hidden: 6,
-        ..SimulatedSettings::default()
+        ..RunSettings::default()
     };
-    settings.source.sensor.scale = "10×6_3×18".parse().unwrap();
+    settings.simulation_mut().unwrap().sensor.scale = "10×6_3×18".parse().unwrap();
     settings.training.stopping.epochs = 15;
     settings
 }
 
 /// Returns the run of the library with `settings`, trained to the end.
-pub(crate) fn trained(settings: SimulatedSettings) -> Run {
+pub(crate) fn trained(settings: RunSettings) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     run

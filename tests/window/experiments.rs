@@ -104,7 +104,7 @@ fn a_table_ends_with_the_librarys_own_numbers() {
     driver.click("Cell 4");
     driver.click(OPEN);
     wait_for_the_network(&mut driver);
-    assert_eq!(RunSettings::from(driver.state().draft), experiment.cells()[1].settings);
+    assert_eq!(driver.state().draft, experiment.cells()[1].settings);
     assert_eq!(driver.state().run.as_ref().unwrap().history.len(), 1 + 3);
     let z = results.cells[1].trials[0].errors.percent();
     let shown = driver.state().result().unwrap().errors.percent();
@@ -138,7 +138,7 @@ fn a_cell_of_a_cross_validation_is_trained_where_it_is_opened() {
     let wanted = driver.views().experiments.outcome().unwrap().results.cells[0]
         .cell
         .settings;
-    assert_eq!(RunSettings::from(state.draft), wanted);
+    assert_eq!(state.draft, wanted);
     assert_eq!(state.result().unwrap().epochs_run, 3);
 }
 

@@ -324,7 +324,7 @@ fn a_report_contains_the_displayed_errors_and_a_kept_run_is_exported_too() {
     driver.save("A: Network file, JSON", &network);
     driver.click("Dismiss");
     driver.save("A: Report, HTML", &of_kept);
-    assert_eq!(NetworkFile::load(&network).unwrap().settings, small().into());
+    assert_eq!(NetworkFile::load(&network).unwrap().settings, small());
     assert!(fs::read_to_string(of_kept).unwrap().contains(&format!("<h1>{name}: ")));
 }
 
@@ -373,7 +373,7 @@ fn export_names_its_network_and_offers_the_displayed_epoch() {
     assert_eq!(file.training.best_epoch, stopped.leader().best_epoch());
     assert_eq!(file.training.history, stopped.leader().history());
     assert_eq!(file.training.stages, stopped.leader().stages());
-    assert_eq!(file.settings, small().into());
+    assert_eq!(file.settings, small());
     assert_eq!(NetworkFile::load(&best).unwrap().network, trained(small()).network());
     let table = fs::read_to_string(&errors).unwrap();
     let z_percent = file.scores.network.percent().unwrap().to_string();

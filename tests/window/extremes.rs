@@ -23,7 +23,7 @@ fn drawn(driver: &mut Driver) {
         driver
             .state()
             .test()
-            .is_some_and(|test| test.sensor == driver.state().draft.source.sensor)
+            .is_some_and(|test| test.sensor == driver.state().draft.simulation().unwrap().sensor)
     });
     driver.settle();
 }
@@ -120,7 +120,7 @@ fn extreme_resistivities_and_geometries_train_or_say_why_not() {
         }
         driver.wait("an answer", |driver| {
             let drawn = driver.state().test().map(|test| test.sensor);
-            drawn == Some(driver.state().draft.source.sensor) || driver.notice().is_some()
+            drawn == Some(driver.state().draft.simulation().unwrap().sensor) || driver.notice().is_some()
         });
         driver.settle();
         if let Some(reason) = try_training(&mut driver) {

@@ -64,7 +64,7 @@ fn shows_condition_of(driver: &Driver, sensor: &SensorModel) {
 #[test]
 fn the_figures_are_the_librarys_and_follow_the_geometry() {
     let mut driver = open();
-    let mut sensor = driver.state().draft.source.sensor;
+    let mut sensor = driver.state().draft.simulation().unwrap().sensor;
     shows_condition_of(&driver, &sensor);
     assert!(driver.says("Without noise, the readings determine every deformation"));
     driver.enter("Height", "8");
@@ -84,7 +84,10 @@ fn the_figures_are_the_librarys_and_follow_the_geometry() {
     }
 
     driver.click("Use this sensor in the Train view");
-    assert_eq!((driver.shown(), driver.state().draft.source.sensor), ("Train", sensor));
+    assert_eq!(
+        (driver.shown(), driver.state().draft.simulation().unwrap().sensor),
+        ("Train", sensor)
+    );
     driver.click_button("Identifiability");
     wait_for_the_answer(&mut driver);
     assert!(!driver.is_enabled("Use this sensor in the Train view"), "it is there");
@@ -99,11 +102,14 @@ fn a_slider_repeats_the_analysis_and_the_train_view_is_one_click_away() {
     driver.press(Key::ArrowRight);
     wait_for_the_answer(&mut driver);
     let pitch = analysis(&driver).question.sensor.geometry.node_pitch_mm;
-    assert!(pitch > before.source.sensor.geometry.node_pitch_mm, "{pitch}");
+    assert!(
+        pitch > before.simulation().unwrap().sensor.geometry.node_pitch_mm,
+        "{pitch}"
+    );
     assert_eq!(driver.state().draft, before, "trying changes nothing there");
     driver.click("Reset to the Train view's sensor");
     wait_for_the_answer(&mut driver);
-    assert_eq!(analysis(&driver).question, Question::of(&before));
+    assert_eq!(analysis(&driver).question, Question::of(before.simulation().unwrap()));
 }
 
 #[test]

@@ -65,7 +65,7 @@ fn a_training_that_was_cut_short_is_offered_at_the_next_start_and_resumed() {
     let folder = folder.path();
     kill(training_in(folder), folder, 1);
     let saved = CheckpointFile::load(&folder.join("training-1.checkpoint")).unwrap();
-    assert_eq!(saved.settings, endless().into());
+    assert_eq!(saved.settings, endless());
     let epoch = saved.starts[0].history().last().unwrap().epoch;
 
     let mut driver = offered_in(folder);

@@ -69,7 +69,7 @@ fn displayed(driver: &Driver) -> Option<(f64, Vec<DVec3>)> {
 
 /// The frame decoded by the library.
 fn by_library(file: &NetworkFile, frame_ohm: &[f64]) -> Vec<DVec3> {
-    let scale = file.settings.simulated().unwrap().source.sensor.scale;
+    let scale = file.settings.simulation().unwrap().sensor.scale;
     let mut decoder = file.network.decoder();
     let mut answer_mm = vec![0.0; scale.rows() * scale.coordinates_per_row()];
     decoder.decode(frame_ohm, &mut answer_mm).unwrap();
@@ -109,9 +109,9 @@ fn without_a_network_one_click_trains_one_and_another_decodes_live() {
     let (time_s, nodes) = displayed(&driver).unwrap();
     let scene = Scene {
         noise: Noise::default(),
-        ..file.settings.simulated().unwrap().source.scene
+        ..file.settings.simulation().unwrap().scene
     };
-    let mut source = Simulated::new(&file.settings.simulated().unwrap().source.sensor, &scene, Seed(0), 50.0).unwrap();
+    let mut source = Simulated::new(&file.settings.simulation().unwrap().sensor, &scene, Seed(0), 50.0).unwrap();
     let mut ohm = vec![0.0; source.readings()];
     while source.next_frame(&mut ohm).unwrap() < time_s {}
     assert_eq!(nodes, by_library(&file, &ohm), "at {time_s} s");
@@ -344,7 +344,7 @@ fn closing_the_window_while_it_records_ends_at_once_and_loses_no_frame() {
 
 /// Returns the frame of the array at rest, and its line.
 fn at_rest(file: &NetworkFile) -> (Vec<f64>, String) {
-    let sensor = file.settings.simulated().unwrap().source.sensor;
+    let sensor = file.settings.simulation().unwrap().sensor;
     let at_rest = vec![DVec3::ZERO; sensor.scale.nodes_per_row()];
     let rows = (0..10).map(|row| sensor.row_resistances(row, &at_rest).unwrap());
     let frame_ohm: Vec<f64> = rows.flatten().collect();

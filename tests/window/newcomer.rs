@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use decoupler::window::Phase;
 use decoupler_core::{
-    evaluation::{Run, SimulatedSettings},
+    evaluation::{Run, RunSettings},
     scene::Loading,
 };
 use decoupler_files::export::format_number;
@@ -25,7 +25,7 @@ fn file() -> (tempfile::TempDir, PathBuf) {
 
 /// Asserts that the displayed table contains the baselines computed by the library for `settings`.
 #[track_caller]
-fn shows_the_baselines_of(driver: &Driver, settings: SimulatedSettings) {
+fn shows_the_baselines_of(driver: &Driver, settings: RunSettings) {
     let run = Run::prepare(settings).unwrap();
     let baselines = run.baselines().unwrap().nodes().unwrap();
     for (name, errors) in [("training mean", baselines.mean), ("linear map", baselines.linear)] {
@@ -44,7 +44,10 @@ fn the_window_opens_on_a_print_and_the_papers_scene_is_one_click_away() {
     let mut driver = open_first();
     driver.wait("the baselines", |driver| !driver.table().is_empty());
     let opened = driver.state().draft;
-    assert!(matches!(opened.source.scene.loading, Loading::Indenter(_)));
+    assert!(matches!(
+        opened.simulation().unwrap().scene.loading,
+        Loading::Indenter(_)
+    ));
     shows_the_baselines_of(&driver, opened);
     assert!(!driver.has("Published"), "the paper has no print");
     // A print: most of the surface is at rest, and the middle of it is pressed.
@@ -55,9 +58,9 @@ fn the_window_opens_on_a_print_and_the_papers_scene_is_one_click_away() {
     assert!(at_rest > 40 && deepest_mm > 0.2, "{at_rest} at rest, {deepest_mm} mm");
 
     driver.click("Paper's scene");
-    assert_eq!(driver.state().draft, SimulatedSettings::default());
+    assert_eq!(driver.state().draft, RunSettings::default());
     driver.wait("the published errors", |driver| driver.has("Published"));
-    shows_the_baselines_of(&driver, SimulatedSettings::default());
+    shows_the_baselines_of(&driver, RunSettings::default());
     driver.click("Indenter's print");
     assert_eq!(driver.state().draft, opened);
 }

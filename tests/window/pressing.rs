@@ -2,7 +2,7 @@
 
 use decoupler_core::{dataset::Dataset, ndarray::Array2};
 use decoupler_core::{
-    evaluation::{Errors, Run, SimulatedSettings},
+    evaluation::{Errors, Run, RunSettings},
     glam::DVec3,
     scene::Touch,
     sensor::SensorModel,
@@ -50,10 +50,10 @@ fn move_to(driver: &mut Driver, at: Pos2) {
 /// Returns the readings under the finger, the errors of the network and the description of its surface, computed by the
 /// library from a set of one snapshot.
 fn expected(run: &Run, touch: &Touch) -> (Array2<f64>, Errors, String) {
-    let settings: SimulatedSettings = run.settings().simulated().unwrap();
-    let sensor: SensorModel = settings.source.sensor;
+    let settings: RunSettings = *run.settings();
+    let sensor: SensorModel = settings.simulation().unwrap().sensor;
     let rows = Vec::from_iter(0..sensor.scale.rows());
-    let deformation = touch.deformation(&sensor, settings.source.stroke_mm());
+    let deformation = touch.deformation(&sensor, settings.simulation().unwrap().stroke_mm());
     let mut readings = Array2::zeros((rows.len(), sensor.scale.columns()));
     let mut targets = Array2::zeros((rows.len(), sensor.scale.coordinates_per_row()));
     for &row in &rows {
@@ -69,7 +69,7 @@ fn expected(run: &Run, touch: &Touch) -> (Array2<f64>, Errors, String) {
     }
     let set = Dataset::new(readings.clone(), targets, Some(&rows), vec![0; rows.len()]).unwrap();
     let decoupled_mm = run.network().decouple(&set);
-    let errors = Errors::measure(&set, &decoupled_mm, settings.source.stroke_mm());
+    let errors = Errors::measure(&set, &decoupled_mm, settings.simulation().unwrap().stroke_mm());
     let z = decoupled_mm.indexed_iter().filter(|((_, column), _)| column % 3 == 2);
     let (low, high) = z.fold((f64::MAX, f64::MIN), |(low, high), (_, z)| (low.min(*z), high.max(*z)));
     (readings, errors, format!("z {low:.2} to {high:.2} mm"))
@@ -83,8 +83,13 @@ fn assert_shows_touch(driver: &Driver, run: &Run) {
     let mean = format!("Network, mean mm: {}", format_number(errors.z_mm));
     let worst = format!("Network, worst mm: {}", format_number(errors.worst_mm));
     assert!(driver.has(&mean) && driver.has(&worst), "{mean}: {:?}", driver.texts());
-    let settings = run.settings().simulated().unwrap();
-    let rest = settings.source.sensor.row_resistances(0, &[DVec3::ZERO; 6]).unwrap();
+    let settings = *run.settings();
+    let rest = settings
+        .simulation()
+        .unwrap()
+        .sensor
+        .row_resistances(0, &[DVec3::ZERO; 6])
+        .unwrap();
     let shown = driver.views().train.drops_percent().unwrap();
     let drop = 100.0 * (1.0 - readings[[0, 4]] / rest[4]);
     assert!((shown[[0, 4]] - drop).abs() < 1e-9, "{} {drop}", shown[[0, 4]]);
@@ -103,11 +108,11 @@ fn the_whole_window_follows_the_finger_in_the_same_frame() {
     let before = driver.get(READINGS).value();
     let (at, node) = over_a_node(&mut driver);
     push(&mut driver, at);
-    let place = small()
-        .source
-        .sensor
-        .geometry
-        .row_node_mm(small().source.sensor.scale, node / 6, node % 6);
+    let place = small().simulation().unwrap().sensor.geometry.row_node_mm(
+        small().simulation().unwrap().sensor.scale,
+        node / 6,
+        node % 6,
+    );
     let print = touch(&driver).print.unwrap();
     assert!(
         print.place_mm.distance(place.truncate()) < 1.0,

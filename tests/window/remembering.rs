@@ -3,7 +3,7 @@
 use std::{fs, path::PathBuf};
 
 use decoupler::window::Phase;
-use decoupler_core::{evaluation::SimulatedSettings, scene::Loading};
+use decoupler_core::{evaluation::RunSettings, scene::Loading};
 
 use eframe::egui::{Vec2, vec2};
 
@@ -17,10 +17,10 @@ fn file() -> (tempfile::TempDir, PathBuf) {
 }
 
 /// The paper's settings except for the loading.
-fn is_a_print(settings: &SimulatedSettings) -> bool {
+fn is_a_print(settings: &RunSettings) -> bool {
     let mut papers = *settings;
-    papers.source.scene.loading = Loading::RandomNodes;
-    papers == SimulatedSettings::default() && matches!(settings.source.scene.loading, Loading::Indenter(_))
+    papers.simulation_mut().unwrap().scene.loading = Loading::RandomNodes;
+    papers == RunSettings::default() && matches!(settings.simulation().unwrap().scene.loading, Loading::Indenter(_))
 }
 
 #[test]
@@ -56,8 +56,8 @@ fn the_file_of_version_0_1_0_is_read() {
     fs::copy(earlier, &path).unwrap();
     let driver = Driver::open_remembering(&path);
     assert_eq!(driver.state().draft.training.stopping.epochs, 1_000_000);
-    assert!(is_a_print(&SimulatedSettings {
-        training: SimulatedSettings::default().training,
+    assert!(is_a_print(&RunSettings {
+        training: RunSettings::default().training,
         ..driver.state().draft
     }));
     assert_eq!(driver.notice(), None);

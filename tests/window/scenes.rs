@@ -1,7 +1,8 @@
 //! Scenes, inputs and presets in the window, and files written before there were scenes.
 
 use decoupler_core::{
-    evaluation::{Outlook, Preset, SimulatedSettings, Simulation},
+    dataset::Simulation,
+    evaluation::{Outlook, Preset, RunSettings},
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Rows, Scene, Span},
     training::StoppingRules,
@@ -22,10 +23,12 @@ fn wait_for_scene(driver: &mut Driver) {
         let (state, draft) = (driver.state(), driver.state().draft);
         let shown = match (&state.preview, &state.run) {
             (Some(preview), _) => Some(preview.settings),
-            (None, run) => run.as_ref().and_then(|run| run.simulated()),
+            (None, run) => run.as_ref().map(|run| *run.settings()),
         };
-        shown
-            .is_some_and(|shown| (shown.source.sensor, shown.source.scene) == (draft.source.sensor, draft.source.scene))
+        shown.is_some_and(|shown| {
+            (shown.simulation().unwrap().sensor, shown.simulation().unwrap().scene)
+                == (draft.simulation().unwrap().sensor, draft.simulation().unwrap().scene)
+        })
     });
 }
 
@@ -41,7 +44,7 @@ fn known_rows_train_one_small_network_for_each_row() {
     wait_for_scene(&mut driver);
     driver.train();
     let mut settings = small();
-    settings.source.scene.rows = Rows::Known;
+    settings.simulation_mut().unwrap().scene.rows = Rows::Known;
     let run = trained(settings);
     assert_eq!(run.network().values().len(), 10);
     assert_eq!(driver.state().run.as_ref().unwrap().weights, 1560);
@@ -56,14 +59,14 @@ fn with_one_row_only_that_row_is_drawn() {
     driver.configure_small();
     driver.click_button("One");
     driver.enter("Row", "4");
-    assert_eq!(driver.state().draft.source.scene.rows, Rows::One(3));
+    assert_eq!(driver.state().draft.simulation().unwrap().scene.rows, Rows::One(3));
     assert!(driver.has("6 unknowns, 18 equations per frame"));
     wait_for_scene(&mut driver);
     assert_eq!(driver.views().train.drawn.frames.actual.nodes_mm.len(), 6);
     assert!(driver.says("1 of 100"), "a snapshot is one sample");
     driver.train();
     let mut settings = small();
-    settings.source.scene.rows = Rows::One(3);
+    settings.simulation_mut().unwrap().scene.rows = Rows::One(3);
     assert_eq!(driver.table(), table_of(&trained(settings)));
     driver.click("Show");
     for tab in ["Nodes", "Histogram", "Regression"] {
@@ -76,7 +79,7 @@ fn with_one_row_only_that_row_is_drawn() {
 
     // A smaller array has a last row too.
     driver.enter("Array scale", "2x3_2x9");
-    assert_eq!(driver.state().draft.source.scene.rows, Rows::One(1));
+    assert_eq!(driver.state().draft.simulation().unwrap().scene.rows, Rows::One(1));
     wait_for_scene(&mut driver);
     driver.settle();
 }
@@ -101,7 +104,7 @@ fn noise_inputs_and_scaling_reach_the_librarys_settings() {
         drift: 0.007,
         sets: NoisySets::Test,
     };
-    assert_eq!(draft.source.scene.noise, noise);
+    assert_eq!(draft.simulation().unwrap().scene.noise, noise);
     let inputs = InputChoice {
         quantity: Quantity::LogResistance,
         scaling: ScalingChoice::Whitening,
@@ -111,11 +114,15 @@ fn noise_inputs_and_scaling_reach_the_librarys_settings() {
         noise,
         ..Scene::default()
     };
-    let paper = SimulatedSettings::default();
+    let paper = RunSettings::default();
     assert_eq!(
         draft,
-        SimulatedSettings {
-            source: Simulation { scene, ..paper.source },
+        RunSettings {
+            source: Simulation {
+                scene,
+                ..*paper.simulation().unwrap()
+            }
+            .into(),
             inputs,
             ..paper
         },
@@ -138,8 +145,11 @@ fn a_training_with_noise_is_compared_with_the_limit_that_noise_sets() {
     wait_for_scene(&mut driver);
     driver.train();
     let mut settings = small();
-    settings.source.scene.noise = Noise::relative(0.001);
-    (settings.source.samples, settings.training.stopping.epochs) = (2000, 40);
+    settings.simulation_mut().unwrap().scene.noise = Noise::relative(0.001);
+    (
+        settings.simulation_mut().unwrap().samples,
+        settings.training.stopping.epochs,
+    ) = (2000, 40);
     settings.inputs.scaling = ScalingChoice::Whitening;
     let run = trained(settings);
     assert_eq!(driver.table(), table_of(&run));
@@ -173,13 +183,13 @@ fn only_the_settings_of_the_current_choices_are_shown() {
     driver.enter("Correlation length", "6.5");
     let correlation_length_mm = 6.5;
     assert_eq!(
-        driver.state().draft.source.scene.loading,
+        driver.state().draft.simulation().unwrap().scene.loading,
         Loading::SmoothField { correlation_length_mm }
     );
     choose(&mut driver, "Loading", "Indenter");
     shows(&driver, &["Shape", "Radius from", "Radius to", "Spread"]);
     assert_eq!(
-        driver.state().draft.source.scene.loading,
+        driver.state().draft.simulation().unwrap().scene.loading,
         Loading::Indenter(Indenter::default())
     );
     choose(&mut driver, "Shape", "Cylinder");
@@ -189,8 +199,8 @@ fn only_the_settings_of_the_current_choices_are_shown() {
     );
     driver.enter("Radius from", "8");
     driver.enter("Largest tilt", "12");
-    let Loading::Indenter(indenter) = driver.state().draft.source.scene.loading else {
-        panic!("{:?}", driver.state().draft.source.scene)
+    let Loading::Indenter(indenter) = driver.state().draft.simulation().unwrap().scene.loading else {
+        panic!("{:?}", driver.state().draft.simulation().unwrap().scene)
     };
     let (smallest, largest) = (8.0, 8.0);
     let cylinder = IndenterShape::Cylinder {
@@ -206,7 +216,7 @@ fn only_the_settings_of_the_current_choices_are_shown() {
     shows(&driver, &["Row", "Largest shift"]);
     driver.click_button("All");
     driver.click_button("z");
-    assert_eq!(driver.state().draft, SimulatedSettings::default());
+    assert_eq!(driver.state().draft, RunSettings::default());
     wait_for_scene(&mut driver);
     driver.settle();
 }
@@ -222,12 +232,18 @@ fn presets_set_how_readings_are_decoded_and_leave_the_sensor_alone() {
     let draft = driver.state().draft;
     let best = Preset::Best.settings();
     assert_eq!(
-        (draft.inputs, draft.source.samples, draft.training),
-        (best.inputs, best.source.samples, best.training)
+        (draft.inputs, draft.simulation().unwrap().samples, draft.training),
+        (best.inputs, best.simulation().unwrap().samples, best.training)
     );
-    assert_eq!((draft.source.sensor, draft.hidden), (before.source.sensor, 7));
     assert_eq!(
-        (draft.source.scene.rows, draft.source.scene.movement),
+        (draft.simulation().unwrap().sensor, draft.hidden),
+        (before.simulation().unwrap().sensor, 7)
+    );
+    assert_eq!(
+        (
+            draft.simulation().unwrap().scene.rows,
+            draft.simulation().unwrap().scene.movement
+        ),
         (Rows::Known, Movement::SIDEWAYS)
     );
 
@@ -235,8 +251,11 @@ fn presets_set_how_readings_are_decoded_and_leave_the_sensor_alone() {
     driver.click("Noise on resistance");
     driver.enter("Relative noise", "0.1");
     let noisy = Preset::Best.settings_in(Noise::relative(0.001));
-    assert_ne!(noisy.source.samples, best.source.samples);
-    assert_eq!(driver.state().draft.source.samples, noisy.source.samples);
+    assert_ne!(noisy.simulation().unwrap().samples, best.simulation().unwrap().samples);
+    assert_eq!(
+        driver.state().draft.simulation().unwrap().samples,
+        noisy.simulation().unwrap().samples
+    );
     let StoppingRules { epochs, .. } = driver.state().draft.training.stopping;
     assert_eq!(epochs, noisy.training.stopping.epochs);
     driver.enter("Relative noise", "0");
@@ -245,7 +264,7 @@ fn presets_set_how_readings_are_decoded_and_leave_the_sensor_alone() {
     // A number of samples set by the user is kept.
     driver.enter("Training samples", "300");
     driver.enter("Relative noise", "0.1");
-    assert_eq!(driver.state().draft.source.samples, 300);
+    assert_eq!(driver.state().draft.simulation().unwrap().samples, 300);
     driver.enter("Relative noise", "0");
     driver.click_button("Paper");
     assert_eq!(driver.state().draft, before);
@@ -261,8 +280,8 @@ fn scenes_that_move_sideways_report_their_condition_number() {
         let text = texts.iter().find(|text| text.starts_with("Condition number"));
         text.unwrap().clone()
     };
-    let of = |settings: &SimulatedSettings| {
-        let outlook = Outlook::of(&settings.source).unwrap();
+    let of = |settings: &RunSettings| {
+        let outlook = Outlook::of(settings.simulation().unwrap()).unwrap();
         let number = format_number(outlook.worst_row.condition());
         format!("Condition number {number}")
     };

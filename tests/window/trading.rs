@@ -124,10 +124,7 @@ fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
     assert!(driver.has("No measured decoder is this accurate."));
 
     driver.click("Load into Train view");
-    assert_eq!(
-        (driver.shown(), driver.state().draft),
-        ("Train", fastest.settings.simulated().unwrap())
-    );
+    assert_eq!((driver.shown(), driver.state().draft), ("Train", fastest.settings));
 }
 
 #[test]
@@ -139,11 +136,19 @@ fn a_click_on_a_point_loads_its_configuration() {
     assert_eq!(driver.shown(), "Train");
     let mut runs = plan.levels[0].runs.iter();
     let best = runs.find(|run| run.preset == Some(Preset::Best)).unwrap();
-    let ridge = best.setup.simulated().unwrap();
+    let ridge = *best.setup.settings();
     let draft = driver.state().draft;
     assert_eq!(
-        (draft.source.scene, draft.inputs, draft.source.samples),
-        (ridge.source.scene, ridge.inputs, ridge.source.samples)
+        (
+            draft.simulation().unwrap().scene,
+            draft.inputs,
+            draft.simulation().unwrap().samples
+        ),
+        (
+            ridge.simulation().unwrap().scene,
+            ridge.inputs,
+            ridge.simulation().unwrap().samples
+        )
     );
     driver.click_button("Trade-off");
     let (marked, level) = (

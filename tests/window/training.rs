@@ -4,7 +4,7 @@ use std::fs;
 
 use decoupler::window::{Effect, Phase};
 use decoupler_core::{
-    evaluation::{Run, SimulatedSettings},
+    evaluation::{Run, RunSettings},
     training::{Method, MomentumSettings, StopReason},
 };
 use decoupler_files::figure::surface::ViewMode;
@@ -118,7 +118,7 @@ fn every_picture_of_a_trained_network_can_be_displayed() {
 }
 
 /// A training that does not end by itself.
-pub(crate) fn endless() -> SimulatedSettings {
+pub(crate) fn endless() -> RunSettings {
     let mut settings = small();
     settings.training.method = Method::Momentum(MomentumSettings::default());
     settings.training.stopping.epochs = 1_000_000;
@@ -200,7 +200,7 @@ fn stopping_a_training_being_prepared_takes_effect_at_once_and_the_previous_one_
         assert_eq!(driver.state().phase, before);
         // So many that the training cannot have begun before it is stopped.
         let mut many = small();
-        many.source.samples = 200_000;
+        many.simulation_mut().unwrap().samples = 200_000;
         driver.window_mut().apply(Effect::Configure(Box::new(many)));
         driver.window_mut().apply(Effect::Train);
         assert_eq!(driver.state().phase, Phase::Preparing);

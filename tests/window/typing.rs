@@ -1,6 +1,6 @@
 //! Typing numbers: with units, and with invalid ones rejected in place.
 
-use decoupler_core::{evaluation::SimulatedSettings, sensor::ArrayScale};
+use decoupler_core::{dataset::Simulation, sensor::ArrayScale};
 use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
@@ -10,13 +10,25 @@ use crate::driver::Driver;
 fn values_are_accepted_with_their_units() {
     let mut driver = Driver::open();
     driver.enter("Height", "0.6 cm");
-    assert_eq!(driver.state().draft.source.sensor.geometry.height_mm, 6.0);
+    assert_eq!(
+        driver.state().draft.simulation().unwrap().sensor.geometry.height_mm,
+        6.0
+    );
     driver.enter("Row pitch", "1500um");
-    assert_eq!(driver.state().draft.source.sensor.geometry.row_pitch_mm, 1.5);
+    assert_eq!(
+        driver.state().draft.simulation().unwrap().sensor.geometry.row_pitch_mm,
+        1.5
+    );
     driver.enter("Largest compression", "15%");
-    assert_eq!(driver.state().draft.source.scene.largest_compression, 0.15);
+    assert_eq!(
+        driver.state().draft.simulation().unwrap().scene.largest_compression,
+        0.15
+    );
     driver.enter("Resistivity", "2 kohm/mm");
-    assert_eq!(driver.state().draft.source.sensor.resistivity_ohm_per_mm, 2000.0);
+    assert_eq!(
+        driver.state().draft.simulation().unwrap().sensor.resistivity_ohm_per_mm,
+        2000.0
+    );
     driver.enter("Smallest gradient", "1e-9");
     assert_eq!(driver.state().draft.training.stopping.min_gradient, 1e-9);
 }
@@ -59,14 +71,17 @@ fn a_notice_above_a_field_does_not_interrupt_typing() {
     driver.type_into("Training samples", "300");
     // The notes on this scene appear above the field during typing.
     driver.wait("the scene's outlook", |driver| {
-        let (preview, draft) = (driver.state().preview.as_ref(), &driver.state().draft.source);
+        let (preview, draft) = (
+            driver.state().preview.as_ref(),
+            driver.state().draft.simulation().unwrap(),
+        );
         preview.is_some_and(|preview| {
-            let source = &preview.settings.source;
+            let source = preview.settings.simulation().unwrap();
             (source.sensor, source.scene) == (draft.sensor, draft.scene) && preview.test.outlook.is_some()
         })
     });
     driver.press(Key::Enter);
-    assert_eq!(driver.state().draft.source.samples, 300);
+    assert_eq!(driver.state().draft.simulation().unwrap().samples, 300);
 }
 
 #[test]
@@ -149,7 +164,7 @@ fn a_double_click_sets_every_slider_to_its_default_value() {
     assert_eq!(driver.views().train.press.finger.depth_share, 0.8);
 
     driver.act("Show Identifiability");
-    let usual = SimulatedSettings::default().source;
+    let usual = Simulation::default();
     for (field, typed) in [
         ("Height", "7"),
         ("Node pitch", "3"),

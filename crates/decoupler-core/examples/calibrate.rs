@@ -6,8 +6,8 @@ use std::error::Error;
 
 use decoupler_core::{
     calibration::{Calibration, ParameterStatus, SensorParameter},
-    dataset::{Dataset, Division, Seed, Stream},
-    evaluation::{Errors, Preset, Run, SimulatedSettings, fine_tune, pressed_rows, rebased},
+    dataset::{Dataset, Division, Seed, Simulation, Stream},
+    evaluation::{Errors, Preset, Run, RunSettings, fine_tune, pressed_rows, rebased},
     job::Job,
     machine::MemoryBudget,
     network::Networks,
@@ -16,22 +16,26 @@ use decoupler_core::{
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut settings = Preset::Best.settings();
-    settings.source.sensor.scale = "10x6_3x18".parse()?;
-    settings.source.scene.loading = Loading::SmoothField {
+    let mut source = Preset::Best.simulation_in(Noise::default());
+    source.sensor.scale = "10x6_3x18".parse()?;
+    source.scene.loading = Loading::SmoothField {
         correlation_length_mm: 4.0,
     };
-    settings.source.scene.noise = Noise::relative(1e-3);
-    settings.source.samples = 4000;
+    source.scene.noise = Noise::relative(1e-3);
+    source.samples = 4000;
+    let mut settings = RunSettings {
+        source: source.into(),
+        ..Preset::Best.settings()
+    };
     settings.training.stopping.epochs = 60;
-    let nominal = settings.source.sensor;
+    let nominal = source.sensor;
     // In place of a recording: 60 frames of a sensor that differs from the drawing, with known presses.
     let mut real = nominal;
     real.geometry.height_mm *= 1.05;
     real.geometry.node_pitch_mm *= 0.95;
     real.geometry.column_node_x0_mm *= 1.05;
     let recorded = |snapshots: usize, seed: u64| -> Result<Dataset, Box<dyn Error>> {
-        let scene = settings.source.scene;
+        let scene = source.scene;
         let mut set = Dataset::simulate(&real, &scene, 10 * snapshots, &mut Seed(seed).rng(Stream::Training))?;
         set.disturb(&real, &scene.noise, &mut Seed(seed).rng(Stream::TrainingNoise))?;
         Ok(rebased(&set, &real, &nominal)?) // Only displacements are known, not the true positions.
@@ -44,7 +48,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     println!("{}", coverage(&nominal, &real, recorded)?);
     let before = train(settings)?;
-    settings.source.sensor = calibration.model;
+    settings.source = Simulation {
+        sensor: calibration.model,
+        ..source
+    }
+    .into();
     let calibrated = train(settings)?;
     let moved = |set: &Dataset| rebased(set, &nominal, &calibration.model);
     let division = Division {
@@ -59,7 +67,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         MemoryBudget::UNLIMITED,
         &Job::UNINTERRUPTED,
     )?;
-    let (stroke_mm, after) = (settings.source.stroke_mm(), moved(&test)?);
+    let (stroke_mm, after) = (source.scene.stroke_mm(&calibration.model.geometry), moved(&test)?);
     let z_mm = |set: &Dataset, networks: &Networks| Errors::measure(set, &networks.decouple(set), stroke_mm).z_mm;
     println!("Z error, nominal geometry:  {:.4} mm", z_mm(&test, &before));
     println!("Z error, calibrated:        {:.4} mm", z_mm(&after, &calibrated));
@@ -98,7 +106,7 @@ fn coverage(
     ))
 }
 
-fn train(settings: SimulatedSettings) -> Result<Networks, Box<dyn Error>> {
+fn train(settings: RunSettings) -> Result<Networks, Box<dyn Error>> {
     let mut run = Run::prepare(settings)?;
     while run.step().is_none() {}
     Ok(run.network())

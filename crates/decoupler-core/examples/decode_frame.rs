@@ -6,12 +6,17 @@ use std::error::Error;
 
 use decoupler_core::{
     decoupling::{Decoder, NewtonDecoder, Precision, ProgramDecoder},
-    evaluation::{Preset, Run},
+    evaluation::{Preset, Run, RunSettings},
+    scene::Noise,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut settings = Preset::Best.settings();
-    settings.source.sensor.scale = "10x6_3x18".parse()?;
+    let mut source = Preset::Best.simulation_in(Noise::default());
+    source.sensor.scale = "10x6_3x18".parse()?;
+    let mut settings = RunSettings {
+        source: source.into(),
+        ..Preset::Best.settings()
+    };
     settings.training.stopping.epochs = 100;
     let mut run = Run::prepare(settings)?;
     while run.step().is_none() {}
@@ -20,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut network = ProgramDecoder::new(run.network().program(Precision::Single));
     network.decode(frames.frame(0), &mut coordinates_mm)?;
     println!("network: node 1 of row-wire 1 is at z = {:.6} mm", coordinates_mm[2]);
-    let (source, rows) = (settings.source, Vec::from_iter(0..frames.rows()));
+    let rows = Vec::from_iter(0..frames.rows());
     let mut newton = NewtonDecoder::new(&source.sensor, &source.scene, &rows)?;
     newton.decode(frames.frame(0), &mut coordinates_mm)?;
     println!("Newton:  node 1 of row-wire 1 is at z = {:.6} mm", coordinates_mm[2]);

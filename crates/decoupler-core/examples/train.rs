@@ -1,11 +1,15 @@
 //! Trains a network for a simulated array and prints its errors: `cargo run --release --example train`.
 #![expect(clippy::print_stdout, reason = "an example's result is what it prints")]
 
-use decoupler_core::evaluation::{ErrorTable, Run, RunError, SimulatedSettings};
+use decoupler_core::{
+    dataset::Simulation,
+    evaluation::{ErrorTable, Run, RunError, RunSettings},
+};
 
 fn main() -> Result<(), RunError> {
-    let mut settings = SimulatedSettings::default();
-    settings.source.sensor.scale = "10x6_3x18".parse().expect("an array scale of the paper");
+    let mut simulation = Simulation::default();
+    simulation.sensor.scale = "10x6_3x18".parse().expect("an array scale of the paper");
+    let mut settings = RunSettings::from(simulation);
     settings.training.stopping.epochs = 100;
     let mut run = Run::prepare(settings)?;
     let reason = loop {

@@ -20,6 +20,7 @@
 //! | [`training`] | methods, the stepped [`training::Trainer`], stop reasons |
 //! | [`decoupling`] | readings to deformation by every decoder, behind one trait |
 //! | [`surface`] | smooth surfaces through the nodes |
+//! | [`problem`] | names and units of readings and targets, and what else is known: positions, memory, sensor |
 //! | [`evaluation`] | errors, a whole run from settings to report, cross-validation, experiments |
 //! | [`live`] | arithmetic on frames as they arrive: re-zero, drift, faults named from the residual |
 //!
@@ -87,10 +88,11 @@
 //! A **training** is a value that is stepped one epoch at a time; pausing only means not calling `step`.
 //!
 //! ```
-//! use decoupler_core::{evaluation::{Run, SimulatedSettings}, job::Job};
+//! use decoupler_core::{dataset::Simulation, evaluation::{Run, RunSettings}, job::Job};
 //!
-//! let mut settings = SimulatedSettings::default(); // The paper's main experiment,
-//! settings.source.sensor.scale = "10x6_3x18".parse()?; // on its smallest array,
+//! let mut simulation = Simulation::default(); // The paper's main experiment,
+//! simulation.sensor.scale = "10x6_3x18".parse()?; // on its smallest array,
+//! let mut settings = RunSettings::from(simulation);
 //! settings.training.stopping.epochs = 20; // cut short.
 //! let mut run = Run::prepare(settings)?;
 //! run.finish(&Job::UNINTERRUPTED)?;
@@ -108,10 +110,10 @@
 //!     evaluation::Preset,
 //! };
 //!
-//! let mut settings = Preset::Best.settings(); // Known rows.
-//! settings.source.sensor.scale = "10x6_3x18".parse()?;
-//! let source = settings.source;
-//! let test = source.draw_test(settings.seed)?;
+//! let mut source = Simulation::default();
+//! source.sensor.scale = "10x6_3x18".parse()?;
+//! source.scene.rows = Rows::Known;
+//! let test = source.draw_test(Seed::default())?;
 //! let frames = test.frames()?;
 //! let rows = Vec::from_iter(0..frames.rows());
 //! let mut newton = NewtonDecoder::new(&source.sensor, &source.scene, &rows)?;
@@ -134,6 +136,7 @@ pub mod live;
 pub mod machine;
 pub mod network;
 mod numerics;
+pub mod problem;
 pub mod scene;
 pub mod sensor;
 pub mod settings;

@@ -6,9 +6,9 @@
 use std::error::Error;
 
 use decoupler_core::{
-    dataset::{Seed, Stream},
+    dataset::{Seed, Simulation, Stream},
     decoupling::Decoder,
-    evaluation::{Preset, Run, SimulatedSettings},
+    evaluation::{Preset, Run, RunSettings},
     live::{FaultEvent, FaultyWire, LeftOutDecoder, WireCheck, equation_decoder},
     rand::{Rng, RngExt},
     scene::{ConverterEnd, Fault, Indenter, Loading, Noise},
@@ -36,10 +36,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let argument = |index: usize, default: &str| arguments.get(index).map_or(default, String::as_str).to_owned();
     let (faults, frames_without_fault): (usize, usize) = (argument(0, "12").parse()?, argument(1, "500").parse()?);
-    let mut settings = Preset::Best.settings_in(Noise::relative(1e-3));
-    settings.source.sensor.scale = argument(2, "10x10_5x30").parse()?;
-    settings.source.scene.loading = Loading::Indenter(Indenter::default());
-    (settings.source.samples, settings.source.validation_samples) = (5000, 1000);
+    let noise = Noise::relative(1e-3);
+    let mut source = Preset::Best.simulation_in(noise);
+    source.sensor.scale = argument(2, "10x10_5x30").parse()?;
+    source.scene.loading = Loading::Indenter(Indenter::default());
+    (source.samples, source.validation_samples) = (5000, 1000);
+    let mut settings = RunSettings {
+        source: source.into(),
+        ..Preset::Best.settings_in(noise)
+    };
     settings.training.stopping.epochs = 50;
     let mut run = Run::prepare(settings)?;
     while run.step().is_none() {}
@@ -48,9 +53,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut rng = Seed(1).rng(Stream::Live);
     for trial in 0..faults {
         let kind = trial % KINDS.len();
-        let (fault, wire) = draw(kind, settings.source.sensor.scale, &mut rng);
+        let (fault, wire) = draw(kind, source.sensor.scale, &mut rng);
         examine(
-            &settings,
+            &source,
             Seed(trial as u64),
             fault,
             wire,
@@ -71,7 +76,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let right: usize = tallies.iter().map(|tally| tally.right).sum();
     println!("right wire named: {right} of {faults}");
-    let alarms = false_alarms(&settings, frames_without_fault)?;
+    let alarms = false_alarms(&source, frames_without_fault)?;
     println!("false alarms: {alarms} in {frames_without_fault} frames without a fault");
     Ok(())
 }
@@ -111,14 +116,14 @@ fn draw(kind: usize, scale: ArrayScale, rng: &mut impl Rng) -> (Fault, FaultyWir
 
 /// Runs the source with the fault until it is named, and decodes frames with and without the wire.
 fn examine(
-    settings: &SimulatedSettings,
+    simulation: &Simulation,
     seed: Seed,
     fault: Fault,
     wire: FaultyWire,
     network: &mut dyn Decoder,
     tally: &mut Tally,
 ) -> Result<(), Box<dyn Error>> {
-    let (sensor, scene) = (&settings.source.sensor, &settings.source.scene);
+    let Simulation { sensor, scene, .. } = simulation;
     let mut intact = Simulated::new(sensor, scene, seed, 10.0)?;
     let mut source = Simulated::new(sensor, scene, seed, 10.0)?;
     source.set_fault(Some(fault))?;
@@ -172,8 +177,8 @@ fn examine(
 }
 
 /// Number of events of the check in frames without a fault.
-fn false_alarms(settings: &SimulatedSettings, frames: usize) -> Result<usize, Box<dyn Error>> {
-    let (sensor, scene) = (&settings.source.sensor, &settings.source.scene);
+fn false_alarms(simulation: &Simulation, frames: usize) -> Result<usize, Box<dyn Error>> {
+    let Simulation { sensor, scene, .. } = simulation;
     let mut source = Simulated::new(sensor, scene, Seed(12345), 100.0)?;
     let mut check = WireCheck::new(sensor, scene, source.rows())?;
     let mut frame_ohm = vec![0.0; source.readings()];

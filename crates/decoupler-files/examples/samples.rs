@@ -5,8 +5,8 @@
 use std::{error::Error, fmt::Write as _, fs, path::PathBuf};
 
 use decoupler_core::{
-    dataset::Seed,
-    evaluation::{Run, Simulation, ready_settings},
+    dataset::{Seed, Simulation},
+    evaluation::{Run, ready_settings},
     scene::Noise,
 };
 use decoupler_files::{
@@ -31,8 +31,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut source = Simulation::default();
     source.sensor.scale = "10x6_3x18".parse()?;
     let mut settings = ready_settings(&source).ok_or("the array is too large")?;
-    settings.source.scene.noise = Noise::relative(NOISE);
-    (settings.source.samples, settings.source.test_samples) = (4000, 200);
+    if let Some(simulation) = settings.simulation_mut() {
+        simulation.scene.noise = Noise::relative(NOISE);
+        (simulation.samples, simulation.test_samples) = (4000, 200);
+    }
     settings.hidden = 8;
     settings.training.stopping.epochs = 60;
     let mut run = Run::prepare(settings)?;
@@ -44,8 +46,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         file.scores.network.percent().unwrap_or(f64::NAN)
     );
 
-    let columns = settings.source.sensor.scale.columns();
-    let (sensor, scene) = (&settings.source.sensor, &settings.source.scene);
+    let Simulation { sensor, scene, .. } = settings.drawn()?;
+    let columns = sensor.scale.columns();
     let mut source = Simulated::new(sensor, scene, Seed(0), FRAMES_PER_SECOND)?;
     let mut frame_ohm = vec![0.0; source.readings()];
     let mut recording = Vec::new();

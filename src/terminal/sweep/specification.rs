@@ -434,7 +434,7 @@ mod tests {
         let mut train = TrainOptions::new();
         let defaults = {
             let arguments = train.parse(&[]).unwrap().training;
-            train_options(&arguments.settings().unwrap().into(), &arguments.scene.decoders())
+            train_options(&arguments.settings().unwrap(), &arguments.scene.decoders())
         };
         for (option, value, with) in cases {
             let words: Vec<_> = [format!("--{option}={value}"), with.to_owned()].into();
@@ -444,7 +444,7 @@ mod tests {
                 arguments.settings().unwrap(),
                 decoders_in_order(&arguments.scene.decoders()),
             );
-            let options = train_options(&settings.into(), &decoders);
+            let options = train_options(&settings, &decoders);
             assert_ne!(options, defaults, "{option}");
             let back = read_back(&options);
             assert_eq!(back.settings().unwrap(), settings, "{option}");

@@ -10,7 +10,7 @@ use std::{
 use clap::ValueEnum;
 use decoupler_core::{
     decoupling::DecoderKind,
-    evaluation::{Begin, Run, Workload},
+    evaluation::{Begin, Run, TrainingSize, Workload},
     job::Job,
 };
 use decoupler_files::{
@@ -94,9 +94,9 @@ impl Trials {
         let words = self.specification.words_at(position);
         let arguments = train.parse(words).map_err(Failure::Arguments)?;
         let setup = arguments.setup(self.specification.recording.as_ref())?;
-        if let Some(settings) = setup.simulated() {
+        if setup.plan().is_none() {
             // The array has the rows of the scene.
-            Workload::of(&settings)?;
+            TrainingSize::drawn(setup.settings())?;
         }
         let decoders = decoders_in_order(&arguments.decoders(&setup));
         let mut options = train_options(setup.settings(), &decoders);
@@ -181,8 +181,9 @@ pub(super) fn train(
     is_stopped: impl Fn() -> bool,
 ) -> Result<Option<Trial>, Failure> {
     let begun = Instant::now();
-    if let Some(settings) = trial.setup.simulated() {
-        let mut workload = Workload::of(&settings)?;
+    if trial.setup.plan().is_none() {
+        let settings = trial.setup.settings();
+        let mut workload = Workload::of(settings, TrainingSize::drawn(settings)?);
         workload.bytes = workload.bytes.saturating_mul(parallel as u64);
         workload.check_memory(memory_budget())?;
     }
@@ -392,10 +393,8 @@ mod tests {
     #[test]
     fn an_experiment_of_the_window_is_specified_trial_by_trial() {
         let mut template = PaperTable::HiddenNodes.experiment();
-        let mut base = template.base.simulated().unwrap();
-        base.source.scene.noise = Noise::relative(1e-3);
-        base.seed = Seed(7);
-        template.base = base.into();
+        template.base.simulation_mut().unwrap().scene.noise = Noise::relative(1e-3);
+        template.base.seed = Seed(7);
         let experiments = [
             (
                 Axis::integers(AxisKind::Hidden, [3, 5]),
@@ -442,9 +441,7 @@ mod tests {
         let folds = sweep_specification(&PaperTable::CrossValidation.experiment(), None);
         assert!(folds.unwrap_err().to_string().contains("no cross-validation"));
         let mut squeezed = PaperTable::HiddenNodes.experiment();
-        let mut base = squeezed.base.simulated().unwrap();
-        base.source.scene.largest_compression = 0.3;
-        squeezed.base = base.into();
+        squeezed.base.simulation_mut().unwrap().scene.largest_compression = 0.3;
         let message = sweep_specification(&squeezed, None).unwrap_err().to_string();
         assert!(message.contains("the largest compression"), "{message}");
     }

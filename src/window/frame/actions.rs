@@ -1,4 +1,4 @@
-use decoupler_core::evaluation::SimulatedSettings;
+use decoupler_core::evaluation::RunSettings;
 use eframe::egui::{
     Align, Button, Context, Frame, Id, Key, Layout, Margin, Modal, Modifiers, RichText, ScrollArea, TextEdit, Ui,
     WidgetInfo, accesskit::Role, util::undoer::Undoer, vec2,
@@ -150,7 +150,7 @@ impl DecouplerWindow {
 }
 
 /// Everything that the user sets for the next training.
-type Drafts = (SourceKind, SimulatedSettings, RecordingDraft);
+type Drafts = (SourceKind, RunSettings, RecordingDraft);
 
 fn drafts(shared: &Shared) -> Drafts {
     (shared.source, shared.draft, shared.recording.clone())

@@ -16,7 +16,7 @@ use crate::window::{
     training_worker::{Inspection, LOST, Request},
     views::CHECKPOINT,
 };
-use decoupler_core::evaluation::{RunSettings, SimulatedSettings};
+use decoupler_core::{dataset::Simulation, evaluation::RunSettings};
 use decoupler_files::{figure::SequentialMap, import::Setup};
 
 impl DecouplerWindow {
@@ -313,7 +313,7 @@ impl DecouplerWindow {
     }
 
     /// Takes new settings; if they change the test set, shows that of the new ones.
-    pub(super) fn configure(&mut self, draft: SimulatedSettings) {
+    pub(super) fn configure(&mut self, draft: RunSettings) {
         let before = std::mem::replace(&mut self.shared.draft, draft);
         self.notices.settle(Matter::Preview);
         if is_within_limits(&draft) {
@@ -339,12 +339,12 @@ impl DecouplerWindow {
 
     /// Uses the setup of another run for the next training.
     pub(super) fn take_setup(&mut self, setup: &Setup) {
-        match (setup.simulated(), setup.plan()) {
-            (Some(settings), _) => {
+        match setup.plan() {
+            None => {
                 self.shared.source = SourceKind::Array;
-                self.configure(settings);
+                self.configure(*setup.settings());
             }
-            (None, Some(plan)) => {
+            Some(plan) => {
                 self.shared.source = SourceKind::Recording;
                 let plan = plan.absolute();
                 self.views.open_plan(&plan);
@@ -354,7 +354,6 @@ impl DecouplerWindow {
                     plan: Ok(Arc::new(plan)),
                 };
             }
-            (None, None) => {}
         }
     }
 
@@ -373,26 +372,29 @@ impl DecouplerWindow {
 }
 
 /// Returns true if `run` is on a simulated array with the test set of these settings.
-pub(super) fn is_of_test_set(run: &RunView, settings: &SimulatedSettings) -> bool {
-    run.simulated()
-        .is_some_and(|of_run| have_same_test_set(&of_run, settings))
+pub(super) fn is_of_test_set(run: &RunView, settings: &RunSettings) -> bool {
+    have_same_test_set(run.settings(), settings)
 }
 
 /// Returns true if both draw the same test set.
-pub(super) fn have_same_test_set(a: &SimulatedSettings, b: &SimulatedSettings) -> bool {
-    let test_set = |settings: &SimulatedSettings| {
-        (
-            settings.source.sensor,
-            settings.source.scene,
-            settings.source.test_samples,
-            settings.seed,
-        )
+pub(super) fn have_same_test_set(a: &RunSettings, b: &RunSettings) -> bool {
+    let test_set = |settings: &RunSettings| {
+        let Simulation {
+            sensor,
+            scene,
+            test_samples,
+            ..
+        } = *settings.simulation()?;
+        Some((sensor, scene, test_samples, settings.seed))
     };
-    test_set(a) == test_set(b)
+    test_set(a).is_some() && test_set(a) == test_set(b)
 }
 
 /// Returns true if both draw the same samples, trained on or not.
-pub(super) fn have_same_sets(a: &SimulatedSettings, b: &SimulatedSettings) -> bool {
-    let samples = |settings: &SimulatedSettings| (settings.source.samples, settings.source.validation_samples);
+pub(super) fn have_same_sets(a: &RunSettings, b: &RunSettings) -> bool {
+    let samples = |settings: &RunSettings| {
+        let simulation = settings.simulation()?;
+        Some((simulation.samples, simulation.validation_samples))
+    };
     have_same_test_set(a, b) && samples(a) == samples(b)
 }

@@ -113,12 +113,13 @@ fn a_press_on_a_large_array_is_answered_again_after_a_panic() {
     let mut driver = Driver::open();
     let mut settings = small();
     // Answers of smaller arrays need no job.
-    settings.source.sensor.scale = "100x60_3x180".parse().unwrap();
-    (settings.source.samples, settings.source.test_samples) = (2, 1);
+    settings.simulation_mut().unwrap().sensor.scale = "100x60_3x180".parse().unwrap();
+    let simulation = settings.simulation_mut().unwrap();
+    (simulation.samples, simulation.test_samples) = (2, 1);
     driver.window_mut().apply(Effect::Configure(Box::new(settings)));
     driver.wait("the surface", |driver| {
         let test = driver.state().test();
-        test.is_some_and(|test| test.sensor == settings.source.sensor)
+        test.is_some_and(|test| test.sensor == settings.simulation().unwrap().sensor)
     });
     panics(&mut driver, "press", |driver| {
         driver.act("Press the middle of the surface");

@@ -4,14 +4,18 @@ use std::{
     time::Duration,
 };
 
-use decoupler_core::evaluation::{RunSettings, SimulatedSettings, Workload};
+use decoupler_core::{
+    dataset::Simulation,
+    evaluation::{RunSettings, TrainingSize, Workload},
+};
 use decoupler_files::{
     export::{WriteError, atomic_write},
     figure::SequentialMap,
     import::Plan,
     machine::{memory_budget, system_cause},
 };
-use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::DeserializeOwned, ser::Error as _};
+use serde_json::{Value, json};
 
 use super::DecouplerWindow;
 use crate::window::{
@@ -43,9 +47,9 @@ pub(super) struct Remembered {
     /// The name of the current view.
     #[serde(deserialize_with = "if_readable")]
     pub(super) view: Option<String>,
-    /// The settings of the next training.
-    #[serde(deserialize_with = "if_readable")]
-    pub(super) draft: Option<SimulatedSettings>,
+    /// The settings of the next training on a simulated array.
+    #[serde(serialize_with = "write_draft", deserialize_with = "read_draft")]
+    pub(super) draft: Option<RunSettings>,
     /// Source of the next training.
     #[serde(deserialize_with = "if_readable")]
     pub(super) source: Option<SourceKind>,
@@ -144,17 +148,39 @@ impl Remembered {
 
 /// Returns the value, or none if it cannot be read as what this program writes.
 fn if_readable<'de, D: Deserializer<'de>, T: DeserializeOwned>(deserializer: D) -> Result<Option<T>, D::Error> {
-    let value = serde_json::Value::deserialize(deserializer)?;
+    let value = Value::deserialize(deserializer)?;
+    Ok(serde_json::from_value(value).ok())
+}
+
+/// Writes the settings of an array with its simulation in the place of the source, as every version has written them.
+fn write_draft<S: Serializer>(draft: &Option<RunSettings>, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut value = serde_json::to_value(draft).map_err(S::Error::custom)?;
+    if let Some(source) = value.get_mut("source") {
+        *source = source["simulated"].take();
+    }
+    value.serialize(serializer)
+}
+
+/// Reads what [`write_draft`] writes; none if it cannot be read.
+fn read_draft<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<RunSettings>, D::Error> {
+    let mut value = Value::deserialize(deserializer)?;
+    if let Some(source) = value.get_mut("source") {
+        *source = json!({ "simulated": source.take() });
+    }
     Ok(serde_json::from_value(value).ok())
 }
 
 /// Returns `true` if the settings could be trained with on this machine.
-pub(super) fn is_within_limits(settings: &SimulatedSettings) -> bool {
+pub(super) fn is_within_limits(settings: &RunSettings) -> bool {
+    let Some(Simulation { sensor, scene, .. }) = settings.simulation() else {
+        return false;
+    };
     settings.check_counts().is_ok()
         && settings.training.check().is_ok()
-        && settings.source.sensor.check().is_ok()
-        && settings.source.scene.check().is_ok()
-        && Workload::of(settings).is_ok_and(|workload| workload.check_memory(memory_budget()).is_ok())
+        && sensor.check().is_ok()
+        && scene.check().is_ok()
+        && TrainingSize::drawn(settings)
+            .is_ok_and(|size| Workload::of(settings, size).check_memory(memory_budget()).is_ok())
 }
 
 /// Longest time that closing waits for the file.
@@ -273,8 +299,8 @@ mod tests {
     fn the_file_is_read_back_bit_by_bit() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("not yet there").join("window.json");
-        let mut draft = SimulatedSettings::default();
-        draft.source.scene.largest_compression = 0.1 + 0.2;
+        let mut draft = RunSettings::default();
+        draft.simulation_mut().unwrap().scene.largest_compression = 0.1 + 0.2;
         let mut written = Remembered {
             is_dark: Some(false),
             view: Some("Compare".to_owned()),
@@ -302,16 +328,16 @@ mod tests {
 
     #[test]
     fn settings_outside_the_limits_are_dropped() {
-        let change: [fn(&mut SimulatedSettings); 6] = [
+        let change: [fn(&mut RunSettings); 6] = [
             |draft| draft.hidden = 0,
-            |draft| draft.source.samples = usize::MAX,
-            |draft| draft.source.test_samples = 0,
-            |draft| draft.source.scene.largest_compression = 2.0,
+            |draft| draft.simulation_mut().unwrap().samples = usize::MAX,
+            |draft| draft.simulation_mut().unwrap().test_samples = 0,
+            |draft| draft.simulation_mut().unwrap().scene.largest_compression = 2.0,
             |draft| draft.training.stopping.goal_mse = f64::NAN,
-            |draft| draft.source.sensor.geometry.height_mm = -1.0,
+            |draft| draft.simulation_mut().unwrap().sensor.geometry.height_mm = -1.0,
         ];
         for (number, change) in change.into_iter().enumerate() {
-            let mut draft = SimulatedSettings::default();
+            let mut draft = RunSettings::default();
             change(&mut draft);
             let text = serde_json::to_string(&Remembered {
                 draft: Some(draft),

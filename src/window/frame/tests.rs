@@ -41,8 +41,12 @@ impl Opened {
         let mut window = Self::new();
         window.wait(|window| window.shared.test().is_some());
         let mut small = window.shared.draft;
-        small.source.sensor.scale = "4x4_2x12".parse().unwrap();
-        (small.hidden, small.source.samples, small.training.stopping.epochs) = (3, 40, 5);
+        small.simulation_mut().unwrap().sensor.scale = "4x4_2x12".parse().unwrap();
+        (
+            small.hidden,
+            small.simulation_mut().unwrap().samples,
+            small.training.stopping.epochs,
+        ) = (3, 40, 5);
         window.apply(Effect::Configure(Box::new(small)));
         window.apply(Effect::Train);
         window.wait(|window| matches!(window.shared.phase, Phase::Ended(_)));
@@ -207,7 +211,7 @@ fn a_training_that_cannot_begin_leaves_the_settings_own_test_set_on_show() {
     let mut window = Opened::new();
     window.wait(|window| window.shared.test().is_some());
     let mut impossible = window.shared.draft;
-    impossible.source.sensor.scale = "4x4_2x12".parse().unwrap();
+    impossible.simulation_mut().unwrap().sensor.scale = "4x4_2x12".parse().unwrap();
     impossible.training.stopping.goal_mse = f64::NAN;
     window.apply(Effect::Configure(Box::new(impossible)));
     // Before the new test set is there.
@@ -217,7 +221,7 @@ fn a_training_that_cannot_begin_leaves_the_settings_own_test_set_on_show() {
         window
             .shared
             .test()
-            .is_some_and(|test| test.sensor == impossible.source.sensor)
+            .is_some_and(|test| test.sensor == impossible.simulation().unwrap().sensor)
     });
 }
 

@@ -11,7 +11,7 @@ use decoupler_core::{
     dataset::SplitBy,
     decoupling::DecoderKind,
     evaluation::{
-        CrossValidation, Preset, Run, RunSets, SimulatedSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint,
+        CrossValidation, Preset, Run, RunSets, RunSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint,
         experiments::{Axis, AxisKind, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments},
         measure_trade_off,
     },
@@ -117,11 +117,14 @@ fn same(name: &str, figure: impl Into<Figure>) -> Seen {
     screen
 }
 
-fn small(preset: Preset) -> SimulatedSettings {
+fn small(preset: Preset) -> RunSettings {
     let mut settings = preset.settings();
-    settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
-    (settings.source.samples, settings.source.validation_samples) = (80, 20);
-    (settings.source.test_samples, settings.hidden) = (20, 3);
+    settings.simulation_mut().unwrap().sensor.scale = "4x4_2x12".parse().unwrap();
+    (
+        settings.simulation_mut().unwrap().samples,
+        settings.simulation_mut().unwrap().validation_samples,
+    ) = (80, 20);
+    (settings.simulation_mut().unwrap().test_samples, settings.hidden) = (20, 3);
     settings.training.stopping.epochs = 30;
     settings
 }
@@ -215,7 +218,7 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
                 ..point.unwrap()
             });
         };
-        measure_trade_off(&settings.into(), &sets, &[3], &kinds, &Job::UNINTERRUPTED, on_point).unwrap();
+        measure_trade_off(&settings, &sets, &[3], &kinds, &Job::UNINTERRUPTED, on_point).unwrap();
     }
     let level = TradeOffLevel {
         noise: Some(0.0),
@@ -231,7 +234,7 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
     }
     let settings = small(Preset::Paper);
     let pressed = [glam::DVec3::Z * 0.3; 4];
-    let row = |row| Identifiability::of_row(&settings.source.sensor, row, &pressed, Axes::Z).unwrap();
+    let row = |row| Identifiability::of_row(&settings.simulation().unwrap().sensor, row, &pressed, Axes::Z).unwrap();
     let rows: Vec<_> = (0..4).map(row).collect();
     let singular_values = same("singular values", singular_values_figure(&rows, 2, 0.01));
     assert_eq!(singular_values.circles, rows[2].unknowns() + 1);

@@ -23,7 +23,7 @@ pub use network_exports::{
 pub use offers::{Action, FileInUse, Offers, refuse_in_use};
 pub use run_list::{LoadedRun, PLACES, RunList, RunsWorker};
 pub use run_view::{RunCommand, RunView, run_buttons_ui, sentence};
-pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_settings};
+pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_scene};
 pub use training_form::{Effect, Matter, Notice, combination_name, method_choice_ui, method_settings_ui, stopping_ui};
 pub use view::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
 

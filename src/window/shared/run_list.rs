@@ -300,18 +300,21 @@ mod tests {
         time::Duration,
     };
 
-    use decoupler_core::evaluation::{Run, SimulatedSettings};
+    use decoupler_core::evaluation::{Run, RunSettings};
     use decoupler_files::export::NetworkFile;
 
     use super::*;
 
     fn small_run() -> NetworkFile {
-        let mut settings = SimulatedSettings {
+        let mut settings = RunSettings {
             hidden: 2,
-            ..SimulatedSettings::default()
+            ..RunSettings::default()
         };
-        settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
-        (settings.source.samples, settings.source.test_samples) = (40, 8);
+        settings.simulation_mut().unwrap().sensor.scale = "4x4_2x12".parse().unwrap();
+        (
+            settings.simulation_mut().unwrap().samples,
+            settings.simulation_mut().unwrap().test_samples,
+        ) = (40, 8);
         settings.training.stopping.epochs = 2;
         let mut run = Run::prepare(settings).unwrap();
         while run.step().is_none() {}

@@ -2,9 +2,10 @@ use std::{sync::Arc, time::Duration};
 
 use decoupler_core::{
     evaluation::{
-        Baselines, ErrorTable, PastNetworks, Problem, PublishedErrors, RunSettings, Scores, SimulatedSettings,
-        StartRecord, TestErrors, auto::AutoRecord,
+        Baselines, ErrorTable, PastNetworks, PublishedErrors, RunSettings, Scores, StartRecord, TestErrors,
+        auto::AutoRecord,
     },
+    problem::Problem,
     text::capitalised,
     training::{EpochRecord, Stage, StopReason},
 };
@@ -78,7 +79,7 @@ impl RunView {
         } = began;
         Self {
             id,
-            published: setup.simulated().and_then(|settings| settings.published()),
+            published: setup.settings().published(),
             asked,
             setup,
             search,
@@ -100,11 +101,6 @@ impl RunView {
     /// Settings it is trained with.
     pub fn settings(&self) -> &RunSettings {
         self.setup.settings()
-    }
-
-    /// Settings of a simulated array, if it is one.
-    pub fn simulated(&self) -> Option<SimulatedSettings> {
-        self.setup.simulated()
     }
 
     /// Errors of this result and of the baselines.

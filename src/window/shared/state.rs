@@ -1,7 +1,8 @@
 use std::sync::Arc;
 
 use decoupler_core::{
-    evaluation::{Baselines, Measured, RunSettings, SimulatedSettings, Simulation, auto::AutoProgress},
+    dataset::Simulation,
+    evaluation::{Baselines, Measured, RunSettings, auto::AutoProgress},
     scene::{Indenter, Loading, RowModel, Scene},
     training::{StopReason, TrainingSettings},
 };
@@ -23,7 +24,7 @@ pub struct Shared {
     /// Source of the next training.
     pub source: SourceKind,
     /// Settings of the next training on a simulated array.
-    pub draft: SimulatedSettings,
+    pub draft: RunSettings,
     /// Settings of the next training on a recording.
     pub recording: RecordingDraft,
     /// State of the worker.
@@ -125,7 +126,7 @@ impl Phase {
 #[derive(Debug)]
 pub struct Preview {
     /// The settings.
-    pub settings: SimulatedSettings,
+    pub settings: RunSettings,
     /// Their test set.
     pub test: TestView,
     /// Baselines, once they are measured.
@@ -160,7 +161,7 @@ impl Shared {
     /// Settings of the next training.
     pub fn settings(&self) -> RunSettings {
         match self.source {
-            SourceKind::Array => self.draft.into(),
+            SourceKind::Array => self.draft,
             SourceKind::Recording => match self.chosen_run() {
                 Some(run) => *run.settings(),
                 None => self.recording.settings,
@@ -251,17 +252,18 @@ impl Shared {
 
 /// Settings with which the window opens for the first time: the paper's experiment, but with a ball pressed somewhere
 /// onto the surface, which is easily recognised as touch, instead of independently pressed nodes.
-pub fn opening_settings() -> SimulatedSettings {
-    let paper = SimulatedSettings::default();
-    SimulatedSettings {
-        source: Simulation {
-            scene: Scene {
-                loading: Loading::Indenter(Indenter::default()),
-                ..paper.source.scene
-            },
-            ..paper.source
-        },
-        ..paper
+pub fn opening_settings() -> RunSettings {
+    RunSettings::from(Simulation {
+        scene: opening_scene(),
+        ..Simulation::default()
+    })
+}
+
+/// The scene with which the window opens for the first time.
+pub fn opening_scene() -> Scene {
+    Scene {
+        loading: Loading::Indenter(Indenter::default()),
+        ..Scene::default()
     }
 }
 

@@ -1,7 +1,7 @@
 use std::{path::PathBuf, sync::Arc};
 
 use decoupler_core::{
-    evaluation::{Combination, MAX_STARTS, RunSettings, SimulatedSettings},
+    evaluation::{Combination, MAX_STARTS, RunSettings},
     settings::{Field, Kind},
     training::{Method, StoppingRules, TrainerState},
 };
@@ -45,7 +45,7 @@ pub fn method_choice_ui(ui: &mut Ui, method: &mut Method) {
 
 /// The settings of the chosen method, the number of starts, and how they become one network; changes all. A paused
 /// training (`is_new` is false) keeps its starts.
-pub fn method_settings_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, is_new: bool) {
+pub fn method_settings_ui(ui: &mut Ui, settings: &mut RunSettings, is_new: bool) {
     let method = &mut settings.training.method;
     let usual = method.with_defaults();
     for setting in method.settings() {
@@ -140,7 +140,7 @@ pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules, usual: StoppingRul
 #[derive(Clone, Debug)]
 pub enum Effect {
     /// Change the settings of the next training.
-    Configure(Box<SimulatedSettings>),
+    Configure(Box<RunSettings>),
     /// Change the settings of the next training on a recording.
     ConfigureRecording(Box<RunSettings>),
     /// Choose the settings of a training on a recording automatically, or not.

@@ -2,7 +2,7 @@
 
 use std::{fmt::Debug, path::PathBuf};
 
-use decoupler_core::evaluation::Channel;
+use decoupler_core::problem::Channel;
 use decoupler_files::{
     export::format_number,
     figure::{

@@ -12,11 +12,12 @@ use std::{
 
 use decoupler_core::{
     evaluation::{
-        Baselines, Coverage, PastNetworks, Problem, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors,
+        Baselines, Coverage, PastNetworks, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors,
         auto::{AutoProgress, AutoRecord},
     },
     live::{DriftReference, NoDriftMonitor},
     network::Networks,
+    problem::Problem,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
 };
 use decoupler_files::{

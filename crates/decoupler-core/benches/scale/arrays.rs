@@ -1,7 +1,7 @@
 //! Frames of large arrays, and the estimated memory for training.
 
 use decoupler_core::{
-    evaluation::{Preset, Workload},
+    evaluation::{Preset, TrainingSize, Workload},
     sensor::ArrayScale,
 };
 
@@ -37,7 +37,7 @@ pub(crate) fn print() {
 
 fn training_gb(scale: ArrayScale) -> f64 {
     let mut settings = Preset::Best.settings();
-    settings.source.sensor.scale = scale;
-    settings.source.samples = 1000 * scale.rows();
-    Workload::of(&settings).unwrap().bytes as f64 * 1e-9
+    settings.simulation_mut().unwrap().sensor.scale = scale;
+    settings.simulation_mut().unwrap().samples = 1000 * scale.rows();
+    Workload::of(&settings, TrainingSize::drawn(&settings).unwrap()).bytes as f64 * 1e-9
 }

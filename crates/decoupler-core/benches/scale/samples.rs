@@ -2,7 +2,7 @@
 
 use std::{fs, process::Command};
 
-use decoupler_core::evaluation::{Run, SimulatedSettings, Workload};
+use decoupler_core::evaluation::{Run, RunSettings, TrainingSize, Workload};
 use rayon::ThreadPoolBuilder;
 
 use crate::{
@@ -27,15 +27,16 @@ pub(crate) fn print() {
             (Some(peak), Some(min)) => format!("{:.0}", peak - min),
             _ => "not available".to_owned(),
         };
-        let estimated = Workload::of(&settings(samples)).unwrap().bytes as f64 * 1e-6;
+        let estimated =
+            Workload::of(&settings(samples), TrainingSize::drawn(&settings(samples)).unwrap()).bytes as f64 * 1e-6;
         println!("| {samples} | {ms:.1} | {peak} | {estimated:.0} |");
     }
     println!("\nExponent {:.2}.", exponent(&SAMPLES, &times));
 }
 
-fn settings(samples: usize) -> SimulatedSettings {
-    let mut settings = SimulatedSettings::default();
-    settings.source.samples = samples;
+fn settings(samples: usize) -> RunSettings {
+    let mut settings = RunSettings::default();
+    settings.simulation_mut().unwrap().samples = samples;
     settings
 }
 

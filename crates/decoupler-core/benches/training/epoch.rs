@@ -3,7 +3,8 @@
 use std::hint::black_box;
 
 use decoupler_core::{
-    evaluation::{Run, SimulatedSettings, Simulation},
+    dataset::Simulation,
+    evaluation::{Run, RunSettings},
     training::{StoppingRules, TrainingSettings},
 };
 use faer::{Accum, Mat, Par, linalg::matmul::matmul};
@@ -18,16 +19,17 @@ pub(crate) fn print() {
         epochs: StoppingRules::MAX_EPOCHS,
         ..StoppingRules::default()
     };
-    let settings = SimulatedSettings {
+    let settings = RunSettings {
         source: Simulation {
             validation_samples: 0,
             ..Simulation::default()
-        },
+        }
+        .into(),
         training: TrainingSettings {
             stopping,
             ..TrainingSettings::default()
         },
-        ..SimulatedSettings::default()
+        ..RunSettings::default()
     };
     let mut run = Run::prepare(settings).expect("the paper's experiment is possible");
     let (slopes, inputs) = (Mat::from_fn(1000, 78, wave), Mat::from_fn(1000, 496, wave));

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use decoupler_core::{
     dataset::Seed,
-    evaluation::{Run, SimulatedSettings},
+    evaluation::{Run, RunSettings},
     training::{Method, StopReason, StoppingRules, TrainingSettings},
 };
 
@@ -24,7 +24,7 @@ struct Outcome {
 }
 
 fn train(method: Method, seed: u64) -> Outcome {
-    let settings = SimulatedSettings {
+    let settings = RunSettings {
         training: TrainingSettings {
             method,
             stopping: StoppingRules {
@@ -33,7 +33,7 @@ fn train(method: Method, seed: u64) -> Outcome {
             },
         },
         seed: Seed(seed),
-        ..SimulatedSettings::default()
+        ..RunSettings::default()
     };
     let mut run = Run::prepare(settings).expect("the paper's experiment is possible");
     while run.step().is_none() {

@@ -26,5 +26,5 @@ pub use history::{History, MemoryStream};
 pub use memory::{LARGEST_LAG, Memory, MemoryConstants, MemoryError, MemoryState};
 pub use samples::{Dataset, DatasetError, LARGEST_SAMPLES};
 pub use seed::{Seed, Stream};
-pub use simulation::SimulationError;
+pub use simulation::{ModelSize, Simulation, SimulationError};
 pub use span::{Span, SpanError};

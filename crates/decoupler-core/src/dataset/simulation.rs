@@ -1,12 +1,80 @@
 use ndarray::Array2;
 use rand::Rng;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{Dataset, LARGEST_SAMPLES};
 use crate::{
-    scene::{DeformationSampler, Noise, NoiseSource, Scene, SceneError},
-    sensor::{SensorError, SensorModel},
+    scene::{DeformationSampler, Noise, NoiseSource, RowModel, Scene, SceneError},
+    sensor::{ArrayScale, SensorError, SensorModel},
 };
+
+/// A simulated sensor, its scene, and the numbers of samples to draw.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Simulation {
+    /// Model of the sensor.
+    pub sensor: SensorModel,
+    /// Scene: rows, axes, loading and noise.
+    pub scene: Scene,
+    /// Number of training samples, over all row-wires read.
+    pub samples: usize,
+    /// Number of validation samples, drawn in addition to select the best weights and to stop the training; 0 for none.
+    pub validation_samples: usize,
+    /// Number of test samples.
+    pub test_samples: usize,
+}
+
+/// Size of the model of a scene; coordinates that do not vary are not counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ModelSize {
+    /// Number of row-wires read.
+    pub rows: usize,
+    /// Number of unknown coordinates in a frame, over all rows.
+    pub unknowns: usize,
+    /// Number of resistances in a frame.
+    pub equations: usize,
+    /// Number of networks: one, or one per known row.
+    pub networks: usize,
+}
+
+impl Default for Simulation {
+    /// Returns the paper's main experiment: 10×10_5×30, 1000 training and 100 test samples.
+    fn default() -> Self {
+        Self {
+            sensor: SensorModel::new(ArrayScale::default()),
+            scene: Scene::default(),
+            samples: 1000,
+            validation_samples: 200,
+            test_samples: 100,
+        }
+    }
+}
+
+impl Simulation {
+    /// Counts the unknowns, equations and networks.
+    ///
+    /// # Errors
+    /// If the array lacks a row of the scene.
+    pub fn model_size(&self) -> Result<ModelSize, SceneError> {
+        let scale = self.sensor.scale;
+        let rows = self.scene.rows.read(scale.rows())?.len();
+        Ok(ModelSize {
+            rows,
+            unknowns: rows * self.scene.unknowns_per_row(scale),
+            equations: rows * scale.columns(),
+            networks: match self.scene.rows.model() {
+                RowModel::Shared => 1,
+                RowModel::Each => rows,
+            },
+        })
+    }
+
+    /// Maximum travel of a node in millimetres, the full scale of its deformation.
+    pub fn stroke_mm(&self) -> f64 {
+        self.scene.stroke_mm(&self.sensor.geometry)
+    }
+}
 
 /// Error in drawing simulated samples.
 #[derive(Clone, Debug, PartialEq, Error)]

@@ -1,11 +1,12 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Coverage, Errors, RunError, RunSets, RunSettings, Simulation, Source, TestErrors, run_sets::check_sets};
+use super::{Coverage, Errors, RunError, RunSets, RunSettings, TestErrors, run_sets::check_sets};
 use crate::{
-    dataset::{Dataset, PerRow},
+    dataset::{Dataset, PerRow, Simulation},
     decoupling::{NewtonDecoder, Program, ProgramDecoder, decode_set},
     job::Job,
     network::Quantity,
+    problem::Problem,
     scene::{NoiseSource, RowModel, Rows},
     sensor::ArrayScale,
 };
@@ -47,7 +48,7 @@ impl Baselines {
     pub fn measure(settings: &RunSettings, sets: &RunSets, job: &Job<'_>) -> Result<Self, RunError> {
         let [mean, linear] = mean_and_linear(settings, sets)?;
         job.check()?;
-        let model_based = model_based(&settings.source, &sets.test)?;
+        let model_based = model_based(&sets.problem, &sets.test)?;
         job.check()?;
         Ok(Self {
             mean,
@@ -97,12 +98,12 @@ impl Scores {
 
 /// Returns the errors on `test` of Newton's method with the noise of the scene and mean and covariance of its loading;
 /// `None` without a sensor model, and if it would take many minutes.
-pub(super) fn model_based(source: &Source, test: &Dataset) -> Result<Option<TestErrors>, RunError> {
+pub(super) fn model_based(problem: &Problem, test: &Dataset) -> Result<Option<TestErrors>, RunError> {
     /// Multiplications of a few minutes on one core.
     const MAX_MULTIPLICATIONS: f64 = 2e11;
     /// Usual number of steps per row.
     const STEPS: f64 = 8.0;
-    let Source::Simulated(Simulation { sensor, scene, .. }) = source else {
+    let Some(Simulation { sensor, scene, .. }) = &problem.sensor else {
         return Ok(None);
     };
     let rows = test.row_wires_read().expect("samples of a scene know their row-wire");
@@ -116,7 +117,7 @@ pub(super) fn model_based(source: &Source, test: &Dataset) -> Result<Option<Test
     }
     let mut decoder = NewtonDecoder::new(sensor, scene, rows)?;
     let answers = decode_set(&mut decoder, test)?;
-    Ok(Some(TestErrors::measure(source, test, &answers)))
+    Ok(Some(TestErrors::measure(problem, test, &answers)))
 }
 
 /// Returns the errors of the training mean and of the linear baseline on the test set.
@@ -126,7 +127,7 @@ pub(super) fn model_based(source: &Source, test: &Dataset) -> Result<Option<Test
 pub(super) fn mean_and_linear(settings: &RunSettings, sets: &RunSets) -> Result<[TestErrors; 2], RunError> {
     check_sets(settings, sets)?;
     let (mut mean, mut linear) = fit_baselines(&sets.split.training, settings)?;
-    let errors = |answers| TestErrors::measure(&settings.source, &sets.test, &answers);
+    let errors = |answers| TestErrors::measure(&sets.problem, &sets.test, &answers);
     Ok([
         errors(decode_set(&mut mean, &sets.test)?),
         errors(decode_set(&mut linear, &sets.test)?),
@@ -147,10 +148,10 @@ pub(super) fn fit_baselines(
         let of_set = move |set: &Dataset| Program::ridge(set, quantity, NoiseSource::default());
         PerRow::fit(training, settings.source.row_model(), of_set)
     };
-    let linear = match settings.source {
-        Source::Simulated(simulation) if simulation.scene.rows == Rows::Known => ridge(Quantity::Resistance)?,
-        Source::Simulated(_) => PerRow::shared(Program::least_squares(training, Quantity::Resistance)?),
-        Source::Measured(_) => ridge(settings.inputs.quantity)?,
+    let linear = match settings.simulation() {
+        Some(simulation) if simulation.scene.rows == Rows::Known => ridge(Quantity::Resistance)?,
+        Some(_) => PerRow::shared(Program::least_squares(training, Quantity::Resistance)?),
+        None => ridge(settings.inputs.quantity)?,
     };
     let [mean, linear] = [mean, linear].map(|programs| ProgramDecoder::new(Program::each(&programs)));
     Ok((mean, linear))
@@ -220,9 +221,9 @@ impl PublishedErrors {
 mod tests {
     use super::*;
     use crate::{
-        dataset::Stream,
+        dataset::{Simulation, Stream},
         decoupling::decode_set,
-        evaluation::{SimulatedSettings, Simulation},
+        evaluation::RunSettings,
         scene::Scene,
         sensor::SensorModel,
     };
@@ -230,23 +231,24 @@ mod tests {
     #[test]
     fn the_linear_map_knows_the_row_if_the_network_does() {
         let errors = |rows, samples| {
-            let mut settings = SimulatedSettings::default();
+            let mut settings = RunSettings::default();
             settings.source = Simulation {
                 sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
                 scene: Scene {
                     rows,
                     ..Scene::default()
                 },
-                ..settings.source
-            };
+                ..*settings.simulation().unwrap()
+            }
+            .into();
             let draw = |samples, stream| {
-                let Simulation { sensor, scene, .. } = &settings.source;
+                let Simulation { sensor, scene, .. } = settings.simulation().unwrap();
                 Dataset::simulate(sensor, scene, samples, &mut settings.seed.rng(stream)).unwrap()
             };
             let test = draw(200, Stream::Test);
             let training = draw(samples, Stream::Training);
-            let (mut mean, mut linear) = fit_baselines(&training, &settings.into()).unwrap();
-            let measured = |answers| Errors::measure(&test, &answers, settings.source.stroke_mm());
+            let (mut mean, mut linear) = fit_baselines(&training, &settings).unwrap();
+            let measured = |answers| Errors::measure(&test, &answers, settings.simulation().unwrap().stroke_mm());
             (
                 measured(decode_set(&mut mean, &test).unwrap()),
                 measured(decode_set(&mut linear, &test).unwrap()),

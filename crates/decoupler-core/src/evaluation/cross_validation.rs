@@ -9,6 +9,7 @@ use crate::{
     dataset::{Dataset, Folds, Seed, SplitBy, Stream},
     decoupling::decode_set,
     job::{Cancelled, Job},
+    problem::Problem,
     training::TrainingError,
 };
 
@@ -113,8 +114,8 @@ impl CrossValidated {
         folds: Folds,
         job: &Job<'_>,
     ) -> Result<Self, RunError> {
-        let is_measured = settings.source.simulation().is_none();
-        let holds_out = !is_measured || settings.training.method.needs_validation();
+        let problem = Problem::of(settings.simulation(), set);
+        let holds_out = problem.has_nodes() || settings.training.method.needs_validation();
         let mut effort = Effort::default();
         let empty = || Array2::zeros(set.targets().dim());
         let (mut network, mut mean, mut linear) = (empty(), empty(), empty());
@@ -129,7 +130,8 @@ impl CrossValidated {
                 seed: nth_seed(settings.seed, fold),
                 ..*settings
             };
-            let mut run = match Run::new(settings, RunSets::new(split, test), Begin::Initialize, job) {
+            let sets = RunSets::new(split, test).described(problem.clone());
+            let mut run = match Run::new(settings, sets, Begin::Initialize, job) {
                 // Every target is constant without this fold: the constant is the answer.
                 Err(RunError::Training(TrainingError::NothingVaries)) if set.has_varying_target() => {
                     scatter(&mut network, samples, &answers_of_mean);

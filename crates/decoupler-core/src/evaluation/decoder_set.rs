@@ -3,13 +3,14 @@ use std::time::Instant;
 use ndarray::Array2;
 
 use super::{
-    MissingFigures, Remark, RunError, RunSettings, Source, TestErrors, baselines::fit_baselines,
-    preparation::unseen_noise, table::frame_us,
+    MissingFigures, Remark, RunError, RunSettings, TestErrors, baselines::fit_baselines, preparation::unseen_noise,
+    table::frame_us,
 };
 use crate::{
     dataset::Dataset,
     decoupling::{Decoder, DecoderKind, FitProblem, Precision, SolvedRows, decode_set, resistance_residual},
     network::Networks,
+    problem::Problem,
     scene::RowModel,
     sensor::SensorModel,
 };
@@ -56,6 +57,7 @@ impl DecoderReport {
 /// Builds and measures decoders for the source of a run.
 pub struct DecoderSet {
     settings: RunSettings,
+    problem: Problem,
     training: Dataset,
     networks: Option<Networks>,
 }
@@ -64,6 +66,7 @@ impl DecoderSet {
     /// Returns decoders fitted to `training`. `networks` must have been trained on it with these settings.
     pub fn new(settings: RunSettings, training: Dataset, networks: Option<Networks>) -> Self {
         Self {
+            problem: Problem::of(settings.simulation(), &training),
             settings,
             training,
             networks,
@@ -85,11 +88,11 @@ impl DecoderSet {
             training: &self.training,
             row_model: self.settings.source.row_model(),
             inputs: self.settings.inputs,
-            unseen: unseen_noise(&self.settings.source)?,
+            unseen: unseen_noise(self.problem.sensor.as_ref())?,
             sensor: self
-                .settings
-                .source
-                .simulation()
+                .problem
+                .sensor
+                .as_ref()
                 .map(|simulation| (&simulation.sensor, &simulation.scene)),
             networks: self.networks.as_ref(),
             precision,
@@ -105,9 +108,9 @@ impl DecoderSet {
         Ok(Box::new(fit_baselines(&self.training, &self.settings)?.1))
     }
 
-    /// Decoders that can be measured for this source, with the precisions of each, in the order offered to the user.
-    pub fn kinds(source: &Source) -> impl Iterator<Item = (DecoderKind, Precision)> + use<> {
-        let has_sensor = source.simulation().is_some();
+    /// Decoders that can be measured for this problem, with the precisions of each, in the order offered to the user.
+    pub fn kinds(problem: &Problem) -> impl Iterator<Item = (DecoderKind, Precision)> + use<> {
+        let has_sensor = problem.sensor.is_some();
         let kinds = DecoderKind::ALL
             .into_iter()
             .filter(move |kind| has_sensor || !kind.needs_sensor());
@@ -127,12 +130,10 @@ impl DecoderSet {
         let Some((answers, solved, cost)) = self.answer(kind, precision, test)? else {
             return Ok(None);
         };
-        let source = &self.settings.source;
-        let errors = TestErrors::measure(source, test, &answers);
-        let mean = TestErrors::measure(source, test, &self.mean_answers(test)?);
-        let residual = source
-            .simulation()
-            .map(|simulation| rms_residual(&simulation.sensor, test, &answers));
+        let errors = TestErrors::measure(&self.problem, test, &answers);
+        let mean = TestErrors::measure(&self.problem, test, &self.mean_answers(test)?);
+        let sensor = self.problem.sensor.as_ref();
+        let residual = sensor.map(|simulation| rms_residual(&simulation.sensor, test, &answers));
         let missing = MissingFigures::of(precision, &errors, residual).map(Remark::Missing);
         let mut remarks = Remark::on(kind, (&errors, &mean), &self.settings, self.size_of_fits());
         remarks.extend(missing);

@@ -1,8 +1,7 @@
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-use super::Source;
-use crate::dataset::Dataset;
+use crate::{dataset::Dataset, problem::Problem};
 
 /// Errors of decoupled coordinates of the nodes in a test set.
 ///
@@ -101,22 +100,22 @@ impl Errors {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TestErrors {
-    /// Errors on the nodes of a simulated array.
+    /// Errors on the nodes of an array.
     Nodes(Errors),
-    /// Errors of each target of a recording.
+    /// Errors of each target.
     Targets(Vec<TargetErrors>),
 }
 
 impl TestErrors {
-    /// Measures the errors of `answers` (samples × targets, in the units of the targets) on `test`, whose samples are
-    /// from `source`.
+    /// Measures the errors of `answers` (samples × targets, in the units of the targets) on `test`, which `problem`
+    /// describes.
     ///
     /// # Panics
     /// If the shapes differ.
-    pub fn measure(source: &Source, test: &Dataset, answers: &Array2<f64>) -> Self {
-        match source {
-            Source::Simulated(simulation) => Self::Nodes(Errors::measure(test, answers, simulation.stroke_mm())),
-            Source::Measured(_) => Self::of_targets(test, answers.view()),
+    pub fn measure(problem: &Problem, test: &Dataset, answers: &Array2<f64>) -> Self {
+        match problem.stroke_mm() {
+            Some(stroke_mm) => Self::Nodes(Errors::measure(test, answers, stroke_mm)),
+            None => Self::of_targets(test, answers.view()),
         }
     }
 

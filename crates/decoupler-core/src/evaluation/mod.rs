@@ -15,16 +15,17 @@ mod intervals;
 mod linear_start;
 mod past_networks;
 mod preparation;
+mod presets;
 mod pressed;
 pub mod recorded;
 mod remark;
 mod run;
 mod run_sets;
 mod settings;
-mod source;
 mod starts;
 mod table;
 mod trade;
+mod workload;
 
 pub use baselines::{Baselines, PublishedErrors, Scores, published_errors};
 pub use cross_validation::{CrossValidated, CrossValidation, Effort};
@@ -33,16 +34,14 @@ pub use errors::{Errors, NodeAddress, Spread, TargetErrors, TestErrors, node_rms
 pub use intervals::{Coverage, HalfWidth, Intervals, IntervalsDefect, NoIntervals};
 pub use past_networks::{PastNetwork, PastNetworks};
 pub use preparation::Begin;
+pub use presets::{Preset, PresetError, ready_settings};
 pub use pressed::{Pressed, PressedAnswer, fine_tune, press_limits, pressed_rows, rebased};
 pub use remark::{Cause, MissingFigures, Remark, error_remarks};
 pub use run::{Run, RunDefect, RunError};
 pub use run_sets::RunSets;
 pub use settings::{
-    Combination, CombinationError, CountError, Initialization, InitializationError, MAX_STARTS, MeasuredSettings,
-    RecordedSize, RunSettings, SimulatedSettings, Workload, WorkloadTime,
-};
-pub use source::{
-    Channel, Measured, ModelSize, Preset, PresetError, Problem, Simulation, Source, TargetPosition, ready_settings,
+    Combination, CombinationError, CountError, Initialization, InitializationError, MAX_STARTS, Measured, RunSettings,
+    Source,
 };
 pub use starts::{StartRecord, StartTrainer, best_start};
 pub use table::{ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, decoded_unit, network_frame_time};
@@ -50,3 +49,4 @@ pub use trade::{
     Outlook, OutlookError, TradeOffCost, TradeOffLevel, TradeOffLimits, TradeOffPoint, fastest_under,
     measure_trade_off, most_accurate_under,
 };
+pub use workload::{TrainingSize, Workload, WorkloadTime};

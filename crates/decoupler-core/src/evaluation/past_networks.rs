@@ -156,19 +156,19 @@ mod tests {
 
     use super::*;
     use crate::{
-        evaluation::{Combination, SimulatedSettings},
+        evaluation::{Combination, RunSettings},
         scene::Rows,
         training::Method,
     };
 
     const NO_BOUND: [usize; 2] = [usize::MAX; 2];
 
-    fn settings() -> SimulatedSettings {
-        let mut settings = SimulatedSettings::default();
-        settings.source.sensor.scale = "3x4_2x12".parse().unwrap();
+    fn settings() -> RunSettings {
+        let mut settings = RunSettings::default();
+        settings.simulation_mut().unwrap().sensor.scale = "3x4_2x12".parse().unwrap();
         (
             settings.hidden,
-            settings.source.samples,
+            settings.simulation_mut().unwrap().samples,
             settings.training.stopping.epochs,
         ) = (3, 60, 40);
         settings
@@ -176,7 +176,7 @@ mod tests {
 
     /// Trains to the end and records every epoch; calls `each` after it.
     fn record(
-        settings: SimulatedSettings,
+        settings: RunSettings,
         [max_bytes, max_count]: [usize; 2],
         mut each: impl FnMut(&PastNetworks, usize),
     ) -> (Run, PastNetworks) {
@@ -197,8 +197,8 @@ mod tests {
         let mut several = settings();
         several.starts = 3;
         let mut known = settings();
-        known.source.scene.rows = Rows::Known;
-        let committee = SimulatedSettings {
+        known.simulation_mut().unwrap().scene.rows = Rows::Known;
+        let committee = RunSettings {
             combine: Combination::Mean,
             ..several
         };

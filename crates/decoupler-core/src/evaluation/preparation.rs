@@ -4,11 +4,11 @@ use rand::Rng;
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Initialization, Run, RunError, RunSets, RunSettings, SimulatedSettings, Simulation, Source,
-    StartTrainer, linear_start::LinearStart, run_sets::check_sets,
+    Baselines, Initialization, Run, RunError, RunSets, RunSettings, StartTrainer, linear_start::LinearStart,
+    run_sets::check_sets,
 };
 use crate::{
-    dataset::{Dataset, PerRow, Split},
+    dataset::{Dataset, PerRow, Simulation, Split},
     job::Job,
     machine::MemoryBudget,
     network::{Inputs, MinMax, Mlp, Shape, nguyen_widrow},
@@ -31,10 +31,10 @@ impl Run {
     /// memory.
     ///
     /// # Errors
-    /// If the settings are invalid.
-    pub fn prepare(settings: SimulatedSettings) -> Result<Self, RunError> {
+    /// If the settings are invalid or those of a recording.
+    pub fn prepare(settings: RunSettings) -> Result<Self, RunError> {
         let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
-        Self::with_baselines(settings.into(), sets, Begin::Initialize, &Job::UNINTERRUPTED)
+        Self::with_baselines(settings, sets, Begin::Initialize, &Job::UNINTERRUPTED)
     }
 
     /// As [`Self::new`], and measures the baselines.
@@ -127,11 +127,11 @@ fn resume(settings: RunSettings, states: Vec<TrainerState>, tasks: &[Task]) -> R
     Ok(starts.collect())
 }
 
-impl SimulatedSettings {
+impl RunSettings {
     /// Checks these settings and the number of saved trainings, before samples are drawn for them.
     pub fn check_states(&self, states: &[TrainerState]) -> Result<(), RunError> {
         self.check_counts()?;
-        check_states(states, self.starts * self.source.model_size()?.networks)
+        check_states(states, self.starts * self.drawn()?.model_size()?.networks)
     }
 }
 
@@ -162,7 +162,11 @@ impl Task {
         validation: Option<&Dataset>,
         test: &Dataset,
     ) -> Result<Self, RunError> {
-        let inputs = Inputs::fit(settings.inputs, training.readings(), unseen_noise(&settings.source)?)?;
+        let inputs = Inputs::fit(
+            settings.inputs,
+            training.readings(),
+            unseen_noise(settings.simulation())?,
+        )?;
         let outputs = MinMax::fit(training.targets())?;
         let scaled = |set: &Dataset| (inputs.of(set.readings()), outputs.scale(set.targets()));
         let linear = match settings.initialization {
@@ -230,9 +234,9 @@ pub(super) fn tasks(settings: &RunSettings, split: &Split, test: &Dataset) -> Re
 }
 
 /// Returns the noise of the readings that the training set lacks.
-pub(super) fn unseen_noise(source: &Source) -> Result<NoiseSource, RunError> {
-    match source {
-        Source::Simulated(Simulation { sensor, scene, .. }) if scene.noise.sets == NoisySets::Test => {
+pub(super) fn unseen_noise(sensor: Option<&Simulation>) -> Result<NoiseSource, RunError> {
+    match sensor {
+        Some(Simulation { sensor, scene, .. }) if scene.noise.sets == NoisySets::Test => {
             Ok(scene.noise.source(sensor)?)
         }
         _ => Ok(NoiseSource::default()),
@@ -246,7 +250,7 @@ mod tests {
     use ndarray::{Axis, Slice};
 
     use super::*;
-    use crate::{evaluation::SimulatedSettings, network::InputChoice, scene::Noise};
+    use crate::{evaluation::Measured, network::InputChoice, scene::Noise};
 
     /// Returns a run of few samples, cancelled at poll number `poll` of the token, from 0, and the number of polls.
     fn cancelled_at(poll: usize, prepare: &dyn Fn(&Job<'_>) -> Result<Run, RunError>) -> (Option<Run>, usize) {
@@ -264,29 +268,33 @@ mod tests {
 
     #[test]
     fn a_run_without_a_test_set_trains_the_same_network() {
-        let mut settings = SimulatedSettings::default();
-        settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
+        let mut settings = RunSettings::default();
+        settings.simulation_mut().unwrap().sensor.scale = "4x4_2x12".parse().unwrap();
         (settings.hidden, settings.training.stopping.epochs) = (3, 5);
         // More than one block of samples, the last with a single one.
-        (settings.source.samples, settings.source.validation_samples) = (1028, 4);
+        (
+            settings.simulation_mut().unwrap().samples,
+            settings.simulation_mut().unwrap().validation_samples,
+        ) = (1028, 4);
         for inputs in [InputChoice::PAPER, InputChoice::BEST] {
             settings.inputs = inputs;
             let drawn = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
             let (split, test) = (drawn.split, Dataset::clone(&drawn.test));
+            let problem = settings.simulation().unwrap().problem();
             let split_of_one = Split {
                 training: split.training.select(&Vec::from_iter(0..1025)),
                 validation: split.validation,
             };
             let mut with_test = Run::with_baselines(
-                settings.into(),
-                RunSets::new(split_of_one.clone(), test),
+                settings,
+                RunSets::new(split_of_one.clone(), test).described(problem.clone()),
                 Begin::Initialize,
                 &Job::UNINTERRUPTED,
             )
             .unwrap();
             let mut without = Run::new(
-                settings.into(),
-                RunSets::without_test(split_of_one),
+                settings,
+                RunSets::without_test(split_of_one).described(problem.clone()),
                 Begin::Initialize,
                 &Job::UNINTERRUPTED,
             )
@@ -299,9 +307,29 @@ mod tests {
     }
 
     #[test]
+    fn sets_of_another_scene_and_draws_of_a_recording_are_refused() {
+        let mut settings = RunSettings {
+            hidden: 3,
+            ..RunSettings::default()
+        };
+        let simulation = settings.simulation_mut().unwrap();
+        simulation.sensor.scale = "4x4_2x12".parse().unwrap();
+        (simulation.samples, simulation.test_samples) = (40, 8);
+        let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+        let begin = |settings| Run::new(settings, sets.clone(), Begin::Initialize, &Job::UNINTERRUPTED).map(|_| ());
+        assert_eq!(begin(settings), Ok(()));
+        settings.simulation_mut().unwrap().scene.largest_compression = 0.1;
+        assert_eq!(begin(settings), Err(RunError::OtherSensor));
+        let recorded = RunSettings::from(Measured { rows: RowModel::Shared });
+        assert_eq!(begin(recorded), Err(RunError::OtherSensor));
+        let message = Run::prepare(recorded).err().unwrap().to_string();
+        assert!(message.contains("read, not drawn"), "{message}");
+    }
+
+    #[test]
     fn blocks_are_scaled_like_all_samples_at_once() {
-        let mut settings = SimulatedSettings::default();
-        settings.source.samples = 1030;
+        let mut settings = RunSettings::default();
+        settings.simulation_mut().unwrap().samples = 1030;
         let RunSets { split, .. } = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
         for choice in [InputChoice::PAPER, InputChoice::BEST] {
             let whole = Inputs::fit(choice, split.training.readings(), NoiseSource::default()).unwrap();
@@ -316,15 +344,19 @@ mod tests {
 
     #[test]
     fn a_cancelled_preparation_ends_at_the_next_part() {
-        let mut settings = SimulatedSettings::default();
-        settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
-        (settings.hidden, settings.source.samples, settings.source.test_samples) = (3, 40, 8);
+        let mut settings = RunSettings::default();
+        settings.simulation_mut().unwrap().sensor.scale = "4x4_2x12".parse().unwrap();
+        (
+            settings.hidden,
+            settings.simulation_mut().unwrap().samples,
+            settings.simulation_mut().unwrap().test_samples,
+        ) = (3, 40, 8);
         let whole = Run::prepare(settings).unwrap();
         let (states, answers_mm) = (whole.states(), whole.decouple_test());
         for begin in [Begin::Initialize, Begin::Resume(states)] {
             let prepare = |job: &Job<'_>| {
                 let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, job)?;
-                Run::with_baselines(settings.into(), sets, begin.clone(), job)
+                Run::with_baselines(settings, sets, begin.clone(), job)
             };
             let (run, parts) = cancelled_at(usize::MAX, &prepare);
             assert_eq!(run.map(|run| run.decouple_test()).as_ref(), Some(&answers_mm));
@@ -337,18 +369,18 @@ mod tests {
     }
 
     fn inputs(noise: Noise) -> Inputs {
-        let mut settings = SimulatedSettings {
+        let mut settings = RunSettings {
             inputs: InputChoice::BEST,
-            ..SimulatedSettings::default()
+            ..RunSettings::default()
         };
-        settings.source.samples = 40;
-        settings.source.scene.noise = Noise {
+        settings.simulation_mut().unwrap().samples = 40;
+        settings.simulation_mut().unwrap().scene.noise = Noise {
             sets: NoisySets::Test,
             ..noise
         };
         let RunSets { split, test, .. } =
             RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
-        let task = Task::new(&settings.into(), &split.training, None, &test).unwrap();
+        let task = Task::new(&settings, &split.training, None, &test).unwrap();
         task.scaling.0
     }
 

@@ -6,10 +6,10 @@ use std::{
 use glam::DVec3;
 use ndarray::Array2;
 
-use super::{RunError, Simulation, run_sets::check_networks};
+use super::{RunError, run_sets::check_networks};
 use crate::{
     calibration::{PressLimits, PressedRow},
-    dataset::{Dataset, PerRow, Split},
+    dataset::{Dataset, PerRow, Simulation, Split},
     decoupling::{DecodeError, Decoder},
     job::Job,
     machine::{MemoryBudget, node_pairs_per_row},
@@ -291,10 +291,11 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
+    use crate::evaluation::RunSettings;
     use crate::{
         dataset::Dataset,
         decoupling::{NewtonDecoder, Program, ProgramDecoder},
-        evaluation::{Errors, Run, SimulatedSettings},
+        evaluation::{Errors, Run},
         scene::{Indenter, Print, Scene},
     };
 
@@ -391,9 +392,9 @@ mod tests {
     /// Compares with [`Errors`] of a test set of this single snapshot.
     #[test]
     fn errors_agree_with_a_test_set_of_one_snapshot() {
-        let mut settings = SimulatedSettings::default();
-        settings.source.sensor = sensor();
-        settings.source.samples = 100;
+        let mut settings = RunSettings::default();
+        settings.simulation_mut().unwrap().sensor = sensor();
+        settings.simulation_mut().unwrap().samples = 100;
         let run = Run::prepare(settings).unwrap();
         let rows = [2, 5, 7];
         let pressed = Pressed::new(&sensor(), &rows, &touch(), 1.0).unwrap();

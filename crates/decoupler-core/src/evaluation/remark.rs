@@ -2,7 +2,7 @@ use std::fmt;
 
 use thiserror::Error;
 
-use super::{Errors, RunSettings, Scores, SimulatedSettings, TargetErrors, TestErrors};
+use super::{Errors, RunSettings, Scores, TargetErrors, TestErrors};
 use crate::{
     decoupling::{DecoderKind, Precision, SolvedRows},
     scene::{Noise, NoisySets},
@@ -111,7 +111,6 @@ impl Cause {
         /// Samples per reading below which more samples would help most.
         const FEW: usize = 4;
         let noise = settings
-            .source
             .simulation()
             .map_or(Noise::default(), |simulation| simulation.scene.noise);
         let is_noisy = !noise.in_test().is_none();
@@ -221,25 +220,26 @@ impl Remark {
     }
 }
 
-/// Returns the remarks on the rows of an error table, with the names of the rows: on the network, whose training ended
-/// for `reason`, and on the linear map.
+/// Returns the remarks on the rows of the error table of a simulated array, with the names of the rows: on the network,
+/// whose training ended for `reason`, and on the linear map.
 pub fn error_remarks(
-    settings: &SimulatedSettings,
+    settings: &RunSettings,
     Scores { network, baselines, .. }: &Scores,
     reason: Option<StopReason>,
 ) -> Vec<(&'static str, Remark)> {
-    let simulation = &settings.source;
+    let Some(simulation) = settings.simulation() else {
+        return Vec::new();
+    };
     let readings = simulation.sensor.scale.columns();
     let networks = simulation.model_size().map_or(1, |size| size.networks);
     let method = settings.training.method;
-    let settings = RunSettings::from(*settings);
     let samples = simulation.samples / networks;
     let rows = [
         ("linear map", DecoderKind::Ridge, &baselines.linear),
         ("network", DecoderKind::Network, network),
     ];
     let of_row = |(name, kind, errors)| {
-        let mut remarks = Remark::on(kind, (errors, &baselines.mean), &settings, (samples, readings));
+        let mut remarks = Remark::on(kind, (errors, &baselines.mean), settings, (samples, readings));
         for remark in remarks.iter_mut().filter(|_| kind == DecoderKind::Network) {
             remark.attribute_to_end(reason, method);
         }
@@ -302,11 +302,11 @@ mod tests {
     }
 
     fn remarks(kind: DecoderKind, noise: Noise, samples: usize, ours: &Errors) -> Vec<String> {
-        let mut settings = SimulatedSettings::default();
-        settings.source.scene.noise = noise;
+        let mut settings = RunSettings::default();
+        settings.simulation_mut().unwrap().scene.noise = noise;
         let mean = errors(0.2, Some(5.0));
         let [ours, mean] = [*ours, mean].map(TestErrors::Nodes);
-        let remarks = Remark::on(kind, (&ours, &mean), &settings.into(), (samples, 30));
+        let remarks = Remark::on(kind, (&ours, &mean), &settings, (samples, 30));
         remarks.iter().map(ToString::to_string).collect()
     }
 
@@ -347,12 +347,7 @@ mod tests {
             assert!(remarks[1].contains("in x is 1.200 times"), "{remarks:?}");
         }
         let [ours, exact] = [errors(0.1, Some(0.5)), errors(0.2, Some(1e-14))].map(TestErrors::Nodes);
-        let of_exact_mean = Remark::on(
-            DecoderKind::Ridge,
-            (&ours, &exact),
-            &SimulatedSettings::default().into(),
-            (500, 30),
-        );
+        let of_exact_mean = Remark::on(DecoderKind::Ridge, (&ours, &exact), &RunSettings::default(), (500, 30));
         assert_eq!(of_exact_mean.len(), 1, "{of_exact_mean:?}");
         let text = of_exact_mean[0].to_string();
         assert!(

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::{
-    Baselines, Combination, CountError, Coverage, Intervals, Problem, RunSettings, Scores, StartRecord, StartTrainer,
+    Baselines, Combination, CountError, Coverage, Intervals, RunSettings, Scores, StartRecord, StartTrainer,
     TestErrors, starts::lowest,
 };
 use crate::{
@@ -18,6 +18,7 @@ use crate::{
     job::{Cancelled, Job},
     machine::MemoryBudget,
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, ScalingError},
+    problem::Problem,
     scene::SceneError,
     sensor::SensorError,
     training::{
@@ -171,12 +172,12 @@ impl Run {
         let record = |trainer: &StartTrainer| {
             let best = trainer.best_records();
             let errors = self.errors_of(&self.network_of(trainer.best().cloned()).decouple(&self.test));
-            let is_array = errors.nodes().is_some();
+            let has_nodes = self.problem.has_nodes();
             StartRecord {
                 train_mse: best.training_mse,
                 validation_mse: best.validation_mse,
-                z_percent: errors.percent().filter(|_| is_array),
-                percent_of_range: errors.percent().filter(|_| !is_array),
+                z_percent: errors.percent().filter(|_| has_nodes),
+                percent_of_range: errors.percent().filter(|_| !has_nodes),
                 epochs: trainer.latest().epoch,
                 best_epoch: trainer.best_epoch(),
                 stop_reason: trainer.stop_reason(),
@@ -235,7 +236,7 @@ impl Run {
 
     /// Returns the errors of answers to the test set (samples × targets, in the units of the targets).
     pub fn errors_of(&self, answers: &Array2<f64>) -> TestErrors {
-        TestErrors::measure(&self.settings.source, &self.test, answers)
+        TestErrors::measure(&self.problem, &self.test, answers)
     }
 
     /// Returns the errors of [`Self::network`] on the test set.
@@ -401,6 +402,15 @@ pub enum RunError {
     /// The samples of a simulated run have no row-wires.
     #[error("samples of a simulated sensor need a row-wire: build the set with row-wires, or declare it as measured")]
     NoRowWires,
+    /// The sets are described as those of another sensor than that of the settings.
+    #[error(
+        "the sets are not described as samples of the sensor and scene in the settings: draw them with these settings, or \
+         describe them by the problem of their simulation"
+    )]
+    OtherSensor,
+    /// The samples of a recording cannot be drawn.
+    #[error("samples of a recording are read, not drawn: import its files, or give the settings of a simulated array")]
+    NotDrawn,
     /// A training cannot begin.
     #[error(transparent)]
     Training(#[from] TrainingError),

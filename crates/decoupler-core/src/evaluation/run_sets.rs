@@ -1,11 +1,12 @@
 use std::sync::Arc;
 
-use super::{Problem, RunError, RunSettings, SimulatedSettings, Simulation, Source, Workload};
+use super::{RunError, RunSettings, TrainingSize, Workload};
 use crate::{
-    dataset::{Dataset, LARGEST_SAMPLES, Seed, Split, SplitBy, Stream},
+    dataset::{Dataset, LARGEST_SAMPLES, Seed, Simulation, Split, SplitBy, Stream},
     job::Job,
     machine::MemoryBudget,
     network::Networks,
+    problem::Problem,
     scene::{Noise, RowModel},
     training::TrainingError,
 };
@@ -27,12 +28,13 @@ impl RunSets {
     /// Draws the sets of a simulated array, after a check that samples and trainings fit into `memory`.
     ///
     /// # Errors
-    /// If the settings are invalid, the run does not fit into memory, or the job is cancelled.
-    pub fn draw(settings: &SimulatedSettings, memory: MemoryBudget, job: &Job<'_>) -> Result<Self, RunError> {
+    /// If the samples are those of a recording, the settings are invalid, the run does not fit into memory, or the job
+    /// is cancelled.
+    pub fn draw(settings: &RunSettings, memory: MemoryBudget, job: &Job<'_>) -> Result<Self, RunError> {
+        let (source, seed) = (settings.drawn()?, settings.seed);
         settings.check_counts()?;
         settings.training.check().map_err(TrainingError::from)?;
-        Workload::of(settings)?.check_memory(memory)?;
-        let (source, seed) = (&settings.source, settings.seed);
+        Workload::of(settings, TrainingSize::drawn(settings)?).check_memory(memory)?;
         let rows = source.model_size()?.rows;
         let held_out = source.validation_samples.div_ceil(rows);
         let total = (source.samples.div_ceil(rows) + held_out) * rows;
@@ -98,11 +100,14 @@ impl RunSets {
 
 /// Checks the settings of the networks, and that the sets of a run match each other and these settings.
 pub(super) fn check_sets(settings: &RunSettings, sets: &RunSets) -> Result<(), RunError> {
-    settings.check_network()?;
+    settings.check_counts()?;
     let RunSets { split, test, .. } = sets;
     let training = &split.training;
-    if matches!(settings.source, Source::Simulated(_)) && training.row_wires_read().is_none() {
+    if settings.simulation().is_some() && training.row_wires_read().is_none() {
         return Err(RunError::NoRowWires);
+    }
+    if settings.simulation() != sets.problem.sensor.as_ref() {
+        return Err(RunError::OtherSensor);
     }
     let sets = [("validation", split.validation.as_ref()), ("test", Some(&**test))];
     let sets = sets.into_iter().filter_map(|(name, set)| Some((name, set?)));

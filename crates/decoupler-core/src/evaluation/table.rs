@@ -1,12 +1,10 @@
 use std::time::{Duration, Instant};
 
-use super::{
-    Channel, Coverage, Errors, Problem, PublishedErrors, Run, Scores, TargetErrors, TestErrors,
-    recorded::HysteresisLoop,
-};
+use super::{Coverage, Errors, PublishedErrors, Run, Scores, TargetErrors, TestErrors, recorded::HysteresisLoop};
 use crate::{
     dataset::Dataset,
     decoupling::{DecodeError, Decoder},
+    problem::{Channel, Problem},
 };
 
 /// Error table with baselines and decoders as rows; the columns depend on the channels. Each target of a recording has
@@ -229,11 +227,11 @@ impl ErrorTable {
         ];
         rows.extend(baselines.model_based.as_ref().map(|errors| (MODEL_BASED, errors)));
         let mut table = Self::new(problem, &rows);
-        if !problem.has_nodes && scores.coverage.iter().any(Option::is_some) {
+        if !problem.has_nodes() && scores.coverage.iter().any(Option::is_some) {
             table.add_coverage(&scores.coverage);
         }
         let last = table.blocks.last_mut();
-        if let (Some(published), Some(block)) = (published, last.filter(|_| problem.has_nodes)) {
+        if let (Some(published), Some(block)) = (published, last.filter(|_| problem.has_nodes())) {
             block.rows.push(ErrorRow {
                 name: "published",
                 errors: table
@@ -278,7 +276,7 @@ impl ErrorTable {
 
     /// Returns the table of these errors, each with its name.
     pub fn new(problem: &Problem, rows: &[(&'static str, &TestErrors)]) -> Self {
-        if problem.has_nodes {
+        if problem.has_nodes() {
             let measures = &ErrorMeasure::OF_NODES;
             let row = |(name, errors): &(&'static str, &TestErrors)| {
                 let of = |measure: &ErrorMeasure| errors.nodes().and_then(|errors| measure.of_nodes(errors));
@@ -382,6 +380,8 @@ mod tests {
     use ndarray::array;
 
     use super::*;
+    use crate::problem::Channel;
+    use crate::problem::Problem;
 
     fn problem(units: [&str; 2]) -> Problem {
         let channel = |(name, unit): (&str, &str)| Channel::new(name, Some(unit));

@@ -1,8 +1,9 @@
 use super::{
-    Begin, DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, Simulation, TestErrors,
+    Begin, DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, TestErrors,
     baselines::model_based,
 };
 use crate::{
+    dataset::Simulation,
     decoupling::DecoderKind,
     identifiability::{Identifiability, IdentifiabilityError, IdentifiabilityWarning},
     job::Job,
@@ -76,11 +77,11 @@ pub fn measure_trade_off(
     mut on_point: impl FnMut(DecoderKind, Result<TradeOffPoint, RunError>, Option<&Run>),
 ) -> Result<(), RunError> {
     let mut set = DecoderSet::new(*settings, sets.split.training.clone(), None);
-    let model_based = model_based(&settings.source, &sets.test)?;
+    let model_based = model_based(&sets.problem, &sets.test)?;
     let model_based = model_based.as_ref().and_then(TestErrors::nodes).copied();
     let offered = decoders
         .iter()
-        .filter(|kind| settings.source.simulation().is_some() || !kind.needs_sensor());
+        .filter(|kind| sets.problem.sensor.is_some() || !kind.needs_sensor());
     let (with_network, without): (Vec<DecoderKind>, Vec<DecoderKind>) = offered.partition(|kind| kind.needs_network());
     let point = |settings: RunSettings, report: DecoderReport, training_seconds| TradeOffPoint {
         preset: None,
@@ -283,6 +284,7 @@ pub enum OutlookError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dataset::Simulation;
     use crate::scene::{Noise, Scene};
 
     #[test]

@@ -5,7 +5,7 @@ use ndarray::{ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::evaluation::Channel;
+use crate::problem::Channel;
 
 /// Description of the training readings against which [`DriftMonitor`] compares later readings: the range over blocks of
 /// training readings of

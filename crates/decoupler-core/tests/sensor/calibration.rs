@@ -3,7 +3,7 @@
 use decoupler_core::{
     calibration::Calibration,
     dataset::{Dataset, Division, Seed, Stream},
-    evaluation::{Errors, Preset, Run, RunError, SimulatedSettings, fine_tune, pressed_rows, rebased},
+    evaluation::{Errors, Preset, Run, RunError, RunSettings, fine_tune, pressed_rows, rebased},
     job::Job,
     machine::MemoryBudget,
     network::Networks,
@@ -11,14 +11,17 @@ use decoupler_core::{
     sensor::SensorModel,
 };
 
-fn settings() -> SimulatedSettings {
+fn settings() -> RunSettings {
     let mut settings = Preset::Best.settings();
-    settings.source.sensor.scale = "4x4_3x12".parse().unwrap();
-    settings.source.scene.loading = Loading::SmoothField {
+    settings.simulation_mut().unwrap().sensor.scale = "4x4_3x12".parse().unwrap();
+    settings.simulation_mut().unwrap().scene.loading = Loading::SmoothField {
         correlation_length_mm: 4.0,
     };
-    settings.source.scene.noise = Noise::relative(1e-3);
-    (settings.source.samples, settings.source.validation_samples) = (600, 100);
+    settings.simulation_mut().unwrap().scene.noise = Noise::relative(1e-3);
+    (
+        settings.simulation_mut().unwrap().samples,
+        settings.simulation_mut().unwrap().validation_samples,
+    ) = (600, 100);
     settings.training.stopping.epochs = 25;
     settings.hidden = 6;
     settings
@@ -33,8 +36,11 @@ fn real(nominal: &SensorModel) -> SensorModel {
 }
 
 /// Snapshots of the real sensor with only the displacements known, given as coordinates of the nominal sensor.
-fn recorded(settings: &SimulatedSettings, snapshots: usize, seed: u64) -> Dataset {
-    let (scene, nominal) = (&settings.source.scene, &settings.source.sensor);
+fn recorded(settings: &RunSettings, snapshots: usize, seed: u64) -> Dataset {
+    let (scene, nominal) = (
+        &settings.simulation().unwrap().scene,
+        &settings.simulation().unwrap().sensor,
+    );
     let real = real(nominal);
     let rows = nominal.scale.rows();
     let mut set = Dataset::simulate(&real, scene, rows * snapshots, &mut Seed(seed).rng(Stream::Training)).unwrap();
@@ -43,7 +49,7 @@ fn recorded(settings: &SimulatedSettings, snapshots: usize, seed: u64) -> Datase
     rebased(&set, &real, nominal).unwrap()
 }
 
-fn trained(settings: SimulatedSettings) -> Networks {
+fn trained(settings: RunSettings) -> Networks {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     run.network()
@@ -52,18 +58,18 @@ fn trained(settings: SimulatedSettings) -> Networks {
 #[test]
 fn calibration_and_fine_tuning_adapt_a_network_to_the_real_sensor() {
     let mut settings = settings();
-    let nominal = settings.source.sensor;
+    let nominal = settings.simulation().unwrap().sensor;
     let (frames, test) = (recorded(&settings, 40, 1), recorded(&settings, 60, 2));
     let calibration = Calibration::fit(&nominal, &pressed_rows(&frames, &nominal).unwrap()).unwrap();
-    let stroke_mm = settings.source.stroke_mm();
+    let stroke_mm = settings.simulation().unwrap().stroke_mm();
     let z_mm = |set: &Dataset, networks: &Networks| Errors::measure(set, &networks.decouple(set), stroke_mm).z_mm;
     let before = z_mm(&test, &trained(settings));
-    settings.source.sensor = calibration.model;
+    settings.simulation_mut().unwrap().sensor = calibration.model;
     let networks = trained(settings);
     let moved = rebased(&test, &nominal, &calibration.model).unwrap();
     let calibrated = z_mm(&moved, &networks);
     // The error of a network trained on the real sensor itself.
-    settings.source.sensor = real(&nominal);
+    settings.simulation_mut().unwrap().sensor = real(&nominal);
     let limit = z_mm(&rebased(&test, &nominal, &real(&nominal)).unwrap(), &trained(settings));
     assert!(calibrated < 0.2 * before, "{before} {calibrated}");
     assert!(calibrated < 1.2 * limit, "{calibrated} {limit}");
@@ -86,7 +92,7 @@ fn calibration_and_fine_tuning_adapt_a_network_to_the_real_sensor() {
     .unwrap();
     assert!(z_mm(&moved, &tuned) < 1.2 * calibrated);
     // A network of another sensor improves greatly with the frames.
-    settings.source.sensor = nominal;
+    settings.simulation_mut().unwrap().sensor = nominal;
     let untold = trained(settings);
     let tuned = fine_tune(
         &untold,
@@ -107,7 +113,7 @@ fn samples_of_another_sensor_are_refused() {
     let mut settings = settings();
     let split = Division::default().divide_for_training(&recorded(&settings, 10, 1), &mut Seed(0).rng(Stream::Split));
     let split = split.unwrap().split(&recorded(&settings, 10, 1));
-    settings.source.sensor.scale = "4x5_3x15".parse().unwrap();
+    settings.simulation_mut().unwrap().sensor.scale = "4x5_3x15".parse().unwrap();
     settings.training.stopping.epochs = 1;
     let message = fine_tune(
         &trained(settings),
@@ -124,7 +130,7 @@ fn samples_of_another_sensor_are_refused() {
 #[test]
 fn displacements_stay_and_coordinates_move() {
     let settings = settings();
-    let nominal = settings.source.sensor;
+    let nominal = settings.simulation().unwrap().sensor;
     let set = recorded(&settings, 3, 5);
     let moved = rebased(&set, &nominal, &real(&nominal)).unwrap();
     for (one, other) in pressed_rows(&set, &nominal)

@@ -75,8 +75,8 @@ impl CheckpointFile {
     /// other, or the job is cancelled.
     pub fn resume(self, job: &Job<'_>, on_progress: &mut dyn FnMut(Progress)) -> Result<(Run, SetupSets), SetupError> {
         let setup = self.setup();
-        if let Some(settings) = setup.simulated() {
-            settings.check_states(&self.starts)?;
+        if self.settings.simulation().is_some() {
+            self.settings.check_states(&self.starts)?;
         }
         let mut sets = setup.sets(Path::new(""), job, on_progress)?;
         sets.check_saved(self.recorded.as_ref())?;

@@ -4,10 +4,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler_core::{
-    evaluation::{Run, Source},
-    text::in_one_line,
-};
+use decoupler_core::{evaluation::Run, text::in_one_line};
 use thiserror::Error;
 
 use super::{
@@ -91,11 +88,10 @@ impl DocumentKind {
     /// # Errors
     /// [`DocumentError::NoPlan`] if the samples are recorded and no plan is given.
     pub(super) fn recorded_of(self, run: &Run, recorded: Option<&Recorded>) -> Result<Option<Recorded>, DocumentError> {
-        match (&run.settings().source, recorded) {
-            (Source::Simulated(_), _) => Ok(None),
-            (Source::Measured(_), Some(recorded)) => Ok(Some(recorded.clone())),
-            (Source::Measured(_), None) => Err(DocumentError::NoPlan(self)),
+        if run.settings().simulation().is_some() {
+            return Ok(None);
         }
+        recorded.map_or(Err(DocumentError::NoPlan(self)), |recorded| Ok(Some(recorded.clone())))
     }
 
     fn cure(self) -> &'static str {

@@ -6,15 +6,16 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::SplitBy,
+    dataset::{Simulation, SplitBy},
     evaluation::{
-        Channel, Combination, CrossValidation, Simulation, TargetErrors,
+        Combination, CrossValidation, TargetErrors,
         experiments::{
             AxisKind, CellResults, CellSummary, Experiment, ExperimentRecording, ExperimentResults, Figure,
             SummaryErrors, Trial,
         },
     },
     network::HiddenSuggestions,
+    problem::Channel,
     text::counted,
 };
 
@@ -264,7 +265,7 @@ fn settings_fields(cell: &CellResults) -> Vec<Field> {
     let settings = &cell.cell.settings;
     let method = field("method", settings.training.method.short_name().into());
     let epochs = field("epochs", settings.training.stopping.epochs.into());
-    match settings.source.simulation() {
+    match settings.simulation() {
         Some(source) => vec![
             field("array", source.sensor.scale.to_string().into()),
             field("hidden", settings.hidden.into()),
@@ -342,7 +343,7 @@ pub fn write_experiment_markdown(
 /// Describes the conditions of an experiment in one or two sentences.
 pub fn describe_conditions(experiment: &Experiment) -> String {
     let base = &experiment.base;
-    let simulation = base.source.simulation();
+    let simulation = base.simulation();
     let varies = |kind| experiment.axes().any(|axis| axis.kind() == kind);
     let mut said = vec![base.training.method.name().to_owned()];
     if let Some(recording) = &experiment.recording {

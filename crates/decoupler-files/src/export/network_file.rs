@@ -1,14 +1,12 @@
 use std::{fmt::Display, io::Write as _, path::Path, sync::Arc};
 
 use decoupler_core::{
-    dataset::{Dataset, MemoryStream},
-    evaluation::{
-        ErrorTable, Intervals, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord,
-        TargetPosition, TestErrors,
-    },
+    dataset::{Dataset, MemoryStream, Simulation},
+    evaluation::{ErrorTable, Intervals, PastNetwork, Run, RunSettings, Scores, StartRecord, TestErrors},
     job::Job,
     live::{DriftReference, NoDriftMonitor},
     network::{DecouplingNetwork, Networks},
+    problem::{Problem, SavedProblem, TargetPosition},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -59,7 +57,7 @@ struct Document {
     settings: RunSettings,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     recorded: Option<Recorded>,
-    problem: Problem,
+    problem: SavedProblem,
     row_wires: Option<Vec<usize>>,
     network: Networks,
     training: TrainingRecord,
@@ -69,6 +67,8 @@ struct Document {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     drift: Option<SavedDrift>,
 }
+
+const NODES_OF_RECORDING: &str = "problem: the targets of a recording are not nodes";
 
 /// Description of the training readings as it is saved; older files have none if there were too few readings.
 #[derive(Serialize, Deserialize)]
@@ -165,8 +165,8 @@ impl NetworkFile {
     /// # Errors
     /// The recording is missing or has changed, or the settings are invalid.
     pub fn test_set(&self) -> Result<Arc<Dataset>, SetupError> {
-        if let Some(settings) = self.settings.simulated() {
-            return Ok(Arc::new(settings.source.draw_test(settings.seed)?));
+        if let Some(simulation) = self.settings.simulation() {
+            return Ok(Arc::new(simulation.draw_test(self.settings.seed)?));
         }
         let sets = self.setup().sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ())?;
         sets.check_saved(self.recorded.as_ref())?;
@@ -180,8 +180,7 @@ impl NetworkFile {
 
     /// Errors of the network and of the baselines, next to the published ones if there are any.
     pub fn error_table(&self) -> ErrorTable {
-        let published = self.settings.simulated().and_then(|settings| settings.published());
-        ErrorTable::of_scores(&self.problem, &self.scores, published.as_ref())
+        ErrorTable::of_scores(&self.problem, &self.scores, self.settings.published().as_ref())
     }
 
     /// Writes the file whole or not at all.
@@ -252,7 +251,7 @@ impl NetworkFile {
         let document = Document {
             settings,
             recorded: recorded.as_ref().map(located),
-            problem,
+            problem: problem.into(),
             row_wires,
             network,
             training,
@@ -286,7 +285,7 @@ impl NetworkFile {
             program,
             settings: document.settings,
             recorded: document.recorded.map(|recorded| recorded.within(folder)),
-            problem: document.problem,
+            problem: (document.problem.with_sensor(document.settings.simulation())).ok_or(NODES_OF_RECORDING)?,
             row_wires: document.row_wires,
             network: document.network,
             training: document.training,
@@ -383,13 +382,13 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         weights.iter().position(|weight| !weight.is_finite())
     };
     let last_epoch = training.history.last().map(|record| record.epoch);
-    let simulated = settings.simulated();
+    let simulation = settings.simulation();
     let defects = [
         (network.values().iter().find_map(weight))
             .map(|index| format!("network: weight {index} is not a finite number")),
         number_defect(network, settings, row_wires.as_deref()),
         (network.values().iter()).find_map(|network| mismatch(network, problem, settings.network_hidden())),
-        simulated.and_then(|settings| place_defect(network, &settings)),
+        simulation.and_then(|simulation| place_defect(network, simulation)),
         last_epoch.is_none().then(|| "training.history: it is empty".to_owned()),
         last_epoch
             .filter(|&last| training.best_epoch > last)
@@ -409,9 +408,9 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         (baselines.model_based.as_ref()).and_then(|errors| unmeasured("scores.baselines.model_based", errors, problem)),
     ];
     let is_placed = |position: &TargetPosition| position.target < problem.targets.len();
-    let problem_defect = match simulated {
-        Some(settings) if *problem != settings.source.problem() => Some("problem: it does not match the array"),
-        None if problem.has_nodes => Some("problem: the targets of a recording are not nodes"),
+    let problem_defect = match simulation {
+        Some(simulation) if *problem != simulation.problem() => Some("problem: it does not match the array"),
+        None if problem.has_nodes() => Some(NODES_OF_RECORDING),
         None if problem
             .memory
             .as_ref()
@@ -434,26 +433,19 @@ pub(super) fn settings_defect(settings: &RunSettings, recorded: Option<&Recorded
         .training
         .check()
         .map_err(|defect| at("settings.training", &defect));
-    let source = match settings.simulated() {
-        Some(settings) => [
-            settings.check_counts().map_err(|defect| at("settings", &defect)),
-            (settings.source.sensor.check()).map_err(|defect| at("settings.source.sensor", &defect)),
-            (settings.source.scene.check()).map_err(|defect| at("settings.source.scene", &defect)),
-        ],
-        None => [
-            settings.check_network().map_err(|defect| at("settings", &defect)),
-            Ok(()),
-            Ok(()),
-        ],
-    };
-    let is_recording = settings.source.simulation().is_none();
-    let recorded = match recorded {
-        Some(_) if !is_recording => Err("recorded: the source is a simulated array".to_owned()),
-        None if is_recording => Err("recorded: it is missing".to_owned()),
+    let counts = settings.check_counts().map_err(|defect| at("settings", &defect));
+    let source = settings
+        .simulation()
+        .map_or(Ok(()), |Simulation { sensor, scene, .. }| {
+            (sensor.check()).map_err(|defect| at("settings.source.sensor", &defect))?;
+            (scene.check()).map_err(|defect| at("settings.source.scene", &defect))
+        });
+    let recorded = match (settings.simulation(), recorded) {
+        (Some(_), Some(_)) => Err("recorded: the source is a simulated array".to_owned()),
+        (None, None) => Err("recorded: it is missing".to_owned()),
         _ => Ok(()),
     };
-    let checks = source.into_iter().chain([training, recorded]);
-    checks.into_iter().find_map(Result::err)
+    [counts, source, training, recorded].into_iter().find_map(Result::err)
 }
 
 fn starts_defect(file: &NetworkFile) -> Option<String> {
@@ -476,7 +468,7 @@ fn starts_defect(file: &NetworkFile) -> Option<String> {
 
 fn number_defect(network: &Networks, settings: &RunSettings, row_wires: Option<&[usize]>) -> Option<String> {
     let found = network.values().len();
-    match settings.simulated().map(|settings| settings.source) {
+    match settings.simulation() {
         Some(source) => match source.model_size() {
             Ok(size) if size.networks == found => None,
             Ok(size) => Some(format!(
@@ -511,11 +503,10 @@ fn mismatch(network: &DecouplingNetwork, problem: &Problem, hidden: usize) -> Op
 
 /// Describes the first coordinate whose training range is out of reach of the nodes of the scene, even with a margin of
 /// one stroke. Networks whose sizes or number do not match the settings are not checked.
-fn place_defect(networks: &Networks, settings: &SimulatedSettings) -> Option<String> {
-    let source = &settings.source;
-    let (sensor, scene) = (&source.sensor, &source.scene);
+fn place_defect(networks: &Networks, simulation: &Simulation) -> Option<String> {
+    let Simulation { sensor, scene, .. } = simulation;
     let rows = scene.rows.read(sensor.scale.rows()).ok()?;
-    let spare_mm = source.stroke_mm() + scene.movement.largest_shift_mm();
+    let spare_mm = simulation.stroke_mm() + scene.movement.largest_shift_mm();
     for (index, network) in networks.values().iter().enumerate() {
         let outputs = network.outputs();
         let rows = match networks.only() {
@@ -549,8 +540,8 @@ fn place_defect(networks: &Networks, settings: &SimulatedSettings) -> Option<Str
 
 fn unmeasured(place: &str, errors: &TestErrors, problem: &Problem) -> Option<String> {
     match errors {
-        TestErrors::Nodes(_) if !problem.has_nodes => return Some(format!("{place}: the targets are not nodes")),
-        TestErrors::Targets(_) if problem.has_nodes => return Some(format!("{place}: the targets are nodes")),
+        TestErrors::Nodes(_) if !problem.has_nodes() => return Some(format!("{place}: the targets are not nodes")),
+        TestErrors::Targets(_) if problem.has_nodes() => return Some(format!("{place}: the targets are nodes")),
         TestErrors::Targets(targets) if targets.len() != problem.targets.len() => {
             let (found, expected) = (targets.len(), problem.targets.len());
             return Some(format!("{place}: {found} of them for {expected} targets"));

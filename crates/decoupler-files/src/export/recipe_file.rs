@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{DocumentError, DocumentKind, WriteError, atomic_write, document::PROGRAM, unfinished::folder_of};
 use crate::import::{Plan, Setup};
-use decoupler_core::evaluation::{SimulatedSettings, Simulation, Source};
+use decoupler_core::{dataset::Simulation, evaluation::RunSettings};
 
 const KIND: DocumentKind = DocumentKind::Recipe;
 
@@ -57,10 +57,10 @@ impl From<&Plan> for RecipeSource {
 
 impl From<&Setup> for RecipeSource {
     fn from(setup: &Setup) -> Self {
-        match (setup.plan(), setup.settings().source) {
+        match (setup.plan(), setup.settings().simulation()) {
             (Some(plan), _) => plan.into(),
-            (None, Source::Simulated(simulation)) => simulation.into(),
-            (None, Source::Measured(_)) => unreachable!("the setup of a recording has a plan"),
+            (None, Some(simulation)) => (*simulation).into(),
+            (None, None) => unreachable!("the setup of a recording has a plan"),
         }
     }
 }
@@ -129,9 +129,7 @@ impl RecipeFile {
 fn check(source: Simulation) -> Result<(), String> {
     source.sensor.check().map_err(|error| error.to_string())?;
     source.scene.check().map_err(|error| error.to_string())?;
-    let settings = SimulatedSettings {
-        source,
-        ..SimulatedSettings::default()
-    };
-    settings.check_counts().map_err(|error| error.to_string())
+    RunSettings::from(source)
+        .check_counts()
+        .map_err(|error| error.to_string())
 }

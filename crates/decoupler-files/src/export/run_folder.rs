@@ -46,7 +46,7 @@ pub struct KeptRun {
 pub struct RunSummary {
     /// Settings, and the plan of a recording.
     pub setup: Setup,
-    /// `true` if the targets are nodes of an array: [`Problem::has_nodes`](decoupler_core::evaluation::Problem).
+    /// `true` if the targets are nodes of an array: [`Problem::has_nodes`](decoupler_core::problem::Problem).
     pub has_nodes: bool,
     /// Error on the test set in percent.
     pub percent: Option<f64>,
@@ -59,7 +59,7 @@ impl RunSummary {
     pub fn of(file: &NetworkFile) -> Self {
         Self {
             setup: file.setup(),
-            has_nodes: file.problem.has_nodes,
+            has_nodes: file.problem.has_nodes(),
             percent: file.scores.network.percent(),
             seconds: file.training.seconds,
         }

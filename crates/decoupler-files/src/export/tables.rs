@@ -3,13 +3,14 @@ use std::io::{self, Write};
 use decoupler_core::{
     dataset::{Dataset, Seed, SplitBy, Stream},
     evaluation::{
-        Channel, Coverage, DecoderReport, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, HalfWidth, Intervals,
-        Problem, Scores, TargetErrors, TargetPosition, TestErrors,
+        Coverage, DecoderReport, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, HalfWidth, Intervals, Scores,
+        TargetErrors, TestErrors,
         recorded::{
             ChannelRemark, Determinacy, Determination, Findings, FittedModel, TargetFindings, Undetermined,
             target_remarks,
         },
     },
+    problem::{Channel, Problem, TargetPosition},
     text::in_one_line,
     training::EpochRecord,
 };
@@ -47,7 +48,7 @@ pub fn error_table(table: &ErrorTable) -> Table {
 /// Returns the table of measured decoders: for an array a row for each, and the `model_based` errors if they exceed
 /// rounding errors; for a recording a row for each decoder and target.
 pub fn decoder_table(problem: &Problem, reports: &[DecoderReport], model_based: Option<&TestErrors>) -> Table {
-    if problem.has_nodes {
+    if problem.has_nodes() {
         array_decoder_table(reports, model_based.and_then(TestErrors::nodes))
     } else {
         recording_decoder_table(problem, reports)
@@ -411,6 +412,7 @@ pub fn describe_worse_than_ridge(problem: &Problem, scores: &Scores) -> Option<S
 #[cfg(test)]
 mod tests {
     use super::*;
+    use decoupler_core::dataset::Simulation;
 
     #[test]
     fn an_error_table_has_gaps_where_the_paper_gives_no_error() {
@@ -419,8 +421,7 @@ mod tests {
             errors: vec![Some(2.28), Some(0.22), Some(2.39e-12), None, None, None],
         };
         let problem = Problem {
-            has_nodes: true,
-            memory: None,
+            sensor: Some(Simulation::default()),
             ..Problem::default()
         };
         let mut errors = ErrorTable::new(&problem, &[]);

@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use decoupler_core::{
     decoupling::Precision,
-    evaluation::{RecordedSize, RunSettings, TradeOffCost, TradeOffLevel, TradeOffPoint, Workload, WorkloadTime},
+    evaluation::{RunSettings, TradeOffCost, TradeOffLevel, TradeOffPoint, TrainingSize, Workload, WorkloadTime},
     machine::MemorySource,
     text::counted,
 };
@@ -53,7 +53,7 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
                 point
                     .method()
                     .map_or(Cell::Number(None), |method| method.short_name().into()),
-                count(point.settings.source.simulation().map(|simulation| simulation.samples)),
+                count(point.settings.simulation().map(|simulation| simulation.samples)),
                 count(hidden.map(|_| point.settings.training.stopping.epochs)),
                 report.errors.percent().into(),
                 report.errors.nodes().map(|errors| errors.z_mm).into(),
@@ -155,10 +155,10 @@ pub fn describe_workload(workload: &Workload) -> String {
 /// Describes the time that a training on a recording will take on this machine, and if it is more than a minute, what
 /// would take less; `None` if it is below ten seconds. The first call measures the speed of the machine, which takes
 /// about 20 ms.
-pub fn describe_recorded_workload(settings: &RunSettings, size: RecordedSize) -> Option<String> {
+pub fn describe_recorded_workload(settings: &RunSettings, size: TrainingSize) -> Option<String> {
     const SHORT: Duration = Duration::from_secs(10);
     const LONG: Duration = Duration::from_secs(60);
-    let workload = Workload::of_recording(settings, size);
+    let workload = Workload::of(settings, size);
     let WorkloadTime { epoch, all_epochs, .. } = workload.time();
     if all_epochs < SHORT {
         return None;
@@ -199,7 +199,7 @@ mod tests {
 
     #[test]
     fn a_long_training_on_a_recording_is_announced_with_faster_methods() {
-        let size = |inputs| RecordedSize {
+        let size = |inputs| TrainingSize {
             samples: 10_000,
             inputs,
             targets: 3,

@@ -1,7 +1,7 @@
 //! Distribution of the errors of nodes or of a target of a recording, and decoded against actual values with the fitted
 //! line.
 
-use decoupler_core::{dataset::Dataset, evaluation::Channel, text::format_number};
+use decoupler_core::{dataset::Dataset, problem::Channel, text::format_number};
 use ndarray::Array2;
 
 use super::{

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use decoupler_core::evaluation::{Channel, Intervals};
+use decoupler_core::{evaluation::Intervals, problem::Channel};
 use ndarray::Array2;
 
 use super::{

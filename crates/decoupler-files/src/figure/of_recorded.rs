@@ -4,7 +4,8 @@
 use std::{ops::RangeInclusive, sync::Arc};
 
 use decoupler_core::{
-    evaluation::{Channel, TargetPosition, recorded::HysteresisLoop},
+    evaluation::recorded::HysteresisLoop,
+    problem::{Channel, TargetPosition},
     surface::{SurfaceError, SurfaceMap},
     text::{counted, format_number},
 };

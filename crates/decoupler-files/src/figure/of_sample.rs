@@ -1,10 +1,7 @@
 //! Figures of all targets of one sample, of the singular values of each row, and of decoupled next to actual nodes.
 
 use decoupler_core::{
-    dataset::Dataset,
-    evaluation::{Channel, NodeAddress},
-    identifiability::Identifiability,
-    text::format_number,
+    dataset::Dataset, evaluation::NodeAddress, identifiability::Identifiability, problem::Channel, text::format_number,
 };
 use glam::DVec3;
 use ndarray::Array2;

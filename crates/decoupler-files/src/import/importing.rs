@@ -7,7 +7,7 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, History, Memory, MemoryError},
-    evaluation::{Channel, Problem, TargetPosition},
+    problem::{Channel, Problem, TargetPosition},
     text::{counted, in_one_line},
 };
 use serde::Serialize;
@@ -139,7 +139,7 @@ impl Recipe {
             targets,
             memory,
             positions,
-            has_nodes: false,
+            sensor: None,
         };
         let recording = Recording {
             set: Dataset::new(readings, targets_of_rows, row_wires.as_deref(), groups)?,

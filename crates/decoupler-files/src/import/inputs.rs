@@ -2,7 +2,7 @@ use std::path::Path;
 
 use decoupler_core::{
     dataset::{History, RowOrder},
-    evaluation::{Channel, Problem},
+    problem::{Channel, Problem},
     text::{clean_name, counted},
 };
 use ndarray::Array2;

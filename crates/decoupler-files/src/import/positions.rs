@@ -11,7 +11,7 @@ use thiserror::Error;
 use super::{
     Cells, Column, DialectChoice, Format, ImportError, Table, TableError, Watch, csv_table::Reading, importing::read,
 };
-use decoupler_core::evaluation::{Channel, TargetPosition};
+use decoupler_core::problem::{Channel, TargetPosition};
 
 /// Columns of the table.
 const COLUMNS: [&str; 3] = ["target", "x", "y"];

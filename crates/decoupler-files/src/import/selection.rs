@@ -9,7 +9,7 @@ use super::{
 };
 use decoupler_core::{
     dataset::{History, Memory, RowOrder, Series},
-    evaluation::Channel,
+    problem::Channel,
     text::counted,
 };
 use ndarray::Array2;

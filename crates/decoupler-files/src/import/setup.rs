@@ -2,7 +2,7 @@ use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use decoupler_core::{
     evaluation::{
-        Begin, Intervals, NoIntervals, Run, RunError, RunSets, RunSettings, SimulatedSettings, Source,
+        Begin, Intervals, NoIntervals, Run, RunError, RunSets, RunSettings,
         experiments::{ExperimentRecording, RecordedSamples, TrialSamples},
     },
     job::{Cancelled, Job},
@@ -68,10 +68,11 @@ pub enum SetupError {
     OtherSamples(String),
 }
 
-impl From<SimulatedSettings> for Setup {
-    fn from(settings: SimulatedSettings) -> Self {
+impl From<RunSettings> for Setup {
+    /// Returns the setup of a simulated array. That of a recording lacks its plan: it has no [sets](Setup::sets).
+    fn from(settings: RunSettings) -> Self {
         Self {
-            settings: settings.into(),
+            settings,
             plan: None,
             is_stored: false,
         }
@@ -84,10 +85,7 @@ impl Setup {
     /// # Panics
     /// If the source of `settings` is simulated.
     pub fn recording(settings: RunSettings, plan: Plan) -> Self {
-        assert!(
-            matches!(settings.source, Source::Measured(_)),
-            "the source is a recording"
-        );
+        assert!(settings.simulation().is_none(), "the source is a recording");
         Self {
             settings,
             plan: Some(plan),
@@ -97,7 +95,7 @@ impl Setup {
 
     /// Returns the setup with these settings; `None` unless a plan is given for a measured source and only for that.
     pub fn of(settings: RunSettings, plan: Option<Plan>) -> Option<Self> {
-        let is_recording = matches!(settings.source, Source::Measured(_));
+        let is_recording = settings.simulation().is_none();
         (is_recording == plan.is_some()).then_some(Self {
             settings,
             plan,
@@ -134,11 +132,6 @@ impl Setup {
         }
     }
 
-    /// Returns the settings of a simulated run; `None` for a recording.
-    pub fn simulated(&self) -> Option<SimulatedSettings> {
-        self.settings.simulated()
-    }
-
     /// Returns the plan of a recording; `None` for a simulated array.
     pub fn plan(&self) -> Option<&Plan> {
         self.plan.as_ref()
@@ -146,10 +139,10 @@ impl Setup {
 
     /// Returns the name of the source: the array scale, or the stem of the first file.
     pub fn source_name(&self) -> String {
-        match (&self.plan, &self.settings.source) {
+        match (&self.plan, self.settings.simulation()) {
             (Some(plan), _) => clean_name(&plan.import.data.file_stem().unwrap_or_default().to_string_lossy()),
-            (None, Source::Simulated(simulation)) => simulation.sensor.scale.to_string(),
-            (None, Source::Measured(_)) => String::new(),
+            (None, Some(simulation)) => simulation.sensor.scale.to_string(),
+            (None, None) => String::new(),
         }
     }
 
@@ -165,8 +158,7 @@ impl Setup {
         on_progress: &mut dyn FnMut(Progress),
     ) -> Result<SetupSets, SetupError> {
         let Some(plan) = &self.plan else {
-            let settings = self.settings.simulated().expect("a setup without a plan is simulated");
-            let sets = RunSets::draw(&settings, memory_budget(), job)?;
+            let sets = RunSets::draw(&self.settings, memory_budget(), job)?;
             return Ok(SetupSets { sets, recordings: None });
         };
         self.check_files()?;

@@ -12,9 +12,9 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::{Seed, SplitBy},
+    dataset::{Seed, Simulation, SplitBy},
     evaluation::{
-        Begin, CrossValidation, Measured, Run, RunSets, RunSettings, SimulatedSettings, Simulation, TestErrors,
+        Begin, CrossValidation, Measured, Run, RunSets, RunSettings, TestErrors,
         experiments::{
             Axis, AxisKind, Experiment, ExperimentError, ExperimentResults, SummaryErrors, Trial, TrialSamples,
             run_experiments,
@@ -32,18 +32,19 @@ use decoupler_files::{
 };
 
 /// Settings that train in less than a second: a small array, few samples, few epochs.
-fn small_settings() -> SimulatedSettings {
-    let mut base = SimulatedSettings {
+fn small_settings() -> RunSettings {
+    let mut base = RunSettings {
         source: Simulation {
             sensor: SensorModel::new("4x2_1x6".parse().unwrap()),
             samples: 40,
             validation_samples: 12,
             test_samples: 20,
             ..Simulation::default()
-        },
+        }
+        .into(),
         hidden: 3,
         starts: 2,
-        ..SimulatedSettings::default()
+        ..RunSettings::default()
     };
     base.training.stopping.epochs = 8;
     base
@@ -51,7 +52,7 @@ fn small_settings() -> SimulatedSettings {
 
 fn small(axis: Axis) -> Experiment {
     Experiment {
-        base: small_settings().into(),
+        base: small_settings(),
         recording: None,
         axis,
         second_axis: None,
@@ -136,9 +137,9 @@ fn a_trial_equals_the_run_with_its_settings() {
     for cell in &run(std::slice::from_ref(&experiment), 2)[0].cells {
         let mut z_percent = Vec::new();
         for (trial, seed) in cell.trials.iter().zip(0..3) {
-            let settings = SimulatedSettings {
+            let settings = RunSettings {
                 seed: Seed(seed),
-                ..cell.cell.settings.simulated().unwrap()
+                ..cell.cell.settings
             };
             let mut alone = Run::prepare(settings).unwrap();
             while alone.step().is_none() {}
@@ -148,7 +149,7 @@ fn a_trial_equals_the_run_with_its_settings() {
             assert_eq!([&trial.mean, &trial.linear], [&baselines.mean, &baselines.linear]);
             let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
             let begin = Begin::Resume(trial.states.clone());
-            let taken_up = Run::new(settings.into(), sets, begin, &Job::UNINTERRUPTED).unwrap();
+            let taken_up = Run::new(settings, sets, begin, &Job::UNINTERRUPTED).unwrap();
             assert_eq!(taken_up.network(), alone.network());
             assert_eq!(taken_up.stop_reason(), alone.stop_reason());
             z_percent.push(alone.errors().percent().unwrap());
@@ -248,9 +249,9 @@ fn cancelling_does_not_wait_for_a_training_to_end() {
 #[test]
 fn a_cell_that_cannot_be_trained_gives_the_reason_and_the_others_continue() {
     let mut settings = small_settings();
-    settings.source.sensor = SensorModel::new("1x32_5x96".parse().unwrap());
+    settings.simulation_mut().unwrap().sensor = SensorModel::new("1x32_5x96".parse().unwrap());
     let mut experiment = small(Axis::integers(AxisKind::Hidden, [2, 512]));
-    experiment.base = settings.into();
+    experiment.base = settings;
     experiment.base.starts = 1;
     let by_name = |method: &Method| method.to_string().contains("Bayesian");
     experiment.base.training.method = Method::all().into_iter().find(by_name).unwrap();

@@ -4,8 +4,8 @@ use decoupler_core::{
     dataset::{Dataset, PerRow, Split, SplitBy},
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        Begin, CrossValidation, DecoderSet, ErrorTable, Measured, Run, RunError, RunSets, RunSettings,
-        SimulatedSettings, Source, TargetErrors,
+        Begin, CrossValidation, DecoderSet, ErrorTable, Measured, Run, RunError, RunSets, RunSettings, Source,
+        TargetErrors,
     },
     job::Job,
     network::{InputChoice, Quantity, ScalingChoice},
@@ -152,7 +152,7 @@ fn every_decoder_without_a_sensor_model_is_measured() {
     for kind in DecoderKind::ALL {
         let report = decoders.measure(kind, Precision::Double, &test).unwrap();
         assert_eq!(report.is_none(), kind.needs_sensor(), "{kind}");
-        let is_offered = DecoderSet::kinds(&settings.source).any(|(offered, _)| offered == kind);
+        let is_offered = DecoderSet::kinds(run.problem()).any(|(offered, _)| offered == kind);
         assert_eq!(is_offered, report.is_some(), "{kind}");
         if let Some(report) = report {
             let targets = report.errors.targets();
@@ -228,8 +228,10 @@ fn mismatched_sets_are_named() {
     };
     let message = run(RowModel::Each, &lacking, set.clone());
     assert!(message.contains("row 2 has no training samples"), "{message}");
-    let mut simulated: RunSettings = SimulatedSettings::default().into();
-    simulated.hidden = 2;
+    let simulated = RunSettings {
+        hidden: 2,
+        ..RunSettings::default()
+    };
     let nameless = Dataset::new(Array2::zeros((4, 3)), Array2::zeros((4, 2)), None, vec![0; 4]).unwrap();
     let nameless = Split {
         training: nameless.clone(),

@@ -1,10 +1,10 @@
 //! Samples keep their row-wire in all folds and selections.
 
 use decoupler_core::{
-    dataset::{Dataset, Seed, SplitBy, Stream},
+    dataset::{Dataset, Seed, Simulation, SplitBy, Stream},
     decoupling::{NewtonDecoder, decode_set},
     evaluation::{
-        CrossValidation, Errors, SimulatedSettings, Simulation,
+        CrossValidation, Errors, RunSettings,
         experiments::{Axis, AxisKind, Experiment, ExperimentError, ExperimentResults, TrialSamples, run_experiments},
     },
     machine::MemoryBudget,
@@ -12,8 +12,8 @@ use decoupler_core::{
     sensor::SensorModel,
 };
 
-fn small(rows: Rows) -> SimulatedSettings {
-    let mut settings = SimulatedSettings {
+fn small(rows: Rows) -> RunSettings {
+    let mut settings = RunSettings {
         source: Simulation {
             sensor: SensorModel::new("4x3_2x9".parse().unwrap()),
             scene: Scene {
@@ -23,9 +23,10 @@ fn small(rows: Rows) -> SimulatedSettings {
             samples: 24,
             validation_samples: 0,
             test_samples: 8,
-        },
+        }
+        .into(),
         hidden: 2,
-        ..SimulatedSettings::default()
+        ..RunSettings::default()
     };
     settings.training.stopping.epochs = 3;
     settings
@@ -35,9 +36,9 @@ fn experiment(rows: Rows, folds: usize, unit: SplitBy) -> Experiment {
     experiment_on(small(rows), folds, unit)
 }
 
-fn experiment_on(settings: SimulatedSettings, folds: usize, unit: SplitBy) -> Experiment {
+fn experiment_on(settings: RunSettings, folds: usize, unit: SplitBy) -> Experiment {
     Experiment {
-        base: settings.into(),
+        base: settings,
         recording: None,
         axis: Axis::integers(AxisKind::Hidden, [2]),
         second_axis: None,
@@ -101,7 +102,7 @@ fn cross_validation_by_samples_works_for_one_row_and_for_known_rows() {
     for rows in [Rows::One(2), Rows::Known] {
         let mut settings = small(rows);
         // Enough samples for every fold to have every row.
-        settings.source.samples = 240;
+        settings.simulation_mut().unwrap().samples = 240;
         let results = finished(experiment_on(settings, 3, SplitBy::Random));
         assert_eq!(results.cells[0].failures, []);
         let errors = &results.cells[0].trials[0].errors;
@@ -160,7 +161,7 @@ fn the_worst_node_is_named_by_its_row_wire() {
 fn folds_are_tested_with_the_noise_of_the_test_set() {
     let z_mm = |sets, relative| {
         let mut settings = small(Rows::All);
-        settings.source.scene.noise = Noise {
+        settings.simulation_mut().unwrap().scene.noise = Noise {
             sets,
             ..Noise::relative(relative)
         };

@@ -1,9 +1,9 @@
 //! Several starts of one run: shared samples, selection of the best start, and independence of threads and pauses.
 
 use decoupler_core::{
-    dataset::Seed,
+    dataset::{Seed, Simulation},
     evaluation::{
-        Begin, MAX_STARTS, Run, RunError, RunSets, SimulatedSettings, Simulation, StartTrainer, Workload, best_start,
+        Begin, MAX_STARTS, Run, RunError, RunSets, RunSettings, StartTrainer, TrainingSize, Workload, best_start,
     },
     job::Job,
     machine::{MemoryBudget, MemorySource},
@@ -11,25 +11,26 @@ use decoupler_core::{
     training::{Method, StopReason, StoppingRules, Trainer, TrainerState},
 };
 
-fn settings(starts: usize) -> SimulatedSettings {
-    let mut settings = SimulatedSettings {
+fn settings(starts: usize) -> RunSettings {
+    let mut settings = RunSettings {
         source: Simulation {
             sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
             samples: 100,
             validation_samples: 40,
             test_samples: 20,
             ..Simulation::default()
-        },
+        }
+        .into(),
         hidden: 4,
         starts,
         seed: Seed(3),
-        ..SimulatedSettings::default()
+        ..RunSettings::default()
     };
     settings.training.stopping.epochs = 12;
     settings
 }
 
-fn trained(settings: SimulatedSettings) -> Run {
+fn trained(settings: RunSettings) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     run
@@ -51,9 +52,9 @@ fn bits(run: &Run) -> Vec<(Vec<u64>, usize, Option<StopReason>)> {
 }
 
 /// Resumes a run of these settings from saved states.
-fn resumed(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
+fn resumed(settings: RunSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
     let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
-    Run::new(settings.into(), sets, Begin::Resume(states), &Job::UNINTERRUPTED)
+    Run::new(settings, sets, Begin::Resume(states), &Job::UNINTERRUPTED)
 }
 
 #[test]
@@ -75,11 +76,12 @@ fn the_first_start_is_the_run_of_one_start_and_the_others_differ() {
 #[test]
 fn the_start_with_the_lowest_validation_error_is_best() {
     for validation_samples in [40, 0] {
-        let run = trained(SimulatedSettings {
+        let run = trained(RunSettings {
             source: Simulation {
                 validation_samples,
-                ..settings(4).source
-            },
+                ..*settings(4).simulation().unwrap()
+            }
+            .into(),
             ..settings(4)
         });
         let starts = run.starts();
@@ -193,13 +195,13 @@ fn too_many_starts_are_refused() {
             "{message}"
         );
     }
-    let wide = SimulatedSettings {
+    let wide = RunSettings {
         hidden: 512,
         starts: 100,
         ..settings(1)
     };
     let memory = MemoryBudget {
-        bytes: Workload::of(&wide).unwrap().bytes - 1,
+        bytes: Workload::of(&wide, TrainingSize::drawn(&wide).unwrap()).bytes - 1,
         source: MemorySource::User,
     };
     let error = RunSets::draw(&wide, memory, &Job::UNINTERRUPTED).err().unwrap();

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use decoupler_core::{
-    dataset::Seed,
+    dataset::{Seed, Simulation},
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        Begin, DecoderSet, Outlook, Preset, Run, RunError, RunSets, SimulatedSettings, Simulation, TradeOffPoint,
-        fastest_under, measure_trade_off, most_accurate_under,
+        Begin, DecoderSet, Outlook, Preset, Run, RunError, RunSets, RunSettings, TradeOffPoint, fastest_under,
+        measure_trade_off, most_accurate_under,
     },
     job::Job,
     machine::MemoryBudget,
@@ -18,15 +18,16 @@ use decoupler_core::{
 use decoupler_files::{export::NetworkFile, import::Setup};
 
 /// Known rows of a small array, quick to train.
-fn small() -> SimulatedSettings {
-    let mut settings = SimulatedSettings {
+fn small() -> RunSettings {
+    let mut settings = RunSettings {
         source: Simulation {
             sensor: SensorModel::new("3x4_2x12".parse().unwrap()),
             samples: 900,
             validation_samples: 90,
             test_samples: 60,
-            ..Preset::Best.settings().source
-        },
+            ..*Preset::Best.settings().simulation().unwrap()
+        }
+        .into(),
         hidden: 6,
         ..Preset::Best.settings()
     };
@@ -34,7 +35,7 @@ fn small() -> SimulatedSettings {
     settings
 }
 
-fn trained(settings: SimulatedSettings) -> Run {
+fn trained(settings: RunSettings) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     run
@@ -43,14 +44,10 @@ fn trained(settings: SimulatedSettings) -> Run {
 fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
     let set = DecoderSet::new(
         *run.settings(),
-        RunSets::draw(
-            &run.settings().simulated().unwrap(),
-            MemoryBudget::UNLIMITED,
-            &Job::UNINTERRUPTED,
-        )
-        .unwrap()
-        .split
-        .training,
+        RunSets::draw(run.settings(), MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
+            .unwrap()
+            .split
+            .training,
         Some(run.network()),
     );
     let report = set.measure(kind, precision, run.test()).unwrap().unwrap();
@@ -58,9 +55,9 @@ fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
 }
 
 /// Resumes a run of these settings from saved states.
-fn resumed(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
+fn resumed(settings: RunSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
     let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
-    Run::new(settings.into(), sets, Begin::Resume(states), &Job::UNINTERRUPTED)
+    Run::new(settings, sets, Begin::Resume(states), &Job::UNINTERRUPTED)
 }
 
 #[test]
@@ -93,21 +90,21 @@ fn knowing_the_row_makes_small_networks_accurate_and_newton_makes_them_exact() {
 #[test]
 fn unknown_rows_are_identified() {
     let mut settings = small();
-    settings.source.scene.rows = Rows::All;
+    settings.simulation_mut().unwrap().scene.rows = Rows::All;
     settings.training.stopping.epochs = 20;
     let run = trained(settings);
     assert_eq!(run.network().values().len(), 1);
     assert!(z_percent(&run, DecoderKind::Newton, Precision::Double) < 1e-9);
-    settings.source.scene.noise = Noise::relative(1e-5);
+    settings.simulation_mut().unwrap().scene.noise = Noise::relative(1e-5);
     let set = DecoderSet::new(
-        settings.into(),
+        settings,
         RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
             .unwrap()
             .split
             .training,
         None,
     );
-    let test = settings.source.draw_test(settings.seed).unwrap();
+    let test = settings.simulation().unwrap().draw_test(settings.seed).unwrap();
     let report = set
         .measure(DecoderKind::Newton, Precision::Double, &test)
         .unwrap()
@@ -126,26 +123,26 @@ fn unknown_rows_are_identified() {
 #[test]
 fn with_one_row_only_that_row_is_drawn_and_modelled() {
     let mut settings = small();
-    settings.source.scene.rows = Rows::One(2);
-    settings.source.samples = 300;
+    settings.simulation_mut().unwrap().scene.rows = Rows::One(2);
+    settings.simulation_mut().unwrap().samples = 300;
     let run = trained(settings);
     assert_eq!(run.test().row_count(), 1);
     assert_eq!(run.test().samples(), 60);
     assert!(run.test().targets().iter().step_by(3).all(|&x| x == 10.0));
-    let size = settings.source.model_size().unwrap();
+    let size = settings.simulation().unwrap().model_size().unwrap();
     assert_eq!((size.unknowns, size.equations, size.networks), (4, 12, 1));
     assert!(z_percent(&run, DecoderKind::Polish, Precision::Double) < 1e-9);
-    let known = small().source.model_size().unwrap();
+    let known = small().simulation().unwrap().model_size().unwrap();
     assert_eq!((known.unknowns, known.equations, known.networks), (12, 36, 3));
-    settings.source.scene.movement = Movement::SIDEWAYS;
-    assert_eq!(settings.source.model_size().unwrap().unknowns, 12);
-    settings.source.scene.rows = Rows::One(3);
+    settings.simulation_mut().unwrap().scene.movement = Movement::SIDEWAYS;
+    assert_eq!(settings.simulation().unwrap().model_size().unwrap().unknowns, 12);
+    settings.simulation_mut().unwrap().scene.rows = Rows::One(3);
     assert!(Run::prepare(settings).is_err(), "there is no fourth row");
 }
 
 #[test]
 fn known_rows_resume_from_saved_states_bit_for_bit() {
-    let mut settings = SimulatedSettings { starts: 2, ..small() };
+    let mut settings = RunSettings { starts: 2, ..small() };
     settings.training.stopping.epochs = 12;
     settings.training.stopping.max_fail = 1;
     let whole = trained(settings);
@@ -170,9 +167,8 @@ fn known_rows_resume_from_saved_states_bit_for_bit() {
     file.save(&path).unwrap();
     assert_eq!(NetworkFile::load(&path).unwrap(), file);
     let mut other = file;
-    let mut settings = other.settings.simulated().unwrap();
-    settings.source.scene.rows = Rows::All;
-    other.settings = settings.into();
+    other.settings.simulation_mut().unwrap().scene.rows = Rows::All;
+    other.problem.sensor = other.settings.simulation().copied();
     let message = other.save(&path).unwrap_err().to_string();
     assert!(message.contains("3 of them"), "{message}");
 }
@@ -181,7 +177,7 @@ fn known_rows_resume_from_saved_states_bit_for_bit() {
 #[test]
 fn the_model_based_errors_are_those_of_newton() {
     let mut settings = small();
-    settings.source.test_samples = 300;
+    settings.simulation_mut().unwrap().test_samples = 300;
     for (noise, loading) in [
         (1e-3, Loading::RandomNodes),
         (
@@ -191,8 +187,8 @@ fn the_model_based_errors_are_those_of_newton() {
             },
         ),
     ] {
-        settings.source.scene.noise = Noise::relative(noise);
-        settings.source.scene.loading = loading;
+        settings.simulation_mut().unwrap().scene.noise = Noise::relative(noise);
+        settings.simulation_mut().unwrap().scene.loading = loading;
         settings.training.stopping.epochs = 20;
         let run = trained(settings);
         let percent = run
@@ -212,21 +208,22 @@ fn the_model_based_errors_are_those_of_newton() {
 #[test]
 fn sideways_movement_is_reported_as_ill_conditioned() {
     let mut settings = Preset::Best.settings();
-    let upright = Outlook::of(&settings.source).unwrap();
+    let upright = Outlook::of(settings.simulation().unwrap()).unwrap();
     assert!(upright.warnings.is_empty());
-    settings.source.scene.movement = Movement::SIDEWAYS;
-    let sideways = Outlook::of(&settings.source).unwrap();
+    settings.simulation_mut().unwrap().scene.movement = Movement::SIDEWAYS;
+    let sideways = Outlook::of(settings.simulation().unwrap()).unwrap();
     assert!(sideways.worst_row.condition() > 1e3 * upright.worst_row.condition());
     assert!(!sideways.warnings.is_empty());
 }
 
 #[test]
 fn a_trade_off_has_a_point_for_every_choice() {
-    let mut settings = SimulatedSettings {
+    let mut settings = RunSettings {
         source: Simulation {
             samples: 90,
-            ..small().source
-        },
+            ..*small().simulation().unwrap()
+        }
+        .into(),
         seed: Seed(3),
         ..small()
     };
@@ -235,15 +232,7 @@ fn a_trade_off_has_a_point_for_every_choice() {
     let keep = |_, point: Result<_, _>, _: Option<&_>| points.push(point.unwrap());
     let sets = Setup::from(settings).sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ());
     let sets = sets.unwrap().sets;
-    measure_trade_off(
-        &settings.into(),
-        &sets,
-        &[2, 3],
-        &DecoderKind::ALL,
-        &Job::UNINTERRUPTED,
-        keep,
-    )
-    .unwrap();
+    measure_trade_off(&settings, &sets, &[2, 3], &DecoderKind::ALL, &Job::UNINTERRUPTED, keep).unwrap();
     // Five without a network; network in two precisions and polish, each with two numbers of hidden nodes.
     assert_eq!(points.len(), 5 + 2 * 3);
     assert_eq!(points.iter().filter(|point| point.hidden() == Some(3)).count(), 3);
@@ -259,7 +248,7 @@ fn a_trade_off_has_a_point_for_every_choice() {
     let mut none = 0;
     let count = |_, _: Result<_, _>, _: Option<&_>| none += 1;
     let cancelled = Job::new(&|| true);
-    let measured = measure_trade_off(&settings.into(), &sets, &[2], &DecoderKind::ALL, &cancelled, count);
+    let measured = measure_trade_off(&settings, &sets, &[2], &DecoderKind::ALL, &cancelled, count);
     assert!(matches!(measured, Err(RunError::Cancelled(_))));
     assert_eq!(none, 0);
 }

@@ -224,9 +224,15 @@ fn hollow_marks_of_the_trade_off_mean_32_bits_and_nothing_else() {
     let mut points = Vec::new();
     for preset in Preset::ALL {
         let mut settings = preset.settings();
-        settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
-        (settings.source.samples, settings.source.validation_samples) = (100, 20);
-        (settings.source.test_samples, settings.training.stopping.epochs) = (20, 2);
+        settings.simulation_mut().unwrap().sensor.scale = "4x4_2x12".parse().unwrap();
+        (
+            settings.simulation_mut().unwrap().samples,
+            settings.simulation_mut().unwrap().validation_samples,
+        ) = (100, 20);
+        (
+            settings.simulation_mut().unwrap().test_samples,
+            settings.training.stopping.epochs,
+        ) = (20, 2);
         let on_point = |_, point: Result<_, _>, _: Option<&_>| {
             points.push(TradeOffPoint {
                 preset: Some(preset),
@@ -236,7 +242,7 @@ fn hollow_marks_of_the_trade_off_mean_32_bits_and_nothing_else() {
         let kinds = [DecoderKind::Ridge, DecoderKind::Network];
         let sets = Setup::from(settings).sets("".as_ref(), &Job::UNINTERRUPTED, &mut |_| ());
         let sets = sets.unwrap().sets;
-        measure_trade_off(&settings.into(), &sets, &[3], &kinds, &Job::UNINTERRUPTED, on_point).unwrap();
+        measure_trade_off(&settings, &sets, &[3], &kinds, &Job::UNINTERRUPTED, on_point).unwrap();
     }
     let is_single = |single: bool| {
         let of_bits = points

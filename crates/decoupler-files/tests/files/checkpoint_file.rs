@@ -3,8 +3,8 @@
 use std::{fs, path::PathBuf, time::Duration};
 
 use decoupler_core::{
-    dataset::Seed,
-    evaluation::{Run, SimulatedSettings, Simulation},
+    dataset::{Seed, Simulation},
+    evaluation::{Run, RunSettings},
     job::Job,
     sensor::SensorModel,
     training::{EpochRecord, GradientDescentSettings, Method, StopReason},
@@ -12,26 +12,27 @@ use decoupler_core::{
 use decoupler_files::export::{CheckpointFile, DocumentError, NetworkFile};
 use tempfile::TempDir;
 
-fn settings(method: Method) -> SimulatedSettings {
-    let mut settings = SimulatedSettings {
+fn settings(method: Method) -> RunSettings {
+    let mut settings = RunSettings {
         source: Simulation {
             sensor: SensorModel::new("2x2_2x6".parse().unwrap()),
             samples: 20,
             validation_samples: 8,
             test_samples: 8,
             ..Simulation::default()
-        },
+        }
+        .into(),
         hidden: 2,
         starts: 2,
         seed: Seed(u64::MAX),
-        ..SimulatedSettings::default()
+        ..RunSettings::default()
     };
     settings.training.method = method;
     settings.training.stopping.epochs = 9;
     settings
 }
 
-fn stepped(settings: SimulatedSettings, epochs: usize) -> Run {
+fn stepped(settings: RunSettings, epochs: usize) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     for _ in 0..epochs {
         run.step();
@@ -94,7 +95,7 @@ fn the_wall_time_is_that_of_all_sessions_or_unknown() {
     let cases = [(3, hour), (3, None), (1, hour), (1, None), (3, Some(Duration::MAX))];
     for (starts, saved) in cases {
         let run = stepped(
-            SimulatedSettings {
+            RunSettings {
                 starts,
                 ..settings(Method::default())
             },
@@ -276,9 +277,9 @@ fn invalid_contents_are_refused() {
         (|file| file.settings.seed = Seed(1), "on these samples it is"),
         (
             |file| {
-                let mut settings = file.settings.simulated().unwrap();
-                settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
-                file.settings = settings.into();
+                let mut settings = file.settings;
+                settings.simulation_mut().unwrap().sensor.scale = "2x3_2x9".parse().unwrap();
+                file.settings = settings;
             },
             "the samples have",
         ),

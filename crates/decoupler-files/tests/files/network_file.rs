@@ -3,8 +3,8 @@
 use std::{fs, path::PathBuf};
 
 use decoupler_core::{
-    dataset::Seed,
-    evaluation::{Run, SimulatedSettings, Simulation, TestErrors},
+    dataset::{Seed, Simulation},
+    evaluation::{Run, RunSettings, TestErrors},
     sensor::SensorModel,
 };
 use decoupler_files::export::{DocumentError, NetworkFile};
@@ -13,17 +13,18 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use tempfile::TempDir;
 
 fn trained() -> NetworkFile {
-    let mut settings = SimulatedSettings {
+    let mut settings = RunSettings {
         source: Simulation {
             sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
             samples: 100,
             validation_samples: 20,
             test_samples: 20,
             ..Simulation::default()
-        },
+        }
+        .into(),
         hidden: 5,
         seed: Seed(u64::MAX),
-        ..SimulatedSettings::default()
+        ..RunSettings::default()
     };
     settings.training.stopping.epochs = 8;
     let mut run = Run::prepare(settings).unwrap();
@@ -68,7 +69,7 @@ fn the_text_of_a_file_is_read_back_and_damage_is_reported() {
 #[test]
 fn a_training_in_progress_can_be_saved() {
     let (_folder, path) = place();
-    let mut run = Run::prepare(SimulatedSettings::default()).unwrap();
+    let mut run = Run::prepare(RunSettings::default()).unwrap();
     for epochs in 0..2 {
         let file = NetworkFile::from_run(&run, None).unwrap();
         assert_eq!(
@@ -180,12 +181,12 @@ fn invalid_contents_are_named() {
         (
             "an impossible geometry",
             replaced("\"height_mm\":5.0", "\"height_mm\":-5.0"),
-            "settings.source.sensor: the height is -5 mm",
+            "settings.simulation().unwrap().sensor: the height is -5 mm",
         ),
         (
             "an impossible scene",
             replaced("\"largest_compression\":0.2", "\"largest_compression\":2.0"),
-            "settings.source.scene",
+            "settings.simulation().unwrap().scene",
         ),
         (
             "an impossible setting",

@@ -3,21 +3,25 @@
 
 use std::{collections::BTreeMap, fs, path::Path, sync::Arc, thread};
 
-use decoupler_core::evaluation::{Run, SimulatedSettings, Simulation};
+use decoupler_core::{
+    dataset::Simulation,
+    evaluation::{Run, RunSettings},
+};
 use decoupler_files::export::{KeptRun, KeptRuns, NetworkFile, RunFolder};
 
 fn trained(hidden: usize) -> Arc<NetworkFile> {
-    let mut settings = SimulatedSettings {
+    let mut settings = RunSettings {
         source: Simulation {
             samples: 40,
             validation_samples: 8,
             test_samples: 8,
             ..Simulation::default()
-        },
+        }
+        .into(),
         hidden,
-        ..SimulatedSettings::default()
+        ..RunSettings::default()
     };
-    settings.source.sensor.scale = "4x3_2x9".parse().unwrap();
+    settings.simulation_mut().unwrap().sensor.scale = "4x3_2x9".parse().unwrap();
     settings.training.stopping.epochs = 4;
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}

@@ -4,7 +4,7 @@ use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
 
 use decoupler_core::{
     dataset::{Memory, MemoryStream, Span},
-    evaluation::{Channel, Problem},
+    problem::{Channel, Problem},
 };
 use decoupler_files::import::{InputLine, InputLines, Recipe};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -140,7 +140,7 @@ fn a_stream_waits_for_its_start_only_as_long_as_that_fits_into_memory() {
         targets: vec![channel("y")],
         memory: None,
         positions: Vec::new(),
-        has_nodes: false,
+        sensor: None,
     };
     let mut lines = lines(&recipe, &problem);
     let line = vec!["1"; 100_000].join(",");

@@ -7,8 +7,8 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::{Division, Seed, SplitBy},
-    evaluation::{Begin, Measured, Run, RunSettings, SimulatedSettings, Simulation, TargetErrors, TestErrors},
+    dataset::{Division, Seed, Simulation, SplitBy},
+    evaluation::{Begin, Measured, Run, RunSettings, TargetErrors, TestErrors},
     job::Job,
     scene::RowModel,
     settings::Value,
@@ -283,9 +283,12 @@ fn no_saved_file_has_an_absolute_path() {
 fn a_run_folder_keeps_runs_of_both_sources() {
     let root = tempfile::tempdir().unwrap();
     let [recordings, runs] = folders(root.path());
-    let mut settings = SimulatedSettings::default();
-    settings.source.sensor.scale = "2x2_2x6".parse().unwrap();
-    (settings.source.samples, settings.source.test_samples) = (20, 8);
+    let mut settings = RunSettings::default();
+    settings.simulation_mut().unwrap().sensor.scale = "2x2_2x6".parse().unwrap();
+    (
+        settings.simulation_mut().unwrap().samples,
+        settings.simulation_mut().unwrap().test_samples,
+    ) = (20, 8);
     settings.training.stopping.epochs = 2;
     let mut simulated = Run::prepare(settings).unwrap();
     while simulated.step().is_none() {}

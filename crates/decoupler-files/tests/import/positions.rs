@@ -2,7 +2,7 @@
 
 use std::{fs, ops::ControlFlow, path::Path};
 
-use decoupler_core::evaluation::TargetPosition;
+use decoupler_core::problem::TargetPosition;
 use decoupler_files::{
     export::RecipeFile,
     import::{ImportError, Plan, PositionsError, Recipe, Recording, holds_positions},

@@ -421,7 +421,7 @@ fn columns_have_names_ranges_units_and_one_meaning() {
     wanted.row_wire = Some("row".into());
     wanted.units = [("y".to_owned(), "V".to_owned())].into();
     let recording = import(&wanted, &folder).unwrap();
-    let titles = |channels: &[decoupler_core::evaluation::Channel]| {
+    let titles = |channels: &[decoupler_core::problem::Channel]| {
         channels.iter().map(|channel| channel.title()).collect::<Vec<_>>()
     };
     assert_eq!(titles(&recording.inputs), ["x (mm)", "y (V)"]);
@@ -530,7 +530,7 @@ fn derived_columns_are_differences_and_ratios_also_with_the_start_of_the_file() 
         derive: recipe.derive[..1].to_vec(),
         ..recipe.clone()
     };
-    let one = decoupler_core::evaluation::Problem {
+    let one = decoupler_core::problem::Problem {
         inputs: problem.inputs[..1].to_vec(),
         ..problem
     };

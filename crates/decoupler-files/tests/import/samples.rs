@@ -18,7 +18,7 @@ fn sample(name: &str) -> PathBuf {
 #[test]
 fn the_network_decodes_the_recording() {
     let file = NetworkFile::load(&sample("network.json")).unwrap();
-    let source = *file.settings.source.simulation().unwrap();
+    let source = *file.settings.simulation().unwrap();
     let (sensor, scale) = (source.sensor, source.sensor.scale);
     let rows = Vec::from_iter(0..scale.rows());
     let reader = BufReader::new(File::open(sample("recording.csv")).unwrap());
@@ -54,7 +54,7 @@ fn the_network_decodes_the_recording() {
 #[test]
 fn the_table_contains_the_readings_of_its_deformation() {
     let file = NetworkFile::load(&sample("network.json")).unwrap();
-    let sensor = file.settings.source.simulation().unwrap().sensor;
+    let sensor = file.settings.simulation().unwrap().sensor;
     let mut table = csv::Reader::from_path(sample("simulated_row.csv")).unwrap();
     let columns = sensor.scale.columns();
     assert_eq!(table.headers().unwrap().len(), 1 + columns + 6);

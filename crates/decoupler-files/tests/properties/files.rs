@@ -4,7 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use decoupler_core::{
     dataset::Dataset,
-    evaluation::{Run, SimulatedSettings},
+    evaluation::{Run, RunSettings},
     job::Job,
     network::{DecouplingNetwork, Mlp},
     training::Method,
@@ -37,10 +37,13 @@ fn sets() -> impl Strategy<Value = Dataset> {
 }
 
 /// Settings of the smallest array with 2 hidden nodes.
-fn small(epochs: usize) -> SimulatedSettings {
-    let mut settings = SimulatedSettings::default();
-    settings.source.sensor.scale = "1x1_1x3".parse().unwrap();
-    (settings.source.samples, settings.source.test_samples) = (20, 10);
+fn small(epochs: usize) -> RunSettings {
+    let mut settings = RunSettings::default();
+    settings.simulation_mut().unwrap().sensor.scale = "1x1_1x3".parse().unwrap();
+    (
+        settings.simulation_mut().unwrap().samples,
+        settings.simulation_mut().unwrap().test_samples,
+    ) = (20, 10);
     settings.hidden = 2;
     settings.training.stopping.epochs = epochs;
     settings

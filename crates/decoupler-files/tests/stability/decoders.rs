@@ -3,7 +3,7 @@
 use decoupler_core::{
     dataset::Dataset,
     decoupling::{DecoderKind, Precision, decode_set},
-    evaluation::{DecoderReport, DecoderSet, Outlook, Run, RunDefect, RunSets, SimulatedSettings},
+    evaluation::{DecoderReport, DecoderSet, Outlook, Run, RunDefect, RunSets, RunSettings},
     machine::MemoryBudget,
     ndarray::Array2,
     scene::{Loading, Rows},
@@ -57,7 +57,7 @@ struct Measured {
     mean_mm: f64,
 }
 
-fn measured(settings: &SimulatedSettings) -> Result<Measured, Verdict> {
+fn measured(settings: &RunSettings) -> Result<Measured, Verdict> {
     let mut run = Run::prepare(*settings).map_err(|error| refused(&error))?;
     while run.step().is_none() {}
     let sets = RunSets::draw(
@@ -66,9 +66,9 @@ fn measured(settings: &SimulatedSettings) -> Result<Measured, Verdict> {
         &decoupler_core::job::Job::UNINTERRUPTED,
     );
     let training = sets.map_err(|error| refused(&error))?.split.training;
-    let set = DecoderSet::new((*settings).into(), training.clone(), Some(run.network()));
+    let set = DecoderSet::new(*settings, training.clone(), Some(run.network()));
     let mut answers = run.test().targets().to_owned();
-    let shared = settings.source.scene.rows == Rows::All;
+    let shared = settings.simulation().unwrap().scene.rows == Rows::All;
     for sample in 0..run.test().samples() {
         let row = run.test().row_index(sample);
         let of_row = if shared { training.clone() } else { training.of_row(row) };
@@ -78,13 +78,13 @@ fn measured(settings: &SimulatedSettings) -> Result<Measured, Verdict> {
     Ok(Measured {
         mean_mm: z_mm(run.test(), &answers),
         defect: run.defect(),
-        outlook: Outlook::of(&settings.source).ok(),
+        outlook: Outlook::of(settings.simulation().unwrap()).ok(),
         run,
         set,
     })
 }
 
-fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKind, precision: Precision) -> Verdict {
+fn judge_decoder(seen: &Measured, settings: &RunSettings, kind: DecoderKind, precision: Precision) -> Verdict {
     let test = seen.run.test();
     let mut decoder = match seen.set.decoder(kind, precision) {
         Ok(Some(decoder)) => decoder,
@@ -118,9 +118,9 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
             "{kind}: {times:.1e} times the error of the mean, without a remark"
         ));
     }
-    let scene = settings.source.scene;
+    let scene = settings.simulation().unwrap().scene;
     let is_exact = kind == DecoderKind::Newton && scene.noise.in_test().is_none() && scene.rows != Rows::All;
-    let stroke_mm = settings.source.stroke_mm();
+    let stroke_mm = settings.simulation().unwrap().stroke_mm();
     if is_exact && errors.worst_mm > 1e-4 * stroke_mm {
         let share = errors.worst_mm / stroke_mm;
         return or_flagged(format!(
@@ -131,8 +131,8 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
 }
 
 /// The model-based row has the errors of Newton's method, and noise that hides everything leaves those of the prior.
-fn judge_model_based(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
-    let scene = settings.source.scene;
+fn judge_model_based(seen: &Measured, settings: &RunSettings) -> Verdict {
+    let scene = settings.simulation().unwrap().scene;
     let baselines = seen.run.baselines().expect("they are measured");
     let Some(found) = baselines.nodes().and_then(|baselines| baselines.model_based) else {
         let note = baselines.model_based_note();
@@ -149,8 +149,8 @@ fn judge_model_based(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
         return wrong(format!("the model-based errors are {found:?}, not {newton:?}"));
     }
     // Every node's depth is uniform, so the mean absolute error without readings is a quarter of the stroke.
-    let (noise, stroke_mm) = (scene.noise, settings.source.stroke_mm());
-    let hides_all = noise.additive_ohm > 1e4 * situations::resistance_ohm(&settings.source.sensor);
+    let (noise, stroke_mm) = (scene.noise, settings.simulation().unwrap().stroke_mm());
+    let hides_all = noise.additive_ohm > 1e4 * situations::resistance_ohm(&settings.simulation().unwrap().sensor);
     let is_independent = scene.loading == Loading::RandomNodes;
     if hides_all && noise.in_test() == noise && is_independent && !(0.2..0.3).contains(&(found.z_mm / stroke_mm)) {
         return wrong(format!(
@@ -161,7 +161,7 @@ fn judge_model_based(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
     Verdict::Right
 }
 
-fn judge(settings: &SimulatedSettings) -> Vec<(String, Verdict)> {
+fn judge(settings: &RunSettings) -> Vec<(String, Verdict)> {
     let seen = match measured(settings) {
         Ok(seen) => seen,
         Err(verdict) => return vec![("prepared".to_owned(), verdict)],

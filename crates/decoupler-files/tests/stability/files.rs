@@ -3,7 +3,7 @@
 use std::{fmt::Display, fs, path::Path};
 
 use decoupler_core::{
-    evaluation::{Run, SimulatedSettings},
+    evaluation::{Run, RunSettings},
     sensor::SensorModel,
 };
 use decoupler_files::{
@@ -20,10 +20,10 @@ const ROOM: &str = "file";
 /// Number of places at which a file is damaged.
 const PLACES: usize = 100;
 
-fn small() -> SimulatedSettings {
+fn small() -> RunSettings {
     let mut settings = situations::ordinary();
-    settings.source.sensor = SensorModel::new("2x2_2x6".parse().unwrap());
-    settings.source.test_samples = 20;
+    settings.simulation_mut().unwrap().sensor = SensorModel::new("2x2_2x6".parse().unwrap());
+    settings.simulation_mut().unwrap().test_samples = 20;
     settings.hidden = 3;
     settings.training.stopping.epochs = 8;
     settings
@@ -77,7 +77,7 @@ fn judge_network(damage: Damage, place: f64) -> Verdict {
         Ok(read) => {
             if read.network.decouple(run.test()) != run.decouple_test() {
                 wrong("a damaged network is read and answers differently")
-            } else if read.settings != small().into() || read.scores.network != run.errors() {
+            } else if read.settings != small() || read.scores.network != run.errors() {
                 wrong("a damaged network is read with other settings or errors")
             } else {
                 Verdict::Right

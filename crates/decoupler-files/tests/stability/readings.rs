@@ -29,11 +29,11 @@ fn remark(run: &Run, readings_ohm: &[f64]) -> Option<String> {
 
 fn judge(noise: Noise, changed: impl Fn(f64) -> f64, is_all: bool) -> Vec<(String, Verdict)> {
     let mut settings = situations::ordinary();
-    settings.source.scene.noise = noise;
+    settings.simulation_mut().unwrap().scene.noise = noise;
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     let set = DecoderSet::new(
-        settings.into(),
+        settings,
         RunSets::draw(
             &settings,
             MemoryBudget::UNLIMITED,
@@ -48,7 +48,7 @@ fn judge(noise: Noise, changed: impl Fn(f64) -> f64, is_all: bool) -> Vec<(Strin
     let count = if is_all { readings.len() } else { 1 };
     readings[..count].iter_mut().for_each(|value| *value = changed(*value));
     let is_resistance = readings.iter().all(|&value| value > 0.0 && value.is_finite());
-    let geometry = settings.source.sensor.geometry;
+    let geometry = settings.simulation().unwrap().sensor.geometry;
     let mut cells = Vec::new();
     for kind in DecoderKind::ALL {
         for &precision in kind.precisions() {

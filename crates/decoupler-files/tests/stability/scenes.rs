@@ -2,7 +2,7 @@
 
 use decoupler_core::{
     dataset::{Dataset, Seed},
-    evaluation::{RunSets, SimulatedSettings},
+    evaluation::{RunSets, RunSettings},
     glam::DVec3,
     machine::MemoryBudget,
     scene::Noise,
@@ -23,7 +23,7 @@ fn largest_ohm(model: &SensorModel) -> f64 {
     rows.fold(0.0, f64::max)
 }
 
-fn judge(settings: &SimulatedSettings) -> Vec<(String, Verdict)> {
+fn judge(settings: &RunSettings) -> Vec<(String, Verdict)> {
     let RunSets { split, test, .. } = match RunSets::draw(
         settings,
         MemoryBudget::UNLIMITED,
@@ -32,16 +32,9 @@ fn judge(settings: &SimulatedSettings) -> Vec<(String, Verdict)> {
         Ok(drawn) => drawn,
         Err(error) => return vec![("drawn".to_owned(), refused(&error))],
     };
-    let noise = settings.source.scene.noise;
-    let clean = SimulatedSettings {
-        source: {
-            let mut source = settings.source;
-            source.scene.noise = Noise::default();
-            source
-        },
-        ..*settings
-    };
-    let truth = clean.source.draw_test(clean.seed).unwrap();
+    let mut clean = *settings.simulation().unwrap();
+    let noise = std::mem::take(&mut clean.scene.noise);
+    let truth = clean.draw_test(settings.seed).unwrap();
     let mut cells = vec![
         ("training readings".to_owned(), judge_finite(&split.training)),
         ("test readings".to_owned(), judge_finite(&test)),
@@ -52,7 +45,7 @@ fn judge(settings: &SimulatedSettings) -> Vec<(String, Verdict)> {
     }
     cells.push((
         "noise of the test set".to_owned(),
-        judge_noise(&truth, &test, noise.in_test(), &settings.source.sensor),
+        judge_noise(&truth, &test, noise.in_test(), &settings.simulation().unwrap().sensor),
     ));
     cells
 }
@@ -65,8 +58,11 @@ fn judge_finite(set: &Dataset) -> Verdict {
     }
 }
 
-fn judge_stroke(set: &Dataset, settings: &SimulatedSettings) -> Verdict {
-    let (height, stroke) = (settings.source.sensor.geometry.height_mm, settings.source.stroke_mm());
+fn judge_stroke(set: &Dataset, settings: &RunSettings) -> Verdict {
+    let (height, stroke) = (
+        settings.simulation().unwrap().sensor.geometry.height_mm,
+        settings.simulation().unwrap().stroke_mm(),
+    );
     let rounding = 1e-15 * height;
     let z = set.targets().into_iter().skip(2).step_by(3).copied();
     let within = height - stroke - rounding..=height + rounding;
@@ -153,11 +149,11 @@ fn judge_noise(truth: &Dataset, noisy: &Dataset, noise: Noise, model: &SensorMod
 }
 
 /// The same seed gives the same bits, a different seed different ones.
-fn judge_seeds(settings: &SimulatedSettings) -> Verdict {
+fn judge_seeds(settings: &RunSettings) -> Verdict {
     let draw = |seed: u64| {
         let mut settings = *settings;
         settings.seed = Seed(seed);
-        settings.source.draw_test(settings.seed)
+        settings.simulation().unwrap().draw_test(settings.seed)
     };
     match (draw(7), draw(7), draw(8)) {
         (Ok(one), Ok(same), Ok(other)) => {

@@ -1,7 +1,8 @@
 //! Simulated settings at their extremes, with a sentence each.
 
 use decoupler_core::{
-    evaluation::{SimulatedSettings, Simulation},
+    dataset::Simulation,
+    evaluation::RunSettings,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Indenter, Loading, Movement, Noise, NoisySets, Rows, Scene},
     sensor::{Geometry, SensorModel},
@@ -10,11 +11,11 @@ use decoupler_core::{
 
 use crate::sensors::in_other_units;
 
-pub(crate) type Situation = (&'static str, String, SimulatedSettings);
+pub(crate) type Situation = (&'static str, String, RunSettings);
 
 /// A small array, slightly larger than the smallest, whose readings determine all deformations.
-pub(crate) fn ordinary() -> SimulatedSettings {
-    SimulatedSettings {
+pub(crate) fn ordinary() -> RunSettings {
+    RunSettings {
         source: Simulation {
             sensor: SensorModel::new("4x3_2x9".parse().unwrap()),
             scene: Scene {
@@ -24,7 +25,8 @@ pub(crate) fn ordinary() -> SimulatedSettings {
             samples: 160,
             validation_samples: 40,
             test_samples: 400,
-        },
+        }
+        .into(),
         inputs: InputChoice {
             quantity: Quantity::Conductance,
             scaling: ScalingChoice::Whitening,
@@ -37,11 +39,11 @@ pub(crate) fn ordinary() -> SimulatedSettings {
                 ..StoppingRules::default()
             },
         },
-        ..SimulatedSettings::default()
+        ..RunSettings::default()
     }
 }
 
-fn changed(change: impl FnOnce(&mut SimulatedSettings)) -> SimulatedSettings {
+fn changed(change: impl FnOnce(&mut RunSettings)) -> RunSettings {
     let mut settings = ordinary();
     change(&mut settings);
     settings
@@ -54,7 +56,7 @@ pub(crate) fn resistance_ohm(model: &SensorModel) -> f64 {
 }
 
 pub(crate) fn noises() -> Vec<(&'static str, String, Noise)> {
-    let ohm = resistance_ohm(&ordinary().source.sensor);
+    let ohm = resistance_ohm(&ordinary().simulation().unwrap().sensor);
     let mut noises = Vec::new();
     for exponent in [-12, -10, -9, -8, -7, -6, -5, -4, -3, -2, -1, 0] {
         let size = 10_f64.powi(exponent);
@@ -125,9 +127,9 @@ fn sizes() -> Vec<Situation> {
     ] {
         for rows in [Rows::All, Rows::Known, Rows::One(0), Rows::One(9)] {
             let settings = changed(|settings| {
-                settings.source.sensor = SensorModel::new(scale.parse().unwrap());
-                settings.source.scene.rows = rows;
-                settings.source.test_samples = 120;
+                settings.simulation_mut().unwrap().sensor = SensorModel::new(scale.parse().unwrap());
+                settings.simulation_mut().unwrap().scene.rows = rows;
+                settings.simulation_mut().unwrap().test_samples = 120;
             });
             found.push(("array sizes and rows", format!("{scale}, rows {rows}"), settings));
         }
@@ -135,10 +137,10 @@ fn sizes() -> Vec<Situation> {
     if !cfg!(debug_assertions) {
         for rows in [Rows::All, Rows::One(0)] {
             let settings = changed(|settings| {
-                settings.source.sensor = SensorModel::new("32x32_16x96".parse().unwrap());
-                settings.source.scene.rows = rows;
-                settings.source.samples = 800;
-                settings.source.test_samples = 64;
+                settings.simulation_mut().unwrap().sensor = SensorModel::new("32x32_16x96".parse().unwrap());
+                settings.simulation_mut().unwrap().scene.rows = rows;
+                settings.simulation_mut().unwrap().samples = 800;
+                settings.simulation_mut().unwrap().test_samples = 64;
             });
             found.push(("array sizes and rows", format!("32x32_16x96, rows {rows}"), settings));
         }
@@ -155,10 +157,10 @@ fn sizes() -> Vec<Situation> {
     ] {
         for rows in [Rows::Known, Rows::All] {
             let settings = changed(|settings| {
-                settings.source.scene.rows = rows;
-                settings.source.samples = samples;
-                settings.source.validation_samples = validation;
-                settings.source.test_samples = test;
+                settings.simulation_mut().unwrap().scene.rows = rows;
+                settings.simulation_mut().unwrap().samples = samples;
+                settings.simulation_mut().unwrap().validation_samples = validation;
+                settings.simulation_mut().unwrap().test_samples = test;
             });
             let sentence = format!("{samples} training, {validation} validation and {test} test samples, rows {rows}");
             found.push(("numbers of samples", sentence, settings));
@@ -167,7 +169,7 @@ fn sizes() -> Vec<Situation> {
     for hidden in [0, 1, 2, 100, 512, 513] {
         let settings = changed(|settings| {
             settings.hidden = hidden;
-            settings.source.sensor = SensorModel::new("1x1_1x3".parse().unwrap());
+            settings.simulation_mut().unwrap().sensor = SensorModel::new("1x1_1x3".parse().unwrap());
         });
         found.push(("hidden nodes", format!("{hidden} hidden nodes"), settings));
     }
@@ -192,24 +194,26 @@ fn lengths() -> Vec<Situation> {
         -1.0,
         f64::NAN,
     ] {
-        let settings = changed(|settings| settings.source.scene.largest_compression = compression);
+        let settings = changed(|settings| settings.simulation_mut().unwrap().scene.largest_compression = compression);
         found.push(("compression", format!("compressed by {compression:e}"), settings));
     }
     for exponent in [-6, -3, 3, 6] {
         let factor = 10_f64.powi(exponent);
         let settings = changed(|settings| {
-            settings.source.sensor.geometry = in_other_units(Geometry::default(), factor);
+            settings.simulation_mut().unwrap().sensor.geometry = in_other_units(Geometry::default(), factor);
         });
         found.push((
             "heights and units of length",
             format!("all lengths times {factor:e}"),
             settings,
         ));
-        let settings = changed(|settings| settings.source.sensor.geometry.height_mm = factor);
+        let settings = changed(|settings| settings.simulation_mut().unwrap().sensor.geometry.height_mm = factor);
         found.push(("heights and units of length", format!("height {factor:e} mm"), settings));
     }
     for exponent in [-300, -150, -12, -6, 6, 12, 150, 300] {
-        let settings = changed(|settings| settings.source.sensor.resistivity_ohm_per_mm = 10_f64.powi(exponent));
+        let settings = changed(|settings| {
+            settings.simulation_mut().unwrap().sensor.resistivity_ohm_per_mm = 10_f64.powi(exponent);
+        });
         found.push(("resistance per mm", format!("1e{exponent} ohm a millimetre"), settings));
     }
     found
@@ -232,9 +236,9 @@ fn loadings() -> Vec<Situation> {
         for movement in movements {
             for rows in [Rows::Known, Rows::All] {
                 let settings = changed(|settings| {
-                    let scene = &mut settings.source.scene;
+                    let scene = &mut settings.simulation_mut().unwrap().scene;
                     (scene.loading, scene.movement, scene.rows) = (loading, movement, rows);
-                    settings.source.test_samples = 120;
+                    settings.simulation_mut().unwrap().test_samples = 120;
                 });
                 found.push((
                     "loadings and axes",
@@ -269,7 +273,7 @@ fn inputs() -> Vec<Situation> {
             ] {
                 let settings = changed(|settings| {
                     settings.inputs = InputChoice { quantity, scaling };
-                    settings.source.scene.noise = noise;
+                    settings.simulation_mut().unwrap().scene.noise = noise;
                 });
                 found.push(("inputs", format!("{quantity:?} {scaling:?}, {noise_name}"), settings));
             }
@@ -283,8 +287,8 @@ pub(crate) fn all() -> Vec<Situation> {
     let noisy = |rows: Rows| {
         noises().into_iter().map(move |(extreme, sentence, noise)| {
             let settings = changed(|settings| {
-                settings.source.scene.noise = noise;
-                settings.source.scene.rows = rows;
+                settings.simulation_mut().unwrap().scene.noise = noise;
+                settings.simulation_mut().unwrap().scene.rows = rows;
             });
             (extreme, format!("{sentence}, rows {rows}"), settings)
         })
@@ -294,9 +298,9 @@ pub(crate) fn all() -> Vec<Situation> {
         .filter(|(extreme, ..)| *extreme != "noise out of range");
     let underdetermined = few.map(|(extreme, sentence, noise)| {
         let settings = changed(|settings| {
-            settings.source.scene.noise = noise;
-            settings.source.sensor = SensorModel::new("4x6_3x4".parse().unwrap());
-            settings.source.test_samples = 120;
+            settings.simulation_mut().unwrap().scene.noise = noise;
+            settings.simulation_mut().unwrap().sensor = SensorModel::new("4x6_3x4".parse().unwrap());
+            settings.simulation_mut().unwrap().test_samples = 120;
         });
         (extreme, format!("{sentence}, fewer readings than unknowns"), settings)
     });

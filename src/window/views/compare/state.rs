@@ -83,10 +83,9 @@ impl Place {
 impl Compared {
     /// Simulates the test set of a run again, or reads it from the files of its recording.
     fn new(file: &NetworkFile, job: &Job<'_>) -> Result<Self, String> {
-        let test = match (file.settings.simulated(), &file.recorded) {
-            (Some(settings), _) => TestSet::Array(TestView::draw(&settings).map_err(|error| error.to_string())?),
-            (None, Some(recorded)) => TestSet::Recording(recorded_test(file, recorded, job)?),
-            (None, None) => return Err("This run has no test samples.".to_owned()),
+        let test = match &file.recorded {
+            None => TestSet::Array(TestView::draw(&file.settings).map_err(|error| error.to_string())?),
+            Some(recorded) => TestSet::Recording(recorded_test(file, recorded, job)?),
         };
         let answers = Arc::new(file.network.decouple(test.set()));
         let drawn = drawn(&test, &answers, 0);
@@ -365,9 +364,8 @@ fn conditions(setup: &Setup) -> String {
         1 => String::new(),
         starts => format!(", {starts} starts"),
     };
-    let simulated = settings.simulated();
-    let samples = simulated.map_or(String::new(), |settings| {
-        format!(", {}", counted(settings.source.samples, "sample"))
+    let samples = settings.simulation().map_or(String::new(), |simulation| {
+        format!(", {}", counted(simulation.samples, "sample"))
     });
     let mut text = format!(
         "{}, {} hidden, {}{samples}, seed {}{starts}",
@@ -376,7 +374,7 @@ fn conditions(setup: &Setup) -> String {
         settings.training.method.short_name(),
         settings.seed
     );
-    for words in simulated.iter().flat_map(differences_from_paper) {
+    for words in differences_from_paper(settings) {
         text += &format!(", {words}");
     }
     text

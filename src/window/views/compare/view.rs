@@ -3,8 +3,10 @@
 use std::{sync::Arc, time::Duration};
 
 use decoupler_core::{
-    evaluation::{Channel, Errors, SimulatedSettings, Simulation, TargetErrors},
+    dataset::Simulation,
+    evaluation::{Errors, RunSettings, TargetErrors},
     network::{InputChoice, Quantity, ScalingChoice},
+    problem::Channel,
     scene::{Loading, Movement, Noise, NoisySets, Rows, Scene},
 };
 use decoupler_files::{
@@ -306,16 +308,18 @@ pub(super) fn compare_exports<'a>(view: &'a CompareView, shared: &'a Shared) -> 
     exports
 }
 
-/// Describes the differences between a run and the paper's scene and inputs; empty if there are none.
-pub fn differences_from_paper(settings: &SimulatedSettings) -> Vec<String> {
-    let paper = SimulatedSettings::default();
-    let (scene, of_paper) = (&settings.source.scene, &paper.source.scene);
+/// Describes the differences between a run on an array and the paper's scene and inputs; empty if there are none.
+pub fn differences_from_paper(settings: &RunSettings) -> Vec<String> {
+    let Some(Simulation { scene, .. }) = settings.simulation() else {
+        return Vec::new();
+    };
+    let of_paper = Scene::default();
     let words = [
         (scene.rows != of_paper.rows).then(|| describe_rows(scene.rows)),
         (scene.movement != of_paper.movement).then(|| describe_movement(scene.movement)),
         (scene.loading != of_paper.loading).then(|| describe_loading(scene)),
         (!scene.noise.is_none()).then(|| format!("noise {}", describe_noise(&scene.noise))),
-        (settings.inputs != paper.inputs).then(|| describe_inputs(settings.inputs)),
+        (settings.inputs != InputChoice::PAPER).then(|| describe_inputs(settings.inputs)),
     ];
     words.into_iter().flatten().collect()
 }
@@ -397,7 +401,7 @@ fn of_nodes(run: &LoadedRun<'_>, figure: fn(&Errors) -> Option<f64>) -> Option<S
 }
 
 fn of_array(run: &LoadedRun<'_>, figure: fn(&Simulation) -> String) -> Option<String> {
-    run.file.settings.source.simulation().map(figure)
+    run.file.settings.simulation().map(figure)
 }
 
 const FIGURES: [(&str, FigureOf); 20] = [
@@ -535,7 +539,7 @@ mod tests {
 
     #[test]
     fn only_differences_from_the_paper_are_listed() {
-        assert!(differences_from_paper(&SimulatedSettings::default()).is_empty());
+        assert!(differences_from_paper(&RunSettings::default()).is_empty());
         let mut best = Preset::Best.settings_in(Noise {
             relative: 1e-3,
             converter_bits: Some(12),
@@ -544,9 +548,9 @@ mod tests {
         });
         let words = ["known rows", "noise 0.001, 12 bits, in test", "conductance, whitened"];
         assert_eq!(differences_from_paper(&best), words);
-        best = SimulatedSettings::default();
-        best.source.scene.rows = Rows::One(2);
-        best.source.scene.loading = Loading::Indenter(Indenter::all()[1]);
+        best = RunSettings::default();
+        best.simulation_mut().unwrap().scene.rows = Rows::One(2);
+        best.simulation_mut().unwrap().scene.loading = Loading::Indenter(Indenter::all()[1]);
         assert_eq!(differences_from_paper(&best), ["row 3 alone", "flat punch"]);
     }
 }

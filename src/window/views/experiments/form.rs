@@ -85,7 +85,7 @@ impl Form {
 
     /// Returns the settings that an axis can vary.
     pub fn offered(&self) -> impl Iterator<Item = AxisKind> + use<> {
-        AxisKind::of_source(&self.template.base.source)
+        AxisKind::of_runs(&self.template.base)
     }
 
     /// Returns the experiment, validated as far as possible without running it.
@@ -225,7 +225,7 @@ impl AxisForm {
 #[cfg(test)]
 mod tests {
     use decoupler_core::{
-        evaluation::{Measured, RunSettings, SimulatedSettings},
+        evaluation::{Measured, RunSettings},
         scene::RowModel,
         training::Method,
     };
@@ -272,7 +272,7 @@ mod tests {
                 .to_string()
                 .contains("no column of groups")
         );
-        form.take(&SimulatedSettings::default().into());
+        form.take(&RunSettings::default().into());
         assert_eq!(form.axes[1].kind, AxisKind::Array);
         assert_eq!(form.template.recording, None);
     }

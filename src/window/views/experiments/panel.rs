@@ -205,7 +205,7 @@ fn base_ui(ui: &mut Ui, form: &mut Form, shared: &Shared) {
     let base = &form.template.base;
     let mut parts = Vec::from_iter(form.setup().map(|setup| setup.source_name()));
     parts.push(counted(base.hidden, "hidden node"));
-    let samples = base.source.simulation().map(|source| counted(source.samples, "sample"));
+    let samples = base.simulation().map(|source| counted(source.samples, "sample"));
     parts.extend(samples);
     parts.push(base.training.method.name().to_owned());
     dim_ui(ui, &format!("{}, unless an axis varies it", parts.join(", ")));

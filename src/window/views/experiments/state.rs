@@ -11,14 +11,12 @@ use std::{
 };
 
 use decoupler_core::{
-    evaluation::{
-        Problem,
-        experiments::{
-            CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, TrialSamples, run_experiments,
-            worker_threads,
-        },
+    evaluation::experiments::{
+        CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, TrialSamples, run_experiments,
+        worker_threads,
     },
     job::Job,
+    problem::Problem,
     training::EpochRecord,
 };
 use decoupler_files::{

@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use crate::window::test_view::Frame;
 use decoupler_core::{
-    evaluation::SimulatedSettings,
+    dataset::Simulation,
     identifiability::{Identifiability, IdentifiabilityError, IdentifiabilityWarning, RowPair},
     scene::{RelativeNoise, RowModel, Scene, SceneError},
     sensor::{SensorError, SensorModel},
@@ -24,12 +24,12 @@ pub struct Question {
 }
 
 impl Question {
-    /// Returns the question for the sensor and the scene of a training, at half the scene's largest compression.
-    pub fn of(settings: &SimulatedSettings) -> Self {
+    /// Returns the question for the sensor and the scene of a simulation, at half the scene's largest compression.
+    pub fn of(simulation: &Simulation) -> Self {
         Self {
-            sensor: settings.source.sensor,
-            scene: settings.source.scene,
-            compression: 0.5 * settings.source.scene.largest_compression,
+            sensor: simulation.sensor,
+            scene: simulation.scene,
+            compression: 0.5 * simulation.scene.largest_compression,
         }
     }
 }
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn the_worst_row_has_the_smallest_singular_value_and_each_node_has_its_value() {
-        let question = Question::of(&SimulatedSettings::default());
+        let question = Question::of(&Simulation::default());
         let found = analysis(&question);
         assert_eq!((found.rows.len(), found.patterns.len()), (10, 1));
         for row in 0..10 {
@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn neighbouring_patterns_have_the_same_sign() {
-        let found = analysis(&Question::of(&SimulatedSettings::default()));
+        let found = analysis(&Question::of(&Simulation::default()));
         let nodes = &found.patterns[0].nodes_mm;
         for row in 1..10 {
             let along: f64 = (0..10)
@@ -237,7 +237,7 @@ mod tests {
 
     #[test]
     fn every_source_of_noise_counts() {
-        let mut question = Question::of(&SimulatedSettings::default());
+        let mut question = Question::of(&Simulation::default());
         question.scene.noise = Noise {
             relative: 3e-3,
             drift: 4e-3,
@@ -253,7 +253,7 @@ mod tests {
 
     #[test]
     fn a_mirrored_layout_gives_a_warning_unless_the_row_is_known() {
-        let mut question = Question::of(&SimulatedSettings::default());
+        let mut question = Question::of(&Simulation::default());
         question.sensor = SensorModel::new("10x6_3x18".parse().unwrap());
         // Column nodes at 7.5, 12.5 and 17.5 mirror the rows about x = 12.5.
         question.sensor.geometry.column_node_x0_mm = 7.5;
@@ -270,7 +270,7 @@ mod tests {
 
     #[test]
     fn each_moving_axis_has_its_pictures_and_invalid_questions_give_a_reason() {
-        let mut question = Question::of(&SimulatedSettings::default());
+        let mut question = Question::of(&Simulation::default());
         question.scene.movement = Movement::SIDEWAYS;
         let found = analysis(&question);
         assert_eq!((found.patterns.len(), found.sensitivities.len()), (3, 3));

@@ -7,7 +7,8 @@ use std::{
 };
 
 use decoupler_core::{
-    evaluation::SimulatedSettings,
+    dataset::Simulation,
+    evaluation::RunSettings,
     scene::Scene,
     sensor::{Axes, SensorModel},
 };
@@ -41,7 +42,7 @@ impl IdentifiabilityView {
     /// Creates the view with the default question; `wake` is called after each answer.
     pub fn new(wake: Wake) -> Self {
         Self {
-            question: Question::of(&SimulatedSettings::default()),
+            question: Question::of(&Simulation::default()),
             analysis: None,
             problem: None,
             is_pending: false,
@@ -59,30 +60,32 @@ impl IdentifiabilityView {
         self.worker.ask(self.question);
     }
 
-    /// Adopts these settings if they have changed since they were last adopted; otherwise changes made here are kept.
-    /// Returns true if they were adopted.
-    pub fn follow(&mut self, settings: &SimulatedSettings) -> bool {
-        let present = (settings.source.sensor, settings.source.scene);
+    /// Adopts this sensor and scene if they have changed since they were last adopted; otherwise changes made here are
+    /// kept. Returns true if they were adopted.
+    pub fn follow(&mut self, simulation: &Simulation) -> bool {
+        let present = (simulation.sensor, simulation.scene);
         if self.followed.replace(present) == Some(present) {
             return false;
         }
-        self.question = Question::of(settings);
+        self.question = Question::of(simulation);
         true
     }
 
-    /// Adopts these settings, discarding changes made here.
-    pub fn take(&mut self, settings: &SimulatedSettings) {
-        self.followed = Some((settings.source.sensor, settings.source.scene));
-        self.question = Question::of(settings);
+    /// Adopts this sensor and scene, discarding changes made here.
+    pub fn take(&mut self, simulation: &Simulation) {
+        self.followed = Some((simulation.sensor, simulation.scene));
+        self.question = Question::of(simulation);
     }
 
     /// Returns these settings with the sensor of the question. Changes made here are kept when these settings come
     /// back.
-    pub fn hand_over(&mut self, settings: &SimulatedSettings) -> SimulatedSettings {
+    pub fn hand_over(&mut self, settings: &RunSettings) -> RunSettings {
         let sensor = self.question.sensor;
-        self.followed = Some((sensor, settings.source.scene));
         let mut settings = *settings;
-        settings.source.sensor = sensor;
+        if let Some(simulation) = settings.simulation_mut() {
+            self.followed = Some((sensor, simulation.scene));
+            simulation.sensor = sensor;
+        }
         settings
     }
 
@@ -171,21 +174,19 @@ mod tests {
         mpsc::{Receiver, channel},
     };
 
-    use decoupler_core::evaluation::SimulatedSettings;
-
     use super::*;
 
     #[test]
     fn changes_are_kept_until_the_settings_change() {
-        let mut settings = SimulatedSettings::default();
+        let mut simulation = Simulation::default();
         let mut state = IdentifiabilityView::new(Arc::new(|| ()));
-        assert!(state.follow(&settings));
+        assert!(state.follow(&simulation));
         state.question.sensor.geometry.height_mm = 7.0;
-        assert!(!state.follow(&settings));
+        assert!(!state.follow(&simulation));
         assert_eq!(state.question.sensor.geometry.height_mm, 7.0);
-        settings.source.scene.largest_compression = 0.4;
-        assert!(state.follow(&settings));
-        assert_eq!(state.question, Question::of(&settings));
+        simulation.scene.largest_compression = 0.4;
+        assert!(state.follow(&simulation));
+        assert_eq!(state.question, Question::of(&simulation));
     }
 
     #[test]
@@ -217,7 +218,7 @@ mod tests {
     #[test]
     fn the_last_answer_is_to_the_newest_question() {
         let (mut worker, wakes) = worker();
-        let mut question = Question::of(&SimulatedSettings::default());
+        let mut question = Question::of(&Simulation::default());
         for step in 1..=40 {
             question.sensor.geometry.height_mm = 0.1 * f64::from(step);
             worker.ask(question);
@@ -236,7 +237,7 @@ mod tests {
     #[test]
     fn an_invalid_question_gives_a_reason() {
         let (mut worker, wakes) = worker();
-        let mut question = Question::of(&SimulatedSettings::default());
+        let mut question = Question::of(&Simulation::default());
         question.sensor.geometry.row_pitch_mm = 0.0;
         worker.ask(question);
         let answer = next_answer(&mut worker, &wakes);

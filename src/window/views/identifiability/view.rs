@@ -30,7 +30,11 @@ impl View for IdentifiabilityView {
 
     /// Shows the sensor and scene of the Train view, with what was last tried on them.
     fn enter(&mut self, shared: &Shared) {
-        if self.follow(&shared.draft) || self.problem.is_some() {
+        let is_other = shared
+            .draft
+            .simulation()
+            .is_some_and(|simulation| self.follow(simulation));
+        if is_other || self.problem.is_some() {
             self.ask();
         }
     }
@@ -112,8 +116,8 @@ pub fn array_form_ui(ui: &mut Ui, view: &mut IdentifiabilityView, shared: &Share
     if question != view.question {
         view.question = question;
         view.ask();
-    } else if is_taken {
-        view.take(&shared.draft);
+    } else if let Some(simulation) = shared.draft.simulation().filter(|_| is_taken) {
+        view.take(simulation);
         view.ask();
     }
 }
@@ -253,13 +257,15 @@ fn form_slider_ui<N: Numeric>(
 fn buttons_ui(ui: &mut Ui, view: &mut IdentifiabilityView, shared: &Shared, effects: &mut Vec<Effect>) -> bool {
     let question = view.question;
     let mut is_taken = false;
-    let can_use = !shared.phase.is_busy() && question.sensor != shared.draft.source.sensor;
+    let of_draft = shared.draft.simulation();
+    let is_other = of_draft.is_some_and(|simulation| question.sensor != simulation.sensor);
+    let can_use = !shared.phase.is_busy() && is_other;
     let why_not = if shared.phase.is_busy() {
         "A training is running in the Train view: its settings cannot be changed now"
     } else {
         "This is already the sensor of the Train view"
     };
-    let can_reset = question != Question::of(&shared.draft);
+    let can_reset = of_draft.is_some_and(|simulation| question != Question::of(simulation));
     ui.vertical_centered_justified(|ui| {
         let button = primary_button("Use this sensor in the Train view");
         let button = ui.add_enabled(can_use, button);

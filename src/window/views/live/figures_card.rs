@@ -90,7 +90,7 @@ pub fn stream_ui(ui: &mut Ui, view: &LiveView) {
 
 fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Shared) {
     let noise = view.network.network(&shared.runs);
-    let noise = noise.and_then(|(_, file)| Some(view.source.noise(&file.settings.simulated()?)));
+    let noise = noise.and_then(|(_, file)| Some(view.source.noise(file.problem.sensor.as_ref()?)));
     let mut residual = format_percent(100.0 * frame.residual);
     if let Some(noise) = noise.filter(|noise| *noise > 0.0 && frame.residual.is_finite()) {
         residual += &format!(" ({} × noise)", format_number(frame.residual / noise));

@@ -7,7 +7,7 @@ use std::{
 };
 
 use decoupler_core::{
-    evaluation::SimulatedSettings,
+    dataset::Simulation,
     scene::{Fault, Rows},
 };
 use decoupler_files::{
@@ -90,9 +90,9 @@ impl Default for SourceForm {
 }
 
 impl SourceForm {
-    /// Returns the noise of a reading, relative to the reading, for a network with these settings.
-    pub fn noise(&self, settings: &SimulatedSettings) -> f64 {
-        let noise = settings.source.scene.noise.in_test();
+    /// Returns the noise of a reading, relative to the reading, for a network of this simulation.
+    pub fn noise(&self, simulation: &Simulation) -> f64 {
+        let noise = simulation.scene.noise.in_test();
         let of_scene = match self.kind {
             _ if !noise.is_none() => noise.relative,
             SourceKind::Simulated => SLIGHT_NOISE,
@@ -153,12 +153,12 @@ impl SourceForm {
         true
     }
 
-    /// Shows the form. `settings` are those of the chosen network if it is of an array; `has_sensor` is false for a
+    /// Shows the form. `simulation` is that of the chosen network if it is of an array; `has_sensor` is false for a
     /// network of a recording. Only the motion of the indenter can be changed while a source is running.
     pub fn form_ui(
         &mut self,
         ui: &mut Ui,
-        settings: Option<&SimulatedSettings>,
+        simulation: Option<&Simulation>,
         has_sensor: bool,
         is_running: bool,
         effects: &mut Vec<Effect>,
@@ -193,7 +193,7 @@ impl SourceForm {
                     dim_ui(ui, if has_sensor { LINES } else { INPUT_LINES });
                 }
             }
-            self.noise_ui(ui, settings);
+            self.noise_ui(ui, simulation);
         });
         if self.kind == SourceKind::Simulated && has_sensor {
             let motions = [
@@ -206,8 +206,8 @@ impl SourceForm {
         }
     }
 
-    fn noise_ui(&mut self, ui: &mut Ui, settings: Option<&SimulatedSettings>) {
-        let Some(settings) = settings else { return };
+    fn noise_ui(&mut self, ui: &mut Ui, simulation: Option<&Simulation>) {
+        let Some(simulation) = simulation else { return };
         let hint = match self.kind {
             SourceKind::Simulated => {
                 "Noise of a simulated reading, relative to the reading (standard deviation). Fault detection uses it."
@@ -217,7 +217,7 @@ impl SourceForm {
                  detection use it: too small a value causes false alarms."
             }
         };
-        let before = self.noise(settings);
+        let before = self.noise(simulation);
         let mut noise = before;
         quantity_ui(ui, "Relative noise", hint, &mut noise, 0.0..=1.0, "");
         if noise != before {
@@ -277,17 +277,17 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         }
         section_heading_ui(ui, "Source");
         let network = view.network.network(&shared.runs).map(|(_, file)| file.clone());
-        let settings = network.as_ref().and_then(|file| file.settings.simulated());
+        let simulation = network.as_ref().and_then(|file| file.problem.sensor);
         let motion = view.source.motion;
         let has_sensor = view.has_sensor(shared);
         view.source
-            .form_ui(ui, settings.as_ref(), has_sensor, view.running.is_some(), effects);
+            .form_ui(ui, simulation.as_ref(), has_sensor, view.running.is_some(), effects);
         if view.source.motion != motion {
             view.command(Command::Move(view.source.motion));
         }
-        if let (SourceKind::Simulated, Some(settings)) = (view.source.kind, settings) {
-            let scale = settings.source.sensor.scale;
-            let read = settings.source.scene.rows.read(scale.rows()).unwrap_or_default();
+        if let (SourceKind::Simulated, Some(simulation)) = (view.source.kind, simulation) {
+            let scale = simulation.sensor.scale;
+            let read = simulation.scene.rows.read(scale.rows()).unwrap_or_default();
             let fault = |view: &LiveView| {
                 let is_possible = view.fault.problem(scale, &read).is_none();
                 view.fault.fault(scale).filter(|_| is_possible)
@@ -481,14 +481,12 @@ impl NetworkChoice {
 
 /// Describes a network in two lines: its array and rows, and its error.
 fn describe_network(file: &NetworkFile) -> (String, String) {
-    let rows = file
-        .settings
-        .simulated()
-        .map(|settings| match settings.source.scene.rows {
-            Rows::All => ", all rows".to_owned(),
-            Rows::Known => ", known rows".to_owned(),
-            Rows::One(row) => format!(", row {} alone", row + 1),
-        });
+    let sensor = file.problem.sensor.as_ref();
+    let rows = sensor.map(|simulation| match simulation.scene.rows {
+        Rows::All => ", all rows".to_owned(),
+        Rows::Known => ", known rows".to_owned(),
+        Rows::One(row) => format!(", row {} alone", row + 1),
+    });
     let source = format!(
         "{}, {} hidden{}",
         file.source_name(),
@@ -496,6 +494,6 @@ fn describe_network(file: &NetworkFile) -> (String, String) {
         rows.unwrap_or_default()
     );
     let error = format_percent(file.scores.network.percent());
-    let name = if file.problem.has_nodes { "Z error" } else { "Error" };
+    let name = if file.problem.has_nodes() { "Z error" } else { "Error" };
     (source, format!("{name} on its test set {error}"))
 }

@@ -106,13 +106,13 @@ impl LiveView {
             .network
             .network(&shared.runs)
             .ok_or("Train a network, or open a network file.")?;
-        let Some(settings) = network.settings.simulated() else {
+        let Some(simulation) = network.problem.sensor else {
             if self.source.kind == SourceKind::Simulated {
                 return Err(NOTHING_TO_SIMULATE.to_owned());
             }
             let plan = LivePlan {
                 network: Arc::clone(network),
-                settings: None,
+                simulation: None,
                 source: self.source.plan(None, at_s)?,
                 noise: 0.0,
                 zero: None,
@@ -120,22 +120,22 @@ impl LiveView {
             };
             return Ok((name.to_owned(), plan));
         };
-        let scale = settings.source.sensor.scale;
-        let read = settings.source.scene.rows.read(scale.rows()).unwrap_or_default();
+        let scale = simulation.sensor.scale;
+        let read = simulation.scene.rows.read(scale.rows()).unwrap_or_default();
         let fault = self
             .fault
             .fault(scale)
             .filter(|_| self.fault.problem(scale, &read).is_none());
         let plan = LivePlan {
             source: self.source.plan(fault, at_s)?,
-            noise: self.source.noise(&settings),
+            noise: self.source.noise(&simulation),
             zero: self
                 .zero
                 .clone()
                 .filter(|zero| zero.is_sound(read.len(), scale.columns())),
             recordings: folder(shared).join("recordings"),
             network: Arc::clone(network),
-            settings: Some(settings),
+            simulation: Some(simulation),
         };
         Ok((name.to_owned(), plan))
     }
@@ -143,7 +143,7 @@ impl LiveView {
     /// Returns true if the network is that of an array, whose sensor model simulates, re-zeroes and finds faults.
     pub(super) fn has_sensor(&self, shared: &Shared) -> bool {
         let network = self.network.network(&shared.runs);
-        network.is_none_or(|(_, file)| file.settings.source.simulation().is_some())
+        network.is_none_or(|(_, file)| file.problem.sensor.is_some())
     }
 
     /// Returns the reason why decoding cannot begin, with what to do.

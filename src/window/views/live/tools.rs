@@ -7,7 +7,7 @@ use std::{
     sync::{Arc, mpsc::Sender},
 };
 
-use decoupler_core::{evaluation::Channel, live::ZeroGains};
+use decoupler_core::{live::ZeroGains, problem::Channel};
 use decoupler_files::{
     export::{Cell, Table, TableColumn, WriteError, atomic_write},
     figure::Figure,

@@ -3,9 +3,9 @@
 use std::{ops::RangeInclusive, str::FromStr};
 
 use decoupler_core::{
-    dataset::LARGEST_SAMPLES,
+    dataset::{LARGEST_SAMPLES, Seed, Simulation},
     decoupling::DecoderKind,
-    evaluation::{Preset, RunSettings, SimulatedSettings, TradeOffLevel, TradeOffPoint},
+    evaluation::{Preset, RunSettings, TradeOffLevel, TradeOffPoint},
     network::LARGEST_HIDDEN,
     scene::{Noise, Scene},
     text::counted,
@@ -148,7 +148,7 @@ impl TradeOffForm {
     /// # Errors
     /// If the form is not a valid measurement.
     pub fn plan(&self, base: &Setup) -> Result<TradeOffPlan, TradeOffFormError> {
-        let has_sensor = base.simulated().is_some();
+        let has_sensor = base.settings().simulation().is_some();
         let chosen = DecoderKind::ALL.into_iter().zip(self.decoders);
         let decoders: Vec<_> = chosen
             .filter(|(kind, is_chosen)| *is_chosen && (has_sensor || !kind.needs_sensor()))
@@ -157,8 +157,8 @@ impl TradeOffForm {
         if decoders.is_empty() {
             return Err(TradeOffFormError::NoDecoder);
         }
-        let levels = match (base.simulated(), base.plan()) {
-            (Some(settings), _) => self.levels_of_array(&settings, &decoders)?,
+        let levels = match (base.settings().simulation(), base.plan()) {
+            (Some(simulation), _) => self.levels_of_array(simulation, base.settings().seed, &decoders)?,
             (None, Some(plan)) => vec![self.level_of_recording(base.settings(), plan, &decoders)?],
             (None, None) => Vec::new(),
         };
@@ -175,7 +175,8 @@ impl TradeOffForm {
     /// Returns a level for each noise, with the sensor and the scene of `base`.
     fn levels_of_array(
         &self,
-        base: &SimulatedSettings,
+        base: &Simulation,
+        seed: Seed,
         decoders: &[DecoderKind],
     ) -> Result<Vec<PlannedLevel>, TradeOffFormError> {
         let presets = match self.presets {
@@ -186,7 +187,7 @@ impl TradeOffForm {
         let level = |noise: f64| {
             let run = |&preset: &Preset| PlannedRun {
                 preset: Some(preset),
-                setup: self.settings(base, preset, noise).into(),
+                setup: self.settings(base, seed, preset, noise).into(),
                 decoders: decoders.to_vec(),
             };
             PlannedLevel {
@@ -199,28 +200,34 @@ impl TradeOffForm {
 
     /// Returns the settings of a preset at a noise level, with the sensor and the scene of `base`. The preset
     /// determines the rows that are read and the inputs of the networks.
-    fn settings(&self, base: &SimulatedSettings, preset: Preset, noise: f64) -> SimulatedSettings {
+    fn settings(&self, base: &Simulation, seed: Seed, preset: Preset, noise: f64) -> RunSettings {
         let noise = Noise {
             relative: noise,
-            ..base.source.scene.noise
+            ..base.scene.noise
         };
-        let mut settings = preset.settings_in(noise);
-        settings.source.sensor = base.source.sensor;
-        settings.seed = base.seed;
-        settings.source.scene = Scene {
-            rows: settings.source.scene.rows,
-            noise,
-            ..base.source.scene
+        let of_preset = preset.simulation_in(noise);
+        let mut source = Simulation {
+            sensor: base.sensor,
+            scene: Scene {
+                rows: of_preset.scene.rows,
+                noise,
+                ..base.scene
+            },
+            test_samples: self.test_samples.clamp(1, LARGEST_SAMPLES),
+            ..of_preset
         };
-        settings.source.test_samples = self.test_samples.clamp(1, LARGEST_SAMPLES);
+        let mut training = preset.settings_in(noise).training;
         if self.thoroughness == Thoroughness::Quick {
-            let source = &mut settings.source;
             source.samples = source.samples.min(self.samples.clamp(1, LARGEST_SAMPLES));
             source.validation_samples = source.validation_samples.min(source.samples.div_ceil(5));
-            let stopping = &mut settings.training.stopping;
-            stopping.epochs = stopping.epochs.min(self.max_epochs());
+            training.stopping.epochs = training.stopping.epochs.min(self.max_epochs());
         }
-        settings
+        RunSettings {
+            source: source.into(),
+            training,
+            seed,
+            ..preset.settings_in(noise)
+        }
     }
 
     /// Returns a run for each method, on the recording that `plan` reads. Decoders without a network do not depend on
@@ -412,7 +419,7 @@ fn marked_ui(
     });
     dim_ui(ui, &format!("{}.", point_facts(point).join("; ")));
     let epochs = counted(point.settings.training.stopping.epochs, "epoch");
-    match point.settings.source.simulation() {
+    match point.settings.simulation() {
         Some(array) => dim_ui(
             ui,
             &format!("{}, at most {epochs}.", counted(array.samples, "training sample")),
@@ -432,14 +439,14 @@ mod tests {
     use super::*;
 
     fn array() -> Setup {
-        SimulatedSettings::default().into()
+        RunSettings::default().into()
     }
 
     /// The settings of the run of a preset at the first level.
-    fn settings(plan: &TradeOffPlan, level: usize, preset: Preset) -> SimulatedSettings {
+    fn settings(plan: &TradeOffPlan, level: usize, preset: Preset) -> RunSettings {
         let mut runs = plan.levels[level].runs.iter();
         let run = runs.find(|run| run.preset == Some(preset)).unwrap();
-        run.setup.simulated().unwrap()
+        *run.setup.settings()
     }
 
     #[test]
@@ -448,18 +455,24 @@ mod tests {
         // Five without a network, then two sizes with two precisions and polish.
         assert_eq!(plan.points(), 4 * 2 * (5 + 2 * 3));
         let best = settings(&plan, 2, Preset::Best);
-        assert_eq!((best.source.samples, best.training.stopping.epochs), (2000, 60));
         assert_eq!(
-            (best.source.scene.rows, best.source.scene.noise.relative),
+            (best.simulation().unwrap().samples, best.training.stopping.epochs),
+            (2000, 60)
+        );
+        assert_eq!(
+            (
+                best.simulation().unwrap().scene.rows,
+                best.simulation().unwrap().scene.noise.relative
+            ),
             (Rows::Known, 1e-3)
         );
     }
 
     #[test]
     fn a_full_measurement_uses_the_presets_in_the_current_scene() {
-        let mut base = SimulatedSettings::default();
-        base.source.scene.largest_compression = 0.1;
-        base.source.sensor.geometry.height_mm = 4.0;
+        let mut base = RunSettings::default();
+        base.simulation_mut().unwrap().scene.largest_compression = 0.1;
+        base.simulation_mut().unwrap().sensor.geometry.height_mm = 4.0;
         let form = TradeOffForm {
             thoroughness: Thoroughness::Full,
             presets: WhichPresets::Only(Preset::Best),
@@ -468,11 +481,11 @@ mod tests {
         let plan = form.plan(&base.into()).unwrap();
         let (settings, preset) = (settings(&plan, 0, Preset::Best), Preset::Best.settings());
         assert_eq!(
-            (settings.source.samples, settings.training),
-            (preset.source.samples, preset.training)
+            (settings.simulation().unwrap().samples, settings.training),
+            (preset.simulation().unwrap().samples, preset.training)
         );
-        assert_eq!(settings.source.sensor, base.source.sensor);
-        assert_eq!(settings.source.scene.largest_compression, 0.1);
+        assert_eq!(settings.simulation().unwrap().sensor, base.simulation().unwrap().sensor);
+        assert_eq!(settings.simulation().unwrap().scene.largest_compression, 0.1);
     }
 
     #[test]

@@ -328,8 +328,8 @@ fn measure_all(plan: &TradeOffPlan, report: &Report<TradeOffEvent>) -> Result<()
     let mut last: Option<(&Setup, SetupSets)> = None;
     for (level, planned) in plan.levels.iter().enumerate() {
         for run in &planned.runs {
-            if let Some(settings) = run.setup.simulated() {
-                let workload = Workload::of_trade_off(&settings, &plan.hidden, &run.decoders);
+            if run.setup.plan().is_none() {
+                let workload = Workload::of_trade_off(run.setup.settings(), &plan.hidden, &run.decoders);
                 let checked = workload.and_then(|workload| workload.check_memory(memory_budget()));
                 checked.map_err(|error| error.to_string())?;
             }

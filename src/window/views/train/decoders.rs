@@ -8,9 +8,10 @@ use std::{cell::RefCell, path::Path, sync::Arc};
 use decoupler_core::{
     dataset::Dataset,
     decoupling::{DecoderKind, Precision},
-    evaluation::{DecoderReport, DecoderSet, ErrorMeasure, Errors, Problem, Source},
+    evaluation::{DecoderReport, DecoderSet, ErrorMeasure, Errors},
     job::Job,
     network::Networks,
+    problem::Problem,
 };
 use decoupler_files::{
     export::{format_number, format_r2},
@@ -74,8 +75,9 @@ impl DecoderMeasuring {
         if let (true, Phase::Paused | Phase::Ended(_), Some((run, of, networks))) = (is_wanted, shared.phase, standing)
         {
             self.of = Some(of);
-            state.measured = Some(DecoderResult::pending(&run.settings().source));
-            self.begin(run.setup.clone(), (**networks).clone(), Arc::clone(run.test.set()));
+            state.measured = Some(DecoderResult::pending(&run.problem));
+            let (problem, test) = (Arc::clone(&run.problem), Arc::clone(run.test.set()));
+            self.begin(run.setup.clone(), problem, (**networks).clone(), test);
         }
     }
 
@@ -84,10 +86,10 @@ impl DecoderMeasuring {
         (self.of, state.measured, self.has_failed) = (None, None, false);
     }
 
-    /// Measures all decoders of `setup` with their trained `networks` on `test`.
-    fn begin(&mut self, setup: Setup, networks: Networks, test: Arc<Dataset>) {
+    /// Measures all decoders of `setup` with their trained `networks` on `test`, which `problem` describes.
+    fn begin(&mut self, setup: Setup, problem: Arc<Problem>, networks: Networks, test: Arc<Dataset>) {
         self.job.start(
-            move |report| measure_all(&setup, networks, &test, report),
+            move |report| measure_all(&setup, &problem, networks, &test, report),
             MeasuringEvent::Ended,
         );
     }
@@ -107,14 +109,14 @@ impl DecoderMeasuring {
     }
 }
 
-fn measure_all(setup: &Setup, networks: Networks, test: &Dataset, report: &Report<MeasuringEvent>) {
+fn measure_all(setup: &Setup, problem: &Problem, networks: Networks, test: &Dataset, report: &Report<MeasuringEvent>) {
     let is_cancelled = || report.is_cancelled();
     let sets = setup.sets(Path::new(""), &Job::new(&is_cancelled), &mut |_| ());
     let set = sets.map_err(|error| error.to_string()).map(|sets| {
         let training = sets.sets.split.training;
         DecoderSet::new(*setup.settings(), training, Some(networks))
     });
-    for (place, wanted) in DecoderResult::pending(&setup.settings().source).into_iter().enumerate() {
+    for (place, wanted) in DecoderResult::pending(problem).into_iter().enumerate() {
         if is_cancelled() {
             return;
         }
@@ -150,14 +152,14 @@ pub struct DecoderResult {
 }
 
 impl DecoderResult {
-    /// All decoders for this source, none measured yet.
-    pub fn pending(source: &Source) -> Vec<Self> {
+    /// All decoders for this problem, none measured yet.
+    pub fn pending(problem: &Problem) -> Vec<Self> {
         let pending = |(kind, precision)| Self {
             kind,
             precision,
             report: None,
         };
-        DecoderSet::kinds(source).map(pending).collect()
+        DecoderSet::kinds(problem).map(pending).collect()
     }
 }
 
@@ -199,7 +201,7 @@ enum Figure {
 impl Figure {
     /// Returns the figures for this problem, from left to right.
     fn of(problem: &Problem, has_model_based: bool) -> Vec<Self> {
-        if !problem.has_nodes {
+        if !problem.has_nodes() {
             return vec![Self::RangePercent, Self::Rmse, Self::R2, Self::FrameTime];
         }
         let figures = [Self::ZPercent, Self::TimesModelBased, Self::Residual, Self::FrameTime].into_iter();
@@ -279,7 +281,7 @@ pub fn decoders_ui(
             }
         });
     focus_ring_ui(ui, &header.header_response);
-    let hint = if problem.has_nodes {
+    let hint = if problem.has_nodes() {
         "Ridge regression, radial-basis network, Newton on Eq. (2) and others on the same test set: errors, times, and \
          ratio to the model-based error."
     } else {
@@ -301,7 +303,7 @@ fn measured_ui(
     let palette = Theme::of(ui).palette;
     // Ratios to rounding are meaningless.
     let model_based = model_based.filter(|errors| !errors.is_rounding());
-    if !problem.has_nodes {
+    if !problem.has_nodes() {
         target_choice_ui(ui, "RMSE and R² of", "target of the decoders", &problem.targets, target);
     }
     let target = (*target).min(problem.targets.len().saturating_sub(1));
@@ -375,7 +377,8 @@ mod tests {
     use std::sync::mpsc::channel;
 
     use decoupler_core::{
-        evaluation::{DecoderSet, Preset, Run, SimulatedSettings, Simulation, Source},
+        dataset::Simulation,
+        evaluation::{DecoderSet, Preset, Run, RunSettings},
         scene::{Noise, NoisySets},
     };
     use egui_kittest::{Harness, kittest::Queryable as _};
@@ -386,26 +389,32 @@ mod tests {
 
     #[test]
     fn decoders_that_cannot_be_measured_say_why_and_none_stays_pending() {
-        let mut settings = SimulatedSettings {
+        let mut settings = RunSettings {
             hidden: 2,
-            ..SimulatedSettings::default()
+            ..RunSettings::default()
         };
         settings.source = Simulation {
             samples: 20,
             validation_samples: 0,
             test_samples: 4,
-            ..settings.source
-        };
-        settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
+            ..Simulation::default()
+        }
+        .into();
+        settings.simulation_mut().unwrap().sensor.scale = "2x3_2x9".parse().unwrap();
         let run = Run::prepare(settings).unwrap();
         let (waking, woken) = channel();
         let wake = move || waking.send(()).unwrap_or(());
         let (mut measuring, mut state) = (DecoderMeasuring::new(Arc::new(wake)), DecodersState::default());
-        state.measured = Some(DecoderResult::pending(&run.settings().source));
+        state.measured = Some(DecoderResult::pending(run.problem()));
         assert!(state.is_measuring());
         let mut impossible = settings;
-        impossible.source.samples = 0;
-        measuring.begin(impossible.into(), run.network(), Arc::clone(run.test()));
+        impossible.simulation_mut().unwrap().samples = 0;
+        measuring.begin(
+            impossible.into(),
+            Arc::clone(run.problem()),
+            run.network(),
+            Arc::clone(run.test()),
+        );
         while state.is_measuring() {
             woken.recv().unwrap();
             measuring.take_events(&mut state);
@@ -422,7 +431,7 @@ mod tests {
     fn unfolded() -> DecodersState {
         DecodersState {
             is_open: true,
-            measured: Some(DecoderResult::pending(&Source::Simulated(Simulation::default()))),
+            measured: Some(DecoderResult::pending(&Simulation::default().problem())),
         }
     }
 
@@ -435,19 +444,19 @@ mod tests {
 
     #[test]
     fn a_decoder_worse_than_the_mean_says_so_with_cause_and_remedy() {
-        let mut settings = decoupler_core::evaluation::SimulatedSettings::default();
-        settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
-        settings.source.samples = 40;
-        settings.source.scene.noise = Noise {
+        let mut settings = decoupler_core::evaluation::RunSettings::default();
+        settings.simulation_mut().unwrap().sensor.scale = "2x3_2x9".parse().unwrap();
+        settings.simulation_mut().unwrap().samples = 40;
+        settings.simulation_mut().unwrap().scene.noise = Noise {
             sets: NoisySets::Test,
             ..Noise::relative(0.5)
         };
-        let test = settings.source.draw_test(settings.seed).unwrap();
+        let test = settings.simulation().unwrap().draw_test(settings.seed).unwrap();
         let mut without_noise = settings;
-        without_noise.source.scene.noise = Noise::default();
+        without_noise.simulation_mut().unwrap().scene.noise = Noise::default();
         // Fitted without the noise that the readings have.
         let set = DecoderSet::new(
-            without_noise.into(),
+            without_noise,
             RunSets::draw(&without_noise, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
                 .unwrap()
                 .split
@@ -461,7 +470,7 @@ mod tests {
         let remark = report.remarks[0].to_string();
         assert!(remark.contains("times that of always answering the mean"), "{remark}");
         let mut decoders = unfolded();
-        let place = DecoderResult::pending(&Source::Simulated(Simulation::default()))
+        let place = DecoderResult::pending(&Simulation::default().problem())
             .iter()
             .position(|result| result.kind == DecoderKind::Ridge);
         decoders.take(place.unwrap(), Ok(report));
@@ -484,23 +493,23 @@ mod tests {
         let mut decoders = unfolded();
         // Four electrodes are too few for six nodes.
         let mut settings = Preset::Best.settings();
-        settings.source.sensor.scale = "10x6_3x4".parse().unwrap();
-        settings.source.samples = 100;
-        settings.source.test_samples = 10;
+        settings.simulation_mut().unwrap().sensor.scale = "10x6_3x4".parse().unwrap();
+        settings.simulation_mut().unwrap().samples = 100;
+        settings.simulation_mut().unwrap().test_samples = 10;
         let set = DecoderSet::new(
-            settings.into(),
+            settings,
             RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
                 .unwrap()
                 .split
                 .training,
             None,
         );
-        let test = settings.source.draw_test(settings.seed).unwrap();
+        let test = settings.simulation().unwrap().draw_test(settings.seed).unwrap();
         let report = set
             .measure(DecoderKind::Newton, Precision::Double, &test)
             .unwrap()
             .unwrap();
-        let place = DecoderResult::pending(&Source::Simulated(Simulation::default()))
+        let place = DecoderResult::pending(&Simulation::default().problem())
             .iter()
             .position(|result| result.kind == DecoderKind::Newton)
             .unwrap();

@@ -193,7 +193,7 @@ mod tests {
     };
     use decoupler_core::{
         dataset::SplitBy,
-        evaluation::{Run, SimulatedSettings},
+        evaluation::{Run, RunSettings},
     };
 
     fn result(run: &Run) -> RunResult {
@@ -218,12 +218,15 @@ mod tests {
 
     #[test]
     fn drawings_of_the_whole_test_set_are_made_once_per_result() {
-        let mut settings = SimulatedSettings {
+        let mut settings = RunSettings {
             hidden: 2,
-            ..SimulatedSettings::default()
+            ..RunSettings::default()
         };
-        settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
-        (settings.source.samples, settings.source.test_samples) = (20, 8);
+        settings.simulation_mut().unwrap().sensor.scale = "2x3_2x9".parse().unwrap();
+        (
+            settings.simulation_mut().unwrap().samples,
+            settings.simulation_mut().unwrap().test_samples,
+        ) = (20, 8);
         let mut run = Run::prepare(settings).unwrap();
         let mut shared = Shared::new(true);
         shared.run = Some(RunView::new(Began {

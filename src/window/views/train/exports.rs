@@ -1,7 +1,8 @@
 //! Exports of the current training.
 
 use decoupler_core::{
-    evaluation::{DecoderReport, SimulatedSettings},
+    dataset::Simulation,
+    evaluation::{DecoderReport, RunSettings},
     sensor::SensorModel,
 };
 use decoupler_files::{
@@ -223,15 +224,16 @@ impl PaperFigure {
     }
 
     /// Returns the settings of the training for the figure.
-    pub fn settings(self) -> SimulatedSettings {
+    pub fn settings(self) -> RunSettings {
         let scale = match self {
             Self::Four => "10×10_5×30",
             Self::Six | Self::Seven | Self::Eight => "10×6_3×18",
         };
         let scale = scale.parse().expect("the paper's arrays are possible");
-        let mut settings = SimulatedSettings::default();
-        settings.source.sensor = SensorModel::new(scale);
-        settings
+        RunSettings::from(Simulation {
+            sensor: SensorModel::new(scale),
+            ..Simulation::default()
+        })
     }
 
     /// Returns how its surfaces are viewed; `None` if it shows none.

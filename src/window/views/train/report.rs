@@ -7,10 +7,11 @@ use std::time::Duration;
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
-        Baselines, Combination, ErrorTable, Errors, Initialization, NodeAddress, Outlook, Problem, Scores,
-        SimulatedSettings, Spread, StartRecord, TestErrors, auto::Tried, best_start, error_remarks,
+        Baselines, Combination, ErrorTable, Errors, Initialization, NodeAddress, Outlook, Scores, Spread, StartRecord,
+        TestErrors, auto::Tried, best_start, error_remarks,
     },
     identifiability::Identifiability,
+    problem::Problem,
     text::counted,
     training::StopReason,
 };
@@ -141,17 +142,23 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
         return;
     }
     let known = shared.preview.as_ref();
-    if let Some((preview, baselines)) = known.and_then(|preview| Some((preview, preview.baselines.clone()?))) {
+    let compared = known.and_then(|preview| {
+        let simulation = preview.settings.simulation()?;
+        Some((preview, simulation, preview.baselines.clone()?))
+    });
+    if let Some((preview, simulation, baselines)) = compared {
         // The settings may have changed to a scene whose baselines are still being computed.
-        let (of_preview, of_draft) = (&preview.settings.source, &shared.draft.source);
-        let is_of_draft = (of_preview.sensor, of_preview.scene) == (of_draft.sensor, of_draft.scene);
+        let is_of_draft = shared
+            .draft
+            .simulation()
+            .is_some_and(|of_draft| (simulation.sensor, simulation.scene) == (of_draft.sensor, of_draft.scene));
         let published = shared.draft.published().filter(|_| is_of_draft);
         let scores = Scores {
             network: baselines.mean.clone(),
             baselines,
             coverage: Vec::new(),
         };
-        let mut table = ErrorTable::of_scores(&preview.settings.source.problem(), &scores, published.as_ref());
+        let mut table = ErrorTable::of_scores(&simulation.problem(), &scores, published.as_ref());
         let rows = table.blocks.iter_mut().flat_map(|block| &mut block.rows);
         for row in rows.filter(|row| row.name == NETWORK) {
             row.errors.fill(None);
@@ -176,9 +183,9 @@ const NETWORK: &str = "network";
 fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
     let Some(reason) = run.stop_reason else { return };
     ui.add_space(space(2));
-    match (run.simulated(), result.errors.nodes(), run.baselines.nodes()) {
-        (Some(settings), Some(errors), Some(baselines)) => {
-            verdict_on_nodes_ui(ui, (run, result, reason), &settings, errors, &baselines);
+    match (result.errors.nodes(), run.baselines.nodes()) {
+        (Some(errors), Some(baselines)) => {
+            verdict_on_nodes_ui(ui, (run, result, reason), errors, &baselines);
         }
         _ => verdict_on_targets_ui(ui, run, result),
     }
@@ -215,10 +222,10 @@ fn verdict_on_targets_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
 fn verdict_on_nodes_ui(
     ui: &mut Ui,
     (run, result, reason): (&RunView, &RunResult, StopReason),
-    settings: &SimulatedSettings,
     errors: &Errors,
     baselines: &Baselines<Errors>,
 ) {
+    let settings = run.settings();
     let remarks = error_remarks(settings, &run.scores(result), Some(reason));
     let of_network = remarks.iter().find(|(row, _)| *row == NETWORK);
     let fault = if let Some(defect) = &result.defect {
@@ -302,7 +309,7 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {
-        let decoding = if run.problem.has_nodes {
+        let decoding = if run.problem.has_nodes() {
             "Decoding a snapshot"
         } else {
             "Decoding a sample"

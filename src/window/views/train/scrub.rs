@@ -4,8 +4,9 @@
 use std::{sync::Arc, time::Duration};
 
 use decoupler_core::{
-    evaluation::{PastNetworks, Source, TestErrors},
+    evaluation::{PastNetworks, TestErrors},
     network::Networks,
+    problem::Problem,
 };
 use eframe::egui::{Align, Layout, RichText, Slider, Ui, Vec2, WidgetInfo, accesskit::Role};
 
@@ -142,12 +143,12 @@ impl ScrubState {
     fn compute(&mut self, run: &RunView, epoch: usize) {
         let Some(present) = &run.result else { return };
         let (past, networks, test) = (run.past.clone(), Arc::clone(&present.networks), run.test.clone());
-        let (is_idle, source) = (present.is_idle, run.settings().source);
+        let (is_idle, problem) = (present.is_idle, Arc::clone(&run.problem));
         // The displayed snapshot is decoded too, as in the results of the training itself.
         let snapshot = present.frame.as_ref().map_or(0, |(snapshot, _)| *snapshot);
         self.job.start(
             move |_| {
-                let result = result_at(epoch, &past, &networks, &source, &test)?;
+                let result = result_at(epoch, &past, &networks, &problem, &test)?;
                 let array = test.array();
                 let recording = test.recording();
                 Some(RunResult {
@@ -166,14 +167,14 @@ fn result_at(
     epoch: usize,
     past: &PastNetworks,
     present: &Networks,
-    source: &Source,
+    problem: &Problem,
     test: &TestSet,
 ) -> Option<RunResult> {
     let past = past.at(epoch, present)?;
     let (networks, best_epoch) = (past.networks, past.best_epoch);
     let answers = networks.decouple(test.set());
     Some(RunResult {
-        errors: TestErrors::measure(source, test.set(), &answers),
+        errors: TestErrors::measure(problem, test.set(), &answers),
         answers: Arc::new(answers),
         frame: None,
         charts: None,

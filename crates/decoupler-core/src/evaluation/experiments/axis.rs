@@ -2,8 +2,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Cell;
 use crate::{
-    dataset::{Division, LARGEST_SAMPLES},
-    evaluation::{MAX_STARTS, SimulatedSettings, Simulation, Source},
+    dataset::{Division, LARGEST_SAMPLES, Simulation},
+    evaluation::{MAX_STARTS, RunSettings, Source},
     network::LARGEST_HIDDEN,
     settings::{EPOCHS, Field, Kind, Setting, SettingError, Value},
     training::Method,
@@ -125,11 +125,11 @@ impl AxisKind {
         self.setting().name
     }
 
-    /// Returns the settings of runs on `source`, in the order offered to the user.
-    pub fn of_source(source: &Source) -> impl Iterator<Item = Self> + use<> {
+    /// Returns the settings of runs with the source of `settings`, in the order offered to the user.
+    pub fn of_runs(settings: &RunSettings) -> impl Iterator<Item = Self> + use<> {
         let mut cell = any_cell();
-        cell.settings.source = *source;
-        cell.division = source.simulation().is_none().then(Division::default);
+        cell.settings.source = settings.source;
+        cell.division = settings.simulation().is_none().then(Division::default);
         Self::ALL.into_iter().filter(move |kind| kind.setting().applies(&cell))
     }
 }
@@ -139,7 +139,7 @@ fn any_cell() -> Cell {
     Cell {
         column: 0,
         row: 0,
-        settings: SimulatedSettings::default().into(),
+        settings: RunSettings::default(),
         division: Some(Division::default()),
         published: None,
     }

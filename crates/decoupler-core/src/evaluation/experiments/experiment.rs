@@ -4,7 +4,7 @@ use thiserror::Error;
 use super::{Axis, AxisKind};
 use crate::{
     dataset::{Division, DivisionError, Seed, SplitBy},
-    evaluation::{CountError, CrossValidation, PublishedErrors, RunSettings, SimulatedSettings, Source},
+    evaluation::{CountError, CrossValidation, PublishedErrors, RunSettings},
     scene::SceneError,
     sensor::ArrayScale,
     training::{SettingError, StoppingRules},
@@ -135,12 +135,12 @@ impl Experiment {
     }
 
     fn published(&self, settings: &RunSettings) -> Option<PublishedErrors> {
-        let settings = settings.simulated().filter(SimulatedSettings::is_papers_scene)?;
+        let simulation = settings.of_paper()?;
         let published = match self.cross_validation {
             None => PublishedErrors::of,
             Some(_) => PublishedErrors::of_cross_validation,
         };
-        published(settings.source.sensor.scale, settings.hidden, settings.source.samples)
+        published(simulation.sensor.scale, settings.hidden, simulation.samples)
     }
 
     /// Returns the axes, one or two.
@@ -206,13 +206,13 @@ impl Experiment {
 
     /// Checks that source and axes match.
     fn check_source(&self) -> Result<(), ExperimentError> {
-        let of = match (self.base.source, &self.recording) {
-            (Source::Simulated(_), None) => "simulated arrays",
-            (Source::Measured(_), Some(_)) => "recordings",
+        let of = match (self.base.simulation(), &self.recording) {
+            (Some(_), None) => "simulated arrays",
+            (None, Some(_)) => "recordings",
             _ => return Err(ExperimentError::OtherSamples),
         };
         for axis in self.axes() {
-            if !AxisKind::of_source(&self.base.source).any(|kind| kind == axis.kind()) {
+            if !AxisKind::of_runs(&self.base).any(|kind| kind == axis.kind()) {
                 return Err(ExperimentError::NoSetting { axis: axis.name(), of });
             }
             let mut cell = self.cell(0, 0);
@@ -223,16 +223,16 @@ impl Experiment {
 
     fn check_cell(&self, cell: &Cell) -> Result<(), ExperimentError> {
         cell.settings.training.check()?;
-        let Some(settings) = cell.settings.simulated() else {
+        cell.settings.check_counts()?;
+        let Some(simulation) = cell.settings.simulation() else {
             return self.check_recorded_cell(cell);
         };
-        settings.check_counts()?;
-        settings.source.scene.check()?;
+        simulation.scene.check()?;
         let Some(CrossValidation { folds, by, .. }) = self.cross_validation else {
             return Ok(());
         };
-        let rows = settings.source.model_size()?.rows;
-        let snapshots = settings.source.samples.div_ceil(rows);
+        let rows = simulation.model_size()?.rows;
+        let snapshots = simulation.samples.div_ceil(rows);
         let (units, unit) = match by {
             SplitBy::Random => (snapshots * rows, "sample"),
             SplitBy::Time | SplitBy::Group => (snapshots, "snapshot"),
@@ -241,7 +241,6 @@ impl Experiment {
     }
 
     fn check_recorded_cell(&self, cell: &Cell) -> Result<(), ExperimentError> {
-        cell.settings.check_network()?;
         if self.cross_validation.is_some() {
             return Err(ExperimentError::CrossValidation);
         }
@@ -299,12 +298,12 @@ impl PaperTable {
     /// only selects the weights.
     pub fn experiment(self) -> Experiment {
         let with = |axis, epochs, starts, cross_validation| {
-            let mut base = SimulatedSettings::default();
+            let mut base = RunSettings::default();
             base.training.stopping.epochs = epochs;
             base.training.stopping.max_fail = StoppingRules::MAX_EPOCHS;
             base.starts = starts;
             Experiment {
-                base: base.into(),
+                base,
                 recording: None,
                 axis,
                 second_axis: None,
@@ -356,7 +355,7 @@ mod tests {
         assert_eq!(cells.len(), 6);
         for (index, cell) in cells.iter().enumerate() {
             assert_eq!((cell.row, cell.column), (index / 3, index % 3));
-            let simulation = cell.settings.simulated().unwrap().source;
+            let simulation = cell.settings.simulation().unwrap();
             assert_eq!(simulation.sensor.scale, ArrayScale::PRESETS[cell.column]);
             assert_eq!(cell.settings.training.method, Method::all()[cell.row]);
         }

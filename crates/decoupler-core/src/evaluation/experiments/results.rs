@@ -5,7 +5,8 @@ use serde::Serialize;
 use super::{Cell, Experiment, Trial, TrialFailure};
 use crate::{
     dataset::{Seed, SplitBy},
-    evaluation::{Errors, Problem, PublishedErrors, Spread, TargetErrors},
+    evaluation::{Errors, PublishedErrors, Spread, TargetErrors},
+    problem::Problem,
     sensor::ArrayScale,
 };
 
@@ -46,7 +47,6 @@ impl ExperimentResults {
             cells: cells.collect(),
             problem: experiment
                 .base
-                .source
                 .simulation()
                 .map(|simulation| Arc::new(simulation.problem())),
             experiment,
@@ -211,7 +211,7 @@ impl CellResults {
         let median = |figure: fn(&Trial) -> Option<f64>| self.spread(figure).map(|spread| spread.median);
         let starts = settings.starts;
         let epochs_run = self.spread(|trial| Some(trial.epochs as f64 / (trial.networks * starts).max(1) as f64));
-        let simulation = settings.source.simulation();
+        let simulation = settings.simulation();
         CellSummary {
             array: simulation.map(|source| source.sensor.scale),
             hidden: settings.hidden,

@@ -14,7 +14,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::{Cell, Experiment, ExperimentError, Trial, TrialFailure, TrialSamples};
 use crate::{
     dataset::Seed,
-    evaluation::{CrossValidation, RunError, SimulatedSettings},
+    evaluation::{CrossValidation, RunError, RunSettings},
     job::{Cancelled, Job},
     network::Shape,
 };
@@ -168,14 +168,9 @@ impl TrialJob {
         let trial = match self.cross_validation {
             None => Trial::on_sets(&self.of_cell, self.seed, samples, job),
             Some(validation) => {
-                let settings = self
-                    .of_cell
-                    .settings
-                    .simulated()
-                    .expect("only arrays are cross-validated");
-                let settings = SimulatedSettings {
+                let settings = RunSettings {
                     seed: self.seed,
-                    ..settings
+                    ..self.of_cell.settings
                 };
                 Trial::by_cross_validation(settings, validation, self.repeat, job)
             }
@@ -200,7 +195,7 @@ fn time_left((work, all_work): (f64, f64), seconds: f64, threads: usize) -> Opti
 /// Approximate number of multiplications in one job of `cell`, if it runs all of its epochs.
 fn work(experiment: &Experiment, cell: &Cell, samples: &TrialSamples) -> f64 {
     let settings = &cell.settings;
-    let (inputs, outputs, samples) = match (settings.source.simulation(), samples) {
+    let (inputs, outputs, samples) = match (settings.simulation(), samples) {
         (Some(source), _) => {
             let scale = source.sensor.scale;
             (scale.columns(), scale.coordinates_per_row(), source.samples)

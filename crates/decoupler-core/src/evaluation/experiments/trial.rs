@@ -6,11 +6,11 @@ use super::Cell;
 use crate::{
     dataset::{Dataset, Division, Seed},
     evaluation::{
-        Begin, CrossValidation, Effort, Problem, Run, RunError, RunSets, RunSettings, SimulatedSettings, TestErrors,
-        baselines::mean_and_linear,
+        Begin, CrossValidation, Effort, Run, RunError, RunSets, RunSettings, TestErrors, baselines::mean_and_linear,
     },
     job::Job,
     machine::MemoryBudget,
+    problem::Problem,
     training::TrainerState,
 };
 
@@ -82,18 +82,18 @@ impl Trial {
 
     /// Cross-validates on a set drawn with the seed of `settings`.
     pub(super) fn by_cross_validation(
-        settings: SimulatedSettings,
+        settings: RunSettings,
         validation: CrossValidation,
         repeat: usize,
         job: &Job<'_>,
     ) -> Result<Self, RunError> {
-        let (simulation, seed) = (&settings.source, settings.seed);
+        let (simulation, seed) = (settings.drawn()?, settings.seed);
         let set = simulation.draw_training(simulation.samples, seed)?;
         let tested = simulation.draw_tested_folds(&set, seed)?;
         let sets = (&set, tested.as_ref().unwrap_or(&set));
-        let validated = validation.run_with_tested(&settings.into(), sets, repeat, job)?;
-        let source = settings.source.into();
-        let errors = |decoupled_mm| TestErrors::measure(&source, &set, decoupled_mm);
+        let validated = validation.run_with_tested(&settings, sets, repeat, job)?;
+        let problem = simulation.problem();
+        let errors = |decoupled_mm| TestErrors::measure(&problem, &set, decoupled_mm);
         Ok(Self {
             seed,
             repeat,
@@ -151,11 +151,7 @@ impl TrialSamples {
     pub(super) fn sets(&self, cell: &Cell, seed: Seed, job: &Job<'_>) -> Result<RunSets, RunError> {
         match self {
             Self::Drawn(memory) => {
-                let mut settings = cell
-                    .settings
-                    .simulated()
-                    .expect("the source of drawn samples is simulated");
-                settings.seed = seed;
+                let settings = RunSettings { seed, ..cell.settings };
                 RunSets::draw(&settings, *memory, job)
             }
             Self::Recorded(recorded) => {

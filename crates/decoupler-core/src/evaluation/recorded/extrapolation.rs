@@ -1,6 +1,6 @@
 use ndarray::ArrayView2;
 
-use crate::{dataset::Dataset, evaluation::Channel};
+use crate::{dataset::Dataset, problem::Channel};
 
 /// Fraction of the range by which a value may be outside it: the extremes of few training samples are exceeded slightly by
 /// others of the same kind.

@@ -1,10 +1,9 @@
 use decoupler_core::{
-    dataset::{Dataset, Memory, PerRow, Seed, Stream},
+    dataset::{Dataset, Memory, PerRow, Seed, Simulation, Stream},
     decoupling::{Decoder, DecoderKind, Description, Precision, decode_set},
-    evaluation::{
-        Channel, DecoderSet, Problem, RunError, RunSets, RunSettings, SimulatedSettings, TargetErrors, TestErrors,
-    },
+    evaluation::{DecoderSet, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
     network::{Networks, ReadingRange},
+    problem::{Channel, Problem},
 };
 use rand::RngExt;
 use serde_json::{Map, Value, json};
@@ -119,8 +118,8 @@ impl<'a> ExportedDecoder<'a> {
     }
 
     pub(super) fn meaning(&self) -> Meaning {
-        match self.origin.settings.simulated() {
-            Some(settings) => Meaning::Array(settings.source.sensor.scale),
+        match &self.origin.problem.sensor {
+            Some(simulation) => Meaning::Array(simulation.sensor.scale),
             None => Meaning::Own {
                 inputs: self.origin.problem.features(),
                 has_memory: self.memory().is_some(),
@@ -180,11 +179,14 @@ impl<'a> ExportedDecoder<'a> {
         const SNAPSHOTS: [usize; 2] = [20, 1];
         /// Readings drawn for each network, and golden vectors among them.
         const EVEN: [usize; 2] = [100, 4];
-        match self.origin.settings.simulated() {
-            Some(mut settings) => {
-                let rows = settings.source.model_size().map_or(1, |size| size.rows);
-                settings.source.test_samples = SNAPSHOTS[0] * rows;
-                let set = settings.source.draw_test(settings.seed).map_err(Box::new)?;
+        match self.origin.problem.sensor {
+            Some(simulation) => {
+                let rows = simulation.model_size().map_or(1, |size| size.rows);
+                let few = Simulation {
+                    test_samples: SNAPSHOTS[0] * rows,
+                    ..simulation
+                };
+                let set = few.draw_test(self.origin.settings.seed).map_err(Box::new)?;
                 let network = |sample| if portable.takes_row() { set.row_index(sample) } else { 0 };
                 let samples = 0..set.samples();
                 let drawn = samples.map(|sample| (network(sample), set.sample_readings(sample).to_vec()));
@@ -221,8 +223,8 @@ impl<'a> ExportedDecoder<'a> {
             .is_network()
             .then(|| json!({ "hidden_nodes": portable.widest() }));
         let errors = &self.fitted.errors;
-        let own = match self.origin.settings.simulated() {
-            Some(settings) => of_array(&self.origin, &settings, portable, errors),
+        let own = match &self.origin.problem.sensor {
+            Some(simulation) => of_array(&self.origin, simulation, portable, errors),
             None => of_recording(&self.origin, portable, errors),
         };
         let half_widths = self.half_widths();
@@ -257,20 +259,20 @@ fn layers(portable: &Portable) -> Vec<String> {
     layers.collect::<Vec<_>>().into_iter().chain(iteration).collect()
 }
 
-fn of_array(origin: &Origin, settings: &SimulatedSettings, portable: &Portable, errors: &TestErrors) -> Value {
-    let sensor = &settings.source.sensor;
+fn of_array(origin: &Origin, simulation: &Simulation, portable: &Portable, errors: &TestErrors) -> Value {
+    let Simulation { sensor, scene, .. } = simulation;
     let names = |channels: Vec<Channel>| channels.into_iter().map(|channel| channel.name).collect::<Vec<_>>();
     json!({
         "trained_by": origin.program,
         "array": sensor.scale.to_string(),
         "geometry": sensor.geometry,
-        "scene": settings.source.scene,
-        "rows": settings.source.scene.rows.to_string(),
+        "scene": scene,
+        "rows": scene.rows.to_string(),
         "row_numbers": portable.takes_row().then_some([1, portable.rows()]),
         "inputs": { "names": names(portable.meaning.inputs()), "unit": "ohm" },
         "outputs": { "names": names(portable.meaning.targets()), "unit": "mm" },
-        "training_samples": settings.source.samples,
-        "seed": settings.seed,
+        "training_samples": simulation.samples,
+        "seed": origin.settings.seed,
         "errors": errors.nodes(),
         "readings_in_training_ohm": ranges(portable),
         "output_range_mm": portable.output_range_mm(),
@@ -363,7 +365,7 @@ impl FittedDecoder {
         if kind.needs_network() && networks.is_none() {
             return Err(BundleError::NoNetwork(kind));
         }
-        let (training, test) = (sets.split.training, sets.test);
+        let (training, test, problem) = (sets.split.training, sets.test, sets.problem);
         let of_row = |set: &Dataset| {
             let targets = set.targets();
             let extremes = targets.columns().into_iter().map(|column| {
@@ -391,7 +393,7 @@ impl FittedDecoder {
             description,
             reading_ranges,
             target_extremes,
-            errors: TestErrors::measure(&settings.source, &test, &answers),
+            errors: TestErrors::measure(&problem, &test, &answers),
         })
     }
 }
@@ -438,7 +440,7 @@ impl Origin {
             problem: Problem::clone(&samples.problem),
             row_wires: samples.test.row_wires_read().map(<[usize]>::to_vec),
             files: names(setup.plan()),
-            errors_of_linear: TestErrors::measure(&settings.source, &samples.test, &answers),
+            errors_of_linear: TestErrors::measure(&samples.problem, &samples.test, &answers),
             settings,
         })
     }

@@ -1,4 +1,4 @@
-use decoupler_core::{evaluation::Channel, sensor::ArrayScale, text::is_unprintable};
+use decoupler_core::{problem::Channel, sensor::ArrayScale, text::is_unprintable};
 
 use crate::export::format_number;
 

@@ -1,10 +1,7 @@
 use std::{fmt::Write, path::PathBuf};
 
 use decoupler_core::{
-    dataset::Memory,
-    decoupling::NotDescribed,
-    evaluation::{Channel, RunError},
-    text::counted,
+    dataset::Memory, decoupling::NotDescribed, evaluation::RunError, problem::Channel, text::counted,
 };
 use thiserror::Error;
 

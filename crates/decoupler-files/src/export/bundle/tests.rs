@@ -23,9 +23,9 @@ use super::{
 };
 use crate::export::NetworkFile;
 use decoupler_core::{
-    evaluation::Channel,
-    evaluation::{Measured, Problem, Run, RunSettings, SimulatedSettings},
+    evaluation::{Measured, Run, RunSettings},
     network::{InputChoice, Quantity, ScalingChoice},
+    problem::{Channel, Problem},
     scene::{Noise, RowModel, Rows},
 };
 
@@ -34,21 +34,21 @@ fn trained(rows: Rows, quantity: Quantity, scaling: ScalingChoice, noise: f64) -
     run_of(trained_settings(rows, quantity, scaling, noise))
 }
 
-fn trained_settings(rows: Rows, quantity: Quantity, scaling: ScalingChoice, noise: f64) -> SimulatedSettings {
-    let mut settings = SimulatedSettings::default();
-    settings.source.sensor = decoupler_core::sensor::SensorModel::new("3x2_2x6".parse().unwrap());
-    settings.source.samples = 90;
-    settings.source.validation_samples = 0;
-    settings.source.test_samples = 9;
-    settings.source.scene.rows = rows;
-    settings.source.scene.noise = Noise::relative(noise);
+fn trained_settings(rows: Rows, quantity: Quantity, scaling: ScalingChoice, noise: f64) -> RunSettings {
+    let mut settings = RunSettings::default();
+    settings.simulation_mut().unwrap().sensor = decoupler_core::sensor::SensorModel::new("3x2_2x6".parse().unwrap());
+    settings.simulation_mut().unwrap().samples = 90;
+    settings.simulation_mut().unwrap().validation_samples = 0;
+    settings.simulation_mut().unwrap().test_samples = 9;
+    settings.simulation_mut().unwrap().scene.rows = rows;
+    settings.simulation_mut().unwrap().scene.noise = Noise::relative(noise);
     settings.inputs = InputChoice { quantity, scaling };
     settings.hidden = 4;
     settings.training.stopping.epochs = 4;
     settings
 }
 
-fn run_of(settings: SimulatedSettings) -> NetworkFile {
+fn run_of(settings: RunSettings) -> NetworkFile {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     NetworkFile::from_run(&run, None).unwrap()
@@ -437,7 +437,7 @@ fn single_precision_is_judged_by_the_readings_of_the_caller() {
 fn constant_channels_are_exported_in_fixed_point() {
     let home = tempfile::tempdir().unwrap();
     let mut settings = trained_settings(Rows::All, Quantity::Resistance, ScalingChoice::MinMax, 0.0);
-    settings.source.scene.noise.converter_bits = Some(2);
+    settings.simulation_mut().unwrap().scene.noise.converter_bits = Some(2);
     let file = run_of(settings);
     let report = export_bundle(
         &file,

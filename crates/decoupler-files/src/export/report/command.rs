@@ -4,9 +4,9 @@ use std::{fmt, path::Path};
 
 use crate::import::{DialectChoice, FileSet, Plan, Recipe, Setup};
 use decoupler_core::{
-    dataset::{Division, Span, SplitBy},
-    evaluation::{Measured, RunSettings, SimulatedSettings},
-    scene::{Loading, Movement, NoisySets, RowModel},
+    dataset::{Division, Simulation, Span, SplitBy},
+    evaluation::{Measured, RunSettings},
+    scene::{Loading, Movement, NoisySets, RowModel, Scene},
     sensor::SensorModel,
 };
 
@@ -28,13 +28,13 @@ impl fmt::Display for CommandGap {
 pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, CommandGap> {
     let settings = setup.settings();
     let mut command = Command("decoupler train".to_owned());
-    let default = match (setup.simulated(), setup.plan()) {
-        (Some(settings), _) => {
-            check_simulation(&settings)?;
-            command.simulation(&settings);
-            let default = SimulatedSettings::default();
+    let default = match (settings.simulation(), setup.plan()) {
+        (Some(simulation), _) => {
+            let default = RunSettings::default();
+            check_simulation(simulation)?;
+            command.simulation(simulation, settings, &default);
             command.option("hidden", settings.hidden, default.hidden);
-            default.into()
+            default
         }
         (None, Some(plan)) => {
             let default = RunSettings::from(Measured { rows: RowModel::Shared });
@@ -67,9 +67,8 @@ pub fn quoted(path: &Path) -> String {
     format!("'{}'", text.replace('\'', r"'\''"))
 }
 
-fn check_simulation(settings: &SimulatedSettings) -> Result<(), CommandGap> {
-    let (source, scene) = (&settings.source, &settings.source.scene);
-    let usual = SimulatedSettings::default().source.scene;
+fn check_simulation(source: &Simulation) -> Result<(), CommandGap> {
+    let (scene, usual) = (&source.scene, Scene::default());
     let read_back = |loading: Loading| loading.to_string().parse() == Ok(loading);
     check([
         (
@@ -127,9 +126,8 @@ impl Command {
     }
 
     /// Adds the options of a simulated array.
-    fn simulation(&mut self, settings: &SimulatedSettings) {
-        let default = SimulatedSettings::default();
-        let (source, usual) = (&settings.source, &default.source);
+    fn simulation(&mut self, source: &Simulation, settings: &RunSettings, default: &RunSettings) {
+        let usual = &Simulation::default();
         let (scene, noise) = (&source.scene, &source.scene.noise);
         let array = |sensor: &SensorModel| sensor.scale.to_string().replace('×', "x");
         self.option("array", array(&source.sensor), array(&usual.sensor));

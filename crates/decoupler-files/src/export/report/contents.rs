@@ -1,9 +1,9 @@
 use std::{path::Path, time::Duration};
 
 use decoupler_core::{
-    dataset::Dataset,
+    dataset::{Dataset, Simulation},
     evaluation::{
-        DecoderReport, Outlook, RunDefect, SimulatedSettings, StartRecord, TestErrors, error_remarks,
+        DecoderReport, Outlook, RunDefect, StartRecord, TestErrors, error_remarks,
         recorded::{Determination, HysteresisLoop},
     },
     sensor::Geometry,
@@ -117,16 +117,18 @@ impl RunReport<'_> {
                 html.table(&search_table(search), "");
             });
         }
-        html.section("Settings", |html| match (setup.simulated(), &file.recorded) {
-            (Some(settings), _) => {
-                html.facts(&settings_facts(file, &settings));
-                for note in settings.source.sensor.scale.note().iter().map(String::as_str) {
-                    html.element("p", "dim", note);
+        html.section("Settings", |html| {
+            match (setup.settings().simulation(), &file.recorded) {
+                (Some(simulation), _) => {
+                    html.facts(&settings_facts(file, simulation));
+                    for note in simulation.sensor.scale.note().iter().map(String::as_str) {
+                        html.element("p", "dim", note);
+                    }
+                    html.element("p", "dim", Geometry::ASSUMPTION);
                 }
-                html.element("p", "dim", Geometry::ASSUMPTION);
+                (None, Some(recorded)) => html.facts(&recording_facts(file, &recorded.relative_to(folder), self.test)),
+                (None, None) => {}
             }
-            (None, Some(recorded)) => html.facts(&recording_facts(file, &recorded.relative_to(folder), self.test)),
-            (None, None) => {}
         });
         html.section("Repeating this run", |html| self.repeat(&setup, html));
         html.finish(&title, &format!("{}{}", include_str!("style.css"), dark_style()))
@@ -182,8 +184,8 @@ impl RunReport<'_> {
     /// Returns all warnings and remarks on the run, with cause and remedy.
     fn remarks(&self, setup: &Setup, answers: &ndarray::Array2<f64>) -> Vec<String> {
         let mut remarks = Vec::from_iter(self.defect.map(ToString::to_string));
-        match (setup.simulated(), setup.plan()) {
-            (Some(settings), _) => remarks.extend(self.array_remarks(&settings)),
+        match (setup.settings().simulation(), setup.plan()) {
+            (Some(simulation), _) => remarks.extend(self.array_remarks(simulation)),
             (None, Some(plan)) => remarks.extend(self.recording_remarks(plan, answers)),
             (None, None) => {}
         }
@@ -194,13 +196,13 @@ impl RunReport<'_> {
         remarks.into_iter().map(|remark| sentence(&remark)).collect()
     }
 
-    fn array_remarks(&self, settings: &SimulatedSettings) -> Vec<String> {
+    fn array_remarks(&self, simulation: &Simulation) -> Vec<String> {
         let Self { file, .. } = *self;
-        let outlook = Outlook::of(&settings.source).ok();
+        let outlook = Outlook::of(simulation).ok();
         let warnings = outlook.iter().flat_map(|outlook| &outlook.warnings);
         let mut remarks = Vec::from_iter(warnings.map(ToString::to_string));
         let reason = file.training.stop_reason;
-        let of_rows = error_remarks(settings, &file.scores, reason);
+        let of_rows = error_remarks(&file.settings, &file.scores, reason);
         remarks.extend(of_rows.iter().map(|(row, remark)| format!("{row}: {remark}")));
         let Some(scores) = file.scores.nodes() else {
             return remarks;
@@ -259,7 +261,7 @@ impl RunReport<'_> {
             columns: columns.to_vec(),
             rows: starts.map(row).collect(),
         };
-        if !self.file.problem.has_nodes {
+        if !self.file.problem.has_nodes() {
             table.remove_column("z_percent");
         }
         table

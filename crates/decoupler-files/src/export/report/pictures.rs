@@ -15,8 +15,9 @@ use crate::{
     },
 };
 use decoupler_core::{
-    dataset::Dataset,
-    evaluation::{Channel, NodeAddress, SimulatedSettings, recorded::HysteresisLoop},
+    dataset::{Dataset, Simulation},
+    evaluation::{NodeAddress, recorded::HysteresisLoop},
+    problem::Channel,
     surface::SurfaceMap,
 };
 
@@ -41,9 +42,9 @@ pub(super) fn pictures(
             training_state_figure(&training.history, &training.stages).into(),
         ),
     ];
-    let (surfaces, of_errors) = match (file.settings.simulated(), file.scores.network.nodes()) {
-        (Some(settings), Some(errors)) => (
-            array_surfaces(&settings, test, answers, errors.worst_node),
+    let (surfaces, of_errors) = match (&file.problem.sensor, file.scores.network.nodes()) {
+        (Some(simulation), Some(errors)) => (
+            array_surfaces(simulation, test, answers, errors.worst_node),
             array_errors(test, answers).into(),
         ),
         _ => (target_surfaces(file, test, answers), target_errors(file, test, answers)),
@@ -139,12 +140,11 @@ fn target_surfaces(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) ->
 /// Actual and decoupled surface of the snapshot of `worst`, which is marked, and the error; `None` where no surface can be
 /// laid through the nodes.
 fn array_surfaces(
-    settings: &SimulatedSettings,
+    source: &Simulation,
     test: &Dataset,
     decoupled_mm: &Array2<f64>,
     worst: NodeAddress,
 ) -> Option<(String, Figure)> {
-    let source = &settings.source;
     let (scale, geometry) = (source.sensor.scale, &source.sensor.geometry);
     let rows = source.scene.rows.read(scale.rows()).ok()?;
     let (x_mm, y_mm) = geometry.lattice_mm(scale, &rows);

@@ -5,15 +5,17 @@ use crate::{
     import::{Plan, Recorded},
 };
 use decoupler_core::{
-    dataset::Dataset,
-    evaluation::{Channel, Combination, SimulatedSettings},
+    dataset::{Dataset, Simulation},
+    evaluation::Combination,
+    problem::Channel,
     scene::{Loading, Movement, Noise, NoisySets, RowModel},
     text::counted,
 };
 
 /// Names and values of all settings.
-pub(super) fn settings_facts(file: &NetworkFile, settings: &SimulatedSettings) -> Vec<(&'static str, String)> {
-    let SimulatedSettings { source, inputs, .. } = settings;
+pub(super) fn settings_facts(file: &NetworkFile, source: &Simulation) -> Vec<(&'static str, String)> {
+    let settings = &file.settings;
+    let inputs = &settings.inputs;
     let (geometry, scene) = (&source.sensor.geometry, &source.scene);
     let mut facts = vec![
         ("Array", source.sensor.scale.to_string()),

@@ -10,7 +10,7 @@ use crate::{
 use decoupler_core::{
     dataset::SplitBy,
     decoupling::{DecoderKind, Precision},
-    evaluation::{Begin, DecoderSet, Measured, Run, RunSets, RunSettings, SimulatedSettings},
+    evaluation::{Begin, DecoderSet, Measured, Run, RunSets, RunSettings},
     job::Job,
     machine::MemoryBudget,
     scene::{Indenter, Loading, RowModel},
@@ -18,9 +18,13 @@ use decoupler_core::{
 };
 
 fn run() -> Run {
-    let mut settings = SimulatedSettings::default();
-    settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
-    (settings.hidden, settings.source.samples, settings.starts) = (3, 60, 2);
+    let mut settings = RunSettings::default();
+    settings.simulation_mut().unwrap().sensor.scale = "4x4_2x12".parse().unwrap();
+    (
+        settings.hidden,
+        settings.simulation_mut().unwrap().samples,
+        settings.starts,
+    ) = (3, 60, 2);
     settings.training.stopping.epochs = 5;
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
@@ -31,14 +35,10 @@ fn run() -> Run {
 fn report(name: &str, file: &NetworkFile, run: &Run) -> String {
     let set = DecoderSet::new(
         file.settings,
-        RunSets::draw(
-            &file.settings.simulated().unwrap(),
-            MemoryBudget::UNLIMITED,
-            &Job::UNINTERRUPTED,
-        )
-        .unwrap()
-        .split
-        .training,
+        RunSets::draw(&file.settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
+            .unwrap()
+            .split
+            .training,
         Some(file.network.clone()),
     );
     let ridge = set.measure(DecoderKind::Ridge, Precision::Double, run.test()).unwrap();
@@ -133,15 +133,15 @@ fn a_report_contains_the_figures_of_its_run() {
 
 #[test]
 fn settings_without_an_option_are_named_instead_of_a_wrong_command() {
-    let mut settings = SimulatedSettings::default();
-    settings.source.sensor.geometry.height_mm = 6.0;
-    settings.source.scene.largest_compression = 0.1;
+    let mut settings = RunSettings::default();
+    settings.simulation_mut().unwrap().sensor.geometry.height_mm = 6.0;
+    settings.simulation_mut().unwrap().scene.largest_compression = 0.1;
     let gap = train_command(&settings.into(), None).unwrap_err().to_string();
     assert!(gap.contains("geometry") && gap.contains("compression"), "{gap}");
     let mut indenter = Indenter::default();
     indenter.spread_mm *= 2.0;
-    let mut settings = SimulatedSettings::default();
-    settings.source.scene.loading = Loading::Indenter(indenter);
+    let mut settings = RunSettings::default();
+    settings.simulation_mut().unwrap().scene.loading = Loading::Indenter(indenter);
     let gap = train_command(&settings.into(), None).unwrap_err().to_string();
     assert!(gap.contains("indenter"), "{gap}");
 }

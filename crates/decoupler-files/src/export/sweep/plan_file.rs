@@ -1,10 +1,10 @@
 use std::path::Path;
 
 use decoupler_core::{
-    dataset::Division,
+    dataset::{Division, Simulation},
     decoupling::DecoderKind,
     evaluation::{
-        Combination, Initialization, RunSettings, Simulation, Source,
+        Combination, Initialization, RunSettings,
         experiments::{Axis, AxisKind, Experiment},
     },
     scene::{NoisySets, RowModel, Rows},
@@ -138,8 +138,8 @@ pub fn sweep_specification(experiment: &Experiment, plan: Option<&Plan>) -> Resu
     if experiment.cross_validation.is_some() {
         return Err(SpecificationGap::CrossValidation);
     }
-    if let Some(settings) = experiment.base.simulated() {
-        train_command(&settings.into(), None).map_err(SpecificationGap::Setting)?;
+    if experiment.base.simulation().is_some() {
+        train_command(&experiment.base.into(), None).map_err(SpecificationGap::Setting)?;
     }
     let mut train = train_options(&experiment.base, &[DecoderKind::Network]);
     let mut axes = Map::new();
@@ -232,13 +232,13 @@ pub fn train_options(settings: &RunSettings, decoders: &[DecoderKind]) -> TrialO
     if settings.initialization != Initialization::default() {
         options.insert("begin".to_owned(), text(&settings.initialization));
     }
-    match &settings.source {
-        Source::Simulated(source) => {
+    match settings.simulation() {
+        Some(source) => {
             options.insert("inputs".to_owned(), text(&settings.inputs.quantity));
             options.extend(simulation_options(source));
         }
-        Source::Measured(source) => {
-            let rows = match source.rows {
+        None => {
+            let rows = match settings.source.row_model() {
                 RowModel::Shared => Rows::All,
                 RowModel::Each => Rows::Known,
             };

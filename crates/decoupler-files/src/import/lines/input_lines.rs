@@ -2,7 +2,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use decoupler_core::{
     dataset::{MemoryStream, Place, Series},
-    evaluation::Channel,
+    problem::Channel,
 };
 use thiserror::Error;
 

@@ -7,10 +7,11 @@ use std::{
 use decoupler_core::{
     dataset::{Folds, SplitBy, Stream},
     evaluation::{
-        Channel, CrossValidated, ErrorTable, RecordedSize, Workload,
+        CrossValidated, ErrorTable, TrainingSize, Workload,
         recorded::{Determination, Findings, FittedModel, NonlinearGain, SplitComparison, StudyStep, channel_remarks},
     },
     job::Job,
+    problem::Channel,
 };
 use decoupler_files::{
     export::describe_channels,
@@ -263,7 +264,7 @@ fn validate(
     let (settings, set, by) = (setup.settings(), &recording.set, plan.division.by);
     let is_cancelled = || report.is_cancelled();
     let job = &Job::new(&is_cancelled);
-    let workload = Workload::of_recording(settings, RecordedSize::of(settings, set));
+    let workload = Workload::of(settings, TrainingSize::of(settings, set));
     workload
         .check_memory(memory_budget())
         .map_err(|error| error.to_string())?;

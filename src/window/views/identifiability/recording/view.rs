@@ -1,10 +1,8 @@
 //! The form, the results and the exports of the study of a recording.
 
 use decoupler_core::{
-    evaluation::{
-        Channel,
-        recorded::{Findings, FittedModel},
-    },
+    evaluation::recorded::{Findings, FittedModel},
+    problem::Channel,
     text::counted,
 };
 use decoupler_files::{

@@ -9,6 +9,7 @@ use super::{
 };
 use crate::window::test_view::Frame;
 use decoupler_core::{
+    dataset::Simulation,
     decoupling::{Decoder, ProgramDecoder},
     live::{ReZero, ZeroGains},
     scene::{Deformation, Scene},
@@ -47,11 +48,8 @@ impl Decoding {
     /// # Errors
     /// If the sensor or the scene is invalid, with the reason.
     pub(super) fn new(network: Arc<NetworkFile>, scene: &Scene, zero: Option<ZeroGains>) -> Result<Self, String> {
-        let settings = network
-            .settings
-            .simulated()
-            .ok_or("a network of a recording has no sensor model")?;
-        let sensor = settings.source.sensor;
+        let simulation = network.problem.sensor;
+        let Simulation { sensor, .. } = simulation.ok_or("a network of a recording has no sensor model")?;
         let scale = sensor.scale;
         let rows = scene.rows.read(scale.rows()).map_err(|error| error.to_string())?;
         let at_rest = vec![DVec3::ZERO; scale.nodes_per_row()];
@@ -268,15 +266,15 @@ mod tests {
     use decoupler_core::{
         dataset::Seed,
         decoupling::resistance_residual,
-        evaluation::{Run, SimulatedSettings},
+        evaluation::{Run, RunSettings},
         scene::{Fault, Noise},
     };
     use decoupler_files::live::Simulated;
 
     fn network() -> Arc<NetworkFile> {
-        let mut settings = SimulatedSettings::default();
-        settings.source.sensor.scale = "4x4_3x12".parse().unwrap();
-        (settings.source.samples, settings.hidden) = (200, 6);
+        let mut settings = RunSettings::default();
+        settings.simulation_mut().unwrap().sensor.scale = "4x4_3x12".parse().unwrap();
+        (settings.simulation_mut().unwrap().samples, settings.hidden) = (200, 6);
         settings.training.stopping.epochs = 10;
         let mut run = Run::prepare(settings).unwrap();
         while run.step().is_none() {}
@@ -288,7 +286,7 @@ mod tests {
         let network = network();
         let scene = Scene {
             noise: Noise::relative(1e-3),
-            ..network.settings.simulated().unwrap().source.scene
+            ..network.settings.simulation().unwrap().scene
         };
         let mut decoding = Decoding::new(Arc::clone(&network), &scene, None).unwrap();
         let mut source = Simulated::new(&decoding.sensor, &scene, Seed(1), 50.0).unwrap();

@@ -6,8 +6,7 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::Seed,
-    evaluation::SimulatedSettings,
+    dataset::{Seed, Simulation},
     scene::{Deformation, Fault, Noise, Rows, Scene},
     sensor::{ArrayScale, SensorModel},
 };
@@ -45,9 +44,9 @@ pub(super) enum Next {
 }
 
 impl LivePlan {
-    /// Returns the scene of `settings` with the noise of the readings.
-    pub(super) fn scene(&self, settings: &SimulatedSettings) -> Scene {
-        let scene = settings.source.scene;
+    /// Returns the scene of `simulation` with the noise of the readings.
+    pub(super) fn scene(&self, simulation: &Simulation) -> Scene {
+        let scene = simulation.scene;
         Scene {
             noise: Noise {
                 relative: self.noise,
@@ -62,12 +61,12 @@ impl FrameSource {
     /// Opens the source of `plan`; `None` if it is no longer wanted.
     pub(super) fn open(
         plan: &LivePlan,
-        settings: &SimulatedSettings,
+        simulation: &Simulation,
         read: &[usize],
         tally: &mut Tally,
         is_wanted: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, String> {
-        let (sensor, scene): (SensorModel, Scene) = (settings.source.sensor, plan.scene(settings));
+        let (sensor, scene): (SensorModel, Scene) = (simulation.sensor, plan.scene(simulation));
         // The rows of a frame are distinguished even if they are not an input of the network.
         let rows = match scene.rows {
             Rows::All => Rows::Known,

@@ -9,8 +9,9 @@ use ndarray::Array2;
 
 use crate::window::test_view::Frame;
 use decoupler_core::{
-    evaluation::{Problem, SimulatedSettings},
+    dataset::Simulation,
     live::{Diagnosis, Drift, NoDriftMonitor, ZeroGains},
+    problem::Problem,
     scene::Fault,
     sensor::SensorModel,
     surface::SurfaceMap,
@@ -26,8 +27,8 @@ use decoupler_files::{
 pub struct LivePlan {
     /// The network.
     pub network: Arc<NetworkFile>,
-    /// Settings of the network with its sensor and scene; `None` for a network of a recording.
-    pub settings: Option<SimulatedSettings>,
+    /// Sensor and scene of the network; `None` for a network of a recording.
+    pub simulation: Option<Simulation>,
     /// Source of the frames.
     pub source: SourcePlan,
     /// Noise of a reading, relative to the reading (standard deviation). Simulated sources add it, and fault detection

@@ -4,8 +4,8 @@ use std::{
 };
 
 use decoupler_core::{
+    dataset::Simulation,
     decoupling::Decoder,
-    evaluation::SimulatedSettings,
     live::{FaultEvent, LeftOutDecoder, WireCheck, equation_decoder},
     scene::Scene,
     sensor::{SensorError, SensorModel},
@@ -41,12 +41,12 @@ impl Session {
     /// Prepares to decode what `plan` says; `None` if that is no longer wanted.
     pub(super) fn open(
         plan: LivePlan,
-        settings: &SimulatedSettings,
+        simulation: &Simulation,
         is_wanted: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, String> {
-        let decoding = Decoding::new(plan.network.clone(), &plan.scene(settings), plan.zero.clone())?;
+        let decoding = Decoding::new(plan.network.clone(), &plan.scene(simulation), plan.zero.clone())?;
         let mut tally = Tally::new(Instant::now());
-        let source = FrameSource::open(&plan, settings, &decoding.rows, &mut tally, is_wanted)?;
+        let source = FrameSource::open(&plan, simulation, &decoding.rows, &mut tally, is_wanted)?;
         Ok(source.map(|source| Self {
             plan,
             source,
@@ -332,8 +332,8 @@ pub fn run(plan: LivePlan, commands: &Receiver<Command>, report: &Report<LiveEve
     send(LiveEvent::Source(source.clone()));
     let plan = LivePlan { source, ..plan };
     let is_wanted = || !report.is_cancelled();
-    let session: Option<Box<dyn LiveSession>> = match plan.settings {
-        Some(settings) => Session::open(plan, &settings, &is_wanted)?.map(|session| Box::new(session) as _),
+    let session: Option<Box<dyn LiveSession>> = match plan.simulation {
+        Some(simulation) => Session::open(plan, &simulation, &is_wanted)?.map(|session| Box::new(session) as _),
         None => TargetSession::open(&plan, &is_wanted)?.map(|session| Box::new(session) as _),
     };
     let Some(mut session) = session else { return Ok(()) };

@@ -9,8 +9,8 @@ use std::{
 
 use decoupler_core::{
     decoupling::{Decoder, ProgramDecoder},
-    evaluation::Problem,
     live::{DriftMonitor, NoDriftMonitor},
+    problem::Problem,
 };
 use decoupler_files::{
     export::NetworkFile,
@@ -389,7 +389,7 @@ mod tests {
     fn plan(network: &Arc<NetworkFile>, path: &Path) -> LivePlan {
         LivePlan {
             network: Arc::clone(network),
-            settings: None,
+            simulation: None,
             source: SourcePlan::Replay {
                 path: path.to_owned(),
                 at_s: 0.0,

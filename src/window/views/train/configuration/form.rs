@@ -1,7 +1,8 @@
 //! The configuration form, with a short summary of each folded part.
 
 use decoupler_core::{
-    evaluation::{Measured, Outlook, Preset, RunSettings, SimulatedSettings, Simulation},
+    dataset::Simulation,
+    evaluation::{Measured, Outlook, Preset, RunSettings, TrainingSize},
     network::{InputChoice, Quantity, ScalingChoice, Shape},
     scene::{Loading, Movement, RowModel, Rows, Scene},
     sensor::{Geometry, SensorModel},
@@ -75,12 +76,15 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
     let mut draft = shared.draft;
     let mut picked = None;
     let is_busy = shared.phase.is_busy();
-    let scene = draft.source.scene;
+    let noise_of = |draft: &RunSettings| draft.simulation().map(|simulation| simulation.scene.noise);
     let followed = present(&draft);
     let top = ui.cursor().top();
     ui.add_enabled_ui(!is_busy, |ui| {
-        array_choice_ui(ui, &mut draft.source.sensor.scale);
-        let scale = draft.source.sensor.scale;
+        let Some(simulation) = draft.simulation_mut() else {
+            return;
+        };
+        array_choice_ui(ui, &mut simulation.sensor.scale);
+        let scale = simulation.sensor.scale;
         hidden_choice_ui(
             ui,
             &mut draft.hidden,
@@ -92,22 +96,27 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
     Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
     ui.add_enabled_ui(!is_busy, |ui| {
         preset_section_ui(ui, &mut draft);
-        scene_choice_ui(ui, &mut draft);
-        ui.add_space(space(2));
-        ui.separator();
-        outlook_notes_ui(ui, &draft, outlook(shared));
-        fold_ui(ui, "Scene", &of_scene(&draft), |ui| {
-            scene_section_ui(ui, &mut draft, outlook(shared));
-        });
+        if let Some(simulation) = draft.simulation_mut() {
+            scene_choice_ui(ui, &mut simulation.scene);
+            ui.add_space(space(2));
+            ui.separator();
+            outlook_notes_ui(ui, &simulation.scene, outlook(shared));
+            fold_ui(ui, "Scene", &of_scene(&simulation.scene), |ui| {
+                scene_section_ui(ui, simulation, outlook(shared));
+            });
+        }
         // The best number of samples depends on the noise.
-        if let Some(preset) = followed.filter(|_| draft.source.scene.noise != scene.noise) {
+        if let Some(preset) = followed.filter(|_| noise_of(&draft) != noise_of(&shared.draft)) {
             draft = applied(preset, &draft);
         }
         fold_ui(ui, "Samples", &of_samples(&draft), |ui| {
             samples_section_ui(ui, &mut draft);
         });
-        let geometry = of_geometry(&draft.source.sensor.geometry);
-        fold_ui(ui, "Geometry", &geometry, |ui| geometry_ui(ui, &mut draft));
+        if let Some(Simulation { sensor, .. }) = draft.simulation_mut() {
+            fold_ui(ui, "Geometry", &of_geometry(&sensor.geometry), |ui| {
+                geometry_ui(ui, sensor);
+            });
+        }
         fold_ui(ui, "Network inputs", &of_inputs(&draft.inputs), |ui| {
             array_inputs_ui(ui, &mut draft);
         });
@@ -120,7 +129,7 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
         "Reset to the paper's settings",
         "10×10_5×30, 12 hidden nodes, 1000 training and 100 test samples",
     );
-    reset_ui(ui, text, hint, &mut draft, SimulatedSettings::default(), is_busy);
+    reset_ui(ui, text, hint, &mut draft, RunSettings::default(), is_busy);
     if draft != shared.draft {
         effects.push(Effect::Configure(Box::new(draft)));
     }
@@ -199,7 +208,7 @@ fn recorded_method_ui(ui: &mut Ui, settings: &mut RunSettings, phase: Phase) {
 }
 
 /// The method. A paused training can be continued with another one.
-fn method_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, phase: Phase) {
+fn method_ui(ui: &mut Ui, settings: &mut RunSettings, phase: Phase) {
     ui.add_space(space(1));
     ui.add_enabled_ui(!phase.is_busy() || phase == Phase::Paused, |ui| {
         method_choice_ui(ui, &mut settings.training.method);
@@ -207,7 +216,7 @@ fn method_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, phase: Phase) {
 }
 
 /// The folded settings of the training; `usual` are the default stopping rules.
-fn training_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, usual: StoppingRules, phase: Phase) {
+fn training_ui(ui: &mut Ui, settings: &mut RunSettings, usual: StoppingRules, phase: Phase) {
     ui.add_enabled_ui(!phase.is_busy() || phase == Phase::Paused, |ui| {
         fold_ui(ui, "When to stop", &of_stopping(&settings.training), |ui| {
             stopping_ui(ui, &mut settings.training.stopping, usual);
@@ -219,14 +228,7 @@ fn training_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, usual: StoppingRul
 }
 
 /// The button that sets `settings` to `usual`.
-fn reset_ui<S: Copy + PartialEq>(
-    ui: &mut Ui,
-    text: &str,
-    hint: &str,
-    settings: &mut RunSettings<S>,
-    usual: RunSettings<S>,
-    is_busy: bool,
-) {
+fn reset_ui(ui: &mut Ui, text: &str, hint: &str, settings: &mut RunSettings, usual: RunSettings, is_busy: bool) {
     ui.add_space(space(4));
     let can_reset = !is_busy && *settings != usual;
     let reset = ui.add_enabled(can_reset, eframe::egui::Button::new(text));
@@ -238,12 +240,15 @@ fn reset_ui<S: Copy + PartialEq>(
 /// Returns the outlook of the scene of the draft, if it is known.
 fn outlook(shared: &Shared) -> Option<&Outlook> {
     let (settings, test) = match (&shared.preview, &shared.run) {
-        (Some(preview), _) => (preview.settings, &preview.test),
-        (None, Some(run)) => (run.simulated()?, run.test.array()?),
+        (Some(preview), _) => (&preview.settings, &preview.test),
+        (None, Some(run)) => (run.settings(), run.test.array()?),
         (None, None) => return None,
     };
-    let is_same =
-        (settings.source.sensor, settings.source.scene) == (shared.draft.source.sensor, shared.draft.source.scene);
+    let sensor_and_scene = |settings: &RunSettings| {
+        let simulation = settings.simulation()?;
+        Some((simulation.sensor, simulation.scene))
+    };
+    let is_same = sensor_and_scene(settings) == sensor_and_scene(&shared.draft);
     test.outlook.as_ref().filter(|_| is_same)
 }
 
@@ -267,7 +272,7 @@ fn paper_section_ui(ui: &mut Ui) -> Option<PaperFigure> {
 }
 
 /// Shows the presets of the settings; changes `draft`.
-pub fn preset_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+pub fn preset_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
     ui.add_space(space(2));
     let options = [
         (
@@ -291,35 +296,38 @@ pub fn preset_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
 }
 
 /// Returns the preset that `draft` follows, if any.
-pub fn present(draft: &SimulatedSettings) -> Option<Preset> {
+pub fn present(draft: &RunSettings) -> Option<Preset> {
     Preset::ALL.into_iter().find(|&preset| applied(preset, draft) == *draft)
 }
 
 /// Returns `draft` with the settings of `preset`: how readings are decoded and trained on, not the scene.
-pub fn applied(preset: Preset, draft: &SimulatedSettings) -> SimulatedSettings {
-    let settings = preset.settings_in(draft.source.scene.noise);
-    SimulatedSettings {
-        source: Simulation {
-            sensor: draft.source.sensor,
-            scene: Scene {
-                rows: settings.source.scene.rows,
-                ..draft.source.scene
-            },
-            test_samples: draft.source.test_samples,
-            ..settings.source
+pub fn applied(preset: Preset, draft: &RunSettings) -> RunSettings {
+    let Some(simulation) = draft.simulation() else {
+        return *draft;
+    };
+    let of_preset = preset.simulation_in(simulation.scene.noise);
+    let source = Simulation {
+        sensor: simulation.sensor,
+        scene: Scene {
+            rows: of_preset.scene.rows,
+            ..simulation.scene
         },
+        test_samples: simulation.test_samples,
+        ..of_preset
+    };
+    RunSettings {
+        source: source.into(),
         hidden: draft.hidden,
         starts: draft.starts,
         combine: draft.combine,
         initialization: draft.initialization,
         seed: draft.seed,
-        ..settings
+        ..preset.settings_in(simulation.scene.noise)
     }
 }
 
 /// Loading, rows, axes and noise.
-pub(super) fn of_scene(draft: &SimulatedSettings) -> String {
-    let scene = &draft.source.scene;
+pub(super) fn of_scene(scene: &Scene) -> String {
     let loading = match scene.loading {
         Loading::RandomNodes => "random nodes".to_owned(),
         Loading::SmoothField { .. } => "smooth field".to_owned(),
@@ -339,12 +347,17 @@ pub(super) fn of_scene(draft: &SimulatedSettings) -> String {
 }
 
 /// Numbers of training, validation and test samples, and the seed.
-pub(super) fn of_samples(draft: &SimulatedSettings) -> String {
-    let source = &draft.source;
-    format!(
-        "{} + {} + {}, seed {}",
-        source.samples, source.validation_samples, source.test_samples, draft.seed.0
-    )
+pub(super) fn of_samples(draft: &RunSettings) -> String {
+    let samples = draft.simulation().map_or(String::new(), |simulation| {
+        let Simulation {
+            samples,
+            validation_samples,
+            test_samples,
+            ..
+        } = simulation;
+        format!("{samples} + {validation_samples} + {test_samples}, ")
+    });
+    format!("{samples}seed {}", draft.seed.0)
 }
 
 /// Height, and whether the geometry differs from the assumed one.
@@ -378,7 +391,7 @@ pub(super) fn of_stopping(training: &TrainingSettings) -> String {
 }
 
 /// The first of the method's own settings, and the number of starts.
-pub(super) fn of_method<S>(settings: &RunSettings<S>) -> String {
+pub(super) fn of_method(settings: &RunSettings) -> String {
     let method = settings.training.method;
     let first = method.settings().next();
     let first = first.and_then(|setting| Some(format!("{} {}, ", setting.name, input_text(setting.number(&method)?))));
@@ -386,8 +399,8 @@ pub(super) fn of_method<S>(settings: &RunSettings<S>) -> String {
     format!("{}{starts}", first.unwrap_or_default())
 }
 
-/// Lengths and resistivity; changes `draft`.
-pub fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+/// Lengths and resistivity; changes `sensor`.
+pub fn geometry_ui(ui: &mut Ui, sensor: &mut SensorModel) {
     let Geometry {
         height_mm,
         row_x0_mm,
@@ -397,7 +410,7 @@ pub fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         column_pitch_mm,
         column_node_x0_mm,
         column_node_pitch_mm,
-    } = &mut draft.source.sensor.geometry;
+    } = &mut sensor.geometry;
     let usual = Geometry::default();
     let lengths = [
         ("Height", glossary::HEIGHT.hint, height_mm, usual.height_mm),
@@ -457,22 +470,19 @@ pub fn geometry_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         ui,
         "Resistivity",
         hint,
-        &mut draft.source.sensor.resistivity_ohm_per_mm,
-        usually(
-            SensorModel::new(draft.source.sensor.scale).resistivity_ohm_per_mm,
-            1e-12..=1e12,
-        ),
+        &mut sensor.resistivity_ohm_per_mm,
+        usually(SensorModel::new(sensor.scale).resistivity_ohm_per_mm, 1e-12..=1e12),
         "Ω/mm",
     );
     let dim = Theme::of(ui).palette.dim;
     ui.label(RichText::new(Geometry::ASSUMPTION).size(type_size().note).color(dim));
-    if draft.source.sensor.geometry != Geometry::default() && ui.button("Reset to the assumed geometry").clicked() {
-        draft.source.sensor.geometry = Geometry::default();
+    if sensor.geometry != Geometry::default() && ui.button("Reset to the assumed geometry").clicked() {
+        sensor.geometry = Geometry::default();
     }
 }
 
 /// The inputs of the network of an array, and its size; changes `draft`.
-pub fn array_inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+pub fn array_inputs_ui(ui: &mut Ui, draft: &mut RunSettings) {
     let options = [
         (Quantity::Resistance, "Resistance", "R, as in the paper."),
         (Quantity::Conductance, "Conductance", glossary::CONDUCTANCE.hint),
@@ -482,16 +492,9 @@ pub fn array_inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         draft.inputs.quantity = picked;
     }
     scaling_ui(ui, &mut draft.inputs.scaling);
-    let Ok(size) = draft.source.model_size() else { return };
-    let scale = draft.source.sensor.scale;
-    let varying_axes = match (draft.source.scene.movement, draft.source.scene.rows) {
-        (Movement::Xyz { .. }, _) => 3,
-        // Without the row number a network must find x, which differs from row to row; y never does.
-        (Movement::Z, Rows::All) if scale.rows() > 1 => 2,
-        (Movement::Z, _) => 1,
-    };
-    let channels = (scale.columns(), varying_axes * scale.nodes_per_row());
-    weights_ui(ui, draft, channels, size.networks);
+    if let Ok(size) = TrainingSize::drawn(draft) {
+        weights_ui(ui, draft, (size.inputs, size.targets), size.networks);
+    }
 }
 
 /// The row model of a recording: one network per row-wire is offered if a column contains the row numbers. Changes
@@ -525,7 +528,7 @@ fn scaling_ui(ui: &mut Ui, scaling: &mut ScalingChoice) {
 }
 
 /// Shows the size of the networks with these numbers of inputs and outputs.
-fn weights_ui<S>(ui: &mut Ui, settings: &RunSettings<S>, (inputs, outputs): (usize, usize), networks: usize) {
+fn weights_ui(ui: &mut Ui, settings: &RunSettings, (inputs, outputs): (usize, usize), networks: usize) {
     let shape = Shape {
         inputs,
         hidden: settings.hidden,

@@ -1,6 +1,6 @@
 use decoupler_core::{
-    dataset::LARGEST_SAMPLES,
-    evaluation::{Outlook, RecordedSize, RunSettings, SimulatedSettings, Workload},
+    dataset::{LARGEST_SAMPLES, Seed, Simulation},
+    evaluation::{Outlook, RunSettings, TrainingSize, Workload},
     network::{HiddenSuggestions, LARGEST_HIDDEN},
     scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Rows, Scene},
     sensor::ArrayScale,
@@ -11,7 +11,7 @@ use eframe::egui::{CollapsingHeader, RichText, Slider, Stroke, Ui};
 
 use crate::window::{
     glossary,
-    shared::opening_settings,
+    shared::opening_scene,
     theme::{Theme, space, type_size},
     widgets::{
         dim_ui, explained_options_ui,
@@ -23,30 +23,34 @@ use crate::window::{
     },
 };
 
-/// Shows rows, axes, loading and noise of the scene; changes `draft`. `outlook` is that of the scene, once
+/// Shows rows, axes, loading and noise of the scene; changes `simulation`. `outlook` is that of the scene, once
 /// it is known.
-pub fn scene_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings, outlook: Option<&Outlook>) {
-    rows_ui(ui, draft);
-    movement_ui(ui, &mut draft.source.scene.movement);
-    loading_ui(ui, &mut draft.source.scene.loading);
+pub fn scene_section_ui(ui: &mut Ui, simulation: &mut Simulation, outlook: Option<&Outlook>) {
+    let scene = &mut simulation.scene;
+    rows_ui(ui, &mut scene.rows, simulation.sensor.scale);
+    movement_ui(ui, &mut scene.movement);
+    loading_ui(ui, &mut scene.loading);
     let hint = glossary::LARGEST_COMPRESSION.hint;
     percent_ui(
         ui,
         "Largest compression",
         hint,
-        &mut draft.source.scene.largest_compression,
+        &mut scene.largest_compression,
         Scene::default().largest_compression,
         0.001..=99.0,
     );
-    noise_ui(ui, &mut draft.source.scene.noise);
-    size_ui(ui, draft);
+    noise_ui(ui, &mut scene.noise);
+    size_ui(ui, simulation);
     condition_ui(ui, outlook);
 }
 
 /// Shows the numbers of samples and the seed; changes `draft`.
-pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
-    let usual = SimulatedSettings::default();
-    let rows = draft.source.model_size().map_or(1, |size| size.rows);
+pub fn samples_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
+    let usual = Simulation::default();
+    let Some(simulation) = draft.simulation_mut() else {
+        return;
+    };
+    let rows = simulation.model_size().map_or(1, |size| size.rows);
     let hint = match rows {
         1 => "Number of samples to which the network is fitted.".to_owned(),
         _ => format!(
@@ -58,31 +62,30 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         ui,
         "Training samples",
         &hint,
-        &mut draft.source.samples,
-        usually(usual.source.samples, 1..=LARGEST_SAMPLES),
+        &mut simulation.samples,
+        usually(usual.samples, 1..=LARGEST_SAMPLES),
     );
     let hint = glossary::VALIDATION_SET.hint;
     count_ui(
         ui,
         "Validation samples",
         hint,
-        &mut draft.source.validation_samples,
-        usually(usual.source.validation_samples, 0..=LARGEST_SAMPLES),
+        &mut simulation.validation_samples,
+        usually(usual.validation_samples, 0..=LARGEST_SAMPLES),
     );
     let hint = glossary::TEST_SET.hint;
     count_ui(
         ui,
         "Test samples",
         hint,
-        &mut draft.source.test_samples,
-        usually(usual.source.test_samples, 1..=LARGEST_SAMPLES),
+        &mut simulation.test_samples,
+        usually(usual.test_samples, 1..=LARGEST_SAMPLES),
     );
-    seed_ui(ui, "Seed", glossary::SEED.hint, &mut draft.seed.0, usual.seed.0);
+    seed_ui(ui, "Seed", glossary::SEED.hint, &mut draft.seed.0, Seed::default().0);
 }
 
-fn rows_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
-    let rows = &mut draft.source.scene.rows;
-    let last = draft.source.sensor.scale.rows() - 1;
+fn rows_ui(ui: &mut Ui, rows: &mut Rows, scale: ArrayScale) {
+    let last = scale.rows() - 1;
     let one = match *rows {
         // The array may have become smaller.
         Rows::One(row) => Rows::One(row.min(last)),
@@ -234,8 +237,8 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
 }
 
 /// Shows the numbers of unknowns and equations of the scene.
-fn size_ui(ui: &mut Ui, draft: &SimulatedSettings) {
-    let Ok(size) = draft.source.model_size() else { return };
+fn size_ui(ui: &mut Ui, simulation: &Simulation) {
+    let Ok(size) = simulation.model_size() else { return };
     let text = format!(
         "{}, {} per frame",
         counted(size.unknowns, "unknown"),
@@ -258,9 +261,9 @@ fn condition_ui(ui: &mut Ui, outlook: Option<&Outlook>) {
 }
 
 /// Shows the warnings of the scene, which stay visible while its settings are folded away.
-pub fn outlook_notes_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>) {
+pub fn outlook_notes_ui(ui: &mut Ui, scene: &Scene, outlook: Option<&Outlook>) {
     let Some(outlook) = outlook else { return };
-    let sideways = draft.source.scene.movement != Movement::Z;
+    let sideways = scene.movement != Movement::Z;
     if outlook.warnings.is_empty() && sideways {
         note_ui(ui, &sideways_in_words(outlook));
     }
@@ -284,12 +287,11 @@ fn sideways_in_words(outlook: &Outlook) -> String {
     }
 }
 
-/// The ready-made scenes, one click each; changes `draft`. All other settings of a scene are folded below them.
-pub fn scene_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+/// The ready-made scenes, one click each; changes `scene`. All other settings of a scene are folded below them.
+pub fn scene_choice_ui(ui: &mut Ui, scene: &mut Scene) {
     ui.add_space(space(1));
     // The preset decides which rows share a network.
-    let scene = &mut draft.source.scene;
-    let [print, paper] = [opening_settings().source.scene, Scene::default()].map(|ready| Scene {
+    let [print, paper] = [opening_scene(), Scene::default()].map(|ready| Scene {
         rows: scene.rows,
         ..ready
     });
@@ -408,7 +410,7 @@ pub fn array_choice_ui(ui: &mut Ui, scale: &mut ArrayScale) {
 
 /// The number of hidden nodes, with the rules of thumb for these numbers of inputs and outputs; changes `hidden`.
 pub fn hidden_choice_ui(ui: &mut Ui, hidden: &mut usize, channels: Option<(usize, usize)>) {
-    let usual = SimulatedSettings::default().hidden;
+    let usual = RunSettings::default().hidden;
     let limits = usually(usual, 1..=LARGEST_HIDDEN);
     count_ui(ui, "Hidden nodes", glossary::HIDDEN_NODES.hint, hidden, limits);
     let Some((n, m)) = channels else {
@@ -426,10 +428,10 @@ pub fn hidden_choice_ui(ui: &mut Ui, hidden: &mut usize, channels: Option<(usize
 }
 
 /// Notes the memory and time of a training that needs much of either.
-pub fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
-    if let Ok(workload) = Workload::of(draft)
-        && workload.is_large()
-    {
+pub fn workload_ui(ui: &mut Ui, draft: &RunSettings) {
+    let Ok(size) = TrainingSize::drawn(draft) else { return };
+    let workload = Workload::of(draft, size);
+    if workload.is_large() {
         let warning = Theme::of(ui).palette.warning;
         let text = capitalised(&describe_workload(&workload));
         ui.label(RichText::new(text).size(type_size().note).color(warning));
@@ -437,7 +439,7 @@ pub fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
 }
 
 /// Notes the time of a training on a recording that takes long.
-pub fn recorded_workload_ui(ui: &mut Ui, settings: &RunSettings, size: RecordedSize) {
+pub fn recorded_workload_ui(ui: &mut Ui, settings: &RunSettings, size: TrainingSize) {
     if let Some(text) = describe_recorded_workload(settings, size) {
         let warning = Theme::of(ui).palette.warning;
         ui.label(RichText::new(capitalised(&text)).size(type_size().note).color(warning));
@@ -451,7 +453,7 @@ fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: &[usize]) {
     let width = ui.available_width();
     let response = slider_ui(ui, slider, width);
     if response.double_clicked() {
-        *hidden = SimulatedSettings::default().hidden;
+        *hidden = RunSettings::default().hidden;
     }
     let rail = response.rect.x_range().shrink(0.4 * response.rect.height());
     let stroke = Stroke::new(1.5, Theme::of(ui).palette.warning);
@@ -485,11 +487,11 @@ mod tests {
     #[test]
     fn a_large_training_states_its_memory_and_time_before_it_begins() {
         for (hidden, is_shown) in [(12, false), (512, true)] {
-            let mut draft = SimulatedSettings {
+            let mut draft = RunSettings {
                 hidden,
-                ..SimulatedSettings::default()
+                ..RunSettings::default()
             };
-            draft.source.sensor.scale = "10x10_5x512".parse().unwrap();
+            draft.simulation_mut().unwrap().sensor.scale = "10x10_5x512".parse().unwrap();
             let harness = Harness::new_ui(move |ui| workload_ui(ui, &draft));
             let found = harness.query_by_label_contains("of memory");
             assert_eq!(found.is_some(), is_shown, "{hidden} hidden nodes");

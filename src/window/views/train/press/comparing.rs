@@ -208,7 +208,7 @@ fn fit_all(subject: &Subject, report: &Report<FitEvent>) {
     let sets = RunSets::draw(&subject.settings, memory_budget(), &Job::new(&is_cancelled));
     let set = sets.map_err(|error| error.to_string()).map(|sets| {
         let networks = Some((*subject.networks).clone());
-        DecoderSet::new(subject.settings.into(), sets.split.training, networks)
+        DecoderSet::new(subject.settings, sets.split.training, networks)
     });
     for kind in KINDS {
         if report.is_cancelled() {

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use decoupler_core::{
-    evaluation::{Begin, Run, RunError, RunSets, SimulatedSettings, ready_settings},
+    evaluation::{Begin, Run, RunError, RunSets, RunSettings, ready_settings},
     job::Job,
     network::Networks,
     scene::{Contact, Print, Touch},
@@ -303,7 +303,7 @@ type Trained = Result<Result<Networks, RunError>, JobError>;
 pub struct ReadyNetwork {
     job: Background<Trained>,
     /// Settings of the network that is there or being trained.
-    of: Option<SimulatedSettings>,
+    of: Option<RunSettings>,
     networks: Option<Arc<Networks>>,
     /// Reason why it could not be trained.
     pub(super) failure: Option<String>,
@@ -343,7 +343,7 @@ impl ReadyNetwork {
                 let is_cancelled = || report.is_cancelled();
                 let job = Job::new(&is_cancelled);
                 let sets = RunSets::draw(&settings, memory_budget(), &job)?;
-                let mut run = Run::new(settings.into(), sets, Begin::Initialize, &job)?;
+                let mut run = Run::new(settings, sets, Begin::Initialize, &job)?;
                 run.finish(&job)?;
                 Ok(run.network())
             },
@@ -369,11 +369,11 @@ impl ReadyNetwork {
 }
 
 /// Returns the settings of the ready-made network for the current test set; `None` if training would take long.
-fn settings_of(shared: &Shared) -> Option<SimulatedSettings> {
+fn settings_of(shared: &Shared) -> Option<RunSettings> {
     let settings = match (&shared.preview, &shared.run) {
-        (Some(preview), _) => preview.settings,
-        (None, Some(run)) => run.simulated()?,
+        (Some(preview), _) => &preview.settings,
+        (None, Some(run)) => run.settings(),
         (None, None) => return None,
     };
-    ready_settings(&settings.source)
+    ready_settings(settings.simulation()?)
 }

@@ -248,8 +248,9 @@ fn remarks_ui(ui: &mut Ui, press: &PressState, shown: &Shown, shared: &Shared) {
     if !text.is_empty() {
         dim_ui(ui, text);
     }
-    let noise = subject.is_some_and(|subject| !subject.is_ready_made && !subject.settings.source.scene.noise.is_none());
-    if noise {
+    let own = subject.filter(|subject| !subject.is_ready_made);
+    let simulation = own.and_then(|subject| subject.settings.simulation());
+    if simulation.is_some_and(|simulation| !simulation.scene.noise.is_none()) {
         dim_ui(ui, "Readings under the finger are without the scene's noise.");
     }
     if let (None, Some(reason)) = (subject, &press.ready.failure) {

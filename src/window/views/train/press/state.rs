@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use decoupler_core::{
-    evaluation::SimulatedSettings,
+    evaluation::RunSettings,
     network::Networks,
     scene::{Indenter, IndenterShape, Print, Span, Touch},
 };
@@ -177,7 +177,7 @@ impl PressState {
         match shared.shown_run().zip(result) {
             Some((run, result)) => Some(Subject {
                 networks: Arc::clone(&result.networks),
-                settings: run.simulated()?,
+                settings: *run.settings(),
                 is_ready_made: false,
                 is_idle: result.is_idle,
             }),
@@ -218,7 +218,7 @@ pub struct Subject {
     /// The network, or one for each row.
     pub networks: Arc<Networks>,
     /// Settings that it was trained with.
-    pub settings: SimulatedSettings,
+    pub settings: RunSettings,
     /// True for the small one that was trained automatically.
     pub is_ready_made: bool,
     /// True once it no longer changes.

@@ -17,7 +17,7 @@ use crate::window::{
     training_worker::RunId,
 };
 use decoupler_core::{
-    evaluation::{Measured, RecordedSize, RunSettings, SimulatedSettings},
+    evaluation::{Measured, RunSettings, TrainingSize},
     scene::RowModel,
 };
 use decoupler_files::{
@@ -261,8 +261,8 @@ impl RecordingEditor {
             }
             Opened::Recipe(draft) => self.show_import(*draft, effects),
             Opened::Simulation(source) => {
-                let settings = SimulatedSettings {
-                    source: *source,
+                let settings = RunSettings {
+                    source: (*source).into(),
                     ..shared.draft
                 };
                 effects.push(Effect::ChooseSource(SourceKind::Array));
@@ -383,11 +383,11 @@ impl RecordingEditor {
     }
 
     /// Returns the size of a training with one network, once the import is checked.
-    pub fn training_size(&self, settings: &RunSettings) -> Option<RecordedSize> {
+    pub fn training_size(&self, settings: &RunSettings) -> Option<TrainingSize> {
         let checked = self.checking.checked.as_ref()?.as_ref().ok()?;
         let (inputs, targets) = checked.channels;
         let is_shared = settings.source.row_model() == RowModel::Shared;
-        is_shared.then_some(RecordedSize {
+        is_shared.then_some(TrainingSize {
             samples: checked.samples[0],
             inputs,
             targets,

@@ -9,11 +9,8 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::{Dataset, Seed},
-    evaluation::{
-        Simulation,
-        recorded::{Extrapolation, channel_remarks},
-    },
+    dataset::{Dataset, Seed, Simulation},
+    evaluation::recorded::{Extrapolation, channel_remarks},
 };
 use decoupler_files::{
     export::{

@@ -14,7 +14,7 @@ use crate::export::bundle::{
     portable::Portable,
     weights::{Arithmetic, Digits, Table, Weights, names},
 };
-use decoupler_core::{evaluation::Channel, network::Quantity};
+use decoupler_core::{network::Quantity, problem::Channel};
 
 const OPSET: i64 = 13;
 /// The first version of the format with opset 13.

@@ -19,7 +19,7 @@ use crate::export::{
 };
 use decoupler_core::{
     decoupling::DecoderKind,
-    evaluation::SimulatedSettings,
+    evaluation::RunSettings,
     job::Job,
     network::{Quantity, ScalingChoice},
     scene::{Movement, Rows},
@@ -37,7 +37,7 @@ const EQUATIONS: [BundleDecoder; 2] = [
     BundleDecoder::Kind(DecoderKind::Polish),
 ];
 
-fn settings(rows: Rows, noise: f64) -> SimulatedSettings {
+fn settings(rows: Rows, noise: f64) -> RunSettings {
     trained_settings(rows, Quantity::Conductance, ScalingChoice::Whitening, noise)
 }
 
@@ -179,19 +179,20 @@ fn export(file: &NetworkFile, kind: BundleDecoder, format: BundleFormat) -> Resu
 fn iterations_on_the_equations_agree_with_the_decoders() {
     let sideways = {
         let mut settings = settings(Rows::Known, 0.0);
-        settings.source.sensor = decoupler_core::sensor::SensorModel::new("2x2_3x18".parse().unwrap());
-        settings.source.scene.movement = Movement::SIDEWAYS;
+        settings.simulation_mut().unwrap().sensor =
+            decoupler_core::sensor::SensorModel::new("2x2_3x18".parse().unwrap());
+        settings.simulation_mut().unwrap().scene.movement = Movement::SIDEWAYS;
         settings
     };
     let all = [Rows::All, Rows::Known, Rows::One(2)].map(|rows| settings(rows, 0.0));
     for settings in all.into_iter().chain([sideways]) {
         let file = run_of(settings);
         // After a network of four epochs, three steps have not converged with sideways movement.
-        let is_sideways = settings.source.scene.movement != Movement::Z;
+        let is_sideways = settings.simulation().unwrap().scene.movement != Movement::Z;
         for kind in EQUATIONS.into_iter().take(if is_sideways { 1 } else { 2 }) {
             for format in [BundleFormat::C99, BundleFormat::NumPy] {
                 let report = export(&file, kind, format).unwrap();
-                let what = format!("{kind}, {format}, {}", settings.source.scene.rows);
+                let what = format!("{kind}, {format}, {}", settings.simulation().unwrap().scene.rows);
                 assert!(report.deviation() < 1e-8, "{what}: {report:?}");
                 assert!(report.vectors.verified > 20, "{what}: {report:?}");
                 assert!(
@@ -221,7 +222,7 @@ fn decoders_that_a_format_cannot_express_are_refused_with_the_reason() {
     }
     // Two readings of each row for two unknowns.
     let mut open = settings(Rows::Known, 0.0);
-    open.source.sensor = decoupler_core::sensor::SensorModel::new("3x2_2x2".parse().unwrap());
+    open.simulation_mut().unwrap().sensor = decoupler_core::sensor::SensorModel::new("3x2_2x2".parse().unwrap());
     let message = export(&run_of(open), EQUATIONS[0], BundleFormat::C99)
         .unwrap_err()
         .to_string();

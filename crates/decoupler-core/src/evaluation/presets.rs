@@ -1,0 +1,208 @@
+use std::{fmt, str::FromStr};
+
+use thiserror::Error;
+
+use super::RunSettings;
+use crate::{
+    dataset::Simulation,
+    machine::node_pairs_per_row,
+    network::{InputChoice, Quantity, ScalingChoice},
+    scene::{Indenter, Loading, Noise, Rows, Scene},
+    training::{StoppingRules, TrainingSettings},
+};
+
+/// Preset settings of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Preset {
+    /// As in the paper: one network for all rows, resistances scaled to [−1, 1].
+    #[default]
+    Paper,
+    /// Best settings found in experiments: known rows, whitened conductances, more samples, and later early stopping.
+    Best,
+}
+
+/// Error for an unknown preset.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("'{0}' is not a preset: give paper or best")]
+pub struct PresetError(String);
+
+impl Preset {
+    /// All presets, in the order offered to the user.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::Best];
+
+    /// Returns the settings of the preset, without noise.
+    pub fn settings(self) -> RunSettings {
+        self.settings_in(Noise::default())
+    }
+
+    /// Returns the settings of the preset for readings with `noise`. Accuracy then depends on the number of samples,
+    /// and few epochs are enough.
+    pub fn settings_in(self, noise: Noise) -> RunSettings {
+        let source = self.simulation_in(noise);
+        match self {
+            Self::Paper => source.into(),
+            Self::Best => RunSettings {
+                inputs: InputChoice::BEST,
+                training: TrainingSettings {
+                    stopping: StoppingRules {
+                        epochs: if noise.is_none() { 1000 } else { 100 },
+                        max_fail: 30,
+                        min_gradient: 0.0,
+                        ..StoppingRules::default()
+                    },
+                    ..TrainingSettings::default()
+                },
+                ..source.into()
+            },
+        }
+    }
+
+    /// Returns the sensor, the scene and the numbers of samples of [`Self::settings_in`].
+    pub fn simulation_in(self, noise: Noise) -> Simulation {
+        let paper = Simulation {
+            scene: Scene {
+                noise,
+                ..Scene::default()
+            },
+            ..Simulation::default()
+        };
+        let (samples, validation_samples) = if noise.is_none() { (5000, 1000) } else { (50_000, 5000) };
+        match self {
+            Self::Paper => paper,
+            Self::Best => Simulation {
+                scene: Scene {
+                    rows: Rows::Known,
+                    ..paper.scene
+                },
+                samples,
+                validation_samples,
+                ..paper
+            },
+        }
+    }
+}
+
+impl fmt::Display for Preset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Paper => "paper",
+            Self::Best => "best",
+        })
+    }
+}
+
+impl FromStr for Preset {
+    type Err = PresetError;
+
+    fn from_str(text: &str) -> Result<Self, PresetError> {
+        let found = Self::ALL.into_iter().find(|preset| preset.to_string() == text.trim());
+        found.ok_or_else(|| PresetError(text.to_owned()))
+    }
+}
+
+/// Returns the settings of a small network that learns imprints of balls on the sensor of `source` in a fraction of a
+/// second, with its rows, axes and stroke, and without noise; `None` for arrays for which training would take longer.
+///
+/// One network for each known row, with conductances scaled to [−1, 1], was the best choice for so few samples.
+pub fn ready_settings(source: &Simulation) -> Option<RunSettings> {
+    /// Number of training samples per row.
+    const SAMPLES: usize = 200;
+    /// Maximum number of pairs of nodes in all samples: about a tenth of a second.
+    const MAX_PAIRS: f64 = 5e7;
+    /// Maximum number of unknowns and readings of all rows, with which the time of an epoch grows.
+    const MAX_CHANNELS: usize = 2000;
+    let rows = source.model_size().ok()?;
+    let samples = SAMPLES * rows.rows;
+    let channels = rows.unknowns + rows.equations;
+    if samples as f64 * node_pairs_per_row(&source.sensor) > MAX_PAIRS || channels > MAX_CHANNELS {
+        return None;
+    }
+    let scene = Scene {
+        rows: match source.scene.rows {
+            Rows::All | Rows::Known => Rows::Known,
+            one @ Rows::One(_) => one,
+        },
+        loading: Loading::Indenter(Indenter::default()),
+        noise: Noise::default(),
+        ..source.scene
+    };
+    let source = Simulation {
+        sensor: source.sensor,
+        scene,
+        samples,
+        validation_samples: 0,
+        test_samples: rows.rows,
+    };
+    Some(RunSettings {
+        inputs: InputChoice {
+            quantity: Quantity::Conductance,
+            scaling: ScalingChoice::MinMax,
+        },
+        hidden: 6,
+        training: TrainingSettings {
+            stopping: StoppingRules {
+                epochs: 30,
+                ..StoppingRules::default()
+            },
+            ..TrainingSettings::default()
+        },
+        ..source.into()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+    use crate::{
+        evaluation::{Pressed, Run},
+        scene::{Print, Touch},
+    };
+
+    /// Returns the mean errors of the ready-made network, and of always answering the rest positions, for a ball
+    /// pressed on the middle of the array.
+    fn errors_mm(scale: &str) -> [f64; 2] {
+        let mut source = Simulation::default();
+        source.sensor.scale = scale.parse().unwrap();
+        let settings = ready_settings(&source).unwrap();
+        let mut run = Run::prepare(settings).unwrap();
+        while run.step().is_none() {}
+        let (sensor, rows) = (source.sensor, Vec::from_iter(0..source.sensor.scale.rows()));
+        let corners = [(0, 0), (rows.len() - 1, sensor.scale.nodes_per_row() - 1)];
+        let [first, last] = corners.map(|(row, node)| sensor.geometry.row_node_mm(sensor.scale, row, node));
+        let print = Print {
+            indenter: Indenter::default(),
+            place_mm: DVec2::new(0.5 * (first.x + last.x), 0.5 * (first.y + last.y)),
+            depth_mm: 0.8,
+        };
+        let touch = Touch {
+            print: Some(print),
+            ..Touch::default()
+        };
+        let pressed = Pressed::new(&sensor, &rows, &touch, 1.0).unwrap();
+        let mut decoder = run.network().decoder();
+        let answer = pressed.answer(&mut decoder, &|| false).unwrap().unwrap();
+        let depths = pressed.nodes_mm().map(|node| sensor.geometry.height_mm - node.z);
+        let nodes = pressed.nodes_mm().count() as f64;
+        [answer.mean_mm, depths.sum::<f64>() / nodes]
+    }
+
+    #[test]
+    fn the_ready_made_network_decodes_imprints_on_every_array_of_the_paper() {
+        for scale in ["10x6_3x18", "10x8_4x24", "10x10_5x30", "4x4_2x12"] {
+            let [network, rest] = errors_mm(scale);
+            assert!(network < 0.25 * rest, "{scale}: {network} of {rest} mm");
+        }
+    }
+
+    #[test]
+    fn large_arrays_have_no_ready_made_network() {
+        let mut source = Simulation::default();
+        source.sensor.scale = "96x96_96x288".parse().unwrap();
+        assert_eq!(ready_settings(&source), None);
+        source.sensor.scale = "10x10_5x30".parse().unwrap();
+        source.scene.rows = Rows::One(99);
+        assert_eq!(ready_settings(&source), None, "a row that does not exist");
+    }
+}

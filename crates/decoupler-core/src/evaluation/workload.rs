@@ -1,0 +1,331 @@
+use std::time::Duration;
+
+use super::{RunError, RunSettings};
+use crate::{
+    dataset::{Dataset, Simulation},
+    decoupling::{DecoderKind, GaussianPrior},
+    machine::{MemoryBudget, Speed, node_pairs_per_row},
+    network::{ScalingChoice, Shape},
+    scene::{Movement, RowModel, Rows},
+    training::{Method, ScaledConjugateGradientSettings},
+};
+
+/// Memory and work of a run, from the sizes of its network and samples alone, so that both are known before it begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Workload {
+    /// Peak memory in bytes: drawn and scaled samples, equations of all trainings, and priors of the rows.
+    pub bytes: u64,
+    /// Number of pairs of nodes in the resistances of all drawn samples.
+    node_pairs: f64,
+    /// Number of multiplications per epoch of all trainings.
+    epoch_multiplications: f64,
+    /// Maximum number of epochs.
+    pub epochs: usize,
+}
+
+/// Size of a training: of its set and of its networks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TrainingSize {
+    /// Number of training samples.
+    pub samples: usize,
+    /// Number of inputs.
+    pub inputs: usize,
+    /// Number of targets; of an array, the coordinates that vary.
+    pub targets: usize,
+    /// Number of networks: 1, or one for each row-wire.
+    pub networks: usize,
+}
+
+impl TrainingSize {
+    /// Returns the size of a training with these settings on a set that was read.
+    pub fn of(settings: &RunSettings, training: &Dataset) -> Self {
+        Self {
+            samples: training.samples(),
+            inputs: training.readings().ncols(),
+            targets: training.targets().ncols(),
+            networks: match settings.source.row_model() {
+                RowModel::Shared => 1,
+                RowModel::Each => training.row_count(),
+            },
+        }
+    }
+
+    /// Returns the size of a training on samples that are yet to be drawn, as whole snapshots.
+    ///
+    /// # Errors
+    /// If the samples are those of a recording, or the array lacks a row of the scene.
+    pub fn drawn(settings: &RunSettings) -> Result<Self, RunError> {
+        let simulation = settings.drawn()?;
+        let Simulation { sensor, scene, .. } = simulation;
+        let (scale, size) = (sensor.scale, simulation.model_size()?);
+        let varying_axes = match (scene.movement, scene.rows) {
+            (Movement::Xyz { .. }, _) => 3,
+            // A network that does not know the row also learns the x coordinate.
+            (Movement::Z, Rows::All) if scale.rows() > 1 => 2,
+            (Movement::Z, _) => 1,
+        };
+        Ok(Self {
+            samples: simulation.samples.div_ceil(size.rows) * size.rows,
+            inputs: scale.columns(),
+            targets: varying_axes * scale.nodes_per_row(),
+            networks: size.networks,
+        })
+    }
+}
+
+/// Time of a run on this machine, from rates measured on one thread. Large runs are faster with more threads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WorkloadTime {
+    /// Time to draw the samples.
+    pub drawing: Duration,
+    /// Time per epoch.
+    pub epoch: Duration,
+    /// Time of all epochs, if none of the other stopping rules ends the training.
+    pub all_epochs: Duration,
+}
+
+impl Workload {
+    /// Number of vectors with an entry for each weight in a method and its trainer.
+    const VECTORS: usize = 8;
+
+    /// Computes the workload of `settings` with a training of this size. Samples of a recording, which have been read by
+    /// then, are not counted.
+    pub fn of(settings: &RunSettings, size: TrainingSize) -> Self {
+        let trainings = Self::of_trainings(settings, size);
+        match settings.simulation() {
+            Some(simulation) => trainings.with_drawing(simulation, size),
+            None => trainings,
+        }
+    }
+
+    fn of_trainings(settings: &RunSettings, size: TrainingSize) -> Self {
+        let shape = Shape {
+            inputs: size.inputs,
+            hidden: settings.hidden,
+            outputs: size.targets,
+        };
+        let (method, of_each) = (&settings.training.method, size.samples.div_ceil(size.networks.max(1)));
+        let trainings = settings.starts * size.networks;
+        // Whitening may leave inputs out, and products of fewer inputs may be kept that would be recomputed for all.
+        let fewest = match settings.inputs.scaling {
+            ScalingChoice::MinMax => shape.inputs,
+            ScalingChoice::Whitening => 1,
+        };
+        let with_inputs = |inputs| method.equations_bytes(Shape { inputs, ..shape }, of_each);
+        let equations_bytes = (fewest..=shape.inputs).map(with_inputs).max().unwrap_or(0);
+        let bytes = (equations_bytes as u64).saturating_add(float_bytes(shape.weights(), Self::VECTORS));
+        Self {
+            bytes: bytes.saturating_mul(trainings as u64),
+            node_pairs: 0.0,
+            epoch_multiplications: trainings as f64 * method.epoch_multiplications(shape, of_each),
+            epochs: settings.training.stopping.epochs,
+        }
+    }
+
+    /// Adds what drawing takes: the samples, the pairs of their nodes, and the priors of the rows.
+    fn with_drawing(self, simulation: &Simulation, size: TrainingSize) -> Self {
+        let Ok(model) = simulation.model_size() else {
+            // Without the rows of the scene, nothing can be drawn.
+            return self;
+        };
+        let scale = simulation.sensor.scale;
+        let whole = |samples: usize| samples.div_ceil(model.rows) * model.rows;
+        let held_out = whole(simulation.validation_samples) + whole(simulation.test_samples);
+        let drawn = size.samples.saturating_add(held_out);
+        // Readings and targets are drawn, split, scaled, and copied to blocks for the training.
+        let per_sample = 3 * scale.columns() + 3 * scale.coordinates_per_row() + size.inputs + 1 + size.targets;
+        let unknowns = model.unknowns / model.rows;
+        // Exact readings that determine the deformation need no prior.
+        let has_priors = !simulation.scene.noise.in_test().is_none() || scale.columns() <= unknowns;
+        let priors = if has_priors {
+            GaussianPrior::bytes(simulation.scene.loading, model.rows, unknowns)
+        } else {
+            0
+        };
+        let bytes = self.bytes.saturating_add(float_bytes(drawn, per_sample));
+        Self {
+            bytes: bytes.saturating_add(priors),
+            node_pairs: drawn as f64 * node_pairs_per_row(&simulation.sensor),
+            ..self
+        }
+    }
+
+    /// Returns the methods that would train on the same recording in less than half of this time, with the time of each
+    /// for the number of epochs that it gets by default.
+    pub fn faster_methods(&self, settings: &RunSettings, size: TrainingSize) -> Vec<(Method, Duration)> {
+        let present = self.time().all_epochs;
+        let candidates = [
+            Method::default(),
+            Method::ScaledConjugateGradient(ScaledConjugateGradientSettings::default()),
+        ];
+        let of_each = candidates.into_iter().map(|method| {
+            let mut other = *settings;
+            other.choose_method(method);
+            (method, Self::of(&other, size).time().all_epochs)
+        });
+        of_each.filter(|(_, time)| time.saturating_mul(2) < present).collect()
+    }
+
+    /// Computes the workload of measuring `decoders` with networks of each number of `hidden` nodes one after the
+    /// other, which is the workload of the largest run.
+    ///
+    /// # Errors
+    /// If the settings are those of a recording, or the array lacks a row of the scene.
+    pub fn of_trade_off(settings: &RunSettings, hidden: &[usize], decoders: &[DecoderKind]) -> Result<Self, RunError> {
+        let trains = decoders.iter().any(|kind| kind.needs_network());
+        let largest = hidden.iter().copied().max().filter(|_| trains);
+        let largest = RunSettings {
+            hidden: largest.unwrap_or(1),
+            ..*settings
+        };
+        Ok(Self::of(&largest, TrainingSize::drawn(&largest)?))
+    }
+
+    /// Returns `true` if the user should be warned of the memory or time before the run begins: more than a gigabyte,
+    /// some seconds to draw the samples, or a second per epoch.
+    pub fn is_large(&self) -> bool {
+        self.bytes > 1_000_000_000 || self.node_pairs > 1e10 || self.epoch_multiplications > 1e10
+    }
+
+    /// Returns `true` if samples are drawn, not read.
+    pub fn draws_samples(&self) -> bool {
+        self.node_pairs > 0.0
+    }
+
+    /// Computes the time on this machine. The first call measures its speed, which takes about 20 ms.
+    pub fn time(&self) -> WorkloadTime {
+        let speed = Speed::measured();
+        let duration = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
+        let epoch = self.epoch_multiplications / speed.multiplications;
+        WorkloadTime {
+            drawing: duration(self.node_pairs / speed.node_pairs),
+            epoch: duration(epoch),
+            all_epochs: duration(epoch * self.epochs as f64),
+        }
+    }
+
+    /// Checks that the work fits into `memory`.
+    ///
+    /// # Errors
+    /// [`RunError::Memory`] if it does not.
+    pub fn check_memory(&self, memory: MemoryBudget) -> Result<(), RunError> {
+        if self.bytes > memory.bytes {
+            return Err(RunError::Memory {
+                bytes: self.bytes,
+                memory,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Returns the number of bytes in this many rows of numbers.
+fn float_bytes(rows: usize, columns: usize) -> u64 {
+    (rows as u64).saturating_mul((columns * size_of::<f64>()) as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{evaluation::Measured, machine::MemorySource};
+
+    fn settings(array: &str, method: &str, hidden: usize) -> RunSettings {
+        let mut settings = RunSettings {
+            hidden,
+            ..RunSettings::default()
+        };
+        settings.simulation_mut().unwrap().sensor.scale = array.parse().unwrap();
+        let mut methods = Method::all().into_iter();
+        settings.training.method = methods.find(|other| other.short_name() == method).unwrap();
+        settings
+    }
+
+    fn drawn(settings: &RunSettings) -> Workload {
+        Workload::of(settings, TrainingSize::drawn(settings).unwrap())
+    }
+
+    #[test]
+    fn large_runs_are_distinguished_from_ordinary_ones() {
+        let cases = [
+            ("10x10_5x30", "lm", 12, false),
+            ("10x10_5x30", "br", 16, false),
+            ("10x6_3x18", "rp", 64, false),
+            ("10x10_5x30", "br", 512, true),
+            ("512x512_512x512", "lm", 4, true),
+            ("512x512_512x512", "gd", 1, true),
+        ];
+        for (array, method, hidden, is_large) in cases {
+            let workload = drawn(&settings(array, method, hidden));
+            assert_eq!(workload.is_large(), is_large, "{array} {method} {hidden}: {workload:?}");
+        }
+    }
+
+    #[test]
+    fn kept_products_and_covariances_of_priors_are_counted() {
+        let mut known = settings("10x10_5x30", "lm", 12);
+        known.simulation_mut().unwrap().scene.rows = Rows::Known;
+        known.simulation_mut().unwrap().samples = 60_000;
+        // 31·32/2 products of two inputs and 12 + 1 + 10 activations of each sample.
+        let kept = 8 * 60_000 * (496 + 23);
+        assert!(drawn(&known).bytes > kept);
+        // Products of all 31 inputs would take 40 MB for each row; those of 27 inputs take 30 MB and are kept.
+        known.simulation_mut().unwrap().samples = 100_000;
+        let by_range = drawn(&known).bytes;
+        known.inputs.scaling = ScalingChoice::Whitening;
+        let whitened = drawn(&known).bytes;
+        assert!(whitened > by_range + 10 * 30_000_000, "{whitened} {by_range}");
+        let mut smooth = settings("512x512_1x512", "gd", 1);
+        smooth.simulation_mut().unwrap().scene.loading = "smooth:4".parse().unwrap();
+        let bytes = drawn(&smooth).bytes;
+        // The products and the factor of the covariance of each row.
+        assert!(bytes > 8 * 2 * 512 * 512 * 512, "{bytes}");
+    }
+
+    /// Bayesian regularisation holds the factor and the inverse of the equations of the hidden layer: (31·512)² each.
+    #[test]
+    fn the_equations_dominate_the_memory_of_wide_networks() {
+        let bytes = drawn(&settings("10x10_5x30", "br", 512)).bytes as f64;
+        let two_matrices = 2.0 * 8.0 * (31.0 * 512.0_f64).powi(2);
+        assert!((1.0..1.4).contains(&(bytes / two_matrices)), "{bytes}");
+    }
+
+    #[test]
+    fn more_memory_than_the_machine_has_is_rejected() {
+        let mut settings = settings("512x512_1x512", "lm", 512);
+        settings.simulation_mut().unwrap().validation_samples = 1_000_000;
+        settings.simulation_mut().unwrap().test_samples = 1_000_000;
+        settings.starts = 100;
+        let workload = drawn(&settings);
+        assert!(workload.bytes > 500_000_000_000, "{workload:?}");
+        let memory = MemoryBudget {
+            bytes: 500_000_000_000,
+            source: MemorySource::System,
+        };
+        let message = workload.check_memory(memory).unwrap_err().to_string();
+        assert!(
+            message.contains("GB of memory, and the machine has 500.0 GB"),
+            "{message}"
+        );
+        assert!(workload.check_memory(MemoryBudget::UNLIMITED).is_ok());
+    }
+
+    #[test]
+    fn wide_inputs_make_a_training_on_a_recording_long_and_conjugate_gradients_faster() {
+        let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        let size = TrainingSize {
+            samples: 5000,
+            inputs: 192,
+            targets: 3,
+            networks: 1,
+        };
+        let workload = Workload::of(&settings, size);
+        let small = Workload::of(&settings, TrainingSize { inputs: 6, ..size });
+        assert!(workload.epoch_multiplications > 100.0 * small.epoch_multiplications);
+        let faster = workload.faster_methods(&settings, size);
+        assert!(
+            faster.iter().any(|(method, _)| method.short_name() == "scg"),
+            "{faster:?}"
+        );
+        assert!(!workload.draws_samples());
+    }
+}

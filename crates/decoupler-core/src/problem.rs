@@ -1,0 +1,237 @@
+//! What is known about the readings and targets of a run.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    dataset::{Dataset, Memory, Simulation},
+    surface::Lattice,
+    text::{cleaned, cleaned_if_any, escaped_if_any},
+};
+
+/// Description of the readings and targets of a run, and of everything else that is known about them. Consumers ask
+/// it what there is: names, units, a memory, positions, nodes, a sensor.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Problem {
+    /// Names and units of the readings, in their order.
+    pub inputs: Vec<Channel>,
+    /// Names and units of the targets, in their order.
+    pub targets: Vec<Channel>,
+    /// Memory: the inputs of a network are then the [features](Self::features) of the readings and of their past.
+    pub memory: Option<Memory>,
+    /// Positions of targets on the skin, for those that have one.
+    pub positions: Vec<TargetPosition>,
+    /// Sensor whose resistances the readings are, with its scene, if it is known. The targets are then the coordinates
+    /// x, y and z of the nodes of a row-wire, in millimetres.
+    pub sensor: Option<Simulation>,
+}
+
+/// A [`Problem`] as it is saved next to the settings of a run, which contain its sensor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SavedProblem {
+    inputs: Vec<Channel>,
+    targets: Vec<Channel>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    memory: Option<Memory>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    positions: Vec<TargetPosition>,
+    #[serde(default)]
+    has_nodes: bool,
+}
+
+impl From<Problem> for SavedProblem {
+    fn from(problem: Problem) -> Self {
+        let has_nodes = problem.has_nodes();
+        let Problem {
+            inputs,
+            targets,
+            memory,
+            positions,
+            sensor: _,
+        } = problem;
+        Self {
+            inputs,
+            targets,
+            memory,
+            positions,
+            has_nodes,
+        }
+    }
+}
+
+impl SavedProblem {
+    /// Returns the problem with this sensor, if its targets are nodes; `None` if there is no sensor for them.
+    pub fn with_sensor(self, sensor: Option<&Simulation>) -> Option<Problem> {
+        let sensor = if self.has_nodes { Some(*sensor?) } else { None };
+        Some(Problem {
+            inputs: self.inputs,
+            targets: self.targets,
+            memory: self.memory,
+            positions: self.positions,
+            sensor,
+        })
+    }
+}
+
+/// Names and units of the features of these channels.
+fn features(memory: &Memory, channels: &[Channel]) -> Vec<Channel> {
+    let names = memory.names(channels.iter().map(|channel| channel.name.as_str()));
+    let units = channels.iter().map(|channel| &channel.unit).cycle();
+    names
+        .into_iter()
+        .zip(units)
+        .map(|(name, unit)| Channel::new(name, unit.as_deref()))
+        .collect()
+}
+
+/// Name and unit of a reading or target.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Channel {
+    /// Full name, as in the header of a file.
+    #[serde(deserialize_with = "cleaned")]
+    pub name: String,
+    /// Unit, if it is known.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "cleaned_if_any"
+    )]
+    pub unit: Option<String>,
+    /// Header of the column in the file with unprintable characters escaped, if they were removed from `name`, or it was cut.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "escaped_if_any"
+    )]
+    pub original: Option<String>,
+}
+
+/// Position of a target that is measured at a known place of the skin.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TargetPosition {
+    /// Index of the target.
+    pub target: usize,
+    /// x in millimetres.
+    pub x_mm: f64,
+    /// y in millimetres.
+    pub y_mm: f64,
+}
+
+impl Problem {
+    /// Names and units of the inputs of a network: the readings and, with a memory, the values computed from their past.
+    pub fn features(&self) -> Vec<Channel> {
+        match &self.memory {
+            Some(memory) => features(memory, &self.inputs),
+            None => self.inputs.clone(),
+        }
+    }
+
+    /// Number of inputs of a network.
+    pub fn feature_count(&self) -> usize {
+        let count = self.inputs.len();
+        self.memory.as_ref().map_or(count, |memory| memory.features(count))
+    }
+
+    /// Returns `true` if the targets are coordinates of nodes.
+    pub fn has_nodes(&self) -> bool {
+        self.sensor.is_some()
+    }
+
+    /// Maximum travel of a node in millimetres; `None` if the targets are not nodes.
+    pub fn stroke_mm(&self) -> Option<f64> {
+        self.sensor.as_ref().map(Simulation::stroke_mm)
+    }
+
+    /// Name of the [error in percent](crate::evaluation::TestErrors::percent) on the test set.
+    pub fn test_percent_name(&self) -> &'static str {
+        if self.has_nodes() {
+            "test Z %"
+        } else {
+            "test error, % of range"
+        }
+    }
+
+    /// Returns the description of samples of `sensor`, or of the unnamed channels of `set` if there is none.
+    pub fn of(sensor: Option<&Simulation>, set: &Dataset) -> Self {
+        match sensor {
+            Some(sensor) => sensor.problem(),
+            None => Self::unnamed(set.channels(), set.outputs()),
+        }
+    }
+
+    /// Returns the description of channels without names: readings `c1`, `c2`, … and targets `t1`, `t2`, ….
+    pub fn unnamed(inputs: usize, targets: usize) -> Self {
+        let channels = |letter: &str, count: usize| {
+            let numbers = 1..=count;
+            let channel = |number| Channel::new(format!("{letter}{number}"), None);
+            numbers.map(channel).collect()
+        };
+        Self {
+            inputs: channels("c", inputs),
+            targets: channels("t", targets),
+            ..Self::default()
+        }
+    }
+
+    /// Returns the unit of all targets, if they share one.
+    pub fn shared_unit(&self) -> Option<&str> {
+        let first = self.targets.first()?.unit.as_deref()?;
+        let is_shared = self.targets.iter().all(|target| target.unit.as_deref() == Some(first));
+        is_shared.then_some(first)
+    }
+}
+
+impl Simulation {
+    /// Returns the description of the channels of a row-wire: its resistances and the coordinates of its nodes.
+    pub fn problem(&self) -> Problem {
+        let scale = self.sensor.scale;
+        let channel = |name: String, unit: &str| Channel::new(name, Some(unit));
+        let nodes = 1..=scale.nodes_per_row();
+        Problem {
+            inputs: (1..=scale.columns())
+                .map(|column| channel(format!("r_{column}"), "Ω"))
+                .collect(),
+            targets: nodes
+                .flat_map(|node| ["x", "y", "z"].map(|axis| channel(format!("{axis}_{node}"), "mm")))
+                .collect(),
+            positions: Vec::new(),
+            memory: None,
+            sensor: Some(*self),
+        }
+    }
+}
+
+impl Channel {
+    /// Returns a channel whose name is as it was in its file.
+    pub fn new(name: impl Into<String>, unit: Option<&str>) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.map(str::to_owned),
+            original: None,
+        }
+    }
+
+    /// Returns the name, followed by the unit in parentheses if it is known.
+    pub fn title(&self) -> String {
+        match &self.unit {
+            Some(unit) => format!("{} ({unit})", self.name),
+            None => self.name.clone(),
+        }
+    }
+}
+
+impl TargetPosition {
+    /// Returns the lattice whose nodes are these positions; `None` if there are none or they do not form a lattice.
+    pub fn lattice(positions: &[Self]) -> Option<Lattice> {
+        Lattice::of(&Self::places_mm(positions))
+    }
+
+    /// Returns the positions (x, y) in millimetres.
+    pub fn places_mm(positions: &[Self]) -> Vec<[f64; 2]> {
+        positions
+            .iter()
+            .map(|position| [position.x_mm, position.y_mm])
+            .collect()
+    }
+}
