@@ -4,9 +4,8 @@ use std::{fs, num::NonZero};
 
 use decoupler::window::Phase;
 use decoupler_core::{
-    evaluation::{
-        RunSettings,
-        experiments::{Axis, AxisKind, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments},
+    evaluation::experiments::{
+        Axis, AxisKind, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments,
     },
     machine::MemoryBudget,
 };
