@@ -34,7 +34,7 @@ pub use intervals::{Coverage, HalfWidth, Intervals, IntervalsDefect, NoIntervals
 pub use past_networks::{PastNetwork, PastNetworks};
 pub use preparation::Begin;
 pub use pressed::{Pressed, PressedAnswer, fine_tune, press_limits, pressed_rows, rebased};
-pub use remark::{Cause, MissingFigures, Remark, error_remarks};
+pub use remark::error_remarks;
 pub use run::{Run, RunDefect, RunError};
 pub use run_sets::RunSets;
 pub use settings::{
