@@ -18,7 +18,7 @@ use decoupler_core::{
     evaluation::{
         Begin, CrossValidated, ErrorTable, Run, RunError, RunSets, RunSettings, Scores, TestErrors, TrainingSize,
         Workload,
-        recorded::{Determination, NonlinearGain, SplitComparison, channel_remarks},
+        recorded::{Determination, SplitComparison, channel_remarks, nonlinear_gains, ridge_remark},
     },
     job::Job,
     problem::{Channel, Problem},
@@ -186,7 +186,7 @@ fn print_folds(
     let channels = &problem.targets;
     let scores = validated.scores(set);
     let determined = Determination::measure(set, validated.network.view(), by);
-    let gains = NonlinearGain::of_validated(set, validated, by);
+    let gains = nonlinear_gains(set, validated, by);
     let better = better(&problem, &scores);
     let mut warnings = recording.warnings.clone();
     warnings.extend(describe_channels(
@@ -197,7 +197,7 @@ fn print_folds(
     warnings.extend(optimism);
     warnings.extend(describe_determinacy(channels, &determined));
     let remarks = channels.iter().zip(gains);
-    warnings.extend(remarks.filter_map(|(channel, gain)| gain?.remark(&channel.name)));
+    warnings.extend(remarks.filter_map(|(channel, gain)| ridge_remark(gain?, &channel.name)));
     let fallbacks = channels.iter().zip(&better).filter(|(_, better)| **better != NETWORK);
     warnings.extend(fallbacks.map(|(channel, better)| {
         format!(

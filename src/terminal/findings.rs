@@ -486,7 +486,7 @@ impl<'a> Target<'a> {
             sentence: describe_target(name, of),
             r2_network: r2(of.network),
             r2_ridge: r2(of.ridge.ok()),
-            network_to_ridge: of.gain.map(|gain| gain.ratio.into()),
+            network_to_ridge: of.gain.map(Figure::from),
             splits: findings.comparison.as_ref().map(|comparison| {
                 let rmse = |errors: &[TargetErrors]| errors[index].rmse;
                 Splits {
@@ -509,7 +509,7 @@ impl<'a> Target<'a> {
                     largest: point.range[1],
                 })
                 .collect(),
-            with_twice_the_samples: doubling.map(|doubling| doubling.ratio.into()),
+            with_twice_the_samples: doubling.map(Figure::from),
             outlook: of.curve.sentence(name),
         }
     }

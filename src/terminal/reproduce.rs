@@ -304,14 +304,16 @@ impl CellReport {
         else {
             return None;
         };
+        let settings = summary.cell.settings;
+        let simulation = settings.simulation()?;
         Some(Self {
-            array: summary.array?,
-            hidden: summary.hidden,
-            samples: summary.samples?,
-            method: summary.method,
-            epochs: summary.epochs,
-            starts: summary.starts,
-            seed: summary.seed,
+            array: simulation.sensor.scale,
+            hidden: settings.hidden,
+            samples: simulation.samples,
+            method: settings.training.method.short_name(),
+            epochs: settings.training.stopping.epochs,
+            starts: settings.starts,
+            seed: settings.seed,
             trials: summary.trials,
             expected_trials: summary.expected_trials,
             z_percent: summary.percent,

@@ -3,7 +3,10 @@ use std::time::Instant;
 use ndarray::Array2;
 
 use super::{
-    MissingFigures, Remark, RunError, RunSettings, TestErrors, baselines::fit_baselines, preparation::unseen_noise,
+    RunError, RunSettings, TestErrors,
+    baselines::fit_baselines,
+    preparation::unseen_noise,
+    remark::{cause, missing_figures, worse_than_mean},
     table::frame_us,
 };
 use crate::{
@@ -32,7 +35,7 @@ pub struct DecoderReport {
     /// Computing time.
     pub cost: DecoderCost,
     /// Remarks on the errors, with cause and remedy.
-    pub remarks: Vec<Remark>,
+    pub remarks: Vec<String>,
 }
 
 /// Computing time of a decoder.
@@ -134,10 +137,10 @@ impl DecoderSet {
         let mean = TestErrors::measure(&self.problem, test, &self.mean_answers(test)?);
         let sensor = self.problem.sensor.as_ref();
         let residual = sensor.map(|simulation| rms_residual(&simulation.sensor, test, &answers));
-        let missing = MissingFigures::of(precision, &errors, residual).map(Remark::Missing);
-        let mut remarks = Remark::on(kind, (&errors, &mean), &self.settings, self.size_of_fits());
-        remarks.extend(missing);
-        remarks.extend((!solved.are_reliable()).then_some(Remark::NotAllSolved(solved)));
+        let cause = cause(kind, &self.settings, self.size_of_fits(), None);
+        let mut remarks = worse_than_mean(&errors, &mean, &cause);
+        remarks.extend(missing_figures(precision, &errors, residual).map(str::to_owned));
+        remarks.extend((!solved.are_reliable()).then(|| solved.to_string()));
         Ok(Some(DecoderReport {
             kind,
             precision,

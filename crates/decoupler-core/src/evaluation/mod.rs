@@ -36,7 +36,7 @@ pub use past_networks::{PastNetwork, PastNetworks};
 pub use preparation::Begin;
 pub use presets::{Preset, PresetError, ready_settings};
 pub use pressed::{Pressed, PressedAnswer, fine_tune, press_limits, pressed_rows, rebased};
-pub use remark::{Cause, MissingFigures, Remark, error_remarks};
+pub use remark::error_remarks;
 pub use run::{Run, RunDefect, RunError};
 pub use run_sets::RunSets;
 pub use settings::{

@@ -13,8 +13,6 @@ pub struct PastNetworks {
     halvings: u32,
     /// In the order of their epochs.
     kept: Vec<Arc<Past>>,
-    /// Memory of the weights, with shared weights counted once.
-    bytes: usize,
 }
 
 /// Network that a run stopped at an epoch would have returned.
@@ -39,20 +37,8 @@ struct Past {
     best_epoch: usize,
     start: usize,
     elapsed: Duration,
-    /// Weights of the network of each row-wire, or of the shared network. Networks that remained the best share them.
-    weights: Vec<Arc<[f64]>>,
-}
-
-impl Past {
-    /// Memory of the weights not shared with the previous network.
-    fn bytes_after(&self, before: Option<&Arc<Self>>) -> usize {
-        let of_row = |(row, weights): (usize, &Arc<[f64]>)| {
-            let shared = before.and_then(|before| before.weights.get(row));
-            let is_shared = shared.is_some_and(|shared| Arc::ptr_eq(shared, weights));
-            if is_shared { 0 } else { size_of_val(&**weights) }
-        };
-        self.weights.iter().enumerate().map(of_row).sum()
-    }
+    /// The network of each row-wire, or the shared network.
+    weights: Vec<Mlp>,
 }
 
 impl PastNetworks {
@@ -69,48 +55,31 @@ impl PastNetworks {
 
     fn record_within(&mut self, run: &Run, max_bytes: usize, max_count: usize) {
         let leader = run.leader();
-        let epoch = run
-            .trainers()
-            .iter()
-            .map(|start| start.latest().epoch)
-            .max()
-            .unwrap_or(0);
+        let epochs = run.trainers().iter().map(|start| start.latest().epoch);
+        let epoch = epochs.max().unwrap_or(0);
+        let weights = run.best();
+        let bytes: usize = weights.iter().map(|mlp| size_of_val(mlp.weights())).sum();
+        let max_count = max_count.min(max_bytes / bytes.max(1));
         // A network that is no longer the latest is kept only at a multiple of 2ᵏ.
-        let latest = self.kept.last().cloned();
-        let stays = |latest: &&Past| latest.epoch < epoch && latest.epoch.is_multiple_of(self.stride());
-        if let Some(latest) = latest.as_deref().filter(|latest| !stays(latest)) {
-            self.kept.pop();
-            self.bytes -= latest.bytes_after(self.kept.last());
-        }
-        let best = run.best();
-        let weights = best.iter().enumerate().map(|(row, mlp)| {
-            let before = latest.as_ref().and_then(|latest| latest.weights.get(row));
-            let same = before.filter(|before| ***before == *mlp.weights());
-            same.map_or_else(|| mlp.weights().into(), Arc::clone)
-        });
-        let past = Past {
+        let stride = self.stride();
+        self.kept
+            .pop_if(|latest| latest.epoch >= epoch || !latest.epoch.is_multiple_of(stride));
+        self.kept.push(Arc::new(Past {
             epoch,
             best_epoch: leader.best_epoch(),
             start: run.leader_number(),
             elapsed: leader.elapsed(),
-            weights: weights.collect(),
-        };
-        self.bytes += past.bytes_after(self.kept.last());
-        self.kept.push(Arc::new(past));
-        while (self.bytes > max_bytes || self.kept.len() > max_count) && self.kept.len() > 1 {
+            weights,
+        }));
+        while self.kept.len() > max_count.max(1) {
             if self.kept.len() == 2 {
                 self.kept.remove(0);
             } else {
                 self.halvings += 1;
                 let stride = self.stride();
-                let stays = |past: &Arc<Past>| past.epoch == epoch || past.epoch.is_multiple_of(stride);
-                self.kept.retain(stays);
+                self.kept
+                    .retain(|past| past.epoch == epoch || past.epoch.is_multiple_of(stride));
             }
-            let before = std::iter::once(None).chain(self.kept.iter().map(Some));
-            self.bytes = before
-                .zip(&self.kept)
-                .map(|(before, past)| past.bytes_after(before))
-                .sum();
         }
     }
 
@@ -137,8 +106,7 @@ impl PastNetworks {
         let past = &self.kept[place];
         let rows = present.values().iter().zip(&past.weights);
         let networks = rows.map(|(network, weights)| {
-            let mlp = Mlp::from_weights(network.mlp().shape(), weights.to_vec());
-            DecouplingNetwork::new(network.inputs().clone(), mlp, network.outputs().clone())
+            DecouplingNetwork::new(network.inputs().clone(), weights.clone(), network.outputs().clone())
         });
         Some(PastNetwork {
             epoch,
@@ -152,8 +120,6 @@ impl PastNetworks {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::HashSet;
-
     use super::*;
     use crate::{
         evaluation::{Combination, RunSettings},
@@ -231,17 +197,12 @@ mod tests {
         // Both bounds keep about ten.
         for bounds in [[max_bytes, usize::MAX], [usize::MAX, 10]] {
             let (_, past) = record(settings, bounds, |past, epoch| {
-                assert!(past.bytes <= bounds[0] && past.kept.len() <= bounds[1], "at {epoch}");
+                let bytes = past.kept.iter().flat_map(|past| &past.weights);
+                let bytes: usize = bytes.map(|mlp| size_of_val(mlp.weights())).sum();
+                assert!(bytes <= bounds[0] && past.kept.len() <= bounds[1], "at {epoch}");
                 let epochs: Vec<usize> = past.epochs().collect();
                 let expected = (0..epoch).step_by(past.stride()).chain([epoch]);
                 assert_eq!(epochs, expected.collect::<Vec<_>>(), "every {}", past.stride());
-                let shared: HashSet<*const f64> = past
-                    .kept
-                    .iter()
-                    .flat_map(|past| &past.weights)
-                    .map(|w| w.as_ptr())
-                    .collect();
-                assert_eq!(past.bytes, shared.len() * 8 * weights, "each network is counted once");
             });
             assert!(past.stride() >= 4 && past.epochs().len() > 5, "{past:?}");
             assert_eq!(past.nearest(past.stride() + 1), Some(past.stride()));

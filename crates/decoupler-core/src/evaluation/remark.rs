@@ -1,293 +1,147 @@
-use std::fmt;
-
-use thiserror::Error;
-
-use super::{Errors, RunSettings, Scores, TargetErrors, TestErrors};
+use super::{Errors, RunSettings, Scores, TestErrors};
 use crate::{
-    decoupling::{DecoderKind, Precision, SolvedRows},
+    decoupling::{DecoderKind, Precision},
     scene::{Noise, NoisySets},
     text::counted,
     training::{Method, StopReason},
 };
 
-/// Remark on an unreliable result of a decoder, with what may help. Printed next to its errors.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Remark {
-    /// Always answering the mean of the training set would be more accurate.
-    WorseThanMean {
-        /// Name of the coordinate or target.
-        target: String,
-        /// Ratio of the mean absolute error to that of the mean; `None` if the mean is exact, for instance if a
-        /// coordinate is the same in all samples.
-        times: Option<f64>,
-        /// Circumstance that may be the cause.
-        cause: Cause,
-    },
-    /// Figures are missing.
-    Missing(MissingFigures),
-    /// Rows were not solved, or the readings do not determine their answers.
-    NotAllSolved(SolvedRows),
-}
-
-/// Circumstance that may be the cause of a result that is worse than the mean. It is known; that it is the cause is not.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Cause {
-    /// The readings have noise that the training set lacks.
-    UnseenNoise,
-    /// The training set is small.
-    FewSamples {
-        /// Number of training samples of each fit.
-        samples: usize,
-        /// Number of readings per sample.
-        readings: usize,
-    },
-    /// The settings of the training.
-    Training,
-    /// The end of the training of the network.
-    End {
-        /// Reason why the training ended.
-        reason: StopReason,
-        /// Method of the training.
-        method: Method,
-    },
-    /// The noise of the readings.
-    Noise,
-    /// Unknown.
-    Unknown,
-}
-
-impl fmt::Display for Remark {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::WorseThanMean { target, times, cause } => {
-                match times {
-                    None => write!(
-                        f,
-                        "it has an error in {target}, although always answering the mean is exact"
-                    )?,
-                    Some(times @ ..1e4) => write!(
-                        f,
-                        "its error in {target} is {times:.3} times that of always answering the mean"
-                    )?,
-                    Some(times) => write!(
-                        f,
-                        "its error in {target} is {times:.1e} times that of always answering the mean"
-                    )?,
-                }
-                write!(f, ": {cause}")
-            }
-            Self::Missing(reason) => reason.fmt(f),
-            Self::NotAllSolved(rows) => rows.fmt(f),
-        }
-    }
-}
-
-impl fmt::Display for Cause {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::UnseenNoise => {
-                f.write_str("the training set lacks the noise of these readings; add the noise to both, or reduce it")
-            }
-            Self::FewSamples { samples, readings } => {
-                let (samples, readings) = (counted(*samples, "training sample"), counted(*readings, "reading"));
-                write!(f, "it was fitted to {samples} of {readings}; more samples may help")
-            }
-            Self::Training => {
-                f.write_str("more or fewer epochs, another number of hidden nodes, or more samples may help")
-            }
-            Self::End { reason, method } => f.write_str(&reason.remedy(method)),
-            Self::Noise => f.write_str("the readings have noise; less noise or more samples may help"),
-            Self::Unknown => f.write_str("use another decoder; more samples may help"),
-        }
-    }
-}
-
-impl Cause {
-    /// Finds the circumstance to name for a decoder fitted with `settings` to `samples` training samples of `readings`
-    /// each.
-    fn of(kind: DecoderKind, settings: &RunSettings, samples: usize, readings: usize) -> Self {
-        /// Samples per reading below which more samples would help most.
-        const FEW: usize = 4;
-        let noise = settings
-            .simulation()
-            .map_or(Noise::default(), |simulation| simulation.scene.noise);
-        let is_noisy = !noise.in_test().is_none();
-        let is_fitted = kind != DecoderKind::Newton;
-        if is_fitted && is_noisy && noise.sets == NoisySets::Test {
-            Self::UnseenNoise
-        } else if is_fitted && samples < FEW * readings {
-            Self::FewSamples { samples, readings }
-        } else if kind.needs_network() {
-            Self::Training
-        } else if is_noisy {
-            Self::Noise
-        } else {
-            Self::Unknown
-        }
-    }
-}
-
-/// Errors of a decoder next to those of the mean, coordinate by coordinate or target by target.
-struct Pair {
-    target: String,
-    error: f64,
-    of_mean: f64,
-    /// Largest error that counts as rounding.
-    rounding: f64,
-}
-
-impl Pair {
-    fn of_nodes(errors: &Errors, mean: &Errors) -> Vec<Self> {
-        /// Largest error in percent that counts as rounding.
-        const ROUNDING: f64 = 1e-9;
-        let percent = |target: &str, error: Option<f64>, of_mean: Option<f64>| {
-            Some(Self {
-                target: target.to_owned(),
-                error: error?,
-                of_mean: of_mean?,
-                rounding: ROUNDING,
-            })
-        };
-        let z = (Some(errors.z_full_scale_percent), Some(mean.z_full_scale_percent));
-        let pairs = [
-            percent("z", z.0, z.1),
-            percent("x", errors.x_percent, mean.x_percent),
-            percent("y", errors.y_percent, mean.y_percent),
-        ];
-        pairs.into_iter().flatten().collect()
-    }
-
-    fn of_targets(errors: &[TargetErrors], mean: &[TargetErrors]) -> Vec<Self> {
-        // A target that is constant in the test samples cannot be judged.
-        let pairs = errors.iter().zip(mean).enumerate();
-        let judged = pairs.filter(|(_, (errors, _))| errors.r2.is_some());
-        let pair = |(index, (errors, mean)): (usize, (&TargetErrors, &TargetErrors))| Self {
-            target: format!("target {}", index + 1),
-            error: errors.mae,
-            of_mean: mean.mae,
-            rounding: 0.0,
-        };
-        judged.map(pair).collect()
-    }
-
-    /// Returns `true` if the error exceeds that of the mean by enough to show in three decimals of their ratio. NaN is
-    /// reported as [`Remark::Missing`] instead.
-    fn is_worse(&self) -> bool {
-        self.error > 1.0005 * self.of_mean + self.rounding
-    }
-
-    /// Returns the ratio of the error to that of the mean; `None` if the error of the mean is only rounding.
-    fn times(&self) -> Option<f64> {
-        let times = (self.of_mean > self.rounding).then(|| self.error / self.of_mean);
-        times.filter(|times| times.is_finite())
-    }
-}
-
-impl Remark {
-    /// Returns the remarks on the errors of a decoder of this kind, fitted with `settings` to `samples` training
-    /// samples of `readings` each, compared with the errors of the mean.
-    pub(super) fn on(
-        kind: DecoderKind,
-        (errors, mean): (&TestErrors, &TestErrors),
-        settings: &RunSettings,
-        (samples, readings): (usize, usize),
-    ) -> Vec<Self> {
-        let cause = Cause::of(kind, settings, samples, readings);
-        let pairs = match (errors, mean) {
-            (TestErrors::Nodes(errors), TestErrors::Nodes(mean)) => Pair::of_nodes(errors, mean),
-            _ => Pair::of_targets(errors.targets(), mean.targets()),
-        };
-        let worse = pairs
-            .into_iter()
-            .filter(Pair::is_worse)
-            .map(|pair| Self::WorseThanMean {
-                times: pair.times(),
-                target: pair.target,
-                cause,
-            });
-        worse.collect()
-    }
-
-    /// Sets the reason for the end of the training as the cause, unless the cause is noise that the training set lacks.
-    fn attribute_to_end(&mut self, reason: Option<StopReason>, method: Method) {
-        if let (Self::WorseThanMean { cause, .. }, Some(reason)) = (self, reason)
-            && *cause != Cause::UnseenNoise
-        {
-            *cause = Cause::End { reason, method };
-        }
-    }
-}
-
-/// Returns the remarks on the rows of the error table of a simulated array, with the names of the rows: on the network,
-/// whose training ended for `reason`, and on the linear map.
+/// Returns the remarks on the rows of an error table, with the names of the rows: on the network, whose training ended
+/// for `reason`, and on the linear map.
 pub fn error_remarks(
     settings: &RunSettings,
     Scores { network, baselines, .. }: &Scores,
     reason: Option<StopReason>,
-) -> Vec<(&'static str, Remark)> {
+) -> Vec<(&'static str, String)> {
     let Some(simulation) = settings.simulation() else {
         return Vec::new();
     };
     let readings = simulation.sensor.scale.columns();
     let networks = simulation.model_size().map_or(1, |size| size.networks);
-    let method = settings.training.method;
+    let end = reason.map(|reason| (reason, settings.training.method));
     let samples = simulation.samples / networks;
     let rows = [
-        ("linear map", DecoderKind::Ridge, &baselines.linear),
-        ("network", DecoderKind::Network, network),
+        ("linear map", DecoderKind::Ridge, &baselines.linear, None),
+        ("network", DecoderKind::Network, network, end),
     ];
-    let of_row = |(name, kind, errors)| {
-        let mut remarks = Remark::on(kind, (errors, &baselines.mean), settings, (samples, readings));
-        for remark in remarks.iter_mut().filter(|_| kind == DecoderKind::Network) {
-            remark.attribute_to_end(reason, method);
-        }
-        remarks.extend(MissingFigures::of(Precision::Double, errors, None).map(Remark::Missing));
+    let of_row = |(name, kind, errors, end)| {
+        let cause = cause(kind, settings, (samples, readings), end);
+        let mut remarks = worse_than_mean(errors, &baselines.mean, &cause);
+        remarks.extend(missing_figures(Precision::Double, errors, None).map(str::to_owned));
         remarks.into_iter().map(move |remark| (name, remark))
     };
     rows.into_iter().flat_map(of_row).collect()
 }
 
-/// Reason why a decoder has no figures, or no residual.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum MissingFigures {
-    /// Readings or answers exceed the range of single precision.
-    #[error(
-        "no figures, since readings or answers exceed single precision (3.4e38): decode in double precision, or lower \
-         the noise"
-    )]
-    SinglePrecision,
-    /// Answers overflow.
-    #[error("no figures, since its answers overflow: lower the noise")]
-    Overflow,
-    /// The sensor has no resistance at the answers.
-    #[error("no residual, since the sensor has no resistances at some answers: they are too far off")]
-    NoResistance,
+/// Returns a circumstance that may be the cause of errors worse than those of the mean, with what may help: for a decoder
+/// fitted with `settings` to `samples` training samples of `readings` each, whose training ended as in `end`. The
+/// circumstance is known; that it is the cause is not.
+pub(super) fn cause(
+    kind: DecoderKind,
+    settings: &RunSettings,
+    (samples, readings): (usize, usize),
+    end: Option<(StopReason, Method)>,
+) -> String {
+    /// Samples per reading below which more samples would help most.
+    const FEW: usize = 4;
+    let noise = settings
+        .simulation()
+        .map_or(Noise::default(), |simulation| simulation.scene.noise);
+    let is_noisy = !noise.in_test().is_none();
+    let is_fitted = kind != DecoderKind::Newton;
+    if is_fitted && is_noisy && noise.sets == NoisySets::Test {
+        return "the training set lacks the noise of these readings; add the noise to both, or reduce it".to_owned();
+    }
+    if let Some((reason, method)) = end {
+        return reason.remedy(&method).to_string();
+    }
+    if is_fitted && samples < FEW * readings {
+        let (samples, readings) = (counted(samples, "training sample"), counted(readings, "reading"));
+        return format!("it was fitted to {samples} of {readings}; more samples may help");
+    }
+    let text = if kind.needs_network() {
+        "more or fewer epochs, another number of hidden nodes, or more samples may help"
+    } else if is_noisy {
+        "the readings have noise; less noise or more samples may help"
+    } else {
+        "use another decoder; more samples may help"
+    };
+    text.to_owned()
 }
 
-impl MissingFigures {
-    /// Returns the reason why figures are missing, given the errors of a decoder and the residual of its answers, if
-    /// there is a model of the sensor; `None` if none are missing.
-    pub(super) fn of(precision: Precision, errors: &TestErrors, residual: Option<f64>) -> Option<Self> {
-        let is_complete = match errors {
-            TestErrors::Nodes(errors) => errors.z_mm.is_finite() && errors.worst_mm.is_finite(),
-            TestErrors::Targets(targets) => targets.iter().all(|target| target.mae.is_finite()),
-        };
-        match precision {
-            _ if is_complete => residual
-                .is_some_and(|residual| !residual.is_finite())
-                .then_some(Self::NoResistance),
-            Precision::Single => Some(Self::SinglePrecision),
-            Precision::Double => Some(Self::Overflow),
+/// Returns a remark on each coordinate or target whose error exceeds that of always answering the mean by enough to show
+/// in three decimals of their ratio. NaN is reported by [`missing_figures`] instead.
+pub(super) fn worse_than_mean(errors: &TestErrors, mean: &TestErrors, cause: &str) -> Vec<String> {
+    /// Largest error in percent that counts as rounding of coordinates.
+    const ROUNDING: f64 = 1e-9;
+    let (pairs, rounding): (Vec<(String, f64, f64)>, f64) = match (errors, mean) {
+        (TestErrors::Nodes(errors), TestErrors::Nodes(mean)) => {
+            let percent = |errors: &Errors| [Some(errors.z_full_scale_percent), errors.x_percent, errors.y_percent];
+            let pairs = ["z", "x", "y"].into_iter().zip(percent(errors)).zip(percent(mean));
+            let pair = |((name, error), of_mean): ((&str, _), Option<f64>)| Some((name.to_owned(), error?, of_mean?));
+            (pairs.filter_map(pair).collect(), ROUNDING)
         }
+        _ => {
+            let pairs = errors.targets().iter().zip(mean.targets()).enumerate();
+            // A target that is constant in the test samples cannot be judged.
+            let judged = pairs.filter(|(_, (errors, _))| errors.r2.is_some());
+            let named = judged.map(|(index, (errors, mean))| (format!("target {}", index + 1), errors.mae, mean.mae));
+            (named.collect(), 0.0)
+        }
+    };
+    let worse = pairs
+        .into_iter()
+        .filter(|(_, error, of_mean)| *error > 1.0005 * of_mean + rounding);
+    let remark = |(target, error, of_mean): (String, f64, f64)| {
+        let times = (of_mean > rounding).then(|| error / of_mean);
+        let compared = match times.filter(|times| times.is_finite()) {
+            None => format!("it has an error in {target}, although always answering the mean is exact"),
+            Some(times @ ..1e4) => {
+                format!("its error in {target} is {times:.3} times that of always answering the mean")
+            }
+            Some(times) => format!("its error in {target} is {times:.1e} times that of always answering the mean"),
+        };
+        format!("{compared}: {cause}")
+    };
+    worse.map(remark).collect()
+}
+
+/// Returns the reason why figures are missing, given the errors of a decoder and the residual of its answers, if there is
+/// a model of the sensor; `None` if none are missing.
+pub(super) fn missing_figures(
+    precision: Precision,
+    errors: &TestErrors,
+    residual: Option<f64>,
+) -> Option<&'static str> {
+    let is_complete = match errors {
+        TestErrors::Nodes(errors) => errors.z_mm.is_finite() && errors.worst_mm.is_finite(),
+        TestErrors::Targets(targets) => targets.iter().all(|target| target.mae.is_finite()),
+    };
+    match precision {
+        _ if is_complete => residual
+            .is_some_and(|residual| !residual.is_finite())
+            .then_some("no residual, since the sensor has no resistances at some answers: they are too far off"),
+        Precision::Single => Some(
+            "no figures, since readings or answers exceed single precision (3.4e38): decode in double precision, or lower \
+             the noise",
+        ),
+        Precision::Double => Some("no figures, since its answers overflow: lower the noise"),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::TargetErrors;
+
+    fn remarks_on(
+        kind: DecoderKind,
+        (errors, mean): (&TestErrors, &TestErrors),
+        settings: &RunSettings,
+        sizes: (usize, usize),
+    ) -> Vec<String> {
+        worse_than_mean(errors, mean, &cause(kind, settings, sizes, None))
+    }
 
     fn errors(z_mm: f64, x_percent: Option<f64>) -> Errors {
         Errors {
@@ -306,8 +160,7 @@ mod tests {
         settings.simulation_mut().unwrap().scene.noise = noise;
         let mean = errors(0.2, Some(5.0));
         let [ours, mean] = [*ours, mean].map(TestErrors::Nodes);
-        let remarks = Remark::on(kind, (&ours, &mean), &settings, (samples, 30));
-        remarks.iter().map(ToString::to_string).collect()
+        remarks_on(kind, (&ours, &mean), &settings, (samples, 30))
     }
 
     #[test]
@@ -347,9 +200,9 @@ mod tests {
             assert!(remarks[1].contains("in x is 1.200 times"), "{remarks:?}");
         }
         let [ours, exact] = [errors(0.1, Some(0.5)), errors(0.2, Some(1e-14))].map(TestErrors::Nodes);
-        let of_exact_mean = Remark::on(DecoderKind::Ridge, (&ours, &exact), &RunSettings::default(), (500, 30));
+        let of_exact_mean = remarks_on(DecoderKind::Ridge, (&ours, &exact), &RunSettings::default(), (500, 30));
         assert_eq!(of_exact_mean.len(), 1, "{of_exact_mean:?}");
-        let text = of_exact_mean[0].to_string();
+        let text = &of_exact_mean[0];
         assert!(
             text.contains("error in x, although always answering the mean is exact"),
             "{text}"
@@ -380,11 +233,8 @@ mod tests {
         let errors = [target(3e-12, Some(-1.0)), target(5.0, Some(0.5)), target(1e-17, None)];
         let mean = [target(2e-12, Some(0.0)), target(7.0, Some(0.0)), target(0.0, None)];
         let [errors, mean] = [errors, mean].map(|targets| TestErrors::Targets(targets.into()));
-        let remarks = Remark::on(DecoderKind::Ridge, (&errors, &mean), &settings, (500, 30));
+        let remarks = remarks_on(DecoderKind::Ridge, (&errors, &mean), &settings, (500, 30));
         assert_eq!(remarks.len(), 1, "{remarks:?}");
-        assert!(
-            remarks[0].to_string().contains("in target 1 is 1.500 times"),
-            "{remarks:?}"
-        );
+        assert!(remarks[0].contains("in target 1 is 1.500 times"), "{remarks:?}");
     }
 }

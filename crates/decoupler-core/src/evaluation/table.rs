@@ -4,6 +4,7 @@ use super::{Coverage, Errors, PublishedErrors, Run, Scores, TargetErrors, TestEr
 use crate::{
     dataset::Dataset,
     decoupling::{DecodeError, Decoder},
+    numerics::median,
     problem::{Channel, Problem},
 };
 
@@ -84,7 +85,6 @@ impl ErrorMeasure {
         Self::ZStrokePercent,
         Self::WorstMm,
     ];
-    const OF_TARGETS: [Self; 5] = [Self::Rmse, Self::Mae, Self::R2, Self::Worst, Self::RangePercent];
     const OF_TARGETS_WITH_INTERVALS: [Self; 7] = [
         Self::Rmse,
         Self::Mae,
@@ -94,6 +94,7 @@ impl ErrorMeasure {
         Self::HalfWidth,
         Self::CoveragePercent,
     ];
+    const OF_TARGETS: &[Self] = Self::OF_TARGETS_WITH_INTERVALS.split_at(5).0;
 
     /// Name in files, such as `z_percent`.
     pub fn field(self) -> &'static str {
@@ -163,55 +164,47 @@ impl ErrorMeasure {
         }
     }
 
-    fn of_nodes(self, errors: &Errors) -> Option<f64> {
-        match self {
-            Self::ZPercent => errors.z_percent,
-            Self::XPercent => errors.x_percent,
-            Self::YPercent => errors.y_percent,
-            Self::ZMm => Some(errors.z_mm),
-            Self::ZStrokePercent => Some(errors.z_full_scale_percent),
-            Self::WorstMm => Some(errors.worst_mm),
-            Self::Rmse
-            | Self::Mae
-            | Self::R2
-            | Self::Worst
-            | Self::RangePercent
-            | Self::CoveragePercent
-            | Self::HalfWidth => None,
-        }
-    }
-
     /// Returns this measure of the errors of a target; `None` for measures of nodes, and where it is undefined.
     pub fn of_target(self, errors: &TargetErrors) -> Option<f64> {
-        match self {
-            Self::Rmse => Some(errors.rmse),
-            Self::Mae => Some(errors.mae),
-            Self::R2 => errors.r2,
-            Self::Worst => Some(errors.worst),
-            Self::RangePercent => errors.percent_of_range,
-            Self::ZPercent | Self::XPercent | Self::YPercent | Self::ZMm | Self::ZStrokePercent | Self::WorstMm => None,
-            // Measures of intervals, which baselines have not.
-            Self::CoveragePercent | Self::HalfWidth => None,
-        }
+        self.of(Figures::Target(errors))
     }
 
-    /// Returns this measure of intervals.
-    fn of_intervals(self, coverage: &Coverage) -> Option<f64> {
-        match self {
-            Self::CoveragePercent => Some(100.0 * coverage.share),
-            Self::HalfWidth => Some(coverage.half_width),
+    fn of(self, figures: Figures<'_>) -> Option<f64> {
+        match (self, figures) {
+            (Self::ZPercent, Figures::Nodes(errors)) => errors.z_percent,
+            (Self::XPercent, Figures::Nodes(errors)) => errors.x_percent,
+            (Self::YPercent, Figures::Nodes(errors)) => errors.y_percent,
+            (Self::ZMm, Figures::Nodes(errors)) => Some(errors.z_mm),
+            (Self::ZStrokePercent, Figures::Nodes(errors)) => Some(errors.z_full_scale_percent),
+            (Self::WorstMm, Figures::Nodes(errors)) => Some(errors.worst_mm),
+            (Self::ZPercent, Figures::Published(published)) => Some(published.z_percent),
+            (Self::XPercent, Figures::Published(published)) => Some(published.x_percent),
+            (Self::YPercent, Figures::Published(published)) => Some(published.y_percent),
+            (Self::Rmse, Figures::Target(errors)) => Some(errors.rmse),
+            (Self::Mae, Figures::Target(errors)) => Some(errors.mae),
+            (Self::R2, Figures::Target(errors)) => errors.r2,
+            (Self::Worst, Figures::Target(errors)) => Some(errors.worst),
+            (Self::RangePercent, Figures::Target(errors)) => errors.percent_of_range,
+            (Self::CoveragePercent, Figures::Intervals(coverage)) => Some(100.0 * coverage.share),
+            (Self::HalfWidth, Figures::Intervals(coverage)) => Some(coverage.half_width),
             _ => None,
         }
     }
+}
 
-    /// Returns the published error, if the paper reports this measure.
-    fn published(self, published: &PublishedErrors) -> Option<f64> {
-        match self {
-            Self::ZPercent => Some(published.z_percent),
-            Self::XPercent => Some(published.x_percent),
-            Self::YPercent => Some(published.y_percent),
-            _ => None,
-        }
+/// Figures in which a measure is looked up.
+#[derive(Clone, Copy)]
+enum Figures<'a> {
+    Nodes(&'a Errors),
+    Published(&'a PublishedErrors),
+    Target(&'a TargetErrors),
+    Intervals(&'a Coverage),
+}
+
+impl ErrorRow {
+    fn new(name: &'static str, measures: &[ErrorMeasure], figures: Figures<'_>) -> Self {
+        let errors = measures.iter().map(|measure| measure.of(figures)).collect();
+        Self { name, errors }
     }
 }
 
@@ -232,14 +225,8 @@ impl ErrorTable {
         }
         let last = table.blocks.last_mut();
         if let (Some(published), Some(block)) = (published, last.filter(|_| problem.has_nodes())) {
-            block.rows.push(ErrorRow {
-                name: "published",
-                errors: table
-                    .measures
-                    .iter()
-                    .map(|measure| measure.published(published))
-                    .collect(),
-            });
+            let row = ErrorRow::new("published", table.measures, Figures::Published(published));
+            block.rows.push(row);
         }
         table
     }
@@ -253,10 +240,8 @@ impl ErrorTable {
                 continue;
             };
             let rows = [("network, loading", loading), ("network, unloading", unloading)];
-            block.rows.extend(rows.map(|(name, errors)| ErrorRow {
-                name,
-                errors: self.measures.iter().map(|measure| measure.of_target(errors)).collect(),
-            }));
+            let row = |(name, errors)| ErrorRow::new(name, self.measures, Figures::Target(errors));
+            block.rows.extend(rows.map(row));
         }
         self
     }
@@ -268,8 +253,8 @@ impl ErrorTable {
         for (index, block) in self.blocks.iter_mut().enumerate() {
             for row in &mut block.rows {
                 let coverage = coverage.get(index).copied().flatten().filter(|_| row.name == NETWORK);
-                let measure = |measure: &ErrorMeasure| measure.of_intervals(&coverage?);
-                row.errors.extend(added.iter().map(measure));
+                let of = |measure: &ErrorMeasure| measure.of(Figures::Intervals(coverage.as_ref()?));
+                row.errors.extend(added.iter().map(of));
             }
         }
     }
@@ -279,27 +264,20 @@ impl ErrorTable {
         if problem.has_nodes() {
             let measures = &ErrorMeasure::OF_NODES;
             let row = |(name, errors): &(&'static str, &TestErrors)| {
-                let of = |measure: &ErrorMeasure| errors.nodes().and_then(|errors| measure.of_nodes(errors));
-                ErrorRow {
-                    name,
-                    errors: measures.iter().map(of).collect(),
-                }
+                Some(ErrorRow::new(name, measures, Figures::Nodes(errors.nodes()?)))
             };
-            let rows = rows.iter().map(row).collect();
+            let rows = rows.iter().filter_map(row).collect();
             return Self {
                 measures,
                 blocks: vec![ErrorBlock { target: None, rows }],
             };
         }
-        let measures = &ErrorMeasure::OF_TARGETS;
+        let measures = ErrorMeasure::OF_TARGETS;
         let block = |target: Channel, errors: &dyn Fn(&TestErrors) -> Option<TargetErrors>| ErrorBlock {
             target: Some(target),
             rows: Vec::from_iter(rows.iter().filter_map(|(name, of_row)| {
                 let errors = errors(of_row)?;
-                Some(ErrorRow {
-                    name,
-                    errors: measures.iter().map(|measure| measure.of_target(&errors)).collect(),
-                })
+                Some(ErrorRow::new(name, measures, Figures::Target(&errors)))
             })),
         };
         let targets = problem.targets.iter().enumerate();
@@ -371,8 +349,7 @@ pub(super) fn frame_us(decoder: &mut dyn Decoder, test: &Dataset) -> Result<f64,
         spent += seconds;
         blocks.push(1e6 * seconds / frames_in_block as f64);
     }
-    blocks.sort_by(f64::total_cmp);
-    Ok(blocks[blocks.len() / 2])
+    Ok(median(blocks))
 }
 
 #[cfg(test)]

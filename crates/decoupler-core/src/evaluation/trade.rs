@@ -47,16 +47,6 @@ impl TradeOffPoint {
     pub fn to_model_based(&self) -> Option<f64> {
         self.report.errors.nodes()?.times(self.model_based.as_ref()?)
     }
-
-    /// Returns the decoding time in microseconds and the error in percent.
-    pub fn decoding(&self) -> (f64, f64) {
-        (self.report.cost.frame_us, self.percent())
-    }
-
-    /// Returns the training time in seconds and the error in percent.
-    pub fn training(&self) -> (f64, f64) {
-        (self.training_seconds, self.percent())
-    }
 }
 
 /// Measures every decoder of `decoders` on the test samples of `sets`, with each number of `hidden` nodes for networks.
@@ -133,7 +123,7 @@ pub(crate) fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
 /// Returns the point with the shortest decoding time among those with an error of at most `percent`.
 pub fn fastest_under(points: &[TradeOffPoint], percent: f64) -> Option<&TradeOffPoint> {
     let good = points.iter().filter(|point| point.percent() <= percent);
-    good.min_by(|a, b| a.decoding().0.total_cmp(&b.decoding().0))
+    good.min_by(|a, b| a.report.cost.frame_us.total_cmp(&b.report.cost.frame_us))
 }
 
 /// Returns the point with the smallest error among those that decode a frame within `microseconds`.
@@ -158,10 +148,11 @@ impl TradeOffCost {
 
     /// Returns the cost (microseconds of decoding, or seconds of training) and the error in percent.
     pub fn of(self, point: &TradeOffPoint) -> (f64, f64) {
-        match self {
-            Self::Decoding => point.decoding(),
-            Self::Training => point.training(),
-        }
+        let cost = match self {
+            Self::Decoding => point.report.cost.frame_us,
+            Self::Training => point.training_seconds,
+        };
+        (cost, point.percent())
     }
 
     /// Returns the name of the cost with its unit.

@@ -3,14 +3,8 @@
 use ndarray::ArrayView1;
 
 /// Median of values, which must not be empty.
-pub(crate) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len().is_multiple_of(2) {
-        0.5 * (values[middle - 1] + values[middle])
-    } else {
-        values[middle]
-    }
+pub(crate) fn median(values: Vec<f64>) -> f64 {
+    quantile(&values, 0.5)
 }
 
 /// Returns the quantile of `values` at `level`: the kth smallest of n values has the level (k − ½)/n, and values in between

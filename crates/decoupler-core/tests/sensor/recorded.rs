@@ -5,7 +5,7 @@ use decoupler_core::{
     evaluation::{
         CrossValidated, Measured, RunError, RunSettings,
         recorded::{
-            Doubling, FittedModel, Interval, LearningCurve, NonlinearGain, SplitComparison, channel_importance,
+            FittedModel, Interval, LearningCurve, SplitComparison, channel_importance, nonlinear_gains, ridge_remark,
         },
     },
     job::Job,
@@ -173,7 +173,7 @@ fn a_learning_curve_predicts_the_error_with_twice_the_samples() {
         for samples in [60, 80, 120] {
             let n = samples as f64;
             let expected = theory(2.0 * n) / theory(n);
-            let ratio = curve(samples, by).doubling.unwrap().ratio;
+            let ratio = curve(samples, by).doubling.unwrap();
             assert!(
                 ratio.low < expected && expected < ratio.high,
                 "{by}, {samples}: {ratio:?}, {expected}"
@@ -187,7 +187,7 @@ fn a_learning_curve_predicts_the_error_with_twice_the_samples() {
         high: 0.95,
     };
     let few = LearningCurve {
-        doubling: Some(Doubling { ratio }),
+        doubling: Some(ratio),
         ..curve(80, SplitBy::Time)
     };
     assert!(few.gains());
@@ -216,13 +216,16 @@ fn a_network_no_better_than_ridge_is_reported_as_such() {
     let gain = |set: &Dataset| {
         let folds = Folds::by(set, 5, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
         let validated = CrossValidated::on_folds(&settings(), set, folds, &Job::UNINTERRUPTED).unwrap();
-        NonlinearGain::of_validated(set, &validated, SplitBy::Time)[0].unwrap()
+        nonlinear_gains(set, &validated, SplitBy::Time)[0].unwrap()
     };
     let linear = gain(&set(400, 3, 7, |c, rng| c[0] + c[1] + normal(rng)));
-    let remark = linear.remark("y").unwrap();
+    let remark = ridge_remark(linear, "y").unwrap();
     assert!(remark.contains("no better than ridge"), "{remark}");
     let curved = gain(&set(400, 3, 8, |c, rng| c[0] + c[1] * c[1] + 0.2 * normal(rng)));
-    assert!(curved.is_supported() && curved.remark("y").is_none(), "{curved:?}");
+    assert!(
+        curved.is_improvement() && ridge_remark(curved, "y").is_none(),
+        "{curved:?}"
+    );
 }
 
 #[test]

@@ -179,7 +179,7 @@ pub fn cells_table(results: &ExperimentResults) -> Table {
     let rows = rows.map(|(cell, summary)| {
         let mut fields = settings_fields(cell);
         fields.extend([
-            field("starts", summary.starts.into()),
+            field("starts", summary.cell.settings.starts.into()),
             field("trials", summary.trials.into()),
         ]);
         let figure = |name: &str, figure: &Figure, has_published: bool| {

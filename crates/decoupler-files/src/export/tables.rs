@@ -7,7 +7,7 @@ use decoupler_core::{
         TargetErrors, TestErrors,
         recorded::{
             ChannelRemark, Determinacy, Determination, Findings, FittedModel, TargetFindings, Undetermined,
-            target_remarks,
+            ridge_remark, target_remarks,
         },
     },
     problem::{Channel, Problem, TargetPosition},
@@ -368,7 +368,7 @@ pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
 pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Findings) -> Vec<String> {
     let mut warnings = describe_channels(inputs, targets, &findings.remarks);
     for (target, found) in targets.iter().zip(&findings.targets) {
-        warnings.extend(found.gain.and_then(|gain| gain.remark(&target.name)));
+        warnings.extend(found.gain.and_then(|gain| ridge_remark(gain, &target.name)));
     }
     warnings
 }

@@ -85,7 +85,7 @@ fn heat_map(results: &ExperimentResults, summaries: &[CellSummary], rows: &Axis)
 /// Position of a cell on the axis: the value itself, or its index in the list.
 fn position(axis: &Axis, index: usize, cell: &CellSummary) -> f64 {
     match axis.kind() {
-        AxisKind::Hidden => cell.hidden as f64,
+        AxisKind::Hidden => cell.cell.settings.hidden as f64,
         _ => index as f64,
     }
 }

@@ -1,21 +1,20 @@
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
     super::{
-        Initialization, RunError, RunSettings,
+        Begin, Measured, Run, RunError, RunSets, RunSettings,
         cross_validation::{nth_seed, scatter},
-        linear_start::LinearStart,
     },
     FoldErrors,
     fold_errors::variances,
 };
 use crate::{
-    dataset::{Dataset, Folds},
+    dataset::{Dataset, Folds, Split},
+    job::Job,
     machine::MemoryBudget,
-    network::{Inputs, MinMax, Shape, nguyen_widrow},
-    scene::NoiseSource,
-    training::{Examples, Problem, StoppingRules, Trainer, TrainingError, TrainingSettings, check_width},
+    scene::RowModel,
+    training::{StoppingRules, TrainingError},
 };
 
 /// Committees trained on all folds but one, for each fold, which advance together epoch by epoch: the epoch at which to
@@ -44,11 +43,10 @@ pub(super) struct BestEpoch {
 
 /// Trainings without one fold.
 struct Part {
-    /// Empty if every target is constant without the fold: the constant is then the answer.
-    trainers: Vec<Trainer>,
+    /// `None` if every target is constant without the fold: the constant is then the answer.
+    run: Option<Run>,
     /// Scaled inputs of the held-out samples.
     inputs: Array2<f64>,
-    outputs: MinMax,
     targets: Array2<f64>,
     answers: Array2<f64>,
     squares: Vec<f64>,
@@ -68,22 +66,24 @@ impl<'a> FoldedTraining<'a> {
         stride: usize,
         memory: MemoryBudget,
     ) -> Result<Self, RunError> {
+        let mut endless = RunSettings {
+            source: Measured { rows: RowModel::Shared }.into(),
+            ..*settings
+        };
+        endless.training.stopping.epochs = StoppingRules::MAX_EPOCHS;
         let parts = (0..folds.count()).into_par_iter().map(|fold| {
             let thinned: Vec<usize> = folds.without(&[fold]).into_iter().step_by(stride).collect();
-            Part::new(
-                settings,
-                &set.select(&thinned),
-                &set.select(folds.test(fold)),
-                fold,
-                memory,
-            )
+            let seed = nth_seed(settings.seed, fold);
+            let settings = RunSettings { seed, ..endless };
+            Part::new(settings, set.select(&thinned), &set.select(folds.test(fold)), memory)
         });
         let parts: Vec<Part> = parts.collect::<Result<_, _>>()?;
-        if parts.iter().all(|part| part.trainers.is_empty()) {
+        if parts.iter().all(|part| part.run.is_none()) {
             return Err(TrainingError::NothingVaries.into());
         }
         let of_part = |part: &Part| {
-            let Some(first) = part.trainers.first() else { return 0.0 };
+            let Some(run) = &part.run else { return 0.0 };
+            let first = &run.leader().rows()[0];
             let shape = first.present().shape();
             let training = settings.training.method.epoch_multiplications(shape, first.samples());
             let answers = part.inputs.nrows() * (shape.weights() + TANH * shape.hidden);
@@ -133,8 +133,8 @@ impl<'a> FoldedTraining<'a> {
     /// gain took, and `patience` more, have passed since, or all trainings have ended.
     pub(super) fn has_passed_its_best(&self, patience: usize) -> bool {
         let (gain, _) = self.gain;
-        let mut trainers = self.parts.iter().flat_map(|part| &part.trainers);
-        self.epoch >= gain + gain / 2 + patience || trainers.all(|trainer| trainer.stop_reason().is_some())
+        let mut runs = self.parts.iter().filter_map(|part| part.run.as_ref());
+        self.epoch >= gain + gain / 2 + patience || runs.all(|run| run.stop_reason().is_some())
     }
 
     /// Epoch of the latest weights.
@@ -149,83 +149,41 @@ impl<'a> FoldedTraining<'a> {
 }
 
 impl Part {
-    fn new(
-        settings: &RunSettings,
-        training: &Dataset,
-        test: &Dataset,
-        fold: usize,
-        memory: MemoryBudget,
-    ) -> Result<Self, RunError> {
-        let inputs = Inputs::fit(settings.inputs, training.readings(), NoiseSource::default())?;
-        let outputs = MinMax::fit(training.targets())?;
-        let scaled = |readings: ArrayView2<'_, f64>| inputs.of(readings);
-        let (x, y) = (scaled(training.readings()), outputs.scale(training.targets()));
-        let linear = match settings.initialization {
-            Initialization::Random => None,
-            Initialization::Ridge if outputs.varying().is_empty() => None,
-            Initialization::Ridge => LinearStart::fit(x.view(), y.view(), LinearStart::nodes(settings.hidden)),
-        };
-        let examples = Examples::new(x.view(), y.view());
-        let shape = Shape {
-            inputs: examples.inputs(),
-            hidden: settings.hidden,
-            outputs: examples.outputs(),
-        };
-        check_width(&settings.training.method, shape, examples.samples(), 1, memory)?;
-        let problem = Problem {
-            training: examples,
-            validation: None,
-            test: None,
-        };
-        let rules = TrainingSettings {
-            method: settings.training.method,
-            stopping: StoppingRules {
-                epochs: StoppingRules::MAX_EPOCHS,
-                ..settings.training.stopping
-            },
-        };
-        let seed = nth_seed(settings.seed, fold);
-        let starts = if shape.outputs == 0 { 0 } else { settings.starts };
-        let trainers = (0..starts).map(|start| {
-            let mut mlp = nguyen_widrow(shape, &mut seed.start_rng(start));
-            if let Some(linear) = &linear {
-                linear.apply(&mut mlp);
-            }
-            Trainer::new(mlp, problem.clone(), rules)
-        });
+    fn new(settings: RunSettings, training: Dataset, test: &Dataset, memory: MemoryBudget) -> Result<Self, RunError> {
         let mut part = Self {
-            trainers: trainers.collect::<Result<_, _>>()?,
-            inputs: scaled(test.readings()),
-            outputs,
+            run: None,
+            inputs: Array2::zeros((0, 0)),
             targets: test.targets().to_owned(),
             answers: Array2::zeros(test.targets().dim()),
             squares: vec![f64::INFINITY; test.outputs()],
         };
-        if part.trainers.is_empty() {
-            part.answer(Array2::zeros((test.samples(), 0)));
+        if training.has_varying_target() {
+            let validation = None;
+            let sets = RunSets::without_test(Split { training, validation }).limited_to(memory);
+            let run = Run::new(settings, sets, Begin::Initialize, &Job::UNINTERRUPTED)?;
+            part.inputs = run.scalings.at(0).0.of(test.readings());
+            part.run = Some(run);
+        } else {
+            let constant = |(_, target)| training.targets()[[0, target]];
+            part.answer(Array2::from_shape_fn(test.targets().dim(), constant));
         }
         Ok(part)
     }
 
     fn step(&mut self) {
-        let mut sum: Option<Array2<f64>> = None;
-        for trainer in &mut self.trainers {
-            trainer.step();
-            let scaled = trainer.present().forward(self.inputs.view());
-            sum = Some(match sum {
-                Some(sum) => sum + scaled,
-                None => scaled,
-            });
-        }
-        let count = self.trainers.len() as f64;
-        if let Some(sum) = sum {
-            self.answer(sum / count);
-        }
+        let Some(run) = &mut self.run else { return };
+        run.step();
+        let present = run.trainers().iter().map(|start| start.rows()[0].present());
+        let scaled = present.map(|network| network.forward(self.inputs.view()));
+        let sum = scaled.reduce(|sum, scaled| sum + scaled).expect("a run has a start");
+        let mean = sum / run.trainers().len() as f64;
+        let answers = run.scalings.at(0).1.restore(mean.view());
+        self.answer(answers);
     }
 
-    /// Sets the answers from scaled ones, and their squared errors.
-    fn answer(&mut self, scaled: Array2<f64>) {
-        self.answers = self.outputs.restore(scaled.view());
+    /// Sets the answers and their squared errors.
+    fn answer(&mut self, answers: Array2<f64>) {
+        self.answers = answers;
         for (target, square) in self.squares.iter_mut().enumerate() {
             let (answers, targets) = (self.answers.column(target), self.targets.column(target));
             let errors = answers

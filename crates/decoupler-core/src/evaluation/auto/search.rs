@@ -102,18 +102,8 @@ impl<'a> Search<'a> {
     }
 
     /// Cross-validates a network within its part of the budget: what is left until `share`, divided by the number of
-    /// candidates still to come in this stage. Returns its error; `None` if it was too expensive.
+    /// candidates still to come in this stage. Returns its error; `None` if the `needed` epochs are too expensive.
     pub(super) fn try_network(
-        &mut self,
-        candidate: Candidate,
-        share: f64,
-        to_come: usize,
-    ) -> Result<Option<f64>, RunError> {
-        self.try_for(candidate, share, to_come, MIN_EPOCHS)
-    }
-
-    /// As [`Self::try_network`], unless this many epochs are too expensive.
-    pub(super) fn try_for(
         &mut self,
         mut candidate: Candidate,
         share: f64,
@@ -159,12 +149,7 @@ impl<'a> Search<'a> {
             Err(_) if !is_first => return Ok(None),
             Err(error) => return Err(error),
         };
-        let weights = Shape {
-            inputs: set.channels(),
-            hidden: candidate.hidden,
-            outputs: set.outputs(),
-        }
-        .weights();
+        let weights = shape(&set, candidate.hidden).weights();
         let epoch = training.epoch_multiplications();
         let (most, patience) = match candidate.method {
             Method::ScaledConjugateGradient(_) => (MAX_SHORT_EPOCHS, SHORT_PATIENCE),
@@ -215,8 +200,7 @@ impl<'a> Search<'a> {
         };
         let shape = Shape {
             inputs,
-            hidden: settings.hidden,
-            outputs: set.outputs(),
+            ..shape(set, settings.hidden)
         };
         let samples = set.samples() * (self.folds.count() - 1) / self.folds.count();
         let epoch = |stride: usize| {
@@ -320,6 +304,15 @@ impl<'a> Search<'a> {
     }
 }
 
+/// Shape of a network with this many hidden nodes for the samples of `set`.
+pub(super) fn shape(set: &Dataset, hidden: usize) -> Shape {
+    Shape {
+        inputs: set.channels(),
+        hidden,
+        outputs: set.outputs(),
+    }
+}
+
 /// Divides the samples by their rule; a part without enough groups is divided in time.
 fn folds(samples: &AutoSamples<'_>, seed: Seed) -> Result<Folds, RunError> {
     let mut rng = seed.rng(Stream::Folds);
@@ -336,6 +329,6 @@ fn folds(samples: &AutoSamples<'_>, seed: Seed) -> Result<Folds, RunError> {
 }
 
 /// Minimum number of epochs of a candidate.
-const MIN_EPOCHS: usize = 10;
+pub(super) const MIN_EPOCHS: usize = 10;
 /// Number of epochs for which samples are thinned out.
 const TYPICAL_EPOCHS: usize = 30;

@@ -1,8 +1,9 @@
-use crate::dataset::{Memory, Span};
+use ndarray::Axis;
 
-use super::{
-    super::errors::{mean, varies},
-    AutoSamples,
+use super::{super::errors::varies, AutoSamples, SamplePast};
+use crate::{
+    dataset::{Memory, Span},
+    numerics::{autocorrelation, median},
 };
 
 /// Shortest time constant in samples.
@@ -16,7 +17,7 @@ pub(super) fn memories(samples: &AutoSamples<'_>) -> Vec<Memory> {
         return Vec::new();
     };
     let longest = samples.set.samples() as f64 / 10.0;
-    let correlation = correlation_time(samples).clamp(2.0 * SHORTEST, longest.max(2.0 * SHORTEST));
+    let correlation = correlation_time(samples, past).clamp(2.0 * SHORTEST, longest.max(2.0 * SHORTEST));
     let interval_s = past.history.interval_s();
     let span = |length: f64| match interval_s {
         Some(interval_s) => Span::Seconds(rounded(length * interval_s)),
@@ -53,41 +54,27 @@ fn rounded(value: f64) -> f64 {
     }
 }
 
-/// Median over the targets of the lag in samples at which the autocorrelation within stretches falls to 1/e.
-fn correlation_time(samples: &AutoSamples<'_>) -> f64 {
-    let Some(past) = &samples.past else { return 1.0 };
+/// Median over the targets of the lag in samples at which the autocorrelation falls to 1/e, with stretches one after the
+/// other.
+fn correlation_time(samples: &AutoSamples<'_>, past: &SamplePast<'_>) -> f64 {
     let row = |sample: usize| past.history.samples()[past.samples[sample]];
-    let of_rows = past.history.stretches();
-    let stretch = |sample: usize| of_rows[row(sample)];
+    let stretches = past.history.stretches();
     // Rows of groups whose times overlap are interleaved.
-    let mut order = Vec::from_iter(0..samples.set.samples());
-    order.sort_by_key(|&sample| (stretch(sample), row(sample)));
-    let stretches: Vec<usize> = order.iter().map(|&sample| stretch(sample)).collect();
     let count = samples.set.samples();
+    let mut order = Vec::from_iter(0..count);
+    order.sort_by_key(|&sample| (stretches[row(sample)], row(sample)));
     let mut times: Vec<f64> = Vec::new();
     for column in samples.set.targets().columns() {
         if !varies(column) {
             continue;
         }
-        let mean = mean(column);
-        let values: Vec<f64> = order.iter().map(|&sample| column[sample] - mean).collect();
-        let variance = values.iter().map(|value| value * value).sum::<f64>() / count as f64;
-        let correlation = |lag: usize| {
-            let (mut sum, mut pairs) = (0.0, 0_usize);
-            for sample in lag..count {
-                if stretches[sample] == stretches[sample - lag] {
-                    sum += values[sample] * values[sample - lag];
-                    pairs += 1;
-                }
-            }
-            sum / pairs.max(1) as f64 / variance
-        };
+        let values = column.select(Axis(0), &order);
+        let is_alike = |lag| autocorrelation(values.view(), lag).is_some_and(|found| found > (-1.0_f64).exp());
         let mut lag = 1;
-        while lag < count / 4 && correlation(lag) > (-1.0_f64).exp() {
+        while lag < count / 4 && is_alike(lag) {
             lag += 1 + lag / 5;
         }
         times.push(lag as f64);
     }
-    times.sort_by(f64::total_cmp);
-    times.get(times.len() / 2).copied().unwrap_or(1.0)
+    if times.is_empty() { 1.0 } else { median(times) }
 }

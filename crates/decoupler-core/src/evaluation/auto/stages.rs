@@ -4,13 +4,13 @@ use super::{
     super::{Initialization, RunError},
     TriedModel, describe_features,
     fold_errors::{FoldErrors, variances},
-    search::{COMMITTEE, Candidate, Measured, SCREENED, Search},
+    search::{COMMITTEE, Candidate, MIN_EPOCHS, Measured, SCREENED, Search, shape},
     spans::memories,
 };
 use crate::{
     dataset::{Memory, SplitBy},
     decoupling::{Regression, ridge},
-    network::{InputChoice, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
+    network::{InputChoice, LARGEST_HIDDEN, Quantity, ScalingChoice},
     training::{Damping, Method, RegularizationSettings, ScaledConjugateGradientSettings, TrainingError},
 };
 
@@ -77,7 +77,7 @@ impl Search<'_> {
         let count = first.len();
         for (number, candidate) in first.into_iter().enumerate() {
             self.expected = count - number + 4 + 3 + FINALISTS;
-            self.try_network(candidate, features, count - number)?;
+            self.try_network(candidate, features, count - number, MIN_EPOCHS)?;
         }
         if self.fixed.hidden.is_none() {
             self.vary_hidden(nodes)?;
@@ -90,12 +90,7 @@ impl Search<'_> {
     /// noise within an epoch or two, and its epochs are expensive.
     fn is_wide(&self) -> bool {
         let set = self.samples.set;
-        let shape = Shape {
-            inputs: set.channels(),
-            hidden: FIRST_HIDDEN,
-            outputs: set.outputs(),
-        };
-        shape.weights() > set.samples()
+        shape(set, FIRST_HIDDEN).weights() > set.samples()
     }
 
     fn first_hidden(&self) -> usize {
@@ -213,7 +208,7 @@ impl Search<'_> {
             .cloned();
         if let Some(second) = second {
             self.expected = 1 + 3 + FINALISTS;
-            self.try_network(Candidate { hidden, ..second }, share, 1)?;
+            self.try_network(Candidate { hidden, ..second }, share, 1, MIN_EPOCHS)?;
         }
         Ok(())
     }
@@ -259,7 +254,7 @@ impl Search<'_> {
             .map(|network| network.best.errors.relative())
             .min_by(f64::total_cmp);
         let candidate = Candidate { hidden, ..base.clone() };
-        let error = self.try_network(candidate, share, 2)?;
+        let error = self.try_network(candidate, share, 2, MIN_EPOCHS)?;
         Ok(error.zip(before).is_some_and(|(error, before)| error < before))
     }
 
@@ -270,11 +265,7 @@ impl Search<'_> {
 
     /// Varies scaling, regularisation and method of the best network.
     fn refine(&mut self, share: f64) -> Result<(), RunError> {
-        let Some(best) = self
-            .ranked()
-            .first()
-            .map(|&place| self.networks[place].candidate.clone())
-        else {
+        let Some(best) = self.best().cloned() else {
             return Ok(());
         };
         let mut variants: Vec<Candidate> = Vec::new();
@@ -294,7 +285,7 @@ impl Search<'_> {
         let count = variants.len();
         for (number, variant) in variants.into_iter().enumerate() {
             self.expected = count + 1 - number + FINALISTS;
-            self.try_network(variant, share, count + 1 - number)?;
+            self.try_network(variant, share, count + 1 - number, MIN_EPOCHS)?;
         }
         let is_regularized = |network: &&Measured| {
             network.candidate.method == regularized(0.0) && network.best.epoch > CORRELATION_EPOCH as usize
@@ -302,7 +293,7 @@ impl Search<'_> {
         let measured = self.networks.last().filter(is_regularized);
         if let Some(candidate) = measured.map(|network| network.candidate.clone()) {
             let method = regularized(CORRELATION_EPOCH);
-            self.try_network(Candidate { method, ..candidate }, share, 1)?;
+            self.try_network(Candidate { method, ..candidate }, share, 1, MIN_EPOCHS)?;
         }
         Ok(())
     }
@@ -323,24 +314,18 @@ impl Search<'_> {
                 starts: wanted.min(LARGEST_HIDDEN / candidate.hidden).max(1),
                 ..candidate.clone()
             };
-            self.try_for(committee, share, best.len() - number, epochs + BEYOND)?;
+            self.try_network(committee, share, best.len() - number, epochs + BEYOND)?;
         }
         // A committee is compared with a smaller one where it was too expensive: it would hardly be worse.
-        let error = |place: usize| self.networks[place].best.errors.upper();
-        let best = (0..self.networks.len())
-            .min_by(|&one, &other| error(one).total_cmp(&error(other)))
-            .ok_or_else(|| RunError::from(TrainingError::NothingVaries))?;
+        let ranked = self.ranked();
+        let best = *ranked.first().ok_or(TrainingError::NothingVaries)?;
         let (errors, features) = (&self.networks[best].best.errors, &self.networks[best].candidate);
         // A few folds do not show that features are dispensable: only networks with the same are compared.
-        let smallest = (0..self.networks.len())
+        let smallest = ranked
+            .into_iter()
             .filter(|&place| same_features(&self.networks[place].candidate, features))
             .filter(|&place| self.networks[place].best.errors.is_as_good_as(errors))
-            .min_by(|&one, &other| {
-                let weights = |place: usize| self.networks[place].weights;
-                weights(one)
-                    .cmp(&weights(other))
-                    .then(error(one).total_cmp(&error(other)))
-            });
+            .min_by_key(|&place| self.networks[place].weights);
         Ok(smallest.unwrap_or(best))
     }
 }

@@ -4,10 +4,8 @@ use serde::Serialize;
 
 use super::{Cell, Experiment, Trial, TrialFailure};
 use crate::{
-    dataset::{Seed, SplitBy},
     evaluation::{Errors, PublishedErrors, Spread, TargetErrors},
     problem::Problem,
-    sensor::ArrayScale,
 };
 
 /// Results of an experiment so far.
@@ -126,22 +124,8 @@ impl CellResults {
 /// Figures of a cell for tables and files: medians unless stated otherwise, `None` if there is no such figure (yet).
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellSummary {
-    /// Array scale; `None` for a recording.
-    pub array: Option<ArrayScale>,
-    /// Number of hidden nodes.
-    pub hidden: usize,
-    /// Number of training samples; in a cross-validation, of all samples. `None` for a recording.
-    pub samples: Option<usize>,
-    /// Rule by which a recording is divided.
-    pub split: Option<SplitBy>,
-    /// Short name of the training method.
-    pub method: &'static str,
-    /// Maximum number of epochs.
-    pub epochs: usize,
-    /// Number of starts per network.
-    pub starts: usize,
-    /// First seed of the cell.
-    pub seed: Seed,
+    /// Cell to which the figures belong.
+    pub cell: Cell,
     /// Number of trials finished.
     pub trials: usize,
     /// Number of trials planned.
@@ -211,20 +195,12 @@ impl CellResults {
         let median = |figure: fn(&Trial) -> Option<f64>| self.spread(figure).map(|spread| spread.median);
         let starts = settings.starts;
         let epochs_run = self.spread(|trial| Some(trial.epochs as f64 / (trial.networks * starts).max(1) as f64));
-        let simulation = settings.simulation();
         CellSummary {
-            array: simulation.map(|source| source.sensor.scale),
-            hidden: settings.hidden,
-            samples: simulation.map(|source| source.samples),
-            split: self.cell.division.map(|division| division.by),
-            method: settings.training.method.short_name(),
-            epochs: settings.training.stopping.epochs,
-            starts,
-            seed: settings.seed,
+            cell: self.cell,
             trials: self.trials.len(),
             expected_trials: self.expected,
             percent: self.figure(|published| Some(published.z_percent), |trial| trial.errors.percent()),
-            errors: match simulation {
+            errors: match settings.simulation() {
                 Some(_) => self.node_errors(),
                 None => SummaryErrors::Targets {
                     r2: self.figure(|_| None, |trial| TargetErrors::over_all(trial.errors.targets())?.r2),

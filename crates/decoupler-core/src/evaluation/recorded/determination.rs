@@ -223,56 +223,32 @@ fn of_fits(evidence: &Evidence, off: &[f64], answers: &[f64], scale: f64) -> f64
     (1.0 - slope).clamp(0.0, 1.0) * evidence.variance(&cross.collect::<Vec<_>>()).variance
 }
 
-/// Held-out error of the network compared with ridge regression, for one target.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NonlinearGain {
-    /// Ratio of the RMSE of the network to that of ridge.
-    pub ratio: Interval,
+/// Returns the ratio of the held-out RMSE of the network to that of ridge regression in a cross-validation of `set`, target
+/// by target; `None` if either has no error.
+///
+/// # Panics
+/// If the set is not the one that was cross-validated.
+pub fn nonlinear_gains(set: &Dataset, validated: &CrossValidated, by: SplitBy) -> Vec<Option<Interval>> {
+    let answers = [validated.network.view(), validated.linear.view()];
+    (0..set.outputs())
+        .map(|target| rmse_ratio(set, answers, target, by))
+        .collect()
 }
 
-impl NonlinearGain {
-    /// Compares the networks of a cross-validation on `set` with its ridge regressions, target by target; `None` if
-    /// either has no error.
-    ///
-    /// # Panics
-    /// If the set is not the one that was cross-validated.
-    pub fn of_validated(set: &Dataset, validated: &CrossValidated, by: SplitBy) -> Vec<Option<Self>> {
-        let answers = [validated.network.view(), validated.linear.view()];
-        (0..set.outputs())
-            .map(|target| {
-                let ratio = rmse_ratio(set, answers, target, by)?;
-                Some(Self { ratio })
-            })
-            .collect()
-    }
-
-    /// Minimum relative reduction of ridge's error that justifies a network.
-    const MIN_GAIN: f64 = 0.05;
-
-    /// Returns `true` if the network is better than ridge by at least 5 %, and significantly.
-    pub fn is_supported(&self) -> bool {
-        self.ratio.high < 1.0 && self.ratio.value <= 1.0 - Self::MIN_GAIN
-    }
-
-    /// Returns a sentence on the target of this name if the network is no or little better than ridge.
-    pub fn remark(&self, name: &str) -> Option<String> {
-        (!self.is_supported()).then(|| {
-            let better = if self.ratio.high < 1.0 {
-                "little better"
-            } else {
-                "no better"
-            };
-            // Enough decimals to show on which side of 1 the interval ends.
-            let differs = |decimals: &usize| format!("{:.decimals$}", self.ratio.high) != format!("{:.decimals$}", 1.0);
-            let decimals = (2..6).find(differs).unwrap_or(2);
-            // The error does not show whether a nonlinear relation is absent, or this training has missed it.
-            format!(
-                "the network is {better} than ridge for {name} (error {:.decimals$} times ridge's): with these settings, \
-                 use ridge",
-                self.ratio
-            )
-        })
-    }
+/// Returns a sentence on the target of this name if the network is no or little better than ridge: if this ratio of their
+/// errors is no [improvement](Interval::is_improvement).
+pub fn ridge_remark(ratio: Interval, name: &str) -> Option<String> {
+    (!ratio.is_improvement()).then(|| {
+        let better = if ratio.high < 1.0 { "little better" } else { "no better" };
+        // Enough decimals to show on which side of 1 the interval ends.
+        let differs = |decimals: &usize| format!("{:.decimals$}", ratio.high) != format!("{:.decimals$}", 1.0);
+        let decimals = (2..6).find(differs).unwrap_or(2);
+        // The error does not show whether a nonlinear relation is absent, or this training has missed it.
+        format!(
+            "the network is {better} than ridge for {name} (error {ratio:.decimals$} times ridge's): with these settings, \
+             use ridge"
+        )
+    })
 }
 
 #[cfg(test)]
@@ -627,12 +603,7 @@ mod tests {
 
     #[test]
     fn the_remark_claims_no_cause_and_shows_whether_the_error_is_below_ridges() {
-        let remark = |value, low, high| {
-            NonlinearGain {
-                ratio: Interval { value, low, high },
-            }
-            .remark("y")
-        };
+        let remark = |value, low, high| ridge_remark(Interval { value, low, high }, "y");
         let worse = remark(1.004, 0.98, 1.02).unwrap();
         assert!(
             worse.contains("no better than ridge for y (error 1.00 (0.98 to 1.02) times ridge's)"),

@@ -1,13 +1,17 @@
 use std::f64::consts::PI;
 
-use ndarray::Array2;
-use rand::{Rng, RngExt};
+use ndarray::{Array2, ArrayView1};
 
 use crate::{
-    dataset::{Dataset, Folds, SplitBy},
+    dataset::{Dataset, Folds, Split, SplitBy},
     decoupling::decode_set,
-    evaluation::{CrossValidated, RunError, RunSettings, baselines::fit_baselines, cross_validation::scatter},
+    evaluation::{
+        Begin, Run, RunError, RunSets, RunSettings,
+        baselines::fit_baselines,
+        cross_validation::{nth_seed, scatter},
+    },
     job::Job,
+    numerics::autocorrelation,
 };
 
 /// Independent units in a set of samples: its groups, or stretches in the order of the samples.
@@ -75,6 +79,25 @@ impl Evidence {
 }
 
 impl Evidence {
+    /// Returns the samples in units that are nearly independent: groups, or stretches as long as those of `series`, which
+    /// has a value for each sample. Neighbouring units are merged if there are many.
+    pub(super) fn units(&self, series: &[f64]) -> Vec<Vec<usize>> {
+        /// More units would be slow to draw and not change an interval.
+        const MAX: usize = 2000;
+        match self {
+            Self::Groups(groups) => {
+                let merged = groups.chunks(groups.len().div_ceil(MAX).max(1));
+                merged.map(<[Vec<usize>]>::concat).collect()
+            }
+            Self::Order => {
+                let stretches = slow_cosines(series).map_or(MAX, |cosines| cosines + 1);
+                let samples = Vec::from_iter(0..series.len());
+                let stretches = samples.chunks(samples.len().div_ceil(stretches).max(1));
+                stretches.map(<[usize]>::to_vec).collect()
+            }
+        }
+    }
+
     /// Returns the mean of positive `values`, and the variance of its logarithm.
     pub(super) fn variance_of_log_mean(&self, values: &[f64]) -> (f64, SumVariance) {
         let total: f64 = values.iter().sum();
@@ -145,11 +168,8 @@ pub(super) fn slow_cosines(series: &[f64]) -> Option<usize> {
     let mut slow: Option<f64> = None;
     while series.len() >= MIN_LENGTH {
         let count = series.len() as f64;
-        let mean = series.iter().sum::<f64>() / count;
-        series.iter_mut().for_each(|value| *value -= mean);
-        let products: f64 = series.windows(2).map(|pair| pair[0] * pair[1]).sum();
-        let found = products / series.iter().map(|value| value * value).sum::<f64>();
-        if found > 2.0 / count.sqrt() {
+        let found = autocorrelation(ArrayView1::from(&series), 1);
+        if let Some(found) = found.filter(|found| *found > 2.0 / count.sqrt()) {
             // Estimates from short series are too small (Marriott and Pope 1954, doi:10.1093/biomet/41.3-4.390).
             let memory = (found + (1.0 + 3.0 * found) / count).min(0.97);
             let bias = (PI / count).powi(2) / 6.0 * 2.0 * memory / (1.0 - memory).powi(2);
@@ -179,83 +199,6 @@ fn of_cosines(series: &[f64], cosines: usize) -> f64 {
     2.0 * squares.sum::<f64>() / cosines as f64
 }
 
-/// Samples in the units that a bootstrap draws: groups (Davison and Hinkley 1997, section 3.8) or consecutive blocks
-/// (Carlstein 1986), so that correlated samples are not treated as independent.
-#[derive(Clone, Debug)]
-pub(super) struct Resampling {
-    units: Vec<Vec<usize>>,
-}
-
-impl Resampling {
-    /// Number of replicates.
-    const REPLICATES: usize = 1000;
-    /// Maximum number of units: more would be slow to draw and not change the interval. Neighbours are merged.
-    const MAX_UNITS: usize = 2000;
-
-    /// Returns the units of `set`: its groups if it is split by group, otherwise blocks as long as the independent
-    /// stretches of `series`, which has a value for each sample in the order of the recording.
-    pub(super) fn of(set: &Dataset, by: SplitBy, series: &[f64]) -> Self {
-        let units = match by {
-            SplitBy::Group => {
-                let groups = set.snapshots();
-                let joined = groups.len().div_ceil(Self::MAX_UNITS);
-                groups.chunks(joined.max(1)).map(<[Vec<usize>]>::concat).collect()
-            }
-            SplitBy::Time | SplitBy::Random => {
-                let length = slow_cosines(series).map_or(1, |cosines| series.len().div_ceil(cosines + 1));
-                let length = length.max(set.samples().div_ceil(Self::MAX_UNITS));
-                let samples: Vec<usize> = (0..set.samples()).collect();
-                samples.chunks(length).map(<[usize]>::to_vec).collect()
-            }
-        };
-        Self { units }
-    }
-
-    /// Number of units.
-    pub(super) fn count(&self) -> usize {
-        self.units.len()
-    }
-
-    /// Returns the sums of K values per sample over each unit.
-    pub(super) fn sums<const K: usize>(&self, values: impl Fn(usize) -> [f64; K]) -> Vec<[f64; K]> {
-        let sum = |unit: &Vec<usize>| {
-            let mut sums = [0.0; K];
-            for &sample in unit {
-                sums.iter_mut()
-                    .zip(values(sample))
-                    .for_each(|(sum, value)| *sum += value);
-            }
-            sums
-        };
-        self.units.iter().map(sum).collect()
-    }
-
-    /// Repeatedly draws as many units as there are, with replacement, and calls `replicate` with the number of times
-    /// that each was drawn.
-    pub(super) fn draw(&self, rng: &mut impl Rng, mut replicate: impl FnMut(&[f64])) {
-        let mut times = vec![0.0; self.count()];
-        for _ in 0..Self::REPLICATES {
-            times.fill(0.0);
-            for _ in 0..self.count() {
-                times[rng.random_range(0..self.count())] += 1.0;
-            }
-            replicate(&times);
-        }
-    }
-}
-
-/// Returns the sum over units, each counted as often as it was drawn.
-pub(super) fn weighted<const K: usize>(sums: &[[f64; K]], times: &[f64]) -> [f64; K] {
-    let mut total = [0.0; K];
-    for (sums, &times) in sums.iter().zip(times) {
-        total
-            .iter_mut()
-            .zip(sums)
-            .for_each(|(total, sum)| *total += times * sum);
-    }
-    total
-}
-
 /// Model that is fitted repeatedly to measure how well the readings determine the targets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FittedModel {
@@ -275,7 +218,8 @@ impl FittedModel {
         }
     }
 
-    /// Returns held-out answers for every sample of `set`, each by a model fitted without its fold.
+    /// Returns held-out answers for every sample of `set`, each by a model fitted without its fold; for the network,
+    /// those of [`CrossValidated`](crate::evaluation::CrossValidated).
     pub(super) fn held_out(
         self,
         settings: &RunSettings,
@@ -283,17 +227,35 @@ impl FittedModel {
         folds: &Folds,
         job: &Job<'_>,
     ) -> Result<Array2<f64>, RunError> {
-        if self == Self::Network {
-            return Ok(CrossValidated::on_folds(settings, set, folds.clone(), job)?.network);
-        }
+        let is_simulated = settings.simulation().is_some();
+        let holds_out = self == Self::Network && (is_simulated || settings.training.method.needs_validation());
         let mut answers = Array2::zeros(set.targets().dim());
         for fold in 0..folds.count() {
             job.check()?;
-            let (_, mut ridge) = fit_baselines(&set.select(&folds.without(&[fold])), settings)?;
-            let of_fold = decode_set(&mut ridge, &set.select(folds.test(fold)))?;
+            let seed = nth_seed(settings.seed, fold);
+            let (split, test) = (folds.divided(fold, holds_out).split(set), set.select(folds.test(fold)));
+            let of_fold = self.answers(&RunSettings { seed, ..*settings }, split, &test, job)?;
             scatter(&mut answers, folds.test(fold), &of_fold);
         }
         Ok(answers)
+    }
+
+    /// Returns the answers to `test` of the model fitted to `split`.
+    pub(super) fn answers(
+        self,
+        settings: &RunSettings,
+        split: Split,
+        test: &Dataset,
+        job: &Job<'_>,
+    ) -> Result<Array2<f64>, RunError> {
+        // A stretch may have no variation to learn from: ridge regression then answers with its mean.
+        if self == Self::Ridge || !split.training.has_varying_target() {
+            let (_, mut ridge) = fit_baselines(&split.training, settings)?;
+            return Ok(decode_set(&mut ridge, test)?);
+        }
+        let mut run = Run::new(*settings, RunSets::new(split, test.clone()), Begin::Initialize, job)?;
+        run.finish(job)?;
+        Ok(run.decouple_test())
     }
 }
 

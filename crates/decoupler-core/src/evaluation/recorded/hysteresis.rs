@@ -1,4 +1,4 @@
-use ndarray::ArrayView2;
+use ndarray::{Array2, ArrayView2};
 use serde::Serialize;
 
 use crate::{
@@ -46,15 +46,9 @@ pub struct LoopLevel {
     pub unloading: f64,
 }
 
-#[derive(Clone, Copy, PartialEq)]
-enum Direction {
-    Loading,
-    Unloading,
-}
-
 /// Part of an excursion off its turning points.
 struct Passage {
-    direction: Direction,
+    is_loading: bool,
     samples: Vec<usize>,
 }
 
@@ -122,72 +116,63 @@ impl HysteresisLoop {
         if 2 * passages.len() < excursions {
             return None;
         }
-        let branches = [Direction::Loading, Direction::Unloading].map(|direction| {
-            let of_branch = passages.iter().filter(|passage| passage.direction == direction);
-            of_branch
-                .flat_map(|passage| &passage.samples)
-                .copied()
-                .collect::<Vec<_>>()
+        let of_branch = |is_loading: bool| passages.iter().filter(move |passage| passage.is_loading == is_loading);
+        let branches = [true, false].map(|is_loading| {
+            let samples = of_branch(is_loading).flat_map(|passage| &passage.samples);
+            samples.copied().collect::<Vec<usize>>()
         });
         let level_of = |sample: usize| {
             let level = ((actual[sample] - lowest) / range * Self::LEVELS as f64) as usize;
             level.min(Self::LEVELS - 1)
         };
-        let levels_of = branches.each_ref().map(|samples| {
-            let mut levels = vec![(0, 0.0); Self::LEVELS];
+        // Mean error of each branch at each level, which does not depend on where the samples are within the level.
+        let mut sums = [[(0, 0.0); 2]; Self::LEVELS];
+        for (branch, samples) in branches.iter().enumerate() {
             for &sample in samples {
-                let (count, sum) = &mut levels[level_of(sample)];
+                let (count, sum) = &mut sums[level_of(sample)][branch];
                 *count += 1;
-                // The mean error does not depend on where the samples are within the level.
                 *sum += decoded[sample] - actual[sample];
             }
-            levels
+        }
+        let means = sums.map(|branches| {
+            let is_common = branches.iter().all(|(count, _)| *count >= Self::MIN_SAMPLES);
+            is_common.then(|| branches.map(|(count, sum)| sum / count as f64))
         });
-        let [loading, unloading] = levels_of;
-        // Error in the middle of the branches at each level that both have.
-        let middles = Vec::from_iter(loading.iter().zip(&unloading).map(|(loading, unloading)| {
-            let is_common = loading.0.min(unloading.0) >= Self::MIN_SAMPLES;
-            is_common.then(|| 0.5 * (loading.1 / loading.0 as f64 + unloading.1 / unloading.0 as f64))
-        }));
         let off_middle = |passage: &Passage| {
-            let off = |&sample: &usize| Some(decoded[sample] - actual[sample] - middles[level_of(sample)]?);
+            let off = |&sample: &usize| {
+                let [loading, unloading] = means[level_of(sample)]?;
+                Some(decoded[sample] - actual[sample] - 0.5 * (loading + unloading))
+            };
             let off = Vec::from_iter(passage.samples.iter().filter_map(off));
-            (!off.is_empty()).then(|| (passage.direction, off.iter().sum::<f64>() / off.len() as f64))
+            (!off.is_empty()).then(|| mean(&off))
         };
-        if !differ(&passages.iter().filter_map(off_middle).collect::<Vec<_>>()) {
+        if !differ([true, false].map(|is_loading| of_branch(is_loading).filter_map(off_middle).collect())) {
             return None;
         }
-        let levels = loading.iter().zip(&unloading).enumerate();
-        let levels: Vec<LoopLevel> = levels
-            .filter(|(_, (loading, unloading))| loading.0.min(unloading.0) >= Self::MIN_SAMPLES)
-            .map(|(level, (loading, unloading))| {
-                let actual = lowest + range * (level as f64 + 0.5) / Self::LEVELS as f64;
-                LoopLevel {
-                    actual,
-                    loading: actual + loading.1 / loading.0 as f64,
-                    unloading: actual + unloading.1 / unloading.0 as f64,
-                }
+        let level = |(level, means): (usize, &Option<[f64; 2]>)| {
+            let [loading, unloading] = (*means)?;
+            let actual = lowest + range * (level as f64 + 0.5) / Self::LEVELS as f64;
+            Some(LoopLevel {
+                actual,
+                loading: actual + loading,
+                unloading: actual + unloading,
             })
-            .collect();
-        if levels.len() < Self::MIN_LEVELS {
-            return None;
-        }
+        };
+        let levels = Vec::from_iter(means.iter().enumerate().filter_map(level));
         let apart = levels.iter().map(|level| (level.loading - level.unloading).abs());
         let percent_of_range = 100.0 * apart.fold(0.0, f64::max) / range;
-        if percent_of_range < Self::MIN_PERCENT {
+        if levels.len() < Self::MIN_LEVELS || percent_of_range < Self::MIN_PERCENT {
             return None;
         }
-        let errors = branches.each_ref().map(|samples| {
-            let column = |values: &[f64]| samples.iter().map(|&sample| values[sample]).collect::<Vec<_>>();
-            let of = |values: Vec<f64>| ndarray::Array2::from_shape_vec((samples.len(), 1), values).ok();
-            let (targets, answers) = (of(column(actual))?, of(column(decoded))?);
-            TargetErrors::measure(targets.view(), answers.view()).into_iter().next()
+        let [loading, unloading] = branches.each_ref().map(|samples| {
+            let column =
+                |values: &[f64]| Array2::from_shape_fn((samples.len(), 1), |(place, _)| values[samples[place]]);
+            TargetErrors::measure(column(actual).view(), column(decoded).view()).remove(0)
         });
-        let [loading, unloading] = errors;
         Some(Self {
-            loading: loading?,
-            unloading: unloading?,
-            samples: branches.each_ref().map(Vec::len),
+            loading,
+            unloading,
+            samples: branches.map(|samples| samples.len()),
             percent_of_range,
             levels,
         })
@@ -203,24 +188,23 @@ impl HysteresisLoop {
     }
 }
 
-/// Returns `true` if the means of the loading and unloading excursions differ significantly.
-fn differ(means: &[(Direction, f64)]) -> bool {
-    let of = |direction| Vec::from_iter(means.iter().filter(|(of, _)| *of == direction).map(|(_, mean)| *mean));
-    let branches = [Direction::Loading, Direction::Unloading].map(of);
-    let freedom = means.len() as f64 - 2.0;
-    if branches.iter().any(|branch| branch.len() < 2) {
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Returns `true` if the means of the values of two branches differ significantly.
+fn differ([loading, unloading]: [Vec<f64>; 2]) -> bool {
+    if loading.len().min(unloading.len()) < 2 {
         return false;
     }
-    let [loading, unloading] = branches
-        .each_ref()
-        .map(|branch| branch.iter().sum::<f64>() / branch.len() as f64);
-    let squares = means.iter().map(|(direction, mean)| match direction {
-        Direction::Loading => (mean - loading).powi(2),
-        Direction::Unloading => (mean - unloading).powi(2),
-    });
-    let counts = branches.iter().map(|branch| 1.0 / branch.len() as f64).sum::<f64>();
-    let standard_error = (squares.sum::<f64>() / freedom * counts).sqrt();
-    (loading - unloading).abs() > student_quantile(freedom) * standard_error
+    let freedom = (loading.len() + unloading.len()) as f64 - 2.0;
+    let squares = |values: &[f64]| {
+        let mean = mean(values);
+        values.iter().map(|value| (value - mean).powi(2)).sum::<f64>()
+    };
+    let counts = 1.0 / loading.len() as f64 + 1.0 / unloading.len() as f64;
+    let standard_error = ((squares(&loading) + squares(&unloading)) / freedom * counts).sqrt();
+    (mean(&loading) - mean(&unloading)).abs() > student_quantile(freedom) * standard_error
 }
 
 /// Returns the excursions of one stretch between the first and the last turning point that are certain.
@@ -230,7 +214,7 @@ fn passages_of(all: &[f64], stretch: &[usize], range: f64) -> Vec<Passage> {
     let (reversal, rest) = (HysteresisLoop::REVERSAL * range, HysteresisLoop::REST * range);
     let mut turning_points = Vec::new();
     let (mut lowest, mut highest) = (0, 0);
-    let mut direction = None;
+    let mut is_loading = None;
     for (sample, &value) in actual.iter().enumerate() {
         if value < actual[lowest] {
             lowest = sample;
@@ -238,37 +222,23 @@ fn passages_of(all: &[f64], stretch: &[usize], range: f64) -> Vec<Passage> {
         if value > actual[highest] {
             highest = sample;
         }
-        let has_risen = value - actual[lowest] >= reversal && direction != Some(Direction::Loading);
-        let has_fallen = actual[highest] - value >= reversal && direction != Some(Direction::Unloading);
+        let has_risen = value - actual[lowest] >= reversal && is_loading != Some(true);
+        let has_fallen = actual[highest] - value >= reversal && is_loading != Some(false);
         if has_risen || has_fallen {
             turning_points.push(if has_risen { lowest } else { highest });
-            direction = Some(if has_risen {
-                Direction::Loading
-            } else {
-                Direction::Unloading
-            });
+            is_loading = Some(has_risen);
             (lowest, highest) = (sample, sample);
         }
     }
     // The last excursion ends at its extreme.
-    turning_points.extend(match direction {
-        Some(Direction::Loading) => Some(highest),
-        Some(Direction::Unloading) => Some(lowest),
-        None => None,
-    });
+    turning_points.extend(is_loading.map(|is_loading| if is_loading { highest } else { lowest }));
     let passage = |pair: &[usize]| {
         let (from, to) = (actual[pair[0]], actual[pair[1]]);
         let is_moving = |sample: &usize| (actual[*sample] - from).abs() >= rest && (actual[*sample] - to).abs() >= rest;
+        let moving = (pair[0]..=pair[1]).filter(is_moving);
         Passage {
-            direction: if to > from {
-                Direction::Loading
-            } else {
-                Direction::Unloading
-            },
-            samples: (pair[0]..=pair[1])
-                .filter(is_moving)
-                .map(|sample| first + sample)
-                .collect(),
+            is_loading: to > from,
+            samples: moving.map(|sample| first + sample).collect(),
         }
     };
     turning_points.windows(2).map(passage).collect()
@@ -276,7 +246,6 @@ fn passages_of(all: &[f64], stretch: &[usize], range: f64) -> Vec<Passage> {
 
 #[cfg(test)]
 mod tests {
-    use ndarray::Array2;
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;

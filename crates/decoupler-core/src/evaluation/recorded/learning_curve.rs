@@ -1,10 +1,10 @@
+use ndarray::{Array1, Array2};
 use rand::{Rng, RngExt, seq::SliceRandom};
 
-use super::{FittedModel, Interval, evidence::Resampling};
+use super::{FittedModel, Interval, evidence::Evidence};
 use crate::{
-    dataset::{Dataset, DividedSamples, Seed, Split, SplitBy, Stream},
-    decoupling::decode_set,
-    evaluation::{Begin, Run, RunError, RunSets, RunSettings, baselines::fit_baselines, cross_validation::nth_seed},
+    dataset::{Dataset, DividedSamples, Split, SplitBy, Stream},
+    evaluation::{RunError, RunSettings, cross_validation::nth_seed},
     job::Job,
     text::format_percent,
 };
@@ -16,8 +16,10 @@ pub struct LearningCurve {
     pub points: Vec<LearningPoint>,
     /// Law fitted to the points; `None` with fewer than three numbers of samples.
     pub law: Option<PowerLaw>,
-    /// Gain from twice the training samples; `None` without a law.
-    pub doubling: Option<Doubling>,
+    /// Ratio of the error with twice the training samples to the error with all available samples: below 1 if more
+    /// samples would help; `None` without a law. It is the median over bootstrap samples of the test set and of the fits,
+    /// and over laws fitted from each number of samples upwards, since laws do not hold for few samples.
+    pub doubling: Option<Interval>,
     /// Standard deviation of the target in the test samples.
     pub deviation: f64,
 }
@@ -33,20 +35,11 @@ pub struct LearningPoint {
     pub range: [f64; 2],
 }
 
-/// Ratio of the error with twice the training samples to the error with all available samples.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Doubling {
-    /// Ratio with its interval: below 1 if more samples would help. It is the median over bootstrap samples of the test
-    /// set and of the fits, and over laws fitted from each number of samples upwards, since laws do not hold for few
-    /// samples.
-    pub ratio: Interval,
-}
-
 /// Squared errors of one fit on the test set.
 struct TestSquares {
     samples: usize,
     /// Samples × outputs.
-    squares: ndarray::Array2<f64>,
+    squares: Array2<f64>,
 }
 
 impl LearningCurve {
@@ -101,9 +94,10 @@ impl LearningCurve {
                     validation: whole.validation.clone(),
                 };
                 let seed = nth_seed(settings.seed, repeat);
+                let answers = model.answers(&RunSettings { seed, ..*settings }, split, &test, job)?;
                 fits.push(TestSquares {
                     samples: chosen.len(),
-                    squares: squared_errors(settings, seed, split, &test, model, job)?,
+                    squares: (answers - test.targets()).powi(2),
                 });
             }
         }
@@ -116,50 +110,7 @@ impl LearningCurve {
         let rmse = |fit: &TestSquares| fit.squares.column(target).mean().unwrap_or(0.0).sqrt();
         let points: Vec<LearningPoint> = levels.iter().map(|level| point(level, rmse)).collect();
         let law = law_of(&points);
-        let doubling = law.and(points.last()).and_then(|all| {
-            let whole = all.samples as f64;
-            let columns: Vec<Vec<f64>> = fits.iter().map(|fit| fit.squares.column(target).to_vec()).collect();
-            let resampling = Resampling::of(test, by, columns.last()?);
-            if resampling.count() < Interval::FEWEST_UNITS {
-                return None;
-            }
-            // Squared errors of every fit on every unit of the test set.
-            let sums: Vec<Vec<[f64; 2]>> = columns
-                .iter()
-                .map(|squares| resampling.sums(|sample| [1.0, squares[sample]]))
-                .collect();
-            let mut picks = Seed(rng.random()).rng(Stream::Resampling);
-            let mut replicates = Vec::new();
-            resampling.draw(rng, |times| {
-                let rmse = |fit: usize| {
-                    let [count, squares] = super::evidence::weighted(&sums[fit], times);
-                    (squares / count).sqrt()
-                };
-                let (mut drawn, mut before, mut first): (Vec<(f64, f64)>, Vec<f64>, usize) = Default::default();
-                for level in &levels {
-                    let errors: Vec<f64> = (first..first + level.len()).map(rmse).collect();
-                    first += level.len();
-                    let mut pick = |errors: &[f64]| errors[picks.random_range(0..errors.len())];
-                    let picked = errors.iter().map(|_| pick(&errors)).sum::<f64>() / errors.len() as f64;
-                    // A single fit varies with its samples as much as one fit of the previous level.
-                    let luck = if errors.len() == 1 && !before.is_empty() {
-                        pick(&before) * before.len() as f64 / before.iter().sum::<f64>()
-                    } else {
-                        1.0
-                    };
-                    let samples = level.iter().map(|fit| fit.samples as f64).sum::<f64>() / level.len() as f64;
-                    drawn.push((samples, picked * luck));
-                    before = errors;
-                }
-                // The smallest number of samples for which the law holds is unknown, so it is drawn.
-                let lowest = picks.random_range(0..=drawn.len().saturating_sub(3));
-                replicates.push(PowerLaw::fit(&drawn[lowest..]).map_or(f64::NAN, |law| law.doubling(whole)));
-            });
-            let mut finite: Vec<f64> = replicates.iter().copied().filter(|ratio| ratio.is_finite()).collect();
-            finite.sort_by(f64::total_cmp);
-            let ratio = Interval::of_replicates(*finite.get(finite.len() / 2)?, &replicates)?;
-            Some(Doubling { ratio })
-        });
+        let doubling = law.and_then(|_| doubling(fits, &levels, &Evidence::of(test, by), target, rng));
         let deviation = test.targets().column(target).std(0.0);
         Self {
             points,
@@ -178,7 +129,7 @@ impl LearningCurve {
 
     /// Returns `true` if twice the samples would lower the error significantly.
     pub fn gains(&self) -> bool {
-        let is_significant = |doubling: Doubling| doubling.ratio.high < 1.0 - Self::MIN_GAIN;
+        let is_significant = |ratio: Interval| ratio.high < 1.0 - Self::MIN_GAIN;
         !self.is_negligible() && self.doubling.is_some_and(is_significant)
     }
 
@@ -191,13 +142,13 @@ impl LearningCurve {
                 format!("the error of {name} is {percent} of its standard deviation: no more samples are needed")
             }
             None => format!("too few samples to estimate the gain from more for {name}"),
-            Some(Doubling { ratio }) if self.gains() => format!(
+            Some(ratio) if self.gains() => format!(
                 "twice the samples would lower the error of {name} by about {:.0} % ({:.0} to {:.0} %)",
                 percent(ratio.value),
                 percent(ratio.high),
                 percent(ratio.low)
             ),
-            Some(Doubling { ratio }) => format!(
+            Some(ratio) => format!(
                 "no gain found for {name} from more samples like these (twice as many: {:.0} %, {:.0} to {:.0} %)",
                 percent(ratio.value),
                 percent(ratio.high),
@@ -215,15 +166,65 @@ fn near(one: usize, other: usize) -> bool {
 
 fn point(level: &[TestSquares], rmse: impl Fn(&TestSquares) -> f64) -> LearningPoint {
     let errors: Vec<f64> = level.iter().map(rmse).collect();
-    let count = level.len();
     LearningPoint {
-        samples: (level.iter().map(|fit| fit.samples).sum::<usize>() + count / 2) / count,
-        rmse: errors.iter().sum::<f64>() / count as f64,
+        samples: mean_samples(level).round() as usize,
+        rmse: errors.iter().sum::<f64>() / level.len() as f64,
         range: [
             errors.iter().copied().fold(f64::INFINITY, f64::min),
             errors.iter().copied().fold(0.0, f64::max),
         ],
     }
+}
+
+/// Bootstraps the ratio of the error with twice the samples to that with all: see [`LearningCurve::doubling`]. Test
+/// samples are drawn in independent units (Davison and Hinkley 1997, section 3.8; Carlstein 1986).
+fn doubling(
+    fits: &[TestSquares],
+    levels: &[&[TestSquares]],
+    evidence: &Evidence,
+    target: usize,
+    rng: &mut impl Rng,
+) -> Option<Interval> {
+    const REPLICATES: usize = 1000;
+    let whole = mean_samples(levels.last()?);
+    let units = evidence.units(&fits.last()?.squares.column(target).to_vec());
+    if units.len() < Interval::FEWEST_UNITS {
+        return None;
+    }
+    let sum_of = |fit: &TestSquares, unit: &[usize]| unit.iter().map(|&sample| fit.squares[[sample, target]]).sum();
+    let sums = Array2::from_shape_fn((fits.len(), units.len()), |(fit, unit)| {
+        sum_of(&fits[fit], &units[unit])
+    });
+    let counts = Array1::from_iter(units.iter().map(|unit| unit.len() as f64));
+    let replicate = || {
+        let mut times = Array1::zeros(units.len());
+        (0..units.len()).for_each(|_| times[rng.random_range(0..units.len())] += 1.0);
+        let errors = (sums.dot(&times) / counts.dot(&times)).sqrt().to_vec();
+        let (mut rest, mut before): (&[f64], &[f64]) = (&errors, &[]);
+        let mut drawn = Vec::with_capacity(levels.len());
+        for level in levels {
+            let (errors, others) = rest.split_at(level.len());
+            let mut pick = |errors: &[f64]| errors[rng.random_range(0..errors.len())];
+            let picked = errors.iter().map(|_| pick(errors)).sum::<f64>() / errors.len() as f64;
+            // A single fit varies with its samples as much as one fit of the previous level.
+            let luck = if errors.len() == 1 && !before.is_empty() {
+                pick(before) * before.len() as f64 / before.iter().sum::<f64>()
+            } else {
+                1.0
+            };
+            drawn.push((mean_samples(level), picked * luck));
+            (rest, before) = (others, errors);
+        }
+        // The smallest number of samples for which the law holds is unknown, so it is drawn.
+        let lowest = rng.random_range(0..=drawn.len().saturating_sub(3));
+        PowerLaw::fit(&drawn[lowest..]).map_or(f64::NAN, |law| law.doubling(whole))
+    };
+    Interval::of_replicates(&Vec::from_iter(std::iter::repeat_with(replicate).take(REPLICATES)))
+}
+
+/// Mean number of samples of fits.
+fn mean_samples(fits: &[TestSquares]) -> f64 {
+    fits.iter().map(|fit| fit.samples as f64).sum::<f64>() / fits.len() as f64
 }
 
 fn law_of(points: &[LearningPoint]) -> Option<PowerLaw> {
@@ -268,32 +269,6 @@ fn choose(
             chosen
         }
     }
-}
-
-/// Returns the squared errors on `test` (samples × outputs) of a fit to `split`.
-fn squared_errors(
-    settings: &RunSettings,
-    seed: Seed,
-    split: Split,
-    test: &Dataset,
-    model: FittedModel,
-    job: &Job<'_>,
-) -> Result<ndarray::Array2<f64>, RunError> {
-    // A stretch may have no variation to learn from: ridge regression then answers with its mean.
-    let has_variation = split.training.has_varying_target();
-    let answers = match model {
-        FittedModel::Network if has_variation => {
-            let sets = RunSets::new(split, test.clone());
-            let mut run = Run::new(RunSettings { seed, ..*settings }, sets, Begin::Initialize, job)?;
-            run.finish(job)?;
-            run.decouple_test()
-        }
-        _ => {
-            let (_, mut ridge) = fit_baselines(&split.training, settings)?;
-            decode_set(&mut ridge, test)?
-        }
-    };
-    Ok((answers - test.targets()).mapv(|error| error * error))
 }
 
 /// Error as a function of the number of training samples: floor + scale · n^(−exponent), the form that learning curves
@@ -414,7 +389,7 @@ mod tests {
                 range: [rmse; 2],
             }],
             law: None,
-            doubling: Some(Doubling { ratio }),
+            doubling: Some(ratio),
             deviation: 2.0,
         };
         assert!(curve(0.02).gains() && curve(0.02).sentence("y").starts_with("twice the samples would lower"));

@@ -15,9 +15,6 @@ pub struct MemoryGain {
 }
 
 impl MemoryGain {
-    /// Minimum relative reduction of the error that is worth a memory.
-    const MIN_GAIN: f64 = 0.05;
-
     /// Memory that is tried where none is given: averages over about 10, 100 and 1000 samples, as far as the recording
     /// has five times as many; in seconds if there are times.
     pub fn usual_memory(history: &History) -> Memory {
@@ -57,8 +54,7 @@ impl MemoryGain {
 
     /// Returns `true` if the memory reduces the error of the target by at least 5 %, and significantly.
     pub fn helps(&self, target: usize) -> bool {
-        let ratio = self.ratios[target].as_ref();
-        ratio.is_some_and(|ratio| ratio.high < 1.0 && ratio.value <= 1.0 - Self::MIN_GAIN)
+        self.ratios[target].as_ref().is_some_and(Interval::is_improvement)
     }
 
     /// Returns a sentence on the target of this name, such as "the past helps to predict y: …".

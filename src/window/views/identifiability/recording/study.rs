@@ -8,7 +8,10 @@ use decoupler_core::{
     dataset::{Folds, SplitBy, Stream},
     evaluation::{
         CrossValidated, ErrorTable, TrainingSize, Workload,
-        recorded::{Determination, Findings, FittedModel, NonlinearGain, SplitComparison, StudyStep, channel_remarks},
+        recorded::{
+            Determination, Findings, FittedModel, SplitComparison, StudyStep, channel_remarks, nonlinear_gains,
+            ridge_remark,
+        },
     },
     job::Job,
     problem::Channel,
@@ -278,7 +281,7 @@ fn validate(
         None
     };
     let determined = Determination::measure(set, validated.network.view(), by);
-    let gains = NonlinearGain::of_validated(set, &validated, by);
+    let gains = nonlinear_gains(set, &validated, by);
     let mut remarks = describe_channels(&recording.inputs, &recording.targets, &channel_remarks(set, by));
     for (target, channel) in recording.targets.iter().enumerate() {
         let name = &channel.name;
@@ -286,7 +289,7 @@ fn validate(
             Ok(determined) => determined.sentence(name, &[FittedModel::Network]),
             Err(cause) => format!("{name}: {cause}"),
         });
-        remarks.extend(gains[target].and_then(|gain| gain.remark(name)));
+        remarks.extend(gains[target].and_then(|gain| ridge_remark(gain, name)));
         remarks.extend(comparison.as_ref().map(|comparison| comparison.sentence(target, name)));
     }
     report.send(StudyEvent::Validated(Box::new(FoldsResult {
