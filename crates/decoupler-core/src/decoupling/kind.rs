@@ -4,7 +4,7 @@ use rand::rngs::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Decoder, NewtonDecoder, PolishedDecoder, Program, ProgramDecoder};
+use super::{Decoder, NewtonDecoder, Program, ProgramDecoder};
 use crate::{
     dataset::{Dataset, PerRow, Seed, Stream},
     network::{InputChoice, Networks, ScalingError},
@@ -290,7 +290,7 @@ fn fit_polish(problem: &FitProblem<'_>) -> Fit {
         return Ok(None);
     };
     let steps = DecoderKind::POLISH_STEPS;
-    let polished = PolishedDecoder::new(first, sensor, scene, rows, steps)?;
+    let polished = NewtonDecoder::after(first, steps, sensor, scene, rows)?;
     Ok(Some(Box::new(polished)))
 }
 

@@ -107,11 +107,6 @@ impl Estimator {
         })
     }
 
-    /// Number of unknown displacements of a row.
-    pub(in crate::decoupling) fn unknowns(&self) -> usize {
-        self.problem.unknowns()
-    }
-
     /// True if readings are exact apart from their rounding.
     pub(in crate::decoupling) fn is_exact(&self) -> bool {
         self.noise.is_none()
