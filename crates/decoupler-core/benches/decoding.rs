@@ -15,9 +15,7 @@ use std::{hint::black_box, time::Instant};
 
 use decoupler_core::{
     dataset::{Dataset, Seed, Stream},
-    decoupling::{
-        Decoder, DecoderKind, Estimator, FitProblem, NewtonDecoder, Precision, ProgramDecoder,
-    },
+    decoupling::{Decoder, DecoderKind, Estimator, FitProblem, NewtonDecoder, Precision, ProgramDecoder},
     network::{InputChoice, Quantity, ScalingChoice, tanh_in_place, tanh_in_place_single},
     scene::{Noise, NoiseSource, RowModel, Rows, Scene},
     sensor::{ArrayScale, Axes, RowConductance, SensorModel},

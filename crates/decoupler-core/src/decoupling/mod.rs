@@ -21,9 +21,9 @@ mod ridge;
 mod takagi_sugeno;
 
 pub use decoder::{DecodeError, Decoder, NotDescribed, SolvedRows, decode_set, resistance_residual};
-pub use equations::{Estimate, Estimator, LARGEST_ERROR, NewtonStop, Solution};
 pub(crate) use equations::GaussianPrior;
-pub use kind::{DecoderKind, DecoderKindError, Fit, FitError, FitProblem, Precision};
+pub use equations::{Estimate, Estimator, LARGEST_ERROR, NewtonStop, Solution};
+pub use kind::{DecoderKind, Fit, FitError, FitProblem, Precision};
 pub use newton::NewtonDecoder;
 pub use program::{Builder, Changes, Domain, Function, Node, NodeId, Operation, Program, ProgramDecoder};
 pub(crate) use ridge::{Regression, ridge};

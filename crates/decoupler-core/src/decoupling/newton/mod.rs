@@ -131,7 +131,9 @@ impl Solver {
         match self.steps {
             None if !self.searched.is_empty() => {
                 let mut solved = SolvedRows::default();
-                let rows = readings_ohm.chunks_exact(channels).zip(coordinates_mm.chunks_exact_mut(outputs));
+                let rows = readings_ohm
+                    .chunks_exact(channels)
+                    .zip(coordinates_mm.chunks_exact_mut(outputs));
                 for (readings_ohm, coordinates_mm) in rows {
                     solved.count(self.search(readings_ohm, coordinates_mm).solution);
                 }
