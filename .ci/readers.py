@@ -26,9 +26,8 @@ NETWORKS = {
     "sharp": "--preset best --samples 1000 --epochs 100",
 }
 AMPLIFYING = {"long", "sharp"}
-# Other decoders that are exported, as "network:decoder". Equations are solved in double precision only.
+# Other decoders that are exported, as "network:decoder".
 LAYERED = ["paper:ridge", "paper:linear", "paper:rbf", "paper:mean", "known:ridge", "known:rbf"]
-EQUATIONS = ["paper:newton", "paper:polish", "sharp:newton", "sharp:polish"]
 # Trained on a recording: readings of any sign, targets of very different magnitudes.
 OWN = "own"
 LAYERED += [f"{OWN}:{decoder}" for decoder in ["ridge", "rbf"]]
@@ -381,9 +380,6 @@ for network, arguments in [*NETWORKS.items(), (OWN, None)]:
     check_json(network)
 for network in LAYERED:
     check_layers(network)
-for network in EQUATIONS:
-    check_c(network, "f64")
-    check_numpy(network, "f64")
 check_memory()
 if failures:
     sys.exit("failed: " + ", ".join(failures))

@@ -183,9 +183,12 @@ fn other_decoders_are_exported_or_refused_with_a_reason() {
         assert!(answers[..index].iter().all(|(other, _)| other != first));
     }
     for (arguments, status, expected) in [
-        ("--decoder newton --format c99 --out b", 1, "have noise"),
-        ("--decoder fuzzy --format c99 --out b", 1, "only for comparison"),
-        ("--decoder newton --format onnx --out b", 2, "give c99 or numpy"),
+        (
+            "--decoder newton --format c99 --out b",
+            2,
+            "solves the equations of the sensor",
+        ),
+        ("--decoder fuzzy --format c99 --out b", 2, "only for comparison"),
         (
             "--decoder ridge --format c99 --precision fixed16 --out b",
             2,

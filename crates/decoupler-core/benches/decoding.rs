@@ -15,9 +15,7 @@ use std::{hint::black_box, time::Instant};
 
 use decoupler_core::{
     dataset::{Dataset, Seed, Stream},
-    decoupling::{
-        Decoder, DecoderKind, Estimator, FitProblem, NewtonDecoder, PolishedDecoder, Precision, ProgramDecoder,
-    },
+    decoupling::{Decoder, DecoderKind, Estimator, FitProblem, NewtonDecoder, Precision, ProgramDecoder},
     network::{InputChoice, Quantity, ScalingChoice, tanh_in_place, tanh_in_place_single},
     scene::{Noise, NoiseSource, RowModel, Rows, Scene},
     sensor::{ArrayScale, Axes, RowConductance, SensorModel},
@@ -171,7 +169,7 @@ fn print_scale(scale: ArrayScale) {
     let first = untrained_networks(&training, InputChoice::BEST, 12).decoder();
     decoders.push((
         "polish, 1 step".into(),
-        Box::new(PolishedDecoder::new(Box::new(first), &model, &scene, &rows, 1).unwrap()),
+        Box::new(NewtonDecoder::after(Box::new(first), 1, &model, &scene, &rows).unwrap()),
     ));
     decoders.push((
         "newton".into(),

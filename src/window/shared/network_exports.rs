@@ -346,11 +346,11 @@ pub fn decoder_export_ui(
 
 /// The formats in which a decoder can be exported, such as "C99, f32"; returns the file asked for.
 pub fn decoder_forms_ui(ui: &mut Ui, kind: DecoderKind, source: &DecoderSource) -> Option<FileTask> {
-    if kind == DecoderKind::Fuzzy {
-        ui.label("Fuzzy rules are only for comparison and cannot be exported");
+    let decoder = BundleDecoder::Kind(kind);
+    if let Err(refused) = decoder.check() {
+        ui.label(refused.to_string());
         return None;
     }
-    let decoder = BundleDecoder::Kind(kind);
     let mut asked = None;
     for form in bundles().filter(|(format, precision)| format.check_for(decoder, *precision).is_ok()) {
         let name = match form {

@@ -175,24 +175,6 @@ impl AffineStart {
         }
     }
 
-    /// The program of the coordinates (3·M2) of the nodes of row-wire `row` at the estimate, before they are clamped to
-    /// the stroke.
-    pub(super) fn program(&self, model: &SensorModel, row: usize) -> Program {
-        let (readings, nodes) = (self.means_ohm.len(), model.scale.nodes_per_row());
-        let middles = (0..nodes).flat_map(|node| model.displaced_mm(row, node, DVec3::Z * self.middle_mm).to_array());
-        let weight = |(reading, coordinate): (usize, usize)| match coordinate % 3 {
-            // z is upwards, and (mean − R)/R is the mean times the change of the conductance.
-            2 => -self.gains_mm[coordinate / 3 * readings + reading] * self.means_ohm[reading],
-            _ => 0.0,
-        };
-        let mut builder = Builder::new(readings);
-        let means = Vec::from_iter(self.means_ohm.iter().map(|ohm| 1.0 / ohm));
-        let changes = builder.changes(Quantity::Conductance, &means, Precision::Double);
-        let weights = Array2::from_shape_fn((readings, 3 * nodes), weight);
-        let coordinates = builder.affine_of(&changes, weights, &Vec::from_iter(middles));
-        builder.finish(coordinates)
-    }
-
     /// Writes the estimate for readings in ohm, before it is clamped to the stroke.
     pub(super) fn estimate(&self, readings_ohm: &[f64], compressions_mm: &mut [f64]) {
         compressions_mm.fill(self.middle_mm);

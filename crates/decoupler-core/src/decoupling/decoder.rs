@@ -3,11 +3,10 @@ use std::{fmt, ops::AddAssign};
 use ndarray::{Array2, Axis};
 use thiserror::Error;
 
-use super::{Program, RowProblemDescription, Solution, equations::RowProblem};
+use super::{Program, Solution, equations::RowProblem};
 use crate::{
     dataset::Dataset,
     sensor::{Axes, SensorModel},
-    text::counted,
 };
 
 /// A method of decoding readings into targets; for a simulated array, resistances in ohm into coordinates of nodes in
@@ -77,50 +76,25 @@ pub trait Decoder: Send {
         SolvedRows::default()
     }
 
-    /// Describes what the decoder computes, for programs that decode without this one.
+    /// Returns the program that the decoder evaluates, for other programs that decode without this one.
     ///
     /// # Errors
-    /// If the decoder cannot be described.
-    fn description(&self) -> Result<Description, NotDescribed> {
-        Err(NotDescribed::Unknown)
+    /// If the decoder is not a program.
+    fn program(&self) -> Result<Program, NotDescribed> {
+        Err(NotDescribed::Equations)
     }
 }
 
-/// What a decoder computes, for programs that decode without this one.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Description {
-    /// From readings to targets.
-    pub program: Program,
-    /// Iteration on the equations of the sensor that starts from the answers of the program.
-    pub equations: Option<RowProblemDescription>,
-}
-
-/// Reason why a decoder cannot be described.
+/// Reason why a decoder is not available as a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NotDescribed {
-    /// The decoder uses the noise of the readings and the prior of the scene.
-    #[error(
-        "the readings of the scene have noise, for which this decoder computes a posterior by expectation propagation, which bundles do not support: take another decoder, or settings without noise"
-    )]
-    Posterior,
-    /// There are no more equations than unknowns.
-    #[error(
-        "a row has {} for {unknowns} unknown displacements, too few for the equations to have one solution: take another decoder",
-        counted(*.readings, "reading")
-    )]
-    Undetermined {
-        /// Number of readings of a row.
-        readings: usize,
-        /// Number of unknowns of a row.
-        unknowns: usize,
-    },
+    /// The decoder solves the equations of the sensor.
+    #[error("it solves the equations of the sensor, which bundles do not contain: export a network or ridge instead")]
+    Equations,
     /// The decoder is a system of fuzzy rules.
-    #[error("fuzzy rules are only for comparison and cannot be exported: take another decoder, such as rbf or ridge")]
+    #[error("it is only for comparison: export another decoder instead, such as rbf or ridge")]
     Rules,
-    /// The decoder cannot be described.
-    #[error("this decoder cannot be exported for other programs: take another decoder")]
-    Unknown,
 }
 
 /// Error for a reading that cannot be decoded.

@@ -1,15 +1,15 @@
 use std::{fmt, str::FromStr};
 
-use rand::rngs::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Decoder, NewtonDecoder, PolishedDecoder, Program, ProgramDecoder};
+use super::{Decoder, NewtonDecoder, Program, ProgramDecoder};
 use crate::{
     dataset::{Dataset, PerRow, Seed, Stream},
     network::{InputChoice, Networks, ScalingError},
     scene::{NoiseSource, RowModel, Scene},
     sensor::{SensorError, SensorModel},
+    text::{Named, UnknownName},
 };
 
 /// Method of decoding the readings of a frame.
@@ -42,30 +42,11 @@ pub enum Precision {
     Single,
 }
 
-/// Error for an unknown name of a decoder.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{text}' is not a decoder: give {words}", words = words())]
-pub struct DecoderKindError {
-    /// Name given.
-    pub text: String,
-}
-
 /// Properties of a decoder.
 struct Entry {
     word: &'static str,
     name: &'static str,
     meaning: &'static str,
-    needs: Needs,
-    fit: fn(&FitProblem<'_>) -> Fit,
-}
-
-/// Requirements of a decoder beyond training samples.
-#[derive(Clone, Copy, PartialEq)]
-enum Needs {
-    Nothing,
-    Network,
-    Sensor,
-    NetworkAndSensor,
 }
 
 impl DecoderKind {
@@ -89,50 +70,36 @@ impl DecoderKind {
                 word: "mean",
                 name: "Training mean",
                 meaning: "Always answers the mean of the training set",
-                needs: Needs::Nothing,
-                fit: fit_mean,
             },
             Self::Ridge => Entry {
                 word: "ridge",
                 name: "Ridge",
                 meaning: "The best affine map of the chosen inputs: ridge regression, with the penalty of each target chosen by cross-validation",
-                needs: Needs::Nothing,
-                fit: fit_ridge,
             },
             Self::Network => Entry {
                 word: "network",
                 name: "Network",
                 meaning: "The trained network, in 64 or in 32 bits",
-                needs: Needs::Network,
-                fit: fit_network,
             },
             Self::RadialBasis => Entry {
                 word: "rbf",
                 name: "Radial basis",
                 meaning: "A radial-basis network by kernel ridge regression: Gaussians around all training samples, or around 1000 of more than 4000, their width and penalties chosen by cross-validation",
-                needs: Needs::Nothing,
-                fit: fit_radial_basis,
             },
             Self::Fuzzy => Entry {
                 word: "fuzzy",
                 name: "Fuzzy rules",
                 meaning: "A Takagi-Sugeno system: fuzzy rules with affine consequents, their number chosen by cross-validation",
-                needs: Needs::Nothing,
-                fit: fit_fuzzy,
             },
             Self::Newton => Entry {
                 word: "newton",
                 name: "Newton",
                 meaning: "Newton's method on Eq. (2) from mid-stroke, with restarts if that fails; with noise and prior if the scene has noise or the readings do not determine the answer",
-                needs: Needs::Sensor,
-                fit: fit_newton,
             },
             Self::Polish => Entry {
                 word: "polish",
                 name: "Network + Newton",
                 meaning: "The network's answer, improved by at most three Newton steps",
-                needs: Needs::NetworkAndSensor,
-                fit: fit_polish,
             },
         }
     }
@@ -152,12 +119,12 @@ impl DecoderKind {
 
     /// Returns `true` if the decoder uses the trained network.
     pub fn needs_network(self) -> bool {
-        matches!(self.entry().needs, Needs::Network | Needs::NetworkAndSensor)
+        matches!(self, Self::Network | Self::Polish)
     }
 
     /// Returns `true` if the decoder solves the equations of the sensor, so that measured samples alone are not enough.
     pub fn needs_sensor(self) -> bool {
-        matches!(self.entry().needs, Needs::Sensor | Needs::NetworkAndSensor)
+        matches!(self, Self::Newton | Self::Polish)
     }
 
     /// Returns the precisions in which the decoder computes.
@@ -169,11 +136,13 @@ impl DecoderKind {
     }
 }
 
-/// Lists the names of all decoders: `mean, ridge … or polish`.
-fn words() -> String {
-    let words = DecoderKind::ALL.map(|kind| kind.entry().word);
-    let [others @ .., last] = &words;
-    format!("{} or {last}", others.join(", "))
+impl Named for DecoderKind {
+    const WHAT: &'static str = "a decoder";
+    const ALL: &'static [Self] = &Self::ALL;
+
+    fn name(self) -> &'static str {
+        self.entry().word
+    }
 }
 
 impl fmt::Display for DecoderKind {
@@ -184,11 +153,10 @@ impl fmt::Display for DecoderKind {
 }
 
 impl FromStr for DecoderKind {
-    type Err = DecoderKindError;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, DecoderKindError> {
-        let found = Self::ALL.into_iter().find(|kind| kind.entry().word == text.trim());
-        found.ok_or_else(|| DecoderKindError { text: text.to_owned() })
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        Self::parse(text)
     }
 }
 
@@ -234,64 +202,47 @@ impl DecoderKind {
     /// # Errors
     /// If samples cannot be scaled, or the sensor has no resistances at rest.
     pub fn fit(self, problem: &FitProblem<'_>) -> Fit {
-        (self.entry().fit)(problem)
+        let FitProblem { inputs, unseen, .. } = *problem;
+        let mut rng = problem.seed.rng(Stream::Expectation);
+        match self {
+            Self::Mean => problem.of_samples(|set| Ok(Program::mean(set))),
+            Self::Ridge => problem.of_samples(|set| Program::ridge(set, inputs.quantity, unseen)),
+            Self::RadialBasis => problem.of_samples(|set| Program::radial_basis(set, inputs, unseen, &mut rng)),
+            Self::Fuzzy => problem.of_samples(|set| Program::fuzzy(set, inputs.quantity, unseen, &mut rng)),
+            Self::Network => Ok(problem.network(problem.precision)),
+            Self::Newton => problem.on_equations(|model, scene, rows| NewtonDecoder::new(model, scene, rows)),
+            Self::Polish => match problem.network(Precision::Double) {
+                Some(network) => problem.on_equations(|model, scene, rows| {
+                    NewtonDecoder::after(network, Self::POLISH_STEPS, model, scene, rows)
+                }),
+                None => Ok(None),
+            },
+        }
     }
 }
 
 impl FitProblem<'_> {
-    fn rng(&self) -> ChaCha8Rng {
-        self.seed.rng(Stream::Expectation)
-    }
-
     /// Fits one program to the samples of all row-wires, or one for each.
     fn of_samples(&self, fit: impl FnMut(&Dataset) -> Result<Program, ScalingError>) -> Fit {
         let programs = PerRow::fit(self.training, self.row_model, fit)?;
         Ok(Some(Box::new(ProgramDecoder::new(Program::each(&programs)))))
     }
-}
 
-fn fit_mean(problem: &FitProblem<'_>) -> Fit {
-    problem.of_samples(|set| Ok(Program::mean(set)))
-}
+    fn network(&self, precision: Precision) -> Option<Box<dyn Decoder>> {
+        let program = self.networks?.program(precision);
+        Some(Box::new(ProgramDecoder::new(program)))
+    }
 
-fn fit_ridge(problem: &FitProblem<'_>) -> Fit {
-    problem.of_samples(|set| Program::ridge(set, problem.inputs.quantity, problem.unseen))
-}
-
-fn fit_radial_basis(problem: &FitProblem<'_>) -> Fit {
-    let mut rng = problem.rng();
-    problem.of_samples(|set| Program::radial_basis(set, problem.inputs, problem.unseen, &mut rng))
-}
-
-fn fit_fuzzy(problem: &FitProblem<'_>) -> Fit {
-    let mut rng = problem.rng();
-    problem.of_samples(|set| Program::fuzzy(set, problem.inputs.quantity, problem.unseen, &mut rng))
-}
-
-fn fit_network(problem: &FitProblem<'_>) -> Fit {
-    let program = problem.networks.map(|networks| networks.program(problem.precision));
-    Ok(program.map(|program| Box::new(ProgramDecoder::new(program)) as Box<dyn Decoder>))
-}
-
-fn fit_newton(problem: &FitProblem<'_>) -> Fit {
-    let Some(((sensor, scene), rows)) = problem.sensor.zip(problem.training.row_wires_read()) else {
-        return Ok(None);
-    };
-    Ok(Some(Box::new(NewtonDecoder::new(sensor, scene, rows)?)))
-}
-
-fn fit_polish(problem: &FitProblem<'_>) -> Fit {
-    let double = FitProblem {
-        precision: Precision::Double,
-        ..*problem
-    };
-    let sensor = problem.sensor.zip(problem.training.row_wires_read());
-    let Some((((sensor, scene), rows), first)) = sensor.zip(fit_network(&double)?) else {
-        return Ok(None);
-    };
-    let steps = DecoderKind::POLISH_STEPS;
-    let polished = PolishedDecoder::new(first, sensor, scene, rows, steps)?;
-    Ok(Some(Box::new(polished)))
+    /// Creates a decoder for the rows that were read; `None` without a sensor.
+    fn on_equations(
+        &self,
+        create: impl FnOnce(&SensorModel, &Scene, &[usize]) -> Result<NewtonDecoder, SensorError>,
+    ) -> Fit {
+        let Some(((model, scene), rows)) = self.sensor.zip(self.training.row_wires_read()) else {
+            return Ok(None);
+        };
+        Ok(Some(Box::new(create(model, scene, rows)?)))
+    }
 }
 
 #[cfg(test)]

@@ -4,8 +4,7 @@
 //! | decoder | how it decodes |
 //! |---|---|
 //! | [`ProgramDecoder`] | evaluates a [`Program`]: trained networks, and all decoders that are fitted to samples |
-//! | [`NewtonDecoder`] | solves Eq. (2) by the [`Estimator`]: the Gauss-Newton method, with prior if the scene has noise |
-//! | [`PolishedDecoder`] | another decoder's answer, improved by a few steps of the [`Estimator`] |
+//! | [`NewtonDecoder`] | solves Eq. (2) by the [`Estimator`]: the Gauss-Newton method, with prior if the scene has noise; also in a few steps from the answer of another decoder |
 //!
 //! [`DecoderKind`] lists them with their names and meanings, and fits each. A [`Program`] is the only forward pass outside
 //! training; exports print it for other languages. [`resistance_residual`] measures how well an answer explains the
@@ -13,18 +12,18 @@
 
 mod affine_map;
 mod decoder;
-mod equation_decoders;
 mod equations;
 mod kind;
+mod newton;
 mod program;
 mod radial_basis;
 mod ridge;
 mod takagi_sugeno;
 
-pub use decoder::{DecodeError, Decoder, Description, NotDescribed, SolvedRows, decode_set, resistance_residual};
-pub use equation_decoders::{NewtonDecoder, PolishedDecoder};
-pub use equations::{Estimate, Estimator, LARGEST_ERROR, NewtonStop, RowChoice, RowProblemDescription, Solution};
-pub(crate) use equations::{GaussianPrior, ranges};
-pub use kind::{DecoderKind, DecoderKindError, Fit, FitError, FitProblem, Precision};
+pub use decoder::{DecodeError, Decoder, NotDescribed, SolvedRows, decode_set, resistance_residual};
+pub(crate) use equations::GaussianPrior;
+pub use equations::{Estimate, Estimator, LARGEST_ERROR, NewtonStop, Solution};
+pub use kind::{DecoderKind, Fit, FitError, FitProblem, Precision};
+pub use newton::NewtonDecoder;
 pub use program::{Builder, Changes, Domain, Function, Node, NodeId, Operation, Program, ProgramDecoder};
 pub(crate) use ridge::{Regression, ridge};

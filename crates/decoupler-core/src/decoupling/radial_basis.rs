@@ -108,17 +108,15 @@ struct KernelRidge {
 }
 
 /// Maximum number of samples from which width and penalties are chosen.
-const MAX_SEARCHED: usize = 900;
+const MAX_SEARCHED: usize = 800;
 /// Products of sharpness and total variance of the inputs that are compared, as powers of 2.
 const SHARPNESS_EXPONENTS: Range<f64> = -9.0..7.0;
 /// Exponent at which the search begins.
 const FIRST_EXPONENT: f64 = -1.0;
 
 /// Penalties that are compared, in descending order; the first leaves only the mean.
-fn penalties() -> Vec<f64> {
-    std::iter::once(f64::INFINITY)
-        .chain((0..=9).map(|place| 0.1_f64.powi(place)))
-        .collect()
+fn penalties() -> impl Iterator<Item = f64> {
+    std::iter::once(f64::INFINITY).chain((0..=9).map(|place| 0.1_f64.powi(place)))
 }
 
 impl KernelRidge {
@@ -189,22 +187,19 @@ fn choose(x: &Array2<f64>, y: &Array2<f64>, folds: Option<&Folds>) -> (f64, Vec<
     let Some(folds) = folds.filter(|_| variance > 0.0) else {
         return (0.0, vec![f64::INFINITY; y.ncols()]);
     };
-    let all = penalties();
     let judge = |exponent: f64| {
         let sharpness = exponent.exp2() / variance;
         let kernel = gaussians(x, x, sharpness);
-        let errors =
-            (0..folds.count()).map(|fold| held_out(&kernel, y, &folds.without(&[fold]), folds.test(fold), &all));
-        let choice = Choice::new(&errors.collect::<Vec<_>>(), y.ncols());
+        let choice = Choice::new(penalties(), y.ncols(), Choice::PATIENCE, |penalty| {
+            let of_fold = |fold| held_out(&kernel, y, &folds.without(&[fold]), folds.test(fold), penalty);
+            (0..folds.count()).map(of_fold).collect()
+        });
         let total = |output: usize| choice.squares.iter().map(|fold| fold[output]).sum::<f64>();
         // The geometric mean over the outputs, whose errors have different sizes.
         let score: f64 = (0..y.ncols())
             .map(|output| total(output).max(f64::MIN_POSITIVE).ln())
             .sum();
-        (
-            score,
-            (sharpness, choice.levels.iter().map(|&level| all[level]).collect()),
-        )
+        (score, (sharpness, choice.levels))
     };
     let mut at = FIRST_EXPONENT;
     let mut best = judge(at);
@@ -220,35 +215,25 @@ fn choose(x: &Array2<f64>, y: &Array2<f64>, folds: Option<&Folds>) -> (f64, Vec<
     best.1
 }
 
-/// Sums of squared errors (penalty × output) on the samples `test` of fits to the samples `training`; infinite where the
-/// kernel is numerically singular.
-fn held_out(
-    kernel: &Mat<f64>,
-    y: &Array2<f64>,
-    training: &[usize],
-    test: &[usize],
-    penalties: &[f64],
-) -> Vec<Vec<f64>> {
+/// Sum of squared errors of each output on the samples `test` of a fit to the samples `training`; infinite if the kernel
+/// is numerically singular.
+fn held_out(kernel: &Mat<f64>, y: &Array2<f64>, training: &[usize], test: &[usize], penalty: f64) -> Vec<f64> {
     let part = |rows: &[usize]| Mat::from_fn(rows.len(), training.len(), |i, j| kernel[(rows[i], training[j])]);
     let means = y
         .select(Axis(0), training)
         .mean_axis(Axis(0))
         .expect("a fold leaves samples");
     let off = |rows: &[usize]| Mat::from_fn(rows.len(), y.ncols(), |s, t| y[[rows[s], t]] - means[t]);
-    let (own, across, fitted, targets) = (part(training), part(test), off(training), off(test));
-    let of_penalty = |&penalty: &f64| {
-        let squares = |errors: Mat<f64>| errors.col_iter().map(|column| column.squared_norm_l2()).collect();
-        if penalty.is_infinite() {
-            return squares(targets.clone());
-        }
-        let mut matrix = own.clone();
-        (0..training.len()).for_each(|sample| matrix[(sample, sample)] += penalty);
-        match matrix.llt(Side::Lower) {
-            Ok(factor) => squares(&across * factor.solve(&fitted) - &targets),
-            Err(_) => vec![f64::INFINITY; y.ncols()],
-        }
-    };
-    penalties.iter().map(of_penalty).collect()
+    let (mut own, targets) = (part(training), off(test));
+    let squares = |errors: Mat<f64>| errors.col_iter().map(|column| column.squared_norm_l2()).collect();
+    if penalty.is_infinite() {
+        return squares(targets);
+    }
+    (0..training.len()).for_each(|sample| own[(sample, sample)] += penalty);
+    match own.llt(Side::Lower) {
+        Ok(factor) => squares(part(test) * factor.solve(&off(training)) - targets),
+        Err(_) => vec![f64::INFINITY; y.ncols()],
+    }
 }
 
 /// Solves for the outputs of each penalty together; a penalty at which the matrix is numerically singular is raised. The

@@ -2,7 +2,7 @@
 
 use decoupler_core::{
     dataset::{Dataset, Seed, Stream},
-    decoupling::{Decoder, NewtonDecoder, PolishedDecoder, Program, ProgramDecoder, decode_set},
+    decoupling::{Decoder, NewtonDecoder, Program, ProgramDecoder, decode_set},
     scene::{Noise, Rows, Scene},
     sensor::SensorModel,
 };
@@ -12,10 +12,10 @@ fn newton(model: &SensorModel, scene: &Scene) -> NewtonDecoder {
     NewtonDecoder::new(model, scene, &rows).unwrap()
 }
 
-fn polished(model: &SensorModel, scene: &Scene, set: &Dataset, steps: usize) -> PolishedDecoder {
+fn polished(model: &SensorModel, scene: &Scene, set: &Dataset, steps: usize) -> NewtonDecoder {
     let first = Box::new(ProgramDecoder::new(Program::mean(set)));
     let rows: Vec<usize> = (0..model.scale.rows()).collect();
-    PolishedDecoder::new(first, model, scene, &rows, steps).unwrap()
+    NewtonDecoder::after(first, steps, model, scene, &rows).unwrap()
 }
 
 fn noisy_set(model: &SensorModel, scene: &Scene, snapshots: usize) -> Dataset {

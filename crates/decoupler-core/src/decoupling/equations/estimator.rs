@@ -107,11 +107,6 @@ impl Estimator {
         })
     }
 
-    /// Number of unknown displacements of a row.
-    pub(in crate::decoupling) fn unknowns(&self) -> usize {
-        self.problem.unknowns()
-    }
-
     /// True if readings are exact apart from their rounding.
     pub(in crate::decoupling) fn is_exact(&self) -> bool {
         self.noise.is_none()
@@ -130,9 +125,7 @@ impl Estimator {
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
     ) -> Result<Estimate, DecodeError> {
-        DecodeError::check(readings_ohm)?;
-        let quick = self.in_lanes(&[row], readings_ohm, coordinates_mm, None)[0];
-        Ok(quick.unwrap_or_else(|| self.search(row, readings_ohm, coordinates_mm)))
+        self.solve_one(row, readings_ohm, coordinates_mm, None)
     }
 
     /// As [`Self::solve`], in at most `steps` steps from the answer of another decoder in `coordinates_mm`, which is
@@ -150,9 +143,33 @@ impl Estimator {
         coordinates_mm: &mut [f64],
         steps: usize,
     ) -> Result<Estimate, DecodeError> {
+        self.solve_one(row, readings_ohm, coordinates_mm, Some(steps))
+    }
+
+    fn solve_one(
+        &mut self,
+        row: usize,
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+        steps: Option<usize>,
+    ) -> Result<Estimate, DecodeError> {
         DecodeError::check(readings_ohm)?;
-        let quick = self.in_lanes(&[row], readings_ohm, coordinates_mm, Some(steps))[0];
-        Ok(quick.unwrap_or_else(|| self.refine(row, readings_ohm, coordinates_mm, steps)))
+        let quick = self.in_lanes(&[row], readings_ohm, coordinates_mm, steps)[0];
+        Ok(quick.unwrap_or_else(|| self.solve_slowly(row, readings_ohm, coordinates_mm, steps)))
+    }
+
+    /// Estimates a row that plain steps did not solve.
+    fn solve_slowly(
+        &mut self,
+        row: usize,
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+        steps: Option<usize>,
+    ) -> Estimate {
+        match steps {
+            None => self.search(row, readings_ohm, coordinates_mm),
+            Some(steps) => self.refine(row, readings_ohm, coordinates_mm, steps),
+        }
     }
 
     /// Estimates rows from their valid readings (rows × M4), as [`Self::solve`] or, with `steps`, as [`Self::polish`];
@@ -175,10 +192,7 @@ impl Estimator {
             let rows = rows.iter().zip(readings_ohm.chunks_exact(readings));
             let rows = rows.zip(coordinates_mm.chunks_exact_mut(coordinates)).zip(quick);
             for (((&row, readings_ohm), coordinates_mm), quick) in rows {
-                let estimate = quick.unwrap_or_else(|| match steps {
-                    None => self.search(row, readings_ohm, coordinates_mm),
-                    Some(steps) => self.refine(row, readings_ohm, coordinates_mm, steps),
-                });
+                let estimate = quick.unwrap_or_else(|| self.solve_slowly(row, readings_ohm, coordinates_mm, steps));
                 solved.count(estimate.solution);
             }
         }
@@ -214,10 +228,9 @@ impl Estimator {
         coordinates_mm: &mut [f64],
         steps: Option<usize>,
     ) -> [Option<Estimate>; LANES] {
-        match (&mut self.lanes, steps) {
-            (None, _) => [None; LANES],
-            (Some(lanes), None) => lanes.solve(rows, readings_ohm, coordinates_mm),
-            (Some(lanes), Some(steps)) => lanes.polish(rows, readings_ohm, coordinates_mm, steps),
+        match &mut self.lanes {
+            None => [None; LANES],
+            Some(lanes) => lanes.solve(rows, readings_ohm, coordinates_mm, steps),
         }
     }
 

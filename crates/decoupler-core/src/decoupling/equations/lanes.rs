@@ -103,17 +103,24 @@ impl Lanes {
     }
 
     /// Solves up to [`LANES`] row-wires for their valid readings in ohm (rows × M4), and writes the absolute coordinates
-    /// (rows × 3·M2) of those that plain steps solve; returns their estimates.
+    /// (rows × 3·M2) of those that plain steps solve; returns their estimates. With `steps`, it takes at most that many from
+    /// the answers of another decoder in `coordinates_mm`, and gives up answers whose misfit grew.
     pub(super) fn solve(
         &mut self,
         rows: &[usize],
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
+        steps: Option<usize>,
     ) -> [Option<Estimate>; LANES] {
         let readings = readings_ohm.chunks_exact(self.problem.equations());
-        for (lane, (&row, readings_ohm)) in self.lanes.iter_mut().zip(rows.iter().zip(readings)) {
+        let coordinates = coordinates_mm.chunks_exact(self.problem.coordinates());
+        let rows_read = rows.iter().zip(readings).zip(coordinates);
+        for (lane, ((&row, readings_ohm), coordinates_mm)) in self.lanes.iter_mut().zip(rows_read) {
             lane.read(row, readings_ohm);
-            if let Some(start) = self.starts.get(row) {
+            if steps.is_some() {
+                self.problem.turn_to(row);
+                self.problem.unknowns_of(coordinates_mm, &mut lane.unknowns_mm);
+            } else if let Some(start) = self.starts.get(row) {
                 let (model, stroke) = (&self.model, self.ranges[0]);
                 let start = start.get_or_init(|| AffineStart::new(model, row, stroke));
                 start.estimate(readings_ohm, &mut lane.unknowns_mm);
@@ -123,31 +130,10 @@ impl Lanes {
             }
             lane.clamp(&self.ranges);
         }
-        self.take_steps(MAX_STEPS);
-        self.write_answers(rows, coordinates_mm)
-    }
-
-    /// As [`Self::solve`], with at most `steps` steps from the answers of another decoder in `coordinates_mm`; answers
-    /// whose misfit grew are given up.
-    pub(super) fn polish(
-        &mut self,
-        rows: &[usize],
-        readings_ohm: &[f64],
-        coordinates_mm: &mut [f64],
-        steps: usize,
-    ) -> [Option<Estimate>; LANES] {
-        let readings = readings_ohm.chunks_exact(self.problem.equations());
-        let coordinates = coordinates_mm.chunks_exact(self.problem.coordinates());
-        for (lane, ((&row, readings_ohm), coordinates_mm)) in
-            self.lanes.iter_mut().zip(rows.iter().zip(readings).zip(coordinates))
-        {
-            lane.read(row, readings_ohm);
-            self.problem.turn_to(row);
-            self.problem.unknowns_of(coordinates_mm, &mut lane.unknowns_mm);
-            lane.clamp(&self.ranges);
+        self.take_steps(steps.unwrap_or(MAX_STEPS));
+        if let Some(steps) = steps {
+            self.judge_moving(steps);
         }
-        self.take_steps(steps);
-        self.judge_moving(steps);
         self.write_answers(rows, coordinates_mm)
     }
 

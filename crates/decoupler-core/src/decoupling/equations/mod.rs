@@ -1,7 +1,6 @@
 //! Eq. (2) of a row-wire, and the estimator that solves it.
 
 mod bounded;
-mod description;
 mod estimate;
 mod estimator;
 mod lanes;
@@ -14,8 +13,7 @@ mod symmetry;
 mod tests;
 mod triangle;
 
-pub use description::{RowChoice, RowProblemDescription};
 pub use estimate::{Estimate, LARGEST_ERROR, NewtonStop, Solution};
 pub use estimator::Estimator;
 pub(crate) use priors::GaussianPrior;
-pub(crate) use row_problem::{Range, RowProblem, ranges};
+pub(crate) use row_problem::{Range, RowProblem};

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     dataset::{MemoryStream, PerRow, Series},
-    decoupling::{DecodeError, Decoder, Description, NotDescribed, Precision},
+    decoupling::{DecodeError, Decoder, NotDescribed, Precision},
 };
 
 /// Decoder that evaluates a [`Program`], many rows at a time and without allocation.
@@ -205,15 +205,12 @@ impl Decoder for ProgramDecoder {
         self.evaluate(row_indices.len(), |row| row_indices[row], readings, targets)
     }
 
-    fn description(&self) -> Result<Description, NotDescribed> {
+    fn program(&self) -> Result<Program, NotDescribed> {
         let is_blend = |node: &Node| matches!(node.operation, Operation::Blend { .. });
         if self.program.nodes().iter().any(is_blend) {
             return Err(NotDescribed::Rules);
         }
-        Ok(Description {
-            program: self.program.clone(),
-            equations: None,
-        })
+        Ok(self.program.clone())
     }
 }
 

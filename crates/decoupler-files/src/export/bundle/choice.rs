@@ -1,6 +1,6 @@
 use std::{fmt, str::FromStr};
 
-use decoupler_core::decoupling::{DecoderKind, Precision};
+use decoupler_core::decoupling::{DecoderKind, NotDescribed, Precision};
 use thiserror::Error;
 
 use super::{
@@ -52,20 +52,14 @@ pub enum ChoiceError {
     /// Fixed point for a decoder other than a network.
     #[error("fixed16 is for networks only: give f64 or f32")]
     WholeNumbers,
-    /// A format that cannot express iterations.
-    #[error(
-        "{format} cannot express the iteration of {decoder} on the equations of the sensor: give {}, or take another decoder",
-        iterating()
-    )]
-    Iteration {
-        /// The format.
-        format: BundleFormat,
+    /// No other program can compute what the decoder does.
+    #[error("{} cannot be exported: {reason}", .decoder.name())]
+    NotDescribed {
         /// The decoder.
         decoder: BundleDecoder,
+        /// The cause.
+        reason: NotDescribed,
     },
-    /// Equations in single precision.
-    #[error("{0} solves equations that amplify the rounding errors of single-precision readings too much: give f64")]
-    SingleEquations(BundleDecoder),
     /// No such precision.
     #[error("'{0}' is not a precision: give f64, f32 or fixed16")]
     Precision(String),
@@ -84,8 +78,6 @@ struct Entry {
     word: &'static str,
     help: &'static str,
     precisions: &'static [BundlePrecision],
-    /// True if it can express an iteration.
-    has_iterations: bool,
     writer: Writer,
 }
 
@@ -109,7 +101,6 @@ impl BundleFormat {
                 word: "onnx",
                 help: "a graph (opset 13) for ONNX runtimes",
                 precisions: &[Double, Single],
-                has_iterations: false,
                 writer: Writer {
                     export: onnx::export,
                     call: onnx::call,
@@ -119,7 +110,6 @@ impl BundleFormat {
                 word: "c99",
                 help: "one header and one source in C",
                 precisions: &[Double, Single, Fixed16],
-                has_iterations: true,
                 writer: Writer {
                     export: c99::export,
                     call: c99::call,
@@ -129,7 +119,6 @@ impl BundleFormat {
                 word: "matlab",
                 help: "one function file for MATLAB and GNU Octave",
                 precisions: &[Double],
-                has_iterations: false,
                 writer: Writer {
                     export: matlab::export,
                     call: matlab::call,
@@ -139,7 +128,6 @@ impl BundleFormat {
                 word: "numpy",
                 help: "weights (.npz) and a decode.py",
                 precisions: &[Double, Single],
-                has_iterations: true,
                 writer: Writer {
                     export: numpy::export,
                     call: numpy::call,
@@ -149,7 +137,6 @@ impl BundleFormat {
                 word: "json",
                 help: "the network file itself, or the numbers of another decoder",
                 precisions: &[Double],
-                has_iterations: false,
                 writer: Writer {
                     export: weights::export,
                     call: |_| String::new(),
@@ -201,33 +188,16 @@ impl BundleFormat {
     /// It cannot.
     pub fn check_for(self, decoder: BundleDecoder, precision: BundlePrecision) -> Result<(), ChoiceError> {
         self.check(precision)?;
-        let has_iterations = self.entry().has_iterations;
         if precision == BundlePrecision::Fixed16 && !decoder.is_network() {
-            Err(ChoiceError::WholeNumbers)
-        } else if decoder.solves_equations() && !has_iterations {
-            Err(ChoiceError::Iteration { format: self, decoder })
-        } else if decoder.solves_equations() && precision != BundlePrecision::Double {
-            Err(ChoiceError::SingleEquations(decoder))
-        } else {
-            Ok(())
+            return Err(ChoiceError::WholeNumbers);
         }
+        decoder.check()
     }
 
     fn precision_names(self) -> String {
         let names = self.precisions().iter().map(BundlePrecision::to_string);
         names.collect::<Vec<_>>().join(" or ")
     }
-}
-
-/// Lists the formats that can express iterations.
-fn iterating() -> String {
-    let formats = BundleFormat::ALL
-        .into_iter()
-        .filter(|format| format.entry().has_iterations);
-    formats
-        .map(|format| format.to_string())
-        .collect::<Vec<_>>()
-        .join(" or ")
 }
 
 /// Lists all decoders.
@@ -288,9 +258,23 @@ pub enum BundleDecoder {
 }
 
 impl BundleDecoder {
-    /// All decoders, in the order offered to the user.
+    /// Decoders that can be exported, in the order offered to the user.
     pub fn all() -> impl Iterator<Item = Self> {
-        DecoderKind::ALL.into_iter().map(Self::Kind).chain([Self::Linear])
+        let kinds = DecoderKind::ALL.into_iter().map(Self::Kind);
+        kinds.chain([Self::Linear]).filter(|decoder| decoder.check().is_ok())
+    }
+
+    /// Checks that the decoder can be exported.
+    ///
+    /// # Errors
+    /// It cannot.
+    pub fn check(self) -> Result<(), ChoiceError> {
+        let reason = match self {
+            Self::Kind(kind) if kind.needs_sensor() => NotDescribed::Equations,
+            Self::Kind(DecoderKind::Fuzzy) => NotDescribed::Rules,
+            _ => return Ok(()),
+        };
+        Err(ChoiceError::NotDescribed { decoder: self, reason })
     }
 
     /// Describes each decoder, for the help of a command.
@@ -314,11 +298,6 @@ impl BundleDecoder {
     /// Returns `true` if the decoder computes with a trained network.
     pub fn needs_network(self) -> bool {
         matches!(self, Self::Kind(kind) if kind.needs_network())
-    }
-
-    /// Returns `true` if the decoder iterates on the equations of the sensor.
-    pub fn solves_equations(self) -> bool {
-        matches!(self, Self::Kind(kind) if kind.needs_sensor())
     }
 
     /// Name in tables and forms.
@@ -355,8 +334,11 @@ impl FromStr for BundleDecoder {
     type Err = ChoiceError;
 
     fn from_str(text: &str) -> Result<Self, ChoiceError> {
-        let found = Self::all().find(|decoder| decoder.to_string() == text.trim());
-        found.ok_or_else(|| ChoiceError::Decoder(text.to_owned()))
+        match (text.trim(), text.trim().parse()) {
+            ("linear", _) => Ok(Self::Linear),
+            (_, Ok(kind)) => Ok(Self::Kind(kind)),
+            (_, Err(_)) => Err(ChoiceError::Decoder(text.to_owned())),
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 use decoupler_core::{
     dataset::{Dataset, Memory, PerRow, Seed, Simulation, Stream},
-    decoupling::{Decoder, DecoderKind, Description, Precision, decode_set},
+    decoupling::{Decoder, DecoderKind, NotDescribed, Precision, Program, decode_set},
     evaluation::{DecoderSet, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
     network::{Networks, ReadingRange},
     problem::{Channel, Problem},
@@ -9,7 +9,7 @@ use rand::RngExt;
 use serde_json::{Map, Value, json};
 
 use super::{
-    BundleDecoder, BundleError, BundlePrecision,
+    BundleDecoder, BundleError, BundlePrecision, ChoiceError,
     layers::Layer,
     meaning::Meaning,
     portable::{ChannelRanges, Portable},
@@ -108,8 +108,8 @@ impl<'a> ExportedDecoder<'a> {
         self.file
     }
 
-    pub(super) fn description(&self) -> &Description {
-        &self.fitted.description
+    pub(super) fn program(&self) -> &Program {
+        &self.fitted.program
     }
 
     /// Memory whose features the decoder takes, if it has one.
@@ -160,12 +160,6 @@ impl<'a> ExportedDecoder<'a> {
         let decoded = self.fitted.decoder.decode_row(row, readings, &mut answer);
         decoded.map_err(|error| Box::new(RunError::from(error)))?;
         Ok(answer)
-    }
-
-    /// Returns the number of rows decoded since the last call whose equations have no solution or more than one.
-    pub(super) fn take_open_rows(&mut self) -> usize {
-        let solved = self.fitted.decoder.take_solved_rows();
-        solved.unsolved + solved.undetermined
     }
 
     /// Draws readings for the verification. Returns the number of golden vectors, which come first, and all readings.
@@ -252,11 +246,7 @@ fn layers(portable: &Portable) -> Vec<String> {
         inputs = outputs;
         text
     });
-    let iteration = portable
-        .equations
-        .as_ref()
-        .map(|equations| format!("at most {} Gauss-Newton steps", equations.steps));
-    layers.collect::<Vec<_>>().into_iter().chain(iteration).collect()
+    layers.collect()
 }
 
 fn of_array(origin: &Origin, simulation: &Simulation, portable: &Portable, errors: &TestErrors) -> Value {
@@ -323,7 +313,7 @@ fn ranges(portable: &Portable) -> Vec<Option<Value>> {
 pub(super) struct FittedDecoder {
     pub(super) kind: BundleDecoder,
     pub(super) decoder: Box<dyn Decoder>,
-    pub(super) description: Description,
+    pub(super) program: Program,
     /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
     pub(super) reading_ranges: Vec<Option<ReadingRange>>,
     /// Ranges of the targets in training: one for all row-wires, or one for each if the row is an argument.
@@ -343,7 +333,7 @@ impl FittedDecoder {
         let decoder = networks.decoder();
         Self {
             kind: BundleDecoder::Kind(DecoderKind::Network),
-            description: decoder.description().expect("networks consist of layers"),
+            program: decoder.program().clone(),
             decoder: Box::new(decoder),
             reading_ranges: all.map(|network| network.inputs().range().cloned()).collect(),
             target_extremes: extremes.collect(),
@@ -381,16 +371,14 @@ impl FittedDecoder {
             BundleDecoder::Linear => Some(set.linear().map_err(Box::new)?),
             BundleDecoder::Kind(kind) => set.decoder(kind, Precision::Double).map_err(Box::new)?,
         };
-        let mut decoder = decoder.ok_or(BundleError::NoSensor(kind))?;
-        let description = decoder
-            .description()
-            .map_err(|reason| BundleError::NotDescribed { decoder: kind, reason })?;
+        let not_described = |reason| ChoiceError::NotDescribed { decoder: kind, reason };
+        let mut decoder = decoder.ok_or_else(|| not_described(NotDescribed::Equations))?;
+        let program = decoder.program().map_err(not_described)?;
         let answers = decode_set(&mut *decoder, &test).map_err(|error| Box::new(RunError::from(error)))?;
-        decoder.take_solved_rows();
         Ok(Self {
             kind,
             decoder,
-            description,
+            program,
             reading_ranges,
             target_extremes,
             errors: TestErrors::measure(&problem, &test, &answers),

@@ -143,7 +143,7 @@ fn single_arithmetic(portable: &Portable, vectors: &Vectors) -> Arithmetic {
     const PART_BEHIND_WIDE_LAYERS: f64 = 0.5;
     let is_enough = |wide_layers: &usize| {
         let single = Weights::of(portable, Arithmetic::single(*wide_layers));
-        let deviation = deviation(portable, &single, vectors);
+        let deviation = deviation(&single, vectors);
         let part = if *wide_layers == 0 {
             PART
         } else {
@@ -210,21 +210,9 @@ impl Bundle<'_> {
     ) -> Result<BundleReport, BundleError> {
         let portable = &self.portable;
         let weights = Weights::of(portable, arithmetic);
-        let tolerance = match portable.equations {
-            Some(_) => Tolerance::of_equations(),
-            None => Tolerance::of(
-                portable,
-                arithmetic,
-                &vectors.growth,
-                deviation(portable, &weights, vectors).of_arithmetic,
-            ),
-        };
+        let found = deviation(&weights, vectors).of_arithmetic;
+        let tolerance = Tolerance::of(portable, arithmetic, &vectors.growth, found);
         self.remarks.extend(tolerance.remarks(arithmetic, portable));
-        if portable.equations.is_some() {
-            let exact = "it takes the readings to be exact and magnifies noise in them many times; for readings with noise, \
-                         take a decoder fitted to noisy samples";
-            self.remarks.push(exact.to_owned());
-        }
         let limits = Deviation {
             total: tolerance.limit + vectors.rounding.worst(),
             of_arithmetic: tolerance.limit,

@@ -7,7 +7,6 @@ use super::{
     choice::BundlePrecision,
     exported_decoder::Metadata,
     fixed_point::FixedNetworks,
-    iteration::Iteration,
     portable::Portable,
     report::BundleError,
     vectors::{Deviation, Vector, Vectors},
@@ -172,27 +171,13 @@ impl Draft<'_> {
 
     /// Deviation of a bundle with these numbers.
     pub(super) fn deviation_of(&self, weights: &Weights) -> Deviation {
-        deviation(self.portable, weights, self.vectors)
+        deviation(weights, self.vectors)
     }
 }
 
-impl Call<'_> {
-    /// True if readings that no deformation explains are reported.
-    pub(super) fn tells_unexplained(&self) -> bool {
-        let equations = self.portable.equations.as_ref();
-        equations.is_some_and(|equations| equations.seeks_solution)
-    }
-}
-
-/// Deviation of a bundle of `portable` with these numbers.
-pub(super) fn deviation(portable: &Portable, weights: &Weights, vectors: &Vectors) -> Deviation {
-    vectors.deviation(|vector: &Vector| match &portable.equations {
-        None => weights.decode(vector.row, &vector.taken),
-        Some(equations) => {
-            let first = |map: usize| weights.decode(map, &vector.taken);
-            Iteration::new(equations).decode(vector.row, &vector.taken, first)
-        }
-    })
+/// Deviation of a bundle with these numbers.
+pub(super) fn deviation(weights: &Weights, vectors: &Vectors) -> Deviation {
+    vectors.deviation(|vector: &Vector| weights.decode(vector.row, &vector.taken))
 }
 
 #[cfg(test)]

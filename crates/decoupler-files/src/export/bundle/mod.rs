@@ -13,7 +13,6 @@ mod exported_decoder;
 mod exporting;
 mod fixed_point;
 mod folder;
-mod iteration;
 mod layers;
 mod matlab;
 mod meaning;

@@ -1,4 +1,4 @@
-use decoupler_core::{decoupling::RowProblemDescription, network::Quantity};
+use decoupler_core::network::Quantity;
 use ndarray::Array2;
 use thiserror::Error;
 
@@ -37,8 +37,6 @@ pub(super) struct Portable {
     pub(super) outputs: usize,
     /// One map for all row-wires, or one for each in ascending order, all of the same shape.
     pub(super) maps: Vec<FoldedMap>,
-    /// Iteration on the equations of the sensor that begins at the answers of the maps.
-    pub(super) equations: Option<RowProblemDescription>,
     /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
     pub(super) ranges: Vec<Option<ChannelRanges>>,
     /// Range to which deviations of each output are relative: the widest of any in training for the coordinates of an array,
@@ -75,8 +73,7 @@ impl Portable {
     /// # Errors
     /// A folded weight is not a finite number.
     pub(super) fn of(exported: &ExportedDecoder<'_>) -> Result<Self, FoldError> {
-        let description = exported.description();
-        let layered = LayeredMap::of(&description.program).expect("decoders that are described are chains of layers");
+        let layered = LayeredMap::of(exported.program()).expect("decoders that are described are chains of layers");
         let quantity = layered[0].quantity;
         let mut maps: Vec<_> = layered.iter().map(FoldedMap::of).collect();
         if let Some(index) = maps.iter().position(|map| !is_finite(map, quantity)) {
@@ -106,7 +103,6 @@ impl Portable {
             name: exported.kind().name(),
             decoder: exported.kind().noun(),
             ranges: ranges.collect(),
-            equations: description.equations.clone(),
             meaning,
             quantity,
             channels,

@@ -1,8 +1,6 @@
 use std::{fmt::Write, path::PathBuf};
 
-use decoupler_core::{
-    dataset::Memory, decoupling::NotDescribed, evaluation::RunError, problem::Channel, text::counted,
-};
+use decoupler_core::{dataset::Memory, evaluation::RunError, problem::Channel, text::counted};
 use thiserror::Error;
 
 use super::{
@@ -221,23 +219,12 @@ pub enum BundleError {
     /// The format does not have the precision.
     #[error(transparent)]
     Choice(#[from] ChoiceError),
-    /// The decoder solves the equations of a sensor, and the samples have none.
-    #[error("{0} solves the equations of a sensor, and a recording has no model of one: take another decoder")]
-    NoSensor(BundleDecoder),
     /// The decoder needs a network, and none was trained.
     #[error("{0} needs a trained network: train one first")]
     NoNetwork(BundleDecoder),
     /// The network was trained on samples in memory and has no network file.
     #[error("json is the network file, and a network trained on samples in memory has none: give another format")]
     NoFile,
-    /// No other program can compute what the decoder does.
-    #[error("{decoder} cannot be exported: {reason}")]
-    NotDescribed {
-        /// The decoder.
-        decoder: BundleDecoder,
-        /// The cause.
-        reason: NotDescribed,
-    },
     /// A memory is exported in double precision only.
     #[error("a network with a memory ({1}) cannot be exported in {0}: give --precision f64, or train without a memory")]
     Memory(&'static str, Memory),
@@ -246,18 +233,6 @@ pub enum BundleError {
         "a lag of {0} samples is too long for an ONNX graph, which copies its state for each sample: export as c99, numpy or matlab"
     )]
     LongLag(usize),
-    /// Rows whose equations have no unique solution.
-    #[error(
-        "{decoder} cannot be exported: the equations of {open} of {rows} rows drawn in the scene have no solution or more than one; take another decoder"
-    )]
-    OpenRows {
-        /// The decoder.
-        decoder: BundleDecoder,
-        /// Such rows.
-        open: usize,
-        /// All rows.
-        rows: usize,
-    },
     /// The scaling cannot be folded into the weights.
     #[error(transparent)]
     Fold(#[from] FoldError),

@@ -1,13 +1,9 @@
-use decoupler_core::{
-    decoupling::{LARGEST_ERROR, RowProblemDescription},
-    evaluation::RunError,
-    text::inert,
-};
+use decoupler_core::text::inert;
 
 use super::{
     choice::{ReadingRounding, Taking},
     exact::{ErrorGrowth, decode_exactly},
-    exported_decoder::{Drawn, ExportedDecoder},
+    exported_decoder::ExportedDecoder,
     meaning::Meaning,
     portable::Portable,
     report::{BundleError, VectorCounts},
@@ -68,12 +64,7 @@ impl Vectors {
         taking: Taking<'_>,
     ) -> Result<Self, BundleError> {
         let mut readings = Vec::new();
-        let ranges = portable
-            .ranges
-            .iter()
-            .enumerate()
-            .filter(|_| portable.equations.is_none());
-        for (index, range) in ranges {
+        for (index, range) in portable.ranges.iter().enumerate() {
             let Some(range) = range else { continue };
             for place in [0.0, 0.5, 1.0] {
                 let between = |&(low, high): &(f64, f64)| if place == 1.0 { high } else { low + place * (high - low) };
@@ -81,9 +72,6 @@ impl Vectors {
             }
         }
         let (golden, drawn) = exported.draw(portable)?;
-        if let Some(equations) = &portable.equations {
-            readings.extend(of_extremes(equations, portable.takes_row())?);
-        }
         let mut vectors = Self {
             all: Vec::new(),
             golden: readings.len() + golden,
@@ -108,17 +96,6 @@ impl Vectors {
                 .map(|(channel, &reading)| taking.error(channel, reading))
                 .collect();
             let of_program = exported.decode(index, &readings)?;
-            if portable.equations.is_some() {
-                // The solution of the equations is exact to within the tolerance of solving them.
-                vectors.all.push(Vector {
-                    row: index,
-                    taken,
-                    answers_to_taken: of_program.clone(),
-                    answers: of_program,
-                    readings,
-                });
-                continue;
-            }
             let map = &portable.maps[index];
             let exact = decode_exactly(portable, map, &readings);
             let of_taken = if taken == readings {
@@ -155,16 +132,6 @@ impl Vectors {
                 answers: exact.answers,
                 answers_to_taken: of_taken.answers,
             });
-        }
-        if portable
-            .equations
-            .as_ref()
-            .is_some_and(|equations| equations.seeks_solution)
-        {
-            let (decoder, open, rows) = (exported.kind(), exported.take_open_rows(), vectors.all.len());
-            if open > 0 {
-                return Err(BundleError::OpenRows { decoder, open, rows });
-            }
         }
         Ok(vectors)
     }
@@ -235,22 +202,6 @@ impl Vectors {
             }
         })
     }
-}
-
-/// Readings of every row-wire at rest and fully pressed.
-fn of_extremes(equations: &RowProblemDescription, takes_row: bool) -> Result<Drawn, BundleError> {
-    let model = &equations.model;
-    let mut readings = Drawn::new();
-    for (index, &row) in equations.rows.iter().enumerate() {
-        // The last unknown is a z, whose stroke is the same for all nodes.
-        for pressed_mm in equations.ranges.last().map_or([0.0, 0.0], |&(low, high)| [low, high]) {
-            let displacements = vec![glam::DVec3::Z * pressed_mm; model.scale.nodes_per_row()];
-            let of_row = model.row_resistances(row, &displacements);
-            let of_row = of_row.map_err(|error| Box::new(RunError::from(error)))?;
-            readings.push((if takes_row { index } else { 0 }, of_row));
-        }
-    }
-    Ok(readings)
 }
 
 /// Largest difference of `answers` from those `expected`, each relative to its scale. NaN if an answer is NaN.
@@ -332,16 +283,6 @@ impl Tolerance {
             },
             usual,
             amplification: growth.most(),
-        }
-    }
-
-    /// Returns the limit of an iteration on the equations of the sensor: the tolerance within which they count as
-    /// solved.
-    pub(super) fn of_equations() -> Self {
-        Self {
-            limit: LARGEST_ERROR,
-            usual: LARGEST_ERROR,
-            amplification: 0.0,
         }
     }
 

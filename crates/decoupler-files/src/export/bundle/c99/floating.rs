@@ -1,6 +1,6 @@
 use super::{
     header::{Header, push_out_of_range},
-    iteration, number, push_array, type_name,
+    number, push_array, type_name,
 };
 use crate::export::bundle::{
     layers::Layer,
@@ -52,10 +52,7 @@ pub(super) fn source(header: &Header<'_>, weights: &Weights) -> String {
         push_array(&mut text, &declaration, &shape, values);
     }
     text += &layers(header, arithmetic);
-    match &portable.equations {
-        Some(equations) => text += &iteration::source(header, equations),
-        None => push_decode(&mut text, header, arithmetic.rest),
-    }
+    push_decode(&mut text, header, arithmetic.rest);
     if let Some(ranges) = portable.known_ranges() {
         let rest = arithmetic.rest;
         let limits = ranges.iter().flat_map(|range| range.limits.iter().copied());

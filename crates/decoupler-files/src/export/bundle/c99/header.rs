@@ -121,7 +121,7 @@ impl Header<'_> {
              {definitions}{half_widths}\
              #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
              /* What the functions return. */\n\
-             enum {{\n    {upper}_OK = 0,\n    {upper}_NO_SUCH_ROW = -1,\n    {upper}_BAD_READING = -2{not_explained}\n}};\n\n",
+             enum {{\n    {upper}_OK = 0,\n    {upper}_NO_SUCH_ROW = -1,\n    {upper}_BAD_READING = -2\n}};\n\n",
             half_widths = portable.meaning.half_widths().map_or_else(String::new, |half_widths| {
                 let half_widths: Vec<String> = half_widths.iter().map(|value| format!("{value:?}")).collect();
                 format!(
@@ -130,10 +130,6 @@ impl Header<'_> {
                     half_widths.join(", ")
                 )
             }),
-            not_explained = match &portable.equations {
-                Some(equations) if equations.seeks_solution => format!(",\n    {upper}_NOT_EXPLAINED = 1"),
-                _ => String::new(),
-            },
         );
         let row = if portable.takes_row() {
             format!(" Rows are counted from 1 to {}.", portable.rows())
@@ -143,17 +139,10 @@ impl Header<'_> {
         let _ = write!(
             text,
             "/* Decodes {one}.{row} Returns {upper}_OK, or leaves the {coordinates} as they are and returns\n   \
-             what is wrong.{overflow}{not_explained} */\n{};\n\n",
+             what is wrong.{overflow} */\n{};\n\n",
             self.decode_signature(),
             one = portable.meaning.sample(),
             coordinates = portable.meaning.output().to_owned() + "s",
-            not_explained = match &portable.equations {
-                Some(equations) if equations.seeks_solution => format!(
-                    "\n   {upper}_NOT_EXPLAINED: the coordinates are the best found, but the readings have noise or come from\n   \
-                     another sensor."
-                ),
-                _ => String::new(),
-            },
             overflow = match self.reading {
                 "int32_t" => String::new(),
                 _ => format!(" Readings so extreme that the sums overflow give {upper}_BAD_READING."),

@@ -3,7 +3,6 @@
 mod fixed;
 mod floating;
 mod header;
-mod iteration;
 
 use std::{
     fmt::{Display, Write},
@@ -138,14 +137,6 @@ pub(super) fn call(call: &Call<'_>) -> String {
     } else {
         String::new()
     };
-    let explained = if call.tells_unexplained() {
-        format!(
-            "\nWhere no deformation explains the readings to 1e-10, as with noise, it is {upper}_NOT_EXPLAINED and the\n\
-             coordinates are the best found."
-        )
-    } else {
-        String::new()
-    };
     let library = if call.fixed.is_some() { "" } else { " -lm" };
     let units = match (call.fixed, meaning) {
         (Some(_), Meaning::Own { .. }) => format!(
@@ -161,7 +152,7 @@ pub(super) fn call(call: &Call<'_>) -> String {
          int status = {name}_decode({row}{readings}, {coordinates});\n\n\
          The status is {upper}_OK, or the reason why there is no answer. Compile {name}_decode.c with your program{libm}. The\n\
          self-test compares the golden vectors:\n\n    \
-         cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n{units}{range}{explained}",
+         cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n{units}{range}",
         libm = if library.is_empty() { "" } else { ", and link with -lm" },
     )
 }
