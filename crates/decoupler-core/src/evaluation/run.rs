@@ -21,7 +21,7 @@ use crate::{
     scene::SceneError,
     sensor::SensorError,
     training::{
-        Method, ResumeError, SettingError, StopReason, StoppingRules, TrainerState, TrainingDefect, TrainingError,
+        Method, SettingError, StopReason, StoppingRules, TrainerState, TrainingDefect, TrainingError,
         check_width,
     },
 };
@@ -425,7 +425,7 @@ pub enum RunError {
         /// Index of the start, from 0.
         start: usize,
         /// Reason given by the trainer.
-        source: ResumeError,
+        source: TrainingError,
     },
     /// The number of saved trainings does not match the settings.
     #[error("{found} saved trainings, but the settings ask for {expected}: starts times networks")]
