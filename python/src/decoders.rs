@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use decoupler_core::{
     dataset::{Dataset, PerRow, Seed, Stream},
     decoupling::{AffineMap, Decoder, RadialBasisNetwork, TakagiSugeno},
-    network::{InputChoice, ScalingChoice, ScalingError},
+    network::{InputChoice, NetworkError, ScalingChoice},
     scene::{NoiseSource, RowModel},
     text::counted,
 };
@@ -120,7 +120,7 @@ pub fn fit_decoder(
     Ok(FittedDecoder::new(kind, row_wires, fitted))
 }
 
-fn fit(kind: Kind, set: &Dataset, model: RowModel, choice: InputChoice, seed: Seed) -> Result<Fitted, ScalingError> {
+fn fit(kind: Kind, set: &Dataset, model: RowModel, choice: InputChoice, seed: Seed) -> Result<Fitted, NetworkError> {
     let unseen = NoiseSource::default();
     let mut rng = seed.rng(Stream::Expectation);
     Ok(match kind {

@@ -10,7 +10,7 @@ use decoupler_core::{
     },
     live::{Diagnosis, FaultCause, FaultyWire, LeftOutDecoder, WireCheck},
     network::{
-        DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, Shape, nguyen_widrow,
+        DecouplingNetwork, InputChoice, Inputs, MinMax, NetworkError, Quantity, ScalingChoice, Shape, nguyen_widrow,
     },
     scene::{Noise, NoiseSource, RowModel, Rows, Scene},
     sensor::{Axes, RowConductance, SensorModel},
@@ -53,7 +53,7 @@ fn a_frame_is_decoded_by_networks_without_allocating() {
                     outputs: outputs.varying().len(),
                 };
                 let mlp = nguyen_widrow(shape, &mut rng);
-                Ok::<_, ScalingError>(DecouplingNetwork::new(inputs, mlp, outputs))
+                Ok::<_, NetworkError>(DecouplingNetwork::new(inputs, mlp, outputs))
             };
             let networks = PerRow::fit(&set, RowModel::Each, network).unwrap();
             let mut double = CompiledNetworks::<f64>::new(&networks, rows);

@@ -9,9 +9,10 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, PerRow, Seed, Stream},
-    network::{InputChoice, Networks, ScalingError},
+    network::{InputChoice, NetworkError, Networks},
     scene::{NoiseSource, RowModel, Scene},
     sensor::{SensorError, SensorModel},
+    text::{Named, UnknownName},
 };
 
 /// Method of decoding the readings of a frame.
@@ -42,14 +43,6 @@ pub enum Precision {
     Double,
     /// 32 bits.
     Single,
-}
-
-/// Error for an unknown name of a decoder.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{text}' is not a decoder: give {words}", words = words())]
-pub struct DecoderKindError {
-    /// Name given.
-    pub text: String,
 }
 
 /// Properties of a decoder.
@@ -171,11 +164,13 @@ impl DecoderKind {
     }
 }
 
-/// Lists the names of all decoders: `mean, ridge … or polish`.
-fn words() -> String {
-    let words = DecoderKind::ALL.map(|kind| kind.entry().word);
-    let [others @ .., last] = &words;
-    format!("{} or {last}", others.join(", "))
+impl Named for DecoderKind {
+    const WHAT: &'static str = "a decoder";
+    const ALL: &'static [Self] = &DecoderKind::ALL;
+
+    fn name(self) -> &'static str {
+        self.entry().word
+    }
 }
 
 impl fmt::Display for DecoderKind {
@@ -186,11 +181,10 @@ impl fmt::Display for DecoderKind {
 }
 
 impl FromStr for DecoderKind {
-    type Err = DecoderKindError;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, DecoderKindError> {
-        let found = Self::ALL.into_iter().find(|kind| kind.entry().word == text.trim());
-        found.ok_or_else(|| DecoderKindError { text: text.to_owned() })
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        Self::parse(text)
     }
 }
 
@@ -221,7 +215,7 @@ pub struct FitProblem<'a> {
 pub enum FitError {
     /// The samples cannot be scaled.
     #[error(transparent)]
-    Scaling(#[from] ScalingError),
+    Scaling(#[from] NetworkError),
     /// The sensor has no resistances at rest.
     #[error(transparent)]
     Sensor(#[from] SensorError),
@@ -246,7 +240,7 @@ impl FitProblem<'_> {
     }
 
     /// Fits one decoder to the samples of all row-wires, or one for each.
-    fn of_samples<D>(&self, fit: impl FnMut(&Dataset) -> Result<D, ScalingError>) -> Fit
+    fn of_samples<D>(&self, fit: impl FnMut(&Dataset) -> Result<D, NetworkError>) -> Fit
     where
         PerRow<D>: Decoder + 'static,
     {

@@ -34,7 +34,7 @@ pub use description::{AffineLayer, Description, Layer, LayeredMap, NotDescribed}
 pub use equation_decoders::{NewtonDecoder, PolishedDecoder};
 pub use equations::{Estimate, Estimator, LARGEST_ERROR, NewtonStop, RowChoice, RowProblemDescription, Solution};
 pub(crate) use equations::{GaussianPrior, ranges};
-pub use kind::{DecoderKind, DecoderKindError, Fit, FitError, FitProblem, Precision};
+pub use kind::{DecoderKind, Fit, FitError, FitProblem, Precision};
 pub use radial_basis::RadialBasisNetwork;
 pub(crate) use ridge::{Regression, ridge};
 pub use takagi_sugeno::TakagiSugeno;

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, Folds},
-    network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, exp},
+    network::{InputChoice, Inputs, MinMax, NetworkError, Quantity, ScalingChoice, exp},
     scene::NoiseSource,
 };
 
@@ -64,7 +64,7 @@ impl RadialBasisNetwork {
         choice: InputChoice,
         unseen: NoiseSource,
         rng: &mut impl Rng,
-    ) -> Result<Self, ScalingError> {
+    ) -> Result<Self, NetworkError> {
         let training = with_noise(training, unseen, rng);
         let inputs = Inputs::fit(choice, training.readings(), NoiseSource::default())?;
         let outputs = MinMax::fit(training.targets())?;

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     dataset::Dataset,
-    network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError},
+    network::{InputChoice, Inputs, MinMax, NetworkError, Quantity, ScalingChoice},
     scene::NoiseSource,
 };
 
@@ -71,7 +71,7 @@ impl TakagiSugeno {
         quantity: Quantity,
         unseen: NoiseSource,
         rng: &mut impl Rng,
-    ) -> Result<Self, ScalingError> {
+    ) -> Result<Self, NetworkError> {
         let scaling = ScalingChoice::Whitening;
         let training = with_noise(training, unseen, rng);
         let inputs = Inputs::fit(
@@ -112,7 +112,7 @@ impl TakagiSugeno {
         inputs: &Inputs,
         outputs: &MinMax,
         antecedents: &Array2<f64>,
-    ) -> Result<(Self, f64), ScalingError> {
+    ) -> Result<(Self, f64), NetworkError> {
         let (ranges, varying) = (outputs.middles_and_half_widths(), outputs.varying());
         let (channels, rules) = (set.channels(), antecedents.ncols());
         let mut system = Self {
@@ -528,7 +528,7 @@ mod tests {
         assert!(
             matches!(
                 error,
-                ScalingError::NotFinite {
+                NetworkError::NotFinite {
                     sample: 3,
                     channel: 2,
                     ..
@@ -538,7 +538,7 @@ mod tests {
         );
         let none = set.select(&[]);
         let error = TakagiSugeno::fit(&none, Quantity::Conductance, NoiseSource::default(), &mut rng).unwrap_err();
-        assert_eq!(error, ScalingError::Empty);
+        assert_eq!(error, NetworkError::Empty);
     }
 
     #[test]

@@ -13,16 +13,15 @@ use super::{
     TestErrors, starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, DivisionError, PerRow, SimulationError, SplitBy},
+    dataset::{Dataset, DatasetError, PerRow, SimulationError, SplitBy},
     decoupling::{DecodeError, FitError},
     job::{Cancelled, Job},
     machine::MemoryBudget,
-    network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, ScalingError},
+    network::{DecouplingNetwork, Inputs, MinMax, Mlp, NetworkError, Networks},
     scene::SceneError,
     sensor::SensorError,
     training::{
-        Method, SettingError, StopReason, StoppingRules, TrainerState, TrainingDefect, TrainingError,
-        check_width,
+        Method, SettingError, StopReason, StoppingRules, TrainerState, TrainingDefect, TrainingError, check_width,
     },
 };
 
@@ -361,10 +360,10 @@ pub enum RunError {
     Fit(#[from] FitError),
     /// Samples cannot be divided.
     #[error(transparent)]
-    Division(#[from] DivisionError),
+    Division(#[from] DatasetError),
     /// Samples cannot be scaled.
     #[error(transparent)]
-    Scaling(#[from] ScalingError),
+    Scaling(#[from] NetworkError),
     /// A reading is not a resistance.
     #[error(transparent)]
     Decode(#[from] DecodeError),

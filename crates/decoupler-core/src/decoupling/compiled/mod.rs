@@ -220,7 +220,7 @@ mod tests {
         dataset::{Dataset, Seed, Stream},
         decoupling::decode_set,
         network::{
-            DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, Shape, nguyen_widrow,
+            DecouplingNetwork, InputChoice, Inputs, MinMax, NetworkError, Quantity, ScalingChoice, Shape, nguyen_widrow,
         },
         scene::{Noise, RowModel, Scene},
         sensor::SensorModel,
@@ -240,7 +240,7 @@ mod tests {
                 outputs: outputs.varying().len(),
             };
             let mlp = nguyen_widrow(shape, &mut rng);
-            Ok::<_, ScalingError>(DecouplingNetwork::new(inputs, mlp, outputs))
+            Ok::<_, NetworkError>(DecouplingNetwork::new(inputs, mlp, outputs))
         };
         let networks = PerRow::fit(&set, RowModel::Each, network).unwrap();
         (set, networks)
