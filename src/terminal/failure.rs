@@ -7,7 +7,7 @@ use std::{
 
 use decoupler_core::{
     calibration::CalibrationError,
-    dataset::{SimulationError, SplitBy},
+    dataset::{DatasetError, SimulationError, SplitBy},
     evaluation::{RunError, experiments::ExperimentError},
     scene::Rows,
     sensor::SensorError,
@@ -210,10 +210,13 @@ impl Failure {
                 | ImportError::Range(_)
                 | ImportError::TwoMeanings { .. }
                 | ImportError::NoColumns(_)
-                | ImportError::Condition { .. }
-                | ImportError::Memory(_)
-                | ImportError::Division(_),
+                | ImportError::Condition { .. },
             ) => 2,
+            // A division or a memory that does not fit the samples is an argument; their shape is not.
+            Self::Import(ImportError::Dataset(
+                DatasetError::Empty { .. } | DatasetError::Length { .. } | DatasetError::RowWire { .. },
+            )) => 1,
+            Self::Import(ImportError::Dataset(_)) => 2,
             Self::Run(error) if is_argument_error(error) => 2,
             Self::Simulation(SimulationError::Count(_) | SimulationError::Scene(_)) => 2,
             Self::Interrupted(_)

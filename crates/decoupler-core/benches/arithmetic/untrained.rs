@@ -2,7 +2,7 @@
 
 use decoupler_core::{
     dataset::{Dataset, PerRow, Seed, Stream},
-    network::{DecouplingNetwork, InputChoice, Inputs, MinMax, Networks, ScalingError, Shape, nguyen_widrow},
+    network::{DecouplingNetwork, InputChoice, Inputs, MinMax, NetworkError, Networks, Shape, nguyen_widrow},
     scene::{NoiseSource, RowModel},
 };
 
@@ -18,7 +18,7 @@ pub(crate) fn untrained_networks(training: &Dataset, choice: InputChoice, hidden
             outputs: outputs.varying().len(),
         };
         let mlp = nguyen_widrow(shape, &mut rng);
-        Ok::<_, ScalingError>(DecouplingNetwork::new(inputs, mlp, outputs))
+        Ok::<_, NetworkError>(DecouplingNetwork::new(inputs, mlp, outputs))
     };
     PerRow::fit(training, RowModel::Each, network).unwrap()
 }

@@ -2,7 +2,6 @@ use std::{fmt, str::FromStr};
 
 use rand::{Rng, seq::SliceRandom};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::{Dataset, DatasetError, Seed, Stream};
 use crate::text::{Named, UnknownName};
@@ -33,57 +32,6 @@ pub struct DividedSamples {
     pub test: Vec<usize>,
 }
 
-/// Error for a set that cannot be divided.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum DivisionError {
-    /// A share is out of range.
-    #[error("{part} fraction {value}: give a number from {least} to below 1, such as 0.2")]
-    Fraction {
-        /// Part at fault: test or validation.
-        part: &'static str,
-        /// Share given.
-        value: f64,
-        /// Smallest valid share.
-        least: &'static str,
-    },
-    /// There is only one unit, so none is left for the test.
-    #[error("all {samples} samples are one {unit}: a test set needs another; give a test file, or split another way")]
-    TooFew {
-        /// Number of samples.
-        samples: usize,
-        /// Name of the unit of division: sample or group.
-        unit: &'static str,
-    },
-    /// The set cannot be divided into so many folds.
-    #[error("{folds} folds of {units} {unit}s: give from 2 folds to as many as there are {unit}s")]
-    Folds {
-        /// Number of folds requested.
-        folds: usize,
-        /// Number of units in the set.
-        units: usize,
-        /// Name of the unit of the folds: sample, snapshot or group.
-        unit: &'static str,
-    },
-    /// The test samples belong to other row-wires.
-    #[error(transparent)]
-    Rows(#[from] DatasetError),
-}
-
-impl DivisionError {
-    /// Checks that so many units, named `unit`, fill `folds` folds.
-    ///
-    /// # Errors
-    /// If there are fewer than two folds, or more folds than units.
-    pub(crate) fn check_folds(folds: usize, units: usize, unit: &'static str) -> Result<(), Self> {
-        if (2..=units).contains(&folds) {
-            Ok(())
-        } else {
-            Err(Self::Folds { folds, units, unit })
-        }
-    }
-}
-
 impl Default for Division {
     /// Returns the division in time: the last fifth is the test set, and nothing is held out for validation, since
     /// the default method of measured runs needs none.
@@ -106,11 +54,11 @@ impl Division {
     ///
     /// # Errors
     /// If a share is out of range, or the set is a single unit.
-    pub fn divide(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DivisionError> {
+    pub fn divide(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DatasetError> {
         self.check()?;
         let units = self.by.ordered_units(set, rng);
         if units.len() < 2 {
-            return Err(DivisionError::TooFew {
+            return Err(DatasetError::TooFew {
                 samples: set.samples(),
                 unit: self.by.unit_name(units.len(), set.samples()),
             });
@@ -122,7 +70,7 @@ impl Division {
     ///
     /// # Errors
     /// If a share is out of range.
-    pub fn divide_for_training(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DivisionError> {
+    pub fn divide_for_training(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DatasetError> {
         self.check()?;
         Ok(self.parts_with_variation(set, self.by.ordered_units(set, rng), 0.0))
     }
@@ -132,7 +80,7 @@ impl Division {
     ///
     /// # Errors
     /// If a share is out of range, the set is a single unit, or `test` has other row-wires.
-    pub fn sets(&self, set: &Dataset, test: Option<&Dataset>, seed: Seed) -> Result<(Split, Dataset), DivisionError> {
+    pub fn sets(&self, set: &Dataset, test: Option<&Dataset>, seed: Seed) -> Result<(Split, Dataset), DatasetError> {
         let mut rng = seed.rng(Stream::Split);
         Ok(match test {
             None => {
@@ -184,14 +132,14 @@ impl Division {
     ///
     /// # Errors
     /// If a share is out of range.
-    pub fn check(&self) -> Result<(), DivisionError> {
+    pub fn check(&self) -> Result<(), DatasetError> {
         let fractions = [
             ("test", self.test_fraction, f64::MIN_POSITIVE, "above 0"),
             ("validation", self.validation_fraction, 0.0, "0"),
         ];
         for (part, value, smallest, least) in fractions {
             if !(smallest..1.0).contains(&value) {
-                return Err(DivisionError::Fraction { part, value, least });
+                return Err(DatasetError::Fraction { part, value, least });
             }
         }
         Ok(())
@@ -379,7 +327,7 @@ mod tests {
         Dataset::new(values.clone(), values, None, groups).unwrap()
     }
 
-    fn divide(set: &Dataset, by: SplitBy, seed: u64) -> Result<DividedSamples, DivisionError> {
+    fn divide(set: &Dataset, by: SplitBy, seed: u64) -> Result<DividedSamples, DatasetError> {
         let division = Division {
             by,
             test_fraction: 0.2,
@@ -498,7 +446,7 @@ mod tests {
                 validation_fraction,
             };
             let error = division.divide(&set(vec![0, 1]), &mut Seed(0).rng(Stream::Split));
-            assert!(matches!(error, Err(DivisionError::Fraction { .. })), "{division:?}");
+            assert!(matches!(error, Err(DatasetError::Fraction { .. })), "{division:?}");
         }
         assert!("block".parse::<SplitBy>().is_err());
         assert!(SplitBy::ALL.iter().all(|by| by.to_string().parse() == Ok(*by)));

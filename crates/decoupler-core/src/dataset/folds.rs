@@ -1,6 +1,6 @@
 use rand::{Rng, seq::SliceRandom};
 
-use super::{Dataset, DividedSamples, DivisionError, SplitBy};
+use super::{Dataset, DatasetError, DividedSamples, SplitBy};
 
 /// Folds of a k-fold cross-validation: every sample is in exactly one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,10 +15,10 @@ impl Folds {
     ///
     /// # Errors
     /// If there are fewer than two folds, or more folds than samples (or groups).
-    pub fn by(set: &Dataset, folds: usize, by: SplitBy, rng: &mut impl Rng) -> Result<Self, DivisionError> {
+    pub fn by(set: &Dataset, folds: usize, by: SplitBy, rng: &mut impl Rng) -> Result<Self, DatasetError> {
         let units = by.units(set);
         let unit = by.unit_name(units.len(), set.samples());
-        DivisionError::check_folds(folds, units.len(), unit)?;
+        DatasetError::check_folds(folds, units.len(), unit)?;
         Ok(match by {
             SplitBy::Time => Self::blocks(&units, folds),
             SplitBy::Group | SplitBy::Random => Self::shuffled(&units, folds, rng),

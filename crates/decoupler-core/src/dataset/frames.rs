@@ -1,7 +1,6 @@
 use ndarray::{Array3, ArrayView2, Axis};
-use thiserror::Error;
 
-use super::Dataset;
+use super::{Dataset, DatasetError};
 use crate::scene::RowModel;
 
 /// Whole frames, each with the readings of all row-wires at one moment: the input of a decoder.
@@ -11,18 +10,6 @@ pub struct Frames {
     readings: Array3<f64>,
     /// Index of the sample behind each row of each snapshot, snapshot by snapshot.
     samples: Vec<usize>,
-}
-
-/// Error for a set with incomplete frames.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("the snapshot of sample {} is incomplete: {found} samples of row-wire {}, but each row-wire read needs exactly one", .sample + 1, .row_wire + 1)]
-pub struct FramesError {
-    /// Index of the first sample of the snapshot, from 0.
-    pub sample: usize,
-    /// Row-wire at fault, from 0.
-    pub row_wire: usize,
-    /// Number of samples of this row-wire in the snapshot.
-    pub found: usize,
 }
 
 impl Frames {
@@ -59,7 +46,7 @@ impl Dataset {
     ///
     /// # Errors
     /// If a snapshot lacks a row-wire, or has one twice.
-    pub fn frames(&self) -> Result<Frames, FramesError> {
+    pub fn frames(&self) -> Result<Frames, DatasetError> {
         let rows = self.row_count();
         let mut samples = Vec::with_capacity(self.samples());
         for snapshot in self.snapshots() {
@@ -68,7 +55,7 @@ impl Dataset {
                 match (of_row.next(), of_row.count()) {
                     (Some(&sample), 0) => samples.push(sample),
                     (first, others) => {
-                        return Err(FramesError {
+                        return Err(DatasetError::Incomplete {
                             sample: snapshot[0],
                             row_wire: self.row_wires_read().map_or(0, |read| read[row_index]),
                             found: others + usize::from(first.is_some()),
@@ -201,10 +188,12 @@ mod tests {
             lacking.to_string().split(':').next(),
             Some("the snapshot of sample 3 is incomplete")
         );
-        assert_eq!((lacking.row_wire, lacking.found), (0, 0));
+        let is = |error: &DatasetError, row: usize, count: usize| matches!(error, DatasetError::Incomplete { row_wire, found, .. } if (*row_wire, *found) == (row, count));
+        assert!(is(&lacking, 0, 0), "{lacking}");
         let twice = set(Some(&[0, 1, 1]), &[0, 0, 0]).frames().unwrap_err();
-        assert_eq!((twice.row_wire, twice.found), (1, 2));
-        assert_eq!(set(None, &[4, 4]).frames().unwrap_err().found, 2);
+        assert!(is(&twice, 1, 2), "{twice}");
+        let both = set(None, &[4, 4]).frames().unwrap_err();
+        assert!(is(&both, 0, 2), "{both}");
     }
 
     #[test]

@@ -3,7 +3,7 @@ use std::collections::{HashMap, HashSet};
 use ndarray::{ArcArray2, Array2, ArrayView2, Axis};
 
 use super::{
-    Memory, MemoryError, MemoryState,
+    DatasetError, Memory, MemoryState,
     continuation::{Continuation, Place, RowOrder, Series, usual_interval_s},
 };
 
@@ -169,13 +169,13 @@ impl History {
     ///
     /// # Errors
     /// If a span is in seconds and the interval is not known, or a time constant is shorter than the interval.
-    pub fn checked(&self, memory: &Memory) -> Result<Memory, MemoryError> {
+    pub fn checked(&self, memory: &Memory) -> Result<Memory, DatasetError> {
         let resolved = self.resolved(memory);
         let in_seconds = resolved.spans().find(|span| span.is_in_seconds());
         if let (Some(span), None) = (in_seconds, resolved.interval_s) {
             return Err(match self.times_s {
-                Some(_) => MemoryError::NoInterval(span),
-                None => MemoryError::NoClock(span),
+                Some(_) => DatasetError::NoInterval(span),
+                None => DatasetError::NoClock(span),
             });
         }
         resolved.check_lengths()?;
@@ -186,7 +186,7 @@ impl History {
     ///
     /// # Errors
     /// If the memory is invalid for these channels (see [`Memory::check`]), or too many series are interleaved.
-    pub fn features(&self, memory: &Memory) -> Result<ArcArray2<f64>, MemoryError> {
+    pub fn features(&self, memory: &Memory) -> Result<ArcArray2<f64>, DatasetError> {
         let memory = self.resolved(memory);
         if memory.is_empty() {
             return Ok(self.of_samples(self.readings.clone()));
@@ -252,7 +252,7 @@ impl MemoryStream {
     ///
     /// # Errors
     /// See [`Memory::check`].
-    pub fn new(memory: &Memory, channels: usize) -> Result<Self, MemoryError> {
+    pub fn new(memory: &Memory, channels: usize) -> Result<Self, DatasetError> {
         let start = MemoryState::new(memory, channels)?;
         Ok(Self {
             features: vec![0.0; start.features()],
@@ -266,7 +266,7 @@ impl MemoryStream {
     ///
     /// # Errors
     /// If they are too large.
-    fn with_room_for(self, series: usize) -> Result<Self, MemoryError> {
+    fn with_room_for(self, series: usize) -> Result<Self, DatasetError> {
         self.start.check_states(series)?;
         Ok(Self {
             states: Continuation::new(self.interval_s, series),

@@ -1,10 +1,8 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use super::Span;
-use crate::text::format_number;
+use super::{DatasetError, Span};
 
 /// Maximum number of samples that a lag reaches back.
 pub const LARGEST_LAG: usize = 100_000;
@@ -12,7 +10,7 @@ pub const LARGEST_LAG: usize = 100_000;
 const MAX_FEATURES: usize = 20_000;
 const MAX_STATE: usize = 10_000_000;
 /// Maximum size of the states of all series that are open at once.
-const MAX_STATES_BYTES: u64 = 2_000_000_000;
+pub(super) const MAX_STATES_BYTES: u64 = 2_000_000_000;
 
 /// Inputs from the past: a network for a sensor with hysteresis, creep or drift sees, next to the current readings,
 /// earlier ones.
@@ -46,71 +44,6 @@ pub struct Memory {
     /// sets it to the median of the time column.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval_s: Option<f64>,
-}
-
-/// Error in a memory.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum MemoryError {
-    /// A span in seconds without an interval.
-    #[error("a memory of {0} needs times: name the time column, or give the memory in samples, as in 20")]
-    NoClock(Span),
-    /// A span in seconds, and times that do not advance.
-    #[error(
-        "a memory of {0} needs the usual interval between samples, and no time is later than the one before in the same \
-         group and row-wire: check the columns of times, groups and row-wires"
-    )]
-    NoInterval(Span),
-    /// A time constant that would have no effect.
-    #[error(
-        "a time constant of {span} is shorter than the usual interval between samples{}: it would remember nothing; give a \
-         longer one or, if the times are not in seconds, the unit of the time column",
-        interval_s.map_or_else(String::new, |interval_s| format!(", {} s", format_number(interval_s)))
-    )]
-    TooShort {
-        /// The time constant.
-        span: Span,
-        /// The interval in seconds, if known.
-        interval_s: Option<f64>,
-    },
-    /// The interval is not a positive number.
-    #[error("the interval of the memory is {0} s: it must be more than 0")]
-    Interval(f64),
-    /// A lag that is no sample before, or too many.
-    #[error("a lag of {lag} is {samples:.1} samples: it must be from 1 to {LARGEST_LAG}")]
-    Lag {
-        /// The lag.
-        lag: Span,
-        /// The lag in samples.
-        samples: f64,
-    },
-    /// A time constant of no length.
-    #[error("a time constant of {0} is not possible: it must be more than 0")]
-    Average(Span),
-    /// More features, or a larger state, than fit.
-    #[error(
-        "a memory of {channels} channels has {features} features and a state of {state} values: use fewer or shorter lags"
-    )]
-    Excess {
-        /// Number of channels.
-        channels: usize,
-        /// Number of features.
-        features: usize,
-        /// Number of values in the state.
-        state: usize,
-    },
-    /// The states of several streams are too large together.
-    #[error(
-        "the lags and averages of {series} groups and row-wires at once are too large: they need {:.1} GB of memory, and may \
-         use {:.0} GB; use shorter lags, fewer averages, or a part of the rows",
-        *.bytes as f64 * 1e-9, MAX_STATES_BYTES as f64 * 1e-9
-    )]
-    TooLarge {
-        /// Number of series of samples.
-        series: usize,
-        /// Memory needed, in bytes.
-        bytes: u64,
-    },
 }
 
 impl Memory {
@@ -169,15 +102,15 @@ impl Memory {
     ///
     /// # Errors
     /// If a span in seconds has no interval, or a lag, a time constant, or the number of features is out of range.
-    pub fn check(&self, channels: usize) -> Result<(), MemoryError> {
+    pub fn check(&self, channels: usize) -> Result<(), DatasetError> {
         MemoryConstants::of(self, channels).map(drop)
     }
 
     /// Checks that every average extends over more than one sample.
-    pub(super) fn check_lengths(&self) -> Result<(), MemoryError> {
+    pub(super) fn check_lengths(&self) -> Result<(), DatasetError> {
         let too_short = |span: &&Span| span.samples(self.interval_s).is_some_and(|samples| samples < 1.0);
         match self.averages.iter().find(too_short) {
-            Some(&span) => Err(MemoryError::TooShort {
+            Some(&span) => Err(DatasetError::TooShort {
                 span,
                 interval_s: self.interval_s,
             }),
@@ -246,27 +179,27 @@ impl MemoryConstants {
     ///
     /// # Errors
     /// See [`Memory::check`].
-    pub fn of(memory: &Memory, channels: usize) -> Result<Self, MemoryError> {
+    pub fn of(memory: &Memory, channels: usize) -> Result<Self, DatasetError> {
         if let Some(interval_s) = memory
             .interval_s
             .filter(|interval_s| !(*interval_s > 0.0 && interval_s.is_finite()))
         {
-            return Err(MemoryError::Interval(interval_s));
+            return Err(DatasetError::MemoryInterval(interval_s));
         }
         let (mut lags, mut averages) = (Vec::new(), Vec::new());
         for past in memory.past() {
             let (Past::Lag(span) | Past::Average(span)) = past;
-            let samples = span.samples(memory.interval_s).ok_or(MemoryError::NoClock(span))?;
+            let samples = span.samples(memory.interval_s).ok_or(DatasetError::NoClock(span))?;
             match past {
                 Past::Lag(lag) => {
                     let rounded = samples.round();
                     if !(1.0..=LARGEST_LAG as f64).contains(&rounded) {
-                        return Err(MemoryError::Lag { lag, samples });
+                        return Err(DatasetError::Lag { lag, samples });
                     }
                     lags.push(rounded as usize);
                 }
                 Past::Average(span) if span.is_valid() => averages.push(span),
-                Past::Average(span) => return Err(MemoryError::Average(span)),
+                Past::Average(span) => return Err(DatasetError::Average(span)),
             }
         }
         let constants = Self {
@@ -278,7 +211,7 @@ impl MemoryConstants {
         };
         let (features, state) = (constants.features(), constants.state());
         if features > MAX_FEATURES.max(channels) || state > MAX_STATE {
-            return Err(MemoryError::Excess {
+            return Err(DatasetError::MemoryExcess {
                 channels,
                 features,
                 state,
@@ -332,7 +265,7 @@ impl MemoryState {
     ///
     /// # Errors
     /// See [`Memory::check`].
-    pub fn new(memory: &Memory, channels: usize) -> Result<Self, MemoryError> {
+    pub fn new(memory: &Memory, channels: usize) -> Result<Self, DatasetError> {
         let constants = MemoryConstants::of(memory, channels)?;
         Ok(Self {
             has_started: false,
@@ -347,10 +280,10 @@ impl MemoryState {
     ///
     /// # Errors
     /// If they are.
-    pub(super) fn check_states(&self, series: usize) -> Result<(), MemoryError> {
+    pub(super) fn check_states(&self, series: usize) -> Result<(), DatasetError> {
         let bytes = (self.constants.state() as u64).saturating_mul((size_of::<f64>() * series) as u64);
         if bytes > MAX_STATES_BYTES {
-            return Err(MemoryError::TooLarge { series, bytes });
+            return Err(DatasetError::StatesTooLarge { series, bytes });
         }
         Ok(())
     }
@@ -443,7 +376,7 @@ mod tests {
         readings: ArrayView2<'_, f64>,
         groups: &[u64],
         times_s: Option<&[f64]>,
-    ) -> Result<Array2<f64>, MemoryError> {
+    ) -> Result<Array2<f64>, DatasetError> {
         let (samples, times_s) = ((0..readings.nrows()).collect(), times_s.map(<[f64]>::to_vec));
         History::new(readings.to_owned(), Some(groups), None, times_s, samples)
             .features(memory)
@@ -631,6 +564,9 @@ mod tests {
             .contains("more than 0")
         );
         let huge = Memory::of_lags(&[LARGEST_LAG]).check(101).unwrap_err();
-        assert!(matches!(huge, MemoryError::Excess { state: 10_100_000, .. }), "{huge}");
+        assert!(
+            matches!(huge, DatasetError::MemoryExcess { state: 10_100_000, .. }),
+            "{huge}"
+        );
     }
 }

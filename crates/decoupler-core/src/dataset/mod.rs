@@ -9,6 +9,7 @@
 
 mod continuation;
 mod division;
+mod error;
 mod folds;
 mod frames;
 mod history;
@@ -19,12 +20,13 @@ mod simulation;
 mod span;
 
 pub use continuation::{Continuation, Place, RowOrder, Series};
-pub use division::{DividedSamples, Division, DivisionError, Split, SplitBy};
+pub use division::{DividedSamples, Division, Split, SplitBy};
+pub use error::DatasetError;
 pub use folds::Folds;
-pub use frames::{Frames, FramesError, PerRow};
+pub use frames::{Frames, PerRow};
 pub use history::{History, MemoryStream};
-pub use memory::{LARGEST_LAG, Memory, MemoryConstants, MemoryError, MemoryState};
-pub use samples::{Dataset, DatasetError, LARGEST_SAMPLES};
+pub use memory::{LARGEST_LAG, Memory, MemoryConstants, MemoryState};
+pub use samples::{Dataset, LARGEST_SAMPLES};
 pub use seed::{Seed, Stream};
 pub use simulation::{ModelSize, Simulation, SimulationError};
-pub use span::{Span, SpanError};
+pub use span::Span;

@@ -2,8 +2,8 @@ use std::{collections::HashMap, sync::Arc};
 
 use glam::DVec3;
 use ndarray::{ArcArray2, ArrayView2, Axis};
-use thiserror::Error;
 
+use super::DatasetError;
 use crate::{
     scene::{Deformation, FaultySensor},
     sensor::SensorModel,
@@ -36,40 +36,6 @@ struct SampleRows {
     read: Arc<[usize]>,
     /// Index in `read` of each sample's row-wire.
     indices: Vec<usize>,
-}
-
-/// Error in the parts of a set.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum DatasetError {
-    /// There are no samples, channels or targets.
-    #[error("the {what} are {samples} × {columns}: give at least one sample and one column")]
-    Empty {
-        /// Part at fault: readings or targets.
-        what: &'static str,
-        /// Number of samples found.
-        samples: usize,
-        /// Number of columns found.
-        columns: usize,
-    },
-    /// A part does not have one entry per sample.
-    #[error("there are {found} {what} for {samples} samples: give one for each")]
-    Length {
-        /// Part at fault: targets, row-wires or groups.
-        what: &'static str,
-        /// Number of entries found.
-        found: usize,
-        /// Number of samples in the readings.
-        samples: usize,
-    },
-    /// A sample belongs to a row-wire that is not read.
-    #[error("sample {}: row-wire {} is not among the rows read; name every row-wire once, in ascending order", .sample + 1, .row_wire + 1)]
-    RowWire {
-        /// Index of the sample, from 0.
-        sample: usize,
-        /// Row-wire, from 0.
-        row_wire: usize,
-    },
 }
 
 impl Dataset {

@@ -1,7 +1,8 @@
 use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
+
+use super::DatasetError;
 
 /// Span of time into the past: a number of samples, or seconds.
 ///
@@ -14,11 +15,6 @@ pub enum Span {
     /// Seconds, more than 0.
     Seconds(f64),
 }
-
-/// Text that is not a span.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{0}' is not a span of time: write a number of samples as in 20, or a time as in 2s, 100ms or 5min")]
-pub struct SpanError(pub String);
 
 impl Span {
     /// Samples in this span at an interval of `interval_s`; `None` for seconds without an interval.
@@ -41,7 +37,7 @@ impl Span {
 }
 
 impl FromStr for Span {
-    type Err = SpanError;
+    type Err = DatasetError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let trimmed = text.trim();
@@ -52,15 +48,15 @@ impl FromStr for Span {
             "s" => Self::Seconds,
             "ms" => |ms| Self::Seconds(ms / 1e3),
             "min" => |minutes| Self::Seconds(60.0 * minutes),
-            _ => return Err(SpanError(text.to_owned())),
+            _ => return Err(DatasetError::SpanText(text.to_owned())),
         };
         let span = number.parse().ok().map(of).filter(|span: &Self| span.is_valid());
-        span.ok_or_else(|| SpanError(text.to_owned()))
+        span.ok_or_else(|| DatasetError::SpanText(text.to_owned()))
     }
 }
 
 impl TryFrom<String> for Span {
-    type Error = SpanError;
+    type Error = DatasetError;
 
     fn try_from(text: String) -> Result<Self, Self::Error> {
         text.parse()

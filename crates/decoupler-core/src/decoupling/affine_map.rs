@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     dataset::Dataset,
-    network::{MinMax, Quantity, ScalingError, channel_noise},
+    network::{MinMax, NetworkError, Quantity, channel_noise},
     scene::NoiseSource,
     sensor::{Axes, RowConductance, SensorModel},
 };
@@ -43,7 +43,7 @@ impl Program {
     ///
     /// # Errors
     /// If values cannot be scaled.
-    pub fn least_squares(training: &Dataset, quantity: Quantity) -> Result<Self, ScalingError> {
+    pub fn least_squares(training: &Dataset, quantity: Quantity) -> Result<Self, NetworkError> {
         Self::affine(training, quantity, NoiseSource::default(), |regression| {
             regression.least_squares()
         })
@@ -55,7 +55,7 @@ impl Program {
     ///
     /// # Errors
     /// If values cannot be scaled.
-    pub fn ridge(training: &Dataset, quantity: Quantity, unseen: NoiseSource) -> Result<Self, ScalingError> {
+    pub fn ridge(training: &Dataset, quantity: Quantity, unseen: NoiseSource) -> Result<Self, NetworkError> {
         let folds = folds(training);
         Self::affine(training, quantity, unseen, |regression| {
             Ok(regression.ridge(folds.as_ref())?.map)
@@ -66,8 +66,8 @@ impl Program {
         training: &Dataset,
         quantity: Quantity,
         unseen: NoiseSource,
-        map: impl FnOnce(&Regression<'_>) -> Result<Array2<f64>, ScalingError>,
-    ) -> Result<Self, ScalingError> {
+        map: impl FnOnce(&Regression<'_>) -> Result<Array2<f64>, NetworkError>,
+    ) -> Result<Self, NetworkError> {
         let readings = training.readings();
         quantity.check(readings)?;
         let standard = Standard::fit(readings, |reading| quantity.of(reading))?;
@@ -262,7 +262,7 @@ mod tests {
         let set = Dataset::new(readings, targets, None, vec![0, 1, 2]).unwrap();
         assert_eq!(
             Program::least_squares(&set, Quantity::Raw),
-            Err(ScalingError::NotConverged)
+            Err(NetworkError::NotConverged)
         );
     }
 

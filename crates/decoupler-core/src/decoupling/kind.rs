@@ -6,7 +6,7 @@ use thiserror::Error;
 use super::{Decoder, NewtonDecoder, Program, ProgramDecoder};
 use crate::{
     dataset::{Dataset, PerRow, Seed, Stream},
-    network::{InputChoice, Networks, ScalingError},
+    network::{InputChoice, NetworkError, Networks},
     scene::{NoiseSource, RowModel, Scene},
     sensor::{SensorError, SensorModel},
     text::{Named, UnknownName},
@@ -187,7 +187,7 @@ pub struct FitProblem<'a> {
 pub enum FitError {
     /// The samples cannot be scaled.
     #[error(transparent)]
-    Scaling(#[from] ScalingError),
+    Scaling(#[from] NetworkError),
     /// The sensor has no resistances at rest.
     #[error(transparent)]
     Sensor(#[from] SensorError),
@@ -223,7 +223,7 @@ impl DecoderKind {
 
 impl FitProblem<'_> {
     /// Fits one program to the samples of all row-wires, or one for each.
-    fn of_samples(&self, fit: impl FnMut(&Dataset) -> Result<Program, ScalingError>) -> Fit {
+    fn of_samples(&self, fit: impl FnMut(&Dataset) -> Result<Program, NetworkError>) -> Fit {
         let programs = PerRow::fit(self.training, self.row_model, fit)?;
         Ok(Some(Box::new(ProgramDecoder::new(Program::each(&programs)))))
     }

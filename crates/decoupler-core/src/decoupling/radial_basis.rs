@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, Folds},
-    network::{InputChoice, Inputs, MinMax, ScalingChoice, ScalingError},
+    network::{InputChoice, Inputs, MinMax, NetworkError, ScalingChoice},
     scene::NoiseSource,
 };
 
@@ -33,7 +33,7 @@ impl Program {
         choice: InputChoice,
         unseen: NoiseSource,
         rng: &mut impl Rng,
-    ) -> Result<Self, ScalingError> {
+    ) -> Result<Self, NetworkError> {
         let training = with_noise(training, unseen, rng);
         let inputs = Inputs::fit(choice, training.readings(), NoiseSource::default())?;
         let outputs = MinMax::fit(training.targets())?;
@@ -484,7 +484,7 @@ mod tests {
             let part = |samples: std::ops::Range<usize>| set.select(&samples.collect::<Vec<_>>());
             let (training, test) = (part(0..fitted), part(fitted..y.len()));
             let (choice, none) = (InputChoice::MEASURED, NoiseSource::default());
-            let decoder = |program: Result<Program, ScalingError>| ProgramDecoder::new(program.unwrap());
+            let decoder = |program: Result<Program, NetworkError>| ProgramDecoder::new(program.unwrap());
             let ridge = r2(&mut decoder(Program::ridge(&training, Quantity::Raw, none)), &test);
             assert!((ridge - r2_ridge).abs() < 0.01, "{name}: ridge {ridge}, {r2_ridge}");
             let mut rng = Seed(0).rng(Stream::Expectation);

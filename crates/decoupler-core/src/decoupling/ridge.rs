@@ -2,8 +2,8 @@ use faer::{Mat, MatRef};
 use ndarray::{Array2, ArrayView2};
 
 use crate::{
-    dataset::{Dataset, DivisionError, Folds, Seed, SplitBy, Stream},
-    network::ScalingError,
+    dataset::{Dataset, DatasetError, Folds, Seed, SplitBy, Stream},
+    network::NetworkError,
 };
 
 /// Ridge regression of outputs on features, with the penalty of each output chosen by cross-validation.
@@ -47,7 +47,7 @@ impl Regression<'_> {
     ///
     /// # Errors
     /// If there are no samples, or the equations have no finite solution.
-    pub fn ridge(&self, folds: Option<&Folds>) -> Result<Ridge, ScalingError> {
+    pub fn ridge(&self, folds: Option<&Folds>) -> Result<Ridge, NetworkError> {
         let all: Vec<usize> = (0..self.samples).collect();
         let parts: Vec<&[usize]> = match folds {
             Some(folds) => (0..folds.count()).map(|fold| folds.test(fold)).collect(),
@@ -80,7 +80,7 @@ impl Regression<'_> {
     ///
     /// # Errors
     /// If there are no samples, or the equations have no finite solution.
-    pub fn least_squares(&self) -> Result<Array2<f64>, ScalingError> {
+    pub fn least_squares(&self) -> Result<Array2<f64>, NetworkError> {
         let all: Vec<usize> = (0..self.samples).collect();
         let fit = self.spectrum([&self.factor(&all)].into_iter(), self.samples)?;
         Ok(fit.map(&vec![0.0; self.outputs]))
@@ -124,9 +124,9 @@ impl Regression<'_> {
         &self,
         factors: impl Iterator<Item = &'f Mat<f64>>,
         samples: usize,
-    ) -> Result<Spectrum, ScalingError> {
+    ) -> Result<Spectrum, NetworkError> {
         if samples == 0 {
-            return Err(ScalingError::Empty);
+            return Err(NetworkError::Empty);
         }
         let (n, m) = (self.features, self.outputs);
         // The squared error that noise adds, summed over the samples, is that of these additional rows.
@@ -146,13 +146,13 @@ impl Regression<'_> {
             first += factor.nrows();
         }
         if !joined.is_all_finite() {
-            return Err(ScalingError::NotConverged);
+            return Err(NetworkError::NotConverged);
         }
         let r = joined.qr().thin_R().to_owned();
         let means: Vec<f64> = (1..1 + n + m).map(|column| r[(0, column)] / r[(0, 0)]).collect();
         let rows = (r.nrows() - 1).min(n);
         let svd = r.submatrix(1, 1, rows, n).thin_svd();
-        let svd = svd.map_err(|_| ScalingError::NotConverged)?;
+        let svd = svd.map_err(|_| NetworkError::NotConverged)?;
         let mut singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
         let smallest = f64::EPSILON * (n + 1) as f64 * singular.first().copied().unwrap_or(0.0);
         singular.retain(|&value| value > smallest);
@@ -319,10 +319,10 @@ impl Standard {
     ///
     /// # Errors
     /// If there are no values, or they overflow.
-    pub fn fit(values: ArrayView2<'_, f64>, of: impl Fn(f64) -> f64) -> Result<Self, ScalingError> {
+    pub fn fit(values: ArrayView2<'_, f64>, of: impl Fn(f64) -> f64) -> Result<Self, NetworkError> {
         let (samples, features) = values.dim();
         if samples == 0 {
-            return Err(ScalingError::Empty);
+            return Err(NetworkError::Empty);
         }
         let first: Vec<f64> = values.row(0).iter().map(|&value| of(value)).collect();
         let (mut shift, mut largest) = (vec![0.0; features], vec![0.0_f64; features]);
@@ -365,7 +365,7 @@ impl Standard {
         if all.copied().all(f64::is_finite) {
             Ok(standard)
         } else {
-            Err(ScalingError::NotConverged)
+            Err(NetworkError::NotConverged)
         }
     }
 
@@ -388,7 +388,7 @@ pub(crate) fn ridge(
     inputs: ArrayView2<'_, f64>,
     targets: ArrayView2<'_, f64>,
     folds: &Folds,
-) -> Result<Ridge, ScalingError> {
+) -> Result<Ridge, NetworkError> {
     let standard = Standard::fit(inputs, |value| value)?;
     let offsets = Standard::fit(targets, |value| value)?.centre;
     let regression = Regression {
@@ -436,7 +436,7 @@ pub(super) fn folds(set: &Dataset) -> Option<Folds> {
     let divide = |folds| Folds::by(set, folds, by, &mut Seed(0).rng(Stream::Split));
     match divide(count) {
         Ok(folds) => Some(folds),
-        Err(DivisionError::Folds { units, .. }) if units >= 2 => divide(units).ok(),
+        Err(DatasetError::Folds { units, .. }) if units >= 2 => divide(units).ok(),
         // A single group.
         Err(_) if samples >= 2 => Some(Folds::consecutive(samples, count.min(samples))),
         Err(_) => None,
@@ -705,7 +705,7 @@ mod tests {
         let none = Array2::zeros((0, 2));
         assert!(matches!(
             Standard::fit(none.view(), |value| value),
-            Err(ScalingError::Empty)
+            Err(NetworkError::Empty)
         ));
     }
 
@@ -746,7 +746,7 @@ mod tests {
         }
         let (x, y) = (normal(0, 3, 0), normal(0, 2, 0));
         let empty = with(&x, &y, &none(3), |regression| regression.ridge(None).map(|_| ()));
-        assert_eq!(empty, Err(ScalingError::Empty));
+        assert_eq!(empty, Err(NetworkError::Empty));
     }
 
     #[test]

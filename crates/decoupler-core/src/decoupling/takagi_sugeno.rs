@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     dataset::Dataset,
-    network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError},
+    network::{InputChoice, Inputs, MinMax, NetworkError, Quantity, ScalingChoice},
     scene::NoiseSource,
 };
 
@@ -49,7 +49,7 @@ impl Program {
         quantity: Quantity,
         unseen: NoiseSource,
         rng: &mut impl Rng,
-    ) -> Result<Self, ScalingError> {
+    ) -> Result<Self, NetworkError> {
         let scaling = ScalingChoice::Whitening;
         let training = with_noise(training, unseen, rng);
         let inputs = Inputs::fit(
@@ -91,7 +91,7 @@ fn with_rules(
     inputs: &Inputs,
     outputs: &MinMax,
     antecedents: &Array2<f64>,
-) -> Result<(Program, f64), ScalingError> {
+) -> Result<(Program, f64), NetworkError> {
     let (ranges, varying) = (outputs.middles_and_half_widths(), outputs.varying());
     let (channels, rules) = (set.channels(), antecedents.ncols());
     let (quantity, centre) = (inputs.quantity(), inputs.affine().0);
@@ -442,7 +442,7 @@ mod tests {
         assert!(
             matches!(
                 error,
-                ScalingError::NotFinite {
+                NetworkError::NotFinite {
                     sample: 3,
                     channel: 2,
                     ..
@@ -452,7 +452,7 @@ mod tests {
         );
         let none = set.select(&[]);
         let error = Program::fuzzy(&none, Quantity::Conductance, NoiseSource::default(), &mut rng).unwrap_err();
-        assert_eq!(error, ScalingError::Empty);
+        assert_eq!(error, NetworkError::Empty);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use crate::{
     machine::MemoryBudget,
     network::{Inputs, MinMax, Mlp, Shape, nguyen_widrow},
     scene::{NoiseSource, NoisySets, RowModel},
-    training::{Examples, Problem, ResumeError, Trainer, TrainerState, check_width},
+    training::{Examples, Problem, Trainer, TrainerState, TrainingError, check_width},
 };
 
 /// Weights with which the trainings of a run begin.
@@ -118,7 +118,7 @@ fn resume(settings: RunSettings, states: Vec<TrainerState>, tasks: &[Task]) -> R
         let refused = |source| RunError::Resume { start, source };
         let trainer = Trainer::resume(state, task.problem.clone()).map_err(refused)?;
         if trainer.present().shape() != task.shape {
-            return Err(refused(ResumeError::Damaged("it has another number of hidden nodes")));
+            return Err(refused(TrainingError::Damaged("it has another number of hidden nodes")));
         }
         Ok(trainer)
     });

@@ -13,17 +13,16 @@ use super::{
     TestErrors, starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, DivisionError, PerRow, SimulationError, SplitBy},
+    dataset::{Dataset, DatasetError, PerRow, SimulationError, SplitBy},
     decoupling::{DecodeError, FitError},
     job::{Cancelled, Job},
     machine::MemoryBudget,
-    network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, ScalingError},
+    network::{DecouplingNetwork, Inputs, MinMax, Mlp, NetworkError, Networks},
     problem::Problem,
     scene::SceneError,
     sensor::SensorError,
     training::{
-        Method, ResumeError, SettingError, StopReason, StoppingRules, TrainerState, TrainingDefect, TrainingError,
-        check_width,
+        Method, SettingError, StopReason, StoppingRules, TrainerState, TrainingDefect, TrainingError, check_width,
     },
 };
 
@@ -362,10 +361,10 @@ pub enum RunError {
     Fit(#[from] FitError),
     /// Samples cannot be divided.
     #[error(transparent)]
-    Division(#[from] DivisionError),
+    Division(#[from] DatasetError),
     /// Samples cannot be scaled.
     #[error(transparent)]
-    Scaling(#[from] ScalingError),
+    Scaling(#[from] NetworkError),
     /// A reading is not a resistance.
     #[error(transparent)]
     Decode(#[from] DecodeError),
@@ -435,7 +434,7 @@ pub enum RunError {
         /// Index of the start, from 0.
         start: usize,
         /// Reason given by the trainer.
-        source: ResumeError,
+        source: TrainingError,
     },
     /// The number of saved trainings does not match the settings.
     #[error("{found} saved trainings, but the settings ask for {expected}: starts times networks")]

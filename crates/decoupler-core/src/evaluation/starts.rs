@@ -143,10 +143,7 @@ impl StartTrainer {
     }
 
     pub(super) fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
-        // Rows may have different inputs, so all are checked before any is changed.
-        for trainer in &self.rows {
-            trainer.check_method(&method)?;
-        }
+        // All rows have the same method, so either the first is rejected or none.
         self.rows
             .iter_mut()
             .try_for_each(|trainer| trainer.continue_with(method))

@@ -4,7 +4,7 @@ use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ChannelNoise, MinMax, Quantity, ReadingRange, ScalingError, Whitening,
+    ChannelNoise, MinMax, NetworkError, Quantity, ReadingRange, Whitening,
     quantity::{root_mean_square, rounding},
 };
 use crate::{
@@ -131,7 +131,7 @@ impl Inputs {
         choice: InputChoice,
         resistances_ohm: ArrayView2<'_, f64>,
         unseen: NoiseSource,
-    ) -> Result<Self, ScalingError> {
+    ) -> Result<Self, NetworkError> {
         let quantity = choice.quantity;
         quantity.check(resistances_ohm)?;
         let values = quantity.of_all(resistances_ohm);

@@ -3,6 +3,7 @@
 //! A [`DecouplingNetwork`] is an [`Mlp`] with the scaling on both sides ([`Inputs`], [`MinMax`]); [`Networks`] are one
 //! network shared by all row-wires or one per row-wire. Weights are initialised at random by [`nguyen_widrow`].
 
+mod error;
 mod inputs;
 mod mlp;
 mod networks;
@@ -11,12 +12,13 @@ mod scaling;
 mod tanh;
 mod whitening;
 
+pub use error::NetworkError;
 pub(crate) use inputs::channel_noise;
 pub use inputs::{InputChoice, InputScaling, Inputs, ScalingChoice};
 pub use mlp::{Mlp, Shape, nguyen_widrow};
-pub use networks::{DecouplingNetwork, HiddenSuggestions, LARGEST_HIDDEN, NetworkError, Networks};
+pub use networks::{DecouplingNetwork, HiddenSuggestions, LARGEST_HIDDEN, Networks};
 pub use quantity::{ChannelNoise, Quantity};
-pub use scaling::{MinMax, ReadingRange, ScalingError};
+pub use scaling::{MinMax, ReadingRange};
 pub(crate) use tanh::{exp, tanh, tanh_single};
 pub use tanh::{tanh_in_place, tanh_in_place_single};
 pub use whitening::Whitening;

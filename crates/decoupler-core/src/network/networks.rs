@@ -4,9 +4,8 @@ use serde::{
     Deserialize, Deserializer, Serialize, Serializer,
     de::{MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
 };
-use thiserror::Error;
 
-use super::{InputScaling, Inputs, MinMax, Mlp, Quantity, ReadingRange, Shape};
+use super::{InputScaling, Inputs, MinMax, Mlp, NetworkError, Quantity, ReadingRange, Shape};
 use crate::dataset::PerRow;
 
 /// Trained networks: one shared by all row-wires read, or one per row-wire where the row is known.
@@ -102,33 +101,6 @@ pub struct DecouplingNetwork {
     outputs: MinMax,
 }
 
-/// Error in a saved network.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum NetworkError {
-    /// The limits of a scaling, or of the readings in the training set, are missing, not finite, or out of order.
-    #[error("the {0} scaling is damaged: its limits are missing, not finite, or out of order")]
-    Scaling(&'static str),
-    /// The number of weights in a layer does not match the scaling and the hidden nodes.
-    #[error("the {layer} layer has {found} weights, but {expected} follow from the scaling and the hidden nodes")]
-    LayerSize {
-        /// Name of the layer.
-        layer: &'static str,
-        /// Number of weights found.
-        found: usize,
-        /// Number of weights expected.
-        expected: usize,
-    },
-    /// A weight is NaN or infinite.
-    #[error("weight {index} of the {layer} layer is not a finite number")]
-    Weight {
-        /// Name of the layer.
-        layer: &'static str,
-        /// Index of the weight, row by row from 0.
-        index: usize,
-    },
-}
-
 impl DecouplingNetwork {
     /// Combines a network with the scaling it was trained with.
     ///
@@ -199,7 +171,7 @@ impl TryFrom<Record> for DecouplingNetwork {
             ("output", record.output_scaling.is_valid()),
         ] {
             if !is_valid {
-                return Err(NetworkError::Scaling(side));
+                return Err(NetworkError::DamagedScaling(side));
             }
         }
         let shape = Shape {

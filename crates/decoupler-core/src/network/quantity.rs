@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::text::{Named, UnknownName};
 
-use super::ScalingError;
+use super::NetworkError;
 
 /// Quantity computed from a resistance R as the input of a decoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -60,9 +60,9 @@ impl Quantity {
     ///
     /// # Errors
     /// At the first reading for which it is not.
-    pub(crate) fn check(self, readings: ArrayView2<'_, f64>) -> Result<(), ScalingError> {
+    pub(crate) fn check(self, readings: ArrayView2<'_, f64>) -> Result<(), NetworkError> {
         match readings.indexed_iter().find(|(_, value)| !self.accepts(**value)) {
-            Some(((sample, channel), &value)) => Err(ScalingError::Reading { sample, channel, value }),
+            Some(((sample, channel), &value)) => Err(NetworkError::Reading { sample, channel, value }),
             None => Ok(()),
         }
     }

@@ -1,8 +1,7 @@
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use super::Quantity;
+use super::{NetworkError, Quantity};
 
 /// Scaling of channels to [−1, 1] by their training minimum and maximum; constant channels are removed and restored.
 ///
@@ -16,75 +15,17 @@ pub struct MinMax {
     maximum: Vec<f64>,
 }
 
-/// Error in fitting or reading a scaling.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum ScalingError {
-    /// There are no samples.
-    #[error("there are no samples to scale")]
-    Empty,
-    /// A value is NaN or infinite.
-    #[error("sample {}, channel {}: {value:?} is not a finite number; give finite readings and targets", .sample + 1, .channel + 1)]
-    NotFinite {
-        /// Index of the sample, from 0.
-        sample: usize,
-        /// Index of the channel, from 0.
-        channel: usize,
-        /// Value found.
-        value: f64,
-    },
-    /// A reading is outside the domain of the chosen input quantity.
-    #[error("sample {}, channel {}: {value:?} is not a resistance; give finite numbers above 0, or use the raw readings", .sample + 1, .channel + 1)]
-    Reading {
-        /// Index of the sample, from 0.
-        sample: usize,
-        /// Index of the channel, from 0.
-        channel: usize,
-        /// Reading found.
-        value: f64,
-    },
-    /// The range of a channel overflows.
-    #[error("channel {} ranges from {minimum:?} to {maximum:?}: too wide to scale; use a larger unit", .channel + 1)]
-    Range {
-        /// Index of the channel, from 0.
-        channel: usize,
-        /// Smallest value of the channel.
-        minimum: f64,
-        /// Largest value of the channel.
-        maximum: f64,
-    },
-    /// The range of a channel is so narrow that its reciprocal overflows.
-    #[error("channel {} ranges from {minimum:?} to {maximum:?}: too narrow to scale; use a smaller unit", .channel + 1)]
-    Narrow {
-        /// Index of the channel, from 0.
-        channel: usize,
-        /// Smallest value of the channel.
-        minimum: f64,
-        /// Largest value of the channel.
-        maximum: f64,
-    },
-    /// A decomposition did not converge, or sums overflowed.
-    #[error(
-        "the equations of the fit or of the principal components have no finite solution: look for extreme values in the \
-         readings and targets, or scale the readings by their range"
-    )]
-    NotConverged,
-    /// The scaling in a file is inconsistent.
-    #[error("its parts are missing, not finite, or of sizes that do not fit")]
-    Damaged,
-}
-
 impl MinMax {
     /// Fits the ranges of `values` (samples × channels).
     ///
     /// # Errors
     /// If there are no samples, a value is not finite, or a range or its reciprocal overflows.
-    pub fn fit(values: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
+    pub fn fit(values: ArrayView2<'_, f64>) -> Result<Self, NetworkError> {
         if values.nrows() == 0 {
-            return Err(ScalingError::Empty);
+            return Err(NetworkError::Empty);
         }
         if let Some(((sample, channel), &value)) = values.indexed_iter().find(|(_, value)| !value.is_finite()) {
-            return Err(ScalingError::NotFinite { sample, channel, value });
+            return Err(NetworkError::NotFinite { sample, channel, value });
         }
         let extreme = |pick: fn(f64, f64) -> f64| -> Vec<f64> {
             let first = values.row(0).to_owned();
@@ -97,14 +38,14 @@ impl MinMax {
         let (minimum, maximum) = (extreme(f64::min), extreme(f64::max));
         for (channel, (&minimum, &maximum)) in minimum.iter().zip(&maximum).enumerate() {
             if !(maximum - minimum).is_finite() {
-                return Err(ScalingError::Range {
+                return Err(NetworkError::Range {
                     channel,
                     minimum,
                     maximum,
                 });
             }
             if minimum < maximum && !(0.5 * (maximum - minimum)).recip().is_finite() {
-                return Err(ScalingError::Narrow {
+                return Err(NetworkError::Narrow {
                     channel,
                     minimum,
                     maximum,
@@ -307,18 +248,18 @@ mod tests {
         let nan = MinMax::fit(array![[1.0, 2.0], [1.0, f64::NAN]].view()).unwrap_err();
         assert!(matches!(
             nan,
-            ScalingError::NotFinite {
+            NetworkError::NotFinite {
                 sample: 1,
                 channel: 1,
                 ..
             }
         ));
         let wide = MinMax::fit(array![[-1e308], [1e308]].view()).unwrap_err();
-        assert!(matches!(wide, ScalingError::Range { channel: 0, .. }));
+        assert!(matches!(wide, NetworkError::Range { channel: 0, .. }));
         let narrow = MinMax::fit(array![[1.0, 0.0], [2.0, 1e-309]].view()).unwrap_err();
-        assert!(matches!(narrow, ScalingError::Narrow { channel: 1, .. }));
+        assert!(matches!(narrow, NetworkError::Narrow { channel: 1, .. }));
         assert!(MinMax::fit(array![[0.0], [1e-307]].view()).is_ok());
-        assert_eq!(MinMax::fit(Array2::zeros((0, 3)).view()), Err(ScalingError::Empty));
+        assert_eq!(MinMax::fit(Array2::zeros((0, 3)).view()), Err(NetworkError::Empty));
     }
 
     #[test]

@@ -2,7 +2,7 @@ use faer::Mat;
 use ndarray::{Array2, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
-use super::{ChannelNoise, ScalingError};
+use super::{ChannelNoise, NetworkError};
 
 /// Noise-aware whitening: principal components of the training values, each divided by √(σ² + noise²), where σ² is the
 /// component's variance and noise² the variance that noise adds to it.
@@ -37,14 +37,14 @@ impl Whitening {
         rounding: &[f64],
         unseen: &ChannelNoise,
         max_components: usize,
-    ) -> Result<Self, ScalingError> {
+    ) -> Result<Self, NetworkError> {
         let (samples, channels) = values.dim();
         assert_eq!([rounding.len(), unseen.own.len(), unseen.common.len()], [channels; 3]);
         let Some(mean) = values.mean_axis(Axis(0)) else {
-            return Err(ScalingError::Empty);
+            return Err(NetworkError::Empty);
         };
         if let Some(((sample, channel), &value)) = values.indexed_iter().find(|(_, value)| !value.is_finite()) {
-            return Err(ScalingError::NotFinite { sample, channel, value });
+            return Err(NetworkError::NotFinite { sample, channel, value });
         }
         // The mean of many samples has a rounding error; adding the mean of the small residuals removes most of it.
         let rest = (&values - &mean).mean_axis(Axis(0)).expect("there are samples");
@@ -58,7 +58,7 @@ impl Whitening {
         } else {
             centred
         };
-        let svd = triangle.thin_svd().map_err(|_| ScalingError::NotConverged)?;
+        let svd = triangle.thin_svd().map_err(|_| NetworkError::NotConverged)?;
         let singular = svd.S().column_vector();
         let root = (samples as f64).sqrt();
         // Rounding errors of the decomposition (Golub and Van Loan, Matrix Computations, section 5.5.8).
@@ -153,9 +153,9 @@ impl From<Whitening> for Record {
 }
 
 impl TryFrom<Record> for Whitening {
-    type Error = ScalingError;
+    type Error = NetworkError;
 
-    fn try_from(record: Record) -> Result<Self, ScalingError> {
+    fn try_from(record: Record) -> Result<Self, NetworkError> {
         let Record {
             mean,
             deviations,
@@ -171,7 +171,7 @@ impl TryFrom<Record> for Whitening {
                 directions,
                 deviations,
             }),
-            _ => Err(ScalingError::Damaged),
+            _ => Err(NetworkError::Damaged),
         }
     }
 }
@@ -195,7 +195,7 @@ mod tests {
         values
     }
 
-    fn fit(values: &Array2<f64>, noise: f64) -> Result<Whitening, ScalingError> {
+    fn fit(values: &Array2<f64>, noise: f64) -> Result<Whitening, NetworkError> {
         let channels = values.ncols();
         let unseen = ChannelNoise {
             own: vec![noise; channels],
@@ -307,6 +307,6 @@ mod tests {
     fn one_sample_or_none() {
         let one = fit(&correlated(1), 0.0).unwrap();
         assert_eq!(one.components(), 0);
-        assert_eq!(fit(&Array2::zeros((0, 2)), 0.0), Err(ScalingError::Empty));
+        assert_eq!(fit(&Array2::zeros((0, 2)), 0.0), Err(NetworkError::Empty));
     }
 }

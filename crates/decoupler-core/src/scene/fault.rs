@@ -1,9 +1,7 @@
 use std::{fmt, str::FromStr};
 
-use thiserror::Error;
-
-use super::{Deformation, Noise};
-use crate::sensor::{ArrayScale, Axes, RowConductance, SensorError, SensorModel, short};
+use super::{Deformation, Noise, SceneError};
+use crate::sensor::{ArrayScale, Axes, RowConductance, SensorError, SensorModel};
 
 /// A fault of the wires or of the electronics.
 ///
@@ -62,39 +60,11 @@ pub enum ConverterEnd {
     High,
 }
 
-/// Invalid description of a fault.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum FaultError {
-    /// Not the description of a fault.
-    #[error(
-        "'{0}' is not a fault: give open-row:ROW, open-column:COLUMN (both with @NODE for a break before that node), \
-         short-rows:ROW-ROW, short-columns:COLUMN-COLUMN, gain:COLUMN=REL, stuck:COLUMN=low or stuck:COLUMN=high"
-    )]
-    Text(String),
-    /// The array, or the scene, has no such wire or node.
-    #[error("there is no {what} {number}; give 1 to {last}")]
-    Number {
-        /// Kind of wire or node.
-        what: &'static str,
-        /// Number, from 1.
-        number: usize,
-        /// Largest number.
-        last: usize,
-    },
-    /// The gain error is out of range.
-    #[error("the gain error is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
-    GainRange(f64),
-    /// The scene does not read a row-wire of the fault.
-    #[error("row {0} is not read in this scene; give a row that is, or read all rows")]
-    NotRead(usize),
-}
-
 impl FromStr for Fault {
-    type Err = FaultError;
+    type Err = SceneError;
 
-    fn from_str(text: &str) -> Result<Self, FaultError> {
-        let unknown = || FaultError::Text(text.to_owned());
+    fn from_str(text: &str) -> Result<Self, SceneError> {
+        let unknown = || SceneError::FaultText(text.to_owned());
         let number = |text: &str| match text.parse::<usize>() {
             Ok(number @ 1..) => Ok(number - 1),
             _ => Err(unknown()),
@@ -122,7 +92,7 @@ impl FromStr for Fault {
                     let column = number(column)?;
                     Ok(Self::Gain { column, relative })
                 } else {
-                    Err(FaultError::GainRange(relative))
+                    Err(SceneError::GainRange(relative))
                 }
             }
             "stuck" => {
@@ -164,12 +134,12 @@ impl Fault {
     ///
     /// # Errors
     /// If a wire or node does not exist.
-    pub fn check(self, scale: ArrayScale, read: &[usize]) -> Result<(), FaultError> {
+    pub fn check(self, scale: ArrayScale, read: &[usize]) -> Result<(), SceneError> {
         let within = |what, index: usize, count: usize| {
             if index < count {
                 return Ok(());
             }
-            Err(FaultError::Number {
+            Err(SceneError::FaultNumber {
                 what,
                 number: index + 1,
                 last: count,
@@ -180,7 +150,7 @@ impl Fault {
             if read.contains(&row) {
                 Ok(())
             } else {
-                Err(FaultError::NotRead(row + 1))
+                Err(SceneError::FaultNotRead(row + 1))
             }
         };
         match self {

@@ -6,7 +6,7 @@ mod noise;
 mod noise_source;
 mod rows;
 
-pub use fault::{ConverterEnd, Fault, FaultError, FaultySensor};
+pub use fault::{ConverterEnd, Fault, FaultySensor};
 pub use loading::{Contact, DeformationSampler, Indenter, IndenterShape, Loading, Span};
 pub(crate) use noise::standard_normal;
 pub use noise::{Noise, NoisySets, RelativeNoise};
@@ -20,7 +20,10 @@ use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::sensor::{ArrayScale, Axes, Geometry, SensorError, SensorModel, short};
+use crate::{
+    sensor::{ArrayScale, Axes, Geometry, SensorError, SensorModel, short},
+    text::{Named, UnknownName},
+};
 
 /// Rows read, movement, loading and noise of the readings. The default is that of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,7 +41,7 @@ pub struct Scene {
     pub noise: Noise,
 }
 
-/// Invalid scene.
+/// Invalid scene or fault.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -62,9 +65,6 @@ pub enum SceneError {
          :cylinder or :edge"
     )]
     LoadingText(String),
-    /// Not a choice of axes.
-    #[error("'{0}' is not a choice of axes: give z or xyz")]
-    AxesText(String),
     /// The shift sideways is out of range.
     #[error(
         "the largest shift sideways is {} mm: it must be above 0 and finite; for none, choose movement along z only",
@@ -96,6 +96,28 @@ pub enum SceneError {
     /// The number of bits is out of range.
     #[error("the converter has {0} bits: give from 1 to {most}", most = Noise::MAX_BITS)]
     Bits(u8),
+    /// Not the description of a fault.
+    #[error(
+        "'{0}' is not a fault: give open-row:ROW, open-column:COLUMN (both with @NODE for a break before that node), \
+         short-rows:ROW-ROW, short-columns:COLUMN-COLUMN, gain:COLUMN=REL, stuck:COLUMN=low or stuck:COLUMN=high"
+    )]
+    FaultText(String),
+    /// The array, or the scene, has no such wire or node.
+    #[error("there is no {what} {number}; give 1 to {last}")]
+    FaultNumber {
+        /// Kind of wire or node.
+        what: &'static str,
+        /// Number, from 1.
+        number: usize,
+        /// Largest number.
+        last: usize,
+    },
+    /// The gain error is out of range.
+    #[error("the gain error is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
+    GainRange(f64),
+    /// The scene does not read a row-wire of the fault.
+    #[error("row {0} is not read in this scene; give a row that is, or read all rows")]
+    FaultNotRead(usize),
 }
 
 impl Default for Scene {
@@ -240,25 +262,30 @@ pub enum Movement {
     },
 }
 
-impl fmt::Display for Movement {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
+impl Named for Movement {
+    const WHAT: &'static str = "a choice of axes";
+    const ALL: &'static [Self] = &[Self::Z, Self::SIDEWAYS];
+
+    fn name(self) -> &'static str {
+        match self {
             Self::Z => "z",
             Self::Xyz { .. } => "xyz",
-        })
+        }
+    }
+}
+
+impl fmt::Display for Movement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
     }
 }
 
 impl FromStr for Movement {
-    type Err = SceneError;
+    type Err = UnknownName;
 
     /// Parses `z` or `xyz`.
-    fn from_str(text: &str) -> Result<Self, SceneError> {
-        match text.trim() {
-            "z" => Ok(Self::Z),
-            "xyz" => Ok(Self::SIDEWAYS),
-            _ => Err(SceneError::AxesText(text.to_owned())),
-        }
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        Self::parse(text)
     }
 }
 

@@ -1,7 +1,8 @@
 use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
+
+use super::SensorError;
 
 /// Maximum number of wires of one kind, or of nodes on a wire.
 pub const LARGEST_COUNT: usize = 512;
@@ -16,23 +17,6 @@ pub struct ArrayScale {
     nodes_per_row: usize,
     nodes_per_column: usize,
     columns: usize,
-}
-
-/// Invalid array scale.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum ArrayScaleError {
-    /// The text does not have the form `M1×M2_M3×M4`.
-    #[error("'{0}' is not an array scale: write M1xM2_M3xM4, for example 10x10_5x30")]
-    Form(String),
-    /// A count is zero or too large.
-    #[error("the number of {what} is {count}: it must be from 1 to {LARGEST_COUNT}")]
-    Count {
-        /// Name of the count.
-        what: &'static str,
-        /// Value of the count.
-        count: usize,
-    },
 }
 
 impl ArrayScale {
@@ -63,7 +47,7 @@ impl ArrayScale {
         nodes_per_row: usize,
         nodes_per_column: usize,
         columns: usize,
-    ) -> Result<Self, ArrayScaleError> {
+    ) -> Result<Self, SensorError> {
         for (what, count) in [
             ("row-wires (M1)", rows),
             ("nodes on a row-wire (M2)", nodes_per_row),
@@ -71,7 +55,7 @@ impl ArrayScale {
             ("column-wires (M4)", columns),
         ] {
             if !(1..=LARGEST_COUNT).contains(&count) {
-                return Err(ArrayScaleError::Count { what, count });
+                return Err(SensorError::Count { what, count });
             }
         }
         Ok(Self {
@@ -126,10 +110,10 @@ impl Default for ArrayScale {
 }
 
 impl FromStr for ArrayScale {
-    type Err = ArrayScaleError;
+    type Err = SensorError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let form = || ArrayScaleError::Form(text.to_owned());
+        let form = || SensorError::ScaleForm(text.to_owned());
         let mut counts = [0; 4];
         let (top, bottom) = text.trim().split_once('_').ok_or_else(form)?;
         for (layer, pair) in [top, bottom].iter().zip(counts.chunks_exact_mut(2)) {
@@ -154,7 +138,7 @@ impl fmt::Display for ArrayScale {
 }
 
 impl TryFrom<String> for ArrayScale {
-    type Error = ArrayScaleError;
+    type Error = SensorError;
 
     fn try_from(text: String) -> Result<Self, Self::Error> {
         text.parse()
@@ -191,11 +175,11 @@ mod tests {
             "10×6×3×18",
         ] {
             let error = text.parse::<ArrayScale>().unwrap_err();
-            assert!(matches!(error, ArrayScaleError::Form(_)), "{text}: {error}");
+            assert!(matches!(error, SensorError::ScaleForm(_)), "{text}: {error}");
         }
         for text in ["0x6_3x18", "10x6_3x0", "10x6_3x513"] {
             let error = text.parse::<ArrayScale>().unwrap_err();
-            assert!(matches!(error, ArrayScaleError::Count { .. }), "{text}: {error}");
+            assert!(matches!(error, SensorError::Count { .. }), "{text}: {error}");
         }
     }
 

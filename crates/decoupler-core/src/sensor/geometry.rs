@@ -1,8 +1,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use super::{ArrayScale, short};
+use super::{ArrayScale, SensorError};
 
 /// Positions of the electrode nodes of the undeformed sensor, in millimetres.
 ///
@@ -30,28 +29,6 @@ pub struct Geometry {
     pub column_node_pitch_mm: f64,
 }
 
-/// Invalid geometry.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum GeometryError {
-    /// A length is NaN or infinite.
-    #[error("{what} is {}: give a finite length in millimetres", short(*.value))]
-    NotFinite {
-        /// Name of the length.
-        what: &'static str,
-        /// Value.
-        value: f64,
-    },
-    /// A length is not positive.
-    #[error("{what} is {} mm: it must be above 0", short(*.value))]
-    NotPositive {
-        /// Name of the length.
-        what: &'static str,
-        /// Value.
-        value: f64,
-    },
-}
-
 impl Default for Geometry {
     fn default() -> Self {
         Self {
@@ -76,7 +53,7 @@ impl Geometry {
     ///
     /// # Errors
     /// If a length is not.
-    pub fn check(&self) -> Result<(), GeometryError> {
+    pub fn check(&self) -> Result<(), SensorError> {
         let Self {
             height_mm,
             row_x0_mm,
@@ -101,12 +78,12 @@ impl Geometry {
         ];
         for (what, value) in offsets.into_iter().chain(lengths) {
             if !value.is_finite() {
-                return Err(GeometryError::NotFinite { what, value });
+                return Err(SensorError::NotFinite { what, value });
             }
         }
         for (what, value) in lengths {
             if value <= 0.0 {
-                return Err(GeometryError::NotPositive { what, value });
+                return Err(SensorError::NotPositive { what, value });
             }
         }
         Ok(())

@@ -6,8 +6,8 @@ mod conductance;
 mod geometry;
 mod resistance;
 
-pub use array_scale::{ArrayScale, ArrayScaleError, LARGEST_COUNT};
+pub use array_scale::{ArrayScale, LARGEST_COUNT};
 pub use conductance::RowConductance;
-pub use geometry::{Axes, Geometry, GeometryError};
+pub use geometry::{Axes, Geometry};
 pub use glam::DVec3;
 pub use resistance::{DEFAULT_RESISTIVITY_OHM_PER_MM, RelativeNoise, SensorError, SensorModel, short};

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    ArrayScale, Geometry, GeometryError,
+    ArrayScale, Geometry, LARGEST_COUNT,
     conductance::{Divided, sum_reciprocal_distances},
 };
 
@@ -31,13 +31,37 @@ impl Default for SensorModel {
     }
 }
 
-/// Error of the resistance model.
+/// Error of the array scale, the geometry or the resistance model.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SensorError {
-    /// The geometry is invalid.
-    #[error(transparent)]
-    Geometry(#[from] GeometryError),
+    /// The text does not have the form `M1×M2_M3×M4`.
+    #[error("'{0}' is not an array scale: write M1xM2_M3xM4, for example 10x10_5x30")]
+    ScaleForm(String),
+    /// A count is zero or too large.
+    #[error("the number of {what} is {count}: it must be from 1 to {LARGEST_COUNT}")]
+    Count {
+        /// Name of the count.
+        what: &'static str,
+        /// Value of the count.
+        count: usize,
+    },
+    /// A length is NaN or infinite.
+    #[error("{what} is {}: give a finite length in millimetres", short(*.value))]
+    NotFinite {
+        /// Name of the length.
+        what: &'static str,
+        /// Value.
+        value: f64,
+    },
+    /// A length is not positive.
+    #[error("{what} is {} mm: it must be above 0", short(*.value))]
+    NotPositive {
+        /// Name of the length.
+        what: &'static str,
+        /// Value.
+        value: f64,
+    },
     /// g is not a positive number.
     #[error("the resistance per millimetre is {}: it must be above 0 and finite", short(*.0))]
     Resistivity(f64),

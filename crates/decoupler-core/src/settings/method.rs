@@ -25,7 +25,7 @@ pub enum Method {
     /// Gradient descent with momentum and an adaptive learning rate (`traingdx`).
     AdaptiveDescent(AdaptiveDescentSettings),
     /// Gradient descent with momentum of steps (`traingdm`).
-    StepMomentum(StepMomentumSettings),
+    StepMomentum(MomentumSettings),
     /// Gradient descent with momentum of gradients, Eq. (11).
     Momentum(MomentumSettings),
     /// Conventional back-propagation, Eq. (5)-(10) (`traingd`).
@@ -194,32 +194,13 @@ impl Default for AdaptiveDescentSettings {
     }
 }
 
-/// Settings of gradient descent with momentum of steps, with the field's usual defaults (`traingdm`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StepMomentumSettings {
-    /// Step length relative to the length of the gradient.
-    pub learning_rate: f64,
-    /// Share of the previous step in each step, below 1.
-    pub momentum: f64,
-}
-
-impl Default for StepMomentumSettings {
-    fn default() -> Self {
-        Self {
-            learning_rate: 0.01,
-            momentum: 0.9,
-        }
-    }
-}
-
-/// Settings of gradient descent with momentum, with the field's usual defaults.
+/// Settings of gradient descent with momentum of gradients or of steps, with the field's usual defaults.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MomentumSettings {
     /// Step length relative to the length of the gradient (alpha).
     pub learning_rate: f64,
-    /// Share of the previous gradient in each step (eta).
+    /// Share of the previous gradient (eta) or step in each step; below 1 for steps.
     pub momentum: f64,
 }
 
@@ -327,7 +308,7 @@ impl Method {
             Self::ScaledConjugateGradient(ScaledConjugateGradientSettings::default()),
             Self::Resilient(ResilientSettings::default()),
             Self::AdaptiveDescent(AdaptiveDescentSettings::default()),
-            Self::StepMomentum(StepMomentumSettings::default()),
+            Self::StepMomentum(MomentumSettings::default()),
             Self::Momentum(MomentumSettings::default()),
             Self::GradientDescent(GradientDescentSettings::default()),
         ]
@@ -420,29 +401,23 @@ impl Method {
     /// # Errors
     /// The first setting out of range, or two that contradict each other.
     pub fn check(&self) -> Result<(), SettingError> {
+        const LIMITS: [(&str, &str); 2] = [("mu", "largest mu"), ("first step length", "largest step length")];
         METHOD.iter().try_for_each(|setting| setting.check(self))?;
-        let (name, value, limit_name, limit) = match self {
-            Self::LevenbergMarquardt(Damping { mu, mu_max, .. })
-            | Self::BayesianRegularization(RegularizationSettings { mu, mu_max, .. }) => {
-                ("mu", *mu, "largest mu", *mu_max)
+        let number = |name| self.settings().find(|setting| setting.name == name)?.number(self);
+        for (name, limit_name) in LIMITS {
+            if let Some((value, limit)) = number(name)
+                .zip(number(limit_name))
+                .filter(|(value, limit)| value > limit)
+            {
+                return Err(SettingError::AboveLimit {
+                    name,
+                    value,
+                    limit_name,
+                    limit,
+                });
             }
-            Self::Resilient(settings) => (
-                "first step length",
-                settings.first_length,
-                "largest step length",
-                settings.largest_length,
-            ),
-            _ => return Ok(()),
-        };
-        if value <= limit {
-            return Ok(());
         }
-        Err(SettingError::AboveLimit {
-            name,
-            value,
-            limit_name,
-            limit,
-        })
+        Ok(())
     }
 
     /// Returns advice for a training of this method that diverged or did not lower the error: resetting the settings

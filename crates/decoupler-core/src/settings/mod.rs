@@ -7,7 +7,7 @@ mod training;
 
 pub use method::{
     AdaptiveDescentSettings, Damping, GradientDescentSettings, Method, MomentumSettings, RegularizationSettings,
-    ResilientSettings, ScaledConjugateGradientSettings, StepMomentumSettings,
+    ResilientSettings, ScaledConjugateGradientSettings,
 };
 pub use rows::{AsText, Field, Kind, Setting, SettingError, Value};
 pub(crate) use training::MIN_MU;

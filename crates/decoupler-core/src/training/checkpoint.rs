@@ -3,10 +3,9 @@
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::{
-    EpochRecord, History, Method, MethodState, Problem, SettingError, Stage, StopReason, StoppingRules, Trainer,
+    EpochColumns, EpochRecord, Method, MethodState, Problem, SettingError, Stage, StopReason, StoppingRules, Trainer,
     TrainingError, TrainingSettings, activations::Activations, trainer::Best,
 };
 use crate::network::{Mlp, Shape};
@@ -23,49 +22,12 @@ pub struct TrainerState {
     mse: f64,
     best_weights: Vec<f64>,
     best_epoch: usize,
-    history: History,
+    history: EpochColumns,
     stages: Vec<Stage>,
     validation_failures: usize,
     stop_reason: Option<StopReason>,
     elapsed: Duration,
     method: MethodState,
-}
-
-/// Reason why a training cannot be resumed.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum ResumeError {
-    /// A setting is out of range.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// The parts contradict each other, or contain numbers that are not finite.
-    #[error("the saved training is damaged: {0}")]
-    Damaged(&'static str),
-    /// The network does not fit the samples.
-    #[error(
-        "the saved network has {} inputs and {} outputs, the samples have {inputs} and {outputs}: resume with the \
-         settings it was started with",
-        .shape.inputs, .shape.outputs
-    )]
-    Shape {
-        /// Shape of the saved network.
-        shape: Shape,
-        /// Number of inputs of the samples.
-        inputs: usize,
-        /// Number of outputs of the samples.
-        outputs: usize,
-    },
-    /// The saved weights have a different error on these samples.
-    #[error(
-        "the saved training had an error of {saved:e}, on these samples it is {found:e}: resume with the settings and \
-         the version of the program it was started with"
-    )]
-    OtherSamples {
-        /// The training error saved.
-        saved: f64,
-        /// The training error found.
-        found: f64,
-    },
 }
 
 /// Relative difference up to which two training errors count as the same. Rounding on another machine stays far below.
@@ -83,7 +45,7 @@ impl TrainerState {
     }
 
     /// Checks everything that does not depend on the samples.
-    fn check(&self) -> Result<(), ResumeError> {
+    fn check(&self) -> Result<(), TrainingError> {
         self.settings.method.check()?;
         self.settings.stopping.check()?;
         let Shape {
@@ -97,26 +59,28 @@ impl TrainerState {
         let expected = w.zip(v).and_then(|(w, v)| w.checked_add(v));
         let sizes = [self.weights.len(), self.best_weights.len()];
         if hidden == 0 || outputs == 0 || sizes.iter().any(|size| Some(*size) != expected) {
-            return Err(ResumeError::Damaged("its weights do not fit its layers"));
+            return Err(TrainingError::Damaged("its weights do not fit its layers"));
         }
         let mut weights = self.weights.iter().chain(&self.best_weights);
         if !weights.all(|weight| weight.is_finite()) {
-            return Err(ResumeError::Damaged("a weight is not a finite number"));
+            return Err(TrainingError::Damaged("a weight is not a finite number"));
         }
         let history = self.history();
         if history.is_empty() || history.iter().enumerate().any(|(epoch, kept)| kept.epoch != epoch) {
-            return Err(ResumeError::Damaged("its history has gaps"));
+            return Err(TrainingError::Damaged("its history has gaps"));
         }
         if self.best_epoch >= history.len() {
-            return Err(ResumeError::Damaged("its best epoch is after the last"));
+            return Err(TrainingError::Damaged("its best epoch is after the last"));
         }
         let first_epochs = || self.stages.iter().map(|stage| stage.first_epoch);
         if first_epochs().next() != Some(0) || !first_epochs().is_sorted() {
-            return Err(ResumeError::Damaged("its methods are out of order"));
+            return Err(TrainingError::Damaged("its methods are out of order"));
         }
         self.stages.iter().try_for_each(|stage| stage.method.check())?;
         if !self.method.fits(self.weights.len()) {
-            return Err(ResumeError::Damaged("the state of its method does not fit its weights"));
+            return Err(TrainingError::Damaged(
+                "the state of its method does not fit its weights",
+            ));
         }
         Ok(())
     }
@@ -132,7 +96,7 @@ impl Trainer {
             mse: Activations::new(self.mlp.shape()).mse(&self.mlp, &self.problem.training),
             best_weights: self.best.mlp.weights().to_vec(),
             best_epoch: self.best.epoch,
-            history: History(self.history.clone()),
+            history: EpochColumns(self.history.clone()),
             stages: self.stages.clone(),
             validation_failures: self.validation_failures,
             stop_reason: self.stop_reason,
@@ -145,11 +109,11 @@ impl Trainer {
     ///
     /// # Errors
     /// If the state is damaged or belongs to other samples.
-    pub fn resume(state: TrainerState, problem: Problem) -> Result<Self, ResumeError> {
+    pub fn resume(state: TrainerState, problem: Problem) -> Result<Self, TrainingError> {
         state.check()?;
         let (shape, training) = (state.shape, &problem.training);
         if (shape.inputs, shape.outputs) != (training.inputs(), training.outputs()) {
-            return Err(ResumeError::Shape {
+            return Err(TrainingError::Shape {
                 shape,
                 inputs: training.inputs(),
                 outputs: training.outputs(),
@@ -162,10 +126,10 @@ impl Trainer {
         // False for NaN.
         let is_same = (found - saved).abs() <= SAME_ERROR * saved.abs();
         if !is_same {
-            return Err(ResumeError::OtherSamples { saved, found });
+            return Err(TrainingError::OtherSamples { saved, found });
         }
         let algorithm = state.settings.method.resume(state.method, &mlp, training);
-        let algorithm = algorithm.ok_or(ResumeError::Damaged("the state belongs to another method"))?;
+        let algorithm = algorithm.ok_or(TrainingError::Damaged("the state belongs to another method"))?;
         let best = state.history.0[state.best_epoch];
         let best_mse = best.validation_mse.unwrap_or(best.training_mse);
         Ok(Self {
@@ -196,7 +160,7 @@ impl Trainer {
     /// # Errors
     /// If a setting is out of range; nothing is then changed.
     pub fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
-        self.check_method(&method)?;
+        method.check()?;
         let begun = Instant::now();
         let first_epoch = self.latest().epoch + 1;
         self.stages.retain(|stage| stage.first_epoch < first_epoch);
@@ -207,15 +171,6 @@ impl Trainer {
         let all_run = self.latest().epoch >= self.settings.stopping.epochs;
         self.stop_reason = all_run.then_some(StopReason::EpochsReached);
         self.elapsed += begun.elapsed();
-        Ok(())
-    }
-
-    /// Checks that [`Self::continue_with`] would accept this method.
-    ///
-    /// # Errors
-    /// As [`Self::continue_with`].
-    pub fn check_method(&self, method: &Method) -> Result<(), TrainingError> {
-        method.check()?;
         Ok(())
     }
 

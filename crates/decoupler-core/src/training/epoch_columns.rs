@@ -1,11 +1,8 @@
 //! File format of the history of a training, column by column.
 
-use std::fmt;
+use std::num::ParseFloatError;
 
-use serde::{
-    Deserialize, Deserializer, Serialize, Serializer,
-    de::{Error, Visitor},
-};
+use serde::{Deserialize, Serialize};
 
 use super::EpochRecord;
 
@@ -13,9 +10,9 @@ use super::EpochRecord;
 /// plotting programs read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Columns", into = "Columns")]
-pub struct History(pub Vec<EpochRecord>);
+pub struct EpochColumns(pub Vec<EpochRecord>);
 
-#[derive(Default, Serialize, Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Columns {
     epoch: Vec<usize>,
@@ -28,34 +25,25 @@ struct Columns {
     validation_failures: Vec<usize>,
 }
 
-impl From<History> for Columns {
-    fn from(history: History) -> Self {
-        let mut columns = Self::default();
-        for record in history.0 {
-            let EpochRecord {
-                epoch,
-                training_mse,
-                validation_mse,
-                test_mse,
-                gradient_norm,
-                parameter,
-                effective_parameters,
-                validation_failures,
-            } = record;
-            columns.epoch.push(epoch);
-            columns.training_mse.push(Number(training_mse));
-            columns.validation_mse.push(validation_mse.map(Number));
-            columns.test_mse.push(test_mse.map(Number));
-            columns.gradient_norm.push(Number(gradient_norm));
-            columns.parameter.push(Number(parameter));
-            columns.effective_parameters.push(effective_parameters.map(Number));
-            columns.validation_failures.push(validation_failures);
+impl From<EpochColumns> for Columns {
+    fn from(EpochColumns(records): EpochColumns) -> Self {
+        fn column<T>(records: &[EpochRecord], value: impl Fn(&EpochRecord) -> T) -> Vec<T> {
+            records.iter().map(value).collect()
         }
-        columns
+        Self {
+            epoch: column(&records, |record| record.epoch),
+            training_mse: column(&records, |record| Number(record.training_mse)),
+            validation_mse: column(&records, |record| record.validation_mse.map(Number)),
+            test_mse: column(&records, |record| record.test_mse.map(Number)),
+            gradient_norm: column(&records, |record| Number(record.gradient_norm)),
+            parameter: column(&records, |record| Number(record.parameter)),
+            effective_parameters: column(&records, |record| record.effective_parameters.map(Number)),
+            validation_failures: column(&records, |record| record.validation_failures),
+        }
     }
 }
 
-impl TryFrom<Columns> for History {
+impl TryFrom<Columns> for EpochColumns {
     type Error = String;
 
     fn try_from(columns: Columns) -> Result<Self, String> {
@@ -69,10 +57,8 @@ impl TryFrom<Columns> for History {
             ("effective_parameters", columns.effective_parameters.len()),
             ("validation_failures", columns.validation_failures.len()),
         ];
-        for (name, length) in lengths {
-            if length != epochs {
-                return Err(format!("history.{name} has {length} entries, but epoch has {epochs}"));
-            }
+        if let Some((name, length)) = lengths.into_iter().find(|(_, length)| *length != epochs) {
+            return Err(format!("history.{name} has {length} entries, but epoch has {epochs}"));
         }
         if let Some(missing) = (0..epochs).find(|&epoch| columns.epoch[epoch] != epoch) {
             return Err(format!("history.epoch: epoch {missing} is missing"));
@@ -92,52 +78,34 @@ impl TryFrom<Columns> for History {
 }
 
 /// Number that may be infinite or NaN; these are strings in the file, since JSON has no such numbers.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(into = "Written", try_from = "Written")]
 struct Number(f64);
 
-impl Serialize for Number {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        if self.0.is_finite() {
-            serializer.serialize_f64(self.0)
+#[derive(Serialize, Deserialize)]
+#[serde(untagged, expecting = "give a number, \"inf\", \"-inf\" or \"NaN\"")]
+enum Written {
+    Number(f64),
+    Text(String),
+}
+
+impl From<Number> for Written {
+    fn from(Number(value): Number) -> Self {
+        if value.is_finite() {
+            Self::Number(value)
         } else {
-            serializer.collect_str(&self.0)
+            Self::Text(value.to_string())
         }
     }
 }
 
-impl<'de> Deserialize<'de> for Number {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(NumberVisitor).map(Self)
-    }
-}
+impl TryFrom<Written> for Number {
+    type Error = ParseFloatError;
 
-struct NumberVisitor;
-
-impl Visitor<'_> for NumberVisitor {
-    type Value = f64;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number, \"inf\", \"-inf\" or \"NaN\"")
-    }
-
-    fn visit_f64<E: Error>(self, value: f64) -> Result<f64, E> {
-        Ok(value)
-    }
-
-    fn visit_u64<E: Error>(self, value: u64) -> Result<f64, E> {
-        Ok(value as f64)
-    }
-
-    fn visit_i64<E: Error>(self, value: i64) -> Result<f64, E> {
-        Ok(value as f64)
-    }
-
-    fn visit_str<E: Error>(self, value: &str) -> Result<f64, E> {
-        match value {
-            "inf" => Ok(f64::INFINITY),
-            "-inf" => Ok(f64::NEG_INFINITY),
-            "NaN" => Ok(f64::NAN),
-            _ => Err(E::invalid_value(serde::de::Unexpected::Str(value), &self)),
+    fn try_from(written: Written) -> Result<Self, ParseFloatError> {
+        match written {
+            Written::Number(value) => Ok(Self(value)),
+            Written::Text(text) => text.parse().map(Self),
         }
     }
 }
@@ -159,9 +127,9 @@ mod tests {
             effective_parameters: Some(value),
             validation_failures: epoch,
         };
-        let history = History(values.iter().enumerate().map(record).collect());
+        let history = EpochColumns(values.iter().enumerate().map(record).collect());
         let text = serde_json::to_string(&history).unwrap();
-        let read: History = serde_json::from_str(&text).unwrap();
+        let read: EpochColumns = serde_json::from_str(&text).unwrap();
         for (read, value) in read.0.iter().zip(values) {
             let numbers = [read.training_mse, read.gradient_norm, read.parameter];
             for number in numbers

@@ -8,120 +8,32 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AdaptiveDescentSettings, Evaluation, Examples, ResilientSettings, StopReason,
+    Evaluation, Examples, Method, StopReason,
     activations::Backpropagation,
     method::{Algorithm, MethodState},
 };
 use crate::network::Mlp;
 
-/// What a step of gradient descent mixes in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Mixed {
-    /// Nothing: conventional back-propagation of the paper, Eq. (5)-(10), in batch form: `v(N+1) = v(N) + α g(N)`, where
-    /// g is the negative gradient of the mean squared error over all samples. Eq. (8)-(9) are written for a sigmoid; the
-    /// derivative of our layers is 1 − h² for the tanh nodes and 1 for the linear outputs.
-    Nothing,
-    /// The previous **gradient**, Eq. (11) of the paper: `v(N+1) = v(N) + α[(1−η) g(N) + η g(N−1)]`. In the first step
-    /// g(N−1) = g(N).
-    Gradient,
-    /// The previous **step** (Rumelhart, Hinton and Williams 1986; `traingdm`): `dX = mc·dXprev + lr·(1 − mc)·g`; dXprev
-    /// is 0 before the first step.
-    Step,
-}
-
-/// Gradient descent with a fixed learning rate.
+/// Method whose steps follow from the gradient g of the mean squared error over all samples, and from the last step or
+/// gradient.
+///
+/// - Conventional back-propagation, Eq. (5)-(10), in batch form: `v(N+1) = v(N) − α g(N)`. Eq. (8)-(9) are written for a
+///   sigmoid; the derivative of our layers is 1 − h² for the tanh nodes and 1 for the linear outputs.
+/// - Momentum of gradients, Eq. (11) of the paper: `v(N+1) = v(N) − α[(1−η) g(N) + η g(N−1)]`. In the first step
+///   g(N−1) = g(N).
+/// - Momentum of steps (Rumelhart, Hinton and Williams 1986; `traingdm`): `dX = mc·dXprev − lr·(1 − mc)·g`; dXprev is 0
+///   before the first step.
+/// - Adaptive learning rate (Vogl et al. 1988; `traingdx`), with the same step. If it lowers the error, lr grows by the
+///   factor `rate_increase`. If it raises the error by more than the factor `largest_error_increase`, it is rejected:
+///   the weights stay, lr shrinks by the factor `rate_decrease`, and dXprev of the next epoch is `−lr·g` with the
+///   reduced lr (0 if that overflows). (The reference manual prints `lr·mc·gX` in the step; we use 1 − mc, as in
+///   `traingdm`.)
+/// - Resilient back-propagation (Riedmiller and Braun 1993; `trainrp`): each weight has its own step length, and only
+///   the sign of its slope is used. The length grows while the sign stays the same and shrinks when it changes; no step
+///   is rejected.
 pub(super) struct GradientDescent {
-    mixed: Mixed,
-    learning_rate: f64,
-    /// Share of the previous gradient or step; 0 if nothing is mixed in.
-    momentum: f64,
-    backpropagation: Backpropagation,
-    /// Previous gradient or step.
-    previous: Vec<f64>,
-}
-
-impl GradientDescent {
-    pub(super) fn new(
-        mixed: Mixed,
-        learning_rate: f64,
-        momentum: f64,
-        mlp: &Mlp,
-        examples: &Examples,
-    ) -> (Self, Evaluation) {
-        let mut backpropagation = Backpropagation::new(mlp);
-        let evaluation = backpropagation.evaluate(mlp, examples);
-        let mut previous = backpropagation.gradient.clone();
-        if mixed == Mixed::Step {
-            previous.fill(0.0);
-        }
-        let method = Self {
-            mixed,
-            learning_rate,
-            momentum,
-            backpropagation,
-            previous,
-        };
-        (method, evaluation)
-    }
-}
-
-impl Algorithm for GradientDescent {
-    fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
-        let (rate, momentum) = (self.learning_rate, self.momentum);
-        let slopes = self.backpropagation.gradient.iter().zip(&mut self.previous);
-        for (weight, (slope, previous)) in mlp.weights_mut().iter_mut().zip(slopes) {
-            if self.mixed == Mixed::Step {
-                *previous = momentum * *previous - rate * (1.0 - momentum) * slope;
-                *weight += *previous;
-            } else {
-                *weight -= rate * ((1.0 - momentum) * slope + momentum * *previous);
-                *previous = *slope;
-            }
-        }
-        self.backpropagation.evaluate(mlp, examples).if_finite()
-    }
-
-    fn parameter(&self) -> f64 {
-        self.learning_rate
-    }
-
-    fn state(&self) -> MethodState {
-        match self.mixed {
-            Mixed::Nothing => MethodState::GradientDescent,
-            Mixed::Gradient => MethodState::Momentum(self.previous.clone()),
-            Mixed::Step => MethodState::StepMomentum(self.previous.clone()),
-        }
-    }
-
-    fn restore(&mut self, state: MethodState) -> bool {
-        match (self.mixed, state) {
-            (Mixed::Nothing, MethodState::GradientDescent) => {}
-            (Mixed::Gradient, MethodState::Momentum(previous)) | (Mixed::Step, MethodState::StepMomentum(previous)) => {
-                self.previous = previous;
-            }
-            _ => return false,
-        }
-        true
-    }
-}
-
-/// Largest learning rate, which keeps a long run of accepted steps from overflowing.
-const MAX_RATE: f64 = 1e300;
-
-/// Gradient descent with momentum and an adaptive learning rate (Vogl et al. 1988; `traingdx`). With gX the negative
-/// gradient, each epoch tries
-///
-/// ```text
-/// dX = mc·dXprev + lr·(1 − mc)·gX
-/// ```
-///
-/// If the step lowers the error, lr grows by the factor `rate_increase`. If it raises the error by more than the factor
-/// `largest_error_increase`, it is rejected: the weights stay, lr shrinks by the factor `rate_decrease`, and dXprev of
-/// the next epoch is `lr·gX` with the reduced lr (0 if that overflows). Before the first epoch dXprev is 0. (The
-/// reference manual prints `lr·mc·gX` in the step; we use 1 − mc, as in `traingdm`.)
-pub(super) struct AdaptiveDescent {
-    settings: AdaptiveDescentSettings,
-    state: AdaptiveState,
+    method: Method,
+    state: MethodState,
     now: Evaluation,
     /// Gradient at the current weights.
     gradient: Vec<f64>,
@@ -135,181 +47,170 @@ pub(super) struct AdaptiveDescent {
 #[serde(deny_unknown_fields)]
 pub struct AdaptiveState {
     learning_rate: f64,
-    step: Vec<f64>,
-}
-
-impl AdaptiveState {
     /// The previous step, with an entry for each weight.
-    pub(super) fn step(&self) -> &[f64] {
-        &self.step
-    }
+    pub(super) step: Vec<f64>,
 }
 
-impl AdaptiveDescent {
-    pub(super) fn new(settings: AdaptiveDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+/// State of resilient back-propagation, with an entry for each weight.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResilientState {
+    /// Gradient of the previous epoch.
+    pub(super) previous_gradient: Vec<f64>,
+    /// Step length of each weight.
+    pub(super) lengths: Vec<f64>,
+}
+
+/// Largest learning rate, which keeps a long run of accepted steps from overflowing.
+const MAX_RATE: f64 = 1e300;
+
+impl GradientDescent {
+    /// Starts `method`, one of those listed above.
+    pub(super) fn new(method: Method, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);
-        let now = backpropagation.evaluate(mlp, examples);
-        let method = Self {
-            settings,
-            state: AdaptiveState {
+        let zeros = vec![0.0; mlp.weights().len()];
+        let mut state = match method {
+            Method::Momentum(_) => MethodState::Momentum(zeros),
+            Method::StepMomentum(_) => MethodState::StepMomentum(zeros),
+            Method::AdaptiveDescent(settings) => MethodState::AdaptiveDescent(AdaptiveState {
                 learning_rate: settings.learning_rate,
-                step: vec![0.0; mlp.weights().len()],
-            },
+                step: zeros,
+            }),
+            Method::Resilient(settings) => MethodState::Resilient(ResilientState {
+                lengths: vec![settings.first_length; zeros.len()],
+                previous_gradient: zeros,
+            }),
+            _ => MethodState::GradientDescent,
+        };
+        let now = backpropagation.evaluate(mlp, examples);
+        let gradient = backpropagation.gradient.clone();
+        if let MethodState::Momentum(previous) = &mut state {
+            previous.copy_from_slice(&gradient);
+        }
+        let method = Self {
+            method,
+            state,
             now,
-            gradient: backpropagation.gradient.clone(),
+            gradient,
             backpropagation,
             candidate: mlp.clone(),
         };
         (method, now)
     }
+
+    /// Adds the step of each weight to the candidate, which is at the current weights.
+    fn move_candidate(&mut self) {
+        let weights = self.candidate.weights_mut().iter_mut().zip(&self.gradient);
+        match (self.method, &mut self.state) {
+            (Method::GradientDescent(settings), _) => {
+                weights.for_each(|(weight, slope)| *weight -= settings.learning_rate * slope);
+            }
+            (Method::Momentum(settings), MethodState::Momentum(previous)) => {
+                let (rate, momentum) = (settings.learning_rate, settings.momentum);
+                for ((weight, slope), previous) in weights.zip(previous) {
+                    *weight -= rate * ((1.0 - momentum) * slope + momentum * *previous);
+                    *previous = *slope;
+                }
+            }
+            (Method::StepMomentum(settings), MethodState::StepMomentum(previous)) => {
+                add_momentum(weights, previous, settings.learning_rate, settings.momentum);
+            }
+            (Method::AdaptiveDescent(settings), MethodState::AdaptiveDescent(state)) => {
+                add_momentum(weights, &mut state.step, state.learning_rate, settings.momentum);
+            }
+            (Method::Resilient(settings), MethodState::Resilient(state)) => {
+                let lengths = state.lengths.iter_mut().zip(&mut state.previous_gradient);
+                for ((weight, slope), (length, before)) in weights.zip(lengths) {
+                    // Compares signs, since the product of two tiny slopes would be 0.
+                    let factor = match (*slope > 0.0, *slope < 0.0, *before > 0.0, *before < 0.0) {
+                        (true, _, true, _) | (_, true, _, true) => settings.length_increase,
+                        (true, _, _, true) | (_, true, true, _) => settings.length_decrease,
+                        _ => 1.0,
+                    };
+                    *length = (*length * factor).min(settings.largest_length);
+                    if *slope != 0.0 {
+                        *weight -= length.copysign(*slope);
+                    }
+                    *before = *slope;
+                }
+            }
+            _ => {}
+        }
+    }
 }
 
-impl Algorithm for AdaptiveDescent {
+/// Adds `momentum` times the previous step and the rest of a step down the gradient to each weight.
+fn add_momentum<'a>(
+    weights: impl Iterator<Item = (&'a mut f64, &'a f64)>,
+    steps: &mut [f64],
+    rate: f64,
+    momentum: f64,
+) {
+    for ((weight, slope), step) in weights.zip(steps) {
+        *step = momentum * *step - rate * (1.0 - momentum) * slope;
+        *weight += *step;
+    }
+}
+
+impl Algorithm for GradientDescent {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
-        let AdaptiveState { learning_rate, step } = &mut self.state;
-        let momentum = self.settings.momentum;
-        for (index, step) in step.iter_mut().enumerate() {
-            *step = momentum * *step - *learning_rate * (1.0 - momentum) * self.gradient[index];
-            self.candidate.weights_mut()[index] = mlp.weights()[index] + *step;
-        }
+        self.candidate.weights_mut().copy_from_slice(mlp.weights());
+        self.move_candidate();
         let then = self.backpropagation.evaluate(&self.candidate, examples);
-        let bearable = then.mse <= self.settings.largest_error_increase * self.now.mse;
-        if bearable && then.if_finite().is_ok() {
+        if let (Method::AdaptiveDescent(settings), MethodState::AdaptiveDescent(state)) = (self.method, &mut self.state)
+        {
+            let bearable = then.mse <= settings.largest_error_increase * self.now.mse;
+            if !bearable || then.if_finite().is_err() {
+                state.learning_rate *= settings.rate_decrease;
+                for (step, slope) in state.step.iter_mut().zip(&self.gradient) {
+                    let next = -state.learning_rate * slope;
+                    *step = if next.is_finite() { next } else { 0.0 };
+                }
+                return Ok(self.now);
+            }
             if then.mse < self.now.mse {
-                *learning_rate = (*learning_rate * self.settings.rate_increase).min(MAX_RATE);
-            }
-            std::mem::swap(mlp, &mut self.candidate);
-            std::mem::swap(&mut self.gradient, &mut self.backpropagation.gradient);
-            self.now = then;
-        } else {
-            *learning_rate *= self.settings.rate_decrease;
-            for (step, slope) in step.iter_mut().zip(&self.gradient) {
-                let next = -*learning_rate * slope;
-                *step = if next.is_finite() { next } else { 0.0 };
+                state.learning_rate = (state.learning_rate * settings.rate_increase).min(MAX_RATE);
             }
         }
-        Ok(self.now)
+        std::mem::swap(mlp, &mut self.candidate);
+        std::mem::swap(&mut self.gradient, &mut self.backpropagation.gradient);
+        self.now = then;
+        then.if_finite()
     }
 
+    /// Returns the learning rate, or the mean step length of resilient back-propagation.
     fn parameter(&self) -> f64 {
-        self.state.learning_rate
+        match (&self.state, self.method) {
+            (MethodState::AdaptiveDescent(state), _) => state.learning_rate,
+            (MethodState::Resilient(state), _) => state.lengths.iter().sum::<f64>() / state.lengths.len() as f64,
+            (_, Method::GradientDescent(settings)) => settings.learning_rate,
+            (_, Method::Momentum(settings) | Method::StepMomentum(settings)) => settings.learning_rate,
+            _ => f64::NAN,
+        }
     }
 
     fn state(&self) -> MethodState {
-        MethodState::AdaptiveDescent(self.state.clone())
+        self.state.clone()
     }
 
     fn restore(&mut self, state: MethodState) -> bool {
-        let MethodState::AdaptiveDescent(state) = state else {
-            return false;
-        };
-        self.state = state;
-        true
-    }
-}
-
-/// Resilient back-propagation (Riedmiller and Braun 1993; `trainrp`): each weight has its own step length, and only the
-/// sign of its slope is used. The length grows while the sign stays the same and shrinks when it changes; no step is
-/// rejected.
-pub(super) struct Resilient {
-    settings: ResilientSettings,
-    backpropagation: Backpropagation,
-    state: ResilientState,
-}
-
-/// State of resilient back-propagation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ResilientState {
-    /// Gradient of the previous epoch.
-    previous_gradient: Vec<f64>,
-    /// Step length of each weight.
-    lengths: Vec<f64>,
-}
-
-impl ResilientState {
-    /// Vectors with an entry for each weight.
-    pub(super) fn vectors(&self) -> [&[f64]; 2] {
-        [&self.previous_gradient, &self.lengths]
-    }
-}
-
-impl Resilient {
-    pub(super) fn new(settings: ResilientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut backpropagation = Backpropagation::new(mlp);
-        let evaluation = backpropagation.evaluate(mlp, examples);
-        let weights = mlp.weights().len();
-        let method = Self {
-            settings,
-            backpropagation,
-            state: ResilientState {
-                previous_gradient: vec![0.0; weights],
-                lengths: vec![settings.first_length; weights],
-            },
-        };
-        (method, evaluation)
-    }
-}
-
-impl Algorithm for Resilient {
-    fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
-        let settings = self.settings;
-        for (index, weight) in mlp.weights_mut().iter_mut().enumerate() {
-            let (now, before) = (
-                self.backpropagation.gradient[index],
-                self.state.previous_gradient[index],
-            );
-            // Compares signs, since the product of two tiny slopes would be 0.
-            let factor = match (now > 0.0, now < 0.0, before > 0.0, before < 0.0) {
-                (true, _, true, _) | (_, true, _, true) => settings.length_increase,
-                (true, _, _, true) | (_, true, true, _) => settings.length_decrease,
-                _ => 1.0,
-            };
-            let length = (self.state.lengths[index] * factor).min(settings.largest_length);
-            self.state.lengths[index] = length;
-            if now != 0.0 {
-                *weight -= length.copysign(now);
-            }
+        let is_same = std::mem::discriminant(&state) == std::mem::discriminant(&self.state);
+        if is_same {
+            self.state = state;
         }
-        self.state
-            .previous_gradient
-            .copy_from_slice(&self.backpropagation.gradient);
-        self.backpropagation.evaluate(mlp, examples).if_finite()
-    }
-
-    /// Returns the mean step length.
-    fn parameter(&self) -> f64 {
-        self.state.lengths.iter().sum::<f64>() / self.state.lengths.len() as f64
-    }
-
-    fn state(&self) -> MethodState {
-        MethodState::Resilient(self.state.clone())
-    }
-
-    fn restore(&mut self, state: MethodState) -> bool {
-        let MethodState::Resilient(state) = state else {
-            return false;
-        };
-        self.state = state;
-        true
+        is_same
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::training::examples::tests::{random_examples, random_mlp};
+    use crate::{
+        settings::{AdaptiveDescentSettings, MomentumSettings},
+        training::examples::tests::{random_examples, random_mlp},
+    };
 
-    #[test]
-    fn a_step_is_the_learning_rate_times_the_negative_gradient() {
-        let (mut mlp, examples) = (random_mlp(3, 2, 2, 1), random_examples(50, 3, 2, 2));
-        let start = mlp.clone();
-        let mut backpropagation = Backpropagation::new(&mlp);
-        backpropagation.evaluate(&mlp, &examples);
-        let (mut method, _) = GradientDescent::new(Mixed::Nothing, 0.5, 0.0, &mlp, &examples);
-        method.step(&mut mlp, &examples).unwrap();
-        for ((moved, weight), slope) in mlp.weights().iter().zip(start.weights()).zip(&backpropagation.gradient) {
-            assert_eq!(*moved, weight - 0.5 * slope);
-        }
+    fn start(method: Method, mlp: &Mlp, examples: &Examples) -> (GradientDescent, Evaluation) {
+        GradientDescent::new(method, mlp, examples)
     }
 
     #[test]
@@ -320,7 +221,11 @@ mod tests {
             backpropagation.evaluate(mlp, &examples);
             backpropagation.gradient
         };
-        let (mut method, _) = GradientDescent::new(Mixed::Gradient, 0.1, 0.7, &mlp, &examples);
+        let settings = MomentumSettings {
+            learning_rate: 0.1,
+            momentum: 0.7,
+        };
+        let mut method = start(Method::Momentum(settings), &mlp, &examples).0;
         let (start, g0) = (mlp.weights().to_vec(), gradient(&mlp));
         method.step(&mut mlp, &examples).unwrap();
         let (first, g1) = (mlp.weights().to_vec(), gradient(&mlp));
@@ -338,7 +243,7 @@ mod tests {
             learning_rate: 1e12,
             ..AdaptiveDescentSettings::default()
         };
-        let (mut method, start) = AdaptiveDescent::new(settings, &mlp, &examples);
+        let (mut method, start) = start(Method::AdaptiveDescent(settings), &mlp, &examples);
         let before = mlp.clone();
         assert_eq!(method.step(&mut mlp, &examples), Ok(start));
         assert_eq!((&mlp, method.parameter()), (&before, 0.7e12));
@@ -357,10 +262,13 @@ mod tests {
             learning_rate: 1e3,
             ..AdaptiveDescentSettings::default()
         };
-        let (mut method, start) = AdaptiveDescent::new(settings, &mlp, &examples);
+        let (mut method, start) = start(Method::AdaptiveDescent(settings), &mlp, &examples);
         let gradient = method.gradient.clone();
         assert_eq!(method.step(&mut mlp, &examples), Ok(start), "the step is rejected");
-        for (step, slope) in method.state.step.iter().zip(&gradient) {
+        let MethodState::AdaptiveDescent(state) = method.state() else {
+            panic!("another method");
+        };
+        for (step, slope) in state.step.iter().zip(&gradient) {
             assert_eq!(*step, -700.0 * slope);
         }
     }

@@ -44,9 +44,10 @@ impl LevenbergMarquardt {
 
 impl Algorithm for LevenbergMarquardt {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
-        let before = self.mse;
+        let (before, gradient) = (self.mse, self.equations.gradient().to_vec());
         self.mse = self.damping.search(&mut self.mu, |mu| {
-            self.equations.solve(mlp, examples, [mu; 4], &[], &mut self.step)?;
+            self.equations
+                .solve(mlp, examples, [mu; 4], &gradient, &mut self.step)?;
             add_step(&mut self.candidate, mlp, &self.step);
             let mse = self.equations.mse(&self.candidate, examples);
             // False for NaN.

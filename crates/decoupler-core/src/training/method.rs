@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Evaluation, Examples, Method, StopReason,
     bayesian_regularization::{BayesianRegularization, BayesianState},
-    gradient_descent::{AdaptiveDescent, AdaptiveState, GradientDescent, Mixed, Resilient, ResilientState},
+    gradient_descent::{AdaptiveState, GradientDescent, ResilientState},
     levenberg_marquardt::{DampedState, LevenbergMarquardt},
     normal_equations::Plan,
     scaled_conjugate_gradient::{ConjugateState, ScaledConjugateGradient},
@@ -67,8 +67,8 @@ impl MethodState {
         let vectors = match self {
             Self::LevenbergMarquardt(_) | Self::BayesianRegularization(_) | Self::GradientDescent => Vec::new(),
             Self::ScaledConjugateGradient(state) => state.vectors().to_vec(),
-            Self::Resilient(state) => state.vectors().to_vec(),
-            Self::AdaptiveDescent(state) => vec![state.step()],
+            Self::Resilient(state) => vec![&state.previous_gradient[..], &state.lengths],
+            Self::AdaptiveDescent(state) => vec![&state.step[..]],
             Self::StepMomentum(previous) | Self::Momentum(previous) => vec![&previous[..]],
         };
         let fits = |vector: &&[f64]| vector.len() == weights && vector.iter().all(|value| value.is_finite());
@@ -82,16 +82,11 @@ impl Method {
         fn boxed((method, evaluation): (impl Algorithm + 'static, Evaluation)) -> (Box<dyn Algorithm>, Evaluation) {
             (Box::new(method), evaluation)
         }
-        let descent = |mixed, rate, momentum| boxed(GradientDescent::new(mixed, rate, momentum, mlp, examples));
         match *self {
             Self::LevenbergMarquardt(settings) => boxed(LevenbergMarquardt::new(settings, mlp, examples)),
             Self::BayesianRegularization(settings) => boxed(BayesianRegularization::new(settings, mlp, examples)),
             Self::ScaledConjugateGradient(settings) => boxed(ScaledConjugateGradient::new(settings, mlp, examples)),
-            Self::Resilient(settings) => boxed(Resilient::new(settings, mlp, examples)),
-            Self::AdaptiveDescent(settings) => boxed(AdaptiveDescent::new(settings, mlp, examples)),
-            Self::StepMomentum(settings) => descent(Mixed::Step, settings.learning_rate, settings.momentum),
-            Self::Momentum(settings) => descent(Mixed::Gradient, settings.learning_rate, settings.momentum),
-            Self::GradientDescent(settings) => descent(Mixed::Nothing, settings.learning_rate, 0.0),
+            _ => boxed(GradientDescent::new(*self, mlp, examples)),
         }
     }
 

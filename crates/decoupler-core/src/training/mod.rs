@@ -21,12 +21,11 @@ mod trainer;
 
 pub use crate::settings::{
     AdaptiveDescentSettings, Damping, GradientDescentSettings, Method, MomentumSettings, RegularizationSettings,
-    ResilientSettings, ScaledConjugateGradientSettings, SettingError, StepMomentumSettings, StoppingRules,
-    TrainingSettings,
+    ResilientSettings, ScaledConjugateGradientSettings, SettingError, StoppingRules, TrainingSettings,
 };
-pub use checkpoint::{ResumeError, TrainerState};
+pub use checkpoint::TrainerState;
 pub use ending::{StopReason, TrainingDefect};
-pub use epoch_columns::History;
+pub use epoch_columns::EpochColumns;
 pub use examples::Examples;
 use method::MethodState;
 use trainer::Evaluation;

@@ -26,7 +26,7 @@ pub struct Problem {
     pub test: Option<Examples>,
 }
 
-/// Reason why a training cannot begin.
+/// Reason why a training cannot begin or be resumed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TrainingError {
@@ -54,6 +54,34 @@ pub enum TrainingError {
         bytes: u64,
         /// Memory of the machine.
         memory: MemoryBudget,
+    },
+    /// The parts contradict each other, or contain numbers that are not finite.
+    #[error("the saved training is damaged: {0}")]
+    Damaged(&'static str),
+    /// The network does not fit the samples.
+    #[error(
+        "the saved network has {} inputs and {} outputs, the samples have {inputs} and {outputs}: resume with the \
+         settings it was started with",
+        .shape.inputs, .shape.outputs
+    )]
+    Shape {
+        /// Shape of the saved network.
+        shape: Shape,
+        /// Number of inputs of the samples.
+        inputs: usize,
+        /// Number of outputs of the samples.
+        outputs: usize,
+    },
+    /// The saved weights have a different error on these samples.
+    #[error(
+        "the saved training had an error of {saved:e}, on these samples it is {found:e}: resume with the settings and \
+         the version of the program it was started with"
+    )]
+    OtherSamples {
+        /// The training error saved.
+        saved: f64,
+        /// The training error found.
+        found: f64,
     },
 }
 

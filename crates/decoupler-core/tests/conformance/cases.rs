@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::{Dataset, PerRow, Seed, Stream},
     decoupling::{Decoder, DecoderKind, FitProblem},
     network::{
-        DecouplingNetwork, InputChoice, Inputs, MinMax, Networks, Quantity, ScalingChoice, ScalingError, Shape,
+        DecouplingNetwork, InputChoice, Inputs, MinMax, NetworkError, Networks, Quantity, ScalingChoice, Shape,
         nguyen_widrow,
     },
     scene::{Noise, NoiseSource, RowModel, Rows, Scene},
@@ -105,7 +105,7 @@ fn untrained(training: &Dataset, row_model: RowModel, choice: InputChoice) -> Ne
             outputs: outputs.varying().len(),
         };
         let mlp = nguyen_widrow(shape, &mut rng);
-        Ok::<_, ScalingError>(DecouplingNetwork::new(inputs, mlp, outputs))
+        Ok::<_, NetworkError>(DecouplingNetwork::new(inputs, mlp, outputs))
     };
     PerRow::fit(training, row_model, network).unwrap()
 }

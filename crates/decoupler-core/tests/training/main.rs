@@ -3,10 +3,10 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod causes;
+mod conformance;
 mod methods;
 mod problems;
 mod resume;
 mod stopping;
-mod threads;
 mod traces;
 mod wide;

@@ -11,12 +11,22 @@ pub(crate) fn wave(row: usize, column: usize) -> f64 {
     (1.0 + 12.9898 * row as f64 + 78.233 * column as f64 + 0.71 * (row * column) as f64).sin()
 }
 
-fn examples(samples: usize, first: usize) -> Examples {
+/// Inputs and targets of the training set.
+pub(crate) fn training() -> (Array2<f64>, Array2<f64>) {
+    samples(120, 0)
+}
+
+fn samples(samples: usize, first: usize) -> (Array2<f64>, Array2<f64>) {
     let inputs = Array2::from_shape_fn((samples, 3), |(row, column)| wave(first + row, column));
     let targets = Array2::from_shape_fn((samples, 2), |(row, output)| {
         let (x, y, z) = (inputs[[row, 0]], inputs[[row, 1]], inputs[[row, 2]]);
         if output == 0 { (2.0 * x + y).sin() } else { x * y - z }
     });
+    (inputs, targets)
+}
+
+fn examples(count: usize, first: usize) -> Examples {
+    let (inputs, targets) = samples(count, first);
     Examples::new(inputs.view(), targets.view())
 }
 

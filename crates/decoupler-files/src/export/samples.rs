@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::Dataset,
     evaluation::{PastNetwork, Run, StartRecord},
     sensor::ArrayScale,
-    training::{EpochRecord, History, Stage, StopReason},
+    training::{EpochColumns, EpochRecord, Stage, StopReason},
 };
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
@@ -168,7 +168,7 @@ struct Document {
     best_epoch: usize,
     epochs: usize,
     seconds: f64,
-    history: History,
+    history: EpochColumns,
     stages: Vec<Stage>,
     starts: Vec<StartRecord>,
 }
@@ -180,7 +180,7 @@ impl From<TrainingRecord> for Document {
             best_epoch: record.best_epoch,
             epochs: record.epochs(),
             seconds: record.seconds,
-            history: History(record.history),
+            history: EpochColumns(record.history),
             stages: record.stages,
             starts: record.starts,
         }

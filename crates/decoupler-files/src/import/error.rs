@@ -3,10 +3,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler_core::{
-    dataset::{DatasetError, DivisionError, MemoryError},
-    text::in_one_line,
-};
+use decoupler_core::{dataset::DatasetError, text::in_one_line};
 use thiserror::Error;
 
 use super::{Format, InputError, PositionsError};
@@ -176,9 +173,6 @@ pub enum ImportError {
         /// Error in its contents.
         source: PositionsError,
     },
-    /// The memory is invalid for the readings.
-    #[error(transparent)]
-    Memory(#[from] MemoryError),
     /// The unit of the times is not a unit of time.
     #[error(
         "the times in '{name}' are in {unit}, and a memory needs times in s, ms, us, ns, min or h: give the unit of the column"
@@ -189,12 +183,9 @@ pub enum ImportError {
         /// Its unit.
         unit: String,
     },
-    /// The samples are not a valid dataset.
+    /// The samples are not a valid dataset, cannot be split, or the memory is invalid for them.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
-    /// The samples cannot be split.
-    #[error(transparent)]
-    Division(#[from] DivisionError),
     /// The caller cancelled the import.
     #[error("the import was cancelled")]
     Cancelled,
@@ -210,7 +201,7 @@ impl ImportError {
             | Self::NoRows { .. }
             | Self::RowWire { .. }
             | Self::Derived { .. }
-            | Self::Memory(_)
+            | Self::Dataset(_)
             | Self::Condition { .. } => Self::OfFile {
                 path: path.to_owned(),
                 source: Box::new(self),

@@ -6,7 +6,7 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::{Dataset, History, Memory, MemoryError},
+    dataset::{Dataset, DatasetError, History, Memory},
     problem::{Channel, Problem, TargetPosition},
     text::{counted, in_one_line},
 };
@@ -505,7 +505,7 @@ impl Recording {
     ///
     /// # Errors
     /// If the memory is invalid for the readings, such as one in seconds without times.
-    pub fn with_memory(&self, memory: Option<&Memory>) -> Result<Self, MemoryError> {
+    pub fn with_memory(&self, memory: Option<&Memory>) -> Result<Self, DatasetError> {
         let memory = memory
             .filter(|memory| !memory.is_empty())
             .map(|memory| self.history.checked(memory))

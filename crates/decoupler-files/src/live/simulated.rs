@@ -2,7 +2,7 @@ use std::f64::consts::TAU;
 
 use decoupler_core::{
     dataset::{Seed, Stream},
-    scene::{Deformation, Fault, FaultError, FaultySensor, Indenter, Loading, NoiseSource, Scene, SceneError},
+    scene::{Deformation, Fault, FaultySensor, Indenter, Loading, NoiseSource, Scene, SceneError},
     sensor::{SensorError, SensorModel, short},
 };
 use glam::{DVec2, DVec3};
@@ -49,15 +49,12 @@ pub enum Motion {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SimulatedError {
-    /// The scene is invalid.
+    /// The scene is invalid, or the array does not have the wires of the fault.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The array has no resistance at rest.
     #[error(transparent)]
     Sensor(#[from] SensorError),
-    /// The array does not have the wires of the fault.
-    #[error(transparent)]
-    Fault(#[from] FaultError),
     /// The rate is out of range.
     #[error("{} frames per second: give a number above 0 and at most 1000000", short(*.0))]
     Rate(f64),

@@ -17,7 +17,7 @@ pub use builder::{Builder, Changes};
 pub use evaluate::ProgramDecoder;
 
 use super::Precision;
-use crate::dataset::{Memory, MemoryError, PerRow};
+use crate::dataset::{DatasetError, Memory, PerRow};
 
 /// A computation from the readings of a row to its targets.
 ///
@@ -261,7 +261,7 @@ impl Program {
     ///
     /// # Panics
     /// If the memory has another number of features than the program has readings.
-    pub fn with_history(self, memory: &Memory, channels: usize) -> Result<Self, MemoryError> {
+    pub fn with_history(self, memory: &Memory, channels: usize) -> Result<Self, DatasetError> {
         memory.check(channels)?;
         assert_eq!(memory.features(channels), self.channels());
         let mut builder = Builder::new(channels);

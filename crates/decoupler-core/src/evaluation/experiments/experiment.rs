@@ -3,7 +3,7 @@ use thiserror::Error;
 
 use super::{Axis, AxisKind};
 use crate::{
-    dataset::{Division, DivisionError, Seed, SplitBy},
+    dataset::{DatasetError, Division, Seed, SplitBy},
     evaluation::{CountError, CrossValidation, PublishedErrors, RunSettings},
     scene::SceneError,
     sensor::ArrayScale,
@@ -89,7 +89,7 @@ pub enum ExperimentError {
     OtherSamples,
     /// A recording cannot be divided in this way.
     #[error(transparent)]
-    Division(#[from] DivisionError),
+    Division(#[from] DatasetError),
     /// A recording without groups is divided by group.
     #[error("split group: the recording has no column of groups; choose one, or omit this split")]
     NoGroups,
@@ -237,7 +237,7 @@ impl Experiment {
             SplitBy::Random => (snapshots * rows, "sample"),
             SplitBy::Time | SplitBy::Group => (snapshots, "snapshot"),
         };
-        Ok(DivisionError::check_folds(folds, units, unit)?)
+        Ok(DatasetError::check_folds(folds, units, unit)?)
     }
 
     fn check_recorded_cell(&self, cell: &Cell) -> Result<(), ExperimentError> {

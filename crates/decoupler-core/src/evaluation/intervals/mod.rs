@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::{CrossValidated, Run, RunError, RunSettings, recorded::Evidence};
 use crate::{
-    dataset::{Dataset, DivisionError, Folds, Seed, SplitBy, Stream},
+    dataset::{Dataset, DatasetError, Folds, Seed, SplitBy, Stream},
     job::Job,
     text::counted,
 };
@@ -182,7 +182,7 @@ pub enum NoIntervals {
     Cancelled,
     /// The samples cannot be divided into folds.
     #[error(transparent)]
-    Folds(#[from] DivisionError),
+    Folds(#[from] DatasetError),
     /// A training failed.
     #[error(transparent)]
     Run(#[from] RunError),

@@ -8,12 +8,11 @@ mod weighting;
 pub use state::BayesianState;
 
 use state::{GroupState, TargetState};
-use weighting::{OutputParameters, scale_outputs, weighted_mse};
 
 use super::{
-    Damping, Evaluation, Examples, RegularizationSettings, StopReason,
+    Evaluation, Examples, RegularizationSettings, StopReason,
     method::{Algorithm, MethodState, add_step},
-    normal_equations::{Classes, NormalEquations, Plan, class_sizes, decay_slopes},
+    normal_equations::{Classes, NormalEquations, Plan, class_sizes},
     trainer::correlation_time,
 };
 use crate::network::Mlp;
@@ -52,29 +51,25 @@ use crate::network::Mlp;
 /// The recorded gradient is that of F / (β n), which vanishes at the minimum of F. The field's toolbox disables
 /// validation stops for this method; here they apply as for every other method.
 pub(super) struct BayesianRegularization {
-    damping: Damping,
-    /// Epoch after which the correlation of errors is measured; 0 for never.
-    correlation_epoch: usize,
+    settings: RegularizationSettings,
     /// Group of each class of weights.
     group_of: Classes<usize>,
     /// Means of the targets, if output biases are drawn towards them.
     means: Vec<f64>,
     state: BayesianState,
-    /// √ρ of each target; empty if all have the same noise level.
-    roots: Vec<f64>,
-    /// γ of the output weights of each target, once measured; empty if all have the same noise level.
-    of_outputs: Vec<OutputParameters>,
+    /// ρ of each target: 1 if all have the same noise level.
+    precisions: Vec<f64>,
+    /// γ of the weights and of the bias of each output, once measured; empty if all have the same noise level.
+    of_outputs: Vec<[f64; 2]>,
     equations: NormalEquations,
     examples: Examples,
     /// Mean squared error.
     mse: f64,
-    /// Mean of ρe²: the same as [`Self::mse`] if all targets have the same noise level.
+    /// Mean of ρe².
     weighted_mse: f64,
     step: Vec<f64>,
-    candidate: Mlp,
     /// The network with its output weights multiplied by √ρ.
     scaled: Mlp,
-    scaled_candidate: Mlp,
 }
 
 /// Maximum lag in samples; the sum of the correlations ends at the first that is not positive.
@@ -93,66 +88,53 @@ fn group_of_classes(groups: f64) -> Classes<usize> {
 impl BayesianRegularization {
     /// Starts with γ = N, as if the data determined all weights.
     pub(super) fn new(settings: RegularizationSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut equations = NormalEquations::new(&Plan::factored(mlp.shape(), examples.samples()), examples);
-        let evaluation = equations.gather(mlp, &[], examples);
-        let weights = mlp.weights().len();
+        let (weights, outputs) = (mlp.weights().len(), examples.outputs());
         let group_of = group_of_classes(settings.groups);
+        let size_of = |group| {
+            let classes = group_of.into_iter().zip(class_sizes(mlp.shape()));
+            classes
+                .map(|(of, size)| if of == group { size as f64 } else { 0.0 })
+                .sum()
+        };
+        let group = |group| GroupState {
+            alpha: 1.0,
+            effective_parameters: size_of(group),
+        };
+        let target = TargetState {
+            precision: 1.0,
+            effective_parameters: weights as f64 / outputs as f64,
+        };
+        // Fewer samples do not determine the noise of each target: with 20, networks came out worse than ridge.
+        let has_own_noise = settings.own_noise != 0.0 && examples.samples() >= weights;
+        let draws_to_means = settings.groups >= 2.0;
         let mut method = Self {
-            damping: settings.damping(),
+            settings,
             group_of,
-            means: if settings.groups < 2.0 {
-                Vec::new()
-            } else {
+            means: if draws_to_means {
                 examples.target_means()
+            } else {
+                Vec::new()
             },
-            correlation_epoch: settings.correlation_epoch as usize,
             state: BayesianState {
                 mu: settings.mu,
                 alpha: 1.0,
                 beta: 1.0,
                 effective_parameters: weights as f64,
-                further: Vec::new(),
+                further: (1..settings.groups as usize).map(group).collect(),
                 epochs: 0,
                 correlation_time: None,
-                // Fewer samples do not determine the noise of each target: with 20, networks came out worse than ridge.
-                targets: if settings.own_noise == 0.0 || examples.samples() < weights {
-                    Vec::new()
-                } else {
-                    let target = TargetState {
-                        precision: 1.0,
-                        effective_parameters: weights as f64 / examples.outputs() as f64,
-                    };
-                    vec![target; examples.outputs()]
-                },
+                targets: vec![target; if has_own_noise { outputs } else { 0 }],
             },
-            roots: Vec::new(),
+            precisions: vec![1.0; outputs],
             of_outputs: Vec::new(),
-            equations,
+            equations: NormalEquations::new(&Plan::factored(mlp.shape(), examples.samples()), examples),
             examples: examples.clone(),
-            mse: evaluation.mse,
-            weighted_mse: evaluation.mse,
+            mse: f64::NAN,
+            weighted_mse: f64::NAN,
             step: vec![0.0; weights],
-            candidate: mlp.clone(),
             scaled: mlp.clone(),
-            scaled_candidate: mlp.clone(),
         };
-        method.state.further = {
-            let sizes = class_sizes(mlp.shape());
-            let classes = group_of.into_iter().zip(sizes);
-            let size = |group| {
-                classes
-                    .clone()
-                    .filter(|(of, _)| *of == group)
-                    .map(|(_, size)| size as f64)
-                    .sum()
-            };
-            (1..settings.groups as usize)
-                .map(|group| GroupState {
-                    alpha: 1.0,
-                    effective_parameters: size(group),
-                })
-                .collect()
-        };
+        method.gather(mlp);
         method.update_weighting();
         let evaluation = method.regularized();
         (method, evaluation)
@@ -161,34 +143,31 @@ impl BayesianRegularization {
 
 impl Algorithm for BayesianRegularization {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
-        let weighting = self.state.clone();
-        let (precisions, means, errors) = (self.precisions(), self.scaled_means(), self.errors());
-        let (beta, prior) = (weighting.beta, (self.group_of, &means[..]));
-        let alphas = weighting.decays(self.group_of);
-        let objective = weighting.objective(self.weighted_mse, errors, &self.scaled, prior);
-        let decay = decay_slopes(&self.scaled, alphas.map(|alpha| alpha / beta), prior.1);
+        let (alphas, beta) = (self.state.decays(self.group_of), self.state.beta);
+        let (objective, slopes) = (self.objective(self.weighted_mse, &self.scaled), self.slopes());
         let hidden_weights = mlp.shape().hidden_weights();
-        self.damping.search(&mut self.state.mu, |mu| {
+        let (mut mu, mut candidate) = (self.state.mu, mlp.clone());
+        let found = self.settings.damping().search(&mut mu, |mu| {
             let damping = alphas.map(|alpha| (mu + alpha) / beta);
             self.equations
-                .solve(&self.scaled, examples, damping, &decay, &mut self.step)?;
-            if !self.roots.is_empty() {
-                let outputs = self.step[hidden_weights..].iter_mut().zip(self.roots.iter().cycle());
-                outputs.for_each(|(step, root)| *step /= root);
+                .solve(&self.scaled, examples, damping, &slopes, &mut self.step)?;
+            let of_outputs = self.step[hidden_weights..].iter_mut();
+            for (step, precision) in of_outputs.zip(self.precisions.iter().cycle()) {
+                *step /= precision.sqrt();
             }
-            add_step(&mut self.candidate, mlp, &self.step);
-            scale_outputs(&mut self.scaled_candidate, &self.candidate, &self.roots);
-            let mse = weighted_mse(&mut self.equations, &self.candidate, &precisions, examples);
+            add_step(&mut candidate, mlp, &self.step);
+            let mse = self.weighted_mse(&candidate);
             // False for NaN.
-            (weighting.objective(mse, errors, &self.scaled_candidate, prior) < objective).then_some(())
-        })?;
-        std::mem::swap(mlp, &mut self.candidate);
-        std::mem::swap(&mut self.scaled, &mut self.scaled_candidate);
+            (self.objective(mse, &self.scaled(&candidate)) < objective).then_some(())
+        });
+        self.state.mu = mu;
+        found?;
+        std::mem::swap(mlp, &mut candidate);
         self.update_precisions(mlp);
         self.gather(mlp);
         self.measure_effective_parameters();
         self.state.epochs += 1;
-        if self.state.epochs == self.correlation_epoch {
+        if self.state.epochs == self.settings.correlation_epoch as usize {
             self.state.correlation_time = Some(correlation_time(mlp, examples, MAX_LAG));
         }
         self.update_weighting();
@@ -213,18 +192,17 @@ impl Algorithm for BayesianRegularization {
         };
         let fresh = std::mem::replace(&mut self.state, state);
         // A state has as many groups and targets as the settings it was saved with, unless it is damaged.
-        let missing = fresh.further.get(self.state.further.len()..).unwrap_or_default();
-        self.state.further.extend_from_slice(missing);
-        self.state.further.truncate(fresh.further.len());
-        let missing = fresh.targets.get(self.state.targets.len()..).unwrap_or_default();
-        self.state.targets.extend_from_slice(missing);
-        self.state.targets.truncate(fresh.targets.len());
-        if !self.state.targets.is_empty() {
-            // Before the first step, the candidate is the network.
-            let mlp = self.candidate.clone();
-            self.scale_targets(&mlp);
-            self.gather(&mlp);
-        }
+        fit(&mut self.state.further, fresh.further);
+        fit(&mut self.state.targets, fresh.targets);
+        // Before the first step every precision is 1.
+        let mlp = self.scaled.clone();
+        self.gather(&mlp);
         true
     }
+}
+
+/// Gives `restored` the length of `fresh`, whose values fill it up.
+fn fit<T: Clone>(restored: &mut Vec<T>, fresh: Vec<T>) {
+    restored.extend_from_slice(fresh.get(restored.len()..).unwrap_or_default());
+    restored.truncate(fresh.len());
 }

@@ -2,10 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    network::Mlp,
-    training::normal_equations::{Classes, class_squares},
-};
+use crate::training::normal_equations::Classes;
 
 /// State of Bayesian regularisation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,11 +48,6 @@ pub(super) struct GroupState {
 }
 
 impl BayesianState {
-    /// Returns `true` if there is one α and one β.
-    pub(super) fn is_plain(&self) -> bool {
-        self.further.is_empty() && self.targets.is_empty()
-    }
-
     /// α of each class of weights.
     pub(super) fn decays(&self, group_of: Classes<usize>) -> Classes {
         group_of.map(|group| match group {
@@ -63,27 +55,4 @@ impl BayesianState {
             group => self.further[group - 1].alpha,
         })
     }
-
-    /// β Σρe² + Σ α Σw², with Σρe² = `mse`·`errors`, and the weights of the scaled network `mlp`.
-    pub(super) fn objective(
-        &self,
-        mse: f64,
-        errors: f64,
-        mlp: &Mlp,
-        (group_of, means): (Classes<usize>, &[f64]),
-    ) -> f64 {
-        let of_weights = if self.is_plain() {
-            self.alpha * sum_of_squares(mlp)
-        } else {
-            let squares = class_squares(mlp, means);
-            let products = self.decays(group_of).into_iter().zip(squares);
-            products.map(|(decay, squares)| decay * squares).sum()
-        };
-        self.beta * mse * errors + of_weights
-    }
-}
-
-/// Σw².
-pub(super) fn sum_of_squares(mlp: &Mlp) -> f64 {
-    mlp.weights().iter().map(|weight| weight * weight).sum()
 }

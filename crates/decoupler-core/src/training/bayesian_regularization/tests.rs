@@ -227,21 +227,3 @@ fn noise_levels_and_decay_maximise_the_evidence() {
     let shares: f64 = state.targets.iter().map(|target| target.effective_parameters).sum();
     assert!((shares / state.effective_parameters - 1.0).abs() < 1e-9, "{shares}");
 }
-
-#[test]
-fn a_training_with_noise_levels_resumes_with_the_same_bits() {
-    let (inputs, targets) = good_and_bad_targets(100, 2);
-    let problem = problem(&inputs, targets.view());
-    let mut first = trained(problem.clone(), 5, RegularizationSettings::recorded(), 12);
-    let state = serde_json::to_string(&first.state()).unwrap();
-    let mut resumed = Trainer::resume(serde_json::from_str(&state).unwrap(), problem).unwrap();
-    for trainer in [&mut first, &mut resumed] {
-        let stopping = StoppingRules {
-            epochs: 30,
-            ..StoppingRules::default()
-        };
-        trainer.set_stopping(stopping).unwrap();
-        while trainer.step().is_none() {}
-    }
-    assert_eq!(first.present().weights(), resumed.present().weights());
-}

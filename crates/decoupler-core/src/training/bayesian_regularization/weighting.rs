@@ -1,33 +1,18 @@
 //! Strengths of regularisation and noise levels, estimated from the data after every accepted step.
 
-use super::{
-    BayesianRegularization,
-    state::{BayesianState, sum_of_squares},
-};
+use super::BayesianRegularization;
 use crate::{
     network::{Mlp, Shape},
     training::{
-        Evaluation, Examples,
+        Evaluation,
         normal_equations::{
-            Classes, HIDDEN_BIASES, HIDDEN_WEIGHTS, NormalEquations, OUTPUT_BIASES, OUTPUT_WEIGHTS, OutputTraces,
-            Traces, class_sizes, class_squares, decay_slopes,
+            Classes, HIDDEN_BIASES, HIDDEN_WEIGHTS, OUTPUT_BIASES, OUTPUT_WEIGHTS, class_sizes, class_squares,
+            decay_slopes, length,
         },
     },
 };
 
-/// Effective number of parameters among the weights of one output.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct OutputParameters {
-    pub(super) weights: f64,
-    pub(super) bias: f64,
-}
-
 impl BayesianRegularization {
-    /// Number of errors n.
-    pub(super) fn errors(&self) -> f64 {
-        self.examples.errors()
-    }
-
     /// Number of independent errors among `errors` that are left to estimate the noise.
     fn free(&self, errors: f64, gamma: f64) -> f64 {
         /// Minimum share of the errors left to estimate the noise.
@@ -44,8 +29,6 @@ impl BayesianRegularization {
     /// Updates each α, and β, from γ. Each is 1 if the formula gives no positive number, and is limited so that the
     /// ratio of any two cannot overflow.
     pub(super) fn update_weighting(&mut self) {
-        let gamma = self.state.effective_parameters;
-        let determined = self.free(self.errors(), gamma);
         let bounded = |value: f64| {
             if value > 0.0 && value.is_finite() {
                 value.clamp(1e-150, 1e150)
@@ -53,19 +36,20 @@ impl BayesianRegularization {
                 1.0
             }
         };
-        if self.state.is_plain() {
-            self.state.alpha = bounded(gamma / (2.0 * sum_of_squares(&self.scaled)));
-        } else {
-            let squares = self.by_group(class_squares(&self.scaled, &self.scaled_means()), |squares| squares);
-            let further: f64 = self.state.further.iter().map(|group| group.effective_parameters).sum();
-            let of_outputs = Vec::from_iter((0..squares.len()).map(|group| self.alpha_of_outputs(group)));
-            self.state.alpha = bounded(of_outputs[0].unwrap_or((gamma - further) / (2.0 * squares[0])));
-            for (number, group) in self.state.further.iter_mut().enumerate() {
-                let shared = group.effective_parameters / (2.0 * squares[number + 1]);
-                group.alpha = bounded(of_outputs[number + 1].unwrap_or(shared));
-            }
+        let (gamma, errors) = (self.state.effective_parameters, self.examples.errors());
+        let squares = self.by_group(class_squares(&self.scaled, &self.scaled_means()));
+        let further = self.state.further.iter().map(|group| group.effective_parameters);
+        let gammas = std::iter::once(gamma - further.clone().sum::<f64>()).chain(further);
+        let of_groups = gammas.zip(squares).enumerate().map(|(group, (gamma, squares))| {
+            let alpha = self.alpha_of_outputs(group);
+            bounded(alpha.unwrap_or(gamma / (2.0 * squares)))
+        });
+        let alphas = Vec::from_iter(of_groups);
+        self.state.alpha = alphas[0];
+        for (group, alpha) in self.state.further.iter_mut().zip(&alphas[1..]) {
+            group.alpha = *alpha;
         }
-        self.state.beta = bounded(determined / (2.0 * self.weighted_mse * self.errors()));
+        self.state.beta = bounded(self.free(errors, gamma) / (2.0 * self.weighted_mse * errors));
     }
 
     /// Returns α of a group that has only weights of outputs: the lowest among single targets. `None` for another
@@ -78,24 +62,20 @@ impl BayesianRegularization {
             return None;
         }
         let Shape { hidden, outputs, .. } = self.scaled.shape();
-        let (weights, means) = (self.scaled.layers().1, self.scaled_means());
-        let (nodes, biases) = weights.split_at(hidden * outputs);
-        let of_target = |(target, parameters): (usize, &OutputParameters)| {
-            let (mut gamma, mut squares) = (0.0, 0.0);
-            if group == self.group_of[OUTPUT_WEIGHTS] {
-                gamma += parameters.weights;
-                squares += nodes
-                    .iter()
-                    .skip(target)
-                    .step_by(outputs)
-                    .map(|weight| weight * weight)
-                    .sum::<f64>();
-            }
-            if group == self.group_of[OUTPUT_BIASES] {
-                gamma += parameters.bias;
-                squares += (biases[target] - means.get(target).unwrap_or(&0.0)).powi(2);
-            }
-            gamma / (2.0 * squares)
+        let (nodes, biases) = self.scaled.layers().1.split_at(hidden * outputs);
+        let means = self.scaled_means();
+        let of_target = |(target, gamma): (usize, &[f64; 2])| {
+            let weights = nodes.iter().skip(target).step_by(outputs);
+            let squares = [
+                weights.map(|weight| weight * weight).sum(),
+                (biases[target] - means.get(target).unwrap_or(&0.0)).powi(2),
+            ];
+            let of_group = |values: &[f64; 2]| -> f64 {
+                let classes = [OUTPUT_WEIGHTS, OUTPUT_BIASES].map(|class| self.group_of[class] == group);
+                let values = classes.into_iter().zip(values).filter(|(is_in, _)| *is_in);
+                values.map(|(_, value)| value).sum()
+            };
+            of_group(gamma) / (2.0 * of_group(&squares))
         };
         let alphas = self.of_outputs.iter().enumerate().map(of_target);
         alphas
@@ -111,156 +91,133 @@ impl BayesianRegularization {
         if self.state.targets.is_empty() {
             return;
         }
-        let squares = self.equations.squares_of_targets(mlp, &self.examples);
         let samples = self.examples.samples() as f64;
-        let betas: Vec<f64> = squares
-            .iter()
-            .zip(&self.state.targets)
-            .map(|(squares, target)| {
-                self.free(samples, target.effective_parameters) / squares.max(samples * MIN_NOISE * MIN_NOISE)
-            })
-            .collect();
+        let squares = self.equations.squares_of_targets(mlp, &self.examples);
+        let of_targets = squares.iter().zip(&self.state.targets).map(|(squares, target)| {
+            self.free(samples, target.effective_parameters) / squares.max(samples * MIN_NOISE * MIN_NOISE)
+        });
+        let betas = Vec::from_iter(of_targets);
         let mean = betas.iter().sum::<f64>() / betas.len() as f64;
         for (target, beta) in self.state.targets.iter_mut().zip(betas) {
             target.precision = beta / mean;
         }
-        self.scale_targets(mlp);
     }
 
-    /// Multiplies the output weights of `mlp` by √ρ in [`Self::scaled`].
-    pub(super) fn scale_targets(&mut self, mlp: &Mlp) {
-        self.roots = self
-            .state
-            .targets
-            .iter()
-            .map(|target| target.precision.sqrt())
-            .collect();
-        scale_outputs(&mut self.scaled, mlp, &self.roots);
-    }
-
-    /// ρ of each target; empty if all have the same noise level.
-    pub(super) fn precisions(&self) -> Vec<f64> {
-        self.state.targets.iter().map(|target| target.precision).collect()
+    /// Returns `mlp` with the weights of each output multiplied by √ρ.
+    pub(super) fn scaled(&self, mlp: &Mlp) -> Mlp {
+        let (mut scaled, hidden_weights) = (mlp.clone(), mlp.shape().hidden_weights());
+        let of_outputs = scaled.weights_mut()[hidden_weights..].iter_mut();
+        for (weight, precision) in of_outputs.zip(self.precisions.iter().cycle()) {
+            *weight *= precision.sqrt();
+        }
+        scaled
     }
 
     /// Means of the targets multiplied by √ρ.
-    pub(super) fn scaled_means(&self) -> Vec<f64> {
-        let mut means = self.means.clone();
-        means.iter_mut().zip(&self.roots).for_each(|(mean, root)| *mean *= root);
-        means
+    fn scaled_means(&self) -> Vec<f64> {
+        let means = self.means.iter().zip(&self.precisions);
+        means.map(|(mean, precision)| mean * precision.sqrt()).collect()
     }
 
     /// Gathers the equations at the weights of `mlp`.
     pub(super) fn gather(&mut self, mlp: &Mlp) {
-        let precisions = self.precisions();
-        self.mse = self.equations.gather(mlp, &precisions, &self.examples).mse;
-        self.weighted_mse = weighted_mse(&mut self.equations, mlp, &precisions, &self.examples);
+        for (precision, target) in self.precisions.iter_mut().zip(&self.state.targets) {
+            *precision = target.precision;
+        }
+        self.scaled = self.scaled(mlp);
+        self.mse = self.equations.gather(mlp, &self.precisions, &self.examples).mse;
+        self.weighted_mse = self.weighted_mse(mlp);
     }
 
-    /// Sums over the classes of each group.
-    fn by_group<T: Copy>(&self, classes: Classes<T>, value: impl Fn(T) -> f64) -> Vec<f64> {
-        let mut sums = vec![0.0; 1 + self.state.further.len()];
-        for (group, class) in self.group_of.into_iter().zip(classes) {
-            sums[group] += value(class);
-        }
-        sums
-    }
-
-    /// Measures γ at the current weights; γ keeps its value if the trace is lost in rounding.
-    pub(super) fn measure_effective_parameters(&mut self) {
-        let BayesianState { alpha, beta, .. } = self.state;
-        if self.state.is_plain() {
-            if let Some(trace) = self.equations.trace_of_inverse(&self.scaled, alpha / beta) {
-                let weights = self.step.len() as f64;
-                self.state.effective_parameters = (weights - alpha / beta * trace).clamp(0.0, weights);
-            }
-            return;
-        }
-        let decays = self.state.decays(self.group_of).map(|alpha| alpha / beta);
-        let Some(traces) = self.equations.traces_of_inverse(&self.scaled, decays) else {
-            return;
-        };
-        let sizes = self.by_group(class_sizes(self.scaled.shape()), |size| size as f64);
-        let classes = traces.classes();
-        let decayed = std::array::from_fn(|class| decays[class] * classes[class]);
-        let decayed = self.by_group(decayed, |decayed| decayed);
-        let groups: Vec<f64> = sizes
+    /// Returns the mean of ρe².
+    pub(super) fn weighted_mse(&mut self, mlp: &Mlp) -> f64 {
+        let squares = self.equations.squares_of_targets(mlp, &self.examples);
+        let weighted = squares
             .iter()
-            .zip(decayed)
-            .map(|(size, decayed)| (size - decayed).clamp(0.0, *size))
-            .collect();
-        for (group, effective) in self.state.further.iter_mut().zip(&groups[1..]) {
-            group.effective_parameters = *effective;
-        }
-        self.state.effective_parameters = groups.iter().sum();
-        self.share_out(decays, &traces);
+            .zip(&self.precisions)
+            .map(|(squares, precision)| squares * precision);
+        weighted.sum::<f64>() / self.examples.errors()
     }
 
-    /// Shares γ out among the targets that have their own noise level.
-    fn share_out(&mut self, decays: Classes, traces: &Traces) {
-        let Shape {
-            inputs,
-            hidden,
-            outputs,
-        } = self.scaled.shape();
-        let of_inputs = (inputs * hidden) as f64 - decays[HIDDEN_WEIGHTS] * traces.hidden_weights;
-        let of_hidden = (of_inputs + hidden as f64 - decays[HIDDEN_BIASES] * traces.hidden_biases).max(0.0);
-        let mut shares = vec![0.0; outputs];
-        let output_weights = &self.scaled.layers().1[..hidden * outputs];
-        for (index, weight) in output_weights.iter().enumerate() {
-            shares[index % outputs] += weight * weight;
+    /// Returns β Σρe² + Σ α Σw², with the mean of ρe² and the weights of the scaled network.
+    pub(super) fn objective(&self, weighted_mse: f64, scaled: &Mlp) -> f64 {
+        let squares = class_squares(scaled, &self.scaled_means());
+        let products = self.state.decays(self.group_of).into_iter().zip(squares);
+        let of_weights: f64 = products.map(|(decay, squares)| decay * squares).sum();
+        self.state.beta * weighted_mse * self.examples.errors() + of_weights
+    }
+
+    /// Returns α/β of each class of weights.
+    fn rates(&self) -> Classes {
+        self.state.decays(self.group_of).map(|alpha| alpha / self.state.beta)
+    }
+
+    /// Returns half the gradient of F/β with respect to the weights of the scaled network.
+    pub(super) fn slopes(&self) -> Vec<f64> {
+        let mut slopes = decay_slopes(&self.scaled, self.rates(), &self.scaled_means());
+        for (slope, of_errors) in slopes.iter_mut().zip(self.equations.gradient()) {
+            *slope += of_errors;
         }
-        let sum: f64 = shares.iter().sum();
-        let of_output = |traces: &OutputTraces| OutputParameters {
-            weights: (hidden as f64 - decays[OUTPUT_WEIGHTS] * traces.weights).max(0.0),
-            bias: (1.0 - decays[OUTPUT_BIASES] * traces.bias).max(0.0),
-        };
-        self.of_outputs.clear();
-        if self.state.targets.is_empty() {
-            return;
-        }
-        self.of_outputs.extend(traces.outputs.iter().map(of_output));
-        for ((target, own), share) in self.state.targets.iter_mut().zip(&self.of_outputs).zip(shares) {
-            let share = if sum > 0.0 { share / sum } else { 1.0 / outputs as f64 };
-            target.effective_parameters = own.weights + own.bias + share * of_hidden;
-        }
+        slopes
     }
 
     /// Returns the current error with the gradient of F / (β n).
     pub(super) fn regularized(&self) -> Evaluation {
-        let beta = self.state.beta;
-        let decays = self.state.decays(self.group_of).map(|alpha| alpha / beta);
-        let means = self.scaled_means();
-        let length = self
-            .equations
-            .gradient_length(&decay_slopes(&self.scaled, decays, &means));
         Evaluation {
             mse: self.mse,
-            gradient_norm: 2.0 * length / self.errors(),
+            gradient_norm: 2.0 * length(&self.slopes()) / self.examples.errors(),
         }
     }
-}
 
-/// Sets `scaled` to `mlp` with the weights of each output multiplied by its root; without roots, to `mlp`.
-pub(super) fn scale_outputs(scaled: &mut Mlp, mlp: &Mlp, roots: &[f64]) {
-    let hidden_weights = mlp.shape().hidden_weights();
-    let scaled = scaled.weights_mut();
-    scaled.copy_from_slice(mlp.weights());
-    if !roots.is_empty() {
-        let outputs = scaled[hidden_weights..].iter_mut().zip(roots.iter().cycle());
-        outputs.for_each(|(weight, root)| *weight *= root);
+    /// Sums over the classes of each group.
+    fn by_group(&self, classes: Classes) -> Vec<f64> {
+        let mut sums = vec![0.0; 1 + self.state.further.len()];
+        for (group, class) in self.group_of.into_iter().zip(classes) {
+            sums[group] += class;
+        }
+        sums
     }
-}
 
-/// Returns the mean of ρe², or of e² without precisions.
-pub(super) fn weighted_mse(equations: &mut NormalEquations, mlp: &Mlp, precisions: &[f64], examples: &Examples) -> f64 {
-    if precisions.is_empty() {
-        return equations.mse(mlp, examples);
+    /// Measures γ at the current weights, and shares it out among the targets that have their own noise level; γ keeps
+    /// its value if the trace is lost in rounding.
+    pub(super) fn measure_effective_parameters(&mut self) {
+        let rates = self.rates();
+        let Some(traces) = self.equations.traces_of_inverse(&self.scaled, rates) else {
+            return;
+        };
+        let (sizes, of_classes) = (
+            class_sizes(self.scaled.shape()).map(|size| size as f64),
+            traces.classes(),
+        );
+        let decayed = self.by_group(std::array::from_fn(|class| rates[class] * of_classes[class]));
+        let groups = self.by_group(sizes).into_iter().zip(decayed);
+        let groups = Vec::from_iter(groups.map(|(size, decayed)| (size - decayed).clamp(0.0, size)));
+        for (group, effective) in self.state.further.iter_mut().zip(&groups[1..]) {
+            group.effective_parameters = *effective;
+        }
+        self.state.effective_parameters = groups.iter().sum();
+        if self.state.targets.is_empty() {
+            return;
+        }
+        let Shape { hidden, outputs, .. } = self.scaled.shape();
+        let determined = |size: f64, class: usize, trace: f64| size - rates[class] * trace;
+        let of_hidden = determined(sizes[HIDDEN_WEIGHTS], HIDDEN_WEIGHTS, traces.hidden[0])
+            + determined(sizes[HIDDEN_BIASES], HIDDEN_BIASES, traces.hidden[1]);
+        let of_output = |[weights, bias]: [f64; 2]| {
+            [
+                determined(hidden as f64, OUTPUT_WEIGHTS, weights).max(0.0),
+                determined(1.0, OUTPUT_BIASES, bias).max(0.0),
+            ]
+        };
+        self.of_outputs = traces.outputs.into_iter().map(of_output).collect();
+        let mut shares = vec![0.0; outputs];
+        for (index, weight) in self.scaled.layers().1[..hidden * outputs].iter().enumerate() {
+            shares[index % outputs] += weight * weight;
+        }
+        let sum: f64 = shares.iter().sum();
+        for ((target, [weights, bias]), share) in self.state.targets.iter_mut().zip(&self.of_outputs).zip(shares) {
+            let share = if sum > 0.0 { share / sum } else { 1.0 / outputs as f64 };
+            target.effective_parameters = weights + bias + share * of_hidden.max(0.0);
+        }
     }
-    let squares = equations.squares_of_targets(mlp, examples);
-    let weighted = squares
-        .iter()
-        .zip(precisions)
-        .map(|(squares, precision)| squares * precision);
-    weighted.sum::<f64>() / examples.errors()
 }

@@ -13,7 +13,7 @@ use crate::{
     network::{Mlp, Shape},
     training::{
         Examples,
-        activations::{BlockNow, KeptActivations, add_scaled, multiply_by_tanh_slopes, scale},
+        activations::{BlockNow, KeptActivations, change_each, multiply_by_tanh_slopes},
         examples::{BLOCK, column, column_mut},
         parallel::{LARGE, accumulate, accumulate_lower, for_each_part, number_of_parts, product},
     },
@@ -123,7 +123,8 @@ impl ConjugateGradient {
             f.copy_from(elimination.f.as_ref().subrows(node * n1, n1));
             accumulate_lower(block.as_mut(), f.as_ref(), f.as_ref().transpose(), -1.0);
             for index in 0..n1 {
-                scale(&mut column_mut(block.as_mut(), index)[index..], weight);
+                let lower = &mut column_mut(block.as_mut(), index)[index..];
+                lower.iter_mut().for_each(|value| *value *= weight);
                 let class = if index + 1 == n1 { HIDDEN_BIASES } else { HIDDEN_WEIGHTS };
                 block[(index, index)] += damping[class] + RIDGE * weight * largest;
             }
@@ -202,8 +203,9 @@ impl ConjugateGradient {
             accumulate(sum.as_mut(), f(node), mixed.as_ref().subcols(node, 1), -1.0);
             let (weights, biases) = column_mut(sum, 0).split_at_mut(n1 - 1);
             let (p, p_biases) = column(direction, node).split_at(n1 - 1);
-            add_scaled(weights, self.damping[HIDDEN_WEIGHTS], p);
-            add_scaled(biases, self.damping[HIDDEN_BIASES], p_biases);
+            for (sum, p, class) in [(weights, p, HIDDEN_WEIGHTS), (biases, p_biases, HIDDEN_BIASES)] {
+                change_each(sum, p, |sum, p| *sum += self.damping[class] * p);
+            }
         }
     }
 
@@ -227,15 +229,10 @@ impl PartBuffers {
         let [pushed, mixed] = &mut self.hidden;
         let mut pushed = pushed.as_mut().subrows_mut(0, samples);
         let mut mixed = mixed.as_mut().subrows_mut(0, samples);
-        let slope = |mut values: MatMut<'_, f64>| {
-            for node in 0..values.ncols() {
-                multiply_by_tanh_slopes(column_mut(values.as_mut(), node), column(now.hidden(), node));
-            }
-        };
         product(pushed.as_mut(), inputs, p);
-        slope(pushed.as_mut());
+        multiply_by_tanh_slopes(pushed.as_mut(), now.hidden());
         product(mixed.as_mut(), pushed.as_ref(), mixing);
-        slope(mixed.as_mut());
+        multiply_by_tanh_slopes(mixed.as_mut(), now.hidden());
         accumulate(self.sum.as_mut(), inputs.transpose(), mixed.as_ref(), 1.0);
     }
 }
@@ -257,7 +254,8 @@ mod tests {
         }
         equations.gather(&mlp, &[], &examples);
         let mut step = vec![0.0; mlp.weights().len()];
-        equations.solve(&mlp, &examples, [1e-3; 4], &[], &mut step)
+        let right = equations.gradient().to_vec();
+        equations.solve(&mlp, &examples, [1e-3; 4], &right, &mut step)
     }
 
     #[test]

@@ -55,55 +55,60 @@ impl Elimination {
         Some(())
     }
 
-    /// Writes the negative right-hand side of the hidden layer, (Jwᵀe + decay) − Σₜ diag(V̄ₜ ⊗ 1) C G⁻¹ (Jvᵀe + decay)ₜ,
-    /// node by node.
-    pub(super) fn reduce(&mut self, sums: &Sums, mlp: &Mlp, decay: &[f64], right: &mut [f64]) {
+    /// Writes the negative right-hand side of the hidden layer, r_W − Σₜ diag(V̄ₜ ⊗ 1) C G⁻¹ r_Vₜ, node by node; r is
+    /// `right` in the order of [`Mlp::weights`].
+    pub(super) fn reduce(&mut self, sums: &Sums, mlp: &Mlp, right: &[f64], reduced: &mut [f64]) {
         let n1 = self.shape.inputs + 1;
-        fill(self.output.as_mut(), |node, output| sums.right_v(decay, node, output));
+        let (right_w, right_v) = layers(self.shape, right);
+        self.output.copy_from(right_v);
         substitute(self.g_factor.as_ref(), self.output.as_mut());
         product(
             self.small.as_mut(),
             self.output.as_ref(),
             output_weights(mlp).transpose(),
         );
-        let mut right = MatMut::from_column_major_slice_mut(right, n1, self.shape.hidden);
-        fill(right.as_mut(), |input, node| sums.right_w(decay, input, node));
+        let mut reduced = MatMut::from_column_major_slice_mut(reduced, n1, self.shape.hidden);
+        reduced.copy_from(right_w);
         for node in 0..self.shape.hidden {
             let (c, small) = (sums.c().subrows(node * n1, n1), self.small.as_ref().subcols(node, 1));
-            accumulate(right.as_mut().subcols_mut(node, 1), c, small, -1.0);
+            accumulate(reduced.as_mut().subcols_mut(node, 1), c, small, -1.0);
         }
     }
 
     /// Writes the whole step in the order of [`Mlp::weights`], given the hidden layer's negative step `d`:
-    /// δV = −G⁻¹ (Jvᵀe + decay − K V̄), column i of K being Cᵢᵀ dᵢ.
-    pub(super) fn complete(&mut self, sums: &Sums, mlp: &Mlp, decay: &[f64], d: &[f64], step: &mut [f64]) {
-        let n1 = self.shape.inputs + 1;
-        let d = MatRef::from_column_major_slice(d, n1, self.shape.hidden);
-        for node in 0..self.shape.hidden {
+    /// δV = −G⁻¹ (r_V − K V̄), column i of K being Cᵢᵀ dᵢ.
+    pub(super) fn complete(&mut self, sums: &Sums, mlp: &Mlp, right: &[f64], d: &[f64], step: &mut [f64]) {
+        let (n1, Shape { hidden, outputs, .. }) = (self.shape.inputs + 1, self.shape);
+        let d = MatRef::from_column_major_slice(d, n1, hidden);
+        for node in 0..hidden {
             let c = sums.c().subrows(node * n1, n1).transpose();
             product(self.small.as_mut().subcols_mut(node, 1), c, d.subcols(node, 1));
         }
-        fill(self.output.as_mut(), |node, output| sums.right_v(decay, node, output));
+        self.output.copy_from(layers(self.shape, right).1);
         accumulate(self.output.as_mut(), self.small.as_ref(), output_weights(mlp), -1.0);
         substitute(self.g_factor.as_ref(), self.output.as_mut());
         let (step_w, step_v) = step.split_at_mut(self.shape.hidden_weights());
-        write_negative(d, step_w);
-        write_negative(self.output.as_ref(), step_v);
+        let output = &self.output;
+        fill(MatMut::from_row_major_slice_mut(step_w, n1, hidden), |a, i| -d[(a, i)]);
+        fill(MatMut::from_row_major_slice_mut(step_v, hidden + 1, outputs), |q, t| {
+            -output[(q, t)]
+        });
     }
+}
+
+/// Returns the values of both layers' weights: n1 × h and (h+1) × outputs.
+fn layers(shape: Shape, values: &[f64]) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
+    let (w, v) = values.split_at(shape.hidden_weights());
+    (
+        MatRef::from_row_major_slice(w, shape.inputs + 1, shape.hidden),
+        MatRef::from_row_major_slice(v, shape.hidden + 1, shape.outputs),
+    )
 }
 
 /// Returns V̄: h × outputs.
 pub(super) fn output_weights(mlp: &Mlp) -> MatRef<'_, f64> {
     let Shape { hidden, outputs, .. } = mlp.shape();
     MatRef::from_row_major_slice(mlp.layers().1, hidden + 1, outputs).subrows(0, hidden)
-}
-
-/// Writes −`matrix` row by row.
-fn write_negative(matrix: MatRef<'_, f64>, values: &mut [f64]) {
-    let columns = matrix.ncols();
-    for (index, value) in values.iter_mut().enumerate() {
-        *value = -matrix[(index / columns, index % columns)];
-    }
 }
 
 pub(super) fn fill(matrix: MatMut<'_, f64>, value: impl Fn(usize, usize) -> f64) {

@@ -29,7 +29,7 @@ pub(super) use classes::{
     Classes, HIDDEN_BIASES, HIDDEN_WEIGHTS, OUTPUT_BIASES, OUTPUT_WEIGHTS, class_sizes, class_squares, decay_slopes,
 };
 pub(super) use plan::Plan;
-pub(super) use schur::{OutputTraces, Traces};
+pub(super) use schur::Traces;
 
 use conjugate::ConjugateGradient;
 use elimination::Elimination;
@@ -47,7 +47,7 @@ pub(super) struct NormalEquations {
     parts: Vec<Sums>,
     elimination: Elimination,
     /// Right-hand side of the hidden layer, then its negative step, node by node.
-    right: Vec<f64>,
+    reduced: Vec<f64>,
     solver: Solver,
 }
 
@@ -72,9 +72,9 @@ impl NormalEquations {
         };
         Self {
             activations: KeptActivations::new(shape, examples, gathering.max(solving)),
-            parts: (0..gathering).map(|_| Sums::new(plan, examples)).collect(),
+            parts: (0..gathering).map(|_| Sums::new(plan)).collect(),
             elimination: Elimination::new(shape),
-            right: vec![0.0; shape.hidden_weights()],
+            reduced: vec![0.0; shape.hidden_weights()],
             solver,
         }
     }
@@ -102,91 +102,68 @@ impl NormalEquations {
         }
         for_each_part(&mut self.parts, Sums::clear);
         self.activations
-            .for_each_block(mlp, examples, &mut self.parts, |sums, now| {
-                sums.add_block(&v, now, examples);
-            });
+            .for_each_block(mlp, examples, &mut self.parts, |sums, now| sums.add_block(&v, now));
         let (sums, others) = self.parts.split_first_mut().expect("there is at least one part");
         others.iter().for_each(|other| sums.add(other));
-        sums.scale_outputs(precisions);
-        let length = sums.gradient_w.squared_norm_l2() + sums.gradient_v.squared_norm_l2();
+        let of_outputs = sums.gradient[mlp.shape().hidden_weights()..].iter_mut();
+        for (slope, precision) in of_outputs.zip(precisions.iter().cycle()) {
+            *slope *= precision.sqrt();
+        }
         Evaluation {
             mse: squares / examples.errors(),
-            gradient_norm: 2.0 * length.sqrt() / examples.errors(),
+            gradient_norm: 2.0 * length(&sums.gradient) / examples.errors(),
         }
     }
 
-    /// Solves `(JᵀJ + damping·I) δ = −(Jᵀe + decay)` from the products last gathered, at the same `mlp`, and writes the
-    /// step δ in the order of [`Mlp::weights`]. `decay` has the [`decay_slopes`] of all weights, or is empty. Returns
-    /// `None`, with `step` unspecified, if the damped equations are numerically singular: a larger damping is needed.
+    /// Returns Jᵀe in the order of [`Mlp::weights`] from the products last gathered.
+    pub(super) fn gradient(&self) -> &[f64] {
+        &self.parts[0].gradient
+    }
+
+    /// Solves `(JᵀJ + damping·I) δ = −right` from the products last gathered, at the same `mlp`, and writes the step δ.
+    /// `right` and `step` are in the order of [`Mlp::weights`]. Returns `None`, with `step` unspecified, if the damped
+    /// equations are numerically singular: a larger damping is needed.
     pub(super) fn solve(
         &mut self,
         mlp: &Mlp,
         examples: &Examples,
         damping: Classes,
-        decay: &[f64],
+        right: &[f64],
         step: &mut [f64],
     ) -> Option<()> {
-        let (sums, elimination, right) = (&self.parts[0], &mut self.elimination, &mut self.right);
+        let (sums, elimination, reduced) = (&self.parts[0], &mut self.elimination, &mut self.reduced);
         elimination.factor(sums, damping)?;
-        elimination.reduce(sums, mlp, decay, right);
+        elimination.reduce(sums, mlp, right, reduced);
         match &mut self.solver {
             Solver::Factored(schur) => {
                 schur.factor(sums, elimination, mlp, damping)?;
-                schur.solve(right);
+                schur.solve(reduced);
             }
             Solver::Iterated(conjugate) => {
                 conjugate.factor(sums, elimination, mlp, damping)?;
-                conjugate.solve(mlp, examples, &mut self.activations, right)?;
+                conjugate.solve(mlp, examples, &mut self.activations, reduced)?;
             }
         }
-        elimination.complete(sums, mlp, decay, right, step);
+        elimination.complete(sums, mlp, right, reduced, step);
         step.iter().all(|value| value.is_finite()).then_some(())
     }
 
-    /// Returns the length of Jᵀe + `decay` from the products last gathered.
-    pub(super) fn gradient_length(&self, decay: &[f64]) -> f64 {
-        let sums = &self.parts[0];
-        // `hypot` avoids overflow of the squares when the error is negligible compared with the decay.
-        let w = (0..sums.gradient_w.ncols())
-            .flat_map(|node| (0..sums.gradient_w.nrows()).map(move |input| sums.right_w(decay, input, node)))
-            .fold(0.0, f64::hypot);
-        let v = (0..sums.gradient_v.ncols())
-            .flat_map(|output| (0..sums.gradient_v.nrows()).map(move |node| sums.right_v(decay, node, output)))
-            .fold(0.0, f64::hypot);
-        w.hypot(v)
-    }
-
-    /// Returns tr (JᵀJ + damping·I)⁻¹ from the products last gathered. Returns `None` if the matrix is not numerically
-    /// positive definite, or if it is not factored.
-    pub(super) fn trace_of_inverse(&mut self, mlp: &Mlp, damping: f64) -> Option<f64> {
-        let trace = self.of_inverse(mlp, [damping; 4], |schur, elimination| {
-            schur.trace_of_inverse(elimination, mlp)
-        })?;
-        trace.is_finite().then_some(trace)
-    }
-
-    /// Returns the contributions of weights to [`Self::trace_of_inverse`], with one damping per class.
+    /// Returns the contributions of weights to tr (JᵀJ + damping·I)⁻¹ from the products last gathered. Returns `None` if
+    /// the matrix is not numerically positive definite, or if it is not factored.
     pub(super) fn traces_of_inverse(&mut self, mlp: &Mlp, damping: Classes) -> Option<Traces> {
-        let traces = self.of_inverse(mlp, damping, |schur, elimination| {
-            schur.traces_of_inverse(elimination, mlp)
-        })?;
-        let is_finite = traces.classes().iter().all(|trace| trace.is_finite());
-        is_finite.then_some(traces)
-    }
-
-    /// Factors the matrix and computes what its inverse is needed for.
-    fn of_inverse<T>(
-        &mut self,
-        mlp: &Mlp,
-        damping: Classes,
-        compute: impl FnOnce(&mut SchurComplement, &mut Elimination) -> T,
-    ) -> Option<T> {
         let (sums, elimination) = (&self.parts[0], &mut self.elimination);
         let Solver::Factored(schur) = &mut self.solver else {
             return None;
         };
         elimination.factor(sums, damping)?;
         schur.factor(sums, elimination, mlp, damping)?;
-        Some(compute(schur, elimination))
+        let traces = schur.traces_of_inverse(elimination, mlp);
+        let is_finite = traces.classes().iter().all(|trace| trace.is_finite());
+        is_finite.then_some(traces)
     }
+}
+
+/// Returns the Euclidean norm; the squares of its values may overflow.
+pub(super) fn length(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::hypot)
 }

@@ -4,7 +4,6 @@ use super::conjugate;
 use crate::{
     network::Shape,
     training::{
-        Examples,
         activations::KeptActivations,
         examples::{BLOCK, pairs},
         parallel::{LARGE, number_of_parts},
@@ -106,15 +105,12 @@ impl Plan {
     /// Approximate memory in bytes of the equations, without the samples.
     pub(in crate::training) fn bytes(&self) -> usize {
         let (order, h, n1) = (self.shape.hidden_weights(), self.shape.hidden, self.shape.inputs + 1);
-        let (entries, kept) = match self.solution {
-            Solution::Factored => (
-                order + h + 1 + n1,
-                Examples::kept_pairs_bytes(self.shape.inputs, self.samples),
-            ),
-            Solution::Iterated => (2 * (h + 1) + n1, 0),
+        let entries = match self.solution {
+            Solution::Factored => order + h + 1 + n1,
+            Solution::Iterated => 2 * (h + 1) + n1,
         };
         let matrices = order.saturating_mul(entries).saturating_mul(size_of::<f64>());
-        let kept = KeptActivations::bytes(self.shape, self.samples) + kept;
+        let kept = KeptActivations::bytes(self.shape, self.samples);
         matrices.saturating_add(self.part_bytes()).saturating_add(kept)
     }
 

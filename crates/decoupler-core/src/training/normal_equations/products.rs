@@ -6,9 +6,8 @@ use super::plan::{CHUNK, Plan, Solution};
 use crate::{
     network::Shape,
     training::{
-        Examples,
-        activations::{BlockNow, multiply, multiply_into, scale, tanh_slopes_into},
-        examples::{BLOCK, PairsBuffer, column, column_mut},
+        activations::{BlockNow, change_each, multiply_by_tanh_slopes, multiply_into},
+        examples::{BLOCK, column, column_mut, fill_pairs, pairs},
         parallel::{accumulate_lower, add_product, product},
     },
 };
@@ -23,12 +22,10 @@ pub(super) struct Sums {
     c: Vec<f64>,
     /// H̃ᵀH̃.
     pub(super) g: Mat<f64>,
-    /// Jwᵀe: n1 × h.
-    pub(super) gradient_w: Mat<f64>,
-    /// Jvᵀe: (h+1) × outputs.
-    pub(super) gradient_v: Mat<f64>,
-    /// Pairs of inputs, if they are not kept.
-    pairs: PairsBuffer,
+    /// Jᵀe in the order of [`Mlp::weights`](crate::network::Mlp::weights).
+    pub(super) gradient: Vec<f64>,
+    /// Pairs of inputs, if the solver needs them: n1(n1+1)/2 × block.
+    pairs: Mat<f64>,
     /// D: block × h.
     slopes: Mat<f64>,
     /// Columns of a product: block × up to [`CHUNK`].
@@ -38,7 +35,7 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    pub(super) fn new(plan: &Plan, examples: &Examples) -> Self {
+    pub(super) fn new(plan: &Plan) -> Self {
         let shape = plan.shape;
         let (h, n1, h1) = (shape.hidden, shape.inputs + 1, shape.hidden + 1);
         let (rows, columns) = plan.gram();
@@ -48,11 +45,10 @@ impl Sums {
             gram: Mat::zeros(rows, columns),
             c: vec![0.0; h * n1 * h1],
             g: Mat::zeros(h1, h1),
-            gradient_w: Mat::zeros(n1, h),
-            gradient_v: Mat::zeros(h1, shape.outputs),
+            gradient: vec![0.0; shape.weights()],
             pairs: match plan.solution {
-                Solution::Factored => examples.pairs_buffer(),
-                Solution::Iterated => PairsBuffer::unused(),
+                Solution::Factored => Mat::zeros(pairs(n1), BLOCK),
+                Solution::Iterated => Mat::new(),
             },
             slopes: Mat::zeros(BLOCK, h),
             columns: Mat::zeros(BLOCK, (h * h1).min(CHUNK).max(n1)),
@@ -65,46 +61,26 @@ impl Sums {
         MatRef::from_column_major_slice(&self.c, self.shape.hidden_weights(), self.shape.hidden + 1)
     }
 
-    /// Entry of Jwᵀe + `decay`, which has an entry for each weight or is empty.
-    pub(super) fn right_w(&self, decay: &[f64], input: usize, node: usize) -> f64 {
-        let decay = decay.get(input * self.shape.hidden + node);
-        self.gradient_w[(input, node)] + decay.copied().unwrap_or_default()
-    }
-
-    /// Entry of Jvᵀe + `decay`, which has an entry for each weight or is empty.
-    pub(super) fn right_v(&self, decay: &[f64], node: usize, output: usize) -> f64 {
-        let decay = decay.get(self.shape.hidden_weights() + node * self.shape.outputs + output);
-        self.gradient_v[(node, output)] + decay.copied().unwrap_or_default()
-    }
-
-    fn sums(&mut self) -> [&mut Mat<f64>; 4] {
-        [&mut self.gram, &mut self.g, &mut self.gradient_w, &mut self.gradient_v]
-    }
-
     pub(super) fn clear(&mut self) {
-        self.c.fill(0.0);
-        self.sums().into_iter().for_each(|sum| sum.fill(0.0));
+        for sum in [&mut self.gram, &mut self.g] {
+            sum.fill(0.0);
+        }
+        for sum in [&mut self.c, &mut self.gradient] {
+            sum.fill(0.0);
+        }
     }
 
     /// Adds the sums of another part.
     pub(super) fn add(&mut self, other: &Self) {
-        self.c.iter_mut().zip(&other.c).for_each(|(sum, value)| *sum += value);
-        let others = [&other.gram, &other.g, &other.gradient_w, &other.gradient_v];
-        self.sums()
-            .into_iter()
-            .zip(others)
-            .for_each(|(sum, other)| *sum += other);
-    }
-
-    /// Multiplies Jvᵀe by the roots of the targets' precisions.
-    pub(super) fn scale_outputs(&mut self, precisions: &[f64]) {
-        for (target, precision) in precisions.iter().enumerate() {
-            scale(column_mut(self.gradient_v.as_mut(), target), precision.sqrt());
+        self.gram += &other.gram;
+        self.g += &other.g;
+        for (sum, other) in [(&mut self.c, &other.c), (&mut self.gradient, &other.gradient)] {
+            change_each(sum, other, |sum, value| *sum += value);
         }
     }
 
     /// Adds a block of samples, with the weights `v` of the output layer from errors to hidden nodes.
-    pub(super) fn add_block(&mut self, v: &[f64], now: &BlockNow<'_>, examples: &Examples) {
+    pub(super) fn add_block(&mut self, v: &[f64], now: &BlockNow<'_>) {
         let Shape {
             inputs,
             hidden: h,
@@ -115,16 +91,18 @@ impl Sums {
         let mut delta = self.delta.as_mut().subrows_mut(0, now.block.samples());
         let mut columns = self.columns.as_mut().subrows_mut(0, now.block.samples());
         for node in 0..h {
-            tanh_slopes_into(column_mut(slopes.as_mut(), node), column(hidden, node));
+            let slopes = column_mut(slopes.as_mut(), node);
+            change_each(slopes, column(hidden, node), |slope, h| *slope = 1.0 - h * h);
         }
         let slope = |node| column(slopes.as_ref(), node);
 
         match self.solution {
             Solution::Factored => {
-                let pairs = examples.input_pairs(now.number, &mut self.pairs);
+                let mut pairs = self.pairs.as_mut().subcols_mut(0, now.block.samples());
+                fill_pairs(a, pairs.as_mut());
                 let nodes = (0..h).flat_map(|i| (0..=i).map(move |j| (i, j)));
                 let factors = nodes.map(|(i, j)| (slope(i), slope(j)));
-                add_products(self.gram.as_mut(), pairs, columns.as_mut(), factors);
+                add_products(self.gram.as_mut(), pairs.as_ref(), columns.as_mut(), factors);
             }
             Solution::Iterated => {
                 // AᵀDᵢ²A for each node i.
@@ -145,13 +123,14 @@ impl Sums {
         add_products(c, a.transpose(), columns, factors);
         add_product(self.g.as_mut(), hidden.transpose(), hidden, 1.0);
 
-        add_product(self.gradient_v.as_mut(), hidden.transpose(), errors, 1.0);
+        let (gradient_w, gradient_v) = self.gradient.split_at_mut(self.shape.hidden_weights());
+        let gradient_w = MatMut::from_row_major_slice_mut(gradient_w, inputs + 1, h);
+        let gradient_v = MatMut::from_row_major_slice_mut(gradient_v, h + 1, outputs);
+        add_product(gradient_v, hidden.transpose(), errors, 1.0);
         let v = MatRef::from_row_major_slice(v, h + 1, outputs).subrows(0, h);
         product(delta.as_mut(), errors, v.transpose());
-        for node in 0..h {
-            multiply(column_mut(delta.as_mut(), node), slope(node));
-        }
-        add_product(self.gradient_w.as_mut(), a.transpose(), delta.as_ref(), 1.0);
+        multiply_by_tanh_slopes(delta.as_mut(), hidden);
+        add_product(gradient_w, a.transpose(), delta.as_ref(), 1.0);
     }
 }
 
@@ -214,14 +193,22 @@ mod tests {
         );
         for sums in [&factored, &iterated] {
             for (i, a) in (0..h).flat_map(|i| (0..n1).map(move |a| (i, a))) {
-                close("gradient of W", sums.gradient_w[(a, i)], gradient[(hidden(i, a), 0)]);
+                close(
+                    "gradient of W",
+                    sums.gradient[hidden(i, a)],
+                    gradient[(hidden(i, a), 0)],
+                );
                 for (q, t) in (0..h1).flat_map(|q| (0..outputs).map(move |t| (q, t))) {
                     let ours = v[(i, t)] * sums.c()[(i * n1 + a, q)];
                     close("C", ours, normal[(hidden(i, a), output(q, t))]);
                 }
             }
             for (q, t) in (0..h1).flat_map(|q| (0..outputs).map(move |t| (q, t))) {
-                close("gradient of V", sums.gradient_v[(q, t)], gradient[(output(q, t), 0)]);
+                close(
+                    "gradient of V",
+                    sums.gradient[output(q, t)],
+                    gradient[(output(q, t), 0)],
+                );
                 for p in 0..h1 {
                     close("G", sums.g[(p, q)], normal[(output(p, t), output(q, t))]);
                 }

@@ -33,8 +33,6 @@ pub(super) struct SchurComplement {
     /// Unpacked n1 × n1 block of BᵀB for each hidden node.
     squares: Vec<f64>,
     cholesky: Cholesky,
-    /// L⁻¹ and L⁻¹ Rₜ, allocated on first use.
-    inverse: Option<(Mat<f64>, Mat<f64>)>,
 }
 
 impl SchurComplement {
@@ -45,7 +43,6 @@ impl SchurComplement {
             s: Mat::zeros(order, order),
             squares: vec![0.0; order * (shape.inputs + 1)],
             cholesky: Cholesky::new(order),
-            inverse: None,
         }
     }
 
@@ -83,68 +80,32 @@ impl SchurComplement {
         substitute(self.s.as_ref(), MatMut::from_column_major_slice_mut(right, order, 1));
     }
 
-    /// Returns the trace of the inverse of the whole matrix last factored. From the blocks of the inverse it is `tr S⁻¹
-    /// + m tr G⁻¹ + Σₜ tr S⁻¹ Rₜ Rₜᵀ` with Rₜ = diag(V̄ₜ ⊗ 1) C G⁻¹; with the factors S = L Lᵀ and G = Lg Lgᵀ this is
-    /// `‖L⁻¹‖² + m ‖Lg⁻¹‖² + Σₜ ‖L⁻¹ Rₜ‖²` (Frobenius norms).
-    pub(super) fn trace_of_inverse(&mut self, elimination: &mut Elimination, mlp: &Mlp) -> f64 {
-        let squares = |matrix: &Mat<f64>| -> f64 {
-            let columns = (0..matrix.ncols()).flat_map(|index| &column(matrix.as_ref(), index)[index..]);
-            columns.map(|value| value * value).sum()
-        };
-        let of_g = squares(&inverse(elimination.g_factor.as_ref()));
-        let mut trace = squares(self.inverse()) + self.shape.outputs as f64 * of_g;
-        self.for_each_output(elimination, mlp, |r| trace += r.squared_norm_l2());
-        trace
-    }
-
-    /// As [`Self::trace_of_inverse`], class by class: diagonal entry k is the squared norm of column k of L⁻¹, or of
-    /// Lg⁻¹ and L⁻¹ Rₜ.
-    pub(super) fn traces_of_inverse(&mut self, elimination: &mut Elimination, mlp: &Mlp) -> Traces {
-        let Shape { inputs, hidden, .. } = self.shape;
-        let square = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
-        let (s, g) = (self.inverse(), inverse(elimination.g_factor.as_ref()));
-        let mut traces = Traces::default();
-        for index in 0..s.ncols() {
-            let is_bias = index % (inputs + 1) == inputs;
-            let class = if is_bias {
-                &mut traces.hidden_biases
-            } else {
-                &mut traces.hidden_weights
-            };
-            *class += square(&column(s.as_ref(), index)[index..]);
-        }
-        let of_node = Vec::from_iter((0..=hidden).map(|node| square(&column(g.as_ref(), node)[node..])));
-        self.for_each_output(elimination, mlp, |r| {
-            let of_node = |node| of_node[node] + square(column(r, node));
-            traces.outputs.push(OutputTraces {
-                weights: (0..hidden).map(of_node).sum(),
-                bias: of_node(hidden),
-            });
-        });
-        traces
-    }
-
-    /// Returns L⁻¹.
-    fn inverse(&mut self) -> &Mat<f64> {
-        let (order, h1) = (self.s.nrows(), self.shape.hidden + 1);
-        let allocate = || (Mat::zeros(order, order), Mat::zeros(order, h1));
-        let (inverse, _) = self.inverse.get_or_insert_with(allocate);
-        invert_lower_triangular(inverse.as_mut(), self.s.as_ref(), Par::Seq);
-        inverse
-    }
-
-    /// Calls `add` with L⁻¹ Rₜ for every output, after [`Self::inverse`]; turns F into C G⁻¹.
-    fn for_each_output(&mut self, elimination: &mut Elimination, mlp: &Mlp, mut add: impl FnMut(MatRef<'_, f64>)) {
-        let (v, n1) = (output_weights(mlp), self.shape.inputs + 1);
+    /// Returns the diagonal of the inverse of the whole matrix last factored, summed over classes of weights; turns F
+    /// into C G⁻¹. From the blocks of the inverse its trace is `tr S⁻¹ + m tr G⁻¹ + Σₜ tr S⁻¹ Rₜ Rₜᵀ` with
+    /// Rₜ = diag(V̄ₜ ⊗ 1) C G⁻¹; with the factors S = L Lᵀ and G = Lg Lgᵀ this is `‖L⁻¹‖² + m ‖Lg⁻¹‖² + Σₜ ‖L⁻¹ Rₜ‖²`
+    /// (Frobenius norms), column by column.
+    pub(super) fn traces_of_inverse(&self, elimination: &mut Elimination, mlp: &Mlp) -> Traces {
+        let (Shape { hidden, outputs, .. }, n1) = (self.shape, self.shape.inputs + 1);
         let Elimination { g_factor, f, .. } = elimination;
+        let square = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
+        let lower = |matrix: &Mat<f64>, index: usize| square(&column(matrix.as_ref(), index)[index..]);
+        let (s, g) = (inverse(self.s.as_ref()), inverse(g_factor.as_ref()));
+        let mut of_hidden = [0.0; 2];
+        for index in 0..s.ncols() {
+            of_hidden[usize::from(index % n1 + 1 == n1)] += lower(&s, index);
+        }
+        let of_node = Vec::from_iter((0..=hidden).map(|node| lower(&g, node)));
         solve_upper_triangular_in_place(g_factor.as_ref().transpose(), f.as_mut().transpose_mut(), Par::Seq);
-        let Some((_, r)) = &mut self.inverse else {
-            return;
-        };
-        for output in 0..self.shape.outputs {
+        let (v, mut r) = (output_weights(mlp), Mat::zeros(s.nrows(), hidden + 1));
+        let of_output = |output| {
             fill(r.as_mut(), |index, column| v[(index / n1, output)] * f[(index, column)]);
             solve_lower_triangular_in_place(self.s.as_ref(), r.as_mut(), Par::Seq);
-            add(r.as_ref());
+            let of_node = |node| of_node[node] + square(column(r.as_ref(), node));
+            [(0..hidden).map(of_node).sum(), of_node(hidden)]
+        };
+        Traces {
+            hidden: of_hidden,
+            outputs: (0..outputs).map(of_output).collect(),
         }
     }
 }
@@ -156,32 +117,19 @@ fn inverse(lower: MatRef<'_, f64>) -> Mat<f64> {
     inverse
 }
 
-/// Contributions of weights to the trace of an inverse.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Contributions of weights and of biases to the trace of an inverse.
+#[derive(Clone, Debug, PartialEq)]
 pub(in crate::training) struct Traces {
-    pub(in crate::training) hidden_weights: f64,
-    pub(in crate::training) hidden_biases: f64,
-    /// Of the weights of each output.
-    pub(in crate::training) outputs: Vec<OutputTraces>,
-}
-
-/// Contributions of the weights of one output to the trace of an inverse.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::training) struct OutputTraces {
-    pub(in crate::training) weights: f64,
-    pub(in crate::training) bias: f64,
+    pub(in crate::training) hidden: [f64; 2],
+    /// Of each output.
+    pub(in crate::training) outputs: Vec<[f64; 2]>,
 }
 
 impl Traces {
     /// Sums over the weights of each class.
     pub(in crate::training) fn classes(&self) -> Classes {
-        let of_outputs = |of: fn(&OutputTraces) -> f64| self.outputs.iter().map(of).sum();
-        [
-            self.hidden_weights,
-            self.hidden_biases,
-            of_outputs(|output| output.weights),
-            of_outputs(|output| output.bias),
-        ]
+        let of_outputs = |class: usize| self.outputs.iter().map(|output| output[class]).sum();
+        [self.hidden[0], self.hidden[1], of_outputs(0), of_outputs(1)]
     }
 }
 

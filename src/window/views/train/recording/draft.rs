@@ -8,7 +8,7 @@ use std::{
     sync::Arc,
 };
 
-use decoupler_core::dataset::{Memory, Span, SpanError, SplitBy};
+use decoupler_core::dataset::{DatasetError, Memory, Span, SplitBy};
 use decoupler_files::import::{
     Condition, Derived, FileSet, ImportError, InspectedFile, Joined, Meaning, Missing, Plan, Recipe, TestFiles,
 };
@@ -530,7 +530,7 @@ impl MemoryTexts {
 pub(super) fn spans(text: &str) -> Result<Vec<Span>, String> {
     let texts = text.split(',').map(str::trim).filter(|text| !text.is_empty());
     texts
-        .map(|text| text.parse().map_err(|error: SpanError| error.to_string()))
+        .map(|text| text.parse().map_err(|error: DatasetError| error.to_string()))
         .collect()
 }
 

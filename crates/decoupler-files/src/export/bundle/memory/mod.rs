@@ -13,7 +13,7 @@ mod scripts;
 use std::fmt::Write;
 
 use decoupler_core::{
-    dataset::{Memory, MemoryConstants, MemoryError, MemoryState, Seed, Span, Stream},
+    dataset::{DatasetError, Memory, MemoryConstants, MemoryState, Seed, Span, Stream},
     text::{counted, format_number, inert},
 };
 use rand::RngExt;
@@ -61,7 +61,7 @@ impl ExportedMemory {
         exported: &mut ExportedDecoder<'_>,
         portable: &Portable,
     ) -> Result<Self, BundleError> {
-        let invalid = |error: MemoryError| BundleError::read_back("the network file", error.to_string());
+        let invalid = |error: DatasetError| BundleError::read_back("the network file", error.to_string());
         let channels = portable.channels / memory.features(1);
         let constants = MemoryConstants::of(memory, channels).map_err(invalid)?;
         let mut state = MemoryState::new(memory, channels).map_err(invalid)?;

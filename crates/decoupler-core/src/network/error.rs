@@ -1,0 +1,80 @@
+use thiserror::Error;
+
+/// Error in fitting or reading a scaling or a network.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum NetworkError {
+    /// There are no samples.
+    #[error("there are no samples to scale")]
+    Empty,
+    /// A value is NaN or infinite.
+    #[error("sample {}, channel {}: {value:?} is not a finite number; give finite readings and targets", .sample + 1, .channel + 1)]
+    NotFinite {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Index of the channel, from 0.
+        channel: usize,
+        /// Value found.
+        value: f64,
+    },
+    /// A reading is outside the domain of the chosen input quantity.
+    #[error("sample {}, channel {}: {value:?} is not a resistance; give finite numbers above 0, or use the raw readings", .sample + 1, .channel + 1)]
+    Reading {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Index of the channel, from 0.
+        channel: usize,
+        /// Reading found.
+        value: f64,
+    },
+    /// The range of a channel overflows.
+    #[error("channel {} ranges from {minimum:?} to {maximum:?}: too wide to scale; use a larger unit", .channel + 1)]
+    Range {
+        /// Index of the channel, from 0.
+        channel: usize,
+        /// Smallest value of the channel.
+        minimum: f64,
+        /// Largest value of the channel.
+        maximum: f64,
+    },
+    /// The range of a channel is so narrow that its reciprocal overflows.
+    #[error("channel {} ranges from {minimum:?} to {maximum:?}: too narrow to scale; use a smaller unit", .channel + 1)]
+    Narrow {
+        /// Index of the channel, from 0.
+        channel: usize,
+        /// Smallest value of the channel.
+        minimum: f64,
+        /// Largest value of the channel.
+        maximum: f64,
+    },
+    /// A decomposition did not converge, or sums overflowed.
+    #[error(
+        "the equations of the fit or of the principal components have no finite solution: look for extreme values in the \
+         readings and targets, or scale the readings by their range"
+    )]
+    NotConverged,
+    /// The scaling in a file is inconsistent.
+    #[error("its parts are missing, not finite, or of sizes that do not fit")]
+    Damaged,
+    /// The limits of a scaling, or of the readings in the training set, are missing, not finite, or out of order.
+    #[error("the {0} scaling is damaged: its limits are missing, not finite, or out of order")]
+    DamagedScaling(&'static str),
+    /// The number of weights in a layer does not match the scaling and the hidden nodes.
+    #[error("the {layer} layer has {found} weights, but {expected} follow from the scaling and the hidden nodes")]
+    LayerSize {
+        /// Name of the layer.
+        layer: &'static str,
+        /// Number of weights found.
+        found: usize,
+        /// Number of weights expected.
+        expected: usize,
+    },
+    /// A weight is NaN or infinite.
+    #[error("weight {index} of the {layer} layer is not a finite number")]
+    Weight {
+        /// Name of the layer.
+        layer: &'static str,
+        /// Index of the weight, row by row from 0.
+        index: usize,
+    },
+}
