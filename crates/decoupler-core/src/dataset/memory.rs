@@ -11,8 +11,6 @@ pub const LARGEST_LAG: usize = 100_000;
 /// Maximum number of features, and of values in a state.
 const MAX_FEATURES: usize = 20_000;
 const MAX_STATE: usize = 10_000_000;
-/// Maximum size of the states of all series that are open at once.
-const MAX_STATES_BYTES: u64 = 2_000_000_000;
 
 /// Inputs from the past: a network for a sensor with hysteresis, creep or drift sees, next to the current readings,
 /// earlier ones.
@@ -98,18 +96,6 @@ pub enum MemoryError {
         features: usize,
         /// Number of values in the state.
         state: usize,
-    },
-    /// The states of several streams are too large together.
-    #[error(
-        "the lags and averages of {series} groups and row-wires at once are too large: they need {:.1} GB of memory, and may \
-         use {:.0} GB; use shorter lags, fewer averages, or a part of the rows",
-        *.bytes as f64 * 1e-9, MAX_STATES_BYTES as f64 * 1e-9
-    )]
-    TooLarge {
-        /// Number of series of samples.
-        series: usize,
-        /// Memory needed, in bytes.
-        bytes: u64,
     },
 }
 
@@ -341,18 +327,6 @@ impl MemoryState {
             averages: vec![0.0; constants.averages.len() * channels],
             constants,
         })
-    }
-
-    /// Checks that the states of this number of series are not too large together.
-    ///
-    /// # Errors
-    /// If they are.
-    pub(super) fn check_states(&self, series: usize) -> Result<(), MemoryError> {
-        let bytes = (self.constants.state() as u64).saturating_mul((size_of::<f64>() * series) as u64);
-        if bytes > MAX_STATES_BYTES {
-            return Err(MemoryError::TooLarge { series, bytes });
-        }
-        Ok(())
     }
 
     /// Number of states that take as much memory as the largest.
