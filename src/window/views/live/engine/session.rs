@@ -6,7 +6,7 @@ use std::{
 use decoupler_core::{
     decoupling::Decoder,
     evaluation::SimulatedSettings,
-    live::{FaultEvent, LeftOutDecoder, WireCheck, equation_decoder},
+    live::{FaultEvent, LeftOutDecoder, WireCheck},
     scene::Scene,
     sensor::{SensorError, SensorModel},
 };
@@ -424,7 +424,7 @@ impl Watch {
             Some(_) => None,
             None => Some(LiveParts {
                 check: WireCheck::new(sensor, scene, rows)?,
-                left_out: LeftOutDecoder::new(sensor, scene, rows, equation_decoder(sensor, scene, rows)?)?,
+                left_out: LeftOutDecoder::new(sensor, scene, rows)?,
             }),
         };
         Ok(Self {
