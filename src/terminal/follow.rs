@@ -14,7 +14,7 @@ use std::{
 use clap::Args;
 use decoupler_core::{
     dataset::{Place, Simulation, SimulationError},
-    live::{FaultEvent, LeftOutDecoder, WireCheck, equation_decoder},
+    live::{FaultEvent, LeftOutDecoder, WireCheck},
     scene::Noise,
 };
 use decoupler_files::{
@@ -372,9 +372,7 @@ impl Faults {
         Ok(Self {
             watch: Some(Watch {
                 check: WireCheck::new(sensor, &scene, &rows).map_err(Failure::Sensor)?,
-                left_out: equation_decoder(sensor, &scene, &rows)
-                    .and_then(|decoder| LeftOutDecoder::new(sensor, &scene, &rows, decoder))
-                    .map_err(Failure::Sensor)?,
+                left_out: LeftOutDecoder::new(sensor, &scene, &rows).map_err(Failure::Sensor)?,
                 frame_ohm: vec![0.0; rows.len() * scale.columns()],
                 is_new: vec![false; rows.len()],
                 columns: scale.columns(),

@@ -130,7 +130,7 @@ pub(super) struct Simulate {
     #[arg(long, default_value_t = 0, value_parser = seed)]
     seed: u64,
     /// Fault of a wire or of the electronics to simulate: open-row:ROW or open-column:COLUMN (broken at the connector, or
-    /// with @NODE before that node), short-rows:ROW-ROW, short-columns:COLUMN-COLUMN, gain:COLUMN=REL (gain error of an
+    /// with @NODE before that node), short-columns:COLUMN-COLUMN, gain:COLUMN=REL (gain error of an
     /// amplifier), stuck:COLUMN=low|high (a converter at an end of its range)
     #[arg(long, value_name = "FAULT")]
     fault: Option<Fault>,

@@ -9,7 +9,7 @@ use decoupler_core::{
     dataset::{Seed, Simulation, Stream},
     decoupling::Decoder,
     evaluation::{Preset, Run, RunSettings},
-    live::{FaultEvent, FaultyWire, LeftOutDecoder, WireCheck, equation_decoder},
+    live::{FaultEvent, FaultyWire, LeftOutDecoder, WireCheck},
     rand::{Rng, RngExt},
     scene::{ConverterEnd, Fault, Indenter, Loading, Noise},
     sensor::ArrayScale,
@@ -143,12 +143,7 @@ fn examine(
                 tally.wrong += 1;
                 println!("{fault}: {found}");
             }
-            let mut decoder = LeftOutDecoder::new(
-                sensor,
-                scene,
-                source.rows(),
-                equation_decoder(sensor, scene, source.rows())?,
-            )?;
+            let mut decoder = LeftOutDecoder::new(sensor, scene, source.rows())?;
             decoder.leave_out(Some(found));
             left_out = Some(decoder);
         }

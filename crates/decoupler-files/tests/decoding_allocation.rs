@@ -4,7 +4,7 @@
 
 use decoupler_core::{
     dataset::Seed,
-    decoupling::{DecodeError, Decoder},
+    decoupling::Decoder,
     live::{Diagnosis, FaultCause, FaultyWire, LeftOutDecoder, WireCheck},
     scene::{Noise, Rows, Scene},
     sensor::{Axes, RowConductance, SensorModel},
@@ -37,24 +37,6 @@ fn the_forward_model_and_its_jacobian_do_not_allocate() {
     }
 }
 
-/// Always answers with the same coordinates: rows × 18.
-struct Known(Vec<f64>);
-
-impl Decoder for Known {
-    fn channels(&self) -> usize {
-        18
-    }
-
-    fn outputs(&self) -> usize {
-        18
-    }
-
-    fn decode_row(&mut self, row_index: usize, _: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        targets.copy_from_slice(&self.0[18 * row_index..][..18]);
-        Ok(())
-    }
-}
-
 #[test]
 fn a_line_is_parsed_and_monitored_without_allocating() {
     let (model, scene) = (
@@ -68,15 +50,9 @@ fn a_line_is_parsed_and_monitored_without_allocating() {
     let mut source = Simulated::new(&model, &scene, Seed(0), 10.0).unwrap();
     let mut frame_ohm = vec![0.0; source.readings()];
     source.next_frame(&mut frame_ohm).unwrap();
-    let truth = source
-        .rows()
-        .iter()
-        .flat_map(|&row| source.deformation().row_positions_mm(&model, row));
-    let truth_mm: Vec<f64> = truth.flat_map(|position| position.to_array()).collect();
-    let known = || Box::new(Known(truth_mm.clone()));
     let mut parser = LineParser::new(model.scale, scene.rows, true).unwrap();
-    let mut check = WireCheck::by(known(), &model, &scene, source.rows()).unwrap();
-    let mut decoder = LeftOutDecoder::new(&model, &scene, source.rows(), known()).unwrap();
+    let mut check = WireCheck::new(&model, &scene, source.rows()).unwrap();
+    let mut decoder = LeftOutDecoder::new(&model, &scene, source.rows()).unwrap();
     decoder.leave_out(Some(Diagnosis {
         wire: FaultyWire::Column(3),
         cause: FaultCause::Unknown,

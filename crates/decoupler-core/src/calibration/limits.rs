@@ -56,22 +56,23 @@ impl PressLimits {
             if !(displacement.is_finite() && displacement.z < height_mm) {
                 return Err(CalibrationError::Displacement { sample, node });
             }
-            let depth_mm = displacement.z;
-            if depth_mm < -tolerance_mm || depth_mm > self.largest_depth_mm + tolerance_mm {
-                return Err(CalibrationError::Depth {
-                    sample,
-                    node,
-                    depth_mm,
-                    largest_mm: self.largest_depth_mm,
-                });
-            }
             let shift_mm = displacement.truncate().abs().max_element();
-            if shift_mm > self.largest_shift_mm + tolerance_mm {
-                return Err(CalibrationError::Shift {
+            let directions = [
+                ("pressed down", displacement.z, "only 0 to", self.largest_depth_mm),
+                ("shifted sideways", shift_mm, "at most", self.largest_shift_mm),
+            ];
+            let is_outside = |mm: f64, largest_mm: f64| mm < -tolerance_mm || mm > largest_mm + tolerance_mm;
+            let outside = directions
+                .into_iter()
+                .find(|&(_, mm, _, largest_mm)| is_outside(mm, largest_mm));
+            if let Some((direction, mm, at_most, largest_mm)) = outside {
+                return Err(CalibrationError::Press {
                     sample,
                     node,
-                    shift_mm,
-                    largest_mm: self.largest_shift_mm,
+                    direction,
+                    mm,
+                    at_most,
+                    largest_mm,
                 });
             }
         }

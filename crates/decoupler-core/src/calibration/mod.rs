@@ -82,34 +82,22 @@ pub enum CalibrationError {
         /// Node on the row-wire, from 0.
         node: usize,
     },
-    /// A displacement is upwards, or further down than nodes may be pressed.
+    /// A displacement is upwards, or exceeds a limit.
     #[error(
-        "sample {}, node {}: it is pressed down by {} mm, but only 0 to {} mm is possible; correct it, or leave this sample out",
-        .sample + 1, .node + 1, rounded(*.depth_mm), short(*.largest_mm)
+        "sample {}, node {}: it is {direction} by {} mm, but {} {} mm is possible; correct it, or leave this sample out",
+        .sample + 1, .node + 1, rounded(*.mm), .at_most, short(*.largest_mm)
     )]
-    Depth {
+    Press {
         /// Index of the sample, from 0.
         sample: usize,
         /// Node on the row-wire, from 0.
         node: usize,
-        /// Displacement downwards.
-        depth_mm: f64,
-        /// Largest possible displacement.
-        largest_mm: f64,
-    },
-    /// A sideways displacement exceeds the limit.
-    #[error(
-        "sample {}, node {}: it is shifted sideways by {} mm, but at most {} mm is possible; correct it, or leave this sample \
-         out",
-        .sample + 1, .node + 1, rounded(*.shift_mm), short(*.largest_mm)
-    )]
-    Shift {
-        /// Index of the sample, from 0.
-        sample: usize,
-        /// Node on the row-wire, from 0.
-        node: usize,
-        /// Sideways displacement.
-        shift_mm: f64,
+        /// Direction of the displacement.
+        direction: &'static str,
+        /// Displacement.
+        mm: f64,
+        /// Words for the range up to the largest displacement.
+        at_most: &'static str,
         /// Largest possible displacement.
         largest_mm: f64,
     },
@@ -169,8 +157,7 @@ impl CalibrationError {
             Self::Shape { sample, .. }
             | Self::Reading { sample, .. }
             | Self::Displacement { sample, .. }
-            | Self::Depth { sample, .. }
-            | Self::Shift { sample, .. }
+            | Self::Press { sample, .. }
             | Self::Absurd { sample, .. } => Some(sample),
             Self::Sensor(_) | Self::OneRow { .. } | Self::TooFew { .. } | Self::NotConverged => None,
         }

@@ -6,7 +6,7 @@ const GAP: f64 = 50.0;
 const ROWS_PER_RESTART: usize = 50;
 
 /// Rows that continue each other: those of one group, read from one row-wire.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Series {
     /// Group, 0 if there are none.
     pub group: u64,
@@ -89,11 +89,6 @@ impl<S> Continuation<S> {
         continued.time_s = time_s.or(continued.time_s);
         continued.last_row = self.rows;
         (&mut continued.state, place)
-    }
-
-    /// Drops the state of a series that has ended.
-    pub fn end(&mut self, series: Series) {
-        self.states.remove(&series);
     }
 
     /// Drops all states.

@@ -122,7 +122,7 @@ impl Division {
             Vec::new()
         };
         DividedSamples {
-            training: ascending(units),
+            training: ascending(units.concat()),
             validation,
             test,
         }
@@ -179,11 +179,12 @@ fn take_last(units: &mut Vec<Vec<usize>>, share: f64) -> Vec<usize> {
         }
         (first, taken) = (first - 1, more);
     }
-    ascending(units.split_off(first))
+    ascending(units.split_off(first).concat())
 }
 
-fn ascending(units: Vec<Vec<usize>>) -> Vec<usize> {
-    let mut samples: Vec<usize> = units.into_iter().flatten().collect();
+/// Samples in ascending order.
+pub(super) fn ascending(samples: impl IntoIterator<Item = usize>) -> Vec<usize> {
+    let mut samples = Vec::from_iter(samples);
     samples.sort_unstable();
     samples
 }
@@ -282,13 +283,13 @@ impl SplitBy {
     pub fn hold_out(self, set: &Dataset, held_out: usize, rng: &mut impl Rng) -> DividedSamples {
         let mut validation = self.units(set);
         let held_out = held_out.min(validation.len().saturating_sub(1));
-        if held_out > 0 && self != Self::Time {
-            validation.shuffle(rng);
+        if held_out > 0 {
+            validation = self.ordered_units(set, rng);
         }
         let training = validation.split_off(held_out);
         DividedSamples {
-            training: ascending(training),
-            validation: ascending(validation),
+            training: ascending(training.concat()),
+            validation: ascending(validation.concat()),
             test: Vec::new(),
         }
     }

@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-use super::{LARGEST_LAG, Span, memory::MAX_STATES_BYTES};
+use super::{LARGEST_LAG, Span};
 use crate::text::format_number;
 
 /// Error in a set of samples, its division or frames, or in a memory of the past.
@@ -119,18 +119,6 @@ pub enum DatasetError {
         features: usize,
         /// Number of values in the state.
         state: usize,
-    },
-    /// The states of several streams are too large together.
-    #[error(
-        "the lags and averages of {series} groups and row-wires at once are too large: they need {:.1} GB of memory, and may \
-         use {:.0} GB; use shorter lags, fewer averages, or a part of the rows",
-        *.bytes as f64 * 1e-9, MAX_STATES_BYTES as f64 * 1e-9
-    )]
-    StatesTooLarge {
-        /// Number of series of samples.
-        series: usize,
-        /// Memory needed, in bytes.
-        bytes: u64,
     },
     /// Text that is not a span.
     #[error("'{0}' is not a span of time: write a number of samples as in 20, or a time as in 2s, 100ms or 5min")]

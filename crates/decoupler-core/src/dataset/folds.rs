@@ -1,6 +1,6 @@
-use rand::{Rng, seq::SliceRandom};
+use rand::Rng;
 
-use super::{Dataset, DatasetError, DividedSamples, SplitBy};
+use super::{Dataset, DatasetError, DividedSamples, SplitBy, division::ascending};
 
 /// Folds of a k-fold cross-validation: every sample is in exactly one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,12 +16,17 @@ impl Folds {
     /// # Errors
     /// If there are fewer than two folds, or more folds than samples (or groups).
     pub fn by(set: &Dataset, folds: usize, by: SplitBy, rng: &mut impl Rng) -> Result<Self, DatasetError> {
-        let units = by.units(set);
-        let unit = by.unit_name(units.len(), set.samples());
-        DatasetError::check_folds(folds, units.len(), unit)?;
+        let units = by.units(set).len();
+        DatasetError::check_folds(folds, units, by.unit_name(units, set.samples()))?;
+        let units = by.ordered_units(set, rng);
         Ok(match by {
             SplitBy::Time => Self::blocks(&units, folds),
-            SplitBy::Group | SplitBy::Random => Self::shuffled(&units, folds, rng),
+            SplitBy::Group | SplitBy::Random => {
+                let deal = |fold| ascending(units.iter().skip(fold).step_by(folds).flatten().copied());
+                Self {
+                    folds: (0..folds).map(deal).collect(),
+                }
+            }
         })
     }
 
@@ -29,20 +34,6 @@ impl Folds {
     pub(crate) fn consecutive(samples: usize, folds: usize) -> Self {
         let units: Vec<Vec<usize>> = (0..samples).map(|sample| vec![sample]).collect();
         Self::blocks(&units, folds)
-    }
-
-    fn shuffled(units: &[Vec<usize>], folds: usize, rng: &mut impl Rng) -> Self {
-        let mut order: Vec<usize> = (0..units.len()).collect();
-        order.shuffle(rng);
-        let deal = |fold: usize| {
-            let assigned = order.iter().skip(fold).step_by(folds);
-            let mut samples: Vec<usize> = assigned.flat_map(|&unit| &units[unit]).copied().collect();
-            samples.sort_unstable();
-            samples
-        };
-        Self {
-            folds: (0..folds).map(deal).collect(),
-        }
     }
 
     /// Blocks of consecutive units, at least one each.
@@ -90,9 +81,7 @@ impl Folds {
     /// Indices of the samples in all folds except those given, ascending.
     pub fn without(&self, folds: &[usize]) -> Vec<usize> {
         let kept = self.folds.iter().enumerate().filter(|(fold, _)| !folds.contains(fold));
-        let mut samples: Vec<usize> = kept.flat_map(|(_, samples)| samples).copied().collect();
-        samples.sort_unstable();
-        samples
+        ascending(kept.flat_map(|(_, samples)| samples).copied())
     }
 }
 

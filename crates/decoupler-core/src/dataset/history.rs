@@ -1,6 +1,6 @@
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
-use ndarray::{ArcArray2, Array2, ArrayView2, Axis};
+use ndarray::{ArcArray2, Array2, ArrayView1, ArrayView2, Axis};
 
 use super::{
     DatasetError, Memory, MemoryState,
@@ -185,30 +185,24 @@ impl History {
     /// Returns the features of the samples: samples × features.
     ///
     /// # Errors
-    /// If the memory is invalid for these channels (see [`Memory::check`]), or too many series are interleaved.
+    /// If the memory is invalid for these channels: see [`Memory::check`].
     pub fn features(&self, memory: &Memory) -> Result<ArcArray2<f64>, DatasetError> {
         let memory = self.resolved(memory);
         if memory.is_empty() {
             return Ok(self.of_samples(self.readings.clone()));
         }
         let (rows, channels) = self.readings.dim();
-        let sequence = self.sequence();
-        let last: HashMap<Series, usize> = sequence.iter().map(|&row| (self.series[row], row)).collect();
-        let mut stream = MemoryStream::new(&memory, channels)?.with_room_for(self.most_open(&sequence, &last))?;
+        let mut stream = MemoryStream::new(&memory, channels)?;
         let mut all = Array2::zeros((rows, memory.features(channels)));
-        let mut readings = vec![0.0; channels];
-        for row in sequence {
-            readings
-                .iter_mut()
-                .zip(self.readings.row(row))
-                .for_each(|(to, from)| *to = *from);
-            let (features, _) = stream.step(self.series[row], &readings, self.time_s(row));
-            all.row_mut(row)
-                .iter_mut()
-                .zip(features)
-                .for_each(|(to, from)| *to = *from);
-            if last[&self.series[row]] == row {
-                stream.states.end(self.series[row]);
+        // One series after the other, so that one state is enough.
+        let mut sequence = self.sequence();
+        sequence.sort_by_key(|&row| self.series[row]);
+        for of_series in sequence.chunk_by(|&one, &next| self.series[one] == self.series[next]) {
+            stream.restart();
+            for &row in of_series {
+                let readings = self.readings.row(row).to_vec();
+                let (features, _) = stream.step(self.series[row], &readings, self.time_s(row));
+                all.row_mut(row).assign(&ArrayView1::from(features));
             }
         }
         Ok(self.of_samples(all.into_shared()))
@@ -220,21 +214,6 @@ impl History {
         }
         rows.select(Axis(0), &self.samples).into_shared()
     }
-
-    /// Maximum number of series that have begun and not ended; `last` is the last row of each.
-    fn most_open(&self, sequence: &[usize], last: &HashMap<Series, usize>) -> usize {
-        let mut open = HashSet::new();
-        let mut most = 0;
-        for &row in sequence {
-            let series = self.series[row];
-            open.insert(series);
-            most = most.max(open.len());
-            if last[&series] == row {
-                open.remove(&series);
-            }
-        }
-        most
-    }
 }
 
 /// Features of rows of readings as they come, with one state of a [`Memory`] for each [`Series`].
@@ -242,7 +221,6 @@ impl History {
 pub struct MemoryStream {
     start: MemoryState,
     states: Continuation<MemoryState>,
-    interval_s: Option<f64>,
     features: Vec<f64>,
 }
 
@@ -258,19 +236,6 @@ impl MemoryStream {
             features: vec![0.0; start.features()],
             states: Continuation::new(memory.interval_s, start.states_that_fit()),
             start,
-            interval_s: memory.interval_s,
-        })
-    }
-
-    /// Returns the stream with room for the states of `series` series at a time.
-    ///
-    /// # Errors
-    /// If they are too large.
-    fn with_room_for(self, series: usize) -> Result<Self, DatasetError> {
-        self.start.check_states(series)?;
-        Ok(Self {
-            states: Continuation::new(self.interval_s, series),
-            ..self
         })
     }
 

@@ -9,8 +9,6 @@ pub const LARGEST_LAG: usize = 100_000;
 /// Maximum number of features, and of values in a state.
 const MAX_FEATURES: usize = 20_000;
 const MAX_STATE: usize = 10_000_000;
-/// Maximum size of the states of all series that are open at once.
-pub(super) const MAX_STATES_BYTES: u64 = 2_000_000_000;
 
 /// Inputs from the past: a network for a sensor with hysteresis, creep or drift sees, next to the current readings,
 /// earlier ones.
@@ -274,18 +272,6 @@ impl MemoryState {
             averages: vec![0.0; constants.averages.len() * channels],
             constants,
         })
-    }
-
-    /// Checks that the states of this number of series are not too large together.
-    ///
-    /// # Errors
-    /// If they are.
-    pub(super) fn check_states(&self, series: usize) -> Result<(), DatasetError> {
-        let bytes = (self.constants.state() as u64).saturating_mul((size_of::<f64>() * series) as u64);
-        if bytes > MAX_STATES_BYTES {
-            return Err(DatasetError::StatesTooLarge { series, bytes });
-        }
-        Ok(())
     }
 
     /// Number of states that take as much memory as the largest.

@@ -241,9 +241,7 @@ impl Dataset {
         assert!(readings.ncols() > 0, "a sample has at least one reading");
         Self {
             readings,
-            targets: self.targets.clone(),
-            rows: self.rows.clone(),
-            groups: self.groups.clone(),
+            ..self.clone()
         }
     }
 

@@ -82,14 +82,12 @@ const RATIO_MARGIN: f64 = 1.1;
 /// Bound of scaled readings, so that their squares are finite.
 const MAX_SCALED: f64 = 1e6;
 
-/// Quantity computed from each block.
+/// Quantity computed from each block: of one input, or of all together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Statistic {
-    MeanVariance,
-    Variance(usize),
+    Variance(Option<usize>),
     Mean(usize),
-    MeanSquare,
-    Square(usize),
+    Square(Option<usize>),
 }
 
 impl Statistic {
@@ -100,11 +98,9 @@ impl Statistic {
 
     fn at(index: usize, channels: usize) -> Self {
         match index {
-            0 => Self::MeanVariance,
-            _ if index <= channels => Self::Variance(index - 1),
+            _ if index <= channels => Self::Variance(index.checked_sub(1)),
             _ if index <= 2 * channels => Self::Mean(index - channels - 1),
-            _ if index == 2 * channels + 1 => Self::MeanSquare,
-            _ => Self::Square(index - 2 * channels - 2),
+            _ => Self::Square((index - 2 * channels - 1).checked_sub(1)),
         }
     }
 
@@ -113,8 +109,8 @@ impl Statistic {
     fn widened(self, [low, high]: [f64; 2]) -> [f64; 2] {
         match self {
             Self::Mean(_) => [low - LEVEL_MARGIN, high + LEVEL_MARGIN],
-            Self::MeanVariance | Self::Variance(_) => [low / RATIO_MARGIN, high * RATIO_MARGIN],
-            Self::MeanSquare | Self::Square(_) => [0.0, high * RATIO_MARGIN],
+            Self::Variance(_) => [low / RATIO_MARGIN, high * RATIO_MARGIN],
+            Self::Square(_) => [0.0, high * RATIO_MARGIN],
         }
     }
 }
@@ -222,27 +218,31 @@ impl DriftReference {
         if blocks < Self::MIN_BLOCKS {
             return Err(NoDriftMonitor::TooFewReadings { blocks, block });
         }
-        let part = |part: usize| part * samples / Self::PARTS..(part + 1) * samples / Self::PARTS;
-        let moments = (0..Self::PARTS).map(|index| {
-            let range = part(index);
-            Moments::of(Mat::from_fn(range.len(), channels, |sample, channel| {
-                scaled(range.start + sample, channel)
-            }))
+        let moments = (0..Self::PARTS).map(|part| {
+            let range = part * samples / Self::PARTS..(part + 1) * samples / Self::PARTS;
+            let scaled = Mat::from_fn(range.len(), 1 + channels, |sample, column| {
+                match column.checked_sub(1) {
+                    Some(channel) => scaled(range.start + sample, channel),
+                    None => 1.0,
+                }
+            });
+            scaled.transpose() * &scaled
         });
-        let moments: Vec<Moments> = moments.collect();
-        let (_, factor) = Moments::factor_of(&moments, None).ok_or(NoDriftMonitor::NotFinite)?;
+        let moments: Vec<Mat<f64>> = moments.collect();
+        let (_, factor) = factor_of(moments.iter()).ok_or(NoDriftMonitor::NotFinite)?;
         (reference.block, reference.blocks, reference.factor) = (block, blocks, factor);
         reference.measure(readings, &moments)
     }
 
     /// Measures the ranges of the statistics.
-    fn measure(mut self, readings: ArrayView2<'_, f64>, moments: &[Moments]) -> Result<Self, NoDriftMonitor> {
+    fn measure(mut self, readings: ArrayView2<'_, f64>, moments: &[Mat<f64>]) -> Result<Self, NoDriftMonitor> {
         let (samples, channels) = readings.dim();
         let mut block = Block::new(channels);
-        let (mut scaled, mut given, mut others) = (vec![0.0; channels], vec![0.0; channels], vec![0.0; channels]);
+        let [mut scaled, mut given, mut held_out] = [(); 3].map(|()| vec![0.0; channels]);
         let mut statistics = vec![0.0; self.ranges.len()];
         for part in 0..Self::PARTS {
-            let (means, factor) = Moments::factor_of(moments, Some(part)).ok_or(NoDriftMonitor::NotFinite)?;
+            let others = moments.iter().enumerate().filter(|(other, _)| *other != part);
+            let (means, factor) = factor_of(others.map(|(_, moments)| moments)).ok_or(NoDriftMonitor::NotFinite)?;
             for sample in part * samples / Self::PARTS..(part + 1) * samples / Self::PARTS {
                 for (channel, (scaled, reading)) in scaled.iter_mut().zip(readings.row(sample)).enumerate() {
                     *scaled = self.scaled(channel, *reading);
@@ -251,12 +251,12 @@ impl DriftReference {
                 whiten(
                     scaled.iter().zip(&means).map(|(scaled, mean)| scaled - mean),
                     &factor,
-                    &mut others,
+                    &mut held_out,
                 );
-                let squares = given.iter().zip(&others);
+                let squares = given.iter().zip(&held_out);
                 block.add(
                     &scaled,
-                    squares.map(|(given, others)| (given * given).max(others * others)),
+                    squares.map(|(given, held_out)| (given * given).max(held_out * held_out)),
                 );
                 if block.count == self.block {
                     block.finish(&mut statistics);
@@ -369,43 +369,20 @@ fn correlation_time(mut series: Vec<f64>) -> f64 {
     time
 }
 
-/// Sums of the scaled readings of a part of the training set, and of their products.
-struct Moments {
-    count: f64,
-    sums: Vec<f64>,
-    products: Mat<f64>,
-}
-
-impl Moments {
-    fn of(scaled: Mat<f64>) -> Self {
-        Self {
-            count: scaled.nrows() as f64,
-            sums: (0..scaled.ncols())
-                .map(|channel| scaled.col(channel).iter().sum())
-                .collect(),
-            products: scaled.transpose() * &scaled,
-        }
-    }
-
-    /// Returns the means and the Cholesky factor of the regularised covariance of all `parts` without `left_out`.
-    fn factor_of(parts: &[Self], left_out: Option<usize>) -> Option<(Vec<f64>, Vec<f64>)> {
-        let kept = || {
-            let parts = parts.iter().enumerate();
-            parts.filter(|(part, _)| Some(*part) != left_out).map(|(_, part)| part)
-        };
-        let count: f64 = kept().map(|part| part.count).sum();
-        let channels = parts.first()?.sums.len();
-        let mean = |channel| kept().map(|part| part.sums[channel]).sum::<f64>() / count;
-        let means: Vec<f64> = (0..channels).map(mean).collect();
-        let covariance = Mat::from_fn(channels, channels, |row, column| {
-            let products: f64 = kept().map(|part| part.products[(row, column)]).sum();
-            products / count - means[row] * means[column] + if row == column { RIDGE } else { 0.0 }
-        });
-        let factor = covariance.llt(Side::Lower).ok()?;
-        let lower = factor.L();
-        let packed = (0..channels).flat_map(|row| (0..=row).map(move |column| lower[(row, column)]));
-        Some((means, packed.collect()))
-    }
+/// Returns the means and the Cholesky factor of the regularised covariance of the readings with these `moments` XᵀX, where
+/// the first column of X is 1.
+fn factor_of<'a>(moments: impl Iterator<Item = &'a Mat<f64>>) -> Option<(Vec<f64>, Vec<f64>)> {
+    let all = moments.cloned().reduce(|all, some| all + some)?;
+    let channels = all.nrows() - 1;
+    let means: Vec<f64> = (1..=channels).map(|channel| all[(channel, 0)] / all[(0, 0)]).collect();
+    let covariance = Mat::from_fn(channels, channels, |row, column| {
+        let product = all[(row + 1, column + 1)] / all[(0, 0)];
+        product - means[row] * means[column] + if row == column { RIDGE } else { 0.0 }
+    });
+    let factor = covariance.llt(Side::Lower).ok()?;
+    let lower = factor.L();
+    let packed = (0..channels).flat_map(|row| (0..=row).map(move |column| lower[(row, column)]));
+    Some((means, packed.collect()))
 }
 
 /// Solves L y = `scaled` for y, with the packed lower triangular matrix L.
@@ -436,19 +413,16 @@ impl Drift {
         let compared = |larger, smaller| if self.is_larger { larger } else { smaller };
         let name = |channel: usize| inputs.get(channel).map_or("an input", |input| &input.name);
         match self.statistic {
-            Statistic::MeanVariance => format!("the inputs vary {} than in training", compared("more", "less")),
-            Statistic::Variance(channel) => {
+            Statistic::Variance(None) => format!("the inputs vary {} than in training", compared("more", "less")),
+            Statistic::Variance(Some(channel)) => {
                 format!("{} varies {} than in training", name(channel), compared("more", "less"))
             }
             Statistic::Mean(channel) => {
-                format!(
-                    "{} is {} on average than in training",
-                    name(channel),
-                    compared("higher", "lower")
-                )
+                let compared = compared("higher", "lower");
+                format!("{} is {compared} on average than in training", name(channel))
             }
-            Statistic::MeanSquare => "the inputs are not related to each other as in training".to_owned(),
-            Statistic::Square(channel) => {
+            Statistic::Square(None) => "the inputs are not related to each other as in training".to_owned(),
+            Statistic::Square(Some(channel)) => {
                 format!("{} is not related to the other inputs as in training", name(channel))
             }
         }

@@ -1,6 +1,6 @@
 use glam::DVec3;
 
-use super::{Diagnosis, FaultyWire, partial_decoder::PartialDecoder};
+use super::{Diagnosis, partial_decoder::PartialDecoder};
 use crate::{
     dataset::{Seed, Stream},
     decoupling::{DecodeError, Decoder},
@@ -8,12 +8,11 @@ use crate::{
     sensor::{SensorError, SensorModel},
 };
 
-/// Decodes with the wire of a named fault left out, if there is one, by another decoder.
+/// Decodes known rows by Eq. (2), with the wire of a named fault left out, if there is one.
 ///
 /// Readings of faulty column-wires have no influence. A faulty row-wire is interpolated from its neighbours in the same
 /// frame, or set to the mean deformation of the scene if nodes are independent or the row is decoded alone. Each answer
 /// depends only on the readings given, not on earlier frames.
-#[derive(Debug)]
 pub struct LeftOutDecoder {
     partial: PartialDecoder,
     fault: Option<Diagnosis>,
@@ -29,17 +28,11 @@ pub struct LeftOutDecoder {
 const DRAWS: usize = 200;
 
 impl LeftOutDecoder {
-    /// Prepares to decode `rows` of `model` in `scene` by `decoder`, which answers with absolute coordinates; initially
-    /// with all wires.
+    /// Prepares to decode `rows` of `model` in `scene`, initially with all wires.
     ///
     /// # Errors
     /// If the model has no resistance.
-    pub fn new(
-        model: &SensorModel,
-        scene: &Scene,
-        rows: &[usize],
-        decoder: Box<dyn Decoder>,
-    ) -> Result<Self, SensorError> {
+    pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
         let sampler = scene.sampler(model);
         let mut rng = Seed(0).rng(Stream::Expectation);
         let mut means_mm = vec![0.0; rows.len() * model.scale.coordinates_per_row()];
@@ -51,7 +44,7 @@ impl LeftOutDecoder {
             sums.for_each(|(sum, coordinate)| *sum += coordinate / DRAWS as f64);
         }
         Ok(Self {
-            partial: PartialDecoder::new(model, scene, rows, decoder)?,
+            partial: PartialDecoder::new(model, scene, rows, scene)?,
             fault: None,
             frame_mm: means_mm.clone(),
             means_mm,
@@ -138,11 +131,8 @@ impl Decoder for LeftOutDecoder {
             self.decode_row(row_index, readings, targets)
                 .map_err(|error| DecodeError { row_index, ..error })?;
         }
-        let dead = |fault: Diagnosis| match fault.wire {
-            FaultyWire::Row(dead) => self.partial.rows.iter().position(|&row| row == dead),
-            FaultyWire::Column(_) | FaultyWire::Columns(_) => None,
-        };
-        if let Some(dead) = self.fault.and_then(dead).filter(|_| self.has_neighbours) {
+        let dead = self.partial.rows.iter().position(|&row| self.is_dead(row));
+        if let Some(dead) = dead.filter(|_| self.has_neighbours) {
             self.interpolate(dead, targets);
         }
         Ok(())

@@ -12,6 +12,5 @@ mod wire_check;
 
 pub use drift::{Drift, DriftEvent, DriftMonitor, DriftReference, NoDriftMonitor};
 pub use left_out_decoder::LeftOutDecoder;
-pub use partial_decoder::equation_decoder;
 pub use re_zero::{ReZero, ReZeroError, ZeroGains};
 pub use wire_check::{Diagnosis, FaultCause, FaultEvent, FaultyWire, WireCheck};

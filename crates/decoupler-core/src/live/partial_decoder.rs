@@ -1,21 +1,20 @@
-use std::fmt;
-
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use crate::{
-    decoupling::{DecodeError, Decoder, Estimator},
+    decoupling::{DecodeError, Decoder, NewtonDecoder},
     scene::{Rows, Scene},
     sensor::{SensorError, SensorModel},
 };
 
-/// Decodes rows of which some readings are missing, by a decoder that needs all of them.
+/// Decodes known rows of which some readings are missing, by a decoder of Eq. (2) that needs all of them.
 ///
 /// Missing readings are replaced by those of Eq. (2) at the answer, until both agree. They then have no residual, and no
 /// influence on an answer of least squares: the EM algorithm (Dempster, Laird and Rubin 1977,
 /// doi:10.1111/j.2517-6161.1977.tb01600.x), accelerated by Anderson's method (1965, doi:10.1145/321296.321305).
+
 pub(super) struct PartialDecoder {
     pub(super) model: SensorModel,
-    decoder: Box<dyn Decoder>,
+    decoder: NewtonDecoder,
     /// Row-wires read.
     pub(super) rows: Vec<usize>,
     /// Resistances with all nodes half-way down, with which missing readings begin: rows × M4.
@@ -39,7 +38,7 @@ const MAX_STEPS: usize = 20;
 const LONGEST_STEP: f64 = 3.0;
 
 impl PartialDecoder {
-    /// Prepares to decode `rows` of `model` by `decoder`, whose answers are absolute coordinates.
+    /// Prepares to decode `rows` of `model` in `scene`, with the prior of the deformations of `presses`.
     ///
     /// # Errors
     /// If the model has no resistance.
@@ -47,8 +46,12 @@ impl PartialDecoder {
         model: &SensorModel,
         scene: &Scene,
         rows: &[usize],
-        decoder: Box<dyn Decoder>,
+        presses: &Scene,
     ) -> Result<Self, SensorError> {
+        let known = Scene {
+            rows: Rows::Known,
+            ..*presses
+        };
         let half_way = vec![DVec3::Z * (0.5 * scene.stroke_mm(&model.geometry)); model.scale.nodes_per_row()];
         let mut half_way_ohm = Vec::with_capacity(rows.len() * model.scale.columns());
         for &row in rows {
@@ -56,7 +59,7 @@ impl PartialDecoder {
         }
         Ok(Self {
             model: *model,
-            decoder,
+            decoder: NewtonDecoder::new(model, &known, rows)?,
             rows: rows.to_vec(),
             half_way_ohm,
             has_gain: scene.noise.in_test().drift > 0.0,
@@ -82,29 +85,30 @@ impl PartialDecoder {
         for column in missing.into_iter().flatten() {
             self.filled_ohm[column] = self.half_way_ohm[row_index * readings_ohm.len() + column];
         }
-        let mut last: Option<[[f64; 2]; 2]> = None;
+        let logs = |ohm: &[f64]| DVec2::from_array(missing.map(|column| column.map_or(0.0, |column| ohm[column].ln())));
+        let is_missing = DVec2::from_array(missing.map(|column| if column.is_some() { 1.0 } else { 0.0 }));
+        let mut last: Option<(DVec2, DVec2)> = None;
         for _ in 0..MAX_STEPS {
             self.decoder.decode_row(row_index, &self.filled_ohm, coordinates_mm)?;
             self.predict(row_index, coordinates_mm);
-            let log_of = |ohm: &[f64], place: usize| missing[place].map_or(0.0, |column| ohm[column].ln());
-            let at = [0, 1].map(|place| log_of(&self.filled_ohm, place));
-            let log_gain = self.log_gain(missing);
-            let misfit = [0, 1].map(|place| match missing[place] {
-                Some(column) => self.predicted_ohm[column].ln() + log_gain - at[place],
-                None => 0.0,
-            });
-            let apart = misfit[0].abs().max(misfit[1].abs());
-            if apart <= TOLERANCE || apart.is_nan() {
+            let at = logs(&self.filled_ohm);
+            let misfit = logs(&self.predicted_ohm) + self.log_gain(missing) * is_missing - at;
+            if !misfit.is_finite() || misfit.abs().max_element() <= TOLERANCE {
                 break;
             }
-            let next = match last.replace([at, misfit]) {
-                Some([last_at, last_misfit]) => extrapolated((at, misfit), (last_at, last_misfit)),
-                None => [0, 1].map(|place| at[place] + misfit[place]),
-            };
-            for (place, column) in missing.into_iter().enumerate() {
+            let mut step = misfit;
+            if let Some((last_at, last_misfit)) = last.replace((at, misfit)) {
+                // The step after which the misfit vanishes if it is linear in one value.
+                let change = misfit - last_misfit;
+                let share = misfit.dot(change) / change.length_squared();
+                if share.is_finite() {
+                    step -= share * (at - last_at + change);
+                }
+            }
+            let next = at + step.clamp(DVec2::splat(-LONGEST_STEP), DVec2::splat(LONGEST_STEP));
+            for (column, log_ohm) in missing.into_iter().zip(next.to_array()) {
                 if let Some(column) = column {
-                    let step = (next[place] - at[place]).clamp(-LONGEST_STEP, LONGEST_STEP);
-                    self.filled_ohm[column] = (at[place] + step).exp();
+                    self.filled_ohm[column] = log_ohm.exp();
                 }
             }
         }
@@ -135,61 +139,5 @@ impl PartialDecoder {
         if predicted.is_err() {
             self.predicted_ohm.fill(f64::NAN);
         }
-    }
-}
-
-impl fmt::Debug for PartialDecoder {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("PartialDecoder")
-            .field("rows", &self.rows)
-            .finish_non_exhaustive()
-    }
-}
-
-/// The next value from two values with their misfits, which vanishes if misfits are linear in one value.
-fn extrapolated((at, misfit): ([f64; 2], [f64; 2]), (last_at, last_misfit): ([f64; 2], [f64; 2])) -> [f64; 2] {
-    let change = [0, 1].map(|place| misfit[place] - last_misfit[place]);
-    let product = |other: [f64; 2]| change[0] * other[0] + change[1] * other[1];
-    let share = product(misfit) / product(change);
-    let share = if share.is_finite() { share } else { 0.0 };
-    [0, 1].map(|place| at[place] + misfit[place] - share * (at[place] - last_at[place] + change[place]))
-}
-
-/// Decoder of known rows by Eq. (2), with the noise and the deformations of `scene`.
-///
-/// # Errors
-/// If the model has no resistance.
-pub fn equation_decoder(model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Box<dyn Decoder>, SensorError> {
-    let scene = Scene {
-        rows: Rows::Known,
-        ..*scene
-    };
-    Ok(Box::new(OfKnownRows {
-        estimator: Estimator::new(model, &scene, rows)?,
-        rows: rows.to_vec(),
-        channels: model.scale.columns(),
-        outputs: model.scale.coordinates_per_row(),
-    }))
-}
-
-struct OfKnownRows {
-    estimator: Estimator,
-    rows: Vec<usize>,
-    channels: usize,
-    outputs: usize,
-}
-
-impl Decoder for OfKnownRows {
-    fn channels(&self) -> usize {
-        self.channels
-    }
-
-    fn outputs(&self) -> usize {
-        self.outputs
-    }
-
-    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        self.estimator.solve(self.rows[row_index], readings, targets)?;
-        Ok(())
     }
 }

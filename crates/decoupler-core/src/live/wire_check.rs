@@ -2,9 +2,8 @@ use std::{f64::consts::TAU, fmt, iter::Sum, mem::discriminant};
 
 use faer::{Mat, Side, linalg::solvers::Solve};
 
-use super::partial_decoder::{Missing, PartialDecoder, equation_decoder};
+use super::partial_decoder::{Missing, PartialDecoder};
 use crate::{
-    decoupling::Decoder,
     numerics::chi_squared_quantile,
     scene::{Loading, Scene},
     sensor::{ArrayScale, SensorError, SensorModel},
@@ -71,7 +70,6 @@ pub enum FaultEvent {
 /// probability is at least [`Self::SURE`].
 ///
 /// Faults that Eq. (2) explains by some deformation cannot be found: two row-wires that touch, for example.
-#[derive(Debug)]
 pub struct WireCheck {
     partial: PartialDecoder,
     axes: &'static [usize],
@@ -176,20 +174,7 @@ impl WireCheck {
             largest_compression: (DEEPER * compression).min(0.5 * (1.0 + compression)),
             ..*scene
         };
-        Self::by(equation_decoder(model, &any_press, rows)?, model, scene, rows)
-    }
-
-    /// As [`Self::new`], with the residual of `decoder`, which answers with absolute coordinates.
-    ///
-    /// # Errors
-    /// If the model has no resistance.
-    pub fn by(
-        decoder: Box<dyn Decoder>,
-        model: &SensorModel,
-        scene: &Scene,
-        rows: &[usize],
-    ) -> Result<Self, SensorError> {
-        let partial = PartialDecoder::new(model, scene, rows, decoder)?;
+        let partial = PartialDecoder::new(model, scene, rows, &any_press)?;
         let noise = scene.noise.in_test();
         let source = noise.source(model)?;
         let own = |&ohm: &f64| source.relative_to(ohm).own.max(SMALLEST_NOISE);
@@ -252,7 +237,9 @@ impl WireCheck {
             return None;
         }
         self.suspicious = 0;
-        let found = self.compare();
+        let frames_ohm = std::mem::take(&mut self.suspicious_ohm);
+        let found = self.compare(&frames_ohm);
+        self.suspicious_ohm = frames_ohm;
         self.next_comparison = match found {
             Some(_) => Self::PERSISTENCE,
             None => (2 * self.next_comparison).min(LONGEST_WAIT * Self::PERSISTENCE),
@@ -292,6 +279,24 @@ impl WireCheck {
         self.partial.predicted_ohm.len()
     }
 
+    /// Column, ln m − ln R and its variance of every reading m that is neither missing nor clipped with R, which is certain.
+    fn misfits(
+        &self,
+        row_index: usize,
+        readings_ohm: &[f64],
+        missing: Missing,
+    ) -> impl Iterator<Item = (usize, f64, f64)> {
+        let pairs = readings_ohm.iter().zip(&self.partial.predicted_ohm).enumerate();
+        let deviations = &self.deviations[row_index * readings_ohm.len()..];
+        pairs
+            .zip(deviations)
+            .filter_map(move |((column, (reading, ohm)), deviation)| {
+                let logs = [reading, ohm].map(|ohm| ohm.ln());
+                let is_used = !missing.contains(&Some(column)) && logs.iter().any(|log| *log < self.log_full_scale);
+                is_used.then_some((column, logs[0] - logs[1], deviation * deviation))
+            })
+    }
+
     /// Decodes a row, and returns its χ² with the most probable logarithm of its gain. The score is not set.
     fn residual(&mut self, row_index: usize, readings_ohm: &[f64], missing: Missing) -> (Fit, f64) {
         let decoded = (self.partial).decode_row(row_index, readings_ohm, missing, &mut self.coordinates_mm);
@@ -304,17 +309,11 @@ impl WireCheck {
             return (fit, 0.0);
         }
         let (mut sum, mut weights) = (0.0, 0.0);
-        for column in (0..readings_ohm.len()).filter(|&column| !missing.contains(&Some(column))) {
-            let [log_reading, log_ohm] = [readings_ohm[column], self.partial.predicted_ohm[column]].map(f64::ln);
-            if log_reading < self.log_full_scale || log_ohm < self.log_full_scale {
-                let weight = self.deviations[row_index * readings_ohm.len() + column].powi(-2);
-                let misfit = log_reading - log_ohm;
-                fit.chi_squared += weight * misfit * misfit;
-                sum += weight * misfit;
-                weights += weight;
-                fit.readings += 1;
-            }
-            // Clipped readings are certain.
+        for (_, misfit, variance) in self.misfits(row_index, readings_ohm, missing) {
+            fit.chi_squared += misfit * misfit / variance;
+            sum += misfit / variance;
+            weights += 1.0 / variance;
+            fit.readings += 1;
         }
         if self.common == 0.0 {
             return (fit, 0.0);
@@ -351,14 +350,10 @@ impl WireCheck {
             })
         };
         let mut precision = Mat::<f64>::identity(moving + 1, moving + 1);
-        for column in (0..columns).filter(|&column| !missing.contains(&Some(column))) {
-            let noise = self.deviations[row_index * columns + column].powi(2);
-            let [log_reading, log_ohm] = [readings_ohm[column], partial.predicted_ohm[column]].map(f64::ln);
-            if log_reading < self.log_full_scale || log_ohm < self.log_full_scale {
-                let slopes = slopes(column);
-                precision += faer::Scale(1.0 / noise) * &slopes * slopes.transpose();
-                fit.score += (TAU * noise).ln();
-            }
+        for (column, _, noise) in self.misfits(row_index, readings_ohm, missing) {
+            let slopes = slopes(column);
+            precision += faer::Scale(1.0 / noise) * &slopes * slopes.transpose();
+            fit.score += (TAU * noise).ln();
         }
         let factor = precision.llt(Side::Lower).ok();
         let diagonal = factor
@@ -386,30 +381,31 @@ impl WireCheck {
         }
     }
 
-    /// All rows of the suspicious frames without the missing readings.
-    fn partial_rows(&mut self, missing: Missing) -> Vec<PartialRow> {
-        let frames_ohm = std::mem::take(&mut self.suspicious_ohm);
+    /// All rows of the frames without the missing readings.
+    fn partial_rows(&mut self, frames_ohm: &[f64], missing: Missing) -> Vec<PartialRow> {
         let (columns, rows) = (self.columns(), self.partial.rows.len());
         let readings = frames_ohm.chunks_exact(columns).enumerate();
-        let found = readings
+        readings
             .map(|(line, ohm)| self.partial_row(line % rows, ohm, missing))
-            .collect();
-        self.suspicious_ohm = frames_ohm;
-        found
+            .collect()
     }
 
-    /// The fault that explains the suspicious frames, if there is one.
-    fn compare(&mut self) -> Option<Diagnosis> {
-        let intact: Vec<Fit> = self.partial_rows([None; 2]).iter().map(|row| row.fit).collect();
-        let mut hypotheses: Vec<Hypothesis> = (0..self.partial.rows.len())
-            .map(|row_index| self.of_row(row_index, &intact))
+    /// The fault that explains these frames, if there is one.
+    fn compare(&mut self, frames_ohm: &[f64]) -> Option<Diagnosis> {
+        let intact: Vec<Fit> = self
+            .partial_rows(frames_ohm, [None; 2])
+            .iter()
+            .map(|row| row.fit)
             .collect();
-        let suspects = self.suspects(&intact);
+        let mut hypotheses: Vec<Hypothesis> = (0..self.partial.rows.len())
+            .map(|row_index| self.of_row(frames_ohm, row_index, &intact))
+            .collect();
+        let suspects = self.suspects(frames_ohm, &intact);
         for &column in &suspects {
-            let rows = self.partial_rows([Some(column), None]);
+            let rows = self.partial_rows(frames_ohm, [Some(column), None]);
             hypotheses.extend(self.of_column(column, &rows));
             if suspects.contains(&(column + 1)) {
-                let rows = self.partial_rows([Some(column), Some(column + 1)]);
+                let rows = self.partial_rows(frames_ohm, [Some(column), Some(column + 1)]);
                 hypotheses.push(of_short(column, &rows));
             }
         }
@@ -426,32 +422,27 @@ impl WireCheck {
     }
 
     /// A fault of a row-wire, which does not affect the other rows.
-    fn of_row(&self, row_index: usize, intact: &[Fit]) -> Hypothesis {
+    fn of_row(&self, frames_ohm: &[f64], row_index: usize, intact: &[Fit]) -> Hypothesis {
         let (rows, columns) = (self.partial.rows.len(), self.columns());
         let others = intact.iter().enumerate().filter(|(line, _)| line % rows != row_index);
-        let lines = self.suspicious_ohm.chunks_exact(columns).skip(row_index).step_by(rows);
+        let lines = frames_ohm.chunks_exact(columns).skip(row_index).step_by(rows);
         let half_way_ohm = &self.partial.half_way_ohm[row_index * columns..][..columns];
         let pairs = lines.flat_map(|line| line.iter().zip(half_way_ohm));
         let is_clipped = |ohm: f64| ohm.ln() >= self.log_full_scale;
         let is_open = pairs.clone().all(|(&ohm, half_way)| is_clipped(ohm) || ohm > *half_way);
         // Clipped readings are certain without any current.
         let uncertain = pairs.filter(|(ohm, _)| !(is_open && is_clipped(**ohm))).count();
-        let of_row = Fit {
-            score: 2.0 * WIDTH.ln() * uncertain as f64,
-            ..Fit::default()
-        };
         Hypothesis {
             wire: FaultyWire::Row(self.partial.rows[row_index]),
             cause: if is_open { FaultCause::Open } else { FaultCause::Unknown },
-            fit: others.map(|(_, fit)| *fit).chain([of_row]).sum(),
+            fit: others.map(|(_, fit)| *fit).chain([unpredicted(uncertain)]).sum(),
         }
     }
 
     /// Column-wires without which the worst rows of the last frame have the smallest χ², and the neighbours of the best:
     /// two touching columns mask each other.
-    fn suspects(&mut self, intact: &[Fit]) -> Vec<usize> {
+    fn suspects(&mut self, frames_ohm: &[f64], intact: &[Fit]) -> Vec<usize> {
         let (rows, columns) = (self.partial.rows.len(), self.columns());
-        let frames_ohm = std::mem::take(&mut self.suspicious_ohm);
         let mut lines: Vec<usize> = (intact.len() - rows..intact.len()).collect();
         lines.sort_by(|&a, &b| intact[b].chi_squared.total_cmp(&intact[a].chi_squared));
         lines.truncate(WORST_ROWS);
@@ -463,7 +454,6 @@ impl WireCheck {
             });
             order.push((fits.map(|fit| fit.chi_squared).sum(), column));
         }
-        self.suspicious_ohm = frames_ohm;
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let best = order[0].1;
         let mut suspects: Vec<usize> = order.iter().take(MAX_SUSPECTS).map(|(_, column)| *column).collect();
@@ -477,7 +467,6 @@ impl WireCheck {
     fn of_column(&self, column: usize, rows: &[PartialRow]) -> [Hypothesis; 3] {
         let rest: Fit = rows.iter().map(|row| row.fit).sum();
         let readings = rows.iter().map(|row| row.missing[0]);
-        let count = rows.len();
         let is_clipped = |reading: &Predicted| reading.log_reading >= self.log_full_scale;
         let (level, of_level) = level(readings.clone().map(|reading| (reading.log_reading, reading.noise)));
         let constant = if readings.clone().all(|reading| is_clipped(&reading)) {
@@ -498,11 +487,7 @@ impl WireCheck {
         // A wire that is broken beyond some of its nodes has higher readings, which vary.
         let is_high = misfits.clone().all(|(misfit, _)| misfit > 0.0);
         let other = if is_high { FaultCause::Open } else { FaultCause::Unknown };
-        let of_other = Fit {
-            score: 2.0 * WIDTH.ln() * count as f64,
-            ..Fit::default()
-        };
-        [constant, (gain, of_gain), (other, of_other)].map(|(cause, fit)| Hypothesis {
+        [constant, (gain, of_gain), (other, unpredicted(rows.len()))].map(|(cause, fit)| Hypothesis {
             wire: FaultyWire::Column(column),
             cause,
             fit: [rest, fit].into_iter().sum(),
@@ -526,6 +511,14 @@ fn of_short(column: usize, rows: &[PartialRow]) -> Hypothesis {
         wire: FaultyWire::Columns(column),
         cause: FaultCause::Shorted,
         fit: of_rows.sum(),
+    }
+}
+
+/// Fit of so many readings that nothing predicts.
+fn unpredicted(readings: usize) -> Fit {
+    Fit {
+        score: 2.0 * WIDTH.ln() * readings as f64,
+        ..Fit::default()
     }
 }
 

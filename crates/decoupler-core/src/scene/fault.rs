@@ -7,8 +7,8 @@ use crate::sensor::{ArrayScale, Axes, RowConductance, SensorError, SensorModel};
 ///
 /// The readout drives one row-wire, grounds the others, and measures the current of each column-wire at virtual ground,
 /// so that a reading depends only on the nodes between its two wires. Wires are connected at their first node. Beyond a
-/// break a wire floats, and its nodes carry no current into an amplifier. Two touching wires share the drive or the
-/// measured current equally: both read 2/(1/R + 1/R′).
+/// break a wire floats, and its nodes carry no current into an amplifier. Two touching column-wires share the measured
+/// current equally: both read 2/(1/R + 1/R′).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
     /// A row-wire is broken before node `before_node`, counted from 0; at its connector if this is 0.
@@ -24,11 +24,6 @@ pub enum Fault {
         column: usize,
         /// First node that is cut off.
         before_node: usize,
-    },
-    /// Row-wires `row` and `row` + 1 touch.
-    ShortedRows {
-        /// First of the two, from 0.
-        row: usize,
     },
     /// Column-wires `column` and `column` + 1 touch.
     ShortedColumns {
@@ -73,18 +68,20 @@ impl FromStr for Fault {
             Some((wire, node)) => Ok((number(wire)?, number(node)?)),
             None => Ok((number(text)?, 0)),
         };
-        let pair = |text: &str| {
-            let (first, second) = text.split_once('-').ok_or_else(unknown)?;
-            let (first, second) = (number(first)?, number(second)?);
-            if second == first + 1 { Ok(first) } else { Err(unknown()) }
-        };
         let (kind, rest) = text.trim().split_once(':').ok_or_else(unknown)?;
         let value = || rest.split_once('=').ok_or_else(unknown);
         match kind {
             "open-row" => place(rest).map(|(row, before_node)| Self::OpenRow { row, before_node }),
             "open-column" => place(rest).map(|(column, before_node)| Self::OpenColumn { column, before_node }),
-            "short-rows" => pair(rest).map(|row| Self::ShortedRows { row }),
-            "short-columns" => pair(rest).map(|column| Self::ShortedColumns { column }),
+            "short-columns" => {
+                let (first, second) = rest.split_once('-').ok_or_else(unknown)?;
+                let (column, next) = (number(first)?, number(second)?);
+                if next == column + 1 {
+                    Ok(Self::ShortedColumns { column })
+                } else {
+                    Err(unknown())
+                }
+            }
             "gain" => {
                 let (column, relative) = value()?;
                 let relative: f64 = relative.parse().map_err(|_| unknown())?;
@@ -115,7 +112,6 @@ impl fmt::Display for Fault {
         match *self {
             Self::OpenRow { row, before_node } => write!(f, "open-row:{}@{}", row + 1, before_node + 1),
             Self::OpenColumn { column, before_node } => write!(f, "open-column:{}@{}", column + 1, before_node + 1),
-            Self::ShortedRows { row } => write!(f, "short-rows:{}-{}", row + 1, row + 2),
             Self::ShortedColumns { column } => write!(f, "short-columns:{}-{}", column + 1, column + 2),
             Self::Gain { column, relative } => write!(f, "gain:{}={relative}", column + 1),
             Self::Stuck { column, end } => {
@@ -135,36 +131,25 @@ impl Fault {
     /// # Errors
     /// If a wire or node does not exist.
     pub fn check(self, scale: ArrayScale, read: &[usize]) -> Result<(), SceneError> {
-        let within = |what, index: usize, count: usize| {
-            if index < count {
-                return Ok(());
-            }
-            Err(SceneError::FaultNumber {
-                what,
-                number: index + 1,
-                last: count,
-            })
+        let wires_and_nodes = match self {
+            Self::OpenRow { row, before_node } => [
+                ("row-wire", row, scale.rows()),
+                ("node on a row-wire", before_node, scale.nodes_per_row()),
+            ],
+            Self::OpenColumn { column, before_node } => [
+                ("column-wire", column, scale.columns()),
+                ("node on a column-wire", before_node, scale.nodes_per_column()),
+            ],
+            Self::ShortedColumns { column } => [("column-wire", column + 1, scale.columns()); 2],
+            Self::Gain { column, .. } | Self::Stuck { column, .. } => [("column-wire", column, scale.columns()); 2],
         };
-        let is_read = |row: usize| {
-            within("row-wire", row, scale.rows())?;
-            if read.contains(&row) {
-                Ok(())
-            } else {
-                Err(SceneError::FaultNotRead(row + 1))
-            }
-        };
+        if let Some((what, index, last)) = wires_and_nodes.into_iter().find(|(_, index, count)| index >= count) {
+            let number = index + 1;
+            return Err(SceneError::FaultNumber { what, number, last });
+        }
         match self {
-            Self::OpenRow { row, before_node } => {
-                is_read(row)?;
-                within("node on a row-wire", before_node, scale.nodes_per_row())
-            }
-            Self::OpenColumn { column, before_node } => {
-                within("column-wire", column, scale.columns())?;
-                within("node on a column-wire", before_node, scale.nodes_per_column())
-            }
-            Self::ShortedRows { row } => is_read(row).and_then(|()| is_read(row + 1)),
-            Self::ShortedColumns { column } => within("column-wire", column + 1, scale.columns()),
-            Self::Gain { column, .. } | Self::Stuck { column, .. } => within("column-wire", column, scale.columns()),
+            Self::OpenRow { row, .. } if !read.contains(&row) => Err(SceneError::FaultNotRead(row + 1)),
+            _ => Ok(()),
         }
     }
 }
@@ -212,7 +197,6 @@ impl FaultySensor {
             };
             conductance.sums().iter().map(of_sum).collect()
         };
-        let shared_ohm = |one: f64, other: f64| 2.0 / (1.0 / one + 1.0 / other);
         match self.fault {
             Fault::OpenRow { row, before_node } => {
                 if let Some(index) = row_index(row) {
@@ -225,19 +209,9 @@ impl FaultySensor {
                     ohms[column] = near_ohm(row, scale.nodes_per_row(), before_node)[column];
                 }
             }
-            Fault::ShortedRows { row } => {
-                if let Some((one, other)) = row_index(row).zip(row_index(row + 1)) {
-                    for k in 0..columns {
-                        let shared =
-                            shared_ohm(resistances_ohm[one * columns + k], resistances_ohm[other * columns + k]);
-                        resistances_ohm[one * columns + k] = shared;
-                        resistances_ohm[other * columns + k] = shared;
-                    }
-                }
-            }
             Fault::ShortedColumns { column } => {
                 for ohms in resistances_ohm.chunks_exact_mut(columns) {
-                    let shared = shared_ohm(ohms[column], ohms[column + 1]);
+                    let shared = 2.0 / (1.0 / ohms[column] + 1.0 / ohms[column + 1]);
                     ohms[column..column + 2].fill(shared);
                 }
             }
@@ -254,35 +228,29 @@ impl FaultySensor {
     pub fn after_noise(&self, read: &[usize], readings_ohm: &mut [f64]) {
         let columns = self.model.scale.columns();
         let (lowest_ohm, full_scale_ohm) = self.range_ohm;
-        let clip = |ohm: &mut f64| *ohm = ohm.min(full_scale_ohm);
-        match self.fault {
-            Fault::OpenRow { row, before_node } => {
-                let of_row = (readings_ohm.chunks_exact_mut(columns).zip(read)).find(|(_, other)| **other == row);
-                for ohm in of_row.into_iter().flat_map(|(ohms, _)| ohms) {
-                    if before_node == 0 {
-                        *ohm = full_scale_ohm;
-                    }
-                    clip(ohm);
-                }
+        let (affected, step) = match self.fault {
+            Fault::OpenRow { row, .. } => {
+                let place = read.iter().position(|&other| other == row);
+                (place.map_or(0..0, |index| index * columns..(index + 1) * columns), 1)
             }
-            Fault::OpenColumn { column, before_node } => {
-                for ohm in readings_ohm.iter_mut().skip(column).step_by(columns) {
-                    if before_node == 0 {
-                        *ohm = full_scale_ohm;
-                    }
-                    clip(ohm);
-                }
+            Fault::OpenColumn { column, .. } | Fault::Gain { column, .. } | Fault::Stuck { column, .. } => {
+                (column..readings_ohm.len(), columns)
             }
-            Fault::Gain { column, .. } => readings_ohm.iter_mut().skip(column).step_by(columns).for_each(clip),
-            Fault::Stuck { column, end } => {
-                let stuck_ohm = match end {
-                    ConverterEnd::Low => lowest_ohm,
-                    ConverterEnd::High => full_scale_ohm,
-                };
-                let of_column = readings_ohm.iter_mut().skip(column).step_by(columns);
-                of_column.for_each(|ohm| *ohm = stuck_ohm);
-            }
-            Fault::ShortedRows { .. } | Fault::ShortedColumns { .. } => {}
+            Fault::ShortedColumns { .. } => return,
+        };
+        for ohm in readings_ohm[affected].iter_mut().step_by(step) {
+            *ohm = match self.fault {
+                Fault::OpenRow { before_node: 0, .. }
+                | Fault::OpenColumn { before_node: 0, .. }
+                | Fault::Stuck {
+                    end: ConverterEnd::High,
+                    ..
+                } => full_scale_ohm,
+                Fault::Stuck {
+                    end: ConverterEnd::Low, ..
+                } => lowest_ohm,
+                _ => ohm.min(full_scale_ohm),
+            };
         }
     }
 }

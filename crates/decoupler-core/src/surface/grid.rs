@@ -1,5 +1,7 @@
 use std::ops::RangeInclusive;
 
+use glam::DVec2;
+
 use super::error::{Axis, SurfaceError};
 
 /// A rectangular grid through the nodes of a lattice that extends half a pitch beyond them; for scattered nodes, a grid
@@ -44,18 +46,18 @@ impl Grid {
 
     /// Returns the indices along x within the bounding rectangle of the nodes.
     pub fn inside_x(&self) -> RangeInclusive<usize> {
-        self.x.first_inside..=self.x.last_inside
+        self.x.inside.clone()
     }
 
     /// Returns the indices along y within the bounding rectangle of the nodes.
     pub fn inside_y(&self) -> RangeInclusive<usize> {
-        self.y.first_inside..=self.y.last_inside
+        self.y.inside.clone()
     }
 
     /// Places of all points.
-    pub(super) fn places_mm(&self) -> impl Iterator<Item = (f64, f64)> {
+    pub(super) fn places_mm(&self) -> impl Iterator<Item = DVec2> {
         let lines = self.x.points_mm.iter();
-        lines.flat_map(|&x| self.y.points_mm.iter().map(move |&y| (x, y)))
+        lines.flat_map(|&x| self.y.points_mm.iter().map(move |&y| DVec2::new(x, y)))
     }
 
     /// For each point, 0 within the bounding rectangle of the nodes, 1 at the ends of the grid, linear between.
@@ -76,17 +78,34 @@ impl Grid {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct GridAxis {
     pub(super) points_mm: Vec<f64>,
-    first_inside: usize,
-    last_inside: usize,
+    inside: RangeInclusive<usize>,
 }
 
 impl GridAxis {
+    /// Divides the intervals between ascending coordinates into `steps` each, and the margins before and after into
+    /// `margin_steps`. The margins of a single coordinate count as inside.
+    fn new(inner_mm: &[f64], steps: usize, [before_mm, after_mm]: [f64; 2], margin_steps: usize) -> Self {
+        let (first_mm, last_mm) = (inner_mm[0], inner_mm[inner_mm.len() - 1]);
+        let before = (0..margin_steps).map(|step| along(first_mm - before_mm, first_mm, step, margin_steps));
+        let between = inner_mm
+            .windows(2)
+            .flat_map(|pair| (0..steps).map(|step| along(pair[0], pair[1], step, steps)));
+        let after = (0..=margin_steps).map(|step| along(last_mm, last_mm + after_mm, step, margin_steps));
+        let points_mm = Vec::from_iter(before.chain(between).chain(after));
+        let outside = if inner_mm.len() == 1 { 0 } else { margin_steps };
+        Self {
+            inside: outside..=points_mm.len() - 1 - outside,
+            points_mm,
+        }
+    }
+
     fn beyond(&self, index: usize) -> f64 {
-        if index < self.first_inside {
-            (self.first_inside - index) as f64 / self.first_inside as f64
+        let (first, last) = (*self.inside.start(), *self.inside.end());
+        if index < first {
+            (first - index) as f64 / first as f64
         } else {
-            let margin = self.points_mm.len() - 1 - self.last_inside;
-            index.saturating_sub(self.last_inside) as f64 / margin.max(1) as f64
+            let margin = self.points_mm.len() - 1 - last;
+            index.saturating_sub(last) as f64 / margin.max(1) as f64
         }
     }
 
@@ -95,50 +114,19 @@ impl GridAxis {
     /// `lone_margin_mm` is the margin around a single coordinate, which has no pitch; it is increased if it would be lost
     /// in the rounding of the coordinate.
     pub(super) fn through(nodes_mm: &[f64], target: usize, lone_margin_mm: f64) -> Self {
+        let [.., before_last_mm, last_mm] = *nodes_mm else {
+            let margin_mm = lone_margin_mm.max(1e3 * CLOSEST_RELATIVE * nodes_mm[0].abs());
+            return Self::new(nodes_mm, 1, [margin_mm; 2], 8);
+        };
         // Very long axes are thinned: more lines than pixels are not visible.
         let stride = nodes_mm.len().div_ceil(target.max(2));
-        let last = nodes_mm.len() - 1;
         let mut kept_mm: Vec<f64> = nodes_mm.iter().copied().step_by(stride).collect();
-        if !last.is_multiple_of(stride) {
-            kept_mm.push(nodes_mm[last]);
+        if !(nodes_mm.len() - 1).is_multiple_of(stride) {
+            kept_mm.push(last_mm);
         }
-        let intervals = kept_mm.len() - 1;
-        let steps = (target.saturating_sub(1) / (intervals + 1)).max(1);
-        let margin_steps = if intervals == 0 { 8 } else { steps.div_ceil(2) };
-
-        let (before_mm, after_mm) = match kept_mm[..] {
-            [first, second, ..] if stride == 1 => (0.5 * (second - first), 0.5 * (nodes_mm[last] - nodes_mm[last - 1])),
-            [_, _, ..] => (
-                0.5 * (nodes_mm[1] - nodes_mm[0]),
-                0.5 * (nodes_mm[last] - nodes_mm[last - 1]),
-            ),
-            _ => {
-                let margin_mm = lone_margin_mm.max(1e3 * CLOSEST_RELATIVE * nodes_mm[0].abs());
-                (margin_mm, margin_mm)
-            }
-        };
-        let (first_mm, last_mm) = (nodes_mm[0], nodes_mm[last]);
-        let mut points_mm: Vec<f64> = (0..margin_steps)
-            .map(|step| along(first_mm - before_mm, first_mm, step, margin_steps))
-            .collect();
-        for pair in kept_mm.windows(2) {
-            points_mm.extend((0..steps).map(|step| along(pair[0], pair[1], step, steps)));
-        }
-        let last_inside = points_mm.len();
-        points_mm.push(last_mm);
-        points_mm.extend((1..=margin_steps).map(|step| along(last_mm, last_mm + after_mm, step, margin_steps)));
-        if intervals == 0 {
-            return Self {
-                first_inside: 0,
-                last_inside: points_mm.len() - 1,
-                points_mm,
-            };
-        }
-        Self {
-            points_mm,
-            first_inside: margin_steps,
-            last_inside,
-        }
+        let steps = (target.saturating_sub(1) / kept_mm.len()).max(1);
+        let margins_mm = [0.5 * (nodes_mm[1] - nodes_mm[0]), 0.5 * (last_mm - before_last_mm)];
+        Self::new(&kept_mm, steps, margins_mm, steps.div_ceil(2))
     }
 
     /// Divides the interval between the outermost nodes into equal steps, and extends it by `margin_mm` at both ends,
@@ -148,14 +136,7 @@ impl GridAxis {
         let share = extent_mm / (extent_mm + 2.0 * margin_mm);
         let steps = ((target as f64 * share) as usize).max(2);
         let margin_steps = (target.saturating_sub(steps) / 2).max(1);
-        let before = (0..margin_steps).map(|step| along(first_mm - margin_mm, first_mm, step, margin_steps));
-        let between = (0..=steps).map(|step| along(first_mm, last_mm, step, steps));
-        let after = (1..=margin_steps).map(|step| along(last_mm, last_mm + margin_mm, step, margin_steps));
-        Self {
-            points_mm: before.chain(between).chain(after).collect(),
-            first_inside: margin_steps,
-            last_inside: margin_steps + steps,
-        }
+        Self::new(&[first_mm, last_mm], steps, [margin_mm; 2], margin_steps)
     }
 }
 
@@ -211,6 +192,22 @@ impl SortedAxis {
             });
         }
         Ok(Self { nodes_mm, order })
+    }
+
+    /// Indices in the order given of the two nodes between which `point_mm` is, or of the outermost two, with its distance
+    /// from the first as a fraction of theirs; below 0 or above 1 beyond the outermost.
+    pub(super) fn between(&self, point_mm: f64) -> ([usize; 2], f64) {
+        let last = self.nodes_mm.len() - 1;
+        let upper = self.nodes_mm.partition_point(|&node_mm| node_mm < point_mm);
+        let upper = upper.clamp(last.min(1), last);
+        let lower = upper.saturating_sub(1);
+        let (lower_mm, upper_mm) = (self.nodes_mm[lower], self.nodes_mm[upper]);
+        let share = if upper > lower {
+            (point_mm - lower_mm) / (upper_mm - lower_mm)
+        } else {
+            0.0
+        };
+        ([self.order[lower], self.order[upper]], share)
     }
 
     /// Minimum distance between neighbours; `None` for a single coordinate.

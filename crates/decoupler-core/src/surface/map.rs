@@ -3,6 +3,8 @@ use std::{
     sync::{Arc, Mutex, PoisonError, Weak},
 };
 
+use glam::DVec2;
+
 use super::{
     error::{Axis, SurfaceError},
     grid::{Grid, GridAxis, SortedAxis},
@@ -55,8 +57,8 @@ pub struct SurfaceMap {
     rows: Vec<Option<usize>>,
     /// See [`Self::beyond`].
     beyond: Vec<f64>,
-    /// Between the nodes of a lattice.
-    bilinear: Option<Bilinear>,
+    /// Coordinates x and y of the nodes of a lattice.
+    lattice: Option<[SortedAxis; 2]>,
 }
 
 /// A map in use, with its coordinates x and y.
@@ -98,8 +100,7 @@ impl SurfaceMap {
     /// # Errors
     /// [`SurfaceError`] if an axis is empty, a coordinate is not finite, or two coordinates coincide.
     pub fn new(x_mm: &[f64], y_mm: &[f64]) -> Result<Self, SurfaceError> {
-        let x = SortedAxis::new(Axis::X, x_mm)?;
-        let y = SortedAxis::new(Axis::Y, y_mm)?;
+        let lattice = [SortedAxis::new(Axis::X, x_mm)?, SortedAxis::new(Axis::Y, y_mm)?];
         let nodes = x_mm.len() * y_mm.len();
         let is_line = x_mm.len() == 1 || y_mm.len() == 1;
         let mut interpolation = if is_line {
@@ -107,38 +108,30 @@ impl SurfaceMap {
         } else {
             Interpolation::ThinPlateSpline
         };
-        let mut grid = self::grid(&x, &y, if is_line { GRID_POINTS } else { affordable(nodes) });
-        // A curve along a line of nodes is constant across it.
-        let row = |ix: usize, iy: usize, grid: &Grid| match (x_mm.len(), y_mm.len()) {
-            (1, _) => iy,
-            (_, 1) => ix,
-            _ => grid.index(ix, iy),
-        };
+        let mut grid = self::grid(&lattice, if is_line { GRID_POINTS } else { affordable(nodes) });
         let mut points = Vec::new();
         let mut rows = Vec::with_capacity(grid.len());
         for ix in 0..grid.x_mm().len() {
             for iy in 0..grid.y_mm().len() {
-                let row = row(ix, iy, &grid);
+                // A curve along a line of nodes is constant across it.
+                let row = match (x_mm.len(), y_mm.len()) {
+                    (1, _) => iy,
+                    (_, 1) => ix,
+                    _ => grid.index(ix, iy),
+                };
                 rows.push(Some(row));
                 if row == points.len() {
                     points.push(point_of(&grid, (ix, iy), (x_mm, y_mm)));
                 }
             }
         }
-        let places_mm = Vec::from_iter(x_mm.iter().flat_map(|&x| y_mm.iter().map(move |&y| (x, y))));
-        let weights = if nodes <= MAX_SPLINE_NODES {
-            Weights::new(&places_mm, &points)
-        } else {
-            None
-        };
+        let places_mm = x_mm.iter().flat_map(|&x| y_mm.iter().map(move |&y| DVec2::new(x, y)));
+        let weights = (nodes <= MAX_SPLINE_NODES).then(|| Weights::new(&Vec::from_iter(places_mm), &points));
+        let weights = weights.flatten();
         if weights.is_none() {
             interpolation = Interpolation::Bilinear;
-            grid = self::grid(&x, &y, GRID_POINTS);
+            grid = self::grid(&lattice, GRID_POINTS);
         }
-        let bilinear = Bilinear::new(
-            (&x.nodes_mm, &x.order, grid.x_mm()),
-            (&y.nodes_mm, &y.order, grid.y_mm()),
-        );
         Ok(Self {
             beyond: grid.beyond(),
             grid,
@@ -146,7 +139,7 @@ impl SurfaceMap {
             interpolation,
             weights,
             rows,
-            bilinear: Some(bilinear),
+            lattice: Some(lattice),
         })
     }
 
@@ -178,7 +171,7 @@ impl SurfaceMap {
             weights: Some(weights),
             rows,
             beyond,
-            bilinear: None,
+            lattice: None,
         })
     }
 
@@ -203,39 +196,29 @@ impl SurfaceMap {
         self.interpolation
     }
 
-    /// Writes the surface through `node_values` (for a lattice `rows × nodes_per_row`, row by row; in any unit) to `out`
-    /// (`x points × y points`, see [`Grid`]).
+    /// Returns the surface through `node_values` (for a lattice `rows × nodes_per_row`, row by row; in any unit): `x points
+    /// × y points`, see [`Grid`].
     ///
     /// On a lattice, a missing value (NaN) leaves a gap around its node, and the rest of that frame is bilinear; with
     /// scattered nodes there is no surface.
     ///
     /// # Panics
-    /// If `node_values` does not have [`Self::node_count`] entries, or `out` not [`Grid::len`].
-    pub fn evaluate_into(&self, node_values: &[f64], out: &mut [f64]) {
-        assert_eq!(node_values.len(), self.nodes, "one value per node");
-        assert_eq!(out.len(), self.grid.len(), "one value per grid point");
-        // A missing value would affect the whole spline.
-        let is_whole = node_values.iter().all(|value| value.is_finite());
-        match (&self.weights, &self.bilinear) {
-            (Some(weights), _) if is_whole => {
-                let values = weights.evaluate(node_values);
-                for (out, row) in out.iter_mut().zip(&self.rows) {
-                    *out = row.map_or(f64::NAN, |row| values[row]);
-                }
-            }
-            (_, Some(bilinear)) => bilinear.evaluate_into(node_values, out),
-            (_, None) => out.fill(f64::NAN),
-        }
-    }
-
-    /// Returns the surface through `node_values`; see [`Self::evaluate_into`].
-    ///
-    /// # Panics
     /// If `node_values` does not have [`Self::node_count`] entries.
     pub fn evaluate(&self, node_values: &[f64]) -> Vec<f64> {
-        let mut out = vec![0.0; self.grid.len()];
-        self.evaluate_into(node_values, &mut out);
-        out
+        assert_eq!(node_values.len(), self.nodes, "one value per node");
+        // A missing value would affect the whole spline.
+        let is_whole = node_values.iter().all(|value| value.is_finite());
+        match (&self.weights, &self.lattice) {
+            (Some(weights), _) if is_whole => {
+                let values = weights.evaluate(node_values);
+                self.rows
+                    .iter()
+                    .map(|row| row.map_or(f64::NAN, |row| values[row]))
+                    .collect()
+            }
+            (_, Some(lattice)) => bilinear(lattice, &self.grid, node_values),
+            (_, None) => vec![f64::NAN; self.grid.len()],
+        }
     }
 }
 
@@ -244,7 +227,7 @@ fn affordable(nodes: usize) -> usize {
     ((MAX_WEIGHTS as f64 / nodes.max(1) as f64).sqrt() as usize).min(GRID_POINTS)
 }
 
-fn grid(x: &SortedAxis, y: &SortedAxis, target: usize) -> Grid {
+fn grid([x, y]: &[SortedAxis; 2], target: usize) -> Grid {
     // A single coordinate gets the pitch of the other axis; a single node gets a millimetre.
     let lone_margin_mm = 0.5 * x.pitch_mm().or(y.pitch_mm()).unwrap_or(1.0);
     Grid::new(
@@ -262,7 +245,7 @@ fn point_of(grid: &Grid, (ix, iy): (usize, usize), (x_mm, y_mm): (&[f64], &[f64]
     let (x, y) = (on_axis(x_mm, grid.x_mm()[ix]), on_axis(y_mm, grid.y_mm()[iy]));
     let (row, node) = (node_at(x_mm, x), node_at(y_mm, y));
     Point {
-        place_mm: (x, y),
+        place_mm: DVec2::new(x, y),
         is_inside: grid.is_inside(ix, iy),
         node: row.zip(node).map(|(row, node)| row * y_mm.len() + node),
     }
@@ -272,76 +255,25 @@ fn node_at(nodes_mm: &[f64], point_mm: f64) -> Option<usize> {
     nodes_mm.iter().position(|&node_mm| node_mm == point_mm)
 }
 
-/// Position of a grid line relative to two lattice lines: `(1 − weight) · lower + weight · upper`. Beyond the outermost
-/// line the weight is below 0 or above 1.
-#[derive(Clone, Copy, Debug)]
-struct Between {
-    lower: usize,
-    upper: usize,
-    weight: f64,
-}
-
-/// Bilinear interpolation on a lattice, fast and defined for every array: weights along both axes. Beyond the outermost nodes the surface keeps its slope.
-#[derive(Clone, Debug)]
-struct Bilinear {
-    x: Vec<Between>,
-    y: Vec<Between>,
-    nodes_per_row: usize,
-}
-
-impl Bilinear {
-    /// Creates the weights. Each axis has the ascending node coordinates, their indices in the caller's order, and the
-    /// grid coordinates.
-    fn new(x: (&[f64], &[usize], &[f64]), y: (&[f64], &[usize], &[f64])) -> Self {
-        Self {
-            x: betweens(x.0, x.1, x.2),
-            y: betweens(y.0, y.1, y.2),
-            nodes_per_row: y.0.len(),
-        }
-    }
-
-    fn evaluate_into(&self, node_values: &[f64], out: &mut [f64]) {
-        for (x, line) in self.x.iter().zip(out.chunks_exact_mut(self.y.len())) {
-            let lower = &node_values[x.lower * self.nodes_per_row..][..self.nodes_per_row];
-            let upper = &node_values[x.upper * self.nodes_per_row..][..self.nodes_per_row];
-            for (y, value) in self.y.iter().zip(line) {
-                let along = |row: &[f64]| mix(row[y.lower], row[y.upper], y.weight);
-                *value = mix(along(lower), along(upper), x.weight);
-            }
-        }
-    }
+/// Bilinear interpolation on a lattice, defined for every array. Beyond the outermost nodes the surface keeps its slope.
+fn bilinear([x, y]: &[SortedAxis; 2], grid: &Grid, node_values: &[f64]) -> Vec<f64> {
+    let along_y = Vec::from_iter(grid.y_mm().iter().map(|&y_mm| y.between(y_mm)));
+    let values = grid.x_mm().iter().flat_map(|&x_mm| {
+        let (rows, share) = x.between(x_mm);
+        let rows = rows.map(|row| &node_values[row * y.nodes_mm.len()..][..y.nodes_mm.len()]);
+        along_y.iter().map(move |&([lower, upper], along)| {
+            let [one, other] = rows.map(|row| mix(row[lower], row[upper], along));
+            mix(one, other, share)
+        })
+    });
+    values.collect()
 }
 
 /// Interpolates linearly; exact at both ends, and unaffected by a missing value (NaN) of zero weight.
-fn mix(lower: f64, upper: f64, weight: f64) -> f64 {
-    if weight == 0.0 {
-        lower
-    } else if weight == 1.0 {
-        upper
-    } else {
-        lower + (upper - lower) * weight
+fn mix(lower: f64, upper: f64, share: f64) -> f64 {
+    match share {
+        0.0 => lower,
+        1.0 => upper,
+        _ => lower + (upper - lower) * share,
     }
-}
-
-fn betweens(nodes_mm: &[f64], order: &[usize], points_mm: &[f64]) -> Vec<Between> {
-    points_mm
-        .iter()
-        .map(|&point_mm| {
-            let last = nodes_mm.len() - 1;
-            let upper = nodes_mm
-                .partition_point(|&node_mm| node_mm < point_mm)
-                .clamp(last.min(1), last);
-            let lower = upper.saturating_sub(1);
-            let weight = if upper > lower {
-                (point_mm - nodes_mm[lower]) / (nodes_mm[upper] - nodes_mm[lower])
-            } else {
-                0.0
-            };
-            Between {
-                lower: order[lower],
-                upper: order[upper],
-                weight,
-            }
-        })
-        .collect()
 }

@@ -48,9 +48,8 @@ impl Scattered {
         let (mut rows, mut beyond) = (vec![None; grid.len()], vec![1.0; grid.len()]);
         let mut points = Vec::new();
         for (index, place_mm) in grid.places_mm().enumerate() {
-            let at = DVec2::from(place_mm);
-            let beyond_mm = hull.distance_mm(at);
-            if beyond_mm <= margin_mm && places.iter().any(|place| place.distance(at) <= reach_mm) {
+            let beyond_mm = hull.distance_mm(place_mm);
+            if beyond_mm <= margin_mm && places.iter().any(|place| place.distance(place_mm) <= reach_mm) {
                 rows[index] = Some(points.len());
                 beyond[index] = beyond_mm / margin_mm;
                 points.push(Point {
@@ -60,15 +59,14 @@ impl Scattered {
                 });
             }
         }
-        let nodes = Vec::from_iter(places.iter().map(|at| (at.x, at.y)));
         // The spline must reproduce the values at the nodes; otherwise it is dominated by rounding errors.
-        points.extend(nodes.iter().enumerate().map(|(node, &place_mm)| Point {
+        points.extend(places.iter().enumerate().map(|(node, &place_mm)| Point {
             place_mm,
             is_inside: true,
             node: Some(node),
         }));
         Ok(Self {
-            weights: Weights::new(&nodes, &points).ok_or(SurfaceError::Uneven)?,
+            weights: Weights::new(&places, &points).ok_or(SurfaceError::Uneven)?,
             grid,
             rows,
             beyond,

@@ -18,13 +18,13 @@
 //! on the unit of length. With the plane, constants and planes are reproduced; and since a multiple of r² in φ adds only
 //! a constant under the two conditions on w, neither Sandwell's −1 nor the unit makes a difference.
 //!
-//! Only z varies from frame to frame, and it enters linearly: z(points) = W z. With P an orthonormal basis of the affine
-//! functions on the nodes and Π = I − PPᵀ, the columns of Wᵀ are `P q + Π (ΠAΠ + τPPᵀ)⁻¹ Π (φ − AP q)`, where q are the
-//! basis functions and φ the Green's functions at a point, and A_mn = φ(|p_m − p_n|). ΠAΠ is positive definite on the
-//! complement of P, so the matrix has a Cholesky factor; any τ > 0 gives the same W.
+//! Only z varies from frame to frame, and it enters linearly: z(points) = W z. With A_mn = φ(|p_m − p_n|) and the affine
+//! functions P on the nodes, the columns of Wᵀ are the first parts of the solutions of `[A P; Pᵀ 0] [w; c] = [φ; q]`,
+//! where φ are the Green's functions and q the affine functions at a point.
 
-use faer::{Mat, MatRef, Scale, Side, linalg::solvers::Solve};
-use ndarray::{Array2, ArrayView1, ArrayViewMut1, linalg::general_mat_vec_mul};
+use faer::{Mat, linalg::solvers::Solve};
+use glam::DVec2;
+use ndarray::{Array2, ArrayView1, ArrayViewMut1, Axis, linalg::general_mat_vec_mul};
 
 /// Largest accepted sum of absolute weights at a point within the nodes. On regular lattices the sum is below 3; a smooth
 /// surface through nodes that nearly coincide overshoots by the size of this sum.
@@ -33,13 +33,10 @@ const LARGEST_AMPLIFICATION: f64 = 1e3;
 /// Largest accepted deviation of the computed weights at a node from 1 there and 0 elsewhere.
 const LARGEST_ROUNDING: f64 = 1e-9;
 
-/// A point in the plane.
-pub(super) type Place = (f64, f64);
-
 /// A point at which a spline is evaluated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
-    pub(super) place_mm: Place,
+    pub(super) place_mm: DVec2,
     /// True within the nodes, where the surface is not extrapolated.
     pub(super) is_inside: bool,
     /// Node at this point.
@@ -52,9 +49,8 @@ pub(super) struct Weights(Array2<f64>);
 
 impl Weights {
     /// Computes the weights at `points`; `None` if they are dominated by rounding errors or amplify too much.
-    pub(super) fn new(nodes_mm: &[Place], points: &[Point]) -> Option<Self> {
-        let places_mm = Vec::from_iter(points.iter().map(|point| point.place_mm));
-        let mut weights = weights(nodes_mm, &places_mm)?;
+    pub(super) fn new(nodes_mm: &[DVec2], points: &[Point]) -> Option<Self> {
+        let mut weights = weights(nodes_mm, points);
         for (mut row, point) in weights.outer_iter_mut().zip(points) {
             let amplification: f64 = row.iter().map(|weight| weight.abs()).sum();
             if !amplification.is_finite() || point.is_inside && amplification > LARGEST_AMPLIFICATION {
@@ -85,53 +81,42 @@ impl Weights {
     }
 }
 
-/// Returns W (`points × nodes`) for nodes that are not on a line, or on one along x or y; `None` if the equations are
-/// numerically singular.
-fn weights(nodes_mm: &[Place], points_mm: &[Place]) -> Option<Array2<f64>> {
+/// Returns W (`points × nodes`) for nodes that are not on a line, or on one along x or y.
+fn weights(nodes_mm: &[DVec2], points: &[Point]) -> Array2<f64> {
     /// Points whose equations are solved together, so that not the whole grid is in memory several times.
     const BLOCK: usize = 1024;
-    let local = LocalCoordinates::of(nodes_mm);
-    let nodes = local.places(nodes_mm);
-    let affine = AffineBasis::of(&nodes);
-    let on_nodes = affine.at(&nodes);
-    let basis = on_nodes.as_ref();
-
-    let is_line = affine.dimensions() < 2;
-    let greens = |others: &[Place]| {
-        Mat::from_fn(nodes.len(), others.len(), |n, p| {
-            green(distance_squared(nodes[n], others[p]), is_line)
-        })
+    // Relative to the centre of the nodes, in units of half their extent: no digits are lost to origin or unit of length.
+    let low = nodes_mm.iter().copied().fold(DVec2::MAX, DVec2::min);
+    let high = nodes_mm.iter().copied().fold(DVec2::MIN, DVec2::max);
+    let middle_mm = 0.5 * low + 0.5 * high;
+    let half_extent_mm = (0.5 * high - 0.5 * low).max_element();
+    let unit_mm = if half_extent_mm > 0.0 { half_extent_mm } else { 1.0 };
+    let local = |place_mm: DVec2| (place_mm - middle_mm) / unit_mm;
+    let nodes = Vec::from_iter(nodes_mm.iter().copied().map(local));
+    let axes = Vec::from_iter((0..2).filter(|&axis| low[axis] < high[axis]));
+    let count = nodes.len();
+    let at = |function: usize, place: DVec2| match function.checked_sub(count) {
+        None => green(nodes[function].distance_squared(place), axes.len() < 2),
+        Some(0) => 1.0,
+        Some(affine) => place[axes[affine - 1]],
     };
-    let system = greens(&nodes);
-    let mut projected = system.clone();
-    // Before the projection, which for three nodes leaves only rounding errors.
-    let tau = system.norm_max().max(f64::MIN_POSITIVE.sqrt());
-    // Twice, once from each side: A is symmetric.
-    remove_affine(basis, &mut projected);
-    projected = projected.transpose().to_owned();
-    remove_affine(basis, &mut projected);
-    projected += (Scale(tau) * basis) * basis.transpose();
-    let factors = projected.llt(Side::Lower).ok()?;
-
-    let of_affine = &system * basis;
-    let mut weights = Array2::zeros((points_mm.len(), nodes.len()));
-    let blocks = points_mm
-        .chunks(BLOCK)
-        .zip(weights.axis_chunks_iter_mut(ndarray::Axis(0), BLOCK));
-    for (points_mm, mut weights) in blocks {
-        let points = local.places(points_mm);
-        let at_points = affine.at(&points);
-        let mut solution = greens(&points);
-        solution -= &of_affine * at_points.transpose();
-        remove_affine(basis, &mut solution);
-        factors.solve_in_place(&mut solution);
-        remove_affine(basis, &mut solution);
-        solution += basis * at_points.transpose();
+    let size = count + 1 + axes.len();
+    let equations = Mat::from_fn(size, size, |row, column| match (nodes.get(row), nodes.get(column)) {
+        (_, Some(node)) => at(row, *node),
+        (Some(node), None) => at(column, *node),
+        (None, None) => 0.0,
+    });
+    let factors = equations.partial_piv_lu();
+    let mut weights = Array2::zeros((points.len(), count));
+    let blocks = points.chunks(BLOCK).zip(weights.axis_chunks_iter_mut(Axis(0), BLOCK));
+    for (points, mut weights) in blocks {
+        let right = Mat::from_fn(size, points.len(), |row, point| at(row, local(points[point].place_mm)));
+        let solution = factors.solve(right);
         for ((point, node), weight) in weights.indexed_iter_mut() {
             *weight = solution[(node, point)];
         }
     }
-    Some(weights)
+    weights
 }
 
 /// φ(r) from r²: r³ on a line, and r² ln r in the plane.
@@ -142,96 +127,5 @@ fn green(distance_squared: f64, is_line: bool) -> f64 {
         0.5 * distance_squared * distance_squared.ln()
     } else {
         0.0
-    }
-}
-
-fn distance_squared(a: Place, b: Place) -> f64 {
-    (a.0 - b.0).powi(2) + (a.1 - b.1).powi(2)
-}
-
-/// Removes from each column its component in the span of `basis`: `matrix = (I − PPᵀ) matrix`.
-fn remove_affine(basis: MatRef<'_, f64>, matrix: &mut Mat<f64>) {
-    let parts = basis.transpose() * &*matrix;
-    *matrix -= basis * parts;
-}
-
-/// Coordinates relative to the centre of the nodes, as fractions of half their extent, so that no digits are lost to the
-/// origin or the unit of the given coordinates.
-struct LocalCoordinates {
-    middle_mm: Place,
-    half_extent_mm: f64,
-}
-
-impl LocalCoordinates {
-    fn of(nodes_mm: &[Place]) -> Self {
-        let range = |coordinate: fn(&Place) -> f64| {
-            let values = || nodes_mm.iter().map(coordinate);
-            let (least, most) = (values().fold(f64::MAX, f64::min), values().fold(f64::MIN, f64::max));
-            (0.5 * least + 0.5 * most, 0.5 * most - 0.5 * least)
-        };
-        let ((x_mm, half_x_mm), (y_mm, half_y_mm)) = (range(|place| place.0), range(|place| place.1));
-        let half_extent_mm = half_x_mm.max(half_y_mm);
-        Self {
-            middle_mm: (x_mm, y_mm),
-            half_extent_mm: if half_extent_mm > 0.0 { half_extent_mm } else { 1.0 },
-        }
-    }
-
-    fn places(&self, places_mm: &[Place]) -> Vec<Place> {
-        let local = |place_mm: f64, middle_mm: f64| (place_mm - middle_mm) / self.half_extent_mm;
-        let places_mm = places_mm.iter();
-        places_mm
-            .map(|&(x, y)| (local(x, self.middle_mm.0), local(y, self.middle_mm.1)))
-            .collect()
-    }
-}
-
-/// Affine functions that are orthonormal on the nodes: a constant, the deviation from the mean of x, and the deviation
-/// from the mean of y after regression on x; without those that vanish on all nodes.
-struct AffineBasis {
-    constant: f64,
-    mean: Place,
-    /// Slope of the regression of y on x over the nodes.
-    tilt: f64,
-    /// Reciprocal norms of both deviations; `None` for one that vanishes.
-    scales: [Option<f64>; 2],
-}
-
-impl AffineBasis {
-    fn of(nodes: &[Place]) -> Self {
-        let count = nodes.len() as f64;
-        let mean = |coordinate: fn(&Place) -> f64| nodes.iter().map(coordinate).sum::<f64>() / count;
-        let mean = (mean(|place| place.0), mean(|place| place.1));
-        let centred = || nodes.iter().map(|node| (node.0 - mean.0, node.1 - mean.1));
-        let square = centred().map(|(x, _)| x * x).sum::<f64>();
-        let tilt = if square > 0.0 {
-            centred().map(|(x, y)| x * y).sum::<f64>() / square
-        } else {
-            0.0
-        };
-        let rest = centred().map(|(x, y)| (y - tilt * x).powi(2)).sum::<f64>();
-        Self {
-            constant: 1.0 / count.sqrt(),
-            mean,
-            tilt,
-            scales: [square, rest].map(|square| (square > 0.0).then(|| 1.0 / square.sqrt())),
-        }
-    }
-
-    /// Number of dimensions of the nodes: 2, 1 on a line, and 0 for one node.
-    fn dimensions(&self) -> usize {
-        self.scales.iter().flatten().count()
-    }
-
-    /// Values of the functions: `points × functions`.
-    fn at(&self, places: &[Place]) -> Mat<f64> {
-        Mat::from_fn(places.len(), 1 + self.dimensions(), |p, function| {
-            let (x, y) = (places[p].0 - self.mean.0, places[p].1 - self.mean.1);
-            match (function, self.scales) {
-                (0, _) => self.constant,
-                (1, [Some(scale), _]) => x * scale,
-                (_, [_, scale]) => (y - self.tilt * x) * scale.unwrap_or_default(),
-            }
-        })
     }
 }

@@ -319,7 +319,6 @@ pub struct FaultForm {
 enum FaultKind {
     BrokenRow,
     BrokenColumn,
-    ShortedRows,
     ShortedColumns,
     Gain,
     Saturated,
@@ -351,7 +350,6 @@ impl FaultForm {
                 column: wire,
                 before_node: node.min(scale.nodes_per_column() - 1),
             },
-            FaultKind::ShortedRows => Fault::ShortedRows { row: wire },
             FaultKind::ShortedColumns => Fault::ShortedColumns { column: wire },
             FaultKind::Gain if self.gain_percent == 0.0 => return None,
             FaultKind::Gain => Fault::Gain {
@@ -400,7 +398,7 @@ impl FaultForm {
                 let hint = "End of the converter's range at which it is stuck.";
                 self.end = options_ui(ui, "Stuck at", hint, &ends, self.end).unwrap_or(self.end);
             }
-            FaultKind::ShortedRows | FaultKind::ShortedColumns => {}
+            FaultKind::ShortedColumns => {}
         }
         if let Some(problem) = self.problem(scale, read) {
             note_ui(ui, &format!("This fault is not possible: {problem}."));
@@ -414,7 +412,7 @@ impl FaultForm {
     }
 }
 
-const KINDS: [(Option<FaultKind>, &str, &str); 7] = [
+const KINDS: [(Option<FaultKind>, &str, &str); 6] = [
     (None, "None", "No wire is faulty."),
     (
         Some(FaultKind::BrokenRow),
@@ -425,11 +423,6 @@ const KINDS: [(Option<FaultKind>, &str, &str); 7] = [
         Some(FaultKind::BrokenColumn),
         "Broken column-wire",
         "Its nodes beyond the break carry no current.",
-    ),
-    (
-        Some(FaultKind::ShortedRows),
-        "Shorted row-wires",
-        "Two neighbours touch, and read the same.",
     ),
     (
         Some(FaultKind::ShortedColumns),
@@ -453,7 +446,6 @@ impl FaultKind {
     fn wires(self, scale: ArrayScale) -> usize {
         match self {
             Self::BrokenRow => scale.rows(),
-            Self::ShortedRows => scale.rows().saturating_sub(1),
             Self::ShortedColumns => scale.columns().saturating_sub(1),
             Self::BrokenColumn | Self::Gain | Self::Saturated => scale.columns(),
         }
@@ -462,7 +454,6 @@ impl FaultKind {
     fn wire_field(self) -> (&'static str, &'static str) {
         match self {
             Self::BrokenRow => ("Row-wire", "Number of the broken row-wire."),
-            Self::ShortedRows => ("First row-wire", "It touches the next one."),
             Self::ShortedColumns => ("First column-wire", "It touches the next one."),
             Self::BrokenColumn | Self::Gain | Self::Saturated => ("Column-wire", "Number of the column-wire."),
         }

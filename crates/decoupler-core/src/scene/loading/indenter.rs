@@ -159,35 +159,15 @@ impl Indenter {
         let place = DVec2::new(between(first.x, last.x), between(first.y, last.y));
         let depth_mm = between(0.0, stroke_mm);
         let direction = DVec2::from_angle(between(0.0, std::f64::consts::TAU));
-        let mut slope_and_radius = |largest_degrees: f64, span: Option<Span>| {
-            let slope = between(0.0, largest_degrees).to_radians().tan();
-            (slope, span.map_or(0.0, |span| between(span.smallest, span.largest)))
+        let (radius_mm, largest_tilt_degrees) = self.radius_mm_and_tilt_degrees();
+        let slope = match self.shape {
+            IndenterShape::Sphere { .. } => 0.0,
+            _ => between(0.0, largest_tilt_degrees).to_radians().tan(),
         };
-        let (slope, body) = match self.shape {
-            IndenterShape::Sphere { radius_mm } => (0.0, Body::Sphere(between(radius_mm.smallest, radius_mm.largest))),
-            IndenterShape::FlatPunch {
-                radius_mm,
-                largest_tilt_degrees,
-            } => {
-                let (slope, radius) = slope_and_radius(largest_tilt_degrees, Some(radius_mm));
-                (slope, Body::FlatPunch(radius))
-            }
-            IndenterShape::Cylinder {
-                radius_mm,
-                largest_tilt_degrees,
-            } => {
-                let (slope, radius) = slope_and_radius(largest_tilt_degrees, Some(radius_mm));
-                (slope, Body::Cylinder(radius))
-            }
-            IndenterShape::Edge { largest_tilt_degrees } => {
-                (slope_and_radius(largest_tilt_degrees, None).0, Body::Edge)
-            }
-        };
-        Press::new(body, place, depth_mm, direction, slope, self.spread_mm)
+        let radius_mm = radius_mm.map_or(0.0, |span| between(span.smallest, span.largest));
+        Press::new(self.body(radius_mm), place, depth_mm, direction, slope, self.spread_mm)
     }
-}
 
-impl Indenter {
     /// Returns the deformation of the array when the upright indenter of middle size presses `depth_mm` deep at (x, y); a
     /// cylinder or an edge is along y.
     pub fn press(&self, model: &SensorModel, place_mm: DVec2, depth_mm: f64) -> Deformation {
@@ -205,14 +185,17 @@ impl Indenter {
     }
 
     fn upright(&self, place_mm: DVec2, depth_mm: f64) -> Press {
-        let middle = |span: Span| 0.5 * (span.smallest + span.largest);
-        let body = match self.shape {
-            IndenterShape::Sphere { radius_mm } => Body::Sphere(middle(radius_mm)),
-            IndenterShape::FlatPunch { radius_mm, .. } => Body::FlatPunch(middle(radius_mm)),
-            IndenterShape::Cylinder { radius_mm, .. } => Body::Cylinder(middle(radius_mm)),
+        let radius_mm = (self.radius_mm_and_tilt_degrees().0).map_or(0.0, |span| 0.5 * (span.smallest + span.largest));
+        Press::new(self.body(radius_mm), place_mm, depth_mm, DVec2::Y, 0.0, self.spread_mm)
+    }
+
+    fn body(&self, radius_mm: f64) -> Body {
+        match self.shape {
+            IndenterShape::Sphere { .. } => Body::Sphere(radius_mm),
+            IndenterShape::FlatPunch { .. } => Body::FlatPunch(radius_mm),
+            IndenterShape::Cylinder { .. } => Body::Cylinder(radius_mm),
             IndenterShape::Edge { .. } => Body::Edge,
-        };
-        Press::new(body, place_mm, depth_mm, DVec2::Y, 0.0, self.spread_mm)
+        }
     }
 }
 

@@ -2,7 +2,7 @@ use faer::{Mat, Side};
 use glam::DVec3;
 use rand::{Rng, RngExt};
 
-use super::{Indenter, Loading, press::Press};
+use super::{Indenter, Loading};
 use crate::{
     numerics::normal_cdf,
     scene::{Deformation, Movement, Scene, standard_normal},
@@ -45,64 +45,42 @@ impl DeformationSampler {
     /// Draws the deformation of the whole array at one moment.
     pub fn draw(&self, rng: &mut impl Rng) -> Deformation {
         let scale = self.model.scale;
-        let shift_mm = self.movement.largest_shift_mm();
+        let shift_mm = match self.movement {
+            Movement::Z => None,
+            Movement::Xyz { largest_shift_mm } => Some(largest_shift_mm),
+        };
+        let shifted_mm = |uniform: f64| shift_mm.unwrap_or(0.0) * (2.0 * uniform - 1.0);
         match &self.loading {
-            Prepared::RandomNodes => {
-                let mut uniform = || rng.random::<f64>();
-                Deformation::from_fn(scale, |_, _| random_mm(self.movement, self.stroke_mm, &mut uniform))
-            }
+            Prepared::RandomNodes => Deformation::from_fn(scale, |_, _| {
+                let z = self.stroke_mm * rng.random::<f64>();
+                let mut sideways = || shift_mm.map_or(0.0, |_| shifted_mm(rng.random()));
+                DVec3::new(sideways(), sideways(), z)
+            }),
             Prepared::SmoothField(field) => {
                 let z = field.draw(rng);
-                let sideways = match self.movement {
-                    Movement::Z => None,
-                    Movement::Xyz { .. } => Some((field.draw(rng), field.draw(rng))),
-                };
+                let sideways = shift_mm.map(|_| [field.draw(rng), field.draw(rng)]);
                 Deformation::from_fn(scale, |row, node| {
                     let at = (row, node);
-                    let sideways = sideways.as_ref().map(|(x, y)| (x[at], y[at]));
-                    field_mm(z[at], sideways, self.stroke_mm, shift_mm)
+                    let [x, y] = sideways
+                        .as_ref()
+                        .map_or([0.0; 2], |[x, y]| [x[at], y[at]].map(shifted_mm));
+                    DVec3::new(x, y, self.stroke_mm * z[at])
                 })
             }
             Prepared::Indenter(indenter) => {
                 let press = indenter.draw(&self.model, self.stroke_mm, rng);
-                let mut sideways = || match self.movement {
-                    Movement::Z => 0.0,
-                    Movement::Xyz { .. } => shift_mm * (2.0 * rng.random::<f64>() - 1.0),
-                };
-                let sideways_mm = (sideways(), sideways());
+                let mut sideways = || shift_mm.map_or(0.0, |_| shifted_mm(rng.random()));
+                let (x, y) = (sideways(), sideways());
                 Deformation::from_fn(scale, |row, node| {
                     let rest_mm = self.model.geometry.row_node_mm(scale, row, node);
-                    dragged_mm(&press, rest_mm, sideways_mm, self.stroke_mm)
+                    let z = press.depth_at_mm(rest_mm.x, rest_mm.y).clamp(0.0, self.stroke_mm);
+                    // Friction drags the surface along with the body, in proportion to the depth.
+                    let dragged = z / self.stroke_mm;
+                    DVec3::new(x * dragged, y * dragged, z)
                 })
             }
         }
     }
-}
-
-/// Displacement of a random node from uniform values in [0, 1).
-fn random_mm(movement: Movement, stroke_mm: f64, uniform: &mut impl FnMut() -> f64) -> DVec3 {
-    let z = stroke_mm * uniform();
-    match movement {
-        Movement::Z => DVec3::new(0.0, 0.0, z),
-        Movement::Xyz { largest_shift_mm } => {
-            let mut sideways = || largest_shift_mm * (2.0 * uniform() - 1.0);
-            DVec3::new(sideways(), sideways(), z)
-        }
-    }
-}
-
-/// Displacement of a node from the values of smooth fields, which are uniform in [0, 1].
-fn field_mm(z: f64, sideways: Option<(f64, f64)>, stroke_mm: f64, shift_mm: f64) -> DVec3 {
-    let (x, y) = sideways.map_or((0.0, 0.0), |(x, y)| (2.0 * x - 1.0, 2.0 * y - 1.0));
-    DVec3::new(shift_mm * x, shift_mm * y, stroke_mm * z)
-}
-
-/// Displacement of the node at `rest_mm` under a press. Friction drags the surface along with the body by up to
-/// `sideways_mm`, in proportion to the depth.
-fn dragged_mm(press: &Press, rest_mm: DVec3, sideways_mm: (f64, f64), stroke_mm: f64) -> DVec3 {
-    let z = press.depth_at_mm(rest_mm.x, rest_mm.y).clamp(0.0, stroke_mm);
-    let dragged = z / stroke_mm;
-    DVec3::new(sideways_mm.0 * dragged, sideways_mm.1 * dragged, z)
 }
 
 /// A stationary Gaussian random field on the nodes with covariance exp(−distance² / (2 length²)), turned into a field

@@ -6,7 +6,7 @@ use std::{
 use decoupler_core::{
     dataset::Simulation,
     decoupling::Decoder,
-    live::{FaultEvent, LeftOutDecoder, WireCheck, equation_decoder},
+    live::{FaultEvent, LeftOutDecoder, WireCheck},
     scene::Scene,
     sensor::{SensorError, SensorModel},
 };
@@ -391,14 +391,12 @@ fn show(session: &mut dyn LiveSession, report: &Report<LiveEvent>) {
 }
 
 /// Detects faults of wires, and decodes without the faulty wires.
-#[derive(Debug)]
 pub(super) struct Watch {
     state: Watched,
     parts: Option<LiveParts>,
     checked: Option<Instant>,
 }
 
-#[derive(Debug)]
 struct LiveParts {
     check: WireCheck,
     left_out: LeftOutDecoder,
@@ -424,7 +422,7 @@ impl Watch {
             Some(_) => None,
             None => Some(LiveParts {
                 check: WireCheck::new(sensor, scene, rows)?,
-                left_out: LeftOutDecoder::new(sensor, scene, rows, equation_decoder(sensor, scene, rows)?)?,
+                left_out: LeftOutDecoder::new(sensor, scene, rows)?,
             }),
         };
         Ok(Self {
