@@ -13,6 +13,7 @@ use crate::{
 /// Readings of faulty column-wires have no influence. A faulty row-wire is interpolated from its neighbours in the same
 /// frame, or set to the mean deformation of the scene if nodes are independent or the row is decoded alone. Each answer
 /// depends only on the readings given, not on earlier frames.
+#[derive(Debug)]
 pub struct LeftOutDecoder {
     partial: PartialDecoder,
     fault: Option<Diagnosis>,

@@ -12,6 +12,7 @@ use crate::{
 /// influence on an answer of least squares: the EM algorithm (Dempster, Laird and Rubin 1977,
 /// doi:10.1111/j.2517-6161.1977.tb01600.x), accelerated by Anderson's method (1965, doi:10.1145/321296.321305).
 
+#[derive(Debug)]
 pub(super) struct PartialDecoder {
     pub(super) model: SensorModel,
     decoder: NewtonDecoder,

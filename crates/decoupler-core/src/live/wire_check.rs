@@ -70,6 +70,7 @@ pub enum FaultEvent {
 /// probability is at least [`Self::SURE`].
 ///
 /// Faults that Eq. (2) explains by some deformation cannot be found: two row-wires that touch, for example.
+#[derive(Debug)]
 pub struct WireCheck {
     partial: PartialDecoder,
     axes: &'static [usize],

@@ -3,6 +3,8 @@
 #[cfg(test)]
 mod tests;
 
+use std::fmt;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -24,6 +26,15 @@ pub struct NewtonDecoder {
     /// Row-wires of the rows that are being decoded.
     row_wires: Vec<usize>,
     solved: SolvedRows,
+}
+
+impl fmt::Debug for NewtonDecoder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("NewtonDecoder")
+            .field("rows", &self.rows)
+            .field("solver", &self.solver)
+            .finish_non_exhaustive()
+    }
 }
 
 #[derive(Clone, Debug)]

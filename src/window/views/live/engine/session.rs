@@ -391,12 +391,14 @@ fn show(session: &mut dyn LiveSession, report: &Report<LiveEvent>) {
 }
 
 /// Detects faults of wires, and decodes without the faulty wires.
+#[derive(Debug)]
 pub(super) struct Watch {
     state: Watched,
     parts: Option<LiveParts>,
     checked: Option<Instant>,
 }
 
+#[derive(Debug)]
 struct LiveParts {
     check: WireCheck,
     left_out: LeftOutDecoder,
