@@ -1,6 +1,9 @@
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-use super::{Coverage, Errors, RunError, RunSets, RunSettings, TestErrors, run_sets::check_sets};
+use super::{
+    Coverage, Errors, RunError, RunSets, RunSettings, TestErrors, cross_validation::scatter, run_sets::check_sets,
+};
 use crate::{
     dataset::{Dataset, PerRow, Simulation},
     decoupling::{NewtonDecoder, Program, ProgramDecoder, decode_set},
@@ -48,7 +51,7 @@ impl Baselines {
     pub fn measure(settings: &RunSettings, sets: &RunSets, job: &Job<'_>) -> Result<Self, RunError> {
         let [mean, linear] = mean_and_linear(settings, sets)?;
         job.check()?;
-        let model_based = model_based(&sets.problem, &sets.test)?;
+        let model_based = model_based(&sets.problem, &sets.test, job)?;
         job.check()?;
         Ok(Self {
             mean,
@@ -70,8 +73,8 @@ impl Baselines {
     pub fn model_based_note(&self) -> Option<&'static str> {
         let is_missing = self.mean.nodes().is_some() && self.model_based.is_none();
         is_missing.then_some(
-            "There is no model-based row: solving the equations for a test set of so many rows of this size takes many \
-             minutes, or an earlier version wrote the file. Lower the number of test samples or the size of the array, and \
+            "There is no model-based row: solving the equations for this many test samples of an array of this size takes \
+             too long, or an earlier version wrote the file. Lower the number of test samples or the size of the array, and \
              train again.",
         )
     }
@@ -97,10 +100,15 @@ impl Scores {
 }
 
 /// Returns the errors on `test` of Newton's method with the noise of the scene and mean and covariance of its loading;
-/// `None` without a sensor model, and if it would take many minutes.
-pub(super) fn model_based(problem: &Problem, test: &Dataset) -> Result<Option<TestErrors>, RunError> {
-    /// Multiplications of a few minutes on one core.
-    const MAX_MULTIPLICATIONS: f64 = 2e11;
+/// `None` without a sensor model, and if it would take more than some seconds.
+///
+/// # Errors
+/// If the sensor is invalid, a reading cannot be decoded, or the job is cancelled.
+pub(super) fn model_based(problem: &Problem, test: &Dataset, job: &Job<'_>) -> Result<Option<TestErrors>, RunError> {
+    /// Multiplications of some seconds on one core.
+    const MAX_MULTIPLICATIONS: f64 = 1e10;
+    /// Multiplications between two checks whether the job is cancelled.
+    const BLOCK: f64 = 5e8;
     /// Usual number of steps per row.
     const STEPS: f64 = 8.0;
     let Some(Simulation { sensor, scene, .. }) = &problem.sensor else {
@@ -112,11 +120,17 @@ pub(super) fn model_based(problem: &Problem, test: &Dataset) -> Result<Option<Te
     let unknowns = (sensor.scale.nodes_per_row() * scene.movement.axes().count()) as f64;
     // QR decomposition of the equations of readings and prior.
     let of_step = 2.0 * unknowns * unknowns * (sensor.scale.columns() as f64 + unknowns);
-    if STEPS * of_step * (test.samples() * tried) as f64 > MAX_MULTIPLICATIONS {
+    let of_sample = STEPS * of_step * tried as f64;
+    if of_sample * test.samples() as f64 > MAX_MULTIPLICATIONS {
         return Ok(None);
     }
     let mut decoder = NewtonDecoder::new(sensor, scene, rows)?;
-    let answers = decode_set(&mut decoder, test)?;
+    let mut answers = Array2::zeros(test.targets().dim());
+    let samples = Vec::from_iter(0..test.samples());
+    for block in samples.chunks((BLOCK / of_sample).max(1.0) as usize) {
+        job.check()?;
+        scatter(&mut answers, block, &decode_set(&mut decoder, &test.select(block))?);
+    }
     Ok(Some(TestErrors::measure(problem, test, &answers)))
 }
 

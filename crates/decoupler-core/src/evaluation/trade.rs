@@ -67,7 +67,7 @@ pub fn measure_trade_off(
     mut on_point: impl FnMut(DecoderKind, Result<TradeOffPoint, RunError>, Option<&Run>),
 ) -> Result<(), RunError> {
     let mut set = DecoderSet::new(*settings, sets.split.training.clone(), None);
-    let model_based = model_based(&sets.problem, &sets.test)?;
+    let model_based = model_based(&sets.problem, &sets.test, job)?;
     let model_based = model_based.as_ref().and_then(TestErrors::nodes).copied();
     let offered = decoders
         .iter()
