@@ -85,7 +85,7 @@ fn networks_are_compared_with_ridge_and_with_a_random_split() {
     let folder = recording();
     let arguments = "inspect --data r.csv --inputs a,b,d,e --targets x --hidden 2 --folds 2 --json";
     let report = json(arguments, folder.path());
-    // x is linear: a network is no better.
+    // x is linear: a network is hardly better.
     assert_eq!(report["model"], "ridge", "{report}");
     let target = &report["targets"][0];
     for figure in ["r2_network", "r2_ridge", "network_to_ridge"] {
@@ -95,7 +95,11 @@ fn networks_are_compared_with_ridge_and_with_a_random_split() {
             "{figure}: {value}"
         );
     }
-    assert!(report["warnings"].to_string().contains("no better than ridge for x"));
+    let warnings = report["warnings"].to_string();
+    assert!(
+        warnings.contains("no better than ridge for x") || warnings.contains("little better than ridge for x"),
+        "{warnings}"
+    );
     assert_eq!(target["splits"]["by"], "time");
     assert!(target["splits"]["sentence"].as_str().unwrap().contains("split by time"));
 }

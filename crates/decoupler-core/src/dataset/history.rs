@@ -1,6 +1,6 @@
 use std::collections::HashMap;
 
-use ndarray::{ArcArray2, Array2, ArrayView1, ArrayView2, Axis};
+use ndarray::{ArcArray2, Array2, ArrayView2, Axis};
 
 use super::{
     DatasetError, Memory, MemoryState,
@@ -192,18 +192,21 @@ impl History {
             return Ok(self.of_samples(self.readings.clone()));
         }
         let (rows, channels) = self.readings.dim();
-        let mut stream = MemoryStream::new(&memory, channels)?;
-        let mut all = Array2::zeros((rows, memory.features(channels)));
+        let mut state = MemoryState::new(&memory, channels)?;
+        let mut all = Array2::zeros((rows, state.features()));
         // One series after the other, so that one state is enough.
         let mut sequence = self.sequence();
         sequence.sort_by_key(|&row| self.series[row]);
-        for of_series in sequence.chunk_by(|&one, &next| self.series[one] == self.series[next]) {
-            stream.restart();
-            for &row in of_series {
-                let readings = self.readings.row(row).to_vec();
-                let (features, _) = stream.step(self.series[row], &readings, self.time_s(row));
-                all.row_mut(row).assign(&ArrayView1::from(features));
-            }
+        let mut places = Continuation::new(memory.interval_s, 1);
+        for row in sequence {
+            let ((), place) = places.next(self.series[row], self.time_s(row), || ());
+            let elapsed_s = state.elapsed_s(place);
+            let readings = self.readings.row(row).to_vec();
+            let mut features = all.row_mut(row);
+            let features = features
+                .as_slice_mut()
+                .expect("a row of a standard array is contiguous");
+            state.step(&readings, elapsed_s, features);
         }
         Ok(self.of_samples(all.into_shared()))
     }
@@ -245,13 +248,7 @@ impl MemoryStream {
     /// If the number of readings is wrong.
     pub fn step(&mut self, series: Series, readings: &[f64], time_s: Option<f64>) -> (&[f64], Place) {
         let (state, place) = self.states.next(series, time_s, || self.start.clone());
-        let elapsed_s = match place {
-            Place::After(elapsed_s) => elapsed_s,
-            Place::First | Place::AfterPause(_) | Place::AfterStepBack(_) => {
-                state.restart();
-                None
-            }
-        };
+        let elapsed_s = state.elapsed_s(place);
         state.step(readings, elapsed_s, &mut self.features);
         (&self.features, place)
     }

@@ -2,7 +2,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{DatasetError, Span};
+use super::{DatasetError, Place, Span};
 
 /// Maximum number of samples that a lag reaches back.
 pub const LARGEST_LAG: usize = 100_000;
@@ -250,6 +250,10 @@ pub struct MemoryState {
     constants: MemoryConstants,
     /// `false` until the first sample.
     has_started: bool,
+    /// Readings of the first sample, which are also those before it.
+    first: Vec<f64>,
+    /// Number of samples in the ring.
+    taken: usize,
     /// The last readings, as a ring of `longest lag × channels`.
     readings: Vec<f64>,
     /// Index of the oldest sample in the ring, which the next one replaces.
@@ -267,6 +271,8 @@ impl MemoryState {
         let constants = MemoryConstants::of(memory, channels)?;
         Ok(Self {
             has_started: false,
+            first: vec![0.0; channels],
+            taken: 0,
             readings: vec![0.0; constants.longest_lag() * channels],
             oldest: 0,
             averages: vec![0.0; constants.averages.len() * channels],
@@ -287,6 +293,17 @@ impl MemoryState {
     /// Forgets the past: the next sample is the first.
     pub fn restart(&mut self) {
         self.has_started = false;
+    }
+
+    /// Seconds since the row before; forgets the past if the next row does not continue it.
+    pub(super) fn elapsed_s(&mut self, place: Place) -> Option<f64> {
+        match place {
+            Place::After(elapsed_s) => elapsed_s,
+            Place::First | Place::AfterPause(_) | Place::AfterStepBack(_) => {
+                self.restart();
+                None
+            }
+        }
     }
 
     /// Takes in the readings of the next sample, `interval_s` seconds after the one before (the usual interval if `None`),
@@ -310,11 +327,10 @@ impl MemoryState {
         let ring = self.constants.longest_lag();
         if !self.has_started {
             self.has_started = true;
-            self.oldest = 0;
-            for past in [&mut self.readings, &mut self.averages] {
-                past.chunks_exact_mut(channels.max(1))
-                    .for_each(|row| row.copy_from_slice(readings));
-            }
+            (self.oldest, self.taken) = (0, 0);
+            self.first.copy_from_slice(readings);
+            let averages = self.averages.chunks_exact_mut(channels.max(1));
+            averages.for_each(|row| row.copy_from_slice(readings));
         }
         let interval_s = interval_s.unwrap_or(self.constants.interval_s);
         let (present, past) = features.split_at_mut(channels);
@@ -322,7 +338,11 @@ impl MemoryState {
         let mut rows = past.chunks_exact_mut(channels.max(1));
         for (lag, row) in self.constants.lags.iter().zip(&mut rows) {
             let start = (self.oldest + ring - lag) % ring * channels;
-            row.copy_from_slice(&self.readings[start..start + channels]);
+            row.copy_from_slice(if *lag <= self.taken {
+                &self.readings[start..start + channels]
+            } else {
+                &self.first
+            });
         }
         let averages = self.averages.chunks_exact_mut(channels.max(1));
         for (index, (average, row)) in averages.zip(&mut rows).enumerate() {
@@ -341,6 +361,7 @@ impl MemoryState {
             let start = self.oldest * channels;
             self.readings[start..start + channels].copy_from_slice(readings);
             self.oldest = (self.oldest + 1) % ring;
+            self.taken = ring.min(self.taken + 1);
         }
     }
 }
@@ -394,22 +415,16 @@ mod tests {
 
     /// One state of ten channels takes 8 MB, those of all groups 800 GB.
     #[test]
-    fn the_past_of_a_series_is_dropped_at_its_end() {
-        let groups = Vec::from_iter(0..100_000);
+    fn many_interleaved_series_take_one_state() {
         let memory = Memory::of_lags(&[LARGEST_LAG]);
-        let readings = Array2::from_shape_fn((200, 1), |(sample, _)| sample as f64);
-        let found = of_series(&memory, readings.view(), &groups[..200], None).unwrap();
-        assert_eq!(found.column(0), found.column(1));
-        // All at once, as those of row-wires are.
+        let groups = Vec::from_iter(0..100_000);
         let interleaved = [&groups[..], &groups].concat();
-        let readings = Array2::zeros((interleaved.len(), 10));
-        let refused = of_series(&memory, readings.view(), &interleaved, None)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            refused.contains("100000 groups and row-wires at once") && refused.contains("800.0 GB"),
-            "{refused}"
-        );
+        let readings = Array2::from_shape_fn((interleaved.len(), 10), |(row, channel)| (10 * row + channel) as f64);
+        let found = of_series(&memory, readings.view(), &interleaved, None).unwrap();
+        // Before the first row of a series are its own readings.
+        for (row, first) in [(7, 7), (100_007, 7), (199_999, 99_999)] {
+            assert_eq!(found.row(row).to_vec()[10..], readings.row(first).to_vec(), "{row}");
+        }
     }
 
     #[test]

@@ -104,7 +104,7 @@ impl Scores {
 ///
 /// # Errors
 /// If the sensor is invalid, a reading cannot be decoded, or the job is cancelled.
-pub(super) fn model_based(problem: &Problem, test: &Dataset, job: &Job<'_>) -> Result<Option<TestErrors>, RunError> {
+fn model_based(problem: &Problem, test: &Dataset, job: &Job<'_>) -> Result<Option<TestErrors>, RunError> {
     /// Multiplications of some seconds on one core.
     const MAX_MULTIPLICATIONS: f64 = 1e10;
     /// Multiplications between two checks whether the job is cancelled.

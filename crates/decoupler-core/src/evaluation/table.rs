@@ -209,8 +209,8 @@ impl ErrorRow {
 }
 
 impl ErrorTable {
-    /// Returns the table of the baselines, the network, the model-based decoder, and the
-    /// published errors, if there are any.
+    /// Returns the table of the baselines, the network, the model-based decoder unless its errors are only rounding, and
+    /// the published errors, if there are any.
     pub fn of_scores(problem: &Problem, scores: &Scores, published: Option<&PublishedErrors>) -> Self {
         let baselines = &scores.baselines;
         let mut rows = vec![
@@ -218,7 +218,10 @@ impl ErrorTable {
             (baselines.linear_name(), &baselines.linear),
             (NETWORK, &scores.network),
         ];
-        rows.extend(baselines.model_based.as_ref().map(|errors| (MODEL_BASED, errors)));
+        // Exact readings that determine the deformation leave only rounding errors.
+        let model_based = baselines.model_based.as_ref();
+        let model_based = model_based.filter(|errors| !errors.nodes().is_some_and(Errors::is_rounding));
+        rows.extend(model_based.map(|errors| (MODEL_BASED, errors)));
         let mut table = Self::new(problem, &rows);
         if !problem.has_nodes() && scores.coverage.iter().any(Option::is_some) {
             table.add_coverage(&scores.coverage);

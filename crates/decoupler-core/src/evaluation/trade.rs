@@ -1,6 +1,5 @@
 use super::{
-    Begin, DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, TestErrors,
-    baselines::model_based,
+    Baselines, Begin, DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, TestErrors,
 };
 use crate::{
     dataset::Simulation,
@@ -67,8 +66,8 @@ pub fn measure_trade_off(
     mut on_point: impl FnMut(DecoderKind, Result<TradeOffPoint, RunError>, Option<&Run>),
 ) -> Result<(), RunError> {
     let mut set = DecoderSet::new(*settings, sets.split.training.clone(), None);
-    let model_based = model_based(&sets.problem, &sets.test, job)?;
-    let model_based = model_based.as_ref().and_then(TestErrors::nodes).copied();
+    let baselines = Baselines::measure(settings, sets, job)?;
+    let model_based = baselines.model_based.as_ref().and_then(TestErrors::nodes).copied();
     let offered = decoders
         .iter()
         .filter(|kind| sets.problem.sensor.is_some() || !kind.needs_sensor());
@@ -95,6 +94,7 @@ pub fn measure_trade_off(
     for &hidden in hidden.iter().filter(|_| !with_network.is_empty()) {
         let settings = RunSettings { hidden, ..*settings };
         let mut run = Run::new(settings, sets.clone(), Begin::Initialize, job)?;
+        run.baselines = Some(baselines.clone());
         run.finish(job)?;
         let training_seconds = run.trainers().iter().map(|start| start.elapsed().as_secs_f64()).sum();
         set.set_networks(Some(run.network()));

@@ -105,7 +105,10 @@ impl Intervals {
     ) -> Result<Self, NoIntervals> {
         let folds = by.folds_of(set, Self::FOLDS);
         let folds = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split))?;
-        let validated = CrossValidated::on_folds(settings, set, folds, job)?;
+        let validated = match CrossValidated::on_folds(settings, set, folds, job) {
+            Err(RunError::Cancelled(_)) => return Err(NoIntervals::Cancelled),
+            validated => validated?,
+        };
         Self::calibrate(set, validated.network.view(), by).checked()
     }
 
