@@ -106,8 +106,9 @@
 //!
 //! ```
 //! use decoupler_core::{
+//!     dataset::{Seed, Simulation},
 //!     decoupling::{Decoder, NewtonDecoder},
-//!     evaluation::Preset,
+//!     scene::Rows,
 //! };
 //!
 //! let mut source = Simulation::default();

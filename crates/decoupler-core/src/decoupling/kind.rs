@@ -141,7 +141,8 @@ impl Named for DecoderKind {
     const ALL: &'static [Self] = &Self::ALL;
 
     fn name(self) -> &'static str {
-        self.entry().word
+        let Entry { word, .. } = self.entry();
+        word
     }
 }
 
@@ -210,7 +211,7 @@ impl DecoderKind {
             Self::RadialBasis => problem.of_samples(|set| Program::radial_basis(set, inputs, unseen, &mut rng)),
             Self::Fuzzy => problem.of_samples(|set| Program::fuzzy(set, inputs.quantity, unseen, &mut rng)),
             Self::Network => Ok(problem.network(problem.precision)),
-            Self::Newton => problem.on_equations(|model, scene, rows| NewtonDecoder::new(model, scene, rows)),
+            Self::Newton => problem.on_equations(NewtonDecoder::new),
             Self::Polish => match problem.network(Precision::Double) {
                 Some(network) => problem.on_equations(|model, scene, rows| {
                     NewtonDecoder::after(network, Self::POLISH_STEPS, model, scene, rows)

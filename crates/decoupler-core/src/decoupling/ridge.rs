@@ -6,6 +6,9 @@ use crate::{
     network::NetworkError,
 };
 
+/// Writes the features and the outputs of a sample.
+type WriteSample<'a> = &'a dyn Fn(usize, &mut [f64], &mut [f64]);
+
 /// Ridge regression of outputs on features, with the penalty of each output chosen by cross-validation.
 ///
 /// Minimises `‖y − ȳ − (X − x̄) B‖² + α ‖B‖²` (Hoerl and Kennard 1970, doi:10.1080/00401706.1970.10488634), with α the
@@ -24,7 +27,7 @@ pub(crate) struct Regression<'a> {
     /// Number of outputs.
     pub outputs: usize,
     /// Writes the features and the outputs of a sample.
-    pub write: &'a dyn Fn(usize, &mut [f64], &mut [f64]),
+    pub write: WriteSample<'a>,
     /// Changes of the features by one standard deviation of each source of noise that the samples lack (sources ×
     /// features). The map then minimises the expected error with this noise.
     pub noise: Array2<f64>,
@@ -424,7 +427,7 @@ pub(super) fn folds(set: &Dataset) -> Option<Folds> {
     let samples = set.samples();
     let count = match samples {
         ..=50 => 20,
-        ..=200 => 10,
+        51..=200 => 10,
         _ => 5,
     };
     let runs = set.groups().chunk_by(|one, next| one == next).count();
@@ -538,7 +541,7 @@ mod tests {
             [
                 [
                     0.7725829902392267,
-                    0.2875275745862320,
+                    0.287_527_574_586_232,
                     0.0524090749323276,
                     0.0748474797196868,
                     -0.2930655791031472,
@@ -589,7 +592,7 @@ mod tests {
             for noise in [none(features), normal(3, features, 5) * 0.2] {
                 let folds = Folds::consecutive(samples, 3);
                 let ridge = with(&x, &y, &noise, |regression| regression.ridge(Some(&folds)).unwrap());
-                let mut best = vec![f64::INFINITY; 2];
+                let mut best = [f64::INFINITY; 2];
                 for level in levels().skip(1).filter(|level| (1e-9..10.0).contains(level)) {
                     let mut squares = vec![Vec::new(); 3];
                     for (fold, squares) in squares.iter_mut().enumerate() {
