@@ -24,7 +24,7 @@ fn a_training_ends_with_the_librarys_own_numbers() {
     driver.train();
     let run = trained(small());
     assert_eq!(driver.table(), table_of(&run));
-    assert_eq!(driver.table().len(), 20, "four rows of five figures");
+    assert_eq!(driver.table().len(), 15, "three rows of five figures");
     let reason = run.stop_reason().unwrap();
     assert!(driver.has(&format!("Finished: {reason}")), "{reason}");
     let epochs = run.leader().latest().epoch;
