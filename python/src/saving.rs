@@ -107,7 +107,6 @@ impl Saved<'_> {
         let sets = setup
             .sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ())
             .map_err(text)?;
-        let sets = sets;
         if samples_crc32(&sets.sets.split.training) != self.origin.crc32 {
             return Err("the files with the samples do not read back as the samples of fit".to_owned());
         }

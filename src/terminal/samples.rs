@@ -10,7 +10,7 @@ use clap::Args;
 use decoupler_core::{
     dataset::{Dataset, LARGEST_SAMPLES, Seed, Simulation, SimulationError, Stream},
     decoupling::{Decoder, Precision, decode_set},
-    evaluation::{DecoderSet, Run, RunError, RunSets, RunSettings, TrainingSize, Workload, error_remarks},
+    evaluation::{DecoderSet, Run, RunError, RunSettings, TrainingSize, Workload, error_remarks},
     job::Job,
     scene::{Fault, FaultySensor},
     sensor::{ArrayScale, SensorModel},
@@ -230,8 +230,7 @@ impl Simulate {
         } else {
             None
         };
-        let sets = RunSets::draw(settings, memory_budget(), &Job::UNINTERRUPTED)?;
-        let set = DecoderSet::new(*settings, sets.split.training, networks);
+        let set = DecoderSet::drawn(*settings, networks, memory_budget(), &Job::UNINTERRUPTED)?;
         Ok(set.decoder(kind, Precision::Double)?)
     }
 }

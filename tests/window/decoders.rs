@@ -2,7 +2,7 @@
 
 use decoupler::window::DecoderResult;
 use decoupler_core::{
-    evaluation::{DecoderSet, Run, RunSets, RunSettings},
+    evaluation::{DecoderSet, Run, RunSettings},
     job::Job,
     machine::MemoryBudget,
     scene::{Noise, Rows},
@@ -47,14 +47,13 @@ fn table(driver: &Driver) -> Vec<String> {
 
 /// The same cells computed by the library.
 fn table_of(run: &Run) -> Vec<String> {
-    let set = DecoderSet::new(
+    let set = DecoderSet::drawn(
         *run.settings(),
-        RunSets::draw(run.settings(), MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
-            .unwrap()
-            .split
-            .training,
         Some(run.network()),
-    );
+        MemoryBudget::UNLIMITED,
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
     let model_based = run
         .baselines()
         .unwrap()

@@ -295,10 +295,8 @@ fn scenes_that_move_sideways_report_their_condition_number() {
     driver.train();
     assert!(driver.says("This scene is ill-conditioned (condition number"));
     let table = driver.table();
-    assert!(
-        table.iter().any(|cell| cell.starts_with("model-based, Y %")),
-        "{table:?}"
-    );
+    // Exact readings leave this scene open: solving the equations for every row-wire would take too long.
+    assert!(driver.says("There is no model-based row"));
     for row in ["training mean", "linear map", "network"] {
         let y = table.iter().find(|cell| cell.starts_with(&format!("{row}, Y %")));
         assert!(

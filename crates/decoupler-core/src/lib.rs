@@ -6,7 +6,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `numerics` | quantiles of distributions and of samples |
+//! | `numerics` | least squares, distributions, special functions, figures of samples |
 //! | [`text`] | numbers, counts and names as text |
 //! | [`job`] | work that can be cancelled |
 //! | [`sensor`] | array scale, geometry, the resistance model and its Jacobian |

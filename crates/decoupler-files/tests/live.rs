@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use std::collections::BTreeSet;
+
 use decoupler_core::{
     dataset::{Seed, Stream},
     decoupling::Decoder,
@@ -565,6 +567,15 @@ fn faults_round_trip_as_text_and_invalid_ones_are_refused() {
     ] {
         assert!(text.parse::<Fault>().is_err(), "{text}");
     }
+    let refusal = "broken:1".parse::<Fault>().unwrap_err().to_string();
+    let (_, offered) = refusal.split_once("give ").unwrap();
+    let offered: BTreeSet<&str> = offered
+        .split(' ')
+        .filter_map(|word| word.split_once(':'))
+        .map(|(kind, _)| kind)
+        .collect();
+    let accepted = ["open-row", "open-column", "short-columns", "gain", "stuck"];
+    assert_eq!(offered, BTreeSet::from(accepted), "{refusal}");
     let scale = "10x6_3x18".parse().unwrap();
     for (text, words) in [
         ("open-row:11", "no row-wire 11; give 1 to 10"),

@@ -63,7 +63,7 @@ pub enum DatasetError {
         /// Name of the unit of division: sample or group.
         unit: &'static str,
     },
-    /// The set cannot be divided into so many folds.
+    /// The set cannot be divided into the given number of folds.
     #[error("{folds} folds of {units} {unit}s: give from 2 folds to as many as there are {unit}s")]
     Folds {
         /// Number of folds requested.
@@ -126,7 +126,7 @@ pub enum DatasetError {
 }
 
 impl DatasetError {
-    /// Checks that so many units, named `unit`, fill `folds` folds.
+    /// Checks that `units` units, each named `unit`, fill `folds` folds.
     ///
     /// # Errors
     /// If there are fewer than two folds, or more folds than units.

@@ -44,8 +44,10 @@ pub enum Precision {
 
 /// Properties of a decoder.
 struct Entry {
-    word: &'static str,
+    /// Name in the terminal and in files.
     name: &'static str,
+    /// Name in tables, charts and forms.
+    title: &'static str,
     meaning: &'static str,
 }
 
@@ -67,38 +69,38 @@ impl DecoderKind {
     const fn entry(self) -> Entry {
         match self {
             Self::Mean => Entry {
-                word: "mean",
-                name: "Training mean",
+                name: "mean",
+                title: "Training mean",
                 meaning: "Always answers the mean of the training set",
             },
             Self::Ridge => Entry {
-                word: "ridge",
-                name: "Ridge",
+                name: "ridge",
+                title: "Ridge",
                 meaning: "The best affine map of the chosen inputs: ridge regression, with the penalty of each target chosen by cross-validation",
             },
             Self::Network => Entry {
-                word: "network",
-                name: "Network",
+                name: "network",
+                title: "Network",
                 meaning: "The trained network, in 64 or in 32 bits",
             },
             Self::RadialBasis => Entry {
-                word: "rbf",
-                name: "Radial basis",
+                name: "rbf",
+                title: "Radial basis",
                 meaning: "A radial-basis network by kernel ridge regression: Gaussians around all training samples, or around 1000 of more than 4000, their width and penalties chosen by cross-validation",
             },
             Self::Fuzzy => Entry {
-                word: "fuzzy",
-                name: "Fuzzy rules",
+                name: "fuzzy",
+                title: "Fuzzy rules",
                 meaning: "A Takagi-Sugeno system: fuzzy rules with affine consequents, their number chosen by cross-validation",
             },
             Self::Newton => Entry {
-                word: "newton",
-                name: "Newton",
+                name: "newton",
+                title: "Newton",
                 meaning: "Newton's method on Eq. (2) from mid-stroke, with restarts if that fails; with noise and prior if the scene has noise or the readings do not determine the answer",
             },
             Self::Polish => Entry {
-                word: "polish",
-                name: "Network + Newton",
+                name: "polish",
+                title: "Network + Newton",
                 meaning: "The network's answer, improved by at most three Newton steps",
             },
         }
@@ -108,7 +110,7 @@ impl DecoderKind {
     pub fn name(self, precision: Precision) -> &'static str {
         match (self, precision) {
             (Self::Network, Precision::Single) => "Network f32",
-            _ => self.entry().name,
+            _ => self.entry().title,
         }
     }
 
@@ -141,15 +143,14 @@ impl Named for DecoderKind {
     const ALL: &'static [Self] = &Self::ALL;
 
     fn name(self) -> &'static str {
-        let Entry { word, .. } = self.entry();
-        word
+        self.entry().name
     }
 }
 
 impl fmt::Display for DecoderKind {
     /// Writes the name used in the terminal and in files.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.entry().word)
+        f.pad(self.entry().name)
     }
 }
 

@@ -83,7 +83,7 @@ pub(super) fn with_noise<'a>(training: &'a Dataset, unseen: NoiseSource, rng: &m
     training
 }
 
-/// At most `count` evenly spaced indices of so many samples.
+/// At most `count` evenly spaced indices of `samples` samples.
 pub(super) fn thinned(samples: usize, count: usize) -> Vec<usize> {
     let kept = count.min(samples);
     (0..kept).map(|place| place * samples / kept).collect()

@@ -3,7 +3,7 @@ use std::time::Instant;
 use ndarray::Array2;
 
 use super::{
-    RunError, RunSettings, TestErrors,
+    RunError, RunSets, RunSettings, TestErrors,
     baselines::fit_baselines,
     preparation::unseen_noise,
     remark::{cause, missing_figures, worse_than_mean},
@@ -12,6 +12,8 @@ use super::{
 use crate::{
     dataset::Dataset,
     decoupling::{Decoder, DecoderKind, FitProblem, Precision, SolvedRows, decode_set, resistance_residual},
+    job::Job,
+    machine::MemoryBudget,
     network::Networks,
     problem::Problem,
     scene::RowModel,
@@ -74,6 +76,21 @@ impl DecoderSet {
             training,
             networks,
         }
+    }
+
+    /// Draws the training set of simulated `settings`, and returns decoders fitted to it. `networks` must have been
+    /// trained with these settings.
+    ///
+    /// # Errors
+    /// As for [`RunSets::draw`].
+    pub fn drawn(
+        settings: RunSettings,
+        networks: Option<Networks>,
+        memory: MemoryBudget,
+        job: &Job<'_>,
+    ) -> Result<Self, RunError> {
+        let sets = RunSets::draw(&settings, memory, job)?;
+        Ok(Self::new(settings, sets.split.training, networks))
     }
 
     /// Replaces the networks.

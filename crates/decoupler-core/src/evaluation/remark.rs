@@ -62,7 +62,7 @@ pub(super) fn cause(
     let text = if kind.needs_network() {
         "more or fewer epochs, another number of hidden nodes, or more samples may help"
     } else if is_noisy {
-        "the readings have noise; less noise or more samples may help"
+        "the readings have noise: use another decoder; less noise or more samples may help"
     } else {
         "use another decoder; more samples may help"
     };

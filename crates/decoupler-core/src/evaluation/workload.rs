@@ -106,7 +106,8 @@ impl Workload {
         };
         let (method, of_each) = (&settings.training.method, size.samples.div_ceil(size.networks.max(1)));
         let trainings = settings.starts * size.networks;
-        // Whitening may leave inputs out, and products of fewer inputs may be kept that would be recomputed for all.
+        // Whitening may leave inputs out, and fewer inputs may take more memory: their equations may be factored, those of
+        // all inputs solved iteratively.
         let fewest = match settings.inputs.scaling {
             ScalingChoice::MinMax => shape.inputs,
             ScalingChoice::Whitening => 1,

@@ -99,7 +99,7 @@ pub enum SceneError {
     /// Not the description of a fault.
     #[error(
         "'{0}' is not a fault: give open-row:ROW, open-column:COLUMN (both with @NODE for a break before that node), \
-         short-rows:ROW-ROW, short-columns:COLUMN-COLUMN, gain:COLUMN=REL, stuck:COLUMN=low or stuck:COLUMN=high"
+         short-columns:COLUMN-COLUMN, gain:COLUMN=REL, stuck:COLUMN=low or stuck:COLUMN=high"
     )]
     FaultText(String),
     /// The array, or the scene, has no such wire or node.

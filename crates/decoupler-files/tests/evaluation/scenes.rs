@@ -42,14 +42,13 @@ fn trained(settings: RunSettings) -> Run {
 }
 
 fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
-    let set = DecoderSet::new(
+    let set = DecoderSet::drawn(
         *run.settings(),
-        RunSets::draw(run.settings(), MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
-            .unwrap()
-            .split
-            .training,
         Some(run.network()),
-    );
+        MemoryBudget::UNLIMITED,
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
     let report = set.measure(kind, precision, run.test()).unwrap().unwrap();
     report.errors.percent().unwrap()
 }
@@ -96,14 +95,7 @@ fn unknown_rows_are_identified() {
     assert_eq!(run.network().values().len(), 1);
     assert!(z_percent(&run, DecoderKind::Newton, Precision::Double) < 1e-9);
     settings.simulation_mut().unwrap().scene.noise = Noise::relative(1e-5);
-    let set = DecoderSet::new(
-        settings,
-        RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
-            .unwrap()
-            .split
-            .training,
-        None,
-    );
+    let set = DecoderSet::drawn(settings, None, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
     let test = settings.simulation().unwrap().draw_test(settings.seed).unwrap();
     let report = set
         .measure(DecoderKind::Newton, Precision::Double, &test)

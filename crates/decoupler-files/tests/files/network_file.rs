@@ -181,12 +181,12 @@ fn invalid_contents_are_named() {
         (
             "an impossible geometry",
             replaced("\"height_mm\":5.0", "\"height_mm\":-5.0"),
-            "settings.simulation().unwrap().sensor: the height is -5 mm",
+            "settings.source.sensor: the height is -5 mm",
         ),
         (
             "an impossible scene",
             replaced("\"largest_compression\":0.2", "\"largest_compression\":2.0"),
-            "settings.simulation().unwrap().scene",
+            "settings.source.scene",
         ),
         (
             "an impossible setting",

@@ -384,7 +384,6 @@ mod tests {
     use egui_kittest::{Harness, kittest::Queryable as _};
 
     use super::*;
-    use decoupler_core::evaluation::RunSets;
     use decoupler_core::machine::MemoryBudget;
 
     #[test]
@@ -455,14 +454,7 @@ mod tests {
         let mut without_noise = settings;
         without_noise.simulation_mut().unwrap().scene.noise = Noise::default();
         // Fitted without the noise that the readings have.
-        let set = DecoderSet::new(
-            without_noise,
-            RunSets::draw(&without_noise, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
-                .unwrap()
-                .split
-                .training,
-            None,
-        );
+        let set = DecoderSet::drawn(without_noise, None, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
         let report = set
             .measure(DecoderKind::Ridge, Precision::Double, &test)
             .unwrap()
@@ -496,14 +488,7 @@ mod tests {
         settings.simulation_mut().unwrap().sensor.scale = "10x6_3x4".parse().unwrap();
         settings.simulation_mut().unwrap().samples = 100;
         settings.simulation_mut().unwrap().test_samples = 10;
-        let set = DecoderSet::new(
-            settings,
-            RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
-                .unwrap()
-                .split
-                .training,
-            None,
-        );
+        let set = DecoderSet::drawn(settings, None, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
         let test = settings.simulation().unwrap().draw_test(settings.seed).unwrap();
         let report = set
             .measure(DecoderKind::Newton, Precision::Double, &test)

@@ -155,35 +155,27 @@ impl RowProblem {
 
     /// Evaluates residuals and derivatives at `unknowns_mm`; returns the rms residual.
     pub(crate) fn evaluate(&mut self, unknowns_mm: &[f64]) -> f64 {
-        self.displace(unknowns_mm);
-        let Self {
-            model,
-            row,
-            displacements_mm,
-            conductance,
-            ..
-        } = self;
         match self.is_refined {
-            true => conductance.evaluate_refined(model, *row, displacements_mm),
-            false => conductance.evaluate(model, *row, displacements_mm),
+            true => self.evaluate_by(unknowns_mm, RowConductance::evaluate_refined),
+            false => self.evaluate_by(unknowns_mm, RowConductance::evaluate),
         }
-        self.write_residuals()
     }
 
     /// Evaluates only the residuals at `unknowns_mm`; derivatives remain those of the last [`Self::evaluate`].
     pub(crate) fn evaluate_residuals(&mut self, unknowns_mm: &[f64]) -> f64 {
-        self.displace(unknowns_mm);
-        let Self {
-            model,
-            row,
-            displacements_mm,
-            conductance,
-            ..
-        } = self;
         match self.is_refined {
-            true => conductance.evaluate_sums_refined(model, *row, displacements_mm),
-            false => conductance.evaluate_sums(model, *row, displacements_mm),
+            true => self.evaluate_by(unknowns_mm, RowConductance::evaluate_sums_refined),
+            false => self.evaluate_by(unknowns_mm, RowConductance::evaluate_sums),
         }
+    }
+
+    fn evaluate_by(
+        &mut self,
+        unknowns_mm: &[f64],
+        evaluate: impl FnOnce(&mut RowConductance, &SensorModel, usize, &[DVec3]),
+    ) -> f64 {
+        self.displace(unknowns_mm);
+        evaluate(&mut self.conductance, &self.model, self.row, &self.displacements_mm);
         self.write_residuals()
     }
 

@@ -4,7 +4,7 @@ use super::{section::Shown, state::Subject};
 use crate::window::job::{Background, JobError, Report, Wake};
 use decoupler_core::{
     decoupling::{Decoder, DecoderKind, Precision},
-    evaluation::{DecoderSet, Pressed, PressedAnswer, RunSets},
+    evaluation::{DecoderSet, Pressed, PressedAnswer},
     job::Job,
 };
 use decoupler_files::machine::memory_budget;
@@ -205,11 +205,9 @@ impl Comparing {
 /// Fits one decoder after the other, the fastest first.
 fn fit_all(subject: &Subject, report: &Report<FitEvent>) {
     let is_cancelled = || report.is_cancelled();
-    let sets = RunSets::draw(&subject.settings, memory_budget(), &Job::new(&is_cancelled));
-    let set = sets.map_err(|error| error.to_string()).map(|sets| {
-        let networks = Some((*subject.networks).clone());
-        DecoderSet::new(subject.settings, sets.split.training, networks)
-    });
+    let networks = Some((*subject.networks).clone());
+    let set = DecoderSet::drawn(subject.settings, networks, memory_budget(), &Job::new(&is_cancelled))
+        .map_err(|error| error.to_string());
     for kind in KINDS {
         if report.is_cancelled() {
             return;
