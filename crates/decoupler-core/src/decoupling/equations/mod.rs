@@ -12,6 +12,7 @@ mod symmetry;
 #[cfg(test)]
 mod tests;
 mod triangle;
+mod upper;
 
 pub use estimate::{Estimate, LARGEST_ERROR, NewtonStop, Solution};
 pub use estimator::Estimator;

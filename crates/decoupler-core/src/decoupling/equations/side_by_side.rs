@@ -1,19 +1,17 @@
 use pulp::{Simd, WithSimd};
 
-/// Cholesky factors of several small least-squares problems side by side, one in each lane of vector registers, with
-/// reused memory. The result of a lane has the same bits whatever the other lanes contain.
-///
-/// The equations are those of [A, b]: the lower triangle of [A, b]ᵀ[A, b], row by row. The last row of their factor
-/// is Aᵀb after forward substitution.
+use super::upper;
+
+/// Cholesky factors of several small least-squares problems side by side, with reused memory: each is in one lane of vector
+/// registers.
 #[derive(Clone, Debug)]
 pub(super) struct SideBySide {
-    unknowns: usize,
-    lower: Vec<[f64; LANES]>,
-    /// Reciprocals of the diagonal entries.
-    reciprocals: Vec<[f64; LANES]>,
+    width: usize,
+    /// [AᵀA, Aᵀb] of every lane, then their factors.
+    rows: Vec<[f64; LANES]>,
     solution: Vec<[f64; LANES]>,
-    /// Smallest fraction of a diagonal entry of AᵀA that remains after eliminating the columns before it.
     min_left: [f64; LANES],
+    scratch: [Vec<[f64; LANES]>; 2],
 }
 
 /// Number of problems side by side.
@@ -23,20 +21,25 @@ const MIN_LEFT: f64 = 1e-11;
 
 impl SideBySide {
     pub(super) fn new(unknowns: usize) -> Self {
-        let width = unknowns + 1;
+        let zeros = |count: usize| vec![[0.0; LANES]; count];
         Self {
-            unknowns,
-            lower: vec![[0.0; LANES]; width * (width + 1) / 2],
-            reciprocals: vec![[0.0; LANES]; unknowns],
-            solution: vec![[0.0; LANES]; unknowns],
+            width: unknowns + 1,
+            rows: zeros(unknowns * (unknowns + 1)),
+            solution: zeros(unknowns),
             min_left: [0.0; LANES],
+            scratch: [zeros(unknowns), zeros(unknowns)],
         }
     }
 
-    /// Sets the equations of the problem in `lane`.
+    /// Sets the equations of the problem in `lane`: the lower triangle of [A, b]ᵀ[A, b], row by row.
     pub(super) fn set(&mut self, lane: usize, equations: &[f64]) {
-        for (to, &value) in self.lower.iter_mut().zip(equations) {
-            to[lane] = value;
+        let mut equations = equations.iter();
+        for column in 0..self.width {
+            for (row, &value) in (0..=column).zip(&mut equations) {
+                if row + 1 < self.width {
+                    self.rows[row * self.width + column][lane] = value;
+                }
+            }
         }
     }
 
@@ -61,12 +64,6 @@ impl SideBySide {
     }
 }
 
-/// Start of a row of the packed triangle.
-#[inline(always)]
-fn begin(row: usize) -> usize {
-    row * (row + 1) / 2
-}
-
 /// A struct instead of a closure so that the body is inlined into the SIMD-dispatched function.
 struct Solving<'a>(&'a mut SideBySide);
 
@@ -75,63 +72,9 @@ impl WithSimd for Solving<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let SideBySide {
-            unknowns,
-            lower,
-            reciprocals,
-            solution,
-            min_left,
-        } = self.0;
-        let n = *unknowns;
-        // The remainder of the diagonal entry is compared with its original value.
-        for (i, diagonal) in solution.iter_mut().enumerate() {
-            *diagonal = lower[begin(i) + i];
-        }
-        *min_left = [f64::INFINITY; LANES];
-        for p in 0..n {
-            let pivot = lower[begin(p) + p];
-            let mut reciprocal = [0.0; LANES];
-            for lane in 0..LANES {
-                let left = pivot[lane] / solution[p][lane];
-                // Written so that NaN counts as the minimum.
-                min_left[lane] = if left >= min_left[lane] { min_left[lane] } else { left };
-                reciprocal[lane] = 1.0 / pivot[lane].sqrt();
-            }
-            reciprocals[p] = reciprocal;
-            for i in p + 1..=n {
-                let entry = &mut lower[begin(i) + p];
-                for lane in 0..LANES {
-                    entry[lane] *= reciprocal[lane];
-                }
-            }
-            for i in p + 1..=n {
-                let (before, row) = lower.split_at_mut(begin(i));
-                let own = row[p];
-                for j in p + 1..i {
-                    let other = &before[begin(j) + p];
-                    let entry = &mut row[j];
-                    for lane in 0..LANES {
-                        entry[lane] -= own[lane] * other[lane];
-                    }
-                }
-                let entry = &mut row[i];
-                for lane in 0..LANES {
-                    entry[lane] -= own[lane] * own[lane];
-                }
-            }
-        }
-        for p in (0..n).rev() {
-            let mut value = lower[begin(n) + p];
-            for i in p + 1..n {
-                let (entry, known) = (&lower[begin(i) + p], &solution[i]);
-                for lane in 0..LANES {
-                    value[lane] -= entry[lane] * known[lane];
-                }
-            }
-            for lane in 0..LANES {
-                solution[p][lane] = value[lane] * reciprocals[p][lane];
-            }
-        }
+        let Self(all) = self;
+        all.min_left = upper::factor(&mut all.rows, all.width, &mut all.scratch[0], 0.0);
+        upper::solve(&all.rows, all.width, &mut all.solution);
     }
 }
 
@@ -141,48 +84,10 @@ struct Inverting<'a>(&'a mut SideBySide);
 impl WithSimd for Inverting<'_> {
     type Output = [f64; LANES];
 
-    /// The squared norm of a row of A⁺ is the diagonal entry of (AᵀA)⁻¹ = L⁻ᵀ L⁻¹, hence that of a column of L⁻¹.
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
-        let SideBySide {
-            unknowns,
-            lower,
-            reciprocals,
-            solution: column,
-            ..
-        } = self.0;
-        let n = *unknowns;
-        let mut largest = [0.0; LANES];
-        for first in 0..n {
-            column[first] = reciprocals[first];
-            let mut squares = [0.0; LANES];
-            for lane in 0..LANES {
-                squares[lane] = column[first][lane] * column[first][lane];
-            }
-            for i in first + 1..n {
-                let mut value = [0.0; LANES];
-                for j in first..i {
-                    let entry = &lower[begin(i) + j];
-                    for lane in 0..LANES {
-                        value[lane] -= entry[lane] * column[j][lane];
-                    }
-                }
-                for lane in 0..LANES {
-                    value[lane] *= reciprocals[i][lane];
-                    squares[lane] += value[lane] * value[lane];
-                }
-                column[i] = value;
-            }
-            for lane in 0..LANES {
-                let is_larger = squares[lane] > largest[lane] || squares[lane].is_nan();
-                largest[lane] = if is_larger { squares[lane] } else { largest[lane] };
-            }
-        }
-        let mut norms = [0.0; LANES];
-        for lane in 0..LANES {
-            norms[lane] = largest[lane].sqrt();
-        }
-        norms
+        let [squares, column] = &mut self.0.scratch;
+        upper::largest_inverse_rows(&self.0.rows, self.0.width, squares, column)
     }
 }
 

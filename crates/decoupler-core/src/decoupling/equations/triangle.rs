@@ -1,3 +1,5 @@
+use super::upper;
+
 /// QR decomposition of a small least-squares problem: by the normal equations if they are well conditioned, otherwise by
 /// Householder reflections, which take four times as long (Golub and Van Loan, Matrix Computations, sections 5.2 and 5.3).
 /// Row by row, so that all columns are transformed at once in vector registers.
@@ -57,30 +59,14 @@ impl Triangle {
                 }
             }
         }
-        self.column.clear();
         for place in 0..unknowns {
-            let diagonal = &mut self.matrix[place * width + place];
-            *diagonal += root * root;
-            self.column.push(*diagonal);
+            self.matrix[place * width + place] += root * root;
         }
-        for pivot in 0..unknowns {
-            let (done, below) = self.matrix.split_at_mut((pivot + 1) * width);
-            let row = &mut done[pivot * width..];
-            // Written so that NaN and overflow are refused.
-            let is_well_conditioned = row[pivot] > MIN_LEFT * self.column[pivot];
-            if !is_well_conditioned {
-                return false;
-            }
-            let reciprocal = 1.0 / row[pivot].sqrt();
-            row[pivot..].iter_mut().for_each(|entry| *entry *= reciprocal);
-            for (place, products) in (pivot + 1..).zip(below.chunks_exact_mut(width)) {
-                let share = row[place];
-                for (product, entry) in products[place..].iter_mut().zip(&row[place..]) {
-                    *product -= share * entry;
-                }
-            }
-        }
-        true
+        self.column.clear();
+        self.column.resize(unknowns, 0.0);
+        let (rows, diagonal) = (self.matrix.as_chunks_mut::<1>().0, self.column.as_chunks_mut().0);
+        let [min_left] = upper::factor(rows, width, diagonal, MIN_LEFT);
+        min_left > MIN_LEFT
     }
 
     /// Zeroes the entries of column `pivot` below the diagonal.
@@ -131,46 +117,20 @@ impl Triangle {
     /// Solves R x = Qᵀb, which minimises `‖A x − b‖² + root² ‖x‖²`. Entries are not finite if the columns of A are
     /// linearly dependent.
     pub(super) fn solve(&self, solution: &mut Vec<f64>) {
-        let unknowns = self.width - 1;
         solution.clear();
-        solution.resize(unknowns, 0.0);
-        for unknown in (0..unknowns).rev() {
-            let row = self.row(unknown);
-            let known = row[unknown + 1..unknowns].iter().zip(&solution[unknown + 1..]);
-            let known: f64 = known.map(|(entry, value)| entry * value).sum();
-            solution[unknown] = (row[unknowns] - known) / row[unknown];
-        }
+        solution.resize(self.unknowns(), 0.0);
+        upper::solve::<1>(self.matrix.as_chunks().0, self.width, solution.as_chunks_mut().0);
     }
 
     /// Returns the largest norm of the first `count` rows of R⁻¹, which equals that of A⁺; infinite if the columns of A are
     /// linearly dependent.
     pub(super) fn largest_inverse_row(&mut self, count: usize) -> f64 {
-        let Self {
-            matrix,
-            width,
-            sums: squares,
-            column,
-        } = self;
-        let width = *width;
-        let row = |index: usize| &matrix[index * width..(index + 1) * width];
-        squares.clear();
-        squares.resize(count, 0.0);
-        for last in 0..width - 1 {
-            // R⁻¹ is upper triangular: its column `last` ends at the diagonal.
-            column.clear();
-            column.resize(last + 1, 0.0);
-            column[last] = 1.0 / row(last)[last];
-            for unknown in (0..last).rev() {
-                let known = row(unknown)[unknown + 1..=last].iter().zip(&column[unknown + 1..]);
-                let known: f64 = known.map(|(entry, value)| entry * value).sum();
-                column[unknown] = -known / row(unknown)[unknown];
-            }
-            for (square, value) in squares.iter_mut().zip(&*column) {
-                *square += value * value;
-            }
-        }
-        let norm = |square: &f64| if square.is_nan() { f64::INFINITY } else { square.sqrt() };
-        squares.iter().map(norm).fold(0.0, f64::max)
+        self.column.clear();
+        self.column.resize(self.width - 1, 0.0);
+        self.sums.clear();
+        self.sums.resize(count, 0.0);
+        let (squares, column) = (self.sums.as_chunks_mut().0, self.column.as_chunks_mut().0);
+        upper::largest_inverse_rows::<1>(self.matrix.as_chunks().0, self.width, squares, column)[0]
     }
 }
 
