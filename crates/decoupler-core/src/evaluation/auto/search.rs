@@ -132,6 +132,9 @@ struct Search<'a> {
     folds: Folds,
     budget_s: f64,
     memory: MemoryBudget,
+    /// `true` if even a small network has more weights than there are samples. Levenberg-Marquardt then fits noise within
+    /// an epoch or two, and its epochs are expensive.
+    is_wide: bool,
     /// Multiplications used so far.
     work: f64,
     tried: Vec<Tried>,
@@ -166,6 +169,7 @@ pub fn choose_settings(
         folds: folds(samples, base.seed)?,
         budget_s,
         memory,
+        is_wide: shape(samples.set, FIRST_HIDDEN).weights() > samples.set.samples(),
         work: 0.0,
         tried: Vec::new(),
         networks: Vec::new(),
@@ -338,18 +342,10 @@ impl Search<'_> {
         candidates.find(|candidate| suits(candidate)).cloned()
     }
 
-    /// Returns `true` if even a small network has more weights than there are samples. Levenberg-Marquardt then fits
-    /// noise within an epoch or two, and its epochs are expensive.
-    fn is_wide(&self) -> bool {
-        let set = self.samples.set;
-        shape(set, FIRST_HIDDEN).weights() > set.samples()
-    }
-
     fn first_hidden(&self) -> usize {
-        if self.is_wide() {
-            FIRST_HIDDEN_WIDE
-        } else {
-            FIRST_HIDDEN
+        match self.is_wide {
+            true => FIRST_HIDDEN_WIDE,
+            false => FIRST_HIDDEN,
         }
     }
 
@@ -395,7 +391,7 @@ impl Search<'_> {
             };
             // The plain readings are always tried, and many inputs are not multiplied unless that helps.
             let plain = plain_error.get_or_insert(error);
-            if number > 0 && self.is_wide() && error >= *plain {
+            if number > 0 && self.is_wide && error >= *plain {
                 continue;
             }
             let rank = if number == 0 { -1.0 } else { error };
@@ -413,10 +409,9 @@ impl Search<'_> {
     fn first_candidates(&self, mut memory: Memory, inputs: InputChoice) -> Vec<Candidate> {
         // To ridge regression, averages and their differences from the readings are the same; not to a network.
         memory.differences |= self.fixed.memory.is_none() && !memory.is_empty() && inputs.quantity == Quantity::Raw;
-        let is_wide = self.is_wide();
         // A regression on many averages that overlap may be worse to begin with than random weights, and one on
         // nearly as many inputs as samples is.
-        let begins: &[Initialization] = match (is_wide, memory.is_empty()) {
+        let begins: &[Initialization] = match (self.is_wide, memory.is_empty()) {
             (true, _) => &[Initialization::Random],
             (false, true) => &[Initialization::Ridge],
             (false, false) => &[Initialization::Ridge, Initialization::Random],
@@ -427,7 +422,7 @@ impl Search<'_> {
             starts: self.fixed.starts.unwrap_or(SCREENED).min(SCREENED),
             ..self.base
         };
-        settings.training.method = self.fixed.method.unwrap_or(if is_wide {
+        settings.training.method = self.fixed.method.unwrap_or(if self.is_wide {
             self.decaying(DECAYS[0])
         } else {
             Method::LevenbergMarquardt(DAMPING)
@@ -501,7 +496,7 @@ impl Search<'_> {
             variants.push(best.with(|settings| settings.inputs.scaling = ScalingChoice::Whitening));
         }
         if self.fixed.method.is_none() {
-            let methods = if self.is_wide() {
+            let methods = if self.is_wide {
                 DECAYS[1..].iter().map(|&decay| self.decaying(decay)).collect()
             } else {
                 vec![regularized(0.0)]
