@@ -259,6 +259,7 @@ impl TargetSurface {
 
 #[cfg(test)]
 mod tests {
+    use decoupler_core::dataset::{Dataset, SplitBy};
     use ndarray::array;
 
     use super::*;
@@ -270,7 +271,8 @@ mod tests {
         let decoded = Array2::from_shape_fn((400, 1), |(sample, _)| {
             actual[[sample, 0]] + if rises(sample) { -0.1 } else { 0.1 }
         });
-        let found = HysteresisLoop::measure(actual.view(), decoded.view(), &[0; 400])
+        let test = Dataset::new(actual.clone(), actual, None, (0..400).collect()).unwrap();
+        let found = HysteresisLoop::of_test(&test, decoded.view(), SplitBy::Time)
             .remove(0)
             .unwrap();
         let force = Channel::new("force", Some("N"));
