@@ -1,9 +1,9 @@
 use std::collections::BTreeMap;
 
 use super::{
-    CalibratedParameter, CalibrationError, CalibrationWarning, ParameterStatus, PressLimits, PressedRow,
-    SensorParameter,
+    CalibratedParameter, CalibrationError, ParameterStatus, PressLimits, PressedRow, SensorParameter,
     equations::{COUNT, Problem, Slopes, restricted},
+    warning::warnings,
 };
 use crate::{
     numerics::{Linearised, Spectrum, two_sided_normal_quantile},
@@ -24,7 +24,7 @@ pub struct Calibration {
     /// Root mean square of the relative errors of the fitted model's resistances.
     pub residual: f64,
     /// Warnings that the readings do not fit the sensor model, with likely causes and remedies.
-    pub warnings: Vec<CalibrationWarning>,
+    pub warnings: Vec<String>,
 }
 
 impl Calibration {
@@ -106,7 +106,7 @@ impl Calibration {
             }));
             let rms = |squares: f64| (squares / readings as f64).sqrt();
             return Ok(Self {
-                warnings: CalibrationWarning::of(&problem, &model, &parameters),
+                warnings: warnings(&problem, &model, &parameters),
                 model,
                 parameters,
                 readings,

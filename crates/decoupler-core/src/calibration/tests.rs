@@ -208,7 +208,7 @@ fn few_frames_and_frames_at_rest_converge_within_the_intervals() {
             let calibration =
                 Calibration::fit(&nominal, &samples).unwrap_or_else(|error| panic!("{scale}, seed {seed}: {error}"));
             assert!(calibration.residual < 1.6 * noise, "{scale}: {}", calibration.residual);
-            assert_eq!(calibration.warnings, [], "{scale}, seed {seed}");
+            assert!(calibration.warnings.is_empty(), "{scale}, seed {seed}");
             within += usize::from(at_rest || intervals_hold(&calibration, &real));
             all += 1;
         }
@@ -223,18 +223,19 @@ fn a_wrong_sensor_gives_a_warning() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let samples = frames(&of_scale("4x3_2x8"), &[0, 1, 2, 3], 30, 1e-3, &mut rng);
     let calibration = Calibration::fit(&of_scale("4x3_3x8"), &samples).unwrap();
-    let words = calibration.warnings[0].to_string();
+    let words = &calibration.warnings[0];
     assert!(
         words.contains("resistance per millimetre: 15") && words.contains("check the array scale"),
         "{words}"
     );
-    assert_eq!(Calibration::fit(&of_scale("4x3_2x8"), &samples).unwrap().warnings, []);
+    let calibration = Calibration::fit(&of_scale("4x3_2x8"), &samples).unwrap();
+    assert!(calibration.warnings.is_empty());
     let mut swapped = samples;
     for sample in &mut swapped {
         sample.resistances_ohm.swap(0, 3);
     }
     let warnings = Calibration::fit(&of_scale("4x3_2x8"), &swapped).unwrap().warnings;
-    let is_misfit = |warning: &CalibrationWarning| matches!(warning, CalibrationWarning::Misfit { .. });
+    let is_misfit = |warning: &String| warning.starts_with("the readings of a crossing are off by ");
     assert!(warnings.iter().any(is_misfit), "{warnings:?}");
 }
 
