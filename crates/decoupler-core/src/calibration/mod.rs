@@ -13,7 +13,7 @@ mod warning;
 
 pub use fit::Calibration;
 pub use limits::PressLimits;
-pub use parameter::{CalibratedParameter, ParameterStatus, SensorParameter};
+pub use parameter::{CalibratedParameter, SensorParameter};
 
 use thiserror::Error;
 

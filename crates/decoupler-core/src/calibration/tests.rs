@@ -58,9 +58,9 @@ fn frames(real: &SensorModel, rows: &[usize], frames: usize, noise: f64, rng: &m
 /// Returns `true` if every interval contains the true value.
 fn intervals_hold(calibration: &Calibration, real: &SensorModel) -> bool {
     let mut parameters = calibration.parameters.iter();
-    parameters.all(|fitted| match fitted.standing {
-        ParameterStatus::Determined(half_width) => (fitted.value - fitted.parameter.of(real)).abs() <= half_width,
-        ParameterStatus::Nominal => fitted.value == fitted.nominal,
+    parameters.all(|fitted| match fitted.half_width {
+        Some(half_width) => (fitted.value - fitted.parameter.of(real)).abs() <= half_width,
+        None => fitted.value == fitted.nominal,
     })
 }
 
@@ -68,7 +68,7 @@ fn determined(calibration: &Calibration) -> Vec<SensorParameter> {
     let determined = calibration
         .parameters
         .iter()
-        .filter(|fitted| fitted.standing != ParameterStatus::Nominal);
+        .filter(|fitted| fitted.half_width.is_some());
     determined.map(|fitted| fitted.parameter).collect()
 }
 
@@ -88,7 +88,7 @@ fn a_sensor_off_by_5_percent_is_recovered_within_the_stated_intervals() {
             SensorParameter::ColumnNodeX,
         ] {
             let fitted = calibration.parameter(parameter);
-            assert!(fitted.standing != ParameterStatus::Nominal, "seed {seed}: {fitted}");
+            assert!(fitted.half_width.is_some(), "seed {seed}: {fitted}");
         }
         assert!(
             (calibration.residual / 1e-3 - 1.0).abs() < 0.1,
@@ -168,10 +168,8 @@ fn intervals_allow_for_deviating_wires() {
                 .for_each(|(ohm, factor)| *ohm *= factor);
         }
         let calibration = Calibration::fit(&nominal(), &samples).unwrap();
-        match calibration.parameter(SensorParameter::Height).standing {
-            ParameterStatus::Determined(half_width) => half_width / calibration.residual,
-            ParameterStatus::Nominal => f64::INFINITY,
-        }
+        let half_width = calibration.parameter(SensorParameter::Height).half_width;
+        half_width.map_or(f64::INFINITY, |half_width| half_width / calibration.residual)
     };
     let (wide, narrow) = (half_width(0.01), half_width(0.0));
     assert!(wide > 2.0 * narrow, "{wide} and {narrow} of the residual");

@@ -1,13 +1,11 @@
 use std::collections::BTreeMap;
 
-use super::{CalibratedParameter, Calibration, ParameterStatus, equations::Problem};
+use super::{CalibratedParameter, Calibration, equations::Problem};
 use crate::sensor::SensorModel;
 
 /// Warnings that the readings do not fit the sensor model, with what to check.
 pub(super) fn warnings(problem: &Problem<'_>, model: &SensorModel, parameters: &[CalibratedParameter]) -> Vec<String> {
-    let fitted = parameters
-        .iter()
-        .filter(|fitted| fitted.standing != ParameterStatus::Nominal);
+    let fitted = parameters.iter().filter(|fitted| fitted.half_width.is_some());
     let warnings = [
         far_from_nominal(problem, parameters),
         misfit(problem, model, fitted.count()),
@@ -24,7 +22,7 @@ fn far_from_nominal(problem: &Problem<'_>, parameters: &[CalibratedParameter]) -
         let deviation = 0.5 * Calibration::NOMINAL_TOLERANCE * reference;
         let apart = (fitted.value - fitted.nominal).abs();
         // The part of the difference beyond the interval.
-        if let ParameterStatus::Determined(half_width) = fitted.standing
+        if let Some(half_width) = fitted.half_width
             && apart - half_width > FAR * deviation
         {
             largest = largest.max(apart / deviation);

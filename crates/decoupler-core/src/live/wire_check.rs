@@ -82,6 +82,8 @@ pub struct WireCheck {
     /// Logarithm of the reading above which the converter clips.
     log_full_scale: f64,
     coordinates_mm: Vec<f64>,
+    /// Columns of the latest residual.
+    used: Vec<usize>,
     /// Last event; [`FaultEvent::Recovered`] at first.
     state: FaultEvent,
     /// Consecutive suspicious frames, each rows × M4.
@@ -180,6 +182,7 @@ impl WireCheck {
             log_full_scale: (noise.range_ohm(model)?.1 * (1.0 - 1e-9)).ln(),
             suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * decoder.half_way_ohm.len()),
             coordinates_mm: vec![0.0; model.scale.coordinates_per_row()],
+            used: Vec::with_capacity(model.scale.columns()),
             state: FaultEvent::Recovered,
             suspicious: 0,
             next_comparison: Self::PERSISTENCE,
@@ -270,22 +273,6 @@ impl WireCheck {
         self.decoder.predicted_ohm.len()
     }
 
-    /// Column, ln m − ln R and its variance of every reading m that is neither missing nor clipped with R, which is certain.
-    fn misfits(
-        &self,
-        row_index: usize,
-        readings_ohm: &[f64],
-        missing: &Range<usize>,
-    ) -> impl Iterator<Item = (usize, f64, f64)> {
-        let deviations = &self.deviations[row_index * readings_ohm.len()..];
-        let present = (0..readings_ohm.len()).filter(|column| !missing.contains(column));
-        present.filter_map(|column| {
-            let logs = [readings_ohm[column], self.decoder.predicted_ohm[column]].map(f64::ln);
-            let is_used = logs.iter().any(|log| *log < self.log_full_scale);
-            is_used.then_some((column, logs[0] - logs[1], deviations[column] * deviations[column]))
-        })
-    }
-
     /// Decodes a row, and returns its χ² with the most probable logarithm of its gain. The score is not set.
     fn residual(&mut self, row_index: usize, readings_ohm: &[f64], missing: &Range<usize>) -> (Fit, f64) {
         let decoded = (self.decoder).decode_without(missing, row_index, readings_ohm, &mut self.coordinates_mm);
@@ -297,19 +284,31 @@ impl WireCheck {
             fit.chi_squared = f64::INFINITY;
             return (fit, 0.0);
         }
+        self.used.clear();
         let (mut sum, mut weights) = (0.0, 0.0);
-        for (_, misfit, variance) in self.misfits(row_index, readings_ohm, missing) {
-            fit.chi_squared += misfit * misfit / variance;
-            sum += misfit / variance;
-            weights += 1.0 / variance;
-            fit.readings += 1;
+        for column in (0..readings_ohm.len()).filter(|column| !missing.contains(column)) {
+            let logs = [readings_ohm[column], self.decoder.predicted_ohm[column]].map(f64::ln);
+            let (misfit, variance) = (logs[0] - logs[1], self.variance(row_index, column));
+            // Where both are clipped, the reading is certain.
+            if logs.iter().any(|log| *log < self.log_full_scale) {
+                fit.chi_squared += misfit * misfit / variance;
+                sum += misfit / variance;
+                weights += 1.0 / variance;
+                self.used.push(column);
+            }
         }
+        fit.readings = self.used.len();
         if self.common == 0.0 {
             return (fit, 0.0);
         }
         let log_gain = sum / (weights + self.common.powi(-2));
         fit.chi_squared -= sum * log_gain;
         (fit, log_gain)
+    }
+
+    /// Variance of the noise of ln m.
+    fn variance(&self, row_index: usize, column: usize) -> f64 {
+        self.deviations[row_index * self.columns() + column].powi(2)
     }
 
     /// Decodes a row without the missing readings, and predicts these.
@@ -339,8 +338,8 @@ impl WireCheck {
             })
         };
         let mut precision = Mat::<f64>::identity(moving + 1, moving + 1);
-        for (column, _, noise) in self.misfits(row_index, readings_ohm, missing) {
-            let slopes = slopes(column);
+        for &column in &self.used {
+            let (noise, slopes) = (self.variance(row_index, column), slopes(column));
             precision += faer::Scale(1.0 / noise) * &slopes * slopes.transpose();
             fit.score += (TAU * noise).ln();
         }
@@ -350,10 +349,7 @@ impl WireCheck {
             .flat_map(|factor| factor.L().diagonal().column_vector().iter());
         fit.score += fit.chi_squared + 2.0 * diagonal.map(|entry| entry.ln()).sum::<f64>();
         let predicted = missing.clone().map(|column| {
-            let (noise, slopes) = (
-                self.deviations[row_index * readings_ohm.len() + column].powi(2),
-                slopes(column),
-            );
+            let (noise, slopes) = (self.variance(row_index, column), slopes(column));
             let solved = factor.as_ref().map(|factor| slopes.transpose() * factor.solve(&slopes));
             Predicted {
                 log_reading: readings_ohm[column].ln(),

@@ -76,18 +76,14 @@ impl FromStr for Fault {
             "short-columns" => {
                 let (first, second) = rest.split_once('-').ok_or_else(unknown)?;
                 let (column, next) = (number(first)?, number(second)?);
-                if next == column + 1 {
-                    Ok(Self::ShortedColumns { column })
-                } else {
-                    Err(unknown())
-                }
+                let short = (next == column + 1).then_some(Self::ShortedColumns { column });
+                short.ok_or_else(unknown)
             }
             "gain" => {
                 let (column, relative) = value()?;
                 let relative: f64 = relative.parse().map_err(|_| unknown())?;
                 if relative > -1.0 && relative <= 10.0 && relative != 0.0 {
-                    let column = number(column)?;
-                    Ok(Self::Gain { column, relative })
+                    number(column).map(|column| Self::Gain { column, relative })
                 } else {
                     Err(SceneError::GainRange(relative))
                 }
@@ -99,8 +95,7 @@ impl FromStr for Fault {
                     "high" => ConverterEnd::High,
                     _ => return Err(unknown()),
                 };
-                let column = number(column)?;
-                Ok(Self::Stuck { column, end })
+                number(column).map(|column| Self::Stuck { column, end })
             }
             _ => Err(unknown()),
         }

@@ -138,7 +138,11 @@ impl Scene {
         if !(self.largest_compression > 0.0 && self.largest_compression < 1.0) {
             return Err(SceneError::Compression(self.largest_compression));
         }
-        self.movement.check()?;
+        if let Movement::Xyz { largest_shift_mm } = self.movement
+            && !(largest_shift_mm > 0.0 && largest_shift_mm.is_finite())
+        {
+            return Err(SceneError::Shift(largest_shift_mm));
+        }
         self.loading.check()?;
         self.noise.check()
     }
@@ -250,15 +254,6 @@ impl Movement {
         match self {
             Self::Z => 0.0,
             Self::Xyz { largest_shift_mm } => largest_shift_mm,
-        }
-    }
-
-    pub(super) fn check(self) -> Result<(), SceneError> {
-        match self {
-            Self::Xyz {
-                largest_shift_mm: shift,
-            } if !(shift > 0.0 && shift.is_finite()) => Err(SceneError::Shift(shift)),
-            _ => Ok(()),
         }
     }
 }

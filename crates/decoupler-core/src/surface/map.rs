@@ -60,8 +60,11 @@ pub struct SurfaceMap {
     pub(super) lattice: Option<[SortedAxis; 2]>,
 }
 
-/// Maps in use, each with its coordinates x and y; of few lattices at a time.
-static SHARED: Mutex<Vec<([Vec<f64>; 2], Weak<SurfaceMap>)>> = Mutex::new(Vec::new());
+/// A map in use, with its coordinates x and y.
+type Shared = ([Vec<f64>; 2], Weak<SurfaceMap>);
+
+/// Maps in use; of few lattices at a time.
+static SHARED: Mutex<Vec<Shared>> = Mutex::new(Vec::new());
 
 impl SurfaceMap {
     /// Returns the map of a lattice that is already in use, or prepares it as [`Self::new`] does: it takes 9 MB for an array
