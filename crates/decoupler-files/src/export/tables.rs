@@ -299,7 +299,7 @@ pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
         count => format!("{count} targets have positions"),
     };
     Some(match TargetPosition::lattice(positions) {
-        Some(lattice) => format!("{count}: a grid of {} × {}", lattice.x_mm().len(), lattice.y_mm().len()),
+        Some(lattice) => format!("{count}: a grid of {} × {}", lattice.x_mm.len(), lattice.y_mm.len()),
         None => format!("{count}, scattered over the skin"),
     })
 }

@@ -185,8 +185,8 @@ impl TargetSurface {
         let first = positions.first().and_then(|first| targets.get(first.target));
         let (map, nodes) = match TargetPosition::lattice(positions) {
             Some(lattice) => (
-                SurfaceMap::shared(lattice.x_mm(), lattice.y_mm())?,
-                lattice.places().iter().map(|&place| positions[place]).collect(),
+                SurfaceMap::shared(&lattice.x_mm, &lattice.y_mm)?,
+                lattice.places.iter().map(|&place| positions[place]).collect(),
             ),
             None => (
                 Arc::new(SurfaceMap::scattered(&TargetPosition::places_mm(positions))?),
