@@ -68,24 +68,12 @@ pub struct Effort {
 }
 
 impl CrossValidation {
-    /// Runs repeat `repeat` (from 0) of the cross-validation on `set`; each repeat has its own seed, derived from that
-    /// of `settings`.
+    /// Runs repeat `repeat` (from 0) of the cross-validation: trains on folds of `set` and tests on the same samples of
+    /// `tested`, whose readings may have other noise. Each repeat has its own seed, derived from that of `settings`.
     ///
     /// # Errors
     /// If the folds cannot be filled, the settings are invalid, or the job is cancelled.
     pub fn run(
-        &self,
-        settings: &RunSettings,
-        set: &Dataset,
-        repeat: usize,
-        job: &Job<'_>,
-    ) -> Result<CrossValidated, RunError> {
-        self.run_with_tested(settings, (set, set), repeat, job)
-    }
-
-    /// As [`Self::run`], on folds of `set`, tested on the same samples of `tested`, whose readings may have other
-    /// noise.
-    pub(super) fn run_with_tested(
         &self,
         settings: &RunSettings,
         (set, tested): (&Dataset, &Dataset),
@@ -156,7 +144,12 @@ impl CrossValidated {
     /// # Panics
     /// If the set has a different shape.
     pub fn scores(&self, set: &Dataset) -> Scores {
-        let errors = |answers: &Array2<f64>| TestErrors::of_targets(set, answers.view());
+        self.scores_of(&Problem::unnamed(set.channels(), set.outputs()), set)
+    }
+
+    /// As [`Self::scores`], for a set that `problem` describes.
+    pub(super) fn scores_of(&self, problem: &Problem, set: &Dataset) -> Scores {
+        let errors = |answers| TestErrors::measure(problem, set, answers);
         Scores {
             network: errors(&self.network),
             baselines: Baselines {

@@ -1,5 +1,6 @@
 use std::{
     fmt,
+    ops::RangeInclusive,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -9,12 +10,13 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::{
-    Baselines, Combination, CountError, Coverage, Intervals, RunSettings, Scores, StartRecord, StartTrainer,
-    TestErrors, starts::lowest,
+    Baselines, Combination, Coverage, Intervals, RunSettings, Scores, StartRecord, StartTrainer, TestErrors,
+    starts::lowest,
 };
 use crate::{
     dataset::{Dataset, DatasetError, PerRow, SimulationError, SplitBy},
     decoupling::{DecodeError, FitError},
+    identifiability::IdentifiabilityError,
     job::{Cancelled, Job},
     machine::MemoryBudget,
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, NetworkError, Networks},
@@ -323,13 +325,20 @@ impl fmt::Display for RunDefect {
     }
 }
 
-/// Error in preparing a run.
+/// Error in preparing a run, an experiment of many runs, or the analysis of a scene.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum RunError {
     /// A number is out of range.
-    #[error(transparent)]
-    Count(#[from] CountError),
+    #[error("{what}: {count} is not possible, give from {} to {}", .allowed.start(), .allowed.end())]
+    Count {
+        /// Name of the setting.
+        what: &'static str,
+        /// Given number.
+        count: usize,
+        /// Allowed range.
+        allowed: RangeInclusive<usize>,
+    },
     /// There are more samples than a run can hold.
     #[error(
         "{training} training and {validation} validation samples, held together as whole snapshots of {rows} rows, are \
@@ -444,4 +453,51 @@ pub enum RunError {
         /// Number of trainings expected.
         expected: usize,
     },
+    /// An axis of an experiment has no values.
+    #[error("there are no values for {0}: give at least one")]
+    NoValues(&'static str),
+    /// Both axes of an experiment vary the same setting.
+    #[error("both axes vary {0}: choose two different ones")]
+    SameAxes(&'static str),
+    /// Runs on this source do not have the setting that an axis varies.
+    #[error("{of} have no setting '{axis}': vary another one")]
+    NoSetting {
+        /// Name of the setting.
+        axis: &'static str,
+        /// Source of the samples.
+        of: &'static str,
+    },
+    /// The settings of an experiment are those of another source than the samples.
+    #[error("settings and samples have different sources: one is simulated, the other recorded")]
+    OtherSamples,
+    /// A recording without groups is divided by group.
+    #[error("split group: the recording has no column of groups; choose one, or omit this split")]
+    NoGroups,
+    /// An experiment cross-validates a recording.
+    #[error("a recording is divided again for each seed: give seeds instead of a cross-validation")]
+    CrossValidation,
+    /// An experiment has too many trainings.
+    #[error("{trainings} trainings: give fewer values, seeds or repeats, so that there are at most {max}")]
+    TooManyTrainings {
+        /// Number of trainings.
+        trainings: usize,
+        /// Maximum number of trainings.
+        max: usize,
+    },
+    /// The operating system provides no threads.
+    #[error("cannot start worker threads: {0}")]
+    Threads(String),
+    /// A scene cannot be analysed.
+    #[error(transparent)]
+    Identifiability(#[from] IdentifiabilityError),
+}
+
+impl RunError {
+    /// Checks that a number is in its range.
+    pub(super) fn check_count(what: &'static str, count: usize, allowed: RangeInclusive<usize>) -> Result<(), Self> {
+        if allowed.contains(&count) {
+            return Ok(());
+        }
+        Err(Self::Count { what, count, allowed })
+    }
 }

@@ -77,7 +77,7 @@ const MODEL_BASED: &str = "model-based";
 const ALL_TARGETS: &str = "all targets";
 
 impl ErrorMeasure {
-    const OF_NODES: [Self; 6] = [
+    pub(super) const OF_NODES: [Self; 6] = [
         Self::ZPercent,
         Self::XPercent,
         Self::YPercent,
@@ -94,7 +94,7 @@ impl ErrorMeasure {
         Self::HalfWidth,
         Self::CoveragePercent,
     ];
-    const OF_TARGETS: &[Self] = Self::OF_TARGETS_WITH_INTERVALS.split_at(5).0;
+    pub(super) const OF_TARGETS: &[Self] = Self::OF_TARGETS_WITH_INTERVALS.split_at(5).0;
 
     /// Name in files, such as `z_percent`.
     pub fn field(self) -> &'static str {
@@ -169,7 +169,7 @@ impl ErrorMeasure {
         self.of(Figures::Target(errors))
     }
 
-    fn of(self, figures: Figures<'_>) -> Option<f64> {
+    pub(super) fn of(self, figures: Figures<'_>) -> Option<f64> {
         match (self, figures) {
             (Self::ZPercent, Figures::Nodes(errors)) => errors.z_percent,
             (Self::XPercent, Figures::Nodes(errors)) => errors.x_percent,
@@ -194,7 +194,7 @@ impl ErrorMeasure {
 
 /// Figures in which a measure is looked up.
 #[derive(Clone, Copy)]
-enum Figures<'a> {
+pub(super) enum Figures<'a> {
     Nodes(&'a Errors),
     Published(&'a PublishedErrors),
     Target(&'a TargetErrors),

@@ -3,7 +3,7 @@
 use decoupler_core::{
     dataset::Dataset,
     decoupling::{DecoderKind, Precision, decode_set},
-    evaluation::{DecoderReport, DecoderSet, Outlook, Run, RunDefect, RunSets, RunSettings},
+    evaluation::{DecoderReport, DecoderSet, Outlook, Run, RunDefect, RunSets, RunSettings, TestErrors},
     machine::MemoryBudget,
     ndarray::Array2,
     scene::{Loading, Rows},
@@ -134,7 +134,7 @@ fn judge_decoder(seen: &Measured, settings: &RunSettings, kind: DecoderKind, pre
 fn judge_model_based(seen: &Measured, settings: &RunSettings) -> Verdict {
     let scene = settings.simulation().unwrap().scene;
     let baselines = seen.run.baselines().expect("they are measured");
-    let Some(found) = baselines.nodes().and_then(|baselines| baselines.model_based) else {
+    let Some(found) = baselines.model_based.as_ref().and_then(TestErrors::nodes) else {
         let note = baselines.model_based_note();
         return note.map_or_else(
             || wrong("there is no model-based row, and no reason"),
@@ -145,7 +145,7 @@ fn judge_model_based(seen: &Measured, settings: &RunSettings) -> Verdict {
         .set
         .measure(DecoderKind::Newton, Precision::Double, seen.run.test());
     let newton = report.ok().flatten().and_then(|report| report.errors.nodes().copied());
-    if newton != Some(found) {
+    if newton.as_ref() != Some(found) {
         return wrong(format!("the model-based errors are {found:?}, not {newton:?}"));
     }
     // Every node's depth is uniform, so the mean absolute error without readings is a quarter of the stroke.

@@ -7,8 +7,8 @@ use std::time::Duration;
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
-        Baselines, Combination, ErrorTable, Errors, Initialization, NodeAddress, Outlook, Scores, Spread, StartRecord,
-        TestErrors, auto::Tried, best_start, error_remarks,
+        Combination, ErrorTable, Errors, Initialization, NodeAddress, Outlook, Scores, Spread, StartRecord, TestErrors,
+        auto::Tried, best_start, error_remarks,
     },
     identifiability::Identifiability,
     problem::Problem,
@@ -183,9 +183,9 @@ const NETWORK: &str = "network";
 fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
     let Some(reason) = run.stop_reason else { return };
     ui.add_space(space(2));
-    match (result.errors.nodes(), run.baselines.nodes()) {
-        (Some(errors), Some(baselines)) => {
-            verdict_on_nodes_ui(ui, (run, result, reason), errors, &baselines);
+    match (result.errors.nodes(), run.baselines.linear.nodes()) {
+        (Some(errors), Some(linear)) => {
+            verdict_on_nodes_ui(ui, (run, result, reason), errors, linear);
         }
         _ => verdict_on_targets_ui(ui, run, result),
     }
@@ -223,7 +223,7 @@ fn verdict_on_nodes_ui(
     ui: &mut Ui,
     (run, result, reason): (&RunView, &RunResult, StopReason),
     errors: &Errors,
-    baselines: &Baselines<Errors>,
+    linear: &Errors,
 ) {
     let settings = run.settings();
     let remarks = error_remarks(settings, &run.scores(result), Some(reason));
@@ -232,7 +232,7 @@ fn verdict_on_nodes_ui(
         Some(defect.to_string())
     } else if let Some((row, remark)) = of_network {
         Some(format!("{row}: {remark}"))
-    } else if errors.z_mm > baselines.linear.z_mm {
+    } else if errors.z_mm > linear.z_mm {
         let remedy = reason.remedy(&settings.training.method);
         Some(format!(
             "a linear map of the resistances is better on z than this network: {remedy}"
@@ -243,8 +243,9 @@ fn verdict_on_nodes_ui(
     if let Some(fault) = fault {
         note_ui(ui, &sentence(&capitalised(&fault)));
     } else if errors.z_mm > 0.0 {
-        let times = format_number(baselines.linear.z_mm / errors.z_mm);
-        let ratio = baselines.model_based.and_then(|model_based| errors.times(&model_based));
+        let times = format_number(linear.z_mm / errors.z_mm);
+        let model_based = run.baselines.model_based.as_ref().and_then(TestErrors::nodes);
+        let ratio = model_based.and_then(|model_based| errors.times(model_based));
         let text = match ratio.map(format_number) {
             None => format!("On z {times} times as accurate as the linear map."),
             Some(ratio) => {
