@@ -316,7 +316,7 @@ impl<'a> Trained<'a> {
             .chain(describe_samples(self.sets))
             .chain(search(self.file).and_then(AutoRecord::remark))
             .chain(self.optimism.iter().cloned())
-            .chain(self.run.defect().map(|defect| defect.to_string()))
+            .chain(self.run.defect())
             .chain(describe_determinacy(&self.file.problem.targets, determined))
             .chain(describe_worse_than_ridge(problem, scores))
             .chain(describe_coverage(&problem.targets, &scores.coverage))

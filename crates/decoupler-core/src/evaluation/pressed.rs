@@ -8,8 +8,8 @@ use ndarray::Array2;
 
 use super::{RunError, run_sets::check_networks};
 use crate::{
-    calibration::{PressLimits, PressedRow},
-    dataset::{Dataset, PerRow, Simulation, Split},
+    calibration::PressedRow,
+    dataset::{Dataset, PerRow, Split},
     decoupling::{DecodeError, Decoder},
     job::Job,
     machine::{MemoryBudget, node_pairs_per_row},
@@ -166,61 +166,27 @@ impl PressedAnswer {
 /// # Panics
 /// If there are not 3·M2 targets, or the array lacks a row-wire.
 pub fn pressed_rows(set: &Dataset, sensor: &SensorModel) -> Result<Vec<PressedRow>, RunError> {
+    assert_eq!(
+        set.outputs(),
+        sensor.scale.coordinates_per_row(),
+        "targets are coordinates of the row's nodes"
+    );
     let pressed = |sample: usize| {
         let row = set.row_wire(sample).ok_or(RunError::NoRowWires)?;
+        let position = |(node, mm): (usize, &[f64])| sensor.displacement_mm(row, node, DVec3::from_slice(mm));
         Ok(PressedRow {
             frame: set.groups()[sample],
             row,
-            displacements_mm: displacements_mm(set, sample, row, sensor),
+            displacements_mm: set
+                .sample_targets(sample)
+                .chunks_exact(3)
+                .enumerate()
+                .map(position)
+                .collect(),
             resistances_ohm: set.sample_readings(sample).to_vec(),
         })
     };
     (0..set.samples()).map(pressed).collect()
-}
-
-/// Returns `set` with its targets converted from model `from` to model `to` of the sensor. Targets are coordinates in
-/// millimetres; displacements stay the same, and rest positions change. A network trained on one model can thus be
-/// tested or trained on samples described by another.
-///
-/// # Errors
-/// If the samples have no row-wires.
-///
-/// # Panics
-/// If there are not 3·M2 targets, or one of the arrays lacks a row-wire.
-pub fn rebased(set: &Dataset, from: &SensorModel, to: &SensorModel) -> Result<Dataset, RunError> {
-    let rows = (0..set.samples()).map(|sample| set.row_wire(sample));
-    let rows: Vec<usize> = rows.collect::<Option<_>>().ok_or(RunError::NoRowWires)?;
-    let mut targets = Array2::zeros(set.targets().dim());
-    for (sample, (&row, mut moved)) in rows.iter().zip(targets.rows_mut()).enumerate() {
-        let displacements = displacements_mm(set, sample, row, from).into_iter().enumerate();
-        let coordinates =
-            displacements.flat_map(|(node, displacement)| to.displaced_mm(row, node, displacement).to_array());
-        moved.iter_mut().zip(coordinates).for_each(|(to, value)| *to = value);
-    }
-    let read = set.row_wires_read().unwrap_or_default();
-    let moved = Dataset::new(set.readings().to_owned(), targets, Some(&rows), set.groups().to_vec());
-    let moved = moved.and_then(|moved| moved.among_rows(read));
-    Ok(moved.expect("the parts are those of a set"))
-}
-
-fn displacements_mm(set: &Dataset, sample: usize, row: usize, sensor: &SensorModel) -> Vec<DVec3> {
-    let targets = set.sample_targets(sample);
-    assert_eq!(
-        targets.len(),
-        sensor.scale.coordinates_per_row(),
-        "targets are coordinates of the row's nodes"
-    );
-    let position = |(node, mm): (usize, &[f64])| sensor.displacement_mm(row, node, DVec3::from_slice(mm));
-    targets.chunks_exact(3).enumerate().map(position).collect()
-}
-
-/// Returns the range of displacements for which a network of this simulated scene is trained. Samples outside are not
-/// presses, or require answers that the network was not trained for.
-pub fn press_limits(simulation: &Simulation) -> PressLimits {
-    PressLimits {
-        largest_depth_mm: simulation.stroke_mm(),
-        largest_shift_mm: simulation.scene.movement.largest_shift_mm(),
-    }
 }
 
 /// Continues the training of `networks` on other samples, such as frames of the real sensor after training on its

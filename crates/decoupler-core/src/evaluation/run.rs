@@ -1,5 +1,4 @@
 use std::{
-    fmt,
     ops::RangeInclusive,
     sync::Arc,
     time::{Duration, Instant},
@@ -24,7 +23,8 @@ use crate::{
     scene::SceneError,
     sensor::SensorError,
     training::{
-        Method, SettingError, StopReason, StoppingRules, TrainerState, TrainingDefect, TrainingError, check_width,
+        Method, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingDefect, TrainingError,
+        check_width,
     },
 };
 
@@ -100,7 +100,7 @@ impl Run {
 
     /// Stops every start at the user's request.
     pub fn stop(&mut self) {
-        self.starts.iter_mut().for_each(StartTrainer::stop);
+        self.trainers_mut().for_each(Trainer::stop);
     }
 
     /// Returns the reason for stopping once every start has ended: the leader's, or [`StopReason::Stopped`] if the
@@ -114,12 +114,12 @@ impl Run {
         self.leader().stop_reason()
     }
 
-    /// Returns the defect of the leader, or of the first start with one if their mean is kept, once the trainings have
-    /// ended; `None` if there is none.
-    pub fn defect(&self) -> Option<RunDefect> {
+    /// Describes the defect of the leader, or of the first start with one if their mean is kept, once the trainings have
+    /// ended: some failed or diverged. The text includes the remedy; `None` if there is no defect.
+    pub fn defect(&self) -> Option<String> {
         match self.settings.combine {
-            Combination::Best => RunDefect::of(self.leader()),
-            Combination::Mean => self.starts.iter().find_map(RunDefect::of),
+            Combination::Best => defect_of(self.leader()),
+            Combination::Mean => self.starts.iter().find_map(defect_of),
         }
     }
 
@@ -133,10 +133,9 @@ impl Run {
         let trainings = rows.len() * self.starts.len();
         let samples = rows[0].samples();
         check_width(&method, rows[0].present().shape(), samples, trainings, self.memory)?;
-        // Starts have the same shapes, so either the first is rejected or none.
-        for start in &mut self.starts {
-            start.continue_with(method)?;
-        }
+        // They have the same shapes, so either the first is rejected or none.
+        self.trainers_mut()
+            .try_for_each(|trainer| trainer.continue_with(method))?;
         self.settings.training.method = method;
         Ok(())
     }
@@ -146,11 +145,14 @@ impl Run {
     /// # Errors
     /// If a setting is out of range; nothing is then changed.
     pub fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
-        for start in &mut self.starts {
-            start.set_stopping(stopping)?;
-        }
+        self.trainers_mut()
+            .try_for_each(|trainer| trainer.set_stopping(stopping))?;
         self.settings.training.stopping = stopping;
         Ok(())
+    }
+
+    fn trainers_mut(&mut self) -> impl Iterator<Item = &mut Trainer> {
+        self.starts.iter_mut().flat_map(|start| &mut start.rows)
     }
 
     /// Returns the trainings of all starts.
@@ -189,7 +191,11 @@ impl Run {
 
     /// Returns the states of all trainings for [`Begin::Resume`](super::Begin::Resume): start by start, and in each row by row.
     pub fn states(&self) -> Vec<TrainerState> {
-        self.starts.iter().flat_map(StartTrainer::states).collect()
+        self.starts
+            .iter()
+            .flat_map(StartTrainer::rows)
+            .map(Trainer::state)
+            .collect()
     }
 
     /// Returns the test set.
@@ -277,52 +283,17 @@ impl Run {
     }
 }
 
-/// Defect of a run that has ended: trainings of its leader failed or diverged. Its text includes the remedy.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RunDefect {
-    /// Number of networks: one, or one for each row-wire.
-    pub networks: usize,
-    /// Number of networks whose training has a defect.
-    pub defective: usize,
-    /// Index of the first defective network, from 0.
-    pub first: usize,
-    /// Defect of the first defective network.
-    pub defect: TrainingDefect,
-}
-
-impl RunDefect {
-    /// Returns the defect of a start whose trainings have all ended.
-    pub(super) fn of(start: &StartTrainer) -> Option<Self> {
-        start.stop_reason()?;
-        let numbered = start.rows().iter().enumerate();
-        let mut defects = numbered.filter_map(|(index, trainer)| Some((index, TrainingDefect::of(trainer)?)));
-        let (first, defect) = defects.next()?;
-        Some(Self {
-            networks: start.rows().len(),
-            defective: 1 + defects.count(),
-            first,
-            defect,
-        })
-    }
-}
-
-impl fmt::Display for RunDefect {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            networks,
-            defective,
-            first,
-            defect,
-        } = self;
-        if *networks > 1 {
-            write!(
-                f,
-                "{defective} of {networks} networks, the first being number {}: ",
-                first + 1
-            )?;
-        }
-        defect.fmt(f)
-    }
+/// Describes the defect of a start whose trainings have all ended, with its remedy.
+fn defect_of(start: &StartTrainer) -> Option<String> {
+    start.stop_reason()?;
+    let numbered = start.rows().iter().enumerate();
+    let mut defects = numbered.filter_map(|(index, trainer)| Some((index + 1, TrainingDefect::of(trainer)?)));
+    let (first, defect) = defects.next()?;
+    let (defective, networks) = (1 + defects.count(), start.rows().len());
+    Some(match networks {
+        1 => defect.to_string(),
+        _ => format!("{defective} of {networks} networks, the first being number {first}: {defect}"),
+    })
 }
 
 /// Error in preparing a run, an experiment of many runs, or the analysis of a scene.

@@ -196,7 +196,7 @@ fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
 
 /// Remarks on the errors of a recording, or by how much the network is better than ridge regression.
 fn verdict_on_targets_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
-    let defect = result.defect.as_ref().map(|defect| capitalised(&defect.to_string()));
+    let defect = result.defect.as_ref().map(|defect| capitalised(defect));
     for remark in defect.iter().chain(&result.remarks) {
         note_ui(ui, &sentence(remark));
     }
@@ -229,7 +229,7 @@ fn verdict_on_nodes_ui(
     let remarks = error_remarks(settings, &run.scores(result), Some(reason));
     let of_network = remarks.iter().find(|(row, _)| *row == NETWORK);
     let fault = if let Some(defect) = &result.defect {
-        Some(defect.to_string())
+        Some(defect.clone())
     } else if let Some((row, remark)) = of_network {
         Some(format!("{row}: {remark}"))
     } else if errors.z_mm > linear.z_mm {

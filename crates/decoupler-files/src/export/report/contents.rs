@@ -3,7 +3,7 @@ use std::{path::Path, time::Duration};
 use decoupler_core::{
     dataset::{Dataset, Simulation},
     evaluation::{
-        DecoderReport, Errors, Outlook, RunDefect, StartRecord, TestErrors, error_remarks,
+        DecoderReport, Errors, Outlook, StartRecord, TestErrors, error_remarks,
         recorded::{Determination, HysteresisLoop},
     },
     sensor::Geometry,
@@ -33,7 +33,7 @@ pub struct RunReport<'a> {
     /// Its network, record and errors.
     pub file: &'a NetworkFile,
     /// Defect of its training, if there is one.
-    pub defect: Option<&'a RunDefect>,
+    pub defect: Option<&'a str>,
     /// Other decoders that were measured on its test set.
     pub decoders: &'a [DecoderReport],
     /// Its test set: [`Run::test`](decoupler_core::evaluation::Run::test), or [`NetworkFile::test_set`], which draws or reads it again.
@@ -183,7 +183,7 @@ impl RunReport<'_> {
 
     /// Returns all warnings and remarks on the run, with cause and remedy.
     fn remarks(&self, setup: &Setup, answers: &ndarray::Array2<f64>) -> Vec<String> {
-        let mut remarks = Vec::from_iter(self.defect.map(ToString::to_string));
+        let mut remarks = Vec::from_iter(self.defect.map(str::to_owned));
         match (setup.settings().simulation(), setup.plan()) {
             (Some(simulation), _) => remarks.extend(self.array_remarks(simulation)),
             (None, Some(plan)) => remarks.extend(self.recording_remarks(plan, answers)),
