@@ -160,11 +160,6 @@ impl TestErrors {
         }
     }
 
-    /// Returns the ratio of the error to that of `other` answers: [`Errors::times`].
-    pub fn times(&self, other: &Self) -> Option<f64> {
-        self.nodes()?.times(other.nodes()?)
-    }
-
     /// Returns this measure of the errors; over all targets of a recording, with the [error in percent](Self::percent).
     pub fn figure(&self, measure: ErrorMeasure) -> Option<f64> {
         match self {

@@ -1,4 +1,4 @@
-use super::{Errors, RunSettings, Scores, TestErrors, TrainingSize};
+use super::{ErrorMeasure, RunSettings, Scores, TestErrors, TrainingSize};
 use crate::{
     decoupling::{DecoderKind, Precision},
     scene::{Noise, NoisySets},
@@ -76,20 +76,20 @@ pub(super) fn cause(
 pub(super) fn worse_than_mean(errors: &TestErrors, mean: &TestErrors, cause: &str) -> Vec<String> {
     /// Largest error in percent that counts as rounding of coordinates.
     const ROUNDING: f64 = 1e-9;
-    let (pairs, rounding): (Vec<(String, f64, f64)>, f64) = match (errors, mean) {
-        (TestErrors::Nodes(errors), TestErrors::Nodes(mean)) => {
-            let percent = |errors: &Errors| [Some(errors.z_full_scale_percent), errors.x_percent, errors.y_percent];
-            let pairs = ["z", "x", "y"].into_iter().zip(percent(errors)).zip(percent(mean));
-            let pair = |((name, error), of_mean): ((&str, _), Option<f64>)| Some((name.to_owned(), error?, of_mean?));
-            (pairs.filter_map(pair).collect(), ROUNDING)
-        }
-        _ => {
-            let pairs = errors.targets().iter().zip(mean.targets()).enumerate();
-            // A target that is constant in the test samples cannot be judged.
-            let judged = pairs.filter(|(_, (errors, _))| errors.r2.is_some());
-            let named = judged.map(|(index, (errors, mean))| (format!("target {}", index + 1), errors.mae, mean.mae));
-            (named.collect(), 0.0)
-        }
+    let (pairs, rounding): (Vec<(String, f64, f64)>, f64) = if errors.nodes().is_some() {
+        let axes = [
+            ("z", ErrorMeasure::ZStrokePercent),
+            ("x", ErrorMeasure::XPercent),
+            ("y", ErrorMeasure::YPercent),
+        ];
+        let pair = |(name, measure): (&str, _)| Some((name.to_owned(), errors.figure(measure)?, mean.figure(measure)?));
+        (axes.into_iter().filter_map(pair).collect(), ROUNDING)
+    } else {
+        let pairs = errors.targets().iter().zip(mean.targets()).enumerate();
+        // A target that is constant in the test samples cannot be judged.
+        let judged = pairs.filter(|(_, (errors, _))| errors.r2.is_some());
+        let named = judged.map(|(index, (errors, mean))| (format!("target {}", index + 1), errors.mae, mean.mae));
+        (named.collect(), 0.0)
     };
     let worse = pairs
         .into_iter()
@@ -134,7 +134,7 @@ pub(super) fn missing_figures(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::TargetErrors;
+    use crate::evaluation::{Errors, TargetErrors};
 
     fn remarks_on(
         kind: DecoderKind,

@@ -1,8 +1,11 @@
-use std::time::{Duration, Instant};
+use std::{
+    hint::black_box,
+    time::{Duration, Instant},
+};
 
 use super::{Coverage, Errors, PublishedErrors, Run, Scores, TargetErrors, TestErrors, recorded::HysteresisLoop};
 use crate::{
-    dataset::Dataset,
+    dataset::{Dataset, Frames},
     decoupling::{DecodeError, Decoder},
     numerics::median,
     problem::{Channel, Problem},
@@ -320,24 +323,20 @@ pub(super) fn frame_us(decoder: &mut dyn Decoder, test: &Dataset) -> Result<f64,
     const BLOCK_SECONDS: f64 = 100e-6;
     const MAX_SECONDS: f64 = 0.03;
     let frames = test.frames().ok();
+    let count = frames.as_ref().map_or(test.samples(), Frames::count);
+    let mut places = (0..count).cycle();
     let mut answer = vec![0.0; test.row_count() * test.outputs()];
-    let mut at = 0;
     let mut decode = |count: usize| -> Result<f64, DecodeError> {
         let begun = Instant::now();
-        for _ in 0..count {
+        for place in places.by_ref().take(count) {
             match &frames {
-                Some(frames) => {
-                    let readings = std::hint::black_box(frames.frame(at % frames.count()));
-                    decoder.decode(readings, &mut answer)?;
-                }
+                Some(frames) => decoder.decode(black_box(frames.frame(place)), &mut answer)?,
                 None => {
-                    let sample = at % test.samples();
-                    let readings = std::hint::black_box(test.sample_readings(sample));
-                    decoder.decode_row(test.row_index(sample), readings, &mut answer[..test.outputs()])?;
+                    let readings = black_box(test.sample_readings(place));
+                    decoder.decode_row(test.row_index(place), readings, &mut answer[..test.outputs()])?;
                 }
             }
-            std::hint::black_box(&answer);
-            at += 1;
+            black_box(&answer);
         }
         Ok(begun.elapsed().as_secs_f64())
     };
