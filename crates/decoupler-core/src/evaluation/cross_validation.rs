@@ -56,9 +56,11 @@ pub struct CrossValidated {
     pub effort: Effort,
 }
 
-/// Number and time of the epochs trained.
+/// Networks trained, with the number and time of their epochs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
+    /// Number of networks trained, each with all starts: 1, or one per fold.
+    pub networks: usize,
     /// Number of epochs, over all starts and folds.
     pub epochs: usize,
     /// Total time of the epochs.
@@ -165,6 +167,7 @@ impl CrossValidated {
 impl Default for Effort {
     fn default() -> Self {
         Self {
+            networks: 0,
             epochs: 0,
             seconds: 0.0,
             min_epoch_seconds: f64::INFINITY,
@@ -184,6 +187,7 @@ impl Effort {
             run.step();
             effort.min_epoch_seconds = effort.min_epoch_seconds.min(begun.elapsed().as_secs_f64() / at_work);
         }
+        effort.networks = 1;
         for trainer in run.trainers() {
             effort.epochs += trainer.latest().epoch;
             effort.seconds += trainer.elapsed().as_secs_f64();
@@ -192,6 +196,7 @@ impl Effort {
     }
 
     fn add(&mut self, other: Self) {
+        self.networks += other.networks;
         self.epochs += other.epochs;
         self.seconds += other.seconds;
         self.min_epoch_seconds = self.min_epoch_seconds.min(other.min_epoch_seconds);

@@ -46,27 +46,23 @@ pub enum AxisKind {
     Seed,
 }
 
+const HIDDEN: Kind = Kind::Integer(1, LARGEST_HIDDEN as u64);
+const SAMPLES: Kind = Kind::Integer(1, LARGEST_SAMPLES as u64);
+const STARTS: Kind = Kind::Integer(1, MAX_STARTS as u64);
+
 /// Settings of a cell that an axis can vary, in the order of [`AxisKind`], which is the one offered to the user.
 static ROWS: [(AxisKind, Setting<Cell>); 11] = [
-    row(
-        AxisKind::Hidden,
-        "hidden nodes",
-        Kind::Integer(1, LARGEST_HIDDEN as u64),
-        |cell| Some(Field::Count(&mut cell.settings.hidden)),
-    ),
+    row(AxisKind::Hidden, "hidden nodes", HIDDEN, |cell| {
+        Some(Field::Count(&mut cell.settings.hidden))
+    }),
     row(AxisKind::Array, "array", Kind::Text, |cell| {
         let source = cell.settings.simulation_mut()?;
         Some(Field::Text(&mut source.sensor.scale))
     }),
-    row(
-        AxisKind::Samples,
-        "samples",
-        Kind::Integer(1, LARGEST_SAMPLES as u64),
-        |cell| {
-            let source = cell.settings.simulation_mut()?;
-            Some(Field::Count(&mut source.samples))
-        },
-    ),
+    row(AxisKind::Samples, "samples", SAMPLES, |cell| {
+        let source = cell.settings.simulation_mut()?;
+        Some(Field::Count(&mut source.samples))
+    }),
     row(AxisKind::Noise, "noise", Kind::Number("", 0.0, f64::MAX), |cell| {
         let source = cell.settings.simulation_mut()?;
         Some(Field::Number(&mut source.scene.noise.relative))
@@ -84,12 +80,9 @@ static ROWS: [(AxisKind, Setting<Cell>); 11] = [
     row(AxisKind::Epochs, EPOCHS.name, EPOCHS.kind, |cell| {
         (EPOCHS.field)(&mut cell.settings.training.stopping)
     }),
-    row(
-        AxisKind::Starts,
-        "starts",
-        Kind::Integer(1, MAX_STARTS as u64),
-        |cell| Some(Field::Count(&mut cell.settings.starts)),
-    ),
+    row(AxisKind::Starts, "starts", STARTS, |cell| {
+        Some(Field::Count(&mut cell.settings.starts))
+    }),
     row(AxisKind::Split, "split", Kind::Choice, |cell| {
         Some(Field::Text(&mut cell.division.as_mut()?.by))
     }),
@@ -127,9 +120,11 @@ impl AxisKind {
 
     /// Returns the settings of runs with the source of `settings`, in the order offered to the user.
     pub fn of_runs(settings: &RunSettings) -> impl Iterator<Item = Self> + use<> {
-        let mut cell = Cell::any();
-        cell.settings.source = settings.source;
-        cell.division = settings.simulation().is_none().then(Division::default);
+        let cell = Cell {
+            settings: *settings,
+            division: settings.simulation().is_none().then(Division::default),
+            ..Cell::default()
+        };
         let rows = ROWS.iter().filter(move |(_, setting)| setting.applies(&cell));
         rows.map(|(kind, _)| *kind)
     }
@@ -153,7 +148,11 @@ impl Axis {
     /// # Errors
     /// The first text that is not a value of the setting.
     pub fn parse<'a>(kind: AxisKind, texts: impl IntoIterator<Item = &'a str>) -> Result<Self, SettingError> {
-        let (setting, mut cell) = (kind.setting(), Cell::any());
+        let setting = kind.setting();
+        let mut cell = Cell {
+            division: Some(Division::default()),
+            ..Cell::default()
+        };
         let value = |text: &str| {
             let value = setting.parse(text)?;
             setting.set(&mut cell, &value)?;

@@ -41,7 +41,7 @@ pub struct ExperimentRecording {
 }
 
 /// Cell of the grid.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cell {
     /// Index of its value on the first axis.
     pub column: usize,
@@ -53,19 +53,6 @@ pub struct Cell {
     pub division: Option<Division>,
     /// Errors that the paper reports for the cell, if there are any.
     pub published: Option<PublishedErrors>,
-}
-
-impl Cell {
-    /// Returns a cell that has every setting.
-    pub(super) fn any() -> Self {
-        Self {
-            column: 0,
-            row: 0,
-            settings: RunSettings::default(),
-            division: Some(Division::default()),
-            published: None,
-        }
-    }
 }
 
 /// Maximum number of trainings in one experiment.

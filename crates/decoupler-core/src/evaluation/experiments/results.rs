@@ -190,8 +190,9 @@ impl CellResults {
             Some(_) => CellSummary::OF_NODES,
             None => CellSummary::OF_TARGETS,
         };
-        let epochs = |trial: &Trial| trial.effort.epochs as f64 / (trial.networks * settings.starts).max(1) as f64;
-        let seconds = |trial: &Trial| trial.effort.seconds / trial.networks.max(1) as f64;
+        let epochs =
+            |trial: &Trial| trial.effort.epochs as f64 / (trial.effort.networks * settings.starts).max(1) as f64;
+        let seconds = |trial: &Trial| trial.effort.seconds / trial.effort.networks.max(1) as f64;
         CellSummary {
             cell: self.cell,
             trials: self.trials.len(),
@@ -240,8 +241,8 @@ mod tests {
                 },
                 coverage: Vec::new(),
             },
-            networks: 1,
             effort: Effort {
+                networks: 1,
                 epochs: 10,
                 seconds: 10.0,
                 min_epoch_seconds: 1.0,

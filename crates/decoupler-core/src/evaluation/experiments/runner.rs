@@ -82,7 +82,8 @@ pub fn run_experiments(
             let work_off = move || {
                 while let Some(trial) = planned.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let begun = Instant::now();
-                    let outcome = trial.run(samples, &Job::new(is_cancelled));
+                    let (of, at) = (&trial.cell, trial.seed_and_repeat);
+                    let outcome = Trial::run(trial.experiment, of, at, samples, &Job::new(is_cancelled));
                     // The receiver is dropped only if the calling thread panicked.
                     if matches!(outcome, Err(RunError::Cancelled(_)))
                         || sender.send((trial, outcome, begun.elapsed())).is_err()
@@ -148,14 +149,6 @@ fn planned<'a>(experiments: &'a [Experiment], samples: &TrialSamples) -> Vec<Pla
     }
     planned.sort_by(|one, other| one.round.cmp(&other.round).then(other.work.total_cmp(&one.work)));
     planned
-}
-
-impl Planned<'_> {
-    /// Runs the trial.
-    fn run(&self, samples: &TrialSamples, job: &Job<'_>) -> Result<Trial, RunError> {
-        job.check()?;
-        Trial::run(self.experiment, &self.cell, self.seed_and_repeat, samples, job)
-    }
 }
 
 /// Estimates the time until all trials are finished, at the speed of the finished ones: `work` of all `all_work`

@@ -5,7 +5,7 @@ use thiserror::Error;
 use super::{Cell, Experiment};
 use crate::{
     dataset::{Dataset, Division, Seed},
-    evaluation::{Baselines, Begin, CrossValidation, Effort, Run, RunError, RunSets, RunSettings, Scores},
+    evaluation::{Baselines, Begin, Effort, Run, RunError, RunSets, RunSettings, Scores},
     job::Job,
     machine::MemoryBudget,
     problem::Problem,
@@ -22,9 +22,7 @@ pub struct Trial {
     /// Errors of the network, the training mean and the linear baseline on the test set; in a cross-validation, on all
     /// samples, each decoupled by the models for which it was held out.
     pub scores: Scores,
-    /// Number of networks trained: 1, or one per fold.
-    pub networks: usize,
-    /// Epochs and time of the trainings.
+    /// Networks, epochs and time of the trainings.
     pub effort: Effort,
     /// Final state of every training, for [`Begin::Resume`]; empty for a cross-validation, which has one network per
     /// fold.
@@ -81,7 +79,7 @@ impl RecordedSamples {
 }
 
 impl Trial {
-    /// Runs a trial of a cell with this seed.
+    /// Runs a trial of a cell with this seed; a cross-validation draws one set with it.
     pub(super) fn run(
         experiment: &Experiment,
         cell: &Cell,
@@ -89,54 +87,40 @@ impl Trial {
         samples: &TrialSamples,
         job: &Job<'_>,
     ) -> Result<Self, RunError> {
+        job.check()?;
         let settings = RunSettings { seed, ..cell.settings };
-        if let Some(validation) = experiment.cross_validation {
-            return Self::by_cross_validation(settings, validation, repeat, job);
-        }
-        let sets = match samples {
-            TrialSamples::Drawn(memory) => RunSets::draw(&settings, *memory, job)?,
-            TrialSamples::Recorded(recorded) => {
-                let division = cell.division.expect("recorded samples have a division");
-                recorded.divided(&division, seed)?
-            }
-        };
-        let baselines = Baselines::fitted(&settings, &sets)?;
-        let mut run = Run::new(settings, sets, Begin::Initialize, job)?;
-        let effort = Effort::train(&mut run, job)?;
-        let scores = Scores {
-            network: run.errors(),
-            baselines,
-            coverage: Vec::new(),
+        let (scores, effort, states) = if let Some(validation) = experiment.cross_validation {
+            let simulation = settings.drawn()?;
+            let set = simulation.draw_training(simulation.samples, seed)?;
+            let tested = simulation.draw_tested_folds(&set, seed)?;
+            let sets = (&set, tested.as_ref().unwrap_or(&set));
+            let validated = validation.run(&settings, sets, repeat, job)?;
+            let scores = validated.scores_of(&simulation.problem(), &set);
+            (scores, validated.effort, Vec::new())
+        } else {
+            let sets = match samples {
+                TrialSamples::Drawn(memory) => RunSets::draw(&settings, *memory, job)?,
+                TrialSamples::Recorded(recorded) => {
+                    let division = cell.division.expect("recorded samples have a division");
+                    recorded.divided(&division, seed)?
+                }
+            };
+            let baselines = Baselines::fitted(&settings, &sets)?;
+            let mut run = Run::new(settings, sets, Begin::Initialize, job)?;
+            let effort = Effort::train(&mut run, job)?;
+            let scores = Scores {
+                network: run.errors(),
+                baselines,
+                coverage: Vec::new(),
+            };
+            (scores, effort, run.states())
         };
         Ok(Self {
             seed,
             repeat,
             scores,
-            networks: 1,
             effort,
-            states: run.states(),
-        })
-    }
-
-    /// Cross-validates on a set drawn with the seed of `settings`.
-    fn by_cross_validation(
-        settings: RunSettings,
-        validation: CrossValidation,
-        repeat: usize,
-        job: &Job<'_>,
-    ) -> Result<Self, RunError> {
-        let (simulation, seed) = (settings.drawn()?, settings.seed);
-        let set = simulation.draw_training(simulation.samples, seed)?;
-        let tested = simulation.draw_tested_folds(&set, seed)?;
-        let tested = tested.as_ref().unwrap_or(&set);
-        let validated = validation.run(&settings, (&set, tested), repeat, job)?;
-        Ok(Self {
-            seed,
-            repeat,
-            scores: validated.scores_of(&simulation.problem(), &set),
-            networks: validated.folds.count(),
-            effort: validated.effort,
-            states: Vec::new(),
+            states,
         })
     }
 }
