@@ -71,8 +71,10 @@ impl MethodState {
             Self::AdaptiveDescent(state) => vec![&state.step[..]],
             Self::StepMomentum(previous) | Self::Momentum(previous) => vec![&previous[..]],
         };
-        let fits = |vector: &&[f64]| vector.len() == weights && vector.iter().all(|value| value.is_finite());
-        vectors.iter().all(fits)
+        let is_finite = |vector: &[f64]| vector.iter().all(|value| value.is_finite());
+        vectors
+            .into_iter()
+            .all(|vector| vector.len() == weights && is_finite(vector))
     }
 }
 
@@ -88,12 +90,6 @@ impl Method {
             Self::ScaledConjugateGradient(settings) => boxed(ScaledConjugateGradient::new(settings, mlp, examples)),
             _ => boxed(GradientDescent::new(*self, mlp, examples)),
         }
-    }
-
-    /// Resumes the method from the state of an interrupted training; `None` if `state` belongs to another method.
-    pub(super) fn resume(&self, state: MethodState, mlp: &Mlp, examples: &Examples) -> Option<Box<dyn Algorithm>> {
-        let (mut running, _) = self.start(mlp, examples);
-        running.restore(state).then_some(running)
     }
 
     /// Approximate memory in bytes of the method's equations for a network of this shape and this many samples.

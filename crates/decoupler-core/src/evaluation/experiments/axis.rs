@@ -55,7 +55,7 @@ static ROWS: [Setting<Cell>; 11] = [
     row("samples", Kind::Integer(1, LARGEST_SAMPLES as u64), |cell| {
         simulation(cell).map(|source| Field::Count(&mut source.samples))
     }),
-    row("noise", Kind::Number("", 0.0, f64::MAX), |cell| {
+    row("noise", Kind::Number(0.0, f64::MAX), |cell| {
         simulation(cell).map(|source| Field::Number(&mut source.scene.noise.relative))
     }),
     row("inputs", Kind::Choice, |cell| {
@@ -83,13 +83,7 @@ static ROWS: [Setting<Cell>; 11] = [
 ];
 
 const fn row(name: &'static str, kind: Kind, field: fn(&mut Cell) -> Option<Field<'_>>) -> Setting<Cell> {
-    Setting {
-        name,
-        heading: "Axes",
-        help: "",
-        kind,
-        field,
-    }
+    Setting::new(name, kind, "", field)
 }
 
 fn simulation(cell: &mut Cell) -> Option<&mut Simulation> {
