@@ -111,20 +111,10 @@ impl Division {
     }
 
     fn parts(&self, mut units: Vec<Vec<usize>>, test_fraction: f64) -> DividedSamples {
-        let test = if test_fraction > 0.0 {
-            take_last(&mut units, test_fraction)
-        } else {
-            Vec::new()
-        };
-        let validation = if units.len() > 1 && self.validation_fraction > 0.0 {
-            take_last(&mut units, self.validation_fraction)
-        } else {
-            Vec::new()
-        };
         DividedSamples {
+            test: take_last(&mut units, test_fraction),
+            validation: take_last(&mut units, self.validation_fraction),
             training: ascending(units.concat()),
-            validation,
-            test,
         }
     }
 
@@ -133,16 +123,14 @@ impl Division {
     /// # Errors
     /// If a share is out of range.
     pub fn check(&self) -> Result<(), DatasetError> {
-        let fractions = [
-            ("test", self.test_fraction, f64::MIN_POSITIVE, "above 0"),
-            ("validation", self.validation_fraction, 0.0, "0"),
-        ];
-        for (part, value, smallest, least) in fractions {
-            if !(smallest..1.0).contains(&value) {
-                return Err(DatasetError::Fraction { part, value, least });
-            }
-        }
-        Ok(())
+        let check = |part, value: f64, smallest: f64, least| {
+            let is_valid = (smallest..1.0).contains(&value);
+            is_valid
+                .then_some(())
+                .ok_or(DatasetError::Fraction { part, value, least })
+        };
+        check("test", self.test_fraction, f64::MIN_POSITIVE, "above 0")?;
+        check("validation", self.validation_fraction, 0.0, "0")
     }
 }
 
@@ -167,8 +155,12 @@ impl DividedSamples {
     }
 }
 
-/// Moves the last units to a part with about this share of all samples: at least one unit, and never all.
+/// Moves the last units to a part with about this share of all samples: at least one unit, and never all. Takes none if
+/// the share is 0, or there is only one unit.
 fn take_last(units: &mut Vec<Vec<usize>>, share: f64) -> Vec<usize> {
+    if share == 0.0 || units.len() < 2 {
+        return Vec::new();
+    }
     let samples: usize = units.iter().map(Vec::len).sum();
     let wanted = share * samples as f64;
     let (mut first, mut taken) = (units.len() - 1, units[units.len() - 1].len());

@@ -138,12 +138,8 @@ pub fn nguyen_widrow(shape: Shape, rng: &mut impl Rng) -> Mlp {
     for node in 0..hidden {
         let direction: Vec<f64> = (0..inputs).map(|_| rng.random_range(-1.0..1.0)).collect();
         // A vector of length 0 has no direction; it is as improbable as 53 zero bits for every input.
-        let norm = direction
-            .iter()
-            .map(|x| x * x)
-            .sum::<f64>()
-            .sqrt()
-            .max(f64::MIN_POSITIVE);
+        let squares: f64 = direction.iter().map(|x| x * x).sum();
+        let norm = squares.sqrt().max(f64::MIN_POSITIVE);
         for (input, x) in direction.iter().enumerate() {
             w[input * hidden + node] = length * x / norm;
         }
