@@ -121,13 +121,12 @@ impl Memory {
 /// In words: `averages over 2s, 10s and lags of 5, 10, as differences`.
 impl fmt::Display for Memory {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let list = |spans: &[Span]| Vec::from_iter(spans.iter().map(Span::to_string)).join(", ");
         let mut parts = Vec::new();
-        if !self.averages.is_empty() {
-            parts.push(format!("averages over {}", list(&self.averages)));
-        }
-        if !self.lags.is_empty() {
-            parts.push(format!("lags of {}", list(&self.lags)));
+        for (what, spans) in [("averages over", &self.averages), ("lags of", &self.lags)] {
+            if !spans.is_empty() {
+                let spans = Vec::from_iter(spans.iter().map(Span::to_string));
+                parts.push(format!("{what} {}", spans.join(", ")));
+            }
         }
         match (parts.is_empty(), self.differences) {
             (true, false) => f.write_str("none"),

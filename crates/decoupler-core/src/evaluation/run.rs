@@ -276,7 +276,7 @@ impl Run {
 }
 
 /// Defect of a run that has ended: trainings of its leader failed or diverged. Its text includes the remedy.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RunDefect {
     /// Number of networks: one, or one for each row-wire.
     pub networks: usize,

@@ -1,6 +1,9 @@
 //! Saving and resuming the state of a training, and continuing it with another method or other stopping rules.
 
-use std::time::{Duration, Instant};
+use std::{
+    mem::discriminant,
+    time::{Duration, Instant},
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -129,9 +132,10 @@ impl Trainer {
             return Err(TrainingError::OtherSamples { saved, found });
         }
         let (mut algorithm, _) = state.settings.method.start(&mlp, training);
-        if !algorithm.restore(state.method) {
+        if discriminant(&algorithm.state()) != discriminant(&state.method) {
             return Err(TrainingError::Damaged("the state belongs to another method"));
         }
+        algorithm.restore(state.method);
         let best = state.history.0[state.best_epoch];
         let best_mse = best.validation_mse.unwrap_or(best.training_mse);
         Ok(Self {

@@ -192,12 +192,8 @@ impl Algorithm for GradientDescent {
         self.state.clone()
     }
 
-    fn restore(&mut self, state: MethodState) -> bool {
-        let is_same = std::mem::discriminant(&state) == std::mem::discriminant(&self.state);
-        if is_same {
-            self.state = state;
-        }
-        is_same
+    fn restore(&mut self, state: MethodState) {
+        self.state = state;
     }
 }
 

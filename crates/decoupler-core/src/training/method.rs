@@ -34,8 +34,8 @@ pub(super) trait Algorithm: Send + Sync {
     /// Returns the state for saving.
     fn state(&self) -> MethodState;
 
-    /// Restores the state of an interrupted training; returns `false` if it is the state of another method.
-    fn restore(&mut self, state: MethodState) -> bool;
+    /// Restores the state of an interrupted training of this method.
+    fn restore(&mut self, state: MethodState);
 }
 
 /// State that a method carries from epoch to epoch in addition to the weights. A training resumed from it gives
@@ -66,7 +66,7 @@ impl MethodState {
     pub(super) fn fits(&self, weights: usize) -> bool {
         let vectors = match self {
             Self::LevenbergMarquardt(_) | Self::BayesianRegularization(_) | Self::GradientDescent => Vec::new(),
-            Self::ScaledConjugateGradient(state) => state.vectors().to_vec(),
+            Self::ScaledConjugateGradient(state) => vec![&state.p[..], &state.r],
             Self::Resilient(state) => vec![&state.previous_gradient[..], &state.lengths],
             Self::AdaptiveDescent(state) => vec![&state.step[..]],
             Self::StepMomentum(previous) | Self::Momentum(previous) => vec![&previous[..]],

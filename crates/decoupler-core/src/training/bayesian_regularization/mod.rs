@@ -219,9 +219,9 @@ impl Algorithm for BayesianRegularization {
         MethodState::BayesianRegularization(self.state.clone())
     }
 
-    fn restore(&mut self, state: MethodState) -> bool {
+    fn restore(&mut self, state: MethodState) {
         let MethodState::BayesianRegularization(state) = state else {
-            return false;
+            return;
         };
         let fresh = std::mem::replace(&mut self.state, state);
         // A state has as many groups and targets as the settings it was saved with, unless it is damaged.
@@ -230,7 +230,6 @@ impl Algorithm for BayesianRegularization {
         // Before the first step every precision is 1.
         let mlp = self.scaled.clone();
         self.gather(&mlp);
-        true
     }
 }
 
