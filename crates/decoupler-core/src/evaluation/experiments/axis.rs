@@ -63,7 +63,7 @@ static ROWS: [(AxisKind, Setting<Cell>); 11] = [
         let source = cell.settings.simulation_mut()?;
         Some(Field::Count(&mut source.samples))
     }),
-    row(AxisKind::Noise, "noise", Kind::Number("", 0.0, f64::MAX), |cell| {
+    row(AxisKind::Noise, "noise", Kind::Number(0.0, f64::MAX), |cell| {
         let source = cell.settings.simulation_mut()?;
         Some(Field::Number(&mut source.scene.noise.relative))
     }),
@@ -97,14 +97,7 @@ const fn row(
     kind: Kind,
     field: fn(&mut Cell) -> Option<Field<'_>>,
 ) -> (AxisKind, Setting<Cell>) {
-    let setting = Setting {
-        name,
-        heading: "Axes",
-        help: "",
-        kind,
-        field,
-    };
-    (axis, setting)
+    (axis, Setting::new(name, kind, "", field))
 }
 
 impl AxisKind {

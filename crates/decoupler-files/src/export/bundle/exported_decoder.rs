@@ -2,7 +2,7 @@ use decoupler_core::{
     dataset::{Dataset, Memory, PerRow, Seed, Simulation, Stream},
     decoupling::{Decoder, DecoderKind, NotDescribed, Precision, Program, decode_set},
     evaluation::{DecoderSet, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
-    network::{Networks, ReadingRange},
+    network::{MinMax, Networks},
     problem::{Channel, Problem},
 };
 use rand::RngExt;
@@ -142,7 +142,7 @@ impl<'a> ExportedDecoder<'a> {
     }
 
     /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
-    pub(super) fn reading_ranges(&self) -> &[Option<ReadingRange>] {
+    pub(super) fn reading_ranges(&self) -> &[Option<MinMax>] {
         &self.fitted.reading_ranges
     }
 
@@ -315,7 +315,7 @@ pub(super) struct FittedDecoder {
     pub(super) decoder: Box<dyn Decoder>,
     pub(super) program: Program,
     /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
-    pub(super) reading_ranges: Vec<Option<ReadingRange>>,
+    pub(super) reading_ranges: Vec<Option<MinMax>>,
     /// Ranges of the targets in training: one for all row-wires, or one for each if the row is an argument.
     pub(super) target_extremes: Vec<Vec<(f64, f64)>>,
     /// Errors on the test samples.
@@ -362,7 +362,7 @@ impl FittedDecoder {
                 let both = |(low, high): (f64, f64), &value: &f64| (low.min(value), high.max(value));
                 column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), both)
             });
-            Ok::<_, BundleError>((ReadingRange::of(set.readings()), extremes.collect::<Vec<_>>()))
+            Ok::<_, BundleError>((MinMax::of(set.readings()), extremes.collect::<Vec<_>>()))
         };
         let in_training = PerRow::fit(&training, settings.source.row_model(), of_row)?;
         let (reading_ranges, target_extremes) = in_training.values().iter().cloned().unzip();
