@@ -7,7 +7,7 @@ use decoupler_core::{
     decoupling::{Decoder, Program, ProgramDecoder},
     network::{InputChoice, ScalingChoice},
     scene::{NoiseSource, RowModel},
-    text::counted,
+    text::{Named, counted},
 };
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::{
@@ -63,7 +63,7 @@ pub fn fit_decoder(
 ) -> PyResult<FittedDecoder> {
     let choice = InputChoice {
         quantity: quantity(inputs)?,
-        scaling: scaling.parse::<ScalingChoice>().map_err(value_error)?,
+        scaling: ScalingChoice::parse(scaling).map_err(value_error)?,
     };
     let samples = Samples {
         readings: readings.view(),

@@ -6,6 +6,7 @@ use decoupler_core::{
     identifiability::Identifiability,
     scene::{Movement, RelativeNoise},
     sensor::{ArrayScale, Geometry, SensorModel},
+    text::Named,
 };
 use glam::DVec3;
 use ndarray::{Array2, Array3, Array5, ArrayView1, ArrayView3, Axis};
@@ -170,7 +171,7 @@ impl Sensor {
                 "noise is {noise}: give a finite number from 0"
             )));
         }
-        let axes = axes.parse::<Movement>().map_err(value_error)?.axes();
+        let axes = Movement::parse(axes).map_err(value_error)?.axes();
         let displacements = Vec::from_iter(displacements.rows().into_iter().map(vector));
         let own = RelativeNoise {
             own: noise,

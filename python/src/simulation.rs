@@ -5,6 +5,7 @@ use decoupler_core::{
     evaluation::{Preset, RunSets, RunSettings},
     job::Job,
     scene::{Loading, Movement, Noise, NoisySets, Rows},
+    text::Named,
 };
 use decoupler_files::machine::memory_budget;
 use numpy::ToPyArray;
@@ -49,7 +50,7 @@ impl Settings {
                 other => return Err(value_error(format!("noise_in: '{other}': give both, training or test"))),
             },
         };
-        let preset: Preset = self.preset.parse().map_err(value_error)?;
+        let preset: Preset = Preset::parse(&self.preset).map_err(value_error)?;
         let mut source = preset.simulation_in(noise);
         source.sensor = sensor.0;
         source.samples = self.samples.unwrap_or(source.samples);
@@ -60,7 +61,7 @@ impl Settings {
             scene.rows = rows.parse::<Rows>().map_err(value_error)?;
         }
         if let Some(axes) = &self.axes {
-            scene.movement = axes.parse::<Movement>().map_err(value_error)?;
+            scene.movement = Movement::parse(axes).map_err(value_error)?;
         }
         if let Some(loading) = &self.loading {
             scene.loading = loading.parse::<Loading>().map_err(value_error)?;

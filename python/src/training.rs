@@ -13,6 +13,7 @@ use decoupler_core::{
     problem::{Channel, Problem},
     scene::RowModel,
     settings::Value,
+    text::Named,
     training::{EpochRecord, Method, StoppingRules},
 };
 use decoupler_files::machine::memory_budget;
@@ -75,10 +76,10 @@ impl Settings {
         settings.training.check().map_err(value_error)?;
         settings.hidden = self.hidden_nodes;
         settings.starts = self.restarts;
-        settings.combine = self.combine.parse::<Combination>().map_err(value_error)?;
-        settings.initialization = self.initialization.parse::<Initialization>().map_err(value_error)?;
+        settings.combine = Combination::parse(&self.combine).map_err(value_error)?;
+        settings.initialization = Initialization::parse(&self.initialization).map_err(value_error)?;
         settings.inputs.quantity = quantity(&self.inputs)?;
-        settings.inputs.scaling = self.scaling.parse::<ScalingChoice>().map_err(value_error)?;
+        settings.inputs.scaling = ScalingChoice::parse(&self.scaling).map_err(value_error)?;
         settings.seed = Seed(self.seed);
         settings.check_counts().map_err(value_error)?;
         Ok(settings)
@@ -118,7 +119,7 @@ pub fn quantity(name: &str) -> PyResult<Quantity> {
     if name == "raw" {
         return Ok(Quantity::Raw);
     }
-    name.parse::<Quantity>().map_err(|_| {
+    Quantity::parse(name).map_err(|_| {
         value_error(format!(
             "inputs: '{name}' is not a quantity: give raw, resistance, conductance or log"
         ))
@@ -200,7 +201,7 @@ pub fn train(
     let settings: Settings = settings.extract()?;
     let run_settings = settings.run(row_wires.is_some())?;
     let calibrates = settings.calibrates()?;
-    let by: SplitBy = settings.split.parse().map_err(value_error)?;
+    let by: SplitBy = SplitBy::parse(&settings.split).map_err(value_error)?;
     if by == SplitBy::Group && groups.is_none() && validation.is_none() {
         return Err(PyValueError::new_err(
             "split=\"group\": give the group of each sample with groups",

@@ -110,7 +110,7 @@ impl Train {
         let honest = || -> Result<Run, RunError> {
             let division = Division { by, ..plan.division };
             let parts = division.divide(set, &mut settings.seed.rng(Stream::Split))?;
-            let sets = RunSets::new(parts.split(set), parts.test_set(set));
+            let sets = RunSets::new(parts.split(set), set.select(&parts.test));
             Run::with_baselines(settings, sets, Begin::Initialize, &Job::UNINTERRUPTED)
         };
         let mut honest = match honest() {

@@ -471,7 +471,7 @@ impl FineTune {
         };
         let parts = division.divide(&frames, &mut settings.seed.rng(Stream::Split));
         let parts = parts.map_err(decoupler_core::evaluation::RunError::from)?;
-        let (split, test) = (parts.split(&frames), parts.test_set(&frames));
+        let (split, test) = (parts.split(&frames), frames.select(&parts.test));
         let mut training = settings.training;
         training.stopping.epochs = self.epochs.unwrap_or(training.stopping.epochs);
         let bar = progress_bar(self.json, 1, "fine-tuning {spinner}");

@@ -7,7 +7,10 @@ use super::{
     file_patterns::{expanded, file_sets},
     interruption::check_same,
 };
-use decoupler_core::dataset::{Division, Memory, Span, SplitBy};
+use decoupler_core::{
+    dataset::{Division, Memory, Span, SplitBy},
+    text::Named,
+};
 use decoupler_files::{
     export::{RecipeFile, RecipeSource},
     import::{
@@ -106,7 +109,7 @@ pub(super) struct ImportArguments {
     #[arg(long, value_name = "FILE")]
     save_recipe: Option<PathBuf>,
     /// Test samples: the last in time, whole groups, or random ones [default: group with --group, else time]
-    #[arg(long, value_name = "time|group|random")]
+    #[arg(long, value_name = "time|group|random", value_parser = SplitBy::parse)]
     split: Option<SplitBy>,
     /// Share of the samples held out for testing [default: 0.2]
     #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "test_data")]

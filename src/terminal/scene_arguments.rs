@@ -7,6 +7,7 @@ use decoupler_core::{
     evaluation::{Measured, Preset, RunSettings},
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Loading, Movement, Noise, NoisySets, RowModel, Rows, Scene},
+    text::Named,
 };
 
 // Rows, movement, loading and noise of the scene, and its decoders. Arguments that are not given have the values of the
@@ -14,13 +15,13 @@ use decoupler_core::{
 #[derive(Args)]
 pub(super) struct SceneArguments {
     /// Settings that other arguments start from: those of the paper, or the best ones measured [default: paper]
-    #[arg(long, value_name = "paper|best")]
+    #[arg(long, value_name = "paper|best", value_parser = Preset::parse)]
     pub(super) preset: Option<Preset>,
     /// all: one network for every row; known: one network per row; N: only row N
     #[arg(long, value_name = "all|known|N")]
     rows: Option<Rows>,
     /// Axes along which nodes move
-    #[arg(long, value_name = "z|xyz")]
+    #[arg(long, value_name = "z|xyz", value_parser = Movement::parse)]
     axes: Option<Movement>,
     /// Loading: random nodes, a smooth random field with this correlation length, or an indenter (:sphere, :flat-punch,
     /// :cylinder, :edge)
@@ -30,7 +31,7 @@ pub(super) struct SceneArguments {
     #[arg(long, value_name = "resistance|conductance|log", value_delimiter = ',')]
     inputs: Vec<String>,
     /// Scaling of the inputs: each to its range, or whitened principal components
-    #[arg(long, value_name = "minmax|whiten")]
+    #[arg(long, value_name = "minmax|whiten", value_parser = ScalingChoice::parse)]
     pub(super) scaling: Option<ScalingChoice>,
     /// Noise of each reading (standard deviation), relative to the reading
     #[arg(long, value_name = "REL", value_parser = number, value_delimiter = ',')]
@@ -48,7 +49,7 @@ pub(super) struct SceneArguments {
     #[arg(long, value_name = "both|training|test", value_parser = noisy_sets)]
     noise_in: Option<NoisySets>,
     /// Decoders to use, separated by commas: mean, ridge, network, rbf, fuzzy, newton, polish
-    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = DecoderKind::parse)]
     pub(super) decoder: Vec<DecoderKind>,
 }
 
@@ -96,9 +97,7 @@ impl SceneArguments {
         match &self.inputs[..] {
             [] => Ok(None),
             [name] => {
-                let quantity = name
-                    .parse()
-                    .map_err(|error| Failure::Arguments(format!("--inputs: {error}")));
+                let quantity = Quantity::parse(name).map_err(|error| Failure::Arguments(format!("--inputs: {error}")));
                 quantity.map(Some)
             }
             _ => {

@@ -10,6 +10,7 @@ use decoupler_core::{
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     settings::Value,
+    text::Named,
     training::{Method, StoppingRules, TrainingSettings},
 };
 use decoupler_files::{export::RecipeSource, import::Setup};
@@ -36,10 +37,10 @@ pub(super) struct TrainingArguments {
     starts: Option<usize>,
     /// How several starts become one network: best keeps the one with the lowest validation error, mean averages their
     /// answers [default: best]
-    #[arg(long, value_name = "best|mean")]
+    #[arg(long, value_name = "best|mean", value_parser = Combination::parse)]
     combine: Option<Combination>,
     /// Weights with which a training begins: random, or ridge regression with random weights added [default: random]
-    #[arg(long, value_name = "random|ridge")]
+    #[arg(long, value_name = "random|ridge", value_parser = Initialization::parse)]
     begin: Option<Initialization>,
     /// Training method [default: lm; br for a recording]
     #[arg(long, value_parser = method())]

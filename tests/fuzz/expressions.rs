@@ -20,6 +20,7 @@ use decoupler_files::{
 use crate::{
     corpus::replay,
     mutation::{for_each_seed, mutated},
+    names::Name,
 };
 
 /// Returns true if the text is accepted.
@@ -51,10 +52,10 @@ fn check_all(text: &str) -> bool {
         check::<Derived>(text),
         check::<Condition>(text),
         check::<Span>(text),
-        check::<SplitBy>(text),
+        check::<Name<SplitBy>>(text),
         check::<Fault>(text),
-        check::<Combination>(text),
-        check::<Initialization>(text),
+        check::<Name<Combination>>(text),
+        check::<Name<Initialization>>(text),
         check::<Separator>(text),
         check::<Decimal>(text),
         check::<Encoding>(text),

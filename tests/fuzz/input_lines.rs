@@ -106,7 +106,8 @@ fn any_input() {
     let memory = Memory {
         lags: vec![Span::Samples(1.0)],
         interval_s: Some(0.1),
-        ..Memory::of_averages_s(&[0.3])
+        averages: vec![Span::Seconds(0.3)],
+        ..Memory::default()
     };
     let problems = [
         (problem(&["a", "b"], &[], None), false),

@@ -1,6 +1,9 @@
 //! Parsers of names: accepted values are unchanged after printing and parsing.
 
-use std::{fmt::Display, str::FromStr};
+use std::{
+    fmt::{self, Display},
+    str::FromStr,
+};
 
 use decoupler_core::{
     decoupling::DecoderKind,
@@ -8,12 +11,31 @@ use decoupler_core::{
     network::{Quantity, ScalingChoice},
     scene::{Loading, Movement, Rows},
     sensor::ArrayScale,
+    text::{Named, UnknownName},
 };
 
 use crate::{
     corpus::replay,
     mutation::{for_each_seed, mutated},
 };
+
+/// Value of an enum whose variants have names.
+#[derive(PartialEq)]
+pub(crate) struct Name<T>(T);
+
+impl<T: Named> FromStr for Name<T> {
+    type Err = UnknownName;
+
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        T::parse(text).map(Self)
+    }
+}
+
+impl<T: Named> Display for Name<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0.name())
+    }
+}
 
 fn check<T: FromStr<Err: Display> + Display + PartialEq>(words: &[&str]) {
     for word in words {
@@ -44,11 +66,11 @@ fn any_input() {
             check_word::<ArrayScale>(text);
             check_word::<Rows>(text);
             check_word::<Loading>(text);
-            check_word::<Movement>(text);
-            check_word::<Quantity>(text);
-            check_word::<ScalingChoice>(text);
-            check_word::<DecoderKind>(text);
-            check_word::<Preset>(text);
+            check_word::<Name<Movement>>(text);
+            check_word::<Name<Quantity>>(text);
+            check_word::<Name<ScalingChoice>>(text);
+            check_word::<Name<DecoderKind>>(text);
+            check_word::<Name<Preset>>(text);
         }
     });
 }
@@ -68,13 +90,13 @@ fn scenes() {
         "indenter:sphere",
         "indenter:flat-punch",
     ]);
-    check::<Movement>(&["z", "xyz"]);
+    check::<Name<Movement>>(&["z", "xyz"]);
 }
 
 #[test]
 fn choices() {
-    check::<Quantity>(&["resistance", "conductance", "log"]);
-    check::<ScalingChoice>(&["minmax", "whiten"]);
-    check::<DecoderKind>(&["mean", "network", "rbf"]);
-    check::<Preset>(&["paper", "best"]);
+    check::<Name<Quantity>>(&["resistance", "conductance", "log"]);
+    check::<Name<ScalingChoice>>(&["minmax", "whiten"]);
+    check::<Name<DecoderKind>>(&["mean", "network", "rbf"]);
+    check::<Name<Preset>>(&["paper", "best"]);
 }

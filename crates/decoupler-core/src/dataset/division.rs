@@ -1,10 +1,10 @@
-use std::{fmt, str::FromStr};
+use std::fmt;
 
 use rand::{Rng, seq::SliceRandom};
 use serde::{Deserialize, Serialize};
 
 use super::{Dataset, DatasetError, Seed, Stream};
-use crate::text::{Named, UnknownName};
+use crate::text::Named;
 
 /// Division of a measured set into training, validation and test samples.
 ///
@@ -55,7 +55,7 @@ impl Division {
     /// # Errors
     /// If a share is out of range, or the set is a single unit.
     pub fn divide(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DatasetError> {
-        let parts = self.parts_with_variation(set, self.test_fraction, rng)?;
+        let parts = self.parts(set, self.test_fraction, rng)?;
         if parts.test.is_empty() {
             let samples = set.samples();
             let unit = self.by.unit_name(1, samples);
@@ -69,7 +69,28 @@ impl Division {
     /// # Errors
     /// If a share is out of range.
     pub fn divide_for_training(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DatasetError> {
-        self.parts_with_variation(set, 0.0, rng)
+        self.parts(set, 0.0, rng)
+    }
+
+    fn parts(&self, set: &Dataset, test_fraction: f64, rng: &mut impl Rng) -> Result<DividedSamples, DatasetError> {
+        self.check()?;
+        let mut units = self.by.ordered_units(set, rng);
+        let hold_out_last = |mut units: Vec<Vec<usize>>| DividedSamples {
+            test: take_last(&mut units, test_fraction),
+            validation: take_last(&mut units, self.validation_fraction),
+            training: ascending(units.concat()),
+        };
+        let targets = set.targets();
+        let varies = |parts: &DividedSamples| {
+            let mut pairs = parts.training.windows(2);
+            pairs.any(|pair| targets.row(pair[0]) != targets.row(pair[1]))
+        };
+        let parts = hold_out_last(units.clone());
+        if varies(&parts) {
+            return Ok(parts);
+        }
+        units.reverse();
+        Ok(Some(hold_out_last(units)).filter(varies).unwrap_or(parts))
     }
 
     /// Divides `set` for a run with this seed, and returns its training, validation and test samples: those of `test` if it is
@@ -81,42 +102,11 @@ impl Division {
         let mut rng = seed.rng(Stream::Split);
         let Some(test) = test else {
             let parts = self.divide(set, &mut rng)?;
-            return Ok((parts.split(set), parts.test_set(set)));
+            return Ok((parts.split(set), set.select(&parts.test)));
         };
         let parts = self.divide_for_training(set, &mut rng)?;
         let read = set.row_wires_read().unwrap_or_default();
         Ok((parts.split(set), test.clone().among_rows(read)?))
-    }
-
-    /// Holds out the last units, or the first if no target varies in what the last leave. The test set is empty if there is
-    /// only one unit.
-    fn parts_with_variation(
-        &self,
-        set: &Dataset,
-        test_fraction: f64,
-        rng: &mut impl Rng,
-    ) -> Result<DividedSamples, DatasetError> {
-        self.check()?;
-        let mut units = self.by.ordered_units(set, rng);
-        let targets = set.targets();
-        let varies = |parts: &DividedSamples| {
-            let mut training = parts.training.windows(2);
-            training.any(|pair| targets.row(pair[0]) != targets.row(pair[1]))
-        };
-        let parts = self.parts(units.clone(), test_fraction);
-        if varies(&parts) {
-            return Ok(parts);
-        }
-        units.reverse();
-        Ok(Some(self.parts(units, test_fraction)).filter(varies).unwrap_or(parts))
-    }
-
-    fn parts(&self, mut units: Vec<Vec<usize>>, test_fraction: f64) -> DividedSamples {
-        DividedSamples {
-            test: take_last(&mut units, test_fraction),
-            validation: take_last(&mut units, self.validation_fraction),
-            training: ascending(units.concat()),
-        }
     }
 
     /// Checks the shares.
@@ -125,10 +115,8 @@ impl Division {
     /// If a share is out of range.
     pub fn check(&self) -> Result<(), DatasetError> {
         let check = |part, value: f64, smallest: f64, least| {
-            let is_valid = (smallest..1.0).contains(&value);
-            is_valid
-                .then_some(())
-                .ok_or(DatasetError::Fraction { part, value, least })
+            let valid = (smallest..1.0).contains(&value).then_some(());
+            valid.ok_or(DatasetError::Fraction { part, value, least })
         };
         check("test", self.test_fraction, f64::MIN_POSITIVE, "above 0")?;
         check("validation", self.validation_fraction, 0.0, "0")
@@ -145,14 +133,6 @@ impl DividedSamples {
             training: set.select(&self.training),
             validation: (!self.validation.is_empty()).then(|| set.select(&self.validation)),
         }
-    }
-
-    /// Returns the test samples of `set`, the set that was divided.
-    ///
-    /// # Panics
-    /// If the set has fewer samples.
-    pub fn test_set(&self, set: &Dataset) -> Dataset {
-        set.select(&self.test)
     }
 }
 
@@ -230,14 +210,6 @@ impl fmt::Display for SplitBy {
     }
 }
 
-impl FromStr for SplitBy {
-    type Err = UnknownName;
-
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        Self::parse(text)
-    }
-}
-
 impl SplitBy {
     /// All rules, in the order offered.
     pub const ALL: [Self; 3] = [Self::Time, Self::Group, Self::Random];
@@ -274,12 +246,8 @@ impl SplitBy {
     /// Holds out `held_out` units of `set` for validation, drawn at random unless in order of time; at least one unit
     /// remains for training.
     pub fn hold_out(self, set: &Dataset, held_out: usize, rng: &mut impl Rng) -> DividedSamples {
-        let mut validation = self.units(set);
-        let held_out = held_out.min(validation.len().saturating_sub(1));
-        if held_out > 0 {
-            validation = self.ordered_units(set, rng);
-        }
-        let training = validation.split_off(held_out);
+        let mut validation = self.ordered_units(set, rng);
+        let training = validation.split_off(held_out.min(validation.len().saturating_sub(1)));
         DividedSamples {
             training: ascending(training.concat()),
             validation: ascending(validation.concat()),
@@ -342,7 +310,7 @@ mod tests {
             divide(&set, SplitBy::Time, 1).unwrap(),
             "no random numbers are used"
         );
-        assert_eq!(parts.test_set(&set).targets()[[0, 0]], 80.0);
+        assert_eq!(set.select(&parts.test).targets()[[0, 0]], 80.0);
         assert_eq!(parts.split(&set).validation.unwrap().samples(), 16);
     }
 
@@ -391,13 +359,13 @@ mod tests {
             let set = set((0..samples).map(|sample| sample / 2).collect());
             for by in SplitBy::ALL {
                 let Ok(parts) = divide(&set, by, 3) else {
-                    assert_eq!(samples, 2, "{by}");
+                    assert_eq!(samples, 2, "{by:?}");
                     continue;
                 };
                 let mut all = [&parts.training[..], &parts.validation, &parts.test].concat();
                 all.sort_unstable();
-                assert_eq!(all, Vec::from_iter(0..samples), "{by}");
-                assert!(!parts.training.is_empty() && !parts.test.is_empty(), "{by}");
+                assert_eq!(all, Vec::from_iter(0..samples), "{by:?}");
+                assert!(!parts.training.is_empty() && !parts.test.is_empty(), "{by:?}");
             }
         }
     }
@@ -442,8 +410,8 @@ mod tests {
             let error = division.divide(&set(vec![0, 1]), &mut Seed(0).rng(Stream::Split));
             assert!(matches!(error, Err(DatasetError::Fraction { .. })), "{division:?}");
         }
-        assert!("block".parse::<SplitBy>().is_err());
-        assert!(SplitBy::ALL.iter().all(|by| by.to_string().parse() == Ok(*by)));
+        assert!(SplitBy::parse("block").is_err());
+        assert!(SplitBy::ALL.iter().all(|by| SplitBy::parse(by.name()) == Ok(*by)));
     }
 
     fn split(samples: usize, held_out: usize) -> (Dataset, Split) {

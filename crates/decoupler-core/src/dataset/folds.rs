@@ -16,9 +16,8 @@ impl Folds {
     /// # Errors
     /// If there are fewer than two folds, or more folds than samples (or groups).
     pub fn by(set: &Dataset, folds: usize, by: SplitBy, rng: &mut impl Rng) -> Result<Self, DatasetError> {
-        let units = by.units(set).len();
-        DatasetError::check_folds(folds, units, by.unit_name(units, set.samples()))?;
         let units = by.ordered_units(set, rng);
+        DatasetError::check_folds(folds, units.len(), by.unit_name(units.len(), set.samples()))?;
         let deal = |fold| ascending(units.iter().skip(fold).step_by(folds).flatten().copied());
         Ok(match by {
             SplitBy::Time => Self::blocks(&units, folds),
@@ -118,7 +117,7 @@ mod tests {
                 }
                 assert_eq!(training.len() + assigned.test(fold).len(), set.samples());
             }
-            assert!(tested.iter().all(|&times| times == 1), "{folds} folds by {unit}");
+            assert!(tested.iter().all(|&times| times == 1), "{folds} folds by {unit:?}");
             let sizes = (0..folds).map(|fold| assigned.test(fold).len());
             let unit_size = if unit == SplitBy::Random { 1 } else { 10 };
             assert!(sizes.clone().max().unwrap() - sizes.min().unwrap() <= unit_size);

@@ -254,6 +254,22 @@ mod tests {
 
     use super::*;
 
+    /// Memory of the readings the given numbers of samples before.
+    fn of_lags(samples: &[usize]) -> Memory {
+        Memory {
+            lags: samples.iter().map(|&lag| Span::Samples(lag as f64)).collect(),
+            ..Memory::default()
+        }
+    }
+
+    /// Memory of averages with these time constants in seconds.
+    fn of_averages_s(time_constants_s: &[f64]) -> Memory {
+        Memory {
+            averages: time_constants_s.iter().map(|&s| Span::Seconds(s)).collect(),
+            ..Memory::default()
+        }
+    }
+
     fn counting(rows: usize) -> Array2<f64> {
         Array2::from_shape_fn((rows, 1), |(row, _)| row as f64)
     }
@@ -264,7 +280,7 @@ mod tests {
         let history = History::new(counting(8), None, None, Some(times_s), vec![0, 1, 4, 5, 6]);
         assert_eq!(history.stretches(), [0, 0, 0, 0, 0, 1, 1, 1]);
         assert!((history.interval_s().unwrap() - 0.1).abs() < 1e-12);
-        let features = history.features(&Memory::of_lags(&[1])).unwrap();
+        let features = history.features(&of_lags(&[1])).unwrap();
         assert_eq!(
             features.column(1).to_vec(),
             [0.0, 0.0, 3.0, 5.0, 5.0],
@@ -281,7 +297,7 @@ mod tests {
         let times_s = vec![0.0, 0.0, 0.1, 0.1, 0.2, 0.2];
         let history = History::new(counting(6), Some(&[0, 1, 0, 1, 0, 1]), None, Some(times_s), vec![5]);
         assert_eq!(history.stretches(), [0, 1, 0, 1, 0, 1]);
-        assert_eq!(history.features(&Memory::of_lags(&[1])).unwrap()[[0, 1]], 3.0);
+        assert_eq!(history.features(&of_lags(&[1])).unwrap()[[0, 1]], 3.0);
     }
 
     #[test]
@@ -292,18 +308,18 @@ mod tests {
         };
         let refused = |history: History, memory: Memory| history.checked(&memory).unwrap_err().to_string();
         let in_milliseconds = of_times(&[0.0, 10.0, 20.0, 30.0]);
-        let text = refused(in_milliseconds, Memory::of_averages_s(&[0.5]));
+        let text = refused(in_milliseconds, of_averages_s(&[0.5]));
         assert!(
             text.contains("shorter than the usual interval") && text.contains("10.0 s"),
             "{text}"
         );
-        let text = refused(of_times(&[4.0, 4.0]), Memory::of_averages_s(&[3.0]));
+        let text = refused(of_times(&[4.0, 4.0]), of_averages_s(&[3.0]));
         assert!(
             text.contains("no time is later") && !text.contains("name the time column"),
             "{text}"
         );
         let untimed = History::new(counting(2), None, None, None, vec![0]);
-        assert!(refused(untimed, Memory::of_averages_s(&[3.0])).contains("name the time column"));
+        assert!(refused(untimed, of_averages_s(&[3.0])).contains("name the time column"));
     }
 
     #[test]
@@ -314,7 +330,7 @@ mod tests {
         history.append(&History::new(counting(4), None, None, times_s(0.4), vec![0, 2]));
         assert_eq!(history.stretches(), [0, 0, 0, 0, 1, 1, 1, 1]);
         assert_eq!(history.samples(), [1, 3, 4, 6]);
-        let features = history.features(&Memory::of_lags(&[1])).unwrap();
+        let features = history.features(&of_lags(&[1])).unwrap();
         assert_eq!(features.column(1).to_vec(), [0.0, 2.0, 0.0, 1.0]);
     }
 
@@ -327,11 +343,11 @@ mod tests {
             RowOrder::Shuffled { count: 2, first_row: 1 }
         ));
         assert!((shuffled.interval_s().unwrap() - 0.1).abs() < 1e-12);
-        let features = shuffled.features(&Memory::of_lags(&[1])).unwrap();
+        let features = shuffled.features(&of_lags(&[1])).unwrap();
         assert_eq!(features.column(1).to_vec(), [2.0, 3.0, 1.0, 3.0]);
         let twice = Vec::from_iter((0..120).map(|row| f64::from(row % 60)));
         let restarted = History::new(counting(120), None, None, Some(twice), vec![59, 60, 61]);
-        let features = restarted.features(&Memory::of_lags(&[1])).unwrap();
+        let features = restarted.features(&of_lags(&[1])).unwrap();
         assert_eq!(features.column(1).to_vec(), [58.0, 60.0, 60.0]);
     }
 
@@ -339,9 +355,9 @@ mod tests {
     fn row_wires_remember_apart() {
         let row_wires = [0, 1, 2, 0, 1, 2];
         let history = History::new(counting(6), None, Some(&row_wires), None, vec![3, 4, 5]);
-        let features = history.features(&Memory::of_lags(&[1])).unwrap();
+        let features = history.features(&of_lags(&[1])).unwrap();
         assert_eq!(features.column(1).to_vec(), [0.0, 1.0, 2.0]);
-        let mut stream = MemoryStream::new(&Memory::of_lags(&[1]), 1).unwrap();
+        let mut stream = MemoryStream::new(&of_lags(&[1]), 1).unwrap();
         let series = |row: usize| Series {
             group: 0,
             row_wire: row_wires[row],
@@ -361,7 +377,7 @@ mod tests {
             Some(times_s.clone()),
             Vec::from_iter(0..8),
         );
-        let memory = history.resolved(&Memory::of_averages_s(&[0.2, 3.0]));
+        let memory = history.resolved(&of_averages_s(&[0.2, 3.0]));
         let expected = history.features(&memory).unwrap();
         let mut stream = MemoryStream::new(&memory, 1).unwrap();
         let only = Series::default();

@@ -45,22 +45,6 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Memory of exponential averages with these time constants in seconds.
-    pub fn of_averages_s(time_constants_s: &[f64]) -> Self {
-        Self {
-            averages: time_constants_s.iter().map(|&s| Span::Seconds(s)).collect(),
-            ..Self::default()
-        }
-    }
-
-    /// Memory of the readings the given numbers of samples before.
-    pub fn of_lags(samples: &[usize]) -> Self {
-        Self {
-            lags: samples.iter().map(|&lag| Span::Samples(lag as f64)).collect(),
-            ..Self::default()
-        }
-    }
-
     /// `true` if the features are the readings alone.
     pub fn is_empty(&self) -> bool {
         self.lags.is_empty() && self.averages.is_empty() && !self.differences
@@ -357,6 +341,22 @@ mod tests {
     use super::*;
     use crate::dataset::{History, Seed, Stream};
 
+    /// Memory of the readings the given numbers of samples before.
+    fn of_lags(samples: &[usize]) -> Memory {
+        Memory {
+            lags: samples.iter().map(|&lag| Span::Samples(lag as f64)).collect(),
+            ..Memory::default()
+        }
+    }
+
+    /// Memory of averages with these time constants in seconds.
+    fn of_averages_s(time_constants_s: &[f64]) -> Memory {
+        Memory {
+            averages: time_constants_s.iter().map(|&s| Span::Seconds(s)).collect(),
+            ..Memory::default()
+        }
+    }
+
     fn all(memory: &Memory, readings: ArrayView2<'_, f64>) -> Array2<f64> {
         of_series(memory, readings, &vec![0; readings.nrows()], None).unwrap()
     }
@@ -378,14 +378,14 @@ mod tests {
         let memory = Memory {
             interval_s: Some(0.01),
             lags: vec![Span::Samples(2.0), Span::Seconds(0.01)],
-            ..Memory::of_averages_s(&[2.0])
+            ..of_averages_s(&[2.0])
         };
         let names = ["a", "b", "a[-2]", "b[-2]", "a[-0.01s]", "b[-0.01s]", "a~2s", "b~2s"];
         assert_eq!(memory.names(["a", "b"]), names);
         assert_eq!(memory.features(2), names.len());
         let memory = Memory {
             differences: true,
-            ..Memory::of_lags(&[5])
+            ..of_lags(&[5])
         };
         assert_eq!(memory.names(["a"]), ["a", "a-a[-5]"]);
         let memory = Memory {
@@ -399,7 +399,7 @@ mod tests {
     /// One state of ten channels takes 8 MB, those of all groups 800 GB.
     #[test]
     fn many_interleaved_series_take_one_state() {
-        let memory = Memory::of_lags(&[LARGEST_LAG]);
+        let memory = of_lags(&[LARGEST_LAG]);
         let groups = Vec::from_iter(0..100_000);
         let interleaved = [&groups[..], &groups].concat();
         let readings = Array2::from_shape_fn((interleaved.len(), 10), |(row, channel)| (10 * row + channel) as f64);
@@ -416,7 +416,7 @@ mod tests {
             lags: vec![Span::Samples(1.0)],
             differences: true,
             interval_s: Some(0.1),
-            ..Memory::of_averages_s(&[0.3])
+            ..of_averages_s(&[0.3])
         };
         let found = all(&memory, array![[1e308], [-1e308], [-1e308], [2.0]].view());
         assert!(found.iter().all(|feature| feature.is_finite()), "{found}");
@@ -426,7 +426,7 @@ mod tests {
     #[test]
     fn lags_reach_back_within_the_series_and_begin_with_its_first_sample() {
         let readings = array![[1.0, 10.0], [2.0, 20.0], [3.0, 30.0], [4.0, 40.0], [5.0, 50.0]];
-        let found = all(&Memory::of_lags(&[1, 3]), readings.view());
+        let found = all(&of_lags(&[1, 3]), readings.view());
         let expected = array![
             [1.0, 10.0, 1.0, 10.0, 1.0, 10.0],
             [2.0, 20.0, 1.0, 10.0, 1.0, 10.0],
@@ -436,7 +436,7 @@ mod tests {
         ];
         assert_eq!(found, expected);
         // Two interleaved groups.
-        let found = of_series(&Memory::of_lags(&[1]), readings.view(), &[7, 3, 7, 3, 7], None).unwrap();
+        let found = of_series(&of_lags(&[1]), readings.view(), &[7, 3, 7, 3, 7], None).unwrap();
         assert_eq!(found.column(2).to_vec(), [1.0, 2.0, 1.0, 2.0, 3.0]);
     }
 
@@ -448,7 +448,7 @@ mod tests {
         readings[[0, 0]] = 0.0;
         let memory = Memory {
             interval_s: Some(0.5),
-            ..Memory::of_averages_s(&[2.0, 0.5])
+            ..of_averages_s(&[2.0, 0.5])
         };
         let found = of_series(&memory, readings.view(), &[0; 7], Some(&times_s)).unwrap();
         for (row, time_s) in found.rows().into_iter().zip(times_s) {
@@ -477,7 +477,7 @@ mod tests {
         };
         let in_seconds = Memory {
             interval_s: Some(0.2),
-            ..Memory::of_averages_s(&[0.6])
+            ..of_averages_s(&[0.6])
         };
         for memory in [in_samples, in_seconds] {
             let found = all(&memory, readings.view());
@@ -530,9 +530,9 @@ mod tests {
     #[test]
     fn impossible_memories_are_refused() {
         let refused = |memory: Memory| memory.check(3).unwrap_err().to_string();
-        assert!(refused(Memory::of_averages_s(&[2.0])).contains("needs times"));
-        assert!(refused(Memory::of_lags(&[0])).contains("from 1"));
-        assert!(refused(Memory::of_lags(&[LARGEST_LAG + 1])).contains("100000"));
+        assert!(refused(of_averages_s(&[2.0])).contains("needs times"));
+        assert!(refused(of_lags(&[0])).contains("from 1"));
+        assert!(refused(of_lags(&[LARGEST_LAG + 1])).contains("100000"));
         assert!(
             refused(Memory {
                 interval_s: Some(f64::NAN),
@@ -543,11 +543,11 @@ mod tests {
         assert!(
             refused(Memory {
                 interval_s: Some(1.0),
-                ..Memory::of_averages_s(&[-1.0])
+                ..of_averages_s(&[-1.0])
             })
             .contains("more than 0")
         );
-        let huge = Memory::of_lags(&[LARGEST_LAG]).check(101).unwrap_err();
+        let huge = of_lags(&[LARGEST_LAG]).check(101).unwrap_err();
         assert!(
             matches!(huge, DatasetError::MemoryExcess { state: 10_100_000, .. }),
             "{huge}"

@@ -1,4 +1,4 @@
-use std::{fmt, ops::AddAssign};
+use std::{array, fmt, ops::AddAssign};
 
 use ndarray::{Array2, Axis};
 use thiserror::Error;
@@ -20,15 +20,27 @@ pub trait Decoder: Send {
     /// Number of targets per row.
     fn outputs(&self) -> usize;
 
-    /// Decodes one row: reads `readings` (channels) of the row-wire with this index among those read, and writes
-    /// `targets` (outputs).
+    /// Decodes rows that need not form a frame: `readings` are rows × channels and `targets` rows × outputs, each for
+    /// the row-wire with its index among those read.
     ///
     /// # Errors
-    /// If a reading cannot be decoded; nothing is then written.
+    /// If a reading cannot be decoded; `row_index` is then the index among these rows, and the contents of `targets`
+    /// are unspecified.
     ///
     /// # Panics
     /// If the slices have other lengths, or there is no such row-wire.
-    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError>;
+    fn decode_rows(&mut self, row_indices: &[usize], readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError>;
+
+    /// Decodes one row, as [`Self::decode_rows`].
+    ///
+    /// # Errors
+    /// If a reading cannot be decoded; the contents of `targets` are then unspecified.
+    ///
+    /// # Panics
+    /// If the slices have other lengths, or there is no such row-wire.
+    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        self.decode_rows(&[row_index], readings, targets)
+    }
 
     /// Decodes a frame, the readings of all row-wires at one moment: `readings` are rows × channels, row by row, and
     /// `targets` rows × outputs.
@@ -39,33 +51,17 @@ pub trait Decoder: Send {
     /// # Panics
     /// If the slices do not consist of whole rows.
     fn decode(&mut self, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        /// Rows that are decoded at once: their indices are on the stack.
+        const BLOCK: usize = 64;
         let (channels, outputs) = (self.channels(), self.outputs());
         assert_eq!(readings.len() / channels, targets.len() / outputs);
-        let rows = readings.chunks_exact(channels).zip(targets.chunks_exact_mut(outputs));
-        for (row_index, (readings, targets)) in rows.enumerate() {
-            self.decode_row(row_index, readings, targets)
-                .map_err(|error| DecodeError { row_index, ..error })?;
-        }
-        Ok(())
-    }
-
-    /// Decodes rows that need not form a frame: `readings` are rows × channels and `targets` rows × outputs, each for
-    /// the row-wire with its index among those read.
-    ///
-    /// # Errors
-    /// If a reading cannot be decoded; `row_index` is then the index among these rows, and the contents of `targets`
-    /// are unspecified.
-    ///
-    /// # Panics
-    /// If the slices have other lengths, or there is no such row-wire.
-    fn decode_rows(&mut self, row_indices: &[usize], readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        let (channels, outputs) = (self.channels(), self.outputs());
-        let lengths = (row_indices.len() * channels, row_indices.len() * outputs);
-        assert_eq!((readings.len(), targets.len()), lengths);
-        let rows = readings.chunks_exact(channels).zip(targets.chunks_exact_mut(outputs));
-        for (row_index, (&known, (readings, targets))) in row_indices.iter().zip(rows).enumerate() {
-            self.decode_row(known, readings, targets)
-                .map_err(|error| DecodeError { row_index, ..error })?;
+        let blocks = readings
+            .chunks(BLOCK * channels)
+            .zip(targets.chunks_mut(BLOCK * outputs));
+        for (block, (readings, targets)) in blocks.enumerate() {
+            let row_indices: [usize; BLOCK] = array::from_fn(|row| block * BLOCK + row);
+            self.decode_rows(&row_indices[..readings.len() / channels], readings, targets)
+                .map_err(|error| error.after(block * BLOCK))?;
         }
         Ok(())
     }
@@ -110,25 +106,25 @@ pub struct DecodeError {
 }
 
 impl DecodeError {
-    /// Checks that all readings of a row are finite and above 0.
-    #[inline(always)]
-    pub(crate) fn check(readings: &[f64]) -> Result<(), Self> {
-        Self::check_that(readings, |value| (value > 0.0) & (value < f64::INFINITY))
+    /// Checks that all readings (rows × channels) are finite and above 0.
+    pub(crate) fn check(readings: &[f64], channels: usize) -> Result<(), Self> {
+        let is_valid = |value: f64| (value > 0.0) & (value < f64::INFINITY);
+        match readings.iter().position(|&value| !is_valid(value)) {
+            None => Ok(()),
+            Some(place) => Err(Self {
+                row_index: place / channels,
+                channel: place % channels,
+                value: readings[place],
+            }),
+        }
     }
 
-    /// Checks that `is_valid` holds for all readings of a row, in a single vectorised pass, since invalid readings
-    /// are rare.
-    #[inline(always)]
-    fn check_that(readings: &[f64], is_valid: impl Fn(f64) -> bool) -> Result<(), Self> {
-        if readings.iter().fold(true, |all, &value| all & is_valid(value)) {
-            return Ok(());
+    /// Returns the error of a row that comes after `rows` others.
+    pub(crate) fn after(self, rows: usize) -> Self {
+        Self {
+            row_index: rows + self.row_index,
+            ..self
         }
-        let channel = readings.iter().position(|&value| !is_valid(value)).unwrap_or(0);
-        Err(Self {
-            row_index: 0,
-            channel,
-            value: readings[channel],
-        })
     }
 }
 
@@ -153,10 +149,7 @@ pub fn decode_set(decoder: &mut dyn Decoder, set: &Dataset) -> Result<Array2<f64
         let answers = answers.as_slice_mut().expect("rows of a standard array are contiguous");
         decoder
             .decode_rows(&row_indices, &readings, answers)
-            .map_err(|error| DecodeError {
-                row_index: first + error.row_index,
-                ..error
-            })?;
+            .map_err(|error| error.after(first))?;
     }
     Ok(answers)
 }

@@ -1,4 +1,4 @@
-use std::{fmt, str::FromStr};
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -9,7 +9,7 @@ use crate::{
     network::{InputChoice, NetworkError, Networks},
     scene::{NoiseSource, RowModel, Scene},
     sensor::{SensorError, SensorModel},
-    text::{Named, UnknownName},
+    text::Named,
 };
 
 /// Method of decoding the readings of a frame.
@@ -150,15 +150,7 @@ impl Named for DecoderKind {
 impl fmt::Display for DecoderKind {
     /// Writes the name used in the terminal and in files.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.entry().name)
-    }
-}
-
-impl FromStr for DecoderKind {
-    type Err = UnknownName;
-
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        Self::parse(text)
+        f.pad(Named::name(*self))
     }
 }
 
@@ -254,9 +246,9 @@ mod tests {
     #[test]
     fn names_parse_and_errors_list_the_choices() {
         for kind in DecoderKind::ALL {
-            assert_eq!(kind.to_string().parse(), Ok(kind));
+            assert_eq!(DecoderKind::parse(Named::name(kind)), Ok(kind));
         }
-        let message = "neural".parse::<DecoderKind>().unwrap_err().to_string();
+        let message = DecoderKind::parse("neural").unwrap_err().to_string();
         assert!(message.ends_with("newton or polish"), "{message}");
     }
 }

@@ -187,13 +187,14 @@ fn rms_residual(sensor: &SensorModel, test: &Dataset, answers: &Array2<f64>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::text::Named;
 
     #[test]
     fn decoders_are_found_by_name() {
         for kind in DecoderKind::ALL {
-            assert_eq!(kind.to_string().parse(), Ok(kind));
+            assert_eq!(DecoderKind::parse(Named::name(kind)), Ok(kind));
         }
-        let message = "knn".parse::<DecoderKind>().unwrap_err().to_string();
+        let message = DecoderKind::parse("knn").unwrap_err().to_string();
         assert!(message.contains("rbf"), "{message}");
     }
 }

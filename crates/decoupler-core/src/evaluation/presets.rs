@@ -1,4 +1,4 @@
-use std::{fmt, str::FromStr};
+use std::fmt;
 
 use super::RunSettings;
 use crate::{
@@ -6,7 +6,7 @@ use crate::{
     machine::node_pairs_per_row,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Indenter, Loading, Noise, Rows, Scene},
-    text::{Named, UnknownName},
+    text::Named,
     training::StoppingRules,
 };
 
@@ -73,14 +73,6 @@ impl Named for Preset {
 impl fmt::Display for Preset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
-    }
-}
-
-impl FromStr for Preset {
-    type Err = UnknownName;
-
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        Self::parse(text)
     }
 }
 

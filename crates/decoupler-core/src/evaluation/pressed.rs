@@ -306,7 +306,7 @@ mod tests {
             18
         }
 
-        fn decode_row(&mut self, _: usize, _: &[f64], answer: &mut [f64]) -> Result<(), DecodeError> {
+        fn decode_rows(&mut self, _: &[usize], _: &[f64], answer: &mut [f64]) -> Result<(), DecodeError> {
             answer.fill(0.0);
             self.frames += 1;
             let ms = if self.frames <= self.slow {

@@ -291,8 +291,11 @@ fn defect_of(start: &StartTrainer) -> Option<String> {
     let (first, defect) = defects.next()?;
     let (defective, networks) = (1 + defects.count(), start.rows().len());
     Some(match networks {
-        1 => defect.to_string(),
-        _ => format!("{defective} of {networks} networks, the first being number {first}: {defect}"),
+        1 => defect.text,
+        _ => format!(
+            "{defective} of {networks} networks, the first being number {first}: {}",
+            defect.text
+        ),
     })
 }
 

@@ -1,4 +1,4 @@
-use std::{fmt, str::FromStr};
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +7,7 @@ use crate::{
     dataset::{LARGEST_SAMPLES, Seed, Simulation},
     network::{InputChoice, LARGEST_HIDDEN},
     scene::{RowModel, Scene},
-    text::{Named, UnknownName},
+    text::Named,
     training::{Method, StoppingRules, TrainingSettings},
 };
 
@@ -116,14 +116,6 @@ impl fmt::Display for Combination {
     }
 }
 
-impl FromStr for Combination {
-    type Err = UnknownName;
-
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        Self::parse(text)
-    }
-}
-
 /// Weights with which a training begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -157,14 +149,6 @@ impl Named for Initialization {
 impl fmt::Display for Initialization {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
-    }
-}
-
-impl FromStr for Initialization {
-    type Err = UnknownName;
-
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        Self::parse(text)
     }
 }
 

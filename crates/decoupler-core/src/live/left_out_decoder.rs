@@ -139,6 +139,29 @@ impl LeftOutDecoder {
         decoded
     }
 
+    /// Decodes rows independently of each other.
+    fn decode_each(
+        &mut self,
+        row_indices: impl ExactSizeIterator<Item = usize>,
+        readings: &[f64],
+        targets: &mut [f64],
+    ) -> Result<(), DecodeError> {
+        let (channels, outputs, count) = (self.channels(), self.outputs(), row_indices.len());
+        assert_eq!((readings.len(), targets.len()), (count * channels, count * outputs));
+        let missing = self.fault.map_or(0..0, |fault| fault.wire.columns());
+        let rows = readings.chunks_exact(channels).zip(targets.chunks_exact_mut(outputs));
+        for (place, (row_index, (readings, targets))) in row_indices.zip(rows).enumerate() {
+            let decoded = if self.is_dead(row_index) {
+                targets.copy_from_slice(&self.means_mm[row_index * outputs..][..outputs]);
+                DecodeError::check(readings, channels)
+            } else {
+                self.decode_without(&missing, row_index, readings, targets)
+            };
+            decoded.map_err(|error| error.after(place))?;
+        }
+        Ok(())
+    }
+
     /// Decodes a row without the readings of up to two column-wires into absolute coordinates (3·M2).
     ///
     /// # Errors
@@ -150,7 +173,7 @@ impl LeftOutDecoder {
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
     ) -> Result<(), DecodeError> {
-        DecodeError::check(readings_ohm)?;
+        DecodeError::check(readings_ohm, readings_ohm.len())?;
         self.filled_ohm.copy_from_slice(readings_ohm);
         let half_way_ohm = &self.half_way_ohm[row_index * readings_ohm.len()..];
         self.filled_ohm[missing.clone()].copy_from_slice(&half_way_ohm[missing.clone()]);
@@ -233,27 +256,15 @@ impl Decoder for LeftOutDecoder {
         self.model.scale.coordinates_per_row()
     }
 
-    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        if self.is_dead(row_index) {
-            DecodeError::check(readings)?;
-            targets.copy_from_slice(&self.means_mm[row_index * targets.len()..][..targets.len()]);
-            return Ok(());
-        }
-        let missing = self.fault.map_or(0..0, |fault| fault.wire.columns());
-        self.decode_without(&missing, row_index, readings, targets)
+    fn decode_rows(&mut self, row_indices: &[usize], readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
+        self.decode_each(row_indices.iter().copied(), readings, targets)
     }
 
     /// Decodes a frame. Unlike with other decoders, this is more accurate for a faulty row than [`Self::decode_row`],
     /// which has no access to the neighbouring rows.
     fn decode(&mut self, frame: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        let (channels, outputs, count) = (self.channels(), self.outputs(), self.rows.len());
-        assert_eq!((frame.len() / channels, targets.len() / outputs), (count, count));
-        let rows = frame.chunks_exact(channels).zip(targets.chunks_exact_mut(outputs));
-        for (row_index, (readings, targets)) in rows.enumerate() {
-            self.decode_row(row_index, readings, targets)
-                .map_err(|error| DecodeError { row_index, ..error })?;
-        }
-        let dead = (0..count).find(|&row_index| self.is_dead(row_index));
+        self.decode_each(0..self.rows.len(), frame, targets)?;
+        let dead = (0..self.rows.len()).find(|&row_index| self.is_dead(row_index));
         if let Some(dead) = dead.filter(|_| self.has_neighbours) {
             self.interpolate(dead, targets);
         }

@@ -1,4 +1,4 @@
-use std::{fmt, str::FromStr};
+use std::fmt;
 
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     scene::{NoiseSource, RelativeNoise},
-    text::{Named, UnknownName},
+    text::Named,
 };
 
 /// Choice of the input quantity and its scaling.
@@ -85,14 +85,6 @@ impl Named for ScalingChoice {
 impl fmt::Display for ScalingChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
-    }
-}
-
-impl FromStr for ScalingChoice {
-    type Err = UnknownName;
-
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        Self::parse(text)
     }
 }
 

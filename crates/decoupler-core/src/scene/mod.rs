@@ -11,7 +11,7 @@ pub(crate) use noise::standard_normal;
 pub use noise::{Noise, NoiseSource, NoisySets, RelativeNoise};
 pub use rows::{RowModel, Rows};
 
-use std::{fmt, str::FromStr};
+use std::fmt;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -19,7 +19,7 @@ use thiserror::Error;
 
 use crate::{
     sensor::{ArrayScale, Axes, Geometry, SensorModel, short},
-    text::{Named, UnknownName},
+    text::Named,
 };
 
 /// Rows read, movement, loading and noise of the readings. The default is that of the paper.
@@ -225,15 +225,6 @@ impl Named for Movement {
 impl fmt::Display for Movement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
-    }
-}
-
-impl FromStr for Movement {
-    type Err = UnknownName;
-
-    /// Parses `z` or `xyz`.
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        Self::parse(text)
     }
 }
 

@@ -3,14 +3,16 @@
 use std::{
     fmt::{self, Display},
     ops::RangeInclusive,
-    str::FromStr,
 };
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Method;
-use crate::sensor::short;
+use crate::{
+    sensor::{ArrayScale, SensorError, short},
+    text::Named,
+};
 
 /// A setting of `S`: a row of a table.
 #[derive(Clone, Copy, Debug)]
@@ -73,13 +75,24 @@ impl AsText for Method {
     }
 }
 
-impl<T: Display + FromStr<Err: Display>> AsText for T {
+impl AsText for ArrayScale {
     fn text(&self) -> String {
         self.to_string()
     }
 
     fn read(&mut self, text: &str) -> Result<(), String> {
-        *self = text.parse().map_err(|error: T::Err| error.to_string())?;
+        *self = text.parse().map_err(|error: SensorError| error.to_string())?;
+        Ok(())
+    }
+}
+
+impl<T: Named> AsText for T {
+    fn text(&self) -> String {
+        self.name().to_owned()
+    }
+
+    fn read(&mut self, text: &str) -> Result<(), String> {
+        *self = Self::parse(text).map_err(|error| error.to_string())?;
         Ok(())
     }
 }

@@ -70,12 +70,6 @@ fn diverged_in(history: &[EpochRecord], reason: StopReason) -> Option<usize> {
     (after < history.len() || reason == StopReason::Diverged).then_some(after)
 }
 
-impl fmt::Display for TrainingDefect {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(&self.text)
-    }
-}
-
 /// Reason why a training ended: a result, not an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

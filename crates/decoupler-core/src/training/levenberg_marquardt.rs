@@ -1,7 +1,5 @@
 //! Levenberg-Marquardt (`trainlm`), and the damping mu of all methods that take Levenberg-Marquardt steps.
 
-use serde::{Deserialize, Serialize};
-
 use super::{
     Damping, Evaluation, Examples, StopReason,
     method::{Algorithm, MethodState, add_step},
@@ -18,12 +16,6 @@ pub(super) struct LevenbergMarquardt {
     equations: NormalEquations,
     step: Vec<f64>,
     candidate: Mlp,
-}
-
-/// State of Levenberg-Marquardt.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct DampedState {
-    mu: f64,
 }
 
 impl LevenbergMarquardt {
@@ -62,11 +54,11 @@ impl Algorithm for LevenbergMarquardt {
     }
 
     fn state(&self) -> MethodState {
-        MethodState::LevenbergMarquardt(DampedState { mu: self.mu })
+        MethodState::LevenbergMarquardt { mu: self.mu }
     }
 
     fn restore(&mut self, state: MethodState) {
-        if let MethodState::LevenbergMarquardt(DampedState { mu }) = state {
+        if let MethodState::LevenbergMarquardt { mu } = state {
             self.mu = mu;
         }
     }

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::{
     Evaluation, Examples, Method, StopReason,
     bayesian_regularization::{BayesianRegularization, BayesianState},
-    gradient_descent::{AdaptiveState, GradientDescent, ResilientState},
-    levenberg_marquardt::{DampedState, LevenbergMarquardt},
+    gradient_descent::{AdaptiveState, GradientDescent},
+    levenberg_marquardt::LevenbergMarquardt,
     normal_equations::Plan,
     scaled_conjugate_gradient::{ConjugateState, ScaledConjugateGradient},
 };
@@ -44,13 +44,21 @@ pub(super) trait Algorithm: Send + Sync {
 #[serde(rename_all = "snake_case")]
 pub enum MethodState {
     /// State of [`Method::LevenbergMarquardt`].
-    LevenbergMarquardt(DampedState),
+    LevenbergMarquardt {
+        /// Damping.
+        mu: f64,
+    },
     /// State of [`Method::BayesianRegularization`].
     BayesianRegularization(BayesianState),
     /// State of [`Method::ScaledConjugateGradient`].
     ScaledConjugateGradient(ConjugateState),
     /// State of [`Method::Resilient`].
-    Resilient(ResilientState),
+    Resilient {
+        /// Gradient of the previous epoch.
+        previous_gradient: Vec<f64>,
+        /// Step length of each weight.
+        lengths: Vec<f64>,
+    },
     /// State of [`Method::AdaptiveDescent`].
     AdaptiveDescent(AdaptiveState),
     /// Previous step of [`Method::StepMomentum`].
@@ -65,9 +73,12 @@ impl MethodState {
     /// Returns `true` if the state has finite values for this many weights.
     pub(super) fn fits(&self, weights: usize) -> bool {
         let vectors = match self {
-            Self::LevenbergMarquardt(_) | Self::BayesianRegularization(_) | Self::GradientDescent => Vec::new(),
+            Self::LevenbergMarquardt { .. } | Self::BayesianRegularization(_) | Self::GradientDescent => Vec::new(),
             Self::ScaledConjugateGradient(state) => vec![&state.p[..], &state.r],
-            Self::Resilient(state) => vec![&state.previous_gradient[..], &state.lengths],
+            Self::Resilient {
+                previous_gradient,
+                lengths,
+            } => vec![&previous_gradient[..], lengths],
             Self::AdaptiveDescent(state) => vec![&state.step[..]],
             Self::StepMomentum(previous) | Self::Momentum(previous) => vec![&previous[..]],
         };

@@ -1,7 +1,7 @@
 //! Programs of every operation, by hand and against their definition.
 
 use decoupler_core::{
-    dataset::{Memory, PerRow, Seed, Stream},
+    dataset::{Memory, PerRow, Seed, Span, Stream},
     decoupling::{
         Builder, DecodeError, Decoder, Domain, Function, NodeId, Operation, Precision, Program, ProgramDecoder,
     },
@@ -297,7 +297,8 @@ fn single_precision_keeps_the_digits_of_readings_that_hardly_differ() {
 fn history_continues_in_its_group_and_row_wire_and_restarts_after_a_pause() {
     let memory = Memory {
         interval_s: Some(0.1),
-        ..Memory::of_averages_s(&[0.2])
+        averages: vec![Span::Seconds(0.2)],
+        ..Memory::default()
     };
     // The average of the reading.
     let of_features = of_one(2, |b, x| b.affine(x, array![[0.0], [1.0]], &[0.0], Precision::Double));

@@ -97,7 +97,7 @@ fn stalled_or_diverged_trainings_report_cause_and_remedy() {
     for (name, values, words) in cases {
         let trainer = trained(method(name, values), 30);
         let defect = TrainingDefect::of(&trainer).unwrap_or_else(|| panic!("{name} has a defect"));
-        let text = defect.to_string();
+        let text = defect.text.clone();
         assert!(
             defect.is_at_start && text.contains("no better than its random start"),
             "{text}"
@@ -142,8 +142,9 @@ fn late_divergence_names_the_epoch_and_keeps_the_best_weights() {
         assert!(history[epoch..].iter().all(|record| record.training_mse > start_mse));
         assert!(history[epoch - 1].training_mse <= start_mse);
         assert!(
-            defect.to_string().contains(&format!("diverged in epoch {epoch}")),
-            "{defect}"
+            defect.text.contains(&format!("diverged in epoch {epoch}")),
+            "{}",
+            defect.text
         );
         let errors = history.iter().filter_map(|record| record.validation_mse);
         assert_eq!(trainer.best_mse(), errors.fold(f64::INFINITY, f64::min));

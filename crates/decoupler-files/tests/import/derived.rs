@@ -55,7 +55,8 @@ fn a_stream_has_the_derived_columns_of_a_file_bit_for_bit_once_the_start_is_over
     let derive = ["d=a-b", "q=a/b", "r=a/start(7)", "p=r-start(0.3s)"];
     let memory = Memory {
         lags: vec![Span::Samples(20.0)],
-        ..Memory::of_averages_s(&[1.0])
+        averages: vec![Span::Seconds(1.0)],
+        ..Memory::default()
     };
     // Rows of the start: one of the columns needs the first 0.3 s, which are over after 16 rows.
     for (derive, memory, start) in [

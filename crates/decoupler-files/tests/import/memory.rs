@@ -45,7 +45,8 @@ fn features_come_from_all_readings_and_start_again_after_a_gap() {
     let folder = folder(40);
     let memory = Memory {
         lags: vec![Span::Samples(1.0), Span::Seconds(0.04)],
-        ..Memory::of_averages_s(&[0.1])
+        averages: vec![Span::Seconds(0.1)],
+        ..Memory::default()
     };
     let recording = import(&recipe(Some(memory.clone())), folder.path()).unwrap();
     let titles = Vec::from_iter(recording.inputs.iter().map(|channel| channel.title()));
@@ -82,7 +83,10 @@ fn features_come_from_all_readings_and_start_again_after_a_gap() {
 #[test]
 fn groups_have_a_past_of_their_own() {
     let folder = folder(40);
-    let mut recipe = recipe(Some(Memory::of_lags(&[3])));
+    let mut recipe = recipe(Some(Memory {
+        lags: vec![Span::Samples(3.0)],
+        ..Memory::default()
+    }));
     recipe.group = Some("group".to_owned());
     let recording = import(&recipe, folder.path()).unwrap();
     // Row 10 is the first of its group, row 11 the second.
@@ -133,7 +137,10 @@ fn the_state_continues_into_the_test_samples_and_test_files_have_the_intervals_o
 #[test]
 fn a_memory_in_seconds_needs_times_in_a_unit_of_time() {
     let folder = folder(40);
-    let mut without = recipe(Some(Memory::of_averages_s(&[2.0])));
+    let mut without = recipe(Some(Memory {
+        averages: vec![Span::Seconds(2.0)],
+        ..Memory::default()
+    }));
     without.time = None;
     assert!(
         import(&without, folder.path())
@@ -145,7 +152,10 @@ fn a_memory_in_seconds_needs_times_in_a_unit_of_time() {
         ..Memory::default()
     });
     assert_eq!(import(&without, folder.path()).unwrap().set.channels(), 2);
-    let mut strange = recipe(Some(Memory::of_averages_s(&[2.0])));
+    let mut strange = recipe(Some(Memory {
+        averages: vec![Span::Seconds(2.0)],
+        ..Memory::default()
+    }));
     strange.units.insert("t".to_owned(), "V".to_owned());
     assert!(
         import(&strange, folder.path())

@@ -2,7 +2,7 @@
 
 use std::{fs, ops::ControlFlow, path::Path};
 
-use decoupler_core::dataset::Memory;
+use decoupler_core::dataset::{Memory, Span};
 use decoupler_files::import::{
     Cells, ColumnKind, Decimal, DialectChoice, Encoding, Inspection, Joined, Progress, Recipe, Recording, Separator,
     Table, read_table,
@@ -615,7 +615,10 @@ fn a_time_zone_in_the_header_is_no_unit() {
         let folder = folder(&[("data.csv", &text)]);
         let mut wanted = recipe("x", "y");
         wanted.time = Some("time".to_owned());
-        wanted.memory = Some(Memory::of_averages_s(&[2.0]));
+        wanted.memory = Some(Memory {
+            averages: vec![Span::Seconds(2.0)],
+            ..Memory::default()
+        });
         let recording = import(&wanted, &folder).unwrap();
         assert_eq!(
             recording.history().times_s().map(|times| times[1] - times[0]),

@@ -2,7 +2,7 @@
 
 use std::{fs, ops::ControlFlow, path::Path};
 
-use decoupler_core::dataset::{Memory, Seed, SplitBy};
+use decoupler_core::dataset::{Memory, Seed, Span, SplitBy};
 use decoupler_files::import::{FileSet, ImportError, Joined, Plan, Recipe, Recording};
 use tempfile::TempDir;
 
@@ -94,7 +94,10 @@ fn equal_values_of_a_group_column_are_one_group_in_all_files() {
 fn the_past_does_not_reach_into_the_file_before() {
     let folder = sessions(2);
     let with_lag = Recipe {
-        memory: Some(Memory::of_lags(&[1])),
+        memory: Some(Memory {
+            lags: vec![Span::Samples(1.0)],
+            ..Memory::default()
+        }),
         ..recipe(2)
     };
     let recording = import(&with_lag, &folder).unwrap();

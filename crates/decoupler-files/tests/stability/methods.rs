@@ -162,7 +162,7 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
         return wrong(format!("the reported reason for stopping does not hold: {reason}"));
     }
     match defect {
-        Some(defect) => flagged(&defect),
+        Some(defect) => flagged(&defect.text),
         None if start > 0.0 && best >= 0.99 * start => wrong(format!(
             "the network has its random initial weights, without a remark: {reason}"
         )),

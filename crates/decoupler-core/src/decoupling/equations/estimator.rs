@@ -153,7 +153,7 @@ impl Estimator {
         coordinates_mm: &mut [f64],
         steps: Option<usize>,
     ) -> Result<Estimate, DecodeError> {
-        DecodeError::check(readings_ohm)?;
+        DecodeError::check(readings_ohm, readings_ohm.len())?;
         let quick = self.in_lanes(&[row], readings_ohm, coordinates_mm, steps)[0];
         Ok(quick.unwrap_or_else(|| self.solve_slowly(row, readings_ohm, coordinates_mm, steps)))
     }

@@ -95,44 +95,6 @@ impl NewtonDecoder {
         decoder.solver.steps = Some(steps);
         Ok(decoder)
     }
-
-    /// Decodes rows of these indices, after the first answers in `targets` if there are any. Rows are solved in parallel
-    /// if there are many.
-    fn solve(&mut self, row_indices: impl Iterator<Item = usize>, readings: &[f64], targets: &mut [f64]) {
-        /// Number of rows from which threads pay.
-        const PARALLEL: usize = 64;
-        /// Rows per block: a multiple of those that are solved side by side.
-        const BLOCK: usize = 16;
-        self.row_wires.clear();
-        self.row_wires.extend(row_indices.map(|index| self.rows[index]));
-        if self.row_wires.len() < PARALLEL {
-            self.solved += self.solver.solve_rows(&mut self.row_wires, readings, targets);
-            return;
-        }
-        let (channels, outputs) = (self.channels(), self.outputs());
-        let solved = self
-            .row_wires
-            .par_chunks_mut(BLOCK)
-            .zip(readings.par_chunks(BLOCK * channels))
-            .zip(targets.par_chunks_mut(BLOCK * outputs))
-            .map_with(self.solver.clone(), |solver, ((rows, readings), targets)| {
-                solver.solve_rows(rows, readings, targets)
-            });
-        self.solved += solved.reduce(SolvedRows::default, |mut all, some| {
-            all += some;
-            all
-        });
-    }
-
-    /// Checks the lengths of slices, and that all readings are resistances.
-    fn check(&self, rows: usize, readings: &[f64], targets: &[f64]) -> Result<(), DecodeError> {
-        let sizes = (rows * self.channels(), rows * self.outputs());
-        assert_eq!((readings.len(), targets.len()), sizes, "whole rows");
-        let mut rows = readings.chunks_exact(self.channels()).enumerate();
-        rows.try_for_each(|(row_index, readings)| {
-            DecodeError::check(readings).map_err(|error| DecodeError { row_index, ..error })
-        })
-    }
 }
 
 impl Solver {
@@ -216,26 +178,37 @@ impl Decoder for NewtonDecoder {
         self.solver.model.scale.coordinates_per_row()
     }
 
-    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        self.decode_rows(&[row_index], readings, targets)
-    }
-
-    fn decode(&mut self, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        let rows = readings.len() / self.channels();
-        self.check(rows, readings, targets)?;
-        if let Some(first) = &mut self.first {
-            first.decode(readings, targets)?;
-        }
-        self.solve(0..rows, readings, targets);
-        Ok(())
-    }
-
+    /// Rows are solved in parallel if there are many.
     fn decode_rows(&mut self, row_indices: &[usize], readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        self.check(row_indices.len(), readings, targets)?;
+        /// Number of rows from which threads pay.
+        const PARALLEL: usize = 64;
+        /// Rows per block: a multiple of those that are solved side by side.
+        const BLOCK: usize = 16;
+        let (channels, outputs) = (self.channels(), self.outputs());
+        let sizes = (row_indices.len() * channels, row_indices.len() * outputs);
+        assert_eq!((readings.len(), targets.len()), sizes, "whole rows");
+        DecodeError::check(readings, channels)?;
         if let Some(first) = &mut self.first {
             first.decode_rows(row_indices, readings, targets)?;
         }
-        self.solve(row_indices.iter().copied(), readings, targets);
+        self.row_wires.clear();
+        self.row_wires.extend(row_indices.iter().map(|&index| self.rows[index]));
+        if row_indices.len() < PARALLEL {
+            self.solved += self.solver.solve_rows(&mut self.row_wires, readings, targets);
+            return Ok(());
+        }
+        let solved = self
+            .row_wires
+            .par_chunks_mut(BLOCK)
+            .zip(readings.par_chunks(BLOCK * channels))
+            .zip(targets.par_chunks_mut(BLOCK * outputs))
+            .map_with(self.solver.clone(), |solver, ((rows, readings), targets)| {
+                solver.solve_rows(rows, readings, targets)
+            });
+        self.solved += solved.reduce(SolvedRows::default, |mut all, some| {
+            all += some;
+            all
+        });
         Ok(())
     }
 

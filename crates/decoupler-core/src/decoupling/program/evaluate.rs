@@ -163,25 +163,6 @@ impl ProgramDecoder {
         }
         answers
     }
-
-    /// Decodes `count` rows; `row_index` gives the index of the row-wire of each.
-    fn evaluate(
-        &mut self,
-        count: usize,
-        row_index: impl Fn(usize) -> usize,
-        readings: &[f64],
-        targets: &mut [f64],
-    ) -> Result<(), DecodeError> {
-        let sizes = (count * self.channels(), count * self.outputs());
-        assert_eq!((readings.len(), targets.len()), sizes, "whole rows");
-        pulp::Arch::new().dispatch(Evaluation {
-            decoder: self,
-            count,
-            row_index,
-            readings,
-            targets,
-        })
-    }
 }
 
 impl Decoder for ProgramDecoder {
@@ -193,16 +174,15 @@ impl Decoder for ProgramDecoder {
         self.program.outputs()
     }
 
-    fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        self.evaluate(1, |_| row_index, readings, targets)
-    }
-
-    fn decode(&mut self, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        self.evaluate(readings.len() / self.channels(), |row| row, readings, targets)
-    }
-
     fn decode_rows(&mut self, row_indices: &[usize], readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        self.evaluate(row_indices.len(), |row| row_indices[row], readings, targets)
+        let sizes = (row_indices.len() * self.channels(), row_indices.len() * self.outputs());
+        assert_eq!((readings.len(), targets.len()), sizes, "whole rows");
+        pulp::Arch::new().dispatch(Evaluation {
+            decoder: self,
+            row_indices,
+            readings,
+            targets,
+        })
     }
 
     fn program(&self) -> Result<Program, NotDescribed> {
@@ -271,61 +251,56 @@ impl Work {
 }
 
 /// A struct instead of a closure so that the body is inlined into the SIMD-dispatched function.
-struct Evaluation<'a, F> {
+struct Evaluation<'a> {
     decoder: &'a mut ProgramDecoder,
-    count: usize,
-    row_index: F,
+    row_indices: &'a [usize],
     readings: &'a [f64],
     targets: &'a mut [f64],
 }
 
-impl<F: Fn(usize) -> usize> WithSimd for Evaluation<'_, F> {
+impl WithSimd for Evaluation<'_> {
     type Output = Result<(), DecodeError>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) -> Self::Output {
         let Self {
             decoder,
-            count,
-            row_index,
+            row_indices,
             readings,
             targets,
         } = self;
         let (channels, outputs) = (decoder.channels(), decoder.outputs());
-        for first in (0..count).step_by(decoder.chunk) {
-            let end = count.min(first + decoder.chunk);
+        for first in (0..row_indices.len()).step_by(decoder.chunk) {
+            let end = row_indices.len().min(first + decoder.chunk);
             let rows = Rows {
-                index: |row| row_index(first + row),
-                count: end - first,
+                indices: &row_indices[first..end],
                 readings: &readings[first * channels..end * channels],
             };
             let targets = &mut targets[first * outputs..end * outputs];
-            decoder.evaluate_chunk(&rows, targets).map_err(|error| DecodeError {
-                row_index: first + error.row_index,
-                ..error
-            })?;
+            decoder
+                .evaluate_chunk(&rows, targets)
+                .map_err(|error| error.after(first))?;
         }
         Ok(())
     }
 }
 
 /// Rows that are evaluated together.
-struct Rows<'a, F> {
+struct Rows<'a> {
     /// Index of the row-wire of each.
-    index: F,
-    count: usize,
+    indices: &'a [usize],
     /// Rows × channels.
     readings: &'a [f64],
 }
 
-impl<F: Fn(usize) -> usize> Rows<'_, F> {
+impl Rows<'_> {
     /// Values of all rows with the padding of each; `None` for constants.
     #[inline(always)]
     fn block<'a>(&'a self, node: &'a Prepared) -> Option<&'a [f64]> {
         match node.work {
             Work::Readings => Some(self.readings),
             Work::Constants(_) => None,
-            _ => Some(&node.values[..self.count * node.stride]),
+            _ => Some(&node.values[..self.indices.len() * node.stride]),
         }
     }
 
@@ -333,7 +308,7 @@ impl<F: Fn(usize) -> usize> Rows<'_, F> {
     #[inline(always)]
     fn row<'a>(&'a self, node: &'a Prepared, row: usize) -> &'a [f64] {
         match &node.work {
-            Work::Constants(constants) => constants.at((self.index)(row)),
+            Work::Constants(constants) => constants.at(self.indices[row]),
             Work::Readings => &self.readings[row * node.stride..(row + 1) * node.stride],
             _ => &node.values[row * node.stride..(row + 1) * node.stride],
         }
@@ -342,11 +317,7 @@ impl<F: Fn(usize) -> usize> Rows<'_, F> {
 
 impl ProgramDecoder {
     #[inline(always)]
-    fn evaluate_chunk<F: Fn(usize) -> usize>(
-        &mut self,
-        rows: &Rows<'_, F>,
-        targets: &mut [f64],
-    ) -> Result<(), DecodeError> {
+    fn evaluate_chunk(&mut self, rows: &Rows<'_>, targets: &mut [f64]) -> Result<(), DecodeError> {
         let Self {
             program, nodes, moment, ..
         } = self;
@@ -366,7 +337,7 @@ impl ProgramDecoder {
             let row = |id: NodeId, row: usize| rows.row(operand(id), row);
             macro_rules! of_rows {
                 (|$row:ident, $results:ident| $body:expr) => {
-                    for $row in 0..rows.count {
+                    for $row in 0..rows.indices.len() {
                         let $results = &mut values[$row * stride..($row + 1) * stride];
                         $body
                     }
@@ -378,7 +349,7 @@ impl ProgramDecoder {
                     let block = rows.block(operand(*of)).expect("constants need no check");
                     // Invalid readings are rare: one vectorised pass finds whether there may be any.
                     if !block.iter().fold(true, |all, &value| all & domain.contains(value)) {
-                        for row_index in 0..rows.count {
+                        for row_index in 0..rows.indices.len() {
                             let values = &row(*of, row_index)[..node.size];
                             if let Some(channel) = values.iter().position(|&value| !domain.contains(value)) {
                                 let value = values[channel];
@@ -411,16 +382,16 @@ impl ProgramDecoder {
                     None => of_rows!(|r, results| kernel::map(precision, *function, row(*of, r), results)),
                 },
                 (Operation::Affine { of, .. }, Work::Placement(placements)) => {
-                    of_rows!(|r, results| placements.at((rows.index)(r)).apply(row(*of, r), results));
+                    of_rows!(|r, results| placements.at(rows.indices[r]).apply(row(*of, r), results));
                 }
                 (Operation::Affine { of, .. }, Work::Table(tables)) => {
                     let inputs = program.node(*of).size;
-                    of_rows!(|r, results| tables.at_mut((rows.index)(r)).affine(&row(*of, r)[..inputs], results));
+                    of_rows!(|r, results| tables.at_mut(rows.indices[r]).affine(&row(*of, r)[..inputs], results));
                 }
                 (Operation::SquaredDistances { of, .. }, Work::Table(tables)) => {
                     let inputs = program.node(*of).size;
                     of_rows!(|r, results| {
-                        let points = tables.at_mut((rows.index)(r));
+                        let points = tables.at_mut(rows.indices[r]);
                         points.squared_distances(&row(*of, r)[..inputs], results);
                     });
                 }
@@ -454,7 +425,7 @@ impl ProgramDecoder {
                     of_rows!(|r, results| {
                         let series = Series {
                             group,
-                            row_wire: (rows.index)(r),
+                            row_wire: rows.indices[r],
                         };
                         results.copy_from_slice(stream.step(series, &row(*of, r)[..channels], time_s).0);
                     });
@@ -471,7 +442,7 @@ impl ProgramDecoder {
         }
         let last = &nodes[output];
         if last.stride != outputs || matches!(last.work, Work::Readings | Work::Constants(_)) {
-            for row in 0..rows.count {
+            for row in 0..rows.indices.len() {
                 targets[row * outputs..(row + 1) * outputs].copy_from_slice(&rows.row(last, row)[..outputs]);
             }
         }

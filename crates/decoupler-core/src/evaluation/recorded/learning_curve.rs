@@ -42,7 +42,7 @@ impl LearningPoint {
         model: FittedModel,
         job: &Job<'_>,
     ) -> Result<Vec<Self>, RunError> {
-        let (whole, test) = (parts.split(set), parts.test_set(set));
+        let (whole, test) = (parts.split(set), set.select(&parts.test));
         let mut rng = settings.seed.rng(Stream::Resampling);
         let mut fits: Vec<(usize, Vec<f64>)> = Vec::new();
         for level in (0..Self::LEVELS).rev() {

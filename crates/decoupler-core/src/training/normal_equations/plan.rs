@@ -35,22 +35,21 @@ pub(in crate::training) struct Plan {
 }
 
 impl Plan {
-    fn new(shape: Shape, samples: usize, solution: Solution) -> Self {
+    /// Equations that are always factored.
+    pub(in crate::training) fn factored(shape: Shape, samples: usize) -> Self {
         Self {
             shape,
             samples,
-            solution,
+            solution: Solution::Factored,
         }
-    }
-
-    /// Equations that are always factored.
-    pub(in crate::training) fn factored(shape: Shape, samples: usize) -> Self {
-        Self::new(shape, samples, Solution::Factored)
     }
 
     /// Equations that are solved by conjugate gradients.
     pub(super) fn iterated(shape: Shape, samples: usize) -> Self {
-        Self::new(shape, samples, Solution::Iterated)
+        Self {
+            solution: Solution::Iterated,
+            ..Self::factored(shape, samples)
+        }
     }
 
     /// Equations with the cheaper solver.

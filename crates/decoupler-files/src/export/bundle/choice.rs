@@ -1,6 +1,9 @@
 use std::{fmt, str::FromStr};
 
-use decoupler_core::decoupling::{DecoderKind, NotDescribed, Precision};
+use decoupler_core::{
+    decoupling::{DecoderKind, NotDescribed, Precision},
+    text::Named,
+};
 use thiserror::Error;
 
 use super::{
@@ -334,7 +337,7 @@ impl FromStr for BundleDecoder {
     type Err = ChoiceError;
 
     fn from_str(text: &str) -> Result<Self, ChoiceError> {
-        match (text.trim(), text.trim().parse()) {
+        match (text.trim(), DecoderKind::parse(text)) {
             ("linear", _) => Ok(Self::Linear),
             (_, Ok(kind)) => Ok(Self::Kind(kind)),
             (_, Err(_)) => Err(ChoiceError::Decoder(text.to_owned())),

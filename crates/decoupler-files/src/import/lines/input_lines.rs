@@ -389,7 +389,7 @@ impl InputColumns {
 
 #[cfg(test)]
 mod tests {
-    use decoupler_core::dataset::Memory;
+    use decoupler_core::dataset::{Memory, Span};
 
     use super::*;
 
@@ -465,7 +465,14 @@ mod tests {
             row_wire: Some("row".to_owned()),
             ..OtherColumns::default()
         };
-        let stream = MemoryStream::new(&Memory::of_lags(&[1]), 1).unwrap();
+        let stream = MemoryStream::new(
+            &Memory {
+                lags: vec![Span::Samples(1.0)],
+                ..Memory::default()
+            },
+            1,
+        )
+        .unwrap();
         let mut lines = InputLines::new(channels(&["u"]), others, None).with_memory(Some(stream));
         assert_eq!(readings(&mut lines, 1, "t,row,u"), None);
         assert_eq!(
@@ -521,7 +528,8 @@ mod tests {
     fn a_memory_continues_from_line_to_line_and_uses_the_time_column() {
         let memory = Memory {
             interval_s: Some(0.1),
-            ..Memory::of_averages_s(&[2.0])
+            averages: vec![Span::Seconds(2.0)],
+            ..Memory::default()
         };
         let others = OtherColumns {
             time: Some("t".to_owned()),

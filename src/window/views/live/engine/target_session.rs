@@ -343,7 +343,7 @@ mod tests {
     use std::{fmt::Write as _, fs, path::Path, sync::mpsc::channel};
 
     use decoupler_core::{
-        dataset::Memory,
+        dataset::{Memory, Span},
         evaluation::{Measured, RunSettings},
         scene::RowModel,
     };
@@ -438,7 +438,10 @@ mod tests {
             targets: vec!["x".to_owned()],
             time: Some("time".to_owned()),
             row_wire: Some("row".to_owned()),
-            memory: Some(Memory::of_lags(&[2])),
+            memory: Some(Memory {
+                lags: vec![Span::Samples(2.0)],
+                ..Memory::default()
+            }),
             ..Recipe::default()
         };
         let trained = import
