@@ -169,7 +169,11 @@ fn print_scale(scale: ArrayScale) {
     let first = untrained_networks(&training, InputChoice::BEST, 12).decoder();
     decoders.push((
         "polish, 1 step".into(),
-        Box::new(NewtonDecoder::after(Box::new(first), 1, &model, &scene, &rows).unwrap()),
+        Box::new(
+            NewtonDecoder::new(&model, &scene, &rows)
+                .unwrap()
+                .after(Box::new(first), 1),
+        ),
     ));
     decoders.push((
         "newton".into(),

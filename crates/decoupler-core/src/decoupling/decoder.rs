@@ -210,11 +210,7 @@ impl AddAssign for SolvedRows {
 impl fmt::Display for SolvedRows {
     /// Writes how many answers are unreliable, why, and what helps; nothing if all are reliable.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            rows,
-            unsolved,
-            undetermined,
-        } = *self;
+        let (rows, unsolved, undetermined) = (self.rows, self.unsolved, self.undetermined);
         if unsolved > 0 {
             write!(
                 f,

@@ -204,11 +204,9 @@ impl DecoderKind {
             Self::RadialBasis => problem.of_samples(|set| Program::radial_basis(set, inputs, unseen, &mut rng)),
             Self::Fuzzy => problem.of_samples(|set| Program::fuzzy(set, inputs.quantity, unseen, &mut rng)),
             Self::Network => Ok(problem.network(problem.precision)),
-            Self::Newton => problem.on_equations(NewtonDecoder::new),
+            Self::Newton => problem.on_equations(|newton| newton),
             Self::Polish => match problem.network(Precision::Double) {
-                Some(network) => problem.on_equations(|model, scene, rows| {
-                    NewtonDecoder::after(network, Self::POLISH_STEPS, model, scene, rows)
-                }),
+                Some(network) => problem.on_equations(|newton| newton.after(network, Self::POLISH_STEPS)),
                 None => Ok(None),
             },
         }
@@ -227,15 +225,12 @@ impl FitProblem<'_> {
         Some(Box::new(ProgramDecoder::new(program)))
     }
 
-    /// Creates a decoder for the rows that were read; `None` without a sensor.
-    fn on_equations(
-        &self,
-        create: impl FnOnce(&SensorModel, &Scene, &[usize]) -> Result<NewtonDecoder, SensorError>,
-    ) -> Fit {
+    /// Creates a decoder for the rows that were read, and changes it; `None` without a sensor.
+    fn on_equations(&self, change: impl FnOnce(NewtonDecoder) -> NewtonDecoder) -> Fit {
         let Some(((model, scene), rows)) = self.sensor.zip(self.training.row_wires_read()) else {
             return Ok(None);
         };
-        Ok(Some(Box::new(create(model, scene, rows)?)))
+        Ok(Some(Box::new(change(NewtonDecoder::new(model, scene, rows)?))))
     }
 }
 

@@ -1,4 +1,4 @@
-use faer::{Mat, MatRef};
+use faer::Mat;
 use ndarray::{Array2, ArrayView2};
 
 use crate::{
@@ -63,13 +63,14 @@ impl Regression<'_> {
             let training = self.samples - parts[fold].len();
             let fit = self.spectrum(others.map(|(_, factor)| factor), training)?;
             let (basis, targets) = fit.seen_from(factor, &self.noise, parts[fold].len());
-            held_out.push((fit.filter, basis, targets, training as f64));
+            held_out.push((fit, basis, targets, training as f64));
         }
         let choice = Choice::new(levels(), self.outputs, usize::MAX, |level| {
-            let of_fold = |(filter, basis, targets, training): &(Filter, Mat<f64>, Mat<f64>, f64)| {
-                filter.held_out(basis.as_ref(), targets.as_ref(), level * training)
+            let squares = |(fit, basis, targets, training): &(Spectrum, Mat<f64>, Mat<f64>, f64)| {
+                let errors = basis * fit.gains(&vec![level * training; self.outputs]) - targets;
+                errors.col_iter().map(|column| column.squared_norm_l2()).collect()
             };
-            held_out.iter().map(of_fold).collect()
+            held_out.iter().map(squares).collect()
         });
         let fit = self.spectrum(factors.iter(), self.samples)?;
         let penalties = choice.levels.iter().map(|level| level * self.samples as f64);
@@ -163,10 +164,8 @@ impl Regression<'_> {
         let projected = svd.U().subcols(0, kept).transpose() * r.submatrix(1, 1 + n, rows, m);
         Ok(Spectrum {
             directions: svd.V().subcols(0, kept).to_owned(),
-            filter: Filter {
-                projected: Mat::from_fn(kept, m, |k, t| singular[k] * projected[(k, t)]),
-                eigenvalues: singular.iter().map(|value| value * value).collect(),
-            },
+            projected: Mat::from_fn(kept, m, |k, t| singular[k] * projected[(k, t)]),
+            eigenvalues: singular.iter().map(|value| value * value).collect(),
             means,
         })
     }
@@ -178,7 +177,10 @@ struct Spectrum {
     means: Vec<f64>,
     /// Features × directions.
     directions: Mat<f64>,
-    filter: Filter,
+    /// Squares of the singular values.
+    eigenvalues: Vec<f64>,
+    /// Directions × outputs.
+    projected: Mat<f64>,
 }
 
 impl Spectrum {
@@ -200,7 +202,7 @@ impl Spectrum {
 
     /// Map with a penalty for each output: features + 1 × outputs, the constant last.
     fn map(&self, penalties: &[f64]) -> Array2<f64> {
-        let gains = &self.directions * self.filter.gains(penalties);
+        let gains = &self.directions * self.gains(penalties);
         let n = gains.nrows();
         Array2::from_shape_fn((n + 1, penalties.len()), |(i, t)| {
             if i < n {
@@ -210,28 +212,13 @@ impl Spectrum {
             self.means[n + t] - shift
         })
     }
-}
 
-/// Gains in eigendirections for any penalty: the projected outputs divided by eigenvalue + penalty.
-struct Filter {
-    eigenvalues: Vec<f64>,
-    /// Eigendirections × outputs.
-    projected: Mat<f64>,
-}
-
-impl Filter {
-    /// Gains (eigendirections × outputs) with a penalty for each output, 0 for an infinite one.
-    pub fn gains(&self, penalties: &[f64]) -> Mat<f64> {
+    /// Gains (directions × outputs) with a penalty for each output, 0 for an infinite one: the projected outputs divided by
+    /// eigenvalue + penalty.
+    fn gains(&self, penalties: &[f64]) -> Mat<f64> {
         Mat::from_fn(self.eigenvalues.len(), penalties.len(), |k, t| {
             self.projected[(k, t)] / (self.eigenvalues[k] + penalties[t])
         })
-    }
-
-    /// Sum of squared errors of each output on held-out samples, given in the eigendirections (samples × eigendirections)
-    /// and with their outputs (samples × outputs), both relative to the means of the others.
-    pub fn held_out(&self, basis: MatRef<'_, f64>, targets: MatRef<'_, f64>, penalty: f64) -> Vec<f64> {
-        let errors = basis * self.gains(&vec![penalty; targets.ncols()]) - targets;
-        errors.col_iter().map(|column| column.squared_norm_l2()).collect()
     }
 }
 

@@ -40,9 +40,7 @@ impl Activations {
     /// Runs the network on `block`; returns the sum of squared errors.
     pub(super) fn forward(&mut self, mlp: &Mlp, block: &Block) -> f64 {
         let (shape, samples) = (mlp.shape(), block.samples());
-        let (w, v) = mlp.layers();
-        let w = MatRef::from_row_major_slice(w, shape.inputs + 1, shape.hidden);
-        let v = MatRef::from_row_major_slice(v, shape.hidden + 1, shape.outputs);
+        let (w, v) = layers(shape, mlp.weights());
         let mut hidden = self.hidden.as_mut().subrows_mut(0, samples);
         product(hidden.as_mut().subcols_mut(0, shape.hidden), block.inputs.as_ref(), w);
         for node in 0..shape.hidden {
@@ -175,6 +173,15 @@ impl KeptActivations {
             }
         });
     }
+}
+
+/// Returns the values of both layers' weights: n1 × h and (h+1) × outputs.
+pub(super) fn layers(shape: Shape, values: &[f64]) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
+    let (w, v) = values.split_at(shape.hidden_weights());
+    (
+        MatRef::from_row_major_slice(w, shape.inputs + 1, shape.hidden),
+        MatRef::from_row_major_slice(v, shape.hidden + 1, shape.outputs),
+    )
 }
 
 /// Writes `a ∘ b`.

@@ -51,8 +51,11 @@ impl TrainerState {
     fn check(&self) -> Result<(), TrainingError> {
         self.settings.check()?;
         self.stages.iter().try_for_each(|stage| stage.method.check())?;
-        let Shape { inputs, hidden, .. } = self.shape;
-        let outputs = self.shape.outputs;
+        let Shape {
+            inputs,
+            hidden,
+            outputs,
+        } = self.shape;
         // Checked, since the sizes come from a file.
         let w = inputs.checked_add(1).and_then(|n1| n1.checked_mul(hidden));
         let v = hidden.checked_add(1).and_then(|h1| h1.checked_mul(outputs));
@@ -60,33 +63,24 @@ impl TrainerState {
         let fit = |weights: &Vec<f64>| Some(weights.len()) == expected;
         let (mut weights, history) = (self.weights.iter().chain(&self.best_weights), self.history());
         let first_epochs = || self.stages.iter().map(|stage| stage.first_epoch);
-        let parts = [
-            (
-                hidden > 0 && outputs > 0 && fit(&self.weights) && fit(&self.best_weights),
-                "its weights do not fit its layers",
-            ),
-            (
-                weights.all(|weight| weight.is_finite()),
-                "a weight is not a finite number",
-            ),
-            (
-                !history.is_empty() && history.iter().enumerate().all(|(epoch, kept)| kept.epoch == epoch),
-                "its history has gaps",
-            ),
-            (self.best_epoch < history.len(), "its best epoch is after the last"),
-            (
-                first_epochs().next() == Some(0) && first_epochs().is_sorted(),
-                "its methods are out of order",
-            ),
-            (
-                self.method.fits(self.weights.len()),
-                "the state of its method does not fit its weights",
-            ),
-        ];
-        match parts.into_iter().find(|(is_sound, _)| !is_sound) {
-            Some((_, defect)) => Err(TrainingError::Damaged(defect)),
-            None => Ok(()),
-        }
+        let has_gap = || history.iter().enumerate().any(|(epoch, kept)| kept.epoch != epoch);
+        let has_layers = hidden > 0 && outputs > 0;
+        let defect = if !(has_layers && fit(&self.weights) && fit(&self.best_weights)) {
+            "its weights do not fit its layers"
+        } else if !weights.all(|weight| weight.is_finite()) {
+            "a weight is not a finite number"
+        } else if history.is_empty() || has_gap() {
+            "its history has gaps"
+        } else if self.best_epoch >= history.len() {
+            "its best epoch is after the last"
+        } else if first_epochs().next() != Some(0) || !first_epochs().is_sorted() {
+            "its methods are out of order"
+        } else if !self.method.fits(self.weights.len()) {
+            "the state of its method does not fit its weights"
+        } else {
+            return Ok(());
+        };
+        Err(TrainingError::Damaged(defect))
     }
 }
 

@@ -15,7 +15,7 @@ fn newton(model: &SensorModel, scene: &Scene) -> NewtonDecoder {
 fn polished(model: &SensorModel, scene: &Scene, set: &Dataset, steps: usize) -> NewtonDecoder {
     let first = Box::new(ProgramDecoder::new(Program::mean(set)));
     let rows: Vec<usize> = (0..model.scale.rows()).collect();
-    NewtonDecoder::after(first, steps, model, scene, &rows).unwrap()
+    NewtonDecoder::new(model, scene, &rows).unwrap().after(first, steps)
 }
 
 fn noisy_set(model: &SensorModel, scene: &Scene, snapshots: usize) -> Dataset {

@@ -79,21 +79,12 @@ impl NewtonDecoder {
         })
     }
 
-    /// Creates a decoder that takes at most `steps` steps after `first`, for `rows` of `model` in `scene`.
-    ///
-    /// # Errors
-    /// If the sensor has no resistances at rest.
-    pub fn after(
-        first: Box<dyn Decoder>,
-        steps: usize,
-        model: &SensorModel,
-        scene: &Scene,
-        rows: &[usize],
-    ) -> Result<Self, SensorError> {
-        let mut decoder = Self::new(model, scene, rows)?;
-        decoder.first = Some(first);
-        decoder.solver.steps = Some(steps);
-        Ok(decoder)
+    /// Returns the decoder that takes at most `steps` steps after `first`.
+    #[must_use]
+    pub fn after(mut self, first: Box<dyn Decoder>, steps: usize) -> Self {
+        self.first = Some(first);
+        self.solver.steps = Some(steps);
+        self
     }
 }
 

@@ -16,7 +16,7 @@ fn solved(mut decoder: impl Decoder, set: &Dataset) -> SolvedRows {
 fn polish(model: &SensorModel, scene: &Scene, set: &Dataset, steps: usize) -> NewtonDecoder {
     let first = Box::new(ProgramDecoder::new(Program::mean(set)));
     let rows = Vec::from_iter(0..model.scale.rows());
-    NewtonDecoder::after(first, steps, model, scene, &rows).unwrap()
+    NewtonDecoder::new(model, scene, &rows).unwrap().after(first, steps)
 }
 
 #[test]
@@ -110,24 +110,13 @@ fn polishing_flags_rows_that_mirror_each_other() {
     let scene = Scene::default();
     let set = Dataset::simulate(&model, &scene, 30, &mut Seed(0).rng(Stream::Test)).unwrap();
     // The first answer identifies the right row-wire.
-    let nearly = NewtonDecoder::after(
-        Box::new(
-            NewtonDecoder::new(
-                &model,
-                &Scene {
-                    rows: Rows::Known,
-                    ..scene
-                },
-                &[0, 1, 2],
-            )
-            .unwrap(),
-        ),
-        9,
-        &model,
-        &scene,
-        &[0, 1, 2],
-    );
-    let solved = solved(nearly.unwrap(), &set);
+    let known = Scene {
+        rows: Rows::Known,
+        ..scene
+    };
+    let first = NewtonDecoder::new(&model, &known, &[0, 1, 2]).unwrap();
+    let nearly = NewtonDecoder::new(&model, &scene, &[0, 1, 2]).unwrap();
+    let solved = solved(nearly.after(Box::new(first), 9), &set);
     assert_eq!((solved.rows, solved.unsolved, solved.undetermined), (30, 0, 20));
 }
 

@@ -13,7 +13,7 @@ use super::{Classes, HIDDEN_BIASES, HIDDEN_WEIGHTS, OUTPUT_BIASES, OUTPUT_WEIGHT
 use crate::{
     network::{Mlp, Shape},
     training::{
-        activations::change_each,
+        activations::{change_each, layers},
         examples::{column, column_mut},
         parallel::{accumulate, cholesky, is_large, product, solve_rows, substitute},
     },
@@ -179,15 +179,6 @@ impl Traces {
         let of_outputs = |class: usize| self.outputs.iter().map(|output| output[class]).sum();
         [self.hidden[0], self.hidden[1], of_outputs(0), of_outputs(1)]
     }
-}
-
-/// Returns the values of both layers' weights: n1 × h and (h+1) × outputs.
-fn layers(shape: Shape, values: &[f64]) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
-    let (w, v) = values.split_at(shape.hidden_weights());
-    (
-        MatRef::from_row_major_slice(w, shape.inputs + 1, shape.hidden),
-        MatRef::from_row_major_slice(v, shape.hidden + 1, shape.outputs),
-    )
 }
 
 /// Returns V̄: h × outputs.
