@@ -22,7 +22,7 @@ use decoupler_core::{
     text::capitalised,
 };
 use decoupler_files::{
-    export::{Cell, Table, describe_target, describe_warnings, format_below_one, format_duration, format_number},
+    export::{describe_target, describe_warnings, format_below_one, format_duration, format_number},
     import::{Dropped, Recording},
 };
 use serde::Serialize;
@@ -46,8 +46,7 @@ pub(super) struct StudyArguments {
     /// Hidden nodes of the networks [default: 12]
     #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_HIDDEN))]
     hidden: Option<usize>,
-    /// Model fitted without each channel and to fewer samples; with ridge, no network is trained [default: network where
-    /// it is better]
+    /// Model that is fitted: ridge regression alone, or the network, which is compared with ridge [default: network]
     #[arg(long, value_name = "ridge|network", value_parser = model())]
     model: Option<FittedModel>,
     /// Time in seconds after which no more steps are begun; ridge regression comes first, and networks that would take much
@@ -101,7 +100,7 @@ impl StudyArguments {
         let folds = import.folds.unwrap_or_else(|| by.folds_of(&recording.set, FOLDS));
         // Before the first step is announced.
         Folds::by(&recording.set, folds, by, &mut settings.seed.rng(Stream::Split)).map_err(RunError::from)?;
-        let bar = progress_bar(is_json, 4, "{bar:20} {msg}");
+        let bar = progress_bar(is_json, 2, "{bar:20} {msg}");
         let begun = Instant::now();
         let begin = |stage: StudyStep| {
             bar.inc(1);
@@ -112,17 +111,19 @@ impl StudyArguments {
                 let _ = writeln!(messages(), "{:.0} s: {stage}", begun.elapsed().as_secs_f64());
             }
         };
-        let divided = (&plan.division, folds);
         let budget_s = self.budget.or(self.model.is_none().then_some(BUDGET_S));
         let is_spent = || budget_s.is_some_and(|budget_s| begun.elapsed().as_secs_f64() > budget_s);
         let time_of_networks = time_of_networks(&settings, &recording.set, folds);
         let affords_networks = budget_s.is_none_or(|budget_s| time_of_networks.as_secs_f64() <= LONGEST * budget_s);
-        let model = self.model.or((!affords_networks).then_some(FittedModel::Ridge));
+        let affordable = match affords_networks {
+            true => FittedModel::Network,
+            false => FittedModel::Ridge,
+        };
         let found = Findings::measure(
             &settings,
             &recording.set,
-            divided,
-            model,
+            (by, folds),
+            self.model.unwrap_or(affordable),
             &begin,
             (&Job::UNINTERRUPTED, &is_spent),
         );
@@ -170,9 +171,6 @@ fn left_out(step: StudyStep) -> &'static str {
     match step {
         StudyStep::Folds => "the network (R² is that of ridge regression)",
         StudyStep::OtherFolds => "the comparison with a random split",
-        StudyStep::Samples => "networks trained on fewer samples (ridge regression instead)",
-        StudyStep::Channels => "the importance of channels",
-        _ => "another step",
     }
 }
 
@@ -187,10 +185,7 @@ pub(super) struct Report<'a> {
     folds: usize,
     hidden: usize,
     seed: u64,
-    /// Model used for channel importances and learning curves.
-    model: &'static str,
     targets: Vec<Target<'a>>,
-    channels: Vec<Worth<'a>>,
     warnings: Vec<String>,
 }
 
@@ -199,18 +194,17 @@ struct Target<'a> {
     name: &'a str,
     unit: Option<&'a str>,
     /// R² of the better of network and ridge.
-    r2: Option<Figure>,
+    r2: Option<Interval>,
     better: Option<&'static str>,
     /// `determined`, `weakly determined`, `uncertain` or `not determined`.
     standing: Option<&'static str>,
     sentence: String,
-    r2_network: Option<Figure>,
-    r2_ridge: Option<Figure>,
+    r2_network: Option<Interval>,
+    r2_ridge: Option<Interval>,
     /// RMSE of the network relative to that of ridge.
-    network_to_ridge: Option<Figure>,
+    network_to_ridge: Option<Interval>,
     /// RMSE of the network and of ridge with honest and with random folds.
     splits: Option<Splits>,
-    learning_curve: Vec<Point>,
 }
 
 #[derive(Serialize)]
@@ -221,42 +215,6 @@ struct Splits {
     random_network: f64,
     random_ridge: f64,
     sentence: String,
-}
-
-#[derive(Clone, Copy, Serialize)]
-struct Figure {
-    value: f64,
-    low: f64,
-    high: f64,
-}
-
-#[derive(Serialize)]
-struct Point {
-    samples: usize,
-    rmse: f64,
-    least: f64,
-    largest: f64,
-}
-
-/// Increase of the error of each target without a channel.
-#[derive(Serialize)]
-struct Worth<'a> {
-    name: &'a str,
-    unit: Option<&'a str>,
-    growth: Vec<Option<Figure>>,
-    is_dispensable: bool,
-}
-
-impl From<Interval> for Figure {
-    fn from(Interval { value, low, high }: Interval) -> Self {
-        Self { value, low, high }
-    }
-}
-
-impl From<Figure> for Interval {
-    fn from(Figure { value, low, high }: Figure) -> Self {
-        Self { value, low, high }
-    }
 }
 
 fn name_of(model: FittedModel) -> &'static str {
@@ -276,12 +234,6 @@ impl<'a> Report<'a> {
     ) -> Self {
         let mut warnings = recording.warnings.clone();
         warnings.extend(describe_warnings(recording, by, findings));
-        let worth = |(index, growth): (usize, &Vec<Option<Interval>>)| Worth {
-            name: &recording.inputs[index].name,
-            unit: recording.inputs[index].unit.as_deref(),
-            growth: growth.iter().map(|growth| growth.map(Figure::from)).collect(),
-            is_dispensable: findings.is_dispensable(index),
-        };
         let targets = recording.targets.iter().enumerate();
         Self {
             files: files(std::iter::once(recording)),
@@ -292,11 +244,9 @@ impl<'a> Report<'a> {
             folds,
             hidden: settings.hidden,
             seed: settings.seed.0,
-            model: name_of(findings.model),
             targets: targets
                 .map(|(index, channel)| Target::new(index, channel, findings))
                 .collect(),
-            channels: findings.importance.iter().enumerate().map(worth).collect(),
             warnings,
         }
     }
@@ -314,8 +264,6 @@ impl<'a> Report<'a> {
             )?;
             self.write_targets(out)?;
             self.write_splits(out)?;
-            self.write_channels(out)?;
-            self.write_curves(out)?;
             write_warnings(&self.warnings, out)
         })
     }
@@ -323,7 +271,8 @@ impl<'a> Report<'a> {
     fn write_targets(&self, out: &mut impl Write) -> io::Result<()> {
         for target in &self.targets {
             write!(out, "{}", capitalised(&target.sentence))?;
-            let of = |name: &str, r2: Option<Figure>| r2.map(|r2| format!("{name} {}", format_below_one(r2.value, 2)));
+            let of =
+                |name: &str, r2: Option<Interval>| r2.map(|r2| format!("{name} {}", format_below_one(r2.value, 2)));
             let of: Vec<String> = [of("network", target.r2_network), of("ridge", target.r2_ridge)]
                 .into_iter()
                 .flatten()
@@ -355,61 +304,13 @@ impl<'a> Report<'a> {
         }
         writeln!(out)
     }
-
-    fn target_names(&self) -> impl Iterator<Item = &str> {
-        self.targets.iter().map(|target| target.name)
-    }
-
-    fn write_channels(&self, out: &mut impl Write) -> io::Result<()> {
-        if self.channels.is_empty() {
-            return Ok(());
-        }
-        writeln!(
-            out,
-            "Error (RMSE) without a channel, relative to the error with all channels (model: {})",
-            self.model
-        )?;
-        let row = |channel: &Worth<'_>| {
-            let growth = channel.growth.iter().map(|growth| match growth {
-                Some(growth) => Interval::from(*growth).to_string(),
-                None => format_number(None),
-            });
-            let note = if channel.is_dispensable { "dispensable" } else { "" };
-            let texts = std::iter::once(channel.name.to_string()).chain(growth);
-            texts.chain([note.to_owned()]).map(Cell::from).collect()
-        };
-        let headings = std::iter::once("channel").chain(self.target_names()).chain([""]);
-        let table = Table::of_headings(headings, self.channels.iter().map(row));
-        write!(out, "{}", table.aligned())?;
-        writeln!(out)
-    }
-
-    fn write_curves(&self, out: &mut impl Write) -> io::Result<()> {
-        let Some(first) = self.targets.first().filter(|first| !first.learning_curve.is_empty()) else {
-            return Ok(());
-        };
-        writeln!(
-            out,
-            "Test error (RMSE) by number of training samples (model: {})",
-            self.model
-        )?;
-        let row = |(index, point): (usize, &Point)| {
-            let errors = self.targets.iter().map(|target| target.learning_curve.get(index));
-            let errors = errors.map(|point| Cell::from(point.map(|point| point.rmse)));
-            std::iter::once(point.samples.into()).chain(errors).collect()
-        };
-        let headings = std::iter::once("samples").chain(self.target_names());
-        let table = Table::of_headings(headings, first.learning_curve.iter().enumerate().map(row));
-        write!(out, "{}", table.aligned())?;
-        writeln!(out)
-    }
 }
 
 impl<'a> Target<'a> {
     fn new(index: usize, channel: &'a Channel, findings: &Findings) -> Self {
         let of = &findings.targets[index];
         let (best, name) = (of.best(), &channel.name);
-        let r2 = |determination: Option<Determination>| determination.map(|of| of.r2.into());
+        let r2 = |determination: Option<Determination>| determination.map(|of| of.r2);
         Self {
             name,
             unit: channel.unit.as_deref(),
@@ -424,7 +325,7 @@ impl<'a> Target<'a> {
             sentence: describe_target(name, of),
             r2_network: r2(of.network),
             r2_ridge: r2(of.ridge.ok()),
-            network_to_ridge: of.gain.map(Figure::from),
+            network_to_ridge: of.gain,
             splits: findings.comparison.as_ref().map(|comparison| {
                 let rmse = |scores: &Scores| {
                     [&scores.network, &scores.baselines.linear].map(|errors| errors.targets()[index].rmse)
@@ -440,16 +341,6 @@ impl<'a> Target<'a> {
                     sentence: comparison.sentence(index, name),
                 }
             }),
-            learning_curve: findings
-                .curve
-                .iter()
-                .map(|point| Point {
-                    samples: point.samples,
-                    rmse: point.rmse[index],
-                    least: point.range[index][0],
-                    largest: point.range[index][1],
-                })
-                .collect(),
         }
     }
 }

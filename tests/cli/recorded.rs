@@ -30,7 +30,7 @@ fn recording() -> TempDir {
 const INSPECT: &str = "inspect --data r.csv --inputs a,b,d,e --targets x,y";
 
 #[test]
-fn each_target_and_channel_is_judged_with_an_interval() {
+fn each_target_is_judged_with_an_interval() {
     let folder = recording();
     let report = json(&format!("{INSPECT} --model ridge --json"), folder.path());
     let target = |index: usize| &report["targets"][index];
@@ -54,35 +54,15 @@ fn each_target_and_channel_is_judged_with_an_interval() {
             .unwrap()
             .starts_with("ridge regression explains almost nothing of y (R² ")
     );
-    let channel = |index: usize| &report["channels"][index];
-    // Without b the error of x is √(0.3² + 0.05²)/0.05 times as large; without a nothing is lost, because d repeats it.
-    let growth = channel(1)["growth"][0]["value"].as_f64().unwrap();
-    assert!((growth / 6.08 - 1.0).abs() < 0.15, "{growth}");
-    assert_eq!(
-        (&channel(0)["is_dispensable"], &channel(1)["is_dispensable"]),
-        (&true.into(), &false.into())
-    );
     let warnings = report["warnings"].to_string();
     assert!(
         warnings.contains("d repeats a") && warnings.contains("e is 7 in every sample"),
         "{warnings}"
     );
-    let curve = target(0)["learning_curve"].as_array().unwrap();
-    let samples = Vec::from_iter(curve.iter().map(|point| point["samples"].as_u64().unwrap()));
-    assert!(
-        samples.len() >= 5 && samples.is_sorted() && samples[samples.len() - 1] == 240,
-        "{samples:?}"
-    );
-    // Its last error is that of the noise, whose standard deviation is 0.05/√3.
-    let last = &curve[curve.len() - 1];
-    let rmse = last["rmse"].as_f64().unwrap();
-    assert!((rmse / (0.05 / 3.0_f64.sqrt()) - 1.0).abs() < 0.2, "{last}");
     let text = String::from_utf8(decoupler(&format!("{INSPECT} --model ridge"), folder.path()).stdout).unwrap();
     for expected in [
         "The readings determine x (R² 0.99",
         "Ridge regression explains almost nothing of y",
-        "dispensable",
-        "samples   ",
     ] {
         assert!(text.contains(expected), "{expected}: {text}");
     }
@@ -93,8 +73,6 @@ fn networks_are_compared_with_ridge_and_with_a_random_split() {
     let folder = recording();
     let arguments = "inspect --data r.csv --inputs a,b,d,e --targets x --hidden 2 --folds 2 --json";
     let report = json(arguments, folder.path());
-    // x is linear: a network is hardly better.
-    assert_eq!(report["model"], "ridge", "{report}");
     let target = &report["targets"][0];
     for figure in ["r2_network", "r2_ridge", "network_to_ridge"] {
         let value = &target[figure];
@@ -103,6 +81,7 @@ fn networks_are_compared_with_ridge_and_with_a_random_split() {
             "{figure}: {value}"
         );
     }
+    // x is linear: a network is hardly better.
     let warnings = report["warnings"].to_string();
     assert!(
         warnings.contains("no better than ridge for x") || warnings.contains("little better than ridge for x"),
@@ -461,9 +440,6 @@ fn repeated_readings_keep_their_frequency() {
         let value = target["r2"]["value"].as_f64().unwrap();
         assert!((value - 0.64).abs() < 0.06, "{target}");
         assert_eq!(target["standing"], "determined", "{target}");
-        // The learning curve uses the same fits.
-        let last = target["learning_curve"].as_array().unwrap().last().unwrap();
-        assert!(last["rmse"].as_f64().unwrap() < 0.4, "{last}");
         let report = json(
             "train --data r.csv --inputs x --targets y --epochs 5 --hidden 2 --json",
             folder.path(),

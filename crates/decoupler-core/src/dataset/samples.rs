@@ -218,19 +218,6 @@ impl Dataset {
         }
     }
 
-    /// Returns all samples with the readings of these channels only, in this order.
-    ///
-    /// # Panics
-    /// If `channels` is empty, or there is no such channel.
-    #[must_use]
-    pub fn of_channels(&self, channels: &[usize]) -> Self {
-        assert!(!channels.is_empty(), "a sample has at least one reading");
-        Self {
-            readings: standard(self.readings.select(Axis(1), channels)),
-            ..self.clone()
-        }
-    }
-
     /// Returns the samples with other readings (samples × channels), such as the features of a [`Memory`](super::Memory).
     ///
     /// # Panics
@@ -344,18 +331,6 @@ mod tests {
         assert_eq!(row.targets().column(0).to_vec(), [0.0, 2.0]);
         assert_eq!(row.row_wire(1), Some(7));
         assert_eq!(part.of_row(0).samples(), 0);
-    }
-
-    #[test]
-    fn channels_are_selected_for_every_sample() {
-        let set = set(Some(&[0, 1]), vec![0, 0]).unwrap();
-        let second = set.of_channels(&[1]);
-        assert_eq!(
-            (second.sample_readings(0), second.sample_readings(1)),
-            (&[1.0][..], &[11.0][..])
-        );
-        assert_eq!((second.targets(), second.row_wire(1)), (set.targets(), Some(1)));
-        assert_eq!(set.of_channels(&[1, 0]).sample_readings(1), [11.0, 10.0]);
     }
 
     #[test]

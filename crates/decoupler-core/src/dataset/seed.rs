@@ -34,8 +34,6 @@ pub enum Stream {
     Live = 8,
     /// Noise of the simulated live source.
     LiveNoise = 9,
-    /// Bootstrap samples, and parts of a training set.
-    Resampling = 20,
 }
 
 /// Offset of the streams of all random initialisations after the first: initialisation k uses this number plus k.

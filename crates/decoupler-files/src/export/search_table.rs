@@ -1,6 +1,6 @@
 use decoupler_core::{
     dataset::SplitBy,
-    evaluation::auto::{AutoRecord, Tried},
+    evaluation::auto::{AutoRecord, Tried, TriedModel},
 };
 
 use super::{Cell, Table, TableColumn};
@@ -24,18 +24,18 @@ pub fn search_table(record: &AutoRecord) -> Table {
         TableColumn::new("seconds", "time", "s").meaning("Estimated time on one core, counted against the budget."),
     ];
     let row = |(place, tried): (usize, &Tried)| -> Vec<Cell> {
+        let (begin, epochs) = match tried.model {
+            TriedModel::Ridge => (Cell::from(""), Cell::from("")),
+            TriedModel::Network { begin, epochs, .. } => (begin.to_string().into(), epochs.into()),
+        };
         vec![
             if place == record.chosen { "*".into() } else { "".into() },
             tried.features().into(),
             tried.model.to_string().into(),
-            tried
-                .training()
-                .map_or_else(|| "".into(), |(begin, _)| begin.to_string().into()),
+            begin,
             (100.0 * tried.error).into(),
             (100.0 * tried.standard_error).into(),
-            tried
-                .training()
-                .map_or_else(|| "".into(), |(_, epochs)| Cell::from(epochs)),
+            epochs,
             tried.seconds.into(),
         ]
     };

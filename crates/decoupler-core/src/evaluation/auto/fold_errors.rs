@@ -18,18 +18,18 @@ pub(super) struct FoldErrors {
 impl FoldErrors {
     /// Evaluates the sums of squared errors `squares` (fold × target) of answers to targets with these [`variances`].
     pub(super) fn new(squares: &[Vec<f64>], variances: &[f64], folds: &Folds) -> Self {
-        let sizes = Vec::from_iter((0..folds.count()).map(|fold| folds.test(fold).len()));
-        let samples = sizes.iter().sum::<usize>() as f64;
         let varying = variances.iter().filter(|variance| **variance > 0.0).count().max(1) as f64;
-        let of_fold = |(squares, size): (&Vec<f64>, &usize)| {
+        let of_fold = |(fold, squares): (usize, &Vec<f64>)| {
             let relative = squares.iter().zip(variances).filter(|(_, variance)| **variance > 0.0);
             let sum: f64 = relative.map(|(square, variance)| square / variance).sum();
-            sum / varying / (*size).max(1) as f64
+            sum / varying / folds.test(fold).len().max(1) as f64
         };
-        let of_folds = Vec::from_iter(squares.iter().zip(&sizes).map(of_fold));
-        let shares = sizes.iter().map(|&size| size as f64 / samples);
+        let of_folds = Vec::from_iter(squares.iter().enumerate().map(of_fold));
+        let samples: usize = (0..folds.count()).map(|fold| folds.test(fold).len()).sum();
+        let share = |fold: usize| folds.test(fold).len() as f64 / samples as f64;
+        let errors = of_folds.iter().enumerate();
         Self {
-            mean_square: of_folds.iter().zip(shares).map(|(error, share)| error * share).sum(),
+            mean_square: errors.map(|(fold, error)| error * share(fold)).sum(),
             of_folds,
         }
     }
@@ -65,11 +65,13 @@ impl FoldErrors {
 /// Variance of each target; 0 for one that does not vary, or only by rounding.
 pub(super) fn variances(targets: ArrayView2<'_, f64>) -> Vec<f64> {
     let of_target = |column: ArrayView1<'_, f64>| {
-        if !varies(column) {
-            return 0.0;
-        }
         let mean = mean(column);
-        column.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / column.len() as f64
+        let squares = column.iter().map(|value| (value - mean).powi(2));
+        if varies(column) {
+            squares.sum::<f64>() / column.len() as f64
+        } else {
+            0.0
+        }
     };
     targets.columns().into_iter().map(of_target).collect()
 }

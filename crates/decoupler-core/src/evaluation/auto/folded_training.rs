@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use super::{
     super::{
-        Begin, Measured, Run, RunError, RunSets, RunSettings,
+        Begin, Run, RunError, RunSets, RunSettings,
         cross_validation::{nth_seed, scatter},
     },
     FoldErrors,
@@ -14,7 +14,6 @@ use crate::{
     job::Job,
     machine::MemoryBudget,
     network::Shape,
-    scene::RowModel,
     training::{StoppingRules, TrainingError},
 };
 
@@ -45,10 +44,9 @@ pub(super) struct BestEpoch {
 
 /// Trainings without one fold.
 struct Part {
-    /// `None` if every target is constant without the fold: the constant is then the answer.
-    run: Option<Run>,
-    /// Scaled inputs of the held-out samples.
-    inputs: Array2<f64>,
+    /// The training and the scaled inputs of the held-out samples; `None` if every target is constant without the fold: the
+    /// constant is then the answer.
+    run: Option<(Run, Array2<f64>)>,
     targets: Array2<f64>,
     answers: Array2<f64>,
 }
@@ -72,10 +70,7 @@ impl<'a> FoldedTraining<'a> {
         stride: usize,
         memory: MemoryBudget,
     ) -> Result<Self, RunError> {
-        let mut endless = RunSettings {
-            source: Measured { rows: RowModel::Shared }.into(),
-            ..*settings
-        };
+        let mut endless = *settings;
         endless.training.stopping.epochs = StoppingRules::MAX_EPOCHS;
         let parts = (0..folds.count()).into_par_iter().map(|fold| {
             let thinned: Vec<usize> = folds.without(&[fold]).into_iter().step_by(stride).collect();
@@ -88,7 +83,7 @@ impl<'a> FoldedTraining<'a> {
             return Err(TrainingError::NothingVaries.into());
         }
         let of_part = |part: &Part| {
-            let Some(run) = &part.run else { return 0.0 };
+            let Some((run, _)) = &part.run else { return 0.0 };
             let first = &run.leader().rows()[0];
             training_multiplications(settings, first.present().shape(), first.samples(), part.targets.nrows())
         };
@@ -135,7 +130,7 @@ impl<'a> FoldedTraining<'a> {
     pub(super) fn has_passed_its_best(&self, patience: usize) -> bool {
         let (gain, _) = self.gain;
         let mut runs = self.parts.iter().filter_map(|part| part.run.as_ref());
-        self.epoch >= gain + gain / 2 + patience || runs.all(|run| run.stop_reason().is_some())
+        self.epoch >= gain + gain / 2 + patience || runs.all(|(run, _)| run.stop_reason().is_some())
     }
 }
 
@@ -144,7 +139,6 @@ impl Part {
         let constant = |(_, target)| training.targets()[[0, target]];
         let mut part = Self {
             run: None,
-            inputs: Array2::zeros((0, 0)),
             targets: test.targets().to_owned(),
             answers: Array2::from_shape_fn(test.targets().dim(), constant),
         };
@@ -152,17 +146,17 @@ impl Part {
             let validation = None;
             let sets = RunSets::without_test(Split { training, validation }).limited_to(memory);
             let run = Run::new(settings, sets, Begin::Initialize, &Job::UNINTERRUPTED)?;
-            part.inputs = run.scalings.at(0).0.of(test.readings());
-            part.run = Some(run);
+            let inputs = run.scalings.at(0).0.of(test.readings());
+            part.run = Some((run, inputs));
         }
         Ok(part)
     }
 
     fn step(&mut self) {
-        let Some(run) = &mut self.run else { return };
+        let Some((run, inputs)) = &mut self.run else { return };
         run.step();
         let present = run.trainers().iter().map(|start| start.rows()[0].present());
-        let scaled = present.map(|network| network.forward(self.inputs.view()));
+        let scaled = present.map(|network| network.forward(inputs.view()));
         let sum = scaled.reduce(|sum, scaled| sum + scaled).expect("a run has a start");
         let mean = sum / run.trainers().len() as f64;
         self.answers = run.scalings.at(0).1.restore(mean.view());
@@ -170,14 +164,8 @@ impl Part {
 
     /// Returns the sum of the squared errors of each target.
     fn squared_errors(&self) -> Vec<f64> {
-        let columns = self.answers.columns().into_iter().zip(self.targets.columns());
-        let squares = columns.map(|(answers, targets)| {
-            let errors = answers
-                .iter()
-                .zip(targets)
-                .map(|(answer, target)| (answer - target).powi(2));
-            errors.sum()
-        });
-        squares.collect()
+        let squares = (&self.answers - &self.targets).powi(2);
+        let sums = squares.columns().into_iter().map(|of_target| of_target.iter().sum());
+        sums.collect()
     }
 }

@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Initialization, RunSettings};
 use crate::{
-    dataset::{Dataset, Folds, History, Memory, Span, SplitBy},
+    dataset::{Dataset, History, Memory, Span, SplitBy},
     network::{InputChoice, Quantity, ScalingChoice},
     text::format_percent,
     training::Method,
@@ -99,8 +99,6 @@ pub struct AutoChoice {
     pub memory: Memory,
     /// Everything that was tried.
     pub record: AutoRecord,
-    /// Folds of the cross-validation.
-    pub folds: Folds,
     /// Held-out answers of the choice to all samples (samples × targets), each by a committee trained without its fold.
     pub answers: Array2<f64>,
 }
@@ -168,14 +166,6 @@ impl Tried {
     pub fn features(&self) -> String {
         describe_features(&self.memory, self.inputs)
     }
-
-    /// Weights with which the training of a network begins, and its number of epochs; `None` for ridge regression.
-    pub fn training(&self) -> Option<(Initialization, usize)> {
-        match self.model {
-            TriedModel::Ridge => None,
-            TriedModel::Network { begin, epochs, .. } => Some((begin, epochs)),
-        }
-    }
 }
 
 impl fmt::Display for TriedModel {
@@ -187,13 +177,15 @@ impl fmt::Display for TriedModel {
         else {
             return f.write_str("ridge");
         };
-        write!(f, "{starts} × {hidden} hidden nodes, {}", method.short_name())?;
-        match method {
-            Method::BayesianRegularization(settings) if settings.correlation_epoch > 0.0 => {
-                f.write_str(", errors correlated")
-            }
-            _ => Ok(()),
-        }
+        let correlated = match method {
+            Method::BayesianRegularization(settings) if settings.correlation_epoch > 0.0 => ", errors correlated",
+            _ => "",
+        };
+        write!(
+            f,
+            "{starts} × {hidden} hidden nodes, {}{correlated}",
+            method.short_name()
+        )
     }
 }
 
@@ -231,18 +223,13 @@ fn describe_features(memory: &Memory, inputs: InputChoice) -> String {
         Quantity::Conductance => "1/readings".to_owned(),
         Quantity::LogResistance => "log readings".to_owned(),
     }];
-    let spans = |spans: &[Span]| spans.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-    if !memory.lags.is_empty() {
-        parts.push(format!("lags {}", spans(&memory.lags)));
-    }
-    if !memory.averages.is_empty() {
-        parts.push(format!("averages {}", spans(&memory.averages)));
-    }
-    if memory.differences {
-        parts.push("as differences".to_owned());
-    }
-    if inputs.scaling == ScalingChoice::Whitening {
-        parts.push("whitened".to_owned());
-    }
+    let mut list = |name: &str, spans: &[Span]| {
+        let spans = Vec::from_iter(spans.iter().map(Span::to_string));
+        parts.extend((!spans.is_empty()).then(|| format!("{name} {}", spans.join(", "))));
+    };
+    list("lags", &memory.lags);
+    list("averages", &memory.averages);
+    parts.extend(memory.differences.then(|| "as differences".to_owned()));
+    parts.extend((inputs.scaling == ScalingChoice::Whitening).then(|| "whitened".to_owned()));
     parts.join(", ")
 }

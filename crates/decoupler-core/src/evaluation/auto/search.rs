@@ -42,8 +42,6 @@ const DECAYS: [f64; 3] = [3e-4, 3e-5, 3e-3];
 const FEATURE_SETS: usize = 2;
 /// Candidates that are compared again as committees.
 const FINALISTS: usize = 2;
-/// Usual number of candidates with other hidden nodes, and of those with other scalings and methods.
-const USUAL: [usize; 2] = [4, 3];
 /// Epoch after which the correlation of errors is measured, if it is: not for trainings that end before.
 const CORRELATION_EPOCH: f64 = 20.0;
 
@@ -88,35 +86,8 @@ impl Candidate {
     }
 }
 
-/// Candidates that are tried one after the other.
-struct Stage {
-    candidates: Vec<Candidate>,
-    /// Share of the budget that may be used up when the last of them has been tried.
-    share: f64,
-    /// Epochs without which a candidate is not worth trying.
-    needed: usize,
-    /// Number of candidates of later stages with the same share.
-    reserve: usize,
-    /// Number of candidates expected in all later stages.
-    later: usize,
-    /// Ends with the first candidate that is no better than all before it with the same features.
-    while_better: bool,
-}
-
-impl Stage {
-    fn new(candidates: Vec<Candidate>, share: f64) -> Self {
-        Self {
-            candidates,
-            share,
-            needed: MIN_EPOCHS,
-            reserve: 0,
-            later: FINALISTS,
-            while_better: false,
-        }
-    }
-}
-
 /// A candidate that was cross-validated.
+#[derive(Clone)]
 struct Measured {
     candidate: Candidate,
     /// Index of its record.
@@ -135,17 +106,17 @@ struct Search<'a> {
     /// `true` if even a small network has more weights than there are samples. Levenberg-Marquardt then fits noise within
     /// an epoch or two, and its epochs are expensive.
     is_wide: bool,
+    /// Hidden nodes with which features are compared.
+    first_hidden: usize,
     /// Multiplications used so far.
     work: f64,
     tried: Vec<Tried>,
     networks: Vec<Measured>,
-    /// Number of candidates still expected.
-    expected: usize,
     job: &'a Job<'a>,
     on_progress: &'a mut dyn FnMut(AutoProgress),
 }
 
-/// Chooses settings for `samples` by cross-validation. `base` gives the source, the seed, and whatever is not searched;
+/// Chooses settings for `samples` by cross-validation. `base` gives the source (one network for all rows), the seed, and whatever is not searched;
 /// its inputs are raw readings. Networks whose equations do not fit into `memory` are not tried.
 ///
 /// # Errors
@@ -162,6 +133,7 @@ pub fn choose_settings(
     if variances(samples.set.targets()).iter().all(|variance| *variance == 0.0) {
         return Err(TrainingError::NothingVaries.into());
     }
+    let is_wide = shape(samples.set, FIRST_HIDDEN).weights() > samples.set.samples();
     let search = Search {
         base: *base,
         fixed,
@@ -169,11 +141,11 @@ pub fn choose_settings(
         folds: folds(samples, base.seed)?,
         budget_s,
         memory,
-        is_wide: shape(samples.set, FIRST_HIDDEN).weights() > samples.set.samples(),
+        is_wide,
+        first_hidden: if is_wide { FIRST_HIDDEN_WIDE } else { FIRST_HIDDEN },
         work: 0.0,
         tried: Vec::new(),
         networks: Vec::new(),
-        expected: 0,
         job,
         on_progress,
     };
@@ -184,41 +156,49 @@ impl Search<'_> {
     /// Tries features, then hidden nodes, then scalings and methods, then committees.
     fn run(mut self) -> Result<AutoChoice, RunError> {
         let candidates = self.screen_features()?;
-        self.try_stage(Stage {
-            later: USUAL.iter().sum::<usize>() + FINALISTS,
-            ..Stage::new(candidates, 0.35)
-        })?;
+        self.try_all(candidates, 0.35, 0)?;
         if self.fixed.hidden.is_none() {
             self.vary_hidden(0.7)?;
         }
         self.refine(0.85)?;
-        self.try_committees(1.0)?;
+        self.try_committees()?;
         self.decide()
     }
 
-    /// Cross-validates the candidates of a stage; returns `true` if the first was better than all before it with the same
-    /// features, or the stage tries all of its candidates in any case.
-    fn try_stage(&mut self, stage: Stage) -> Result<bool, RunError> {
-        let count = stage.candidates.len();
-        for (number, candidate) in stage.candidates.into_iter().enumerate() {
-            let left = count - number;
-            self.expected = left + stage.later;
+    /// Cross-validates candidates, within this share of the budget for all work until then and for `reserve` later ones.
+    fn try_all(&mut self, candidates: Vec<Candidate>, share: f64, reserve: usize) -> Result<(), RunError> {
+        let mut left = candidates.len() + reserve;
+        for candidate in candidates {
+            self.try_network(candidate, self.part(share, left), MIN_EPOCHS)?;
+            left -= 1;
+        }
+        Ok(())
+    }
+
+    /// Cross-validates candidates up to the first that is no better than all before it with the same features; returns `true`
+    /// if there is a better one.
+    fn try_while_better(&mut self, candidates: impl Iterator<Item = Candidate>, share: f64) -> Result<bool, RunError> {
+        let mut is_any_better = false;
+        for candidate in candidates {
             let alike = self
                 .networks
                 .iter()
                 .filter(|network| network.candidate.has_features_of(&candidate));
             let before = alike
                 .map(|network| network.best.errors.relative())
-                .min_by(f64::total_cmp);
-            let to_come = if stage.while_better { 2 } else { left + stage.reserve };
-            let limit = (stage.share * self.budget() - self.work).max(0.0) / to_come as f64;
-            let error = self.try_network(candidate, limit, stage.needed)?;
-            let is_better = error.zip(before).is_some_and(|(error, before)| error < before);
-            if stage.while_better && !is_better {
-                return Ok(number > 0);
+                .fold(f64::INFINITY, f64::min);
+            let error = self.try_network(candidate, self.part(share, 2), MIN_EPOCHS)?;
+            if error.is_none_or(|error| error >= before) {
+                break;
             }
+            is_any_better = true;
         }
-        Ok(count > 0)
+        Ok(is_any_better)
+    }
+
+    /// Returns one of so many `parts` of the multiplications that are left of this share of the budget.
+    fn part(&self, share: f64, parts: usize) -> f64 {
+        (share * self.budget() - self.work).max(0.0) / parts as f64
     }
 
     /// Cross-validates a network within `limit` multiplications. Returns its error; `None` if the `needed` epochs are too
@@ -306,9 +286,8 @@ impl Search<'_> {
     fn announce(&mut self, memory: &Memory, inputs: InputChoice, model: &TriedModel) -> Result<(), RunError> {
         self.job.check()?;
         let number = self.tried.len() + 1;
-        let expected = number + self.expected.saturating_sub(1);
         let features = describe_features(memory, inputs);
-        let mut text = format!("Trying candidate {number} of {expected}: {features}, {model}");
+        let mut text = format!("Trying candidate {number}: {features}, {model}");
         if let Some(best) = self.ranked().first() {
             let error = format_percent(100.0 * best.best.errors.relative());
             text += &format!(", best error so far {error}");
@@ -342,13 +321,6 @@ impl Search<'_> {
         candidates.find(|candidate| suits(candidate)).cloned()
     }
 
-    fn first_hidden(&self) -> usize {
-        match self.is_wide {
-            true => FIRST_HIDDEN_WIDE,
-            false => FIRST_HIDDEN,
-        }
-    }
-
     /// Compares features by ridge regression; returns networks on the plain readings and on the best others.
     fn screen_features(&mut self) -> Result<Vec<Candidate>, RunError> {
         let plain = InputChoice {
@@ -365,11 +337,9 @@ impl Search<'_> {
                 features.push((first.clone(), InputChoice { quantity, ..plain }));
             }
         }
-        let count = features.len();
         let mut plain_error: Option<f64> = None;
         let mut measured: Vec<(f64, (Memory, InputChoice))> = Vec::new();
         for (number, (memory, inputs)) in features.into_iter().enumerate() {
-            self.expected = count - number + FEATURE_SETS + 1 + USUAL.iter().sum::<usize>() + FINALISTS;
             let width = memory.features(self.samples.set.channels());
             let work = Regression::multiplications(self.samples.set.samples(), width, self.folds.count());
             if number > 0 && self.work + work > 0.2 * self.budget() {
@@ -381,14 +351,12 @@ impl Search<'_> {
             };
             let values = set.readings().mapv(|reading| inputs.quantity.of(reading));
             self.work += work;
-            let error = match ridge(values.view(), set.targets(), &self.folds) {
-                Ok(fit) => {
-                    let errors = FoldErrors::new(&fit.squares, &variances(set.targets()), &self.folds);
-                    self.record(&memory, inputs, TriedModel::Ridge, &errors, work);
-                    errors.relative()
-                }
-                Err(_) => f64::INFINITY,
-            };
+            let fit = ridge(values.view(), set.targets(), &self.folds);
+            let error = fit.map_or(f64::INFINITY, |fit| {
+                let errors = FoldErrors::new(&fit.squares, &variances(set.targets()), &self.folds);
+                self.record(&memory, inputs, TriedModel::Ridge, &errors, work);
+                errors.relative()
+            });
             // The plain readings are always tried, and many inputs are not multiplied unless that helps.
             let plain = plain_error.get_or_insert(error);
             if number > 0 && self.is_wide && error >= *plain {
@@ -418,7 +386,7 @@ impl Search<'_> {
         };
         let mut settings = RunSettings {
             inputs,
-            hidden: self.fixed.hidden.unwrap_or(self.first_hidden()),
+            hidden: self.fixed.hidden.unwrap_or(self.first_hidden),
             starts: self.fixed.starts.unwrap_or(SCREENED).min(SCREENED),
             ..self.base
         };
@@ -457,40 +425,27 @@ impl Search<'_> {
     /// Tries other numbers of hidden nodes on the best features and on the plain readings, which need more of them: more
     /// while it helps, and fewer if it does not. Then tries the second best features with the number found.
     fn vary_hidden(&mut self, share: f64) -> Result<(), RunError> {
-        let Some(best) = self.best(|_| true) else {
-            return Ok(());
-        };
+        let best = self.best(|_| true).ok_or(TrainingError::NothingVaries)?;
         let is_other = |candidate: &Candidate| !candidate.has_features_of(&best);
         let plain = self.best(|candidate| is_other(candidate) && candidate.memory.is_empty());
-        let first = self.first_hidden();
+        let first = self.first_hidden;
         for base in std::iter::once(best.clone()).chain(plain) {
             let with = |hidden| base.with(|settings| settings.hidden = hidden);
-            let stage = |candidates| Stage {
-                later: 1 + USUAL[1] + FINALISTS,
-                while_better: true,
-                ..Stage::new(candidates, share)
-            };
             let more = HIDDEN.into_iter().filter(|&hidden| hidden > first).map(with);
-            if !self.try_stage(stage(more.collect()))? {
+            if !self.try_while_better(more, share)? {
                 let fewer = HIDDEN.into_iter().rev().filter(|&hidden| hidden < first).map(with);
-                self.try_stage(stage(fewer.collect()))?;
+                self.try_while_better(fewer, share)?;
             }
         }
         let hidden = self.best(|_| true).map_or(first, |best| best.settings.hidden);
         let second = self.best(|candidate| is_other(candidate) && !candidate.memory.is_empty());
         let second = second.map(|second| second.with(|settings| settings.hidden = hidden));
-        self.try_stage(Stage {
-            later: USUAL[1] + FINALISTS,
-            ..Stage::new(Vec::from_iter(second), share)
-        })?;
-        Ok(())
+        self.try_all(Vec::from_iter(second), share, 0)
     }
 
     /// Varies scaling, regularisation and method of the best network.
     fn refine(&mut self, share: f64) -> Result<(), RunError> {
-        let Some(best) = self.best(|_| true) else {
-            return Ok(());
-        };
+        let best = self.best(|_| true).ok_or(TrainingError::NothingVaries)?;
         let mut variants = Vec::new();
         if self.fixed.scaling.is_none() {
             variants.push(best.with(|settings| settings.inputs.scaling = ScalingChoice::Whitening));
@@ -504,11 +459,7 @@ impl Search<'_> {
             let with = |method| best.with(|settings| settings.training.method = method);
             variants.extend(methods.into_iter().map(with));
         }
-        self.try_stage(Stage {
-            reserve: 1,
-            later: 1 + FINALISTS,
-            ..Stage::new(variants, share)
-        })?;
+        self.try_all(variants, share, 1)?;
         let is_regularized = |network: &&Measured| {
             network.candidate.settings.training.method == regularized(0.0)
                 && network.best.epoch > CORRELATION_EPOCH as usize
@@ -517,8 +468,7 @@ impl Search<'_> {
             let method = regularized(CORRELATION_EPOCH);
             network.candidate.with(|settings| settings.training.method = method)
         });
-        self.try_stage(Stage::new(Vec::from_iter(correlated), share))?;
-        Ok(())
+        self.try_all(Vec::from_iter(correlated), share, 0)
     }
 
     /// Number of networks of a committee with this many hidden nodes each.
@@ -528,7 +478,7 @@ impl Search<'_> {
     }
 
     /// Cross-validates the best candidates again as committees.
-    fn try_committees(&mut self, share: f64) -> Result<(), RunError> {
+    fn try_committees(&mut self) -> Result<(), RunError> {
         /// Epochs beyond the best.
         const BEYOND: usize = 5;
         let finalists = self.ranked().into_iter().take(FINALISTS).map(|network| {
@@ -539,13 +489,8 @@ impl Search<'_> {
         let finalists = Vec::from_iter(finalists);
         let mut left = finalists.len();
         for (committee, epochs) in finalists {
+            self.try_network(committee, self.part(1.0, left), epochs + BEYOND)?;
             left -= 1;
-            self.try_stage(Stage {
-                needed: epochs + BEYOND,
-                reserve: left,
-                later: left,
-                ..Stage::new(vec![committee], share)
-            })?;
         }
         Ok(())
     }
@@ -562,26 +507,21 @@ impl Search<'_> {
             .filter(|network| network.candidate.has_features_of(&best.candidate))
             .filter(|network| network.best.errors.is_as_good_as(&best.best.errors))
             .min_by_key(|network| network.candidate.settings.hidden);
-        let chosen = smallest.unwrap_or(best);
-        let (chosen, Candidate { memory, settings }, best) =
-            (chosen.place, chosen.candidate.clone(), chosen.best.clone());
-        let mut settings = RunSettings {
-            starts: self.committee(settings.hidden),
-            combine: Combination::Mean,
-            ..settings
-        };
+        let chosen = smallest.unwrap_or(best).clone();
+        let Measured { candidate, place, best } = chosen;
+        let mut settings = candidate.settings;
+        (settings.starts, settings.combine) = (self.committee(settings.hidden), Combination::Mean);
         settings.training.stopping.epochs = self.fixed.epochs.unwrap_or(best.epoch);
         Ok(AutoChoice {
             settings,
-            memory,
+            memory: candidate.memory,
             record: AutoRecord {
                 budget_s: self.budget_s,
                 folds: self.folds.count(),
                 by: self.samples.by,
                 tried: self.tried,
-                chosen,
+                chosen: place,
             },
-            folds: self.folds,
             answers: best.answers,
         })
     }
@@ -611,7 +551,7 @@ fn shape(set: &Dataset, hidden: usize) -> Shape {
 }
 
 /// Divides the samples by their rule; a part without enough groups is divided in time.
-fn folds(samples: &AutoSamples<'_>, seed: Seed) -> Result<Folds, RunError> {
+pub(super) fn folds(samples: &AutoSamples<'_>, seed: Seed) -> Result<Folds, RunError> {
     let mut rng = seed.rng(Stream::Folds);
     let (set, groups) = (samples.set, samples.set.snapshots().len());
     Ok(match samples.by {

@@ -62,18 +62,16 @@ fn correlation_time(set: &Dataset, history: &History, samples: &[usize]) -> f64 
     let count = set.samples();
     let mut order = Vec::from_iter(0..count);
     order.sort_by_key(|&sample| (stretches[row(sample)], row(sample)));
-    let mut times: Vec<f64> = Vec::new();
-    for column in set.targets().columns() {
-        if !varies(column) {
-            continue;
-        }
+    let targets = set.targets();
+    let varying = targets.columns().into_iter().filter(|column| varies(*column));
+    let times = Vec::from_iter(varying.map(|column| {
         let values = column.select(Axis(0), &order);
         let is_alike = |lag| autocorrelation(values.view(), lag).is_some_and(|found| found > (-1.0_f64).exp());
         let mut lag = 1;
         while lag < count / 4 && is_alike(lag) {
             lag += 1 + lag / 5;
         }
-        times.push(lag as f64);
-    }
+        lag as f64
+    }));
     if times.is_empty() { 1.0 } else { median(times) }
 }

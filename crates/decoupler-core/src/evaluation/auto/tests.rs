@@ -111,9 +111,18 @@ fn given_settings_are_kept_and_groups_are_not_divided() {
         (3, 2, 7)
     );
     assert!(choice.memory.is_empty());
-    for fold in 0..choice.folds.count() {
-        let of_fold = choice.folds.test(fold);
-        let others = choice.folds.without(&[fold]);
+    let (readings, targets) = creeping(300);
+    let set = Dataset::new(readings, targets, None, groups.clone()).unwrap();
+    let samples = AutoSamples {
+        set: &set,
+        past: None,
+        by: SplitBy::Group,
+    };
+    let folds = search::folds(&samples, settings.seed).unwrap();
+    assert_eq!(folds.count(), choice.record.folds);
+    for fold in 0..folds.count() {
+        let of_fold = folds.test(fold);
+        let others = folds.without(&[fold]);
         assert!(
             of_fold
                 .iter()

@@ -1,10 +1,7 @@
 use ndarray::{Array1, ArrayView1, ArrayView2};
 use thiserror::Error;
 
-use super::{
-    Interval,
-    interval::{Evidence, SumVariance},
-};
+use super::{Evidence, Interval, interval::SumVariance, product, scaled_deviations};
 use crate::{
     dataset::{Dataset, SplitBy},
     evaluation::{
@@ -47,10 +44,7 @@ pub enum Undetermined {
     Constant,
     /// There are too few independent units for an interval.
     #[error("there are fewer than 3 independent stretches or groups: record longer, or record more groups")]
-    FewUnits {
-        /// Number of independent stretches or groups.
-        units: usize,
-    },
+    FewUnits,
     /// The error is NaN, or neither negligible nor known within a factor of 100.
     #[error(
         "its R² is not determined by {units} independent stretches or groups: record longer, or record more groups"
@@ -83,22 +77,15 @@ impl Determination {
         let targets = set.targets();
         let columns = targets.columns().into_iter().zip(answers.columns());
         columns
-            .map(|(truth, answers)| Self::of_one(&evidence, truth, answers))
+            .map(|(truth, answers)| Self::of_one(&evidence, [truth, answers]))
             .collect()
     }
 
-    fn of_one(
-        evidence: &Evidence,
-        truth: ArrayView1<'_, f64>,
-        answers: ArrayView1<'_, f64>,
-    ) -> Result<Self, Undetermined> {
+    fn of_one(evidence: &Evidence, [truth, answers]: [ArrayView1<'_, f64>; 2]) -> Result<Self, Undetermined> {
         if !varies(truth) {
             return Err(Undetermined::Constant);
         }
-        let off = centred(truth);
-        // Scaled by the largest deviation to avoid overflow.
-        let scale = off.fold(0.0_f64, |scale, off| scale.max(off.abs()));
-        let off = off / scale;
+        let (off, scale) = scaled_deviations(truth);
         let errors = (&answers - &truth) / scale;
         let variation = product(&off, &off);
         // 1 − R².
@@ -108,13 +95,14 @@ impl Determination {
         let spread = evidence.variance(&influences);
         let units = spread.units;
         if units < Interval::FEWEST_UNITS {
-            return Err(Undetermined::FewUnits { units });
+            return Err(Undetermined::FewUnits);
         }
         let of_mean = evidence.variance(&(&off / variation.sqrt()));
+        let mean = mean(answers);
         let variance = spread.variance
             // From the square of the mean: the mean of few units differs from the true mean.
             + 2.0 * (of_mean.variance * unexplained / truth.len() as f64).powi(2)
-            + of_fits(evidence, &off, &(centred(answers) / scale));
+            + of_fits(evidence, &off, &(answers.mapv(|answer| answer - mean) / scale));
         let spread = SumVariance { variance, units };
         // The logarithm of a very small error can be uncertain although the error is certainly small.
         let small = Interval {
@@ -122,8 +110,8 @@ impl Determination {
             low: 0.0,
             high: unexplained + spread.reach(),
         };
-        let is_negligible = small.high <= Self::NEGLIGIBLE;
-        let ratio = Interval::of_ratio(unexplained, spread).or(is_negligible.then_some(small));
+        let small = Some(small).filter(|small| small.high <= Self::NEGLIGIBLE);
+        let ratio = Interval::of_ratio(unexplained, spread).or(small);
         let r2 = ratio.ok_or(Undetermined::Unbounded { units })?.map(|ratio| 1.0 - ratio);
         Ok(Self { r2, units })
     }
@@ -159,25 +147,19 @@ impl Determination {
             ),
             Determinacy::NotDetermined => (format!("{explains} almost nothing of {name}"), OTHER),
         };
-        let is_few = self.r2.low < 1.0 - Self::NEGLIGIBLE && self.units < Self::FEW_UNITS;
-        let few = if is_few {
-            format!(", from only {} independent stretches or groups", self.units)
-        } else {
-            String::new()
-        };
-        let is_too_short = is_few && determinacy != Determinacy::Uncertain;
-        let longer = if is_too_short { "; record longer" } else { "" };
         let Interval { value, low, high } = self.r2;
         // Enough decimals to show how far a good R² is from 1.
         let digits = (1.0 - (1.0 - value).abs().max(1e-9).log10().floor()).clamp(2.0, 6.0) as usize;
         let [value, low, high] = [value, low, high].map(|r2| format_below_one(r2, digits));
-        format!("{claim} (R² {value}, {low} to {high}){few}{longer}{advice}")
+        let mut sentence = format!("{claim} (R² {value}, {low} to {high})");
+        if self.r2.low < 1.0 - Self::NEGLIGIBLE && self.units < Self::FEW_UNITS {
+            sentence += &format!(", from only {} independent stretches or groups", self.units);
+            if determinacy != Determinacy::Uncertain {
+                sentence += "; record longer";
+            }
+        }
+        sentence + advice
     }
-}
-
-fn centred(values: ArrayView1<'_, f64>) -> Array1<f64> {
-    let mean = mean(values);
-    values.mapv(|value| value - mean)
 }
 
 /// Returns the variance of 1 − R² from the covariance of errors in different folds: a sample changes its own error and,
@@ -194,34 +176,29 @@ fn of_fits(evidence: &Evidence, off: &Array1<f64>, answers: &Array1<f64>) -> f64
     (1.0 - slope).clamp(0.0, 1.0) * evidence.variance(&cross).variance
 }
 
-fn product(one: &Array1<f64>, other: &Array1<f64>) -> f64 {
-    one.iter().zip(other).map(|(one, other)| one * other).sum()
-}
-
 /// Returns the ratio of the held-out RMSE of the network to that of ridge regression in a cross-validation of `set`, target
 /// by target; `None` if either has no error.
 ///
 /// # Panics
 /// If the set is not the one that was cross-validated.
 pub fn nonlinear_gains(set: &Dataset, validated: &CrossValidated, by: SplitBy) -> Vec<Option<Interval>> {
-    let answers = [validated.network.view(), validated.linear.view()];
-    (0..set.outputs())
-        .map(|target| Interval::of_rmse(set, answers, target, by))
-        .collect()
+    Interval::of_rmse(set, [validated.network.view(), validated.linear.view()], by)
 }
 
-/// Returns a sentence on the target of this name if the network is no or little better than ridge: if this ratio of their
-/// errors is no [improvement](Interval::is_improvement).
+/// Returns a sentence on the target of this name if the network is no or little better than ridge: unless this ratio of
+/// their errors is a significant reduction by at least 5 %.
 pub fn ridge_remark(ratio: Interval, name: &str) -> Option<String> {
-    (!ratio.is_improvement()).then(|| {
-        let better = if ratio.high < 1.0 { "little better" } else { "no better" };
+    let Interval { value, low, high } = ratio;
+    (high >= 1.0 || value > 0.95).then(|| {
+        let better = if high < 1.0 { "little better" } else { "no better" };
         // Enough decimals to show on which side of 1 the interval ends.
-        let differs = |decimals: &usize| format!("{:.decimals$}", ratio.high) != format!("{:.decimals$}", 1.0);
+        let differs = |decimals: &usize| format!("{high:.decimals$}") != format!("{:.decimals$}", 1.0);
         let decimals = (2..6).find(differs).unwrap_or(2);
+        let [value, low, high] = [value, low, high].map(|ratio| format!("{ratio:.decimals$}"));
         // The error does not show whether a nonlinear relation is absent, or this training has missed it.
         format!(
-            "the network is {better} than ridge for {name} (error {ratio:.decimals$} times ridge's): with these settings, \
-             use ridge"
+            "the network is {better} than ridge for {name} (error {value} ({low} to {high}) times ridge's): with these \
+             settings, use ridge"
         )
     })
 }
@@ -540,11 +517,11 @@ mod tests {
         for groups in [1, 2] {
             let set = set(rising(), (0..30).map(|sample| sample % groups).collect());
             let found = measure(&set, &zeros, SplitBy::Group);
-            assert_eq!(found, Err(Undetermined::FewUnits { units: groups }));
+            assert_eq!(found, Err(Undetermined::FewUnits));
         }
         let two = set(vec![1.0, 2.0], vec![0, 1]);
         let found = measure(&two, &Array2::zeros((2, 1)), SplitBy::Time);
-        assert_eq!(found, Err(Undetermined::FewUnits { units: 2 }));
+        assert_eq!(found, Err(Undetermined::FewUnits));
         // One of three groups has all of the variation and all of the error.
         let targets = (0..30).map(|sample| if sample == 29 { 1e8 } else { 0.0 }).collect();
         let found = measure(

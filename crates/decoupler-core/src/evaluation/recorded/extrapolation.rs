@@ -53,7 +53,7 @@ impl Extrapolation {
         ];
         let (samples, outside) = (
             test.samples(),
-            is_outside.iter().filter(|is_outside| **is_outside).count(),
+            is_outside.into_iter().filter(|outside| *outside).count(),
         );
         let share = outside as f64 / samples.max(1) as f64;
         let warning = format!(

@@ -46,8 +46,8 @@ pub struct LoopLevel {
     pub unloading: f64,
 }
 
-/// Part of an excursion off its turning points: the index of its branch, 0 for loading and 1 for unloading, and its samples.
-type Passage = (usize, Vec<usize>);
+/// Samples of each loading and of each unloading excursion, off its turning points.
+type Passages = [Vec<Vec<usize>>; 2];
 
 impl HysteresisLoop {
     /// Reversal that makes a turning point, relative to the range.
@@ -93,43 +93,46 @@ impl HysteresisLoop {
             return None;
         }
         let samples = Vec::from_iter(0..actual.len());
-        let stretches = samples.chunk_by(|&one, &next| stretches[one] == stretches[next]);
-        let mut passages = Vec::from_iter(stretches.flat_map(|stretch| passages_of(actual, stretch, range)));
-        let excursions = passages.len();
-        passages.retain(|(_, samples)| samples.len() >= Self::MIN_PASSAGE);
-        if 2 * passages.len() < excursions {
+        let mut passages = Passages::default();
+        for stretch in samples.chunk_by(|&one, &next| stretches[one] == stretches[next]) {
+            add_passages(&mut passages, actual, stretch, range);
+        }
+        let count = |passages: &Passages| passages.iter().map(Vec::len).sum::<usize>();
+        let excursions = count(&passages);
+        for branch in &mut passages {
+            branch.retain(|samples| samples.len() >= Self::MIN_PASSAGE);
+        }
+        if 2 * count(&passages) < excursions {
             return None;
         }
+        let branches = passages.each_ref().map(|branch| branch.concat());
         let error = |sample: usize| decoded[sample] - actual[sample];
         let level_of = |sample: usize| {
             let level = ((actual[sample] - lowest) / range * Self::LEVELS as f64) as usize;
             level.min(Self::LEVELS - 1)
         };
         // Mean error of each branch at each level, which does not depend on where the samples are within the level.
-        let mut sums = [[(0, 0.0); 2]; Self::LEVELS];
-        for (branch, samples) in &passages {
+        let mut errors = vec![[Vec::new(), Vec::new()]; Self::LEVELS];
+        for (branch, samples) in branches.iter().enumerate() {
             for &sample in samples {
-                let (count, sum) = &mut sums[level_of(sample)][*branch];
-                *count += 1;
-                *sum += error(sample);
+                errors[level_of(sample)][branch].push(error(sample));
             }
         }
-        let means = sums.map(|branches| {
-            let is_common = branches.iter().all(|(count, _)| *count >= Self::MIN_SAMPLES);
-            is_common.then(|| branches.map(|(count, sum)| sum / count as f64))
-        });
+        let means = Vec::from_iter(errors.iter().map(|branches| {
+            let is_common = branches.iter().all(|errors| errors.len() >= Self::MIN_SAMPLES);
+            is_common.then(|| branches.each_ref().map(|errors| mean(errors)))
+        }));
         // Mean distance of each excursion from the middle of the branches.
-        let mut distances = [Vec::new(), Vec::new()];
-        for (branch, samples) in &passages {
-            let distance = |&sample: &usize| {
-                let [loading, unloading] = means[level_of(sample)]?;
-                Some(error(sample) - 0.5 * (loading + unloading))
-            };
-            let of_passage = Vec::from_iter(samples.iter().filter_map(distance));
-            if !of_passage.is_empty() {
-                distances[*branch].push(mean(&of_passage));
-            }
-        }
+        let distance = |&sample: &usize| {
+            let [loading, unloading] = means[level_of(sample)]?;
+            Some(error(sample) - 0.5 * (loading + unloading))
+        };
+        let distances = passages.map(|branch| {
+            let distances = branch
+                .iter()
+                .map(|samples| Vec::from_iter(samples.iter().filter_map(distance)));
+            Vec::from_iter(distances.filter(|of| !of.is_empty()).map(|of| mean(&of)))
+        });
         let level = |(level, means): (usize, &Option<[f64; 2]>)| {
             let [loading, unloading] = (*means)?;
             let actual = lowest + range * (level as f64 + 0.5) / Self::LEVELS as f64;
@@ -145,10 +148,6 @@ impl HysteresisLoop {
         if !differ(distances) || levels.len() < Self::MIN_LEVELS || percent_of_range < Self::MIN_PERCENT {
             return None;
         }
-        let branches = [0, 1].map(|branch| {
-            let of_branch = passages.iter().filter(|(of, _)| *of == branch);
-            Vec::from_iter(of_branch.flat_map(|(_, samples)| samples.iter().copied()))
-        });
         let [loading, unloading] = branches.each_ref().map(|samples| {
             let column =
                 |values: &[f64]| Array2::from_shape_fn((samples.len(), 1), |(place, _)| values[samples[place]]);
@@ -178,29 +177,27 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 /// Returns `true` if the means of the values of two branches differ significantly.
-fn differ([loading, unloading]: [Vec<f64>; 2]) -> bool {
-    if loading.len().min(unloading.len()) < 2 {
+fn differ(branches: [Vec<f64>; 2]) -> bool {
+    let [loading, unloading] = branches.each_ref().map(|values| values.len() as f64);
+    if loading.min(unloading) < 2.0 {
         return false;
     }
-    let freedom = (loading.len() + unloading.len()) as f64 - 2.0;
-    let squares = |values: &[f64]| {
-        let mean = mean(values);
-        values.iter().map(|value| (value - mean).powi(2)).sum::<f64>()
-    };
-    let counts = 1.0 / loading.len() as f64 + 1.0 / unloading.len() as f64;
-    let standard_error = ((squares(&loading) + squares(&unloading)) / freedom * counts).sqrt();
-    (mean(&loading) - mean(&unloading)).abs() > student_quantile(freedom) * standard_error
+    let freedom = loading + unloading - 2.0;
+    let means = branches.each_ref().map(|values| mean(values));
+    let pairs = branches.iter().zip(means);
+    let squares = pairs.flat_map(|(values, mean)| values.iter().map(move |value| (value - mean).powi(2)));
+    let standard_error = (squares.sum::<f64>() / freedom * (1.0 / loading + 1.0 / unloading)).sqrt();
+    (means[0] - means[1]).abs() > student_quantile(freedom) * standard_error
 }
 
-/// Returns the excursions of one stretch between the first and the last turning point that are certain.
-fn passages_of(all: &[f64], stretch: &[usize], range: f64) -> Vec<Passage> {
-    let first = stretch[0];
-    let actual = &all[first..first + stretch.len()];
+/// Adds the excursions of one stretch between the first and the last turning point that are certain.
+fn add_passages(passages: &mut Passages, actual: &[f64], stretch: &[usize], range: f64) {
     let (reversal, rest) = (HysteresisLoop::REVERSAL * range, HysteresisLoop::REST * range);
     let mut turning_points = Vec::new();
-    let (mut lowest, mut highest) = (0, 0);
+    let (mut lowest, mut highest) = (stretch[0], stretch[0]);
     let mut is_loading = None;
-    for (sample, &value) in actual.iter().enumerate() {
+    for &sample in stretch {
+        let value = actual[sample];
         if value < actual[lowest] {
             lowest = sample;
         }
@@ -217,13 +214,11 @@ fn passages_of(all: &[f64], stretch: &[usize], range: f64) -> Vec<Passage> {
     }
     // The last excursion ends at its extreme.
     turning_points.extend(is_loading.map(|is_loading| if is_loading { highest } else { lowest }));
-    let passage = |pair: &[usize]| {
+    for pair in turning_points.windows(2) {
         let (from, to) = (actual[pair[0]], actual[pair[1]]);
         let is_moving = |sample: &usize| (actual[*sample] - from).abs() >= rest && (actual[*sample] - to).abs() >= rest;
-        let moving = (pair[0]..=pair[1]).filter(is_moving);
-        (usize::from(to <= from), moving.map(|sample| first + sample).collect())
-    };
-    turning_points.windows(2).map(passage).collect()
+        passages[usize::from(to <= from)].push((pair[0]..=pair[1]).filter(is_moving).collect());
+    }
 }
 
 #[cfg(test)]

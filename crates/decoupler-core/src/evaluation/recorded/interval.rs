@@ -1,6 +1,7 @@
-use std::{f64::consts::PI, fmt};
+use std::f64::consts::PI;
 
 use ndarray::{Array1, ArrayView1, ArrayView2};
+use serde::Serialize;
 
 use crate::{
     dataset::{Dataset, SplitBy},
@@ -8,7 +9,7 @@ use crate::{
 };
 
 /// Figure with its 95 % confidence interval.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Interval {
     /// Figure from all samples.
     pub value: f64,
@@ -23,8 +24,6 @@ impl Interval {
     pub(super) const FEWEST_UNITS: usize = 3;
     /// Maximum factor between an end and the figure; beyond it, the figure is not determined.
     const MAX_FACTOR: f64 = 100.0;
-    /// Minimum relative reduction of an error that justifies a more expensive model.
-    const MIN_GAIN: f64 = 0.05;
 
     /// Returns the interval of a positive ratio with sampling variance `spread`: a Student's t interval in the
     /// logarithm, in which the ratio of two sums of squares is nearly normal. `None` if the ratio is not determined.
@@ -39,24 +38,18 @@ impl Interval {
         })
     }
 
-    /// Returns the ratio of the RMSE of the first answers to that of the second, both for the same samples of one target;
-    /// `None` if it is not determined.
-    pub(super) fn of_rmse(
-        set: &Dataset,
-        answers: [ArrayView2<'_, f64>; 2],
-        target: usize,
-        by: SplitBy,
-    ) -> Option<Self> {
-        let [ours, theirs] = answers.map(|answers| squared_errors(set, answers, target));
-        let total = theirs.iter().sum::<f64>();
-        let ratio = ours.iter().sum::<f64>() / total;
-        let spread = Evidence::of(set, by).variance(&((ours - theirs * ratio) / total));
-        Some(Self::of_ratio(ratio, spread)?.map(f64::sqrt))
-    }
-
-    /// Returns `true` if this ratio of an error to another one is a reduction by at least 5 %, and significant.
-    pub fn is_improvement(&self) -> bool {
-        self.high < 1.0 && self.value <= 1.0 - Self::MIN_GAIN
+    /// Returns the ratio of the RMSE of the first answers to that of the second for each target of `set`; `None` if it is not
+    /// determined.
+    pub(super) fn of_rmse(set: &Dataset, answers: [ArrayView2<'_, f64>; 2], by: SplitBy) -> Vec<Option<Self>> {
+        let evidence = Evidence::of(set, by);
+        let of_target = |target: usize| {
+            let [ours, theirs] = answers.map(|answers| squared_errors(set, answers, target));
+            let total = theirs.iter().sum::<f64>();
+            let ratio = ours.iter().sum::<f64>() / total;
+            let spread = evidence.variance(&((ours - theirs * ratio) / total));
+            Some(Self::of_ratio(ratio, spread)?.map(f64::sqrt))
+        };
+        (0..set.outputs()).map(of_target).collect()
     }
 
     /// Returns the interval of a monotonic function of the figure.
@@ -68,18 +61,6 @@ impl Interval {
             low: low.min(high),
             high: low.max(high),
         }
-    }
-}
-
-impl fmt::Display for Interval {
-    /// Writes `0.04 (0.01 to 0.09)`, with the given number of decimals, or two.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let digits = f.precision().unwrap_or(2);
-        // Avoids -0.00.
-        let places = 10.0_f64.powi(digits as i32);
-        let [value, low, high] =
-            [self.value, self.low, self.high].map(|figure| (figure * places).round() / places + 0.0);
-        write!(f, "{value:.digits$} ({low:.digits$} to {high:.digits$})")
     }
 }
 
@@ -228,11 +209,18 @@ mod tests {
     }
 
     #[test]
-    fn an_interval_is_written_with_both_ends() {
+    fn the_interval_of_a_ratio_is_that_of_its_logarithm() {
         // t with 20 degrees of freedom is 2.086: e^(±0.2086).
         let interval = of_ratio(1.0, 0.01, 21).unwrap();
-        assert_eq!(format!("{interval:.4}"), "1.0000 (0.8117 to 1.2319)");
-        assert_eq!(interval.map(|ratio| 1.0 - ratio).to_string(), "0.00 (-0.23 to 0.19)");
+        assert!(
+            (interval.low - 0.8117).abs() < 1e-4 && (interval.high - 1.2319).abs() < 1e-4,
+            "{interval:?}"
+        );
+        let interval = interval.map(|ratio| 1.0 - ratio);
+        assert!(
+            (interval.low + 0.2319).abs() < 1e-4 && (interval.high - 0.1883).abs() < 1e-4,
+            "{interval:?}"
+        );
     }
 
     #[test]

@@ -1,8 +1,8 @@
 use ndarray::{Array1, ArrayView1};
 
+use super::{product, scaled_deviations};
 use crate::{
     dataset::{Dataset, SplitBy},
-    evaluation::errors::mean,
     problem::Channel,
     sensor::short,
 };
@@ -22,19 +22,18 @@ pub fn channel_remarks(set: &Dataset, by: SplitBy, inputs: &[Channel], targets: 
     let mut remarks = Vec::new();
     for (channel, readings) in readings.columns().into_iter().enumerate() {
         let name = &inputs[channel].name;
-        let Some(unit) = &units[channel] else {
-            let value = short(readings[0]);
-            remarks.push(format!(
-                "{name} is {value} in every sample: it carries no information; check its wire"
-            ));
-            continue;
-        };
-        match position_of_parallel(unit, &units[..channel], ROUNDING) {
-            Some(of) => remarks.push(format!(
+        let unit = units[channel].as_ref();
+        let original = unit.and_then(|unit| position_of_parallel(unit, &units[..channel], ROUNDING));
+        match (unit, original) {
+            (None, _) => remarks.push(format!(
+                "{name} is {} in every sample: it carries no information; check its wire",
+                short(readings[0])
+            )),
+            (_, Some(of)) => remarks.push(format!(
                 "{name} repeats {}: it adds no information; check that it is the right channel",
                 inputs[of].name
             )),
-            None => remarks.extend(saturation(name, readings)),
+            _ => remarks.extend(saturation(name, readings)),
         }
     }
     remarks.extend(target_remarks(set, by, inputs, targets));
@@ -99,21 +98,18 @@ fn single_change(values: ArrayView1<'_, f64>, groups: &[usize], by: SplitBy) -> 
 
 /// Returns the deviations of the readings from their mean as a vector of length 1; `None` for a constant channel.
 fn unit_vector(channel: ArrayView1<'_, f64>) -> Option<Array1<f64>> {
-    if channel.iter().all(|value| *value == channel[0]) {
-        return None;
-    }
-    let mean = mean(channel);
-    let off = channel.mapv(|value| value - mean);
-    let largest = off.fold(0.0_f64, |largest, off| largest.max(off.abs()));
-    let off = off / largest;
-    let length = off.iter().map(|value| value * value).sum::<f64>().sqrt();
-    Some(off / length)
+    let is_constant = channel.iter().all(|value| *value == channel[0]);
+    (!is_constant).then(|| {
+        let (off, _) = scaled_deviations(channel);
+        let length = product(&off, &off).sqrt();
+        off / length
+    })
 }
 
 /// Returns the index of the first of `others` that equals this vector up to sign and a `distance`; all have length 1.
 fn position_of_parallel(one: &Array1<f64>, others: &[Option<Array1<f64>>], distance: f64) -> Option<usize> {
     let is_parallel = |other: &Array1<f64>| {
-        let along: f64 = one.iter().zip(other).map(|(a, b)| a * b).sum();
+        let along = product(one, other);
         let apart = one.iter().zip(other).map(|(a, b)| (a - along.signum() * b).powi(2));
         along.abs() > 0.999_999 && apart.sum::<f64>().sqrt() < distance
     };

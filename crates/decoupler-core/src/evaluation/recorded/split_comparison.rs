@@ -54,9 +54,8 @@ impl SplitComparison {
         };
         let by = SplitBy::honest(set);
         let (honest, random) = (validate(by)?, validate(SplitBy::Random)?);
-        let answers = [random.network.view(), honest.network.view()];
-        let ratio = |target| Interval::of_rmse(set, answers, target, by);
-        Ok(Self::of(set, by, [honest.scores(set), random.scores(set)], ratio))
+        let ratios = Interval::of_rmse(set, [random.network.view(), honest.network.view()], by);
+        Ok(Self::of(set, by, [honest.scores(set), random.scores(set)], ratios))
     }
 
     /// Compares the test errors of two runs on parts of `set`, split by `by` and at random; `None` if a run is of a single fold.
@@ -80,22 +79,18 @@ impl SplitComparison {
             };
             Some(Interval::of_ratio(ratio, spread)?.map(f64::sqrt))
         };
-        Some(Self::of(set, by, scores, ratio))
+        Some(Self::of(set, by, scores, (0..set.outputs()).map(ratio).collect()))
     }
 
-    fn of(
-        set: &Dataset,
-        by: SplitBy,
-        [honest, random]: [Scores; 2],
-        ratio: impl Fn(usize) -> Option<Interval>,
-    ) -> Self {
+    fn of(set: &Dataset, by: SplitBy, [honest, random]: [Scores; 2], ratios: Vec<Option<Interval>>) -> Self {
         let targets = set.targets();
+        let successive = targets.columns().into_iter().map(|of| autocorrelation(of, 1));
         Self {
             by,
             honest,
             random,
-            ratios: (0..set.outputs()).map(ratio).collect(),
-            successive: targets.columns().into_iter().map(|of| autocorrelation(of, 1)).collect(),
+            ratios,
+            successive: successive.collect(),
         }
     }
 

@@ -39,8 +39,8 @@ pub struct RecordingStudy {
     pub(super) found: Option<Box<RecordingFindings>>,
     /// Errors of the last cross-validation.
     pub(super) validated: Option<Box<FoldsResult>>,
-    /// Model that is refitted; the better of the two if `None`.
-    pub(super) model: Option<FittedModel>,
+    /// Model of the analysis.
+    pub(super) model: FittedModel,
     /// Extent of a cross-validation.
     pub(super) choice: FoldsChoice,
 }
@@ -87,7 +87,7 @@ impl RecordingStudy {
             reading: None,
             found: None,
             validated: None,
-            model: None,
+            model: FittedModel::Network,
             choice: FoldsChoice {
                 folds: 5,
                 compares_random: false,
@@ -161,8 +161,8 @@ impl RecordingStudy {
 /// Work for the thread.
 #[derive(Clone, Debug)]
 pub enum Task {
-    /// Measure what the readings determine; without a model, with the better of ridge and network.
-    Findings(Option<FittedModel>),
+    /// Measure what the readings determine with this model.
+    Findings(FittedModel),
     /// Cross-validate.
     CrossValidation,
 }
@@ -176,8 +176,6 @@ pub struct RecordingFindings {
     pub folds: String,
     /// Number of samples.
     pub samples: usize,
-    /// Channels of the readings.
-    pub inputs: Vec<Channel>,
     /// Channels of the targets.
     pub targets: Vec<Channel>,
     /// The findings.
@@ -234,16 +232,16 @@ fn find(
     setup: Setup,
     plan: &Plan,
     recording: Recording,
-    model: Option<FittedModel>,
+    model: FittedModel,
     folds: usize,
     report: &Report<StudyEvent>,
 ) -> Result<(), String> {
     let begun = Instant::now();
-    let division = (&plan.division, folds);
+    let divided = (plan.division.by, folds);
     let begin = |stage| report.send(StudyEvent::Began(stage));
     let is_cancelled = || report.is_cancelled();
     let ends: (&Job<'_>, &dyn Fn() -> bool) = (&Job::new(&is_cancelled), &|| false);
-    let found = Findings::measure(setup.settings(), &recording.set, division, model, &begin, ends);
+    let found = Findings::measure(setup.settings(), &recording.set, divided, model, &begin, ends);
     let findings = found.map_err(|error| error.to_string())?;
     report.send(StudyEvent::Found(Box::new(RecordingFindings {
         warnings: describe_warnings(&recording, plan.division.by, &findings),
@@ -251,7 +249,6 @@ fn find(
         setup,
         folds: describe_folds(folds, plan.division.by),
         samples: recording.set.samples(),
-        inputs: recording.inputs,
         targets: recording.targets,
         time: begun.elapsed(),
     })));

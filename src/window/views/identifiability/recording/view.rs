@@ -1,15 +1,8 @@
 //! The form, the results and the exports of the study of a recording.
 
-use decoupler_core::{
-    evaluation::recorded::{Findings, FittedModel},
-    problem::Channel,
-    text::counted,
-};
+use decoupler_core::{evaluation::recorded::FittedModel, text::counted};
 use decoupler_files::{
-    export::{
-        Cell, Table, TableColumn as ExportColumn, describe_target, error_table, format_below_one, format_duration,
-        format_number,
-    },
+    export::{describe_target, error_table, format_below_one, format_duration},
     import::Setup,
 };
 use eframe::egui::{Key, Modifiers, RichText, Sense, Ui};
@@ -22,7 +15,7 @@ use crate::window::{
     shared::{Export, FileWords, Offers, Shared, copy_exports, csv_export, error_table_ui, sentence},
     theme::{Theme, space, type_size},
     widgets::{
-        TableCell, TableColumn, TableRow, TableView, card_ui, dim_ui, explained_options_ui,
+        card_ui, dim_ui, explained_options_ui,
         fields::{capitalised, count_ui},
         ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button, scrolled_ui, section_heading_ui,
         state_ui, with_shortcut,
@@ -31,7 +24,7 @@ use crate::window::{
 
 const CHANGED: &str = "The recording or the settings have changed since: analyse again.";
 
-/// Shows what the readings determine on the left, the learning curve and the cross-validation on the right.
+/// Shows what the readings determine on the left, and the cross-validation on the right.
 pub fn body_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {
     let whole = ui.available_rect_before_wrap();
     let ready = ready(shared);
@@ -49,26 +42,21 @@ pub fn body_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {
                 changed_ui(ui, &found.setup, setup.as_ref());
                 findings_ui(ui, found);
             }
-            None => placeholder_ui(ui, "Press “Analyse readings” for R², channels and learning curve."),
+            None => placeholder_ui(ui, "Press “Analyse readings” for R² and channels without information."),
         });
     });
     card_ui(ui, right.with_min_x(right.min.x + space(1)), |ui| {
-        scrolled_ui(ui, "study", |ui| {
-            if let Some(found) = found {
-                curve_ui(ui, found);
+        scrolled_ui(ui, "study", |ui| match validated {
+            Some(validated) => {
+                changed_ui(ui, &validated.setup, setup.as_ref());
+                folds_ui(ui, validated);
             }
-            match validated {
-                Some(validated) => {
-                    changed_ui(ui, &validated.setup, setup.as_ref());
-                    folds_ui(ui, validated);
-                }
-                None => {
-                    ui.add_space(space(2));
-                    dim_ui(
-                        ui,
-                        "“Cross-validate” tests on every sample and lists the held-out errors here.",
-                    );
-                }
+            None => {
+                ui.add_space(space(2));
+                dim_ui(
+                    ui,
+                    "“Cross-validate” tests on every sample and lists the held-out errors here.",
+                );
             }
         });
     });
@@ -85,9 +73,8 @@ fn empty_ui(ui: &mut Ui, study: &mut RecordingStudy, ready: Option<Setup>, share
         (Some(under_way), _) => placeholder_ui(ui, &progress(under_way, study)),
         (None, Err(obstacle)) => placeholder_ui(ui, &obstacle),
         (None, Ok(_)) => {
-            let text = "How well the readings determine each target, what each channel contributes, and how the error falls \
-                        with the number of samples: measured on held-out samples, with confidence intervals of 95 % from \
-                        independent stretches or groups of samples.";
+            let text = "How well the readings determine each target: measured on held-out samples, with confidence intervals \
+                        of 95 % from independent stretches or groups of samples.";
             if invitation_ui(ui, text, "Analyse now", ready.is_some())
                 && let Some(setup) = ready
             {
@@ -155,13 +142,8 @@ pub fn folds_ui(ui: &mut Ui, validated: &FoldsResult) {
     }
 }
 
-/// Shows what the readings determine, target by target, and the contribution of each channel.
+/// Shows what the readings determine, target by target, and channels without information.
 pub fn findings_ui(ui: &mut Ui, found: &RecordingFindings) {
-    targets_ui(ui, found);
-    channels_ui(ui, found);
-}
-
-fn targets_ui(ui: &mut Ui, found: &RecordingFindings) {
     section_heading_ui(ui, "What the readings determine");
     let RecordingFindings { findings, targets, .. } = found;
     for (index, (target, of_target)) in targets.iter().zip(&findings.targets).enumerate() {
@@ -193,90 +175,6 @@ fn targets_ui(ui: &mut Ui, found: &RecordingFindings) {
     );
 }
 
-fn channels_ui(ui: &mut Ui, found: &RecordingFindings) {
-    if found.findings.importance.is_empty() {
-        return;
-    }
-    section_heading_ui(ui, "Channels");
-    dim_ui(
-        ui,
-        &format!(
-            "RMSE without a channel, relative to the RMSE with all channels; {} is fitted again for each. Dim: \
-             dispensable, because no error grows significantly without it.",
-            name_of(found.findings.model)
-        ),
-    );
-    let palette = Theme::of(ui).palette;
-    let titles: Vec<String> = found.targets.iter().map(Channel::title).collect();
-    let columns: Vec<TableColumn<'_>> = std::iter::once(TableColumn::text("channel"))
-        .chain(titles.iter().map(|title| TableColumn::figure(title)))
-        .collect();
-    let rows = found.findings.importance.iter().enumerate().map(|(channel, growth)| {
-        let colour = if found.findings.is_dispensable(channel) {
-            palette.dim
-        } else {
-            palette.text
-        };
-        let name = found.inputs[channel].title();
-        let growth = growth.iter().map(|growth| match growth {
-            Some(growth) => growth.to_string(),
-            None => format_number(None),
-        });
-        let cells = std::iter::once(name.clone()).chain(growth).map(TableCell::new);
-        TableRow::new(cells).named(name).colour(colour)
-    });
-    TableView::new("channels", &columns).show_all(ui, rows.collect());
-}
-
-/// Shows the errors on the test samples by the number of training samples.
-pub fn curve_ui(ui: &mut Ui, found: &RecordingFindings) {
-    if found.findings.curve.is_empty() {
-        return;
-    }
-    section_heading_ui(ui, "Learning curve");
-    dim_ui(
-        ui,
-        &format!(
-            "RMSE on the test samples by the number of training samples: mean of the fits, from best to worst; {} is fitted \
-             again for each.",
-            name_of(found.findings.model)
-        ),
-    );
-    let titles: Vec<String> = found.targets.iter().map(Channel::title).collect();
-    let columns: Vec<TableColumn<'_>> = std::iter::once(TableColumn::figure("samples"))
-        .chain(titles.iter().map(|title| TableColumn::figure(title)))
-        .collect();
-    let rows = found.findings.curve.iter().map(|point| {
-        let samples = point.samples.to_string();
-        let errors = point.rmse.iter().zip(&point.range).map(|(&rmse, &range)| {
-            let [best, worst] = range.map(format_number);
-            format!("{} ({best} to {worst})", format_number(rmse))
-        });
-        let cells = std::iter::once(samples.clone()).chain(errors).map(TableCell::new);
-        TableRow::new(cells).named(counted(point.samples, "sample"))
-    });
-    TableView::new("learning curve", &columns).show_all(ui, rows.collect());
-}
-
-fn name_of(model: FittedModel) -> &'static str {
-    match model {
-        FittedModel::Ridge => "ridge",
-        FittedModel::Network => "the network",
-    }
-}
-
-const CHANNELS: FileWords = FileWords {
-    kind: "channel table",
-    description: "How much the error of each target grows without each channel, with every digit, as CSV.",
-    extensions: &["csv"],
-};
-
-const CURVE: FileWords = FileWords {
-    kind: "learning curve",
-    description: "RMSE of each target on the test samples by the number of training samples, with every digit, as CSV.",
-    extensions: &["csv"],
-};
-
 const HELD_OUT: FileWords = FileWords {
     kind: "cross-validation table",
     description: "Errors of each target over all samples, each tested by models fitted to the other folds, with every \
@@ -284,119 +182,31 @@ const HELD_OUT: FileWords = FileWords {
     extensions: &["csv"],
 };
 
-/// Returns the exports: learning curve, channels and errors of the cross-validation.
+/// Returns the exports: the errors of the cross-validation.
 pub fn study_exports(study: &RecordingStudy) -> Vec<Export<'_>> {
-    let nothing = || "The readings are not analysed yet: press “Analyse readings” first.".to_owned();
-    let of_source = |source: &str, what: &str| format!("{source}-{what}");
-    let found = study.found.as_deref().ok_or_else(nothing);
-    let stem = |what: &str| {
-        let source = found.as_ref().map_or(String::new(), |found| found.setup.source_name());
-        of_source(&source, what)
-    };
-    let curve = found.clone().map(|found| move || curve_table(found));
-    let mut exports = vec![csv_export(
-        "Learning curve",
-        CURVE,
-        stem("learning-curve"),
-        curve.clone(),
-    )];
-    exports.extend(copy_exports("Learning curve", curve));
-    let channels = found.clone().map(|found| move || channel_table(found));
-    exports.push(csv_export(
-        "Channel table",
-        CHANNELS,
-        stem("channels"),
-        channels.clone(),
-    ));
-    exports.extend(copy_exports("Channel table", channels));
     let validated = study.validated.as_deref();
-    let name = validated.map_or(String::new(), |validated| validated.setup.source_name());
+    let source = validated.map_or(String::new(), |validated| validated.setup.source_name());
     let validated = validated.ok_or_else(|| "Nothing is cross-validated yet: press “Cross-validate” first.".to_owned());
     let errors = validated.map(|validated| move || error_table(&validated.table));
-    exports.push(csv_export(
-        "Cross-validation table",
-        HELD_OUT,
-        of_source(&name, "cross-validation"),
-        errors.clone(),
-    ));
+    let stem = format!("{source}-cross-validation");
+    let mut exports = vec![csv_export("Cross-validation table", HELD_OUT, stem, errors.clone())];
     exports.extend(copy_exports("Cross-validation table", errors));
     exports
-}
-
-/// Returns the growth of the error of each target without each channel.
-fn channel_table(found: &RecordingFindings) -> Table {
-    let mut rows = Vec::new();
-    for (channel, growth) in found.inputs.iter().zip(&found.findings.importance) {
-        for (target, growth) in found.targets.iter().zip(growth) {
-            let names = [&channel.name, &target.name];
-            let figures = [
-                growth.map(|growth| growth.value),
-                growth.map(|growth| growth.low),
-                growth.map(|growth| growth.high),
-            ];
-            let names = names.into_iter().map(|name| Cell::from(name.clone()));
-            rows.push(names.chain(figures.map(Cell::Number)).collect());
-        }
-    }
-    let columns = [
-        ("channel", "Channel"),
-        ("target", "Target"),
-        ("rmse_ratio", "RMSE without it / with all"),
-        ("low", "from"),
-        ("high", "to"),
-    ];
-    Table {
-        columns: columns
-            .map(|(field, heading)| ExportColumn::new(field, heading, ""))
-            .into(),
-        rows,
-    }
-}
-
-/// Returns the errors of each target by the number of training samples.
-fn curve_table(found: &RecordingFindings) -> Table {
-    let mut rows = Vec::new();
-    for point in &found.findings.curve {
-        for (index, target) in found.targets.iter().enumerate() {
-            let [best, worst] = point.range[index];
-            let figures = [point.rmse[index], best, worst].map(Cell::from);
-            let names = [Cell::from(point.samples), Cell::from(target.name.clone())];
-            rows.push(names.into_iter().chain(figures).collect());
-        }
-    }
-    let columns = [
-        ("samples", "Training samples"),
-        ("target", "Target"),
-        ("rmse", "RMSE"),
-        ("min", "best fit"),
-        ("max", "worst fit"),
-    ];
-    Table {
-        columns: columns
-            .map(|(field, heading)| ExportColumn::new(field, heading, ""))
-            .into(),
-        rows,
-    }
 }
 
 /// Largest number of folds offered.
 const MAX_FOLDS: usize = 1000;
 
-const MODELS: [(Option<FittedModel>, &str, &str); 3] = [
+const MODELS: [(FittedModel, &str, &str); 2] = [
     (
-        None,
-        "better of the two",
-        "The network where it is better than ridge regression for a target, else ridge.",
-    ),
-    (
-        Some(FittedModel::Ridge),
+        FittedModel::Ridge,
         "ridge",
         "Ridge regression alone: takes seconds, but finds linear relations only.",
     ),
     (
-        Some(FittedModel::Network),
+        FittedModel::Network,
         "network",
-        "The network of these settings: each fit is a training.",
+        "The network of these settings, compared with ridge regression: each fit is a training.",
     ),
 ];
 
@@ -414,8 +224,8 @@ pub fn form_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {
         };
         ui.add_enabled_ui(!study.is_under_way(), |ui| {
             choices_ui(ui, study);
-            if let Ok(setup) = &setup {
-                dim_ui(ui, &cost(study, setup, shared));
+            if setup.is_ok() {
+                dim_ui(ui, &cost(study, shared));
             }
         });
         ui.add_space(space(2));
@@ -434,7 +244,6 @@ fn choices_ui(ui: &mut Ui, study: &mut RecordingStudy) {
     ui.checkbox(compares_random, "Compare with random folds")
         .on_hover_text(hint);
     section_heading_ui(ui, "Model");
-    dim_ui(ui, "Model that is fitted without each channel and to fewer samples.");
     if let Some(model) = explained_options_ui(ui, "Fitted model", &MODELS, study.model, true) {
         study.model = model;
     }
@@ -461,9 +270,11 @@ fn buttons_ui(ui: &mut Ui, study: &mut RecordingStudy, ready: Option<Setup>) {
     let why_not = "Open a recording in the Train view, and wait until no training is running.";
     ui.vertical_centered_justified(|ui| {
         let analyse = ui.add_enabled(ready.is_some(), primary_button("Analyse readings"));
-        let hint = "Measures on held-out samples how well the readings determine each target, what each channel contributes, \
-                    and how the error falls with the number of samples";
-        let is_analysed = analyse.on_hover_text(with_shortcut(ui, hint, Key::Enter)).on_disabled_hover_text(why_not).clicked();
+        let hint = "Measures on held-out samples how well the readings determine each target";
+        let is_analysed = analyse
+            .on_hover_text(with_shortcut(ui, hint, Key::Enter))
+            .on_disabled_hover_text(why_not)
+            .clicked();
         let validate = ui.add_enabled(ready.is_some(), ghost_button("Cross-validate"));
         let hint = "Tests on every sample with networks trained on the other folds: one training per fold.";
         let is_validated = validate.on_hover_text(hint).on_disabled_hover_text(why_not).clicked();
@@ -491,32 +302,17 @@ pub(super) fn progress(under_way: UnderWay, study: &RecordingStudy) -> String {
 }
 
 /// Describes the cost of the analysis.
-fn cost(study: &RecordingStudy, setup: &Setup, shared: &Shared) -> String {
+fn cost(study: &RecordingStudy, shared: &Shared) -> String {
     let folds = study.choice.folds;
-    if study.model == Some(FittedModel::Ridge) {
+    if study.model == FittedModel::Ridge {
         return format!("The analysis trains no network with ridge alone; {folds} folds.");
     }
-    // Inputs of a plan may be patterns; those of the last analysis are known.
-    let known = study.found.as_ref().filter(|found| found.setup.plan() == setup.plan());
-    let channels = known.map_or_else(
-        || setup.plan().map_or(0, |plan| plan.import.inputs.len()),
-        |found| found.inputs.len(),
-    );
-    let max = Findings::max_trainings(channels, folds);
-    let min = match study.model {
-        Some(_) => max,
-        // Ridge may turn out to be as good.
-        None => 2 * folds,
-    };
-    let range = if min == max {
-        format!("up to {max}")
-    } else {
-        format!("{min} to {max}")
-    };
+    // A cross-validation by the split and one at random, and one by group unless that is the split.
+    let [min, max] = [2, 3].map(|rounds| rounds * folds);
     let last = shared.result().and_then(|result| result.wall_time);
     let time = last.map_or_else(String::new, |last| {
         let [min, max] = [min, max].map(|count| format_duration(last.saturating_mul(count as u32)));
         format!("; the last training took {}, so {min} to {max}", format_duration(last))
     });
-    format!("The analysis takes {range} trainings with {folds} folds{time}.")
+    format!("The analysis takes {min} to {max} trainings with {folds} folds{time}.")
 }
