@@ -12,7 +12,6 @@ use decoupler_core::{
     decoupling::{Decoder, Precision, decode_set},
     evaluation::{DecoderSet, Run, RunError, RunSettings, TrainingSize, Workload, error_remarks},
     job::Job,
-    scene::{Fault, FaultySensor},
     sensor::{ArrayScale, SensorModel},
 };
 use decoupler_files::{
@@ -20,6 +19,7 @@ use decoupler_files::{
         AtomicFile, WriteError, describe_recorded_workload, describe_workload, write_samples, write_samples_header,
     },
     import::{Progress, Setup, SetupError, SetupSets},
+    live::{Fault, FaultySensor},
     machine::memory_budget,
 };
 
@@ -185,7 +185,7 @@ impl Simulate {
             let mut set = Dataset::simulate(sensor, scene, samples, &mut rng)?;
             let noise = scene.noise.in_test();
             let disturbed = match &faulty {
-                Some(faulty) => set.disturb_faulty(sensor, faulty, &noise, &mut noise_rng),
+                Some(faulty) => faulty.disturb(&mut set, &noise, &mut noise_rng),
                 None => set.disturb(sensor, &noise, &mut noise_rng),
             };
             disturbed.map_err(RunError::from)?;

@@ -6,7 +6,6 @@ use std::{fmt::Display, str::FromStr};
 use decoupler_core::{
     dataset::{Span, SplitBy},
     evaluation::{Combination, Initialization},
-    scene::Fault,
 };
 use decoupler_files::{
     export::{
@@ -14,7 +13,7 @@ use decoupler_files::{
         bundle::{BundleDecoder, BundleFormat, BundlePrecision},
     },
     import::{Condition, Decimal, Derived, Encoding, Missing, Separator},
-    live::Source,
+    live::{Fault, Source},
 };
 
 use crate::{

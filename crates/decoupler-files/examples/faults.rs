@@ -11,10 +11,10 @@ use decoupler_core::{
     evaluation::{Preset, Run, RunSettings},
     live::{FaultEvent, FaultyWire, LeftOutDecoder, WireCheck},
     rand::{Rng, RngExt},
-    scene::{ConverterEnd, Fault, Indenter, Loading, Noise},
+    scene::{Indenter, Loading, Noise},
     sensor::ArrayScale,
 };
-use decoupler_files::live::Simulated;
+use decoupler_files::live::{ConverterEnd, Fault, Simulated};
 
 const KINDS: [&str; 5] = ["open row", "open column", "short columns", "gain", "stuck"];
 /// Number of frames between presses that are decoded, and in all with each fault.

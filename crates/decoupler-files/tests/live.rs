@@ -8,10 +8,10 @@ use decoupler_core::{
     dataset::{Seed, Stream},
     decoupling::Decoder,
     live::{Diagnosis, FaultCause, FaultEvent, FaultyWire, LeftOutDecoder, WireCheck},
-    scene::{Deformation, Fault, FaultySensor, Indenter, Loading, Noise, Scene},
+    scene::{Deformation, Indenter, Loading, Noise, Scene},
     sensor::SensorModel,
 };
-use decoupler_files::live::Simulated;
+use decoupler_files::live::{Fault, FaultySensor, Simulated};
 use glam::DVec3;
 use rand::RngExt;
 

@@ -1,14 +1,8 @@
 use std::{collections::HashMap, sync::Arc};
 
-use glam::DVec3;
 use ndarray::{ArcArray2, ArrayView2, Axis};
-use rand::Rng;
 
 use super::DatasetError;
-use crate::{
-    scene::{Deformation, FaultySensor, Noise},
-    sensor::{SensorError, SensorModel},
-};
 
 /// Largest number of samples in a set, limited by memory.
 pub const LARGEST_SAMPLES: usize = 1_000_000;
@@ -255,46 +249,6 @@ fn standard(values: impl Into<ArcArray2<f64>>) -> ArcArray2<f64> {
 fn contiguous(values: &ArcArray2<f64>, sample: usize) -> &[f64] {
     let all = values.as_slice().expect("kept in standard layout");
     &all[sample * values.ncols()..(sample + 1) * values.ncols()]
-}
-
-impl Dataset {
-    /// Replaces the readings of simulated snapshots by those of a faulty sensor with noise: its wires and amplifiers come
-    /// before the noise, its converter after. `model` is the sensor without its fault.
-    ///
-    /// # Errors
-    /// See [`Self::disturb`].
-    pub fn disturb_faulty(
-        &mut self,
-        model: &SensorModel,
-        faulty: &FaultySensor,
-        noise: &Noise,
-        rng: &mut impl Rng,
-    ) -> Result<(), SensorError> {
-        let firsts = (0..self.samples()).step_by(self.row_count());
-        let deformations = Vec::from_iter(firsts.map(|first| self.simulated_deformation(model, first)));
-        let read = self.row_wires_read().map_or_else(Vec::new, <[usize]>::to_vec);
-        let length = read.len() * self.channels();
-        for (snapshot, deformation) in self.readings_mut().chunks_exact_mut(length).zip(&deformations) {
-            faulty.before_noise(&read, deformation, snapshot);
-        }
-        self.disturb(model, noise, rng)?;
-        for snapshot in self.readings_mut().chunks_exact_mut(length) {
-            faulty.after_noise(&read, snapshot);
-        }
-        Ok(())
-    }
-
-    /// Deformation of the simulated snapshot that begins with sample `first`. Row-wires that are not read are at rest.
-    fn simulated_deformation(&self, model: &SensorModel, first: usize) -> Deformation {
-        let read = self.row_wires_read().unwrap_or_default();
-        Deformation::from_fn(model.scale, |row, node| {
-            let index = read.iter().position(|&other| other == row);
-            index.map_or(DVec3::ZERO, |index| {
-                let coordinates_mm = &self.sample_targets(first + index)[3 * node..];
-                model.displacement_mm(row, node, DVec3::from_slice(coordinates_mm))
-            })
-        })
-    }
 }
 
 #[cfg(test)]

@@ -2,11 +2,11 @@ use std::{f64::consts::TAU, fmt, iter::Sum, mem::discriminant, ops::Range};
 
 use faer::{Mat, Side, linalg::solvers::Solve};
 
-use super::LeftOutDecoder;
 use crate::{
+    decoupling::Estimator,
     numerics::chi_squared_quantile,
     scene::{Loading, Scene},
-    sensor::{ArrayScale, SensorError, SensorModel},
+    sensor::{ArrayScale, DVec3, SensorError, SensorModel},
 };
 
 /// Faulty wire, counted from 0.
@@ -72,16 +72,24 @@ pub enum FaultEvent {
 /// Faults that Eq. (2) explains by some deformation cannot be found: two row-wires that touch, for example.
 #[derive(Debug)]
 pub struct WireCheck {
-    decoder: LeftOutDecoder,
+    model: SensorModel,
+    /// Row-wires read.
+    rows: Vec<usize>,
+    estimator: Estimator,
     axes: &'static [usize],
     stroke_mm: f64,
+    /// Resistances with all nodes half-way down: rows × M4.
+    half_way_ohm: Vec<f64>,
     /// Relative noise of each reading (standard deviation): rows × M4.
     deviations: Vec<f64>,
     /// Standard deviation of the gain error of a row; 0 for none.
     common: f64,
     /// Logarithm of the reading above which the converter clips.
     log_full_scale: f64,
+    /// Coordinates, displacements (M2) and resistances (M4) of the latest estimate.
     coordinates_mm: Vec<f64>,
+    displacements_mm: Vec<DVec3>,
+    predicted_ohm: Vec<f64>,
     /// Columns of the latest residual.
     used: Vec<usize>,
     /// Last event; [`FaultEvent::Recovered`] at first.
@@ -169,25 +177,35 @@ impl WireCheck {
             largest_compression: (DEEPER * compression).min(0.5 * (1.0 + compression)),
             ..*scene
         };
-        let decoder = LeftOutDecoder::with_prior(model, scene, rows, &any_press)?;
         let noise = scene.noise.in_test();
         let source = noise.source(model)?;
         let own = |&ohm: &f64| source.relative_to(ohm).own.max(SMALLEST_NOISE);
+        let stroke_mm = scene.stroke_mm(&model.geometry);
+        let half_way = vec![DVec3::Z * (0.5 * stroke_mm); model.scale.nodes_per_row()];
+        let mut half_way_ohm = Vec::with_capacity(rows.len() * model.scale.columns());
+        for &row in rows {
+            half_way_ohm.extend(model.row_resistances(row, &half_way)?);
+        }
         Ok(Self {
+            model: *model,
+            rows: rows.to_vec(),
+            estimator: Estimator::new(model, &any_press, rows)?,
             axes: scene.movement.axes().indices(),
-            stroke_mm: scene.stroke_mm(&model.geometry),
-            deviations: decoder.half_way_ohm.iter().map(own).collect(),
+            stroke_mm,
+            deviations: half_way_ohm.iter().map(own).collect(),
             // Rows are decoded one by one but share this error: it must not be penalised more than once in total.
             common: noise.drift * (rows.len() as f64).sqrt(),
             log_full_scale: (noise.range_ohm(model)?.1 * (1.0 - 1e-9)).ln(),
-            suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * decoder.half_way_ohm.len()),
+            suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * half_way_ohm.len()),
+            half_way_ohm,
             coordinates_mm: vec![0.0; model.scale.coordinates_per_row()],
+            displacements_mm: half_way,
+            predicted_ohm: vec![0.0; model.scale.columns()],
             used: Vec::with_capacity(model.scale.columns()),
             state: FaultEvent::Recovered,
             suspicious: 0,
             next_comparison: Self::PERSISTENCE,
             normal: 0,
-            decoder,
         })
     }
 
@@ -256,7 +274,7 @@ impl WireCheck {
         let missing = left_out.map_or(0..0, FaultyWire::columns);
         let rows = frame_ohm.chunks_exact(self.columns()).enumerate();
         let fits = rows.filter_map(|(row_index, readings_ohm)| {
-            let is_left_out = left_out.is_some_and(|wire| wire.is_row(self.decoder.rows[row_index]));
+            let is_left_out = left_out.is_some_and(|wire| wire.is_row(self.rows[row_index]));
             (!is_left_out).then(|| self.residual(row_index, readings_ohm, &missing).0)
         });
         let all = fits.sum();
@@ -265,29 +283,36 @@ impl WireCheck {
 
     /// Returns `true` if χ² is that of intact wires; `false` for NaN.
     fn is_within_limit(&self, fit: Fit) -> bool {
-        let unknowns = self.axes.len() * self.decoder.displacements_mm.len() * fit.rows;
+        let unknowns = self.axes.len() * self.displacements_mm.len() * fit.rows;
         fit.chi_squared <= chi_squared_quantile(fit.readings, DEVIATE) + OF_PRIOR * unknowns as f64
     }
 
     fn columns(&self) -> usize {
-        self.decoder.predicted_ohm.len()
+        self.predicted_ohm.len()
     }
 
     /// Decodes a row, and returns its χ² with the most probable logarithm of its gain. The score is not set.
     fn residual(&mut self, row_index: usize, readings_ohm: &[f64], missing: &Range<usize>) -> (Fit, f64) {
-        let decoded = (self.decoder).decode_without(missing, row_index, readings_ohm, &mut self.coordinates_mm);
+        let row = self.rows[row_index];
+        let coordinates_mm = &mut self.coordinates_mm;
+        let decoded = (self.estimator).solve_without(missing.clone(), row, readings_ohm, coordinates_mm);
         let mut fit = Fit {
             rows: 1,
             ..Fit::default()
         };
-        if decoded.is_err() {
+        let nodes = self.displacements_mm.iter_mut().zip(coordinates_mm.chunks_exact(3));
+        for (node, (displacement, at)) in nodes.enumerate() {
+            *displacement = self.model.displacement_mm(row, node, DVec3::from_slice(at));
+        }
+        let predicted = (self.model).row_resistances_into(row, &self.displacements_mm, &mut self.predicted_ohm);
+        if decoded.is_err() || predicted.is_err() {
             fit.chi_squared = f64::INFINITY;
             return (fit, 0.0);
         }
         self.used.clear();
         let (mut sum, mut weights) = (0.0, 0.0);
         for column in (0..readings_ohm.len()).filter(|column| !missing.contains(column)) {
-            let logs = [readings_ohm[column], self.decoder.predicted_ohm[column]].map(f64::ln);
+            let logs = [readings_ohm[column], self.predicted_ohm[column]].map(f64::ln);
             let (misfit, variance) = (logs[0] - logs[1], self.variance(row_index, column));
             // Where both are clipped, the reading is certain.
             if logs.iter().any(|log| *log < self.log_full_scale) {
@@ -314,14 +339,13 @@ impl WireCheck {
     /// Decodes a row without the missing readings, and predicts these.
     fn partial_row(&mut self, row_index: usize, readings_ohm: &[f64], missing: &Range<usize>) -> PartialRow {
         let (mut fit, log_gain) = self.residual(row_index, readings_ohm, missing);
-        let LeftOutDecoder {
-            model,
-            rows,
+        let Self {
             displacements_mm,
             predicted_ohm,
             ..
-        } = &self.decoder;
-        let Ok(jacobian) = model.row_jacobian(rows[row_index], displacements_mm) else {
+        } = &*self;
+        let jacobian = self.model.row_jacobian(self.rows[row_index], displacements_mm);
+        let Ok(jacobian) = jacobian else {
             fit.score = f64::INFINITY;
             return (fit, vec![Predicted::default(); missing.len()]);
         };
@@ -363,7 +387,7 @@ impl WireCheck {
 
     /// All rows of the frames without the missing readings.
     fn partial_rows(&mut self, frames_ohm: &[f64], missing: Range<usize>) -> Vec<PartialRow> {
-        let rows = self.decoder.rows.len();
+        let rows = self.rows.len();
         let readings = frames_ohm.chunks_exact(self.columns()).enumerate();
         readings
             .map(|(line, ohm)| self.partial_row(line % rows, ohm, &missing))
@@ -373,7 +397,7 @@ impl WireCheck {
     /// The fault that explains these frames, if there is one.
     fn compare(&mut self, frames_ohm: &[f64]) -> Option<Diagnosis> {
         let intact: Vec<Fit> = (self.partial_rows(frames_ohm, 0..0).iter().map(|(fit, _)| *fit)).collect();
-        let rows = 0..self.decoder.rows.len();
+        let rows = 0..self.rows.len();
         let mut hypotheses: Vec<Hypothesis> = rows.map(|row| self.of_row(frames_ohm, row, &intact)).collect();
         let suspects = self.suspects(frames_ohm, &intact);
         for &column in &suspects {
@@ -397,10 +421,10 @@ impl WireCheck {
 
     /// A fault of a row-wire, which does not affect the other rows.
     fn of_row(&self, frames_ohm: &[f64], row_index: usize, intact: &[Fit]) -> Hypothesis {
-        let (rows, columns) = (self.decoder.rows.len(), self.columns());
+        let (rows, columns) = (self.rows.len(), self.columns());
         let others = intact.iter().enumerate().filter(|(line, _)| line % rows != row_index);
         let lines = frames_ohm.chunks_exact(columns).skip(row_index).step_by(rows);
-        let half_way_ohm = &self.decoder.half_way_ohm[row_index * columns..][..columns];
+        let half_way_ohm = &self.half_way_ohm[row_index * columns..][..columns];
         let pairs = lines.flat_map(|line| line.iter().zip(half_way_ohm));
         let is_clipped = |ohm: f64| ohm.ln() >= self.log_full_scale;
         let is_open = pairs.clone().all(|(&ohm, half_way)| is_clipped(ohm) || ohm > *half_way);
@@ -408,13 +432,13 @@ impl WireCheck {
         let uncertain = pairs.filter(|(ohm, _)| !(is_open && is_clipped(**ohm))).count();
         let cause = if is_open { FaultCause::Open } else { FaultCause::Unknown };
         let fit = others.map(|(_, fit)| *fit).chain([unpredicted(uncertain)]).sum();
-        (FaultyWire::Row(self.decoder.rows[row_index]), cause, fit)
+        (FaultyWire::Row(self.rows[row_index]), cause, fit)
     }
 
     /// Column-wires without which the worst rows of the last frame have the smallest χ², and the neighbours of the best:
     /// two touching columns mask each other.
     fn suspects(&mut self, frames_ohm: &[f64], intact: &[Fit]) -> Vec<usize> {
-        let (rows, columns) = (self.decoder.rows.len(), self.columns());
+        let (rows, columns) = (self.rows.len(), self.columns());
         let mut lines: Vec<usize> = (intact.len() - rows..intact.len()).collect();
         lines.sort_by(|&a, &b| intact[b].chi_squared.total_cmp(&intact[a].chi_squared));
         lines.truncate(WORST_ROWS);

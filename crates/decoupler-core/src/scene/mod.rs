@@ -1,11 +1,9 @@
 //! The scene: rows read, movement, loading and noise. Decoders model only what varies in the scene.
 
-mod fault;
 mod loading;
 mod noise;
 mod rows;
 
-pub use fault::{ConverterEnd, Fault, FaultySensor};
 pub use loading::{Contact, DeformationSampler, Indenter, IndenterShape, Loading, Print, Span, Touch};
 pub(crate) use noise::standard_normal;
 pub use noise::{Noise, NoiseSource, NoisySets, RelativeNoise};
@@ -38,7 +36,7 @@ pub struct Scene {
     pub noise: Noise,
 }
 
-/// Invalid scene or fault.
+/// Invalid scene.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SceneError {
@@ -93,28 +91,6 @@ pub enum SceneError {
     /// The number of bits is out of range.
     #[error("the converter has {0} bits: give from 1 to {most}", most = Noise::MAX_BITS)]
     Bits(u8),
-    /// Not the description of a fault.
-    #[error(
-        "'{0}' is not a fault: give open-row:ROW, open-column:COLUMN (both with @NODE for a break before that node), \
-         short-columns:COLUMN-COLUMN, gain:COLUMN=REL, stuck:COLUMN=low or stuck:COLUMN=high"
-    )]
-    FaultText(String),
-    /// The array, or the scene, has no such wire or node.
-    #[error("there is no {what} {number}; give 1 to {last}")]
-    FaultNumber {
-        /// Kind of wire or node.
-        what: &'static str,
-        /// Number, from 1.
-        number: usize,
-        /// Largest number.
-        last: usize,
-    },
-    /// The gain error is out of range.
-    #[error("the gain error is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
-    GainRange(f64),
-    /// The scene does not read a row-wire of the fault.
-    #[error("row {0} is not read in this scene; give a row that is, or read all rows")]
-    FaultNotRead(usize),
 }
 
 impl Default for Scene {

@@ -110,7 +110,7 @@ impl Noise {
     ///
     /// # Errors
     /// If the undeformed sensor has no resistance.
-    pub(crate) fn range_ohm(&self, model: &SensorModel) -> Result<(f64, f64), SensorError> {
+    pub fn range_ohm(&self, model: &SensorModel) -> Result<(f64, f64), SensorError> {
         let converter = Converter::new(self.converter_bits.unwrap_or(16), model)?;
         Ok((converter.step_ohm, converter.step_ohm * converter.steps))
     }

@@ -58,18 +58,7 @@ impl RowConductance {
     /// If there are not M2 displacements.
     pub fn evaluate(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
         assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
-        self.evaluate_broken(model, row, displacements_mm, model.scale.nodes_per_column());
-    }
-
-    /// Evaluates sums and derivatives with a broken row-wire or broken column-wires. Only the first nodes contribute:
-    /// those displaced by `displacements_mm` (up to M2), and the first `electrodes` (up to M3) of every column-wire.
-    /// Derivatives by other nodes are left unchanged.
-    ///
-    /// # Panics
-    /// If there are more displacements or electrodes than nodes.
-    pub fn evaluate_broken(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3], electrodes: usize) {
-        assert!(displacements_mm.len() <= model.scale.nodes_per_row() && electrodes <= model.scale.nodes_per_column());
-        let at = (model, row, displacements_mm, electrodes);
+        let at = (model, row, displacements_mm);
         let (sums, derivatives) = (&mut self.sums[..], &mut self.derivatives[..]);
         match (self.axes, self.is_refined) {
             (Axes::Z, false) => sum_reciprocal_distances::<1, false>(at, sums, derivatives),
@@ -82,7 +71,7 @@ impl RowConductance {
     /// Evaluates only the sums, bit-identical to [`Self::evaluate`]; derivatives remain those of the last evaluation.
     pub(crate) fn evaluate_sums(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
         assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
-        let at = (model, row, displacements_mm, model.scale.nodes_per_column());
+        let at = (model, row, displacements_mm);
         match self.is_refined {
             false => sum_reciprocal_distances::<0, false>(at, &mut self.sums, &mut []),
             true => sum_reciprocal_distances::<0, true>(at, &mut self.sums, &mut []),
@@ -132,9 +121,6 @@ const ELECTRODES: usize = 8;
 /// (M2), into `sums` (M4); and its derivatives by the displacements along no axis (`AXES` = 0), z (1) or x, y and z (3)
 /// into `derivatives` (M2 × `AXES` × M4, in 1/mm²).
 ///
-/// If a wire is broken, the sum is over the nodes before the break: the first nodes of the row-wire, if fewer
-/// displacements are given, and the first `electrodes` of every column-wire.
-///
 /// With d² = dx² + dy² + z²: ∂(1/d)/∂ux = −dx/d³, ∂(1/d)/∂uy = −dy/d³ and, with uz positive downwards, ∂(1/d)/∂uz = z/d³.
 ///
 /// Differences of coordinates are accurate to the last place for any origin, and the sum over nodes is compensated
@@ -143,7 +129,7 @@ const ELECTRODES: usize = 8;
 ///
 /// There are no fused operations, so results are bit-identical on all machines.
 pub(super) fn sum_reciprocal_distances<const AXES: usize, const IS_REFINED: bool>(
-    (model, row, displacements_mm, electrodes): (&SensorModel, usize, &[DVec3], usize),
+    (model, row, displacements_mm): (&SensorModel, usize, &[DVec3]),
     sums: &mut [f64],
     derivatives: &mut [f64],
 ) {
@@ -151,7 +137,6 @@ pub(super) fn sum_reciprocal_distances<const AXES: usize, const IS_REFINED: bool
         model,
         row,
         displacements_mm,
-        electrodes,
         sums,
         derivatives,
     });
@@ -162,7 +147,6 @@ struct Summation<'a, const AXES: usize, const IS_REFINED: bool> {
     model: &'a SensorModel,
     row: usize,
     displacements_mm: &'a [DVec3],
-    electrodes: usize,
     sums: &'a mut [f64],
     derivatives: &'a mut [f64],
 }
@@ -179,7 +163,7 @@ impl<const AXES: usize, const IS_REFINED: bool> WithSimd for Summation<'_, AXES,
         self.sums.fill(0.0);
         // The first chunk, usually the only one, has separate code, which does not read derivatives.
         self.add_electrodes(&differences, 0, true);
-        for first in (ELECTRODES..self.electrodes).step_by(ELECTRODES) {
+        for first in (ELECTRODES..self.model.scale.nodes_per_column()).step_by(ELECTRODES) {
             self.add_electrodes(&differences, first, false);
         }
     }
@@ -189,7 +173,7 @@ impl<const AXES: usize, const IS_REFINED: bool> Summation<'_, AXES, IS_REFINED> 
     /// Adds the terms of one chunk of electrodes, from `first_electrode` on, of every column-wire.
     #[inline(always)]
     fn add_electrodes(&mut self, differences: &Differences, first_electrode: usize, are_first: bool) {
-        let Self { model, electrodes, .. } = *self;
+        let model = self.model;
         let columns = self.sums.len();
         let Differences {
             grid,
@@ -201,7 +185,7 @@ impl<const AXES: usize, const IS_REFINED: bool> Summation<'_, AXES, IS_REFINED> 
         // x of the first node on the column-wires minus that of each electrode.
         let electrodes_x: [SplitLength; ELECTRODES] =
             std::array::from_fn(|electrode| electrode_pitch.times(-((first_electrode + electrode) as f64)));
-        let electrodes_x = &electrodes_x[..ELECTRODES.min(electrodes - first_electrode)];
+        let electrodes_x = &electrodes_x[..ELECTRODES.min(model.scale.nodes_per_column() - first_electrode)];
         for (block, sums) in self.sums.chunks_mut(LANES).enumerate() {
             let first = block * LANES;
             // y of the middle of the array minus that of each column-wire.
@@ -362,42 +346,6 @@ mod tests {
                 }
             }
         }
-    }
-
-    /// Compared with the full sums of a smaller array whose nodes are at the same positions.
-    #[test]
-    fn a_broken_wire_has_the_sums_of_a_shorter_one() {
-        let model = SensorModel::new("3x4_3x12".parse().unwrap());
-        let displacements_mm: Vec<DVec3> = (0..4)
-            .map(|node| DVec3::new(0.1, -0.2, 0.2 * f64::from(node)))
-            .collect();
-        for (nodes, electrodes) in [(1, 3), (3, 2), (4, 1), (4, 3)] {
-            let mut short = SensorModel {
-                scale: format!("3x{nodes}_{electrodes}x12").parse().unwrap(),
-                ..model
-            };
-            let apart_mm =
-                model.geometry.row_node_mm(model.scale, 1, 0) - short.geometry.row_node_mm(short.scale, 1, 0);
-            let moved: Vec<DVec3> = displacements_mm[..nodes].iter().map(|u| *u + apart_mm).collect();
-            short.geometry.height_mm = model.geometry.height_mm;
-            let (mut broken, mut whole) = (
-                RowConductance::new(&model, Axes::Xyz),
-                RowConductance::new(&short, Axes::Xyz),
-            );
-            broken.evaluate_broken(&model, 1, &displacements_mm[..nodes], electrodes);
-            whole.evaluate(&short, 1, &moved);
-            for column in 0..12 {
-                assert!((broken.sums()[column] / whole.sums()[column] - 1.0).abs() < 1e-13);
-                for unknown in 0..3 * nodes {
-                    assert!((broken.derivatives(unknown)[column] - whole.derivatives(unknown)[column]).abs() < 1e-13);
-                }
-            }
-        }
-        let mut none = RowConductance::new(&model, Axes::Xyz);
-        none.evaluate_broken(&model, 1, &[], 3);
-        assert!(none.sums().iter().all(|sum| *sum == 0.0));
-        none.evaluate_broken(&model, 1, &displacements_mm, 0);
-        assert!(none.sums().iter().all(|sum| *sum == 0.0));
     }
 
     /// y is accurate to 2 units in the last place if x y² is accurate to twice as many: y (1 + δ) gives 1 + 2δ.

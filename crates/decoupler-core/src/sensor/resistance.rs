@@ -135,7 +135,7 @@ impl SensorModel {
         assert_eq!(displacements_mm.len(), self.scale.nodes_per_row());
         assert_eq!(resistances_ohm.len(), self.scale.columns());
         // The sum of reciprocal distances, per millimetre, is accumulated in place of the resistance.
-        let at = (self, row, displacements_mm, self.scale.nodes_per_column());
+        let at = (self, row, displacements_mm);
         sum_reciprocal_distances::<0, false>(at, resistances_ohm, &mut []);
         for (column, value) in resistances_ohm.iter_mut().enumerate() {
             *value = self.resistivity_ohm_per_mm / *value;

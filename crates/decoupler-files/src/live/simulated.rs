@@ -2,12 +2,14 @@ use std::f64::consts::TAU;
 
 use decoupler_core::{
     dataset::{Seed, Stream},
-    scene::{Deformation, Fault, FaultySensor, Indenter, Loading, NoiseSource, Scene, SceneError},
+    scene::{Deformation, Indenter, Loading, NoiseSource, Scene, SceneError},
     sensor::{SensorError, SensorModel, short},
 };
 use glam::{DVec2, DVec3};
 use rand::{Rng, RngExt, rngs::ChaCha8Rng};
 use thiserror::Error;
+
+use super::{Fault, FaultError, FaultySensor};
 
 /// Source of frames without hardware: an indenter that moves over the array, pressing and lifting.
 ///
@@ -49,9 +51,12 @@ pub enum Motion {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SimulatedError {
-    /// The scene is invalid, or the array does not have the wires of the fault.
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// The array does not have the wires of the fault.
+    #[error(transparent)]
+    Fault(#[from] FaultError),
     /// The array has no resistance at rest.
     #[error(transparent)]
     Sensor(#[from] SensorError),

@@ -1,10 +1,6 @@
 use std::sync::Arc;
 
-use decoupler_core::{
-    live::ZeroGains,
-    scene::{ConverterEnd, Fault},
-    sensor::ArrayScale,
-};
+use decoupler_core::{live::ZeroGains, sensor::ArrayScale};
 use decoupler_files::{
     export::format_number,
     figure::{
@@ -12,6 +8,7 @@ use decoupler_files::{
         surface::{Quantity, Surface, SurfaceFigure},
         zero_gains_figure,
     },
+    live::{ConverterEnd, Fault},
 };
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
 use ndarray::Array2;

@@ -6,13 +6,10 @@ use std::{
     },
 };
 
-use decoupler_core::{
-    dataset::Simulation,
-    scene::{Fault, Rows},
-};
+use decoupler_core::{dataset::Simulation, scene::Rows};
 use decoupler_files::{
     export::{NetworkFile, format_percent},
-    live::{Motion, Source},
+    live::{Fault, Motion, Source},
 };
 use eframe::egui::{ComboBox, TextEdit, Ui, vec2};
 

@@ -1,3 +1,5 @@
+use std::ops::Range as Columns;
+
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use super::{
@@ -34,6 +36,8 @@ pub struct Estimator {
     /// Plain steps for exact readings.
     lanes: Option<Lanes>,
     problem: RowProblem,
+    /// Column-wires whose readings do not count.
+    left_out: Columns<usize>,
     ranges: Vec<Range>,
     /// Ranges that steps without damping and prior may not leave.
     wide: Vec<Range>,
@@ -92,6 +96,7 @@ impl Estimator {
         Ok(Self {
             lanes,
             problem: refined.unwrap_or_else(|| RowProblem::new(model, scene.movement.axes())),
+            left_out: 0..0,
             ranges,
             wide: wide_ranges(model, scene),
             noise,
@@ -126,6 +131,27 @@ impl Estimator {
         coordinates_mm: &mut [f64],
     ) -> Result<Estimate, DecodeError> {
         self.solve_one(row, readings_ohm, coordinates_mm, None)
+    }
+
+    /// As [`Self::solve`], without the readings of these column-wires, which must be resistances but have no influence. If
+    /// no others remain, the estimate is the mean of the scene's deformations.
+    ///
+    /// # Errors
+    /// If a reading is not a resistance.
+    ///
+    /// # Panics
+    /// If `row` is not one of the given rows.
+    pub fn solve_without(
+        &mut self,
+        left_out: Columns<usize>,
+        row: usize,
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+    ) -> Result<Estimate, DecodeError> {
+        self.left_out = left_out;
+        let estimate = self.solve(row, readings_ohm, coordinates_mm);
+        self.left_out = 0..0;
+        estimate
     }
 
     /// As [`Self::solve`], in at most `steps` steps from the answer of another decoder in `coordinates_mm`, which is
@@ -199,6 +225,15 @@ impl Estimator {
         solved
     }
 
+    /// Number of readings that count.
+    fn readings(&self) -> usize {
+        self.problem.equations() - self.left_out.len()
+    }
+
+    fn is_redundant(&self) -> bool {
+        self.problem.is_redundant(self.readings())
+    }
+
     /// Estimates a row from its valid readings as if they were those of row-wire `row`, if plain steps solve it.
     pub(in crate::decoupling) fn try_plainly(
         &mut self,
@@ -217,7 +252,7 @@ impl Estimator {
         coordinates_mm: &mut [f64],
     ) -> Estimate {
         self.problem.read(row, readings_ohm);
-        self.has_prior = !(self.is_exact() && self.problem.is_redundant());
+        self.has_prior = !(self.is_exact() && self.is_redundant());
         self.start_from(coordinates_mm, 1)
     }
 
@@ -229,8 +264,8 @@ impl Estimator {
         steps: Option<usize>,
     ) -> [Option<Estimate>; LANES] {
         match &mut self.lanes {
-            None => [None; LANES],
-            Some(lanes) => lanes.solve(rows, readings_ohm, coordinates_mm, steps),
+            Some(lanes) if self.left_out.is_empty() => lanes.solve(rows, readings_ohm, coordinates_mm, steps),
+            _ => [None; LANES],
         }
     }
 
@@ -242,7 +277,7 @@ impl Estimator {
         coordinates_mm: &mut [f64],
     ) -> Estimate {
         self.problem.read(row, readings_ohm);
-        if self.is_exact() && self.problem.is_redundant() {
+        if self.is_exact() && self.is_redundant() {
             self.has_prior = false;
             let found = self.start_from(coordinates_mm, STARTS);
             if !found.is_open() {
@@ -314,6 +349,9 @@ impl Estimator {
         let mut misfits = Misfits::default();
         let mut standardised = 0.0;
         for (reading, &misfit) in self.problem.residuals().iter().enumerate() {
+            if self.left_out.contains(&reading) {
+                continue;
+            }
             let misfit = self.without_gain(misfit);
             // Only exact readings are compared with their rounding.
             let slopes = self.ranges.iter().enumerate().filter(|_| self.is_exact());
@@ -322,7 +360,7 @@ impl Estimator {
             let expansion = self.noise.expand(self.problem.reading_ohm(reading), misfit);
             standardised += expansion.standardised * expansion.standardised;
         }
-        let readings = self.problem.equations();
+        let readings = self.readings().max(1);
         let residual = misfits.residual(readings);
         let spread = if self.has_prior {
             deviation
@@ -337,7 +375,7 @@ impl Estimator {
         let is_only = || {
             let row = self.problem.row();
             !self.is_exact()
-                || spread <= LARGEST_ERROR && self.problem.is_redundant() && !self.symmetry.has_twin(row, &self.at[..n])
+                || spread <= LARGEST_ERROR && self.is_redundant() && !self.symmetry.has_twin(row, &self.at[..n])
         };
         let surprise = if self.has_prior {
             objective + log_determinant - self.priors.of(self.problem.row()).log_precision()
@@ -509,6 +547,9 @@ impl Estimator {
         let mut objective = 0.0;
         let gain = 1.0 + self.noise.drift() * self.at.get(n).copied().unwrap_or(0.0);
         for (reading, &misfit) in self.problem.residuals().iter().enumerate() {
+            if self.left_out.contains(&reading) {
+                continue;
+            }
             let misfit = self.without_gain(misfit);
             let expansion = self.noise.expand(self.problem.reading_ohm(reading), misfit);
             objective += expansion.deviance;

@@ -88,7 +88,7 @@ impl Lanes {
         };
         let has_starts = axes == Axes::Z && model.scale.rows() * AffineStart::bytes(model) <= LARGEST_STARTS_BYTES;
         let starts = if has_starts { model.scale.rows() } else { 0 };
-        problem.is_redundant().then(|| Self {
+        problem.is_redundant(problem.equations()).then(|| Self {
             model: *model,
             problem,
             last_length_mm: smallest_gap_mm(model, scene) * f64::EPSILON.sqrt() / (axes.count() as f64).sqrt(),

@@ -267,9 +267,9 @@ mod tests {
         dataset::Seed,
         decoupling::resistance_residual,
         evaluation::{Run, RunSettings},
-        scene::{Fault, Noise},
+        scene::Noise,
     };
-    use decoupler_files::live::Simulated;
+    use decoupler_files::live::{Fault, Simulated};
 
     fn network() -> Arc<NetworkFile> {
         let mut settings = RunSettings::default();

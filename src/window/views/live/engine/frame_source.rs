@@ -7,12 +7,12 @@ use std::{
 
 use decoupler_core::{
     dataset::{Seed, Simulation},
-    scene::{Deformation, Fault, Noise, Rows, Scene},
+    scene::{Deformation, Noise, Rows, Scene},
     sensor::{ArrayScale, SensorModel},
 };
 use decoupler_files::{
     import::{LineParser, ParsedLine},
-    live::{Keeping, Lines, NextLine, Simulated, Source},
+    live::{Fault, Keeping, Lines, NextLine, Simulated, Source},
 };
 
 use super::{

@@ -12,14 +12,13 @@ use decoupler_core::{
     dataset::Simulation,
     live::{Diagnosis, Drift, NoDriftMonitor, ZeroGains},
     problem::Problem,
-    scene::Fault,
     sensor::SensorModel,
     surface::SurfaceMap,
 };
 use decoupler_files::{
     export::NetworkFile,
     figure::TargetSurface,
-    live::{Motion, Source},
+    live::{Fault, Motion, Source},
 };
 
 /// Frames to be decoded, and the network that decodes them.

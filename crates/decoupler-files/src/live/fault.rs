@@ -1,7 +1,13 @@
 use std::{fmt, str::FromStr};
 
-use super::{Deformation, Noise, SceneError};
-use crate::sensor::{ArrayScale, Axes, RowConductance, SensorError, SensorModel};
+use decoupler_core::{
+    dataset::Dataset,
+    scene::{Deformation, Noise},
+    sensor::{ArrayScale, SensorError, SensorModel, short},
+};
+use glam::DVec3;
+use rand::Rng;
+use thiserror::Error;
 
 /// A fault of the wires or of the electronics.
 ///
@@ -46,6 +52,34 @@ pub enum Fault {
     },
 }
 
+/// Invalid fault.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum FaultError {
+    /// Not the description of a fault.
+    #[error(
+        "'{0}' is not a fault: give open-row:ROW, open-column:COLUMN (both with @NODE for a break before that node), \
+         short-columns:COLUMN-COLUMN, gain:COLUMN=REL, stuck:COLUMN=low or stuck:COLUMN=high"
+    )]
+    Text(String),
+    /// The array, or the scene, has no such wire or node.
+    #[error("there is no {what} {number}; give 1 to {last}")]
+    Number {
+        /// Kind of wire or node.
+        what: &'static str,
+        /// Number, from 1.
+        number: usize,
+        /// Largest number.
+        last: usize,
+    },
+    /// The gain error is out of range.
+    #[error("the gain error is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
+    Gain(f64),
+    /// The scene does not read a row-wire of the fault.
+    #[error("row {0} is not read in this scene; give a row that is, or read all rows")]
+    NotRead(usize),
+}
+
 /// End of a converter's range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConverterEnd {
@@ -56,10 +90,10 @@ pub enum ConverterEnd {
 }
 
 impl FromStr for Fault {
-    type Err = SceneError;
+    type Err = FaultError;
 
-    fn from_str(text: &str) -> Result<Self, SceneError> {
-        let unknown = || SceneError::FaultText(text.to_owned());
+    fn from_str(text: &str) -> Result<Self, FaultError> {
+        let unknown = || FaultError::Text(text.to_owned());
         let number = |text: &str| match text.parse::<usize>() {
             Ok(number @ 1..) => Ok(number - 1),
             _ => Err(unknown()),
@@ -85,7 +119,7 @@ impl FromStr for Fault {
                 if relative > -1.0 && relative <= 10.0 && relative != 0.0 {
                     number(column).map(|column| Self::Gain { column, relative })
                 } else {
-                    Err(SceneError::GainRange(relative))
+                    Err(FaultError::Gain(relative))
                 }
             }
             "stuck" => {
@@ -125,7 +159,7 @@ impl Fault {
     ///
     /// # Errors
     /// If a wire or node does not exist.
-    pub fn check(self, scale: ArrayScale, read: &[usize]) -> Result<(), SceneError> {
+    pub fn check(self, scale: ArrayScale, read: &[usize]) -> Result<(), FaultError> {
         let wires_and_nodes = match self {
             Self::OpenRow { row, before_node } => [
                 ("row-wire", row, scale.rows()),
@@ -140,10 +174,10 @@ impl Fault {
         };
         if let Some((what, index, last)) = wires_and_nodes.into_iter().find(|(_, index, count)| index >= count) {
             let number = index + 1;
-            return Err(SceneError::FaultNumber { what, number, last });
+            return Err(FaultError::Number { what, number, last });
         }
         match self {
-            Self::OpenRow { row, .. } if !read.contains(&row) => Err(SceneError::FaultNotRead(row + 1)),
+            Self::OpenRow { row, .. } if !read.contains(&row) => Err(FaultError::NotRead(row + 1)),
             _ => Ok(()),
         }
     }
@@ -172,32 +206,62 @@ impl FaultySensor {
         })
     }
 
+    /// Replaces the readings of simulated snapshots by those of the faulty sensor with noise: its wires and amplifiers
+    /// come before the noise, its converter after.
+    ///
+    /// # Errors
+    /// See [`Dataset::disturb`].
+    pub fn disturb(&self, set: &mut Dataset, noise: &Noise, rng: &mut impl Rng) -> Result<(), SensorError> {
+        let read = set.row_wires_read().map_or_else(Vec::new, <[usize]>::to_vec);
+        let simulated = set.clone();
+        change_snapshots(set, |snapshot, ohms| {
+            // Row-wires that are not read are at rest.
+            let deformation = Deformation::from_fn(self.model.scale, |row, node| {
+                let index = read.iter().position(|&other| other == row);
+                index.map_or(DVec3::ZERO, |index| {
+                    let coordinates_mm = &simulated.sample_targets(snapshot * read.len() + index)[3 * node..];
+                    self.model.displacement_mm(row, node, DVec3::from_slice(coordinates_mm))
+                })
+            });
+            self.before_noise(&read, &deformation, ohms);
+        });
+        set.disturb(&self.model, noise, rng)?;
+        change_snapshots(set, |_, ohms| self.after_noise(&read, ohms));
+        Ok(())
+    }
+
     /// Applies faults of wires and amplifiers to the resistances of one snapshot (rows `read`, row by row), which belong
     /// to `deformation`.
     pub fn before_noise(&self, read: &[usize], deformation: &Deformation, resistances_ohm: &mut [f64]) {
         let scale = self.model.scale;
         let (columns, full_scale_ohm) = (scale.columns(), self.range_ohm.1);
-        let mut conductance = RowConductance::new(&self.model, Axes::Z);
-        let mut near_ohm = |row: usize, nodes: usize, electrodes: usize| -> Vec<f64> {
-            let displacements_mm = &deformation.row_mm(row)[..nodes];
-            conductance.evaluate_broken(&self.model, row, displacements_mm, electrodes);
-            let of_sum = |&sum: &f64| {
-                // Without any node there is no current, and the converter reads its full scale.
-                if sum > 0.0 {
-                    self.model.resistivity_ohm_per_mm / sum
-                } else {
-                    full_scale_ohm
-                }
-            };
-            conductance.sums().iter().map(of_sum).collect()
+        // Eq. (2) over the nodes before a break.
+        let near_ohm = |row: usize, nodes: usize, column: usize, electrodes: usize| {
+            let positions_mm = deformation.row_positions_mm(&self.model, row).take(nodes);
+            let reciprocals = positions_mm.flat_map(|at_mm| {
+                let electrodes = 0..electrodes;
+                electrodes.map(move |electrode| {
+                    let electrode_mm = self.model.geometry.column_node_mm(column, electrode);
+                    at_mm.distance(electrode_mm).recip()
+                })
+            });
+            // Without any node there is no current, and the converter reads its full scale.
+            let sum: f64 = reciprocals.sum();
+            if sum > 0.0 {
+                self.model.resistivity_ohm_per_mm / sum
+            } else {
+                full_scale_ohm
+            }
         };
         for (&row, ohms) in read.iter().zip(resistances_ohm.chunks_exact_mut(columns)) {
             match self.fault {
                 Fault::OpenRow { row: open, before_node } if open == row => {
-                    ohms.copy_from_slice(&near_ohm(row, before_node, scale.nodes_per_column()));
+                    for (column, ohm) in ohms.iter_mut().enumerate() {
+                        *ohm = near_ohm(row, before_node, column, scale.nodes_per_column());
+                    }
                 }
                 Fault::OpenColumn { column, before_node } => {
-                    ohms[column] = near_ohm(row, scale.nodes_per_row(), before_node)[column];
+                    ohms[column] = near_ohm(row, scale.nodes_per_row(), column, before_node);
                 }
                 Fault::ShortedColumns { column } => {
                     let shared = 2.0 / (1.0 / ohms[column] + 1.0 / ohms[column + 1]);
@@ -240,4 +304,16 @@ impl FaultySensor {
             }
         }
     }
+}
+
+/// Changes the readings of each snapshot (rows × M4), given its index.
+fn change_snapshots(set: &mut Dataset, mut change: impl FnMut(usize, &mut [f64])) {
+    let mut readings = set.readings().to_owned();
+    let all = readings
+        .as_slice_mut()
+        .expect("a set has its readings in standard layout");
+    for (snapshot, ohms) in all.chunks_exact_mut(set.row_count() * set.channels()).enumerate() {
+        change(snapshot, ohms);
+    }
+    *set = set.with_readings(readings);
 }
