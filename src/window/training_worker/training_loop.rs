@@ -16,6 +16,7 @@ use super::{
     calibration::Calibration,
     keeping::{Keeping, Kept},
     message::{continue_run, furthest_epoch},
+    past_networks::PastNetworks,
 };
 use crate::window::{
     job::Report,
@@ -24,7 +25,7 @@ use crate::window::{
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
-        Begin, PastNetworks, Run, Scores, TestErrors,
+        Begin, Run, Scores, TestErrors,
         auto::{AutoFixed, DEFAULT_BUDGET_S},
         network_frame_time,
         recorded::Determination,

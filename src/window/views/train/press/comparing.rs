@@ -1,10 +1,14 @@
 use std::sync::Arc;
 
-use super::{section::Shown, state::Subject};
+use super::{
+    pressed::{Pressed, PressedAnswer},
+    section::Shown,
+    state::Subject,
+};
 use crate::window::job::{Background, JobError, Report, Wake};
 use decoupler_core::{
     decoupling::{Decoder, DecoderKind, Precision},
-    evaluation::{DecoderSet, Pressed, PressedAnswer, RunError},
+    evaluation::{DecoderSet, RunError},
     job::Job,
 };
 use decoupler_files::machine::memory_budget;
