@@ -27,7 +27,7 @@ use decoupler_core::{
     evaluation::{
         Begin, Run, Scores, TestErrors,
         auto::{AutoFixed, DEFAULT_BUDGET_S},
-        network_frame_time,
+        frame_us,
         recorded::Determination,
     },
     job::Job,
@@ -453,7 +453,10 @@ impl<'a> TrainingLoop<'a> {
                     .filter(|start| start.stop_reason().is_some())
                     .count(),
                 wall_time: run.wall_time(),
-                frame_time: is_idle.then(|| network_frame_time(run)).flatten(),
+                frame_time: Some(run.test())
+                    .filter(|_| is_idle)
+                    .and_then(|test| frame_us(&mut networks.decoder(), test).ok())
+                    .map(|microseconds| Duration::from_secs_f64(1e-6 * microseconds)),
                 is_idle,
                 networks: Arc::new(networks),
             },

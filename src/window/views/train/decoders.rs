@@ -240,7 +240,7 @@ impl Figure {
             Self::Residual => report.residual,
             Self::Rmse => Some(of_target?.rmse),
             Self::R2 => of_target?.r2,
-            Self::FrameTime => Some(report.cost.frame_us),
+            Self::FrameTime => Some(report.frame_us),
         }
     }
 
