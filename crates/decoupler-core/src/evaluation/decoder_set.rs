@@ -3,7 +3,7 @@ use std::time::Instant;
 use ndarray::Array2;
 
 use super::{
-    RunError, RunSets, RunSettings, TestErrors, TrainingSize,
+    RunError, RunSettings, TestErrors, TrainingSize,
     baselines::fit_baselines,
     preparation::unseen_noise,
     remark::{cause, missing_figures, worse_than_mean},
@@ -12,8 +12,6 @@ use super::{
 use crate::{
     dataset::Dataset,
     decoupling::{Decoder, DecoderKind, FitProblem, Precision, SolvedRows, decode_set, resistance_residual},
-    job::Job,
-    machine::MemoryBudget,
     network::Networks,
     problem::Problem,
     sensor::SensorModel,
@@ -68,21 +66,6 @@ impl DecoderSet {
             training,
             networks,
         }
-    }
-
-    /// Draws the training set of simulated `settings`, and returns decoders fitted to it. `networks` must have been
-    /// trained with these settings.
-    ///
-    /// # Errors
-    /// As for [`RunSets::draw`].
-    pub fn drawn(
-        settings: RunSettings,
-        networks: Option<Networks>,
-        memory: MemoryBudget,
-        job: &Job<'_>,
-    ) -> Result<Self, RunError> {
-        let sets = RunSets::draw(&settings, memory, job)?;
-        Ok(Self::new(settings, sets.split.training, networks))
     }
 
     /// Fits a decoder; `precision` applies to networks only. Returns `None` if the decoder needs networks or a sensor
