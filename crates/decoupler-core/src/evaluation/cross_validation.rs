@@ -69,6 +69,25 @@ pub struct Effort {
     pub min_epoch_seconds: f64,
 }
 
+impl CrossValidation {
+    /// Runs repeat `repeat` (from 0) of the cross-validation: trains on folds of `set` and tests on the same samples of
+    /// `tested`, whose readings may have other noise. Each repeat has its own seed, derived from that of `settings`.
+    ///
+    /// # Errors
+    /// If the folds cannot be filled, the settings are invalid, or the job is cancelled.
+    pub fn run(
+        &self,
+        settings: &RunSettings,
+        (set, tested): (&Dataset, &Dataset),
+        repeat: usize,
+        job: &Job<'_>,
+    ) -> Result<CrossValidated, RunError> {
+        let seed = nth_seed(settings.seed, repeat);
+        let folds = Folds::by(set, self.folds, self.by, &mut seed.rng(Stream::Split))?;
+        CrossValidated::of_sets(&RunSettings { seed, ..*settings }, (set, tested), folds, job)
+    }
+}
+
 impl CrossValidated {
     /// Cross-validates on `folds` of `set`; each fold has its own seed, derived from that of `settings`.
     ///
@@ -78,8 +97,8 @@ impl CrossValidated {
         Self::of_sets(settings, (set, set), folds, job)
     }
 
-    /// Trains on folds of `set` and tests on the same samples of `tested`, whose readings may have other noise.
-    pub(super) fn of_sets(
+    /// Trains on folds of `set` and tests on the same samples of `tested`.
+    fn of_sets(
         settings: &RunSettings,
         (set, tested): (&Dataset, &Dataset),
         folds: Folds,

@@ -1,10 +1,10 @@
 //! Measured samples in the library: training, cross-validation and tables without any geometry.
 
 use decoupler_core::{
-    dataset::{Dataset, Folds, PerRow, Split, SplitBy},
+    dataset::{Dataset, PerRow, Split, SplitBy},
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        Begin, CrossValidated, DecoderSet, ErrorTable, Measured, Run, RunError, RunSets, RunSettings, Source,
+        Begin, CrossValidation, DecoderSet, ErrorTable, Measured, Run, RunError, RunSets, RunSettings, Source,
         TargetErrors,
     },
     job::Job,
@@ -123,9 +123,14 @@ fn every_fold_is_answered_by_networks_not_trained_on_it() {
     });
     let set = Dataset::new(readings, targets, None, (0..400).map(|sample| sample / 20).collect()).unwrap();
     let r2 = |unit| {
-        let folds = Folds::by(&set, 5, unit, &mut ChaCha8Rng::seed_from_u64(0)).unwrap();
-        let validated =
-            CrossValidated::on_folds(&settings(RowModel::Shared), &set, folds, &Job::UNINTERRUPTED).unwrap();
+        let validation = CrossValidation {
+            folds: 5,
+            repeats: 1,
+            by: unit,
+        };
+        let validated = validation
+            .run(&settings(RowModel::Shared), (&set, &set), 0, &Job::UNINTERRUPTED)
+            .unwrap();
         validated.scores(&set).network.targets()[0].r2.unwrap()
     };
     let [by_sample, by_group] = [SplitBy::Random, SplitBy::Group].map(r2);

@@ -4,11 +4,8 @@ use thiserror::Error;
 
 use super::{Cell, Experiment};
 use crate::{
-    dataset::{Dataset, Division, Folds, Seed, Stream},
-    evaluation::{
-        Baselines, Begin, CrossValidated, Effort, Run, RunError, RunSets, RunSettings, Scores,
-        cross_validation::nth_seed,
-    },
+    dataset::{Dataset, Division, Seed},
+    evaluation::{Baselines, Begin, Effort, Run, RunError, RunSets, RunSettings, Scores},
     job::Job,
     machine::MemoryBudget,
     problem::Problem,
@@ -97,14 +94,7 @@ impl Trial {
             let set = simulation.draw_training(simulation.samples, seed)?;
             let tested = simulation.draw_tested_folds(&set, seed)?;
             let sets = (&set, tested.as_ref().unwrap_or(&set));
-            // Each repeat has its own seed.
-            let settings = RunSettings {
-                seed: nth_seed(seed, repeat),
-                ..settings
-            };
-            let mut rng = settings.seed.rng(Stream::Split);
-            let folds = Folds::by(&set, validation.folds, validation.by, &mut rng)?;
-            let validated = CrossValidated::of_sets(&settings, sets, folds, job)?;
+            let validated = validation.run(&settings, sets, repeat, job)?;
             return Ok(Self {
                 seed,
                 repeat,
