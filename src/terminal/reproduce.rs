@@ -134,7 +134,7 @@ impl Reproduce {
         run_experiments(
             &experiments,
             &TrialSamples::Drawn(memory_budget()),
-            worker_threads(false),
+            worker_threads(),
             || graceful.is_end_requested(),
             |finished| {
                 results[finished.experiment].record(finished.cell, finished.outcome);

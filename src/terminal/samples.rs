@@ -10,7 +10,7 @@ use clap::Args;
 use decoupler_core::{
     dataset::{Dataset, LARGEST_SAMPLES, Seed, Simulation, SimulationError, Stream},
     decoupling::{Decoder, Precision, decode_set},
-    evaluation::{DecoderSet, Run, RunError, RunSettings, TrainingSize, Workload, error_remarks},
+    evaluation::{DecoderSet, Run, RunError, RunSets, RunSettings, TrainingSize, Workload, error_remarks},
     job::Job,
     sensor::{ArrayScale, SensorModel},
 };
@@ -228,7 +228,8 @@ impl Simulate {
         } else {
             None
         };
-        let set = DecoderSet::drawn(*settings, networks, memory_budget(), &Job::UNINTERRUPTED)?;
+        let sets = RunSets::draw(settings, memory_budget(), &Job::UNINTERRUPTED)?;
+        let set = DecoderSet::new(*settings, sets.split.training, networks);
         Ok(set.decoder(kind, Precision::Double)?)
     }
 }

@@ -233,7 +233,7 @@ impl MeasuredLevel {
                     validation_samples: training.samples[1],
                 },
             },
-            frame_us: point.report.cost.frame_us,
+            frame_us: point.report.frame_us,
             training_s: point.training_seconds,
             remarks: point.report.remarks.iter().map(ToString::to_string).collect(),
             on_decoding_front,
@@ -259,7 +259,7 @@ impl MeasuredLevel {
     fn table(&self) -> Table {
         let mut table = trade_off_summary(&self.level);
         let mut points = Vec::from_iter(self.level.points.iter().zip(self.fronts()));
-        points.sort_by(|(one, _), (other, _)| one.report.cost.frame_us.total_cmp(&other.report.cost.frame_us));
+        points.sort_by(|(one, _), (other, _)| one.report.frame_us.total_cmp(&other.report.frame_us));
         table.columns.push(TableColumn::field(""));
         for (row, (_, (is_on_decoding_front, is_on_training_front))) in table.rows.iter_mut().zip(points) {
             let marks = [(is_on_decoding_front, "*"), (is_on_training_front, "+")];

@@ -158,9 +158,9 @@ impl<'a> Decoder<'a> {
     fn new(channels: &'a [Channel], report: &DecoderReport) -> Self {
         Self {
             errors: ErrorsReport::new(channels, &report.errors),
-            frame_us: report.cost.frame_us,
+            frame_us: report.frame_us,
             residual: report.residual.filter(|residual| residual.is_finite()),
-            fit_seconds: report.cost.fit_seconds,
+            fit_seconds: report.fit_seconds,
             remarks: report.remarks.iter().map(ToString::to_string).collect(),
             solved: (report.solved.rows > 0).then_some(Solved {
                 rows: report.solved.rows,

@@ -4,9 +4,8 @@ use std::{ops::RangeInclusive, sync::Arc};
 
 use decoupler_core::{
     dataset::{Dataset, Simulation, SplitBy},
-    evaluation::{NodeAddress, Outlook, Pressed, Run, RunError, RunSettings, recorded::HysteresisLoop},
+    evaluation::{NodeAddress, Outlook, Run, RunError, RunSettings, recorded::HysteresisLoop},
     problem::{Channel, Problem},
-    scene::Touch,
     sensor::SensorModel,
     surface::{SurfaceError, SurfaceMap},
 };
@@ -150,9 +149,8 @@ impl TestView {
         let rows = simulation.scene.rows.read(row_count).unwrap_or_default();
         let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &rows);
         let stroke_mm = simulation.stroke_mm();
-        let unloaded = Pressed::new(&sensor, &rows, &Touch::default(), stroke_mm);
         Ok(Self {
-            unloaded_ohm: unloaded.ok().map(|unloaded| Arc::new(unloaded.readings_ohm().clone())),
+            unloaded_ohm: unloaded_ohm(&sensor, &rows).map(Arc::new),
             snapshots: Arc::new(set.snapshots()),
             set,
             surface: SurfaceMap::shared(&x_mm, &y_mm)?,
@@ -239,6 +237,14 @@ impl TestView {
             colours: style.colours,
         }
     }
+}
+
+/// Returns the readings of the sensor at rest, rows read × M4; `None` if they cannot be computed.
+fn unloaded_ohm(sensor: &SensorModel, rows: &[usize]) -> Option<Array2<f64>> {
+    let at_rest = vec![DVec3::ZERO; sensor.scale.nodes_per_row()];
+    let readings = rows.iter().map(|&row| sensor.row_resistances(row, &at_rest));
+    let readings = readings.collect::<Result<Vec<_>, _>>().ok()?.concat();
+    Array2::from_shape_vec((rows.len(), sensor.scale.columns()), readings).ok()
 }
 
 /// Returns the outlook if it can be computed quickly; the arrays of the paper take a millisecond.

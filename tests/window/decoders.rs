@@ -2,7 +2,7 @@
 
 use decoupler::window::DecoderResult;
 use decoupler_core::{
-    evaluation::{DecoderSet, Run, RunSettings},
+    evaluation::{DecoderSet, Run, RunSets, RunSettings},
     job::Job,
     machine::MemoryBudget,
     scene::{Noise, Rows},
@@ -47,13 +47,8 @@ fn table(driver: &Driver) -> Vec<String> {
 
 /// The same cells computed by the library.
 fn table_of(run: &Run) -> Vec<String> {
-    let set = DecoderSet::drawn(
-        *run.settings(),
-        Some(run.network()),
-        MemoryBudget::UNLIMITED,
-        &Job::UNINTERRUPTED,
-    )
-    .unwrap();
+    let sets = RunSets::draw(run.settings(), MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+    let set = DecoderSet::new(*run.settings(), sets.split.training, Some(run.network()));
     let model_based = run.baselines().unwrap().model_based.as_ref();
     let model_based = model_based.and_then(|errors| errors.nodes());
     let model_based = model_based.filter(|errors| !errors.is_rounding());

@@ -112,7 +112,7 @@ fn node_pairs_per_second() -> f64 {
 }
 
 /// Number of node pairs in the resistances of a row-wire.
-pub(crate) fn node_pairs_per_row(sensor: &SensorModel) -> f64 {
+pub fn node_pairs_per_row(sensor: &SensorModel) -> f64 {
     let scale = sensor.scale;
     scale.nodes_per_row() as f64 * scale.nodes_per_column() as f64 * scale.columns() as f64
 }

@@ -6,8 +6,9 @@ use std::{error::Error, fmt::Write as _, fs, path::PathBuf};
 
 use decoupler_core::{
     dataset::{Seed, Simulation},
-    evaluation::{Run, ready_settings},
-    scene::Noise,
+    evaluation::{Run, RunSettings},
+    network::{InputChoice, Quantity, ScalingChoice},
+    scene::{Indenter, Loading, Noise, Rows},
 };
 use decoupler_files::{
     export::NetworkFile,
@@ -28,13 +29,21 @@ fn main() -> Result<(), Box<dyn Error>> {
         .nth(1)
         .map_or_else(|| PathBuf::from("target/samples"), PathBuf::from);
     fs::create_dir_all(&folder)?;
-    let mut source = Simulation::default();
+    let mut source = Simulation {
+        samples: 4000,
+        validation_samples: 0,
+        test_samples: 200,
+        ..Simulation::default()
+    };
     source.sensor.scale = "10x6_3x18".parse()?;
-    let mut settings = ready_settings(&source).ok_or("the array is too large")?;
-    if let Some(simulation) = settings.simulation_mut() {
-        simulation.scene.noise = Noise::relative(NOISE);
-        (simulation.samples, simulation.test_samples) = (4000, 200);
-    }
+    source.scene.rows = Rows::Known;
+    source.scene.loading = Loading::Indenter(Indenter::default());
+    source.scene.noise = Noise::relative(NOISE);
+    let mut settings = RunSettings::from(source);
+    settings.inputs = InputChoice {
+        quantity: Quantity::Conductance,
+        scaling: ScalingChoice::MinMax,
+    };
     settings.hidden = 8;
     settings.training.stopping.epochs = 60;
     let mut run = Run::prepare(settings)?;

@@ -129,10 +129,7 @@ impl Sweep {
         let of_shard = positions.len();
         let bar = progress_bar(self.json, of_shard, "{bar:30} {pos} of {len} trials, {elapsed} elapsed");
         let stop = Stop::begin();
-        let threads = self
-            .threads
-            .and_then(NonZero::new)
-            .unwrap_or_else(|| worker_threads(false));
+        let threads = self.threads.and_then(NonZero::new).unwrap_or_else(worker_threads);
         let filled = fill(folder, trials, positions, threads, &bar, &stop);
         bar.finish_and_clear();
         let Filled {

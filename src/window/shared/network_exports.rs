@@ -6,7 +6,7 @@ use std::{path::Path, sync::Arc};
 
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
-    evaluation::{DecoderReport, PastNetworks, Run},
+    evaluation::{DecoderReport, Run},
     job::Job,
 };
 use decoupler_files::{
@@ -23,7 +23,7 @@ use decoupler_files::{
 use eframe::egui::{Button, Ui, WidgetInfo, accesskit::Role, containers::menu::MenuButton};
 
 use super::{Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords};
-use crate::window::training_worker::{RunId, TrainedRun};
+use crate::window::training_worker::{PastNetworks, RunId, TrainedRun};
 
 const NETWORK: BundleDecoder = BundleDecoder::Kind(DecoderKind::Network);
 

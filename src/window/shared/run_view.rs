@@ -2,8 +2,7 @@ use std::{sync::Arc, time::Duration};
 
 use decoupler_core::{
     evaluation::{
-        Baselines, ErrorTable, PastNetworks, PublishedErrors, RunSettings, Scores, StartRecord, TestErrors,
-        auto::AutoRecord,
+        Baselines, ErrorTable, PublishedErrors, RunSettings, Scores, StartRecord, TestErrors, auto::AutoRecord,
     },
     problem::Problem,
     text::capitalised,
@@ -20,7 +19,7 @@ use super::{Phase, Shared, SourceKind};
 use crate::window::{
     test_view::TestSet,
     theme::{Palette, Theme, space, type_size},
-    training_worker::{Began, Progress, RunId, RunResult, append_epochs},
+    training_worker::{Began, PastNetworks, Progress, RunId, RunResult, append_epochs},
     widgets::{Landmark, ghost_button, primary_button, state_ui, status_progress_ui, with_shortcut},
 };
 

@@ -12,7 +12,7 @@ use std::{
 
 use decoupler_core::{
     evaluation::{
-        Baselines, Coverage, PastNetworks, Run, RunError, RunSettings, StartRecord, TestErrors,
+        Baselines, Coverage, Run, RunError, RunSettings, StartRecord, TestErrors,
         auto::{AutoProgress, AutoRecord},
     },
     live::{DriftReference, NoDriftMonitor},
@@ -26,7 +26,7 @@ use decoupler_files::{
 };
 use ndarray::Array2;
 
-use super::{calibration::Calibration, keeping::Kept, training_loop::TrainingLoop};
+use super::{calibration::Calibration, keeping::Kept, past_networks::PastNetworks, training_loop::TrainingLoop};
 use crate::window::{
     job::{Background, JobError, Wake},
     test_view::{Frame, TargetCharts, TestSet, TestViewError},

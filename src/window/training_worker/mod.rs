@@ -4,7 +4,9 @@
 mod calibration;
 mod keeping;
 mod message;
+mod past_networks;
 mod training_loop;
 
 pub use message::{Began, Event, Inspection, Progress, Request, RunId, RunResult, TrainedRun, Worker, append_epochs};
+pub use past_networks::PastNetworks;
 pub use training_loop::LOST;

@@ -16,6 +16,7 @@ use super::{
     calibration::Calibration,
     keeping::{Keeping, Kept},
     message::{continue_run, furthest_epoch},
+    past_networks::PastNetworks,
 };
 use crate::window::{
     job::Report,
@@ -24,9 +25,9 @@ use crate::window::{
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
-        Begin, PastNetworks, Run, Scores, TestErrors,
+        Begin, Run, Scores, TestErrors,
         auto::{AutoFixed, DEFAULT_BUDGET_S},
-        network_frame_time,
+        frame_us,
         recorded::Determination,
     },
     job::Job,
@@ -452,7 +453,10 @@ impl<'a> TrainingLoop<'a> {
                     .filter(|start| start.stop_reason().is_some())
                     .count(),
                 wall_time: run.wall_time(),
-                frame_time: is_idle.then(|| network_frame_time(run)).flatten(),
+                frame_time: Some(run.test())
+                    .filter(|_| is_idle)
+                    .and_then(|test| frame_us(&mut networks.decoder(), test).ok())
+                    .map(|microseconds| Duration::from_secs_f64(1e-6 * microseconds)),
                 is_idle,
                 networks: Arc::new(networks),
             },

@@ -129,7 +129,7 @@ impl CrossValidated {
                 }
                 run => run?,
             };
-            effort.add(Effort::train(&mut run, job)?);
+            effort.train(&mut run, job)?;
             scatter(&mut network, samples, &run.decouple_test());
         }
         Ok(Self {
@@ -176,30 +176,22 @@ impl Default for Effort {
 }
 
 impl Effort {
-    /// Trains `run` to its end, unless the job is cancelled.
-    pub(super) fn train(run: &mut Run, job: &Job<'_>) -> Result<Self, Cancelled> {
-        let mut effort = Self::default();
+    /// Trains `run` to its end, unless the job is cancelled, and counts its effort.
+    pub(super) fn train(&mut self, run: &mut Run, job: &Job<'_>) -> Result<(), Cancelled> {
         while run.stop_reason().is_none() {
             job.check()?;
             let at_work = run.trainers().iter().filter(|trainer| trainer.stop_reason().is_none());
             let at_work = at_work.count() as f64;
             let begun = Instant::now();
             run.step();
-            effort.min_epoch_seconds = effort.min_epoch_seconds.min(begun.elapsed().as_secs_f64() / at_work);
+            self.min_epoch_seconds = self.min_epoch_seconds.min(begun.elapsed().as_secs_f64() / at_work);
         }
-        effort.networks = 1;
+        self.networks += 1;
         for trainer in run.trainers() {
-            effort.epochs += trainer.latest().epoch;
-            effort.seconds += trainer.elapsed().as_secs_f64();
+            self.epochs += trainer.latest().epoch;
+            self.seconds += trainer.elapsed().as_secs_f64();
         }
-        Ok(effort)
-    }
-
-    fn add(&mut self, other: Self) {
-        self.networks += other.networks;
-        self.epochs += other.epochs;
-        self.seconds += other.seconds;
-        self.min_epoch_seconds = self.min_epoch_seconds.min(other.min_epoch_seconds);
+        Ok(())
     }
 }
 

@@ -3,7 +3,7 @@ use std::time::Instant;
 use ndarray::Array2;
 
 use super::{
-    RunError, RunSets, RunSettings, TestErrors, TrainingSize,
+    RunError, RunSettings, TestErrors, TrainingSize,
     baselines::fit_baselines,
     preparation::unseen_noise,
     remark::{cause, missing_figures, worse_than_mean},
@@ -12,8 +12,6 @@ use super::{
 use crate::{
     dataset::Dataset,
     decoupling::{Decoder, DecoderKind, FitProblem, Precision, SolvedRows, decode_set, resistance_residual},
-    job::Job,
-    machine::MemoryBudget,
     network::Networks,
     problem::Problem,
     sensor::SensorModel,
@@ -33,19 +31,12 @@ pub struct DecoderReport {
     pub residual: Option<f64>,
     /// Numbers of rows solved, for decoders that solve the equations of the sensor.
     pub solved: SolvedRows,
-    /// Computing time.
-    pub cost: DecoderCost,
-    /// Remarks on the errors, with cause and remedy.
-    pub remarks: Vec<String>,
-}
-
-/// Computing time of a decoder.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DecoderCost {
     /// Median time to decode a frame on one thread, in microseconds.
     pub frame_us: f64,
     /// Time to fit the decoder to the training set in seconds, without training the network.
     pub fit_seconds: f64,
+    /// Remarks on the errors, with cause and remedy.
+    pub remarks: Vec<String>,
 }
 
 impl DecoderReport {
@@ -63,7 +54,7 @@ pub struct DecoderSet {
     settings: RunSettings,
     problem: Problem,
     training: Dataset,
-    networks: Option<Networks>,
+    pub(super) networks: Option<Networks>,
 }
 
 impl DecoderSet {
@@ -75,26 +66,6 @@ impl DecoderSet {
             training,
             networks,
         }
-    }
-
-    /// Draws the training set of simulated `settings`, and returns decoders fitted to it. `networks` must have been
-    /// trained with these settings.
-    ///
-    /// # Errors
-    /// As for [`RunSets::draw`].
-    pub fn drawn(
-        settings: RunSettings,
-        networks: Option<Networks>,
-        memory: MemoryBudget,
-        job: &Job<'_>,
-    ) -> Result<Self, RunError> {
-        let sets = RunSets::draw(&settings, memory, job)?;
-        Ok(Self::new(settings, sets.split.training, networks))
-    }
-
-    /// Replaces the networks.
-    pub(super) fn set_networks(&mut self, networks: Option<Networks>) {
-        self.networks = networks;
     }
 
     /// Fits a decoder; `precision` applies to networks only. Returns `None` if the decoder needs networks or a sensor
@@ -168,7 +139,8 @@ impl DecoderSet {
             remarks,
             residual,
             solved,
-            cost: DecoderCost { frame_us, fit_seconds },
+            frame_us,
+            fit_seconds,
         }))
     }
 }

@@ -11,12 +11,11 @@ mod cross_validation;
 mod decoder_set;
 mod errors;
 pub mod experiments;
+mod fine_tuning;
 mod intervals;
 mod linear_start;
-mod past_networks;
 mod preparation;
 mod presets;
-mod pressed;
 pub mod recorded;
 mod remark;
 mod run;
@@ -29,19 +28,18 @@ mod workload;
 
 pub use baselines::{Baselines, PublishedErrors, Scores, published_errors};
 pub use cross_validation::{CrossValidated, CrossValidation, Effort};
-pub use decoder_set::{DecoderCost, DecoderReport, DecoderSet};
+pub use decoder_set::{DecoderReport, DecoderSet};
 pub use errors::{Errors, NodeAddress, Spread, TargetErrors, TestErrors, node_rms_mm};
+pub use fine_tuning::{fine_tune, pressed_rows};
 pub use intervals::{Coverage, HalfWidth, Intervals, NoIntervals};
-pub use past_networks::{PastNetwork, PastNetworks};
 pub use preparation::Begin;
-pub use presets::{Preset, ready_settings};
-pub use pressed::{Pressed, PressedAnswer, fine_tune, pressed_rows};
+pub use presets::Preset;
 pub use remark::error_remarks;
 pub use run::{Run, RunError};
 pub use run_sets::RunSets;
 pub use settings::{Combination, Initialization, MAX_STARTS, Measured, RunSettings, Source};
 pub use starts::{StartRecord, StartTrainer, best_start};
-pub use table::{ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, decoded_unit, network_frame_time};
+pub use table::{ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, decoded_unit, frame_us};
 pub use trade::{
     Outlook, TradeOffCost, TradeOffLevel, TradeOffLimits, TradeOffPoint, fastest_under, measure_trade_off,
     most_accurate_under,

@@ -13,14 +13,8 @@ pub fn error_remarks(
     Scores { network, baselines, .. }: &Scores,
     reason: Option<StopReason>,
 ) -> Vec<(&'static str, String)> {
-    let Some(simulation) = settings.simulation() else {
+    let Ok(size) = TrainingSize::drawn(settings) else {
         return Vec::new();
-    };
-    let size = TrainingSize {
-        samples: simulation.samples,
-        inputs: simulation.sensor.scale.columns(),
-        targets: simulation.sensor.scale.coordinates_per_row(),
-        networks: simulation.model_size().map_or(1, |size| size.networks),
     };
     let end = reason.map(|reason| (reason, settings.training.method));
     let rows = [

@@ -215,7 +215,7 @@ impl Run {
     }
 
     /// Returns the best weights so far, for all rows or for each.
-    pub(super) fn best(&self) -> Vec<Mlp> {
+    pub fn best(&self) -> Vec<Mlp> {
         match self.settings.combine {
             Combination::Best => self.leader().best().cloned().collect(),
             Combination::Mean => {

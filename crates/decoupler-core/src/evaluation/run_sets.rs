@@ -62,7 +62,10 @@ impl RunSets {
         } else {
             held_out.split(&drawn)
         };
-        Ok(Self::new(split, test).described(source.problem()).limited_to(memory))
+        Ok(Self {
+            memory,
+            ..Self::new(split, test).described(source.problem())
+        })
     }
 
     /// Returns sets without test samples, for programs that need only the networks. Their training is bit-identical to
@@ -80,12 +83,6 @@ impl RunSets {
             test: Arc::new(test),
             memory: MemoryBudget::UNLIMITED,
         }
-    }
-
-    /// Returns the sets with this limit of memory for trainings on them.
-    #[must_use]
-    pub fn limited_to(self, memory: MemoryBudget) -> Self {
-        Self { memory, ..self }
     }
 
     /// Returns the sets with this description of their channels.

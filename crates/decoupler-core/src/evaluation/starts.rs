@@ -61,7 +61,7 @@ pub(super) fn lowest(errors: impl IntoIterator<Item = f64>) -> Option<usize> {
 /// Values for several trainings are their means, epoch by epoch; a training that has ended keeps its last values.
 pub struct StartTrainer {
     pub(super) rows: Vec<Trainer>,
-    /// History averaged over all rows; empty for a single training, which has its own.
+    /// History averaged over all rows.
     history: Vec<EpochRecord>,
 }
 
@@ -76,7 +76,7 @@ impl StartTrainer {
             rows,
             history: Vec::new(),
         };
-        joined.rebuild_history(0);
+        joined.extend_history(0);
         joined
     }
 
@@ -87,25 +87,24 @@ impl StartTrainer {
 
     /// Runs one epoch of every training that has not ended. Returns the reason for stopping once all have ended.
     pub(super) fn step(&mut self) -> Option<StopReason> {
-        // Stays on this thread, which saves a thread switch per epoch.
-        if let [only] = self.rows.as_mut_slice() {
-            return only.step();
-        }
         let next = |trainer: &Trainer| trainer.stop_reason().is_none().then(|| trainer.history().len());
         let first_new = self.rows.iter().filter_map(next).min();
-        self.rows.par_iter_mut().for_each(|trainer| {
-            trainer.step();
-        });
+        match self.rows.as_mut_slice() {
+            // Stays on this thread, which saves a thread switch per epoch.
+            [only] => {
+                only.step();
+            }
+            all => all.par_iter_mut().for_each(|trainer| {
+                trainer.step();
+            }),
+        }
         if let Some(first_new) = first_new {
-            self.rebuild_history(first_new);
+            self.extend_history(first_new);
         }
         self.stop_reason()
     }
 
-    fn rebuild_history(&mut self, from: usize) {
-        if self.rows.len() == 1 {
-            return;
-        }
+    fn extend_history(&mut self, from: usize) {
         let epochs = self.rows.iter().map(|trainer| trainer.history().len()).max();
         self.history.truncate(from);
         for epoch in self.history.len()..epochs.unwrap_or(0) {
@@ -134,10 +133,7 @@ impl StartTrainer {
 
     /// Returns the records of all epochs so far, beginning with the initialisation.
     pub fn history(&self) -> &[EpochRecord] {
-        match &self.rows[..] {
-            [only] => only.history(),
-            _ => &self.history,
-        }
+        &self.history
     }
 
     /// Returns the record of the latest epoch.

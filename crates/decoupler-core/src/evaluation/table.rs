@@ -1,9 +1,6 @@
-use std::{
-    hint::black_box,
-    time::{Duration, Instant},
-};
+use std::{hint::black_box, time::Instant};
 
-use super::{Coverage, Errors, PublishedErrors, Run, Scores, TargetErrors, TestErrors, recorded::HysteresisLoop};
+use super::{Coverage, Errors, PublishedErrors, Scores, TargetErrors, TestErrors, recorded::HysteresisLoop};
 use crate::{
     dataset::{Dataset, Frames},
     decoupling::{DecodeError, Decoder},
@@ -298,15 +295,7 @@ impl ErrorTable {
     }
 }
 
-/// Returns the time to decode a frame of the test set with the best network so far, in double precision on one thread;
-/// `None` if the test set has readings that cannot be decoded.
-pub fn network_frame_time(run: &Run) -> Option<Duration> {
-    let mut decoder = run.network().decoder();
-    let microseconds = frame_us(&mut decoder, run.test()).ok()?;
-    Some(Duration::from_secs_f64(1e-6 * microseconds))
-}
-
-/// Returns the unit to which [`DecoderCost::frame_us`](super::DecoderCost::frame_us) measured on `test` refers: "a
+/// Returns the unit to which [`frame_us`] measured on `test` refers: "a
 /// sample", or "a frame of 4 row-wires".
 pub fn decoded_unit(test: &Dataset) -> String {
     match (test.frames(), test.row_count()) {
@@ -316,8 +305,11 @@ pub fn decoded_unit(test: &Dataset) -> String {
 }
 
 /// Returns the time in microseconds to decode a frame of `test`, or a sample if `test` does not consist of whole
-/// frames: the median over blocks of frames, each long enough for the clock.
-pub(super) fn frame_us(decoder: &mut dyn Decoder, test: &Dataset) -> Result<f64, DecodeError> {
+/// frames, on one thread: the median over blocks of frames, each long enough for the clock.
+///
+/// # Errors
+/// If a reading of `test` cannot be decoded.
+pub fn frame_us(decoder: &mut dyn Decoder, test: &Dataset) -> Result<f64, DecodeError> {
     const FEWEST_BLOCKS: usize = 3;
     const MAX_BLOCKS: usize = 101;
     const BLOCK_SECONDS: f64 = 100e-6;

@@ -83,7 +83,7 @@ pub fn measure_trade_off(
             let run = run.insert(Run::new(settings, sets.clone(), Begin::Initialize, job)?);
             run.baselines = Some(baselines.clone());
             run.finish(job)?;
-            set.set_networks(Some(run.network()));
+            set.networks = Some(run.network());
         }
         let of_run = |run: &Run| run.trainers().iter().map(|start| start.elapsed().as_secs_f64()).sum();
         for &kind in offered {
@@ -93,7 +93,7 @@ pub fn measure_trade_off(
                     let point = measured.map(|report| TradeOffPoint {
                         preset: None,
                         settings,
-                        training_seconds: run.as_ref().map_or(report.cost.fit_seconds, of_run),
+                        training_seconds: run.as_ref().map_or(report.fit_seconds, of_run),
                         report,
                         model_based,
                     });
@@ -118,14 +118,14 @@ pub(crate) fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
 /// Returns the index of the point with the shortest decoding time among those with an error of at most `percent`.
 pub fn fastest_under(points: &[TradeOffPoint], percent: f64) -> Option<usize> {
     let is_good = |place: &usize| points[*place].percent() <= percent;
-    let time = |place: usize| points[place].report.cost.frame_us;
+    let time = |place: usize| points[place].report.frame_us;
     let places = (0..points.len()).filter(is_good);
     places.min_by(|&a, &b| time(a).total_cmp(&time(b)))
 }
 
 /// Returns the index of the point with the smallest error among those that decode a frame within `microseconds`.
 pub fn most_accurate_under(points: &[TradeOffPoint], microseconds: f64) -> Option<usize> {
-    let is_quick = |place: &usize| points[*place].report.cost.frame_us <= microseconds;
+    let is_quick = |place: &usize| points[*place].report.frame_us <= microseconds;
     let error = |place: usize| points[place].percent();
     let places = (0..points.len()).filter(is_quick);
     places.min_by(|&a, &b| error(a).total_cmp(&error(b)))
@@ -148,7 +148,7 @@ impl TradeOffCost {
     /// Returns the cost (microseconds of decoding, or seconds of training) and the error in percent.
     pub fn of(self, point: &TradeOffPoint) -> (f64, f64) {
         let cost = match self {
-            Self::Decoding => point.report.cost.frame_us,
+            Self::Decoding => point.report.frame_us,
             Self::Training => point.training_seconds,
         };
         (cost, point.percent())

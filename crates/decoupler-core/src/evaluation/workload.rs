@@ -154,15 +154,19 @@ impl Workload {
         self.bytes > 1_000_000_000 || self.node_pairs > 1e10 || self.epoch_multiplications > 1e10
     }
 
+    /// Number of multiplications of all epochs.
+    pub(super) fn multiplications(&self) -> f64 {
+        self.epoch_multiplications * self.epochs as f64
+    }
+
     /// Computes the time on this machine. The first call measures its speed, which takes about 20 ms.
     pub fn time(&self) -> WorkloadTime {
         let speed = Speed::measured();
         let duration = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
-        let epoch = self.epoch_multiplications / speed.multiplications;
         WorkloadTime {
             drawing: duration(self.node_pairs / speed.node_pairs),
-            epoch: duration(epoch),
-            all_epochs: duration(epoch * self.epochs as f64),
+            epoch: duration(self.epoch_multiplications / speed.multiplications),
+            all_epochs: duration(self.multiplications() / speed.multiplications),
         }
     }
 

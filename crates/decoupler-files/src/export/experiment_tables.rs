@@ -69,7 +69,7 @@ impl ExperimentTable {
         let summaries = results.summaries();
         let has_published = results.cells.iter().any(|cell| cell.cell.published.is_some());
         let axes = results.experiment.axes().map(|axis| ExperimentColumn {
-            heading: axis.name(),
+            heading: axis.kind.name(),
             kind: ExperimentColumnKind::Axis,
         });
         let first = summaries

@@ -58,7 +58,7 @@ pub use experiment_tables::{
     ExperimentColumn, ExperimentColumnKind, ExperimentTable, cells_table, describe_conditions, describe_failures,
     describe_worse_than_mean, trials_table, write_experiment_markdown,
 };
-pub use network_file::NetworkFile;
+pub use network_file::{NetworkFile, PastNetwork};
 pub use recipe_file::{RecipeFile, RecipeSource};
 pub use run_folder::{KeptRun, KeptRuns, RunFolder, RunSummary};
 pub use samples::{TrainingRecord, write_decoded, write_decoded_header, write_samples, write_samples_header};

@@ -1,8 +1,8 @@
-use std::{fmt::Display, io::Write as _, path::Path, sync::Arc};
+use std::{fmt::Display, io::Write as _, path::Path, sync::Arc, time::Duration};
 
 use decoupler_core::{
     dataset::{Dataset, MemoryStream, Simulation},
-    evaluation::{ErrorTable, Intervals, PastNetwork, Run, RunSettings, Scores, StartRecord, TestErrors},
+    evaluation::{ErrorTable, Intervals, Run, RunSettings, Scores, StartRecord, TestErrors},
     job::Job,
     live::{DriftReference, NoDriftMonitor},
     network::{DecouplingNetwork, Networks},
@@ -99,6 +99,21 @@ impl SavedDrift {
             Some(Self::Older(_)) | None => Err(NoDriftMonitor::NotDescribed),
         }
     }
+}
+
+/// Network that a run stopped at an epoch would have returned.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PastNetwork {
+    /// Epoch at which the run is assumed to stop.
+    pub epoch: usize,
+    /// Epoch of these weights: the best so far.
+    pub best_epoch: usize,
+    /// Index of the start that was the leader at that epoch.
+    pub start: usize,
+    /// Training time of that start up to that epoch, summed over all rows.
+    pub elapsed: Duration,
+    /// The shared network, or the network of each row-wire.
+    pub networks: Networks,
 }
 
 impl NetworkFile {

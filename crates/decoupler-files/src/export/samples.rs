@@ -2,12 +2,14 @@ use std::io::{self, Write};
 
 use decoupler_core::{
     dataset::Dataset,
-    evaluation::{PastNetwork, Run, StartRecord},
+    evaluation::{Run, StartRecord},
     sensor::ArrayScale,
     training::{EpochColumns, EpochRecord, Stage, StopReason},
 };
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
+
+use super::PastNetwork;
 
 /// Writes the names of the columns of [`write_samples`], with or without those of decoded coordinates, and ends the
 /// line.

@@ -65,7 +65,7 @@ fn array_decoder_table(reports: &[DecoderReport], model_based: Option<&Errors>) 
             nodes.map(|errors| errors.z_mm).into(),
             model_based.and_then(|model_based| nodes?.times(model_based)).into(),
             report.residual.into(),
-            report.cost.frame_us.into(),
+            report.frame_us.into(),
         ]
     };
     let of_model_based = model_based.map(|errors| {
@@ -101,7 +101,7 @@ fn recording_decoder_table(problem: &Problem, reports: &[DecoderReport]) -> Tabl
     let row = |report: &DecoderReport, target: &Channel, errors: &TargetErrors| {
         let names = [report.kind.name(report.precision).into(), target.title().into()];
         let errors = measures.map(|measure| error_cell((&measure.of_target(errors), &measure)));
-        let times = [report.cost.frame_us.into(), report.cost.fit_seconds.into()];
+        let times = [report.frame_us.into(), report.fit_seconds.into()];
         Vec::from_iter(names.into_iter().chain(errors).chain(times))
     };
     let rows = reports.iter().flat_map(|report| {

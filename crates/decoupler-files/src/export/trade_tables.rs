@@ -57,7 +57,7 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
                 count(hidden.map(|_| point.settings.training.stopping.epochs)),
                 report.errors.percent().into(),
                 report.errors.nodes().map(|errors| errors.z_mm).into(),
-                report.cost.frame_us.into(),
+                report.frame_us.into(),
                 point.training_seconds.into(),
                 report.residual.into(),
                 point.model_based.and_then(|errors| errors.z_percent).into(),
@@ -96,12 +96,12 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
             point.report.errors.percent().into(),
             point.report.errors.nodes().map(|errors| errors.z_mm).into(),
             point.to_model_based().into(),
-            point.report.cost.frame_us.into(),
+            point.report.frame_us.into(),
             point.training_seconds.into(),
         ]
     };
     let mut points: Vec<&TradeOffPoint> = level.points.iter().collect();
-    points.sort_by(|a, b| a.report.cost.frame_us.total_cmp(&b.report.cost.frame_us));
+    points.sort_by(|a, b| a.report.frame_us.total_cmp(&b.report.frame_us));
     let mut table = Table {
         columns: vec![
             TableColumn::new("decoder", "Decoder", ""),

@@ -71,8 +71,8 @@ fn heat_map(results: &ExperimentResults, summaries: &[CellSummary], rows: &Axis)
     }
     HeatMap {
         colours: SequentialMap::default(),
-        x_name: columns.name().to_owned(),
-        y_name: rows.name().to_owned(),
+        x_name: columns.kind.name().to_owned(),
+        y_name: rows.kind.name().to_owned(),
         columns: labels(columns),
         rows: labels(rows),
         values,
@@ -139,7 +139,7 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
         },
     ];
     series.retain(|series| !series.points.is_empty());
-    let x = PlotAxis::linear(axis.name());
+    let x = PlotAxis::linear(axis.kind.name());
     let x = match is_number {
         true => x.ticked(TickRule::Whole),
         false => x
@@ -224,7 +224,9 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
         ),
     ];
     let trials = results.cells.iter().map(|cell| cell.expected).max().unwrap_or(1);
-    let names = labels(axis).into_iter().map(|label| format!("{label} {}", axis.name()));
+    let names = labels(axis)
+        .into_iter()
+        .map(|label| format!("{label} {}", axis.kind.name()));
     let cells: Vec<(String, Hue)> = names.zip(HUES.into_iter().cycle()).collect();
     let plots = errors.map(|(y, published, measured)| {
         let x = PlotAxis::linear(repeat_name(results)).including([0.5, trials as f64 + 0.5]);

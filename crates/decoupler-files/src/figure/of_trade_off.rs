@@ -251,7 +251,7 @@ pub fn point_facts(point: &TradeOffPoint) -> Vec<String> {
     if let Some(ratio) = point.to_model_based() {
         facts.push(format!("{} times the model-based error", format_number(ratio)));
     }
-    facts.push(format!("{} per frame", frame_time(point.report.cost.frame_us)));
+    facts.push(format!("{} per frame", frame_time(point.report.frame_us)));
     facts.push(format!("{} of training", training_time(point.training_seconds)));
     facts.extend(point.report.remarks.iter().map(ToString::to_string));
     facts

@@ -243,9 +243,10 @@ impl SetupSets {
             split,
             test,
         } = planned;
-        let sets = RunSets::new(split, test)
-            .described(recording.problem())
-            .limited_to(memory_budget());
+        let sets = RunSets {
+            memory: memory_budget(),
+            ..RunSets::new(split, test).described(recording.problem())
+        };
         Ok(Self {
             sets,
             recordings: Some(Recordings {

@@ -474,7 +474,7 @@ fn axes_belong_to_their_source() {
         Axis::parse(AxisKind::Noise, ["0.1"]).unwrap(),
         Axis::names(AxisKind::Array, [ArrayScale::default()]),
     ] {
-        let name = axis.name();
+        let name = axis.kind.name();
         let expected = format!("recordings have no setting '{name}': vary another one");
         assert_eq!(message(&on_recording(&setup, axis, None)), expected);
     }

@@ -42,13 +42,8 @@ fn trained(settings: RunSettings) -> Run {
 }
 
 fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
-    let set = DecoderSet::drawn(
-        *run.settings(),
-        Some(run.network()),
-        MemoryBudget::UNLIMITED,
-        &Job::UNINTERRUPTED,
-    )
-    .unwrap();
+    let sets = RunSets::draw(run.settings(), MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+    let set = DecoderSet::new(*run.settings(), sets.split.training, Some(run.network()));
     let report = set.measure(kind, precision, run.test()).unwrap().unwrap();
     report.errors.percent().unwrap()
 }
@@ -95,7 +90,8 @@ fn unknown_rows_are_identified() {
     assert_eq!(run.network().values().len(), 1);
     assert!(z_percent(&run, DecoderKind::Newton, Precision::Double) < 1e-9);
     settings.simulation_mut().unwrap().scene.noise = Noise::relative(1e-5);
-    let set = DecoderSet::drawn(settings, None, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+    let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+    let set = DecoderSet::new(settings, sets.split.training, None);
     let test = settings.simulation().unwrap().draw_test(settings.seed).unwrap();
     let report = set
         .measure(DecoderKind::Newton, Precision::Double, &test)
@@ -235,7 +231,7 @@ fn a_trade_off_has_a_point_for_every_choice() {
     assert!(
         points
             .iter()
-            .all(|point| fastest.report.cost.frame_us <= point.report.cost.frame_us)
+            .all(|point| fastest.report.frame_us <= point.report.frame_us)
     );
     let mut none = 0;
     let count = |_, _: Result<_, _>, _: Option<&_>| none += 1;

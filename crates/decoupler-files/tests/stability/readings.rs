@@ -2,7 +2,7 @@
 
 use decoupler_core::{
     decoupling::{Decoder, DecoderKind},
-    evaluation::{DecoderSet, Run},
+    evaluation::{DecoderSet, Run, RunSets},
     machine::MemoryBudget,
     scene::Noise,
 };
@@ -32,13 +32,13 @@ fn judge(noise: Noise, changed: impl Fn(f64) -> f64, is_all: bool) -> Vec<(Strin
     settings.simulation_mut().unwrap().scene.noise = noise;
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
-    let set = DecoderSet::drawn(
-        settings,
-        Some(run.network()),
+    let sets = RunSets::draw(
+        &settings,
         MemoryBudget::UNLIMITED,
         &decoupler_core::job::Job::UNINTERRUPTED,
     )
     .unwrap();
+    let set = DecoderSet::new(settings, sets.split.training, Some(run.network()));
     let mut readings = run.test().sample_readings(0).to_vec();
     let count = if is_all { readings.len() } else { 1 };
     readings[..count].iter_mut().for_each(|value| *value = changed(*value));

@@ -409,7 +409,7 @@ pub fn run(job: &mut Background<ExperimentEvent>, experiment: Experiment, setup:
             let run = run_experiments(
                 &[experiment],
                 &samples,
-                worker_threads(false),
+                worker_threads(),
                 || report.is_cancelled(),
                 |finished| report.send(ExperimentEvent::Finished(Box::new(finished))),
             );

@@ -136,7 +136,7 @@ impl Figure {
         match self {
             Self::Error => format_number(point.report.errors.percent()),
             Self::ToModelBased => format_number(point.to_model_based()),
-            Self::Frame => frame_time(point.report.cost.frame_us),
+            Self::Frame => frame_time(point.report.frame_us),
             Self::Training => training_time(point.training_seconds),
         }
     }
@@ -169,7 +169,7 @@ pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) 
         .iter()
         .map(|figure| TableColumn::figure(figure.heading(level.noise.is_some())));
     let columns: Vec<TableColumn<'_>> = std::iter::once(names).chain(headings).collect();
-    let frame_us = |number: usize| level.points[number].report.cost.frame_us;
+    let frame_us = |number: usize| level.points[number].report.frame_us;
     let mut order: Vec<usize> = (0..level.points.len()).collect();
     order.sort_by(|&a, &b| frame_us(a).total_cmp(&frame_us(b)));
     let row = |place: usize| {

@@ -377,7 +377,7 @@ fn answer_ui(
         "{}: {}, {}",
         point_name(point),
         format_percent(point.report.errors.percent()),
-        frame_time(point.report.cost.frame_us)
+        frame_time(point.report.frame_us)
     );
     let accent = Theme::of(ui).palette.accent;
     let response = ui.selectable_label(

@@ -240,7 +240,7 @@ impl Figure {
             Self::Residual => report.residual,
             Self::Rmse => Some(of_target?.rmse),
             Self::R2 => of_target?.r2,
-            Self::FrameTime => Some(report.cost.frame_us),
+            Self::FrameTime => Some(report.frame_us),
         }
     }
 
@@ -378,13 +378,19 @@ mod tests {
 
     use decoupler_core::{
         dataset::Simulation,
-        evaluation::{DecoderSet, Preset, Run, RunSettings},
+        evaluation::{DecoderSet, Preset, Run, RunSets, RunSettings},
         scene::{Noise, NoisySets},
     };
     use egui_kittest::{Harness, kittest::Queryable as _};
 
     use super::*;
     use decoupler_core::machine::MemoryBudget;
+
+    /// Returns decoders fitted to the training set of `settings`.
+    fn decoders_of(settings: RunSettings) -> DecoderSet {
+        let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+        DecoderSet::new(settings, sets.split.training, None)
+    }
 
     #[test]
     fn decoders_that_cannot_be_measured_say_why_and_none_stays_pending() {
@@ -454,7 +460,7 @@ mod tests {
         let mut without_noise = settings;
         without_noise.simulation_mut().unwrap().scene.noise = Noise::default();
         // Fitted without the noise that the readings have.
-        let set = DecoderSet::drawn(without_noise, None, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+        let set = decoders_of(without_noise);
         let report = set
             .measure(DecoderKind::Ridge, Precision::Double, &test)
             .unwrap()
@@ -488,7 +494,7 @@ mod tests {
         settings.simulation_mut().unwrap().sensor.scale = "10x6_3x4".parse().unwrap();
         settings.simulation_mut().unwrap().samples = 100;
         settings.simulation_mut().unwrap().test_samples = 10;
-        let set = DecoderSet::drawn(settings, None, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+        let set = decoders_of(settings);
         let test = settings.simulation().unwrap().draw_test(settings.seed).unwrap();
         let report = set
             .measure(DecoderKind::Newton, Precision::Double, &test)

@@ -3,11 +3,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use decoupler_core::{
-    evaluation::{PastNetworks, TestErrors},
-    network::Networks,
-    problem::Problem,
-};
+use decoupler_core::{evaluation::TestErrors, network::Networks, problem::Problem};
 use eframe::egui::{Align, Layout, RichText, Slider, Ui, Vec2, WidgetInfo, accesskit::Role};
 
 use crate::window::{
@@ -15,7 +11,7 @@ use crate::window::{
     shared::{RunResult, RunView, Shared},
     test_view::TestSet,
     theme::{Theme, space, type_size},
-    training_worker::RunId,
+    training_worker::{PastNetworks, RunId},
     widgets::{ghost_button, slider_ui},
 };
 

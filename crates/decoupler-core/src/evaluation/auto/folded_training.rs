@@ -144,7 +144,10 @@ impl Part {
         };
         if training.has_varying_target() {
             let validation = None;
-            let sets = RunSets::without_test(Split { training, validation }).limited_to(memory);
+            let sets = RunSets {
+                memory,
+                ..RunSets::without_test(Split { training, validation })
+            };
             let run = Run::new(settings, sets, Begin::Initialize, &Job::UNINTERRUPTED)?;
             let inputs = run.scalings.at(0).0.of(test.readings());
             part.run = Some((run, inputs));

@@ -156,11 +156,6 @@ impl Axis {
         Ok(Self { kind, values })
     }
 
-    /// Returns the name of the setting.
-    pub fn name(&self) -> &'static str {
-        self.kind.name()
-    }
-
     /// Returns value `index` as text.
     ///
     /// # Panics

@@ -118,14 +118,14 @@ impl Experiment {
     /// The first problem found.
     pub fn check(&self) -> Result<(), RunError> {
         if let Some(empty) = self.axes().find(|axis| axis.values.is_empty()) {
-            return Err(RunError::NoValues(empty.name()));
+            return Err(RunError::NoValues(empty.kind.name()));
         }
         if self
             .second_axis
             .as_ref()
             .is_some_and(|second| second.kind == self.axis.kind)
         {
-            return Err(RunError::SameAxes(self.axis.name()));
+            return Err(RunError::SameAxes(self.axis.kind.name()));
         }
         let (repeats, folds) = self.repeats_and_folds();
         RunError::check_count("seeds", self.seeds, 1..=MAX_TRIALS)?;
@@ -153,7 +153,10 @@ impl Experiment {
         }
         for axis in self.axes() {
             if !AxisKind::of_runs(&self.base).any(|kind| kind == axis.kind) {
-                return Err(RunError::NoSetting { axis: axis.name(), of });
+                return Err(RunError::NoSetting {
+                    axis: axis.kind.name(),
+                    of,
+                });
             }
             let mut cell = self.cell(0, 0);
             let mut values = 0..axis.values.len();

@@ -56,29 +56,29 @@ impl ExperimentResults {
     /// # Panics
     /// If there is no such cell.
     pub fn record(&mut self, cell: usize, outcome: Result<Trial, TrialFailure>) {
-        fn insert<T>(sorted: &mut Vec<T>, one: T, key: impl Fn(&T) -> (u64, usize)) {
-            let place = sorted.partition_point(|other| key(other) < key(&one));
-            sorted.insert(place, one);
-        }
         let CellResults { trials, failures, .. } = &mut self.cells[cell];
         match outcome {
-            Ok(trial) => insert(trials, trial, |trial| (trial.seed.0, trial.repeat)),
-            Err(failure) => insert(failures, failure, |failure| (failure.seed.0, failure.repeat)),
+            Ok(trial) => trials.push(trial),
+            Err(failure) => failures.push(failure),
         }
+        trials.sort_by_key(|trial| (trial.seed.0, trial.repeat));
+        failures.sort_by_key(|failure| (failure.seed.0, failure.repeat));
     }
 
     /// Returns the value of a cell on each axis, as text.
     pub fn cell_labels(&self, cell: &CellResults) -> Vec<String> {
-        let places = [cell.cell.column, cell.cell.row].into_iter();
-        places
-            .zip(self.experiment.axes())
-            .map(|(place, axis)| axis.label(place))
-            .collect()
+        let axes = self.experiment.axes().zip([cell.cell.column, cell.cell.row]);
+        axes.map(|(axis, place)| axis.label(place)).collect()
     }
 
     /// Returns `true` if every trial has finished or failed.
     pub fn is_complete(&self) -> bool {
         self.cells.iter().all(CellResults::is_complete)
+    }
+
+    /// Returns the figures of every cell, row by row.
+    pub fn summaries(&self) -> Vec<CellSummary> {
+        self.cells.iter().map(CellResults::summary).collect()
     }
 }
 
@@ -91,11 +91,10 @@ impl CellResults {
     /// Returns the trial with the median error in percent (the lower of two), as representative for the cell.
     pub fn median_trial(&self) -> Option<&Trial> {
         let percent = |trial: &Trial| trial.scores.network.percent();
-        let with_errors = self.trials.iter().filter_map(|trial| Some((trial, percent(trial)?)));
-        let mut trials: Vec<_> = with_errors.collect();
-        trials.sort_by(|(_, one), (_, other)| one.total_cmp(other));
-        let middle = trials.len().checked_sub(1)? / 2;
-        Some(trials[middle].0)
+        let with_errors = self.trials.iter().filter_map(|trial| Some((percent(trial)?, trial)));
+        let mut trials = Vec::from_iter(with_errors);
+        trials.sort_by(|(one, _), (other, _)| one.total_cmp(other));
+        Some(trials.get(trials.len().checked_sub(1)? / 2)?.1)
     }
 }
 
@@ -159,13 +158,6 @@ pub struct Figure {
     pub max: Option<f64>,
     /// Value of each trial, by seed and repeat.
     pub values: Vec<Option<f64>>,
-}
-
-impl ExperimentResults {
-    /// Returns the figures of every cell, row by row.
-    pub fn summaries(&self) -> Vec<CellSummary> {
-        self.cells.iter().map(CellResults::summary).collect()
-    }
 }
 
 impl CellResults {

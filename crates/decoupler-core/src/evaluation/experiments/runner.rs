@@ -11,8 +11,12 @@ use std::{
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::{Cell, Experiment, RecordedSamples, Trial, TrialFailure, TrialSamples};
-use crate::{dataset::Seed, evaluation::RunError, job::Job, network::Shape};
+use super::{Cell, Experiment, Trial, TrialFailure, TrialSamples};
+use crate::{
+    dataset::Seed,
+    evaluation::{RunError, TrainingSize, Workload},
+    job::Job,
+};
 
 /// A finished trial.
 #[derive(Clone, Debug)]
@@ -31,11 +35,9 @@ pub struct Finished {
     pub time_left: Option<Duration>,
 }
 
-/// Returns the number of worker threads: one per core, or one fewer to leave a core to the window.
-pub fn worker_threads(leave_one_core: bool) -> NonZero<usize> {
-    let cores = thread::available_parallelism().map_or(1, NonZero::get);
-    let threads = cores.saturating_sub(usize::from(leave_one_core));
-    NonZero::new(threads).unwrap_or(NonZero::<usize>::MIN)
+/// Returns the number of worker threads: one per core.
+pub fn worker_threads() -> NonZero<usize> {
+    thread::available_parallelism().unwrap_or(NonZero::<usize>::MIN)
 }
 
 /// Runs all trials of `experiments` on `samples` and on `threads` threads, one trial per thread, and passes each to
@@ -160,21 +162,12 @@ fn time_left((work, all_work): (f64, f64), seconds: f64, threads: usize) -> Opti
 /// Approximate number of multiplications in one trial of `cell`, if it runs all of its epochs.
 fn work(experiment: &Experiment, cell: &Cell, samples: &TrialSamples) -> f64 {
     let settings = &cell.settings;
-    let sizes = match samples {
-        TrialSamples::Recorded(RecordedSamples { set, .. }) => Some((set.channels(), set.outputs(), set.samples())),
-        TrialSamples::Drawn(_) => settings.simulation().map(|source| {
-            let scale = source.sensor.scale;
-            (scale.columns(), scale.coordinates_per_row(), source.samples)
-        }),
+    let size = match samples {
+        TrialSamples::Recorded(recorded) => Ok(TrainingSize::of(settings, &recorded.set)),
+        TrialSamples::Drawn(_) => TrainingSize::drawn(settings),
     };
-    let (inputs, outputs, samples) = sizes.unwrap_or((1, 1, 1));
-    let shape = Shape {
-        inputs,
-        hidden: settings.hidden,
-        outputs,
-    };
-    let epochs = experiment.repeats_and_folds().1 * settings.starts * settings.training.stopping.epochs;
-    settings.training.method.epoch_multiplications(shape, samples) * epochs as f64
+    let of_training = size.map_or(1.0, |size| Workload::of(settings, size).multiplications());
+    experiment.repeats_and_folds().1 as f64 * of_training
 }
 
 #[cfg(test)]

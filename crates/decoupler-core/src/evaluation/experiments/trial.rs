@@ -89,38 +89,41 @@ impl Trial {
     ) -> Result<Self, RunError> {
         job.check()?;
         let settings = RunSettings { seed, ..cell.settings };
-        let (scores, effort, states) = if let Some(validation) = experiment.cross_validation {
+        if let Some(validation) = experiment.cross_validation {
             let simulation = settings.drawn()?;
             let set = simulation.draw_training(simulation.samples, seed)?;
             let tested = simulation.draw_tested_folds(&set, seed)?;
             let sets = (&set, tested.as_ref().unwrap_or(&set));
             let validated = validation.run(&settings, sets, repeat, job)?;
-            let scores = validated.scores_of(&simulation.problem(), &set);
-            (scores, validated.effort, Vec::new())
-        } else {
-            let sets = match samples {
-                TrialSamples::Drawn(memory) => RunSets::draw(&settings, *memory, job)?,
-                TrialSamples::Recorded(recorded) => {
-                    let division = cell.division.expect("recorded samples have a division");
-                    recorded.divided(&division, seed)?
-                }
-            };
-            let baselines = Baselines::fitted(&settings, &sets)?;
-            let mut run = Run::new(settings, sets, Begin::Initialize, job)?;
-            let effort = Effort::train(&mut run, job)?;
-            let scores = Scores {
-                network: run.errors(),
-                baselines,
-                coverage: Vec::new(),
-            };
-            (scores, effort, run.states())
+            return Ok(Self {
+                seed,
+                repeat,
+                scores: validated.scores_of(&simulation.problem(), &set),
+                effort: validated.effort,
+                states: Vec::new(),
+            });
+        }
+        let sets = match samples {
+            TrialSamples::Drawn(memory) => RunSets::draw(&settings, *memory, job)?,
+            TrialSamples::Recorded(recorded) => {
+                let division = cell.division.expect("recorded samples have a division");
+                recorded.divided(&division, seed)?
+            }
         };
+        let baselines = Baselines::fitted(&settings, &sets)?;
+        let mut run = Run::new(settings, sets, Begin::Initialize, job)?;
+        let mut effort = Effort::default();
+        effort.train(&mut run, job)?;
         Ok(Self {
             seed,
             repeat,
-            scores,
+            scores: Scores {
+                network: run.errors(),
+                baselines,
+                coverage: Vec::new(),
+            },
             effort,
-            states,
+            states: run.states(),
         })
     }
 }

@@ -10,7 +10,7 @@ use crate::{
 use decoupler_core::{
     dataset::SplitBy,
     decoupling::{DecoderKind, Precision},
-    evaluation::{Begin, DecoderSet, Measured, Run, RunSettings},
+    evaluation::{Begin, DecoderSet, Measured, Run, RunSets, RunSettings},
     job::Job,
     machine::MemoryBudget,
     scene::{Indenter, Loading, RowModel},
@@ -33,13 +33,8 @@ fn run() -> Run {
 
 /// The report under `name`, as a program reads it.
 fn report(name: &str, file: &NetworkFile, run: &Run) -> String {
-    let set = DecoderSet::drawn(
-        file.settings,
-        Some(file.network.clone()),
-        MemoryBudget::UNLIMITED,
-        &Job::UNINTERRUPTED,
-    )
-    .unwrap();
+    let sets = RunSets::draw(&file.settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+    let set = DecoderSet::new(file.settings, sets.split.training, Some(file.network.clone()));
     let ridge = set.measure(DecoderKind::Ridge, Precision::Double, run.test()).unwrap();
     let (defect, decoders) = (run.defect(), [ridge.unwrap()]);
     let report = RunReport {

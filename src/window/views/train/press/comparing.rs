@@ -1,10 +1,14 @@
 use std::sync::Arc;
 
-use super::{section::Shown, state::Subject};
+use super::{
+    pressed::{Pressed, PressedAnswer},
+    section::Shown,
+    state::Subject,
+};
 use crate::window::job::{Background, JobError, Report, Wake};
 use decoupler_core::{
     decoupling::{Decoder, DecoderKind, Precision},
-    evaluation::{DecoderSet, Pressed, PressedAnswer, RunError},
+    evaluation::{DecoderSet, RunError, RunSets},
     job::Job,
 };
 use decoupler_files::machine::memory_budget;
@@ -206,8 +210,9 @@ impl Comparing {
 fn fit_all(subject: &Subject, report: &Report<FitEvent>) {
     let is_cancelled = || report.is_cancelled();
     let networks = Some((*subject.networks).clone());
-    let set = DecoderSet::drawn(subject.settings, networks, memory_budget(), &Job::new(&is_cancelled))
-        .map_err(|error| error.to_string());
+    let sets = RunSets::draw(&subject.settings, memory_budget(), &Job::new(&is_cancelled));
+    let set = sets.map(|sets| DecoderSet::new(subject.settings, sets.split.training, networks));
+    let set = set.map_err(|error| error.to_string());
     for kind in KINDS {
         if report.is_cancelled() {
             return;

@@ -2,11 +2,13 @@
 //!
 //! `state` holds the finger and its [`Touch`](decoupler_core::scene::Touch), and has the touch answered in the same frame,
 //! or in the background for large arrays. `pointer` turns mouse and keys into a touch before anything of the frame is
-//! drawn, and trains a small network that answers until there is another. `comparing` asks the other decoders in the
-//! background. `section` computes and shows the answers.
+//! drawn, and trains a small network (`ready_settings`) that answers until there is another. `comparing` asks the other
+//! decoders in the background. `pressed` is the touched sensor with its readings. `section` computes and shows the answers.
 
 mod comparing;
 mod pointer;
+mod pressed;
+mod ready_settings;
 mod section;
 mod state;
 

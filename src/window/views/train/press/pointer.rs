@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use decoupler_core::{
-    evaluation::{Begin, Run, RunError, RunSets, RunSettings, ready_settings},
+    evaluation::{Begin, Run, RunError, RunSets, RunSettings},
     job::Job,
     network::Networks,
     scene::{Contact, Print, Touch},
@@ -10,7 +10,10 @@ use decoupler_files::{figure::surface::Ray, machine::memory_budget};
 use eframe::egui::{Context, Key, Modifiers, Painter, PointerButton, Pos2, Response, Shape, Stroke, pos2};
 use glam::{DVec2, DVec3};
 
-use super::state::{Grip, Hand, PressState, Subject, Target, Tool};
+use super::{
+    ready_settings::ready_settings,
+    state::{Grip, Hand, PressState, Subject, Target, Tool},
+};
 use crate::window::{
     job::{Background, JobError, Wake},
     shared::Shared,

@@ -2,7 +2,6 @@ use std::{sync::Arc, time::Duration};
 
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
-    evaluation::{Pressed, PressedAnswer},
     job::Job,
     network::Networks,
     scene::Touch,
@@ -17,6 +16,7 @@ use ndarray::Array2;
 
 use super::{
     comparing::Compared,
+    pressed::{Pressed, PressedAnswer},
     state::{Finger, PressState, Subject, Tool},
 };
 use crate::window::{

@@ -1,23 +1,20 @@
+//! A touched sensor, and the answers of decoders to its readings.
+
 use std::{
     ops::RangeInclusive,
     time::{Duration, Instant},
 };
 
-use glam::DVec3;
-use ndarray::Array2;
-
-use super::{RunError, run_sets::check_networks};
-use crate::{
-    calibration::PressedRow,
-    dataset::{Dataset, PerRow, Split},
+use decoupler_core::{
     decoupling::{DecodeError, Decoder},
+    evaluation::RunError,
     job::Job,
-    machine::{MemoryBudget, node_pairs_per_row},
-    network::{DecouplingNetwork, Networks},
+    machine::node_pairs_per_row,
     scene::Touch,
     sensor::{SensorError, SensorModel},
-    training::{Examples, Problem, Trainer, TrainingSettings, check_width},
 };
+use glam::DVec3;
+use ndarray::Array2;
 
 /// Sensor deformed by a [`Touch`]: positions of its nodes and readings of its wires, without noise.
 #[derive(Clone, Debug, PartialEq)]
@@ -156,85 +153,6 @@ impl PressedAnswer {
     }
 }
 
-/// Returns the samples of `set` as readings of known deformations, for
-/// [`Calibration::fit`](crate::calibration::Calibration::fit). The targets must be the absolute coordinates of the
-/// row's nodes in millimetres, with the rest positions of `sensor`.
-///
-/// # Errors
-/// If the samples have no row-wires.
-///
-/// # Panics
-/// If there are not 3·M2 targets, or the array lacks a row-wire.
-pub fn pressed_rows(set: &Dataset, sensor: &SensorModel) -> Result<Vec<PressedRow>, RunError> {
-    assert_eq!(
-        set.outputs(),
-        sensor.scale.coordinates_per_row(),
-        "targets are coordinates of the row's nodes"
-    );
-    let pressed = |sample: usize| {
-        let row = set.row_wire(sample).ok_or(RunError::NoRowWires)?;
-        let position = |(node, mm): (usize, &[f64])| sensor.displacement_mm(row, node, DVec3::from_slice(mm));
-        Ok(PressedRow {
-            frame: set.groups()[sample],
-            row,
-            displacements_mm: set
-                .sample_targets(sample)
-                .chunks_exact(3)
-                .enumerate()
-                .map(position)
-                .collect(),
-            resistances_ohm: set.sample_readings(sample).to_vec(),
-        })
-    };
-    (0..set.samples()).map(pressed).collect()
-}
-
-/// Continues the training of `networks` on other samples, such as frames of the real sensor after training on its
-/// calibrated model. Scalings do not change. The weights with the lowest validation error
-/// are returned, possibly the initial ones: with a validation set, fine-tuning cannot increase the validation error.
-///
-/// # Errors
-/// If the samples do not have the channels, targets or rows of the networks, a setting is out of range, or the
-/// networks are too wide for `memory`, or the job is cancelled.
-pub fn fine_tune(
-    networks: &Networks,
-    split: &Split,
-    training: TrainingSettings,
-    memory: MemoryBudget,
-    job: &Job<'_>,
-) -> Result<Networks, RunError> {
-    check_networks(networks, split)?;
-    let mut tuned = Vec::with_capacity(networks.values().len());
-    for (index, network) in networks.values().iter().enumerate() {
-        let examples = |set: &Dataset| {
-            let set = if networks.only().is_some() {
-                set.clone()
-            } else {
-                set.of_row(index)
-            };
-            let inputs = network.inputs().of(set.readings());
-            Examples::new(inputs.view(), network.outputs().scale(set.targets()).view())
-        };
-        let problem = Problem {
-            training: examples(&split.training),
-            validation: split.validation.as_ref().map(examples),
-            test: None,
-        };
-        let (shape, samples) = (network.mlp().shape(), problem.training.samples());
-        check_width(&training.method, shape, samples, 1, memory)?;
-        let mut trainer = Trainer::new(network.mlp().clone(), problem, training)?;
-        while trainer.step().is_none() {
-            job.check()?;
-        }
-        tuned.push(DecouplingNetwork::new(
-            network.inputs().clone(),
-            trainer.best().clone(),
-            network.outputs().clone(),
-        ));
-    }
-    Ok(PerRow::each(tuned))
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::{
@@ -245,11 +163,10 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::evaluation::RunSettings;
-    use crate::{
+    use decoupler_core::{
         dataset::Dataset,
         decoupling::{NewtonDecoder, Program, ProgramDecoder},
-        evaluation::{Errors, Run},
+        evaluation::{Errors, Run, RunSettings},
         scene::{Indenter, Print, Scene},
     };
 

@@ -1,7 +1,10 @@
 use std::{sync::Arc, time::Duration};
 
-use super::Run;
-use crate::network::{DecouplingNetwork, Mlp, Networks};
+use decoupler_core::{
+    evaluation::Run,
+    network::{DecouplingNetwork, Mlp, Networks},
+};
+use decoupler_files::export::PastNetwork;
 
 /// Best networks at past epochs: the networks that a run stopped at each epoch would have returned.
 ///
@@ -13,21 +16,6 @@ pub struct PastNetworks {
     halvings: u32,
     /// In the order of their epochs.
     kept: Vec<Arc<Past>>,
-}
-
-/// Network that a run stopped at an epoch would have returned.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PastNetwork {
-    /// Epoch at which the run is assumed to stop.
-    pub epoch: usize,
-    /// Epoch of these weights: the best so far.
-    pub best_epoch: usize,
-    /// Index of the start that was the leader at that epoch.
-    pub start: usize,
-    /// Training time of that start up to that epoch, summed over all rows.
-    pub elapsed: Duration,
-    /// The shared network, or the network of each row-wire.
-    pub networks: Networks,
 }
 
 /// Weights of a past epoch.
@@ -121,7 +109,7 @@ impl PastNetworks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
+    use decoupler_core::{
         evaluation::{Combination, RunSettings},
         scene::Rows,
         training::Method,
