@@ -108,7 +108,10 @@ impl Contents {
 
     /// Precision of readings and targets.
     pub(super) fn outer_precision(&self) -> Precision {
-        self.precision_of(self.exported.targets)
+        match self.precision {
+            BundlePrecision::Single => Precision::Single,
+            BundlePrecision::Double | BundlePrecision::Fixed16 => Precision::Double,
+        }
     }
 
     pub(super) fn channels(&self) -> usize {

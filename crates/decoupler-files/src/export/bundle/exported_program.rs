@@ -77,6 +77,24 @@ impl ExportedProgram {
         }
     }
 
+    /// The program with constants that are larger or smaller by this relative error, in a fixed pattern.
+    pub(super) fn disturbed(&self, error: f64) -> Program {
+        let mut nodes = self.program.nodes().to_vec();
+        // A linear congruential generator (Knuth, The Art of Computer Programming, volume 2, section 3.3.4).
+        let mut state = 1_u64;
+        let values = nodes.iter_mut().flat_map(|node| match &mut node.operation {
+            Operation::Select { tables, .. } => &mut tables[..],
+            _ => &mut [],
+        });
+        for value in values.flatten() {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            *value *= 1.0 + if state >> 63 == 0 { error } else { -error };
+        }
+        Program::new(nodes, self.program.output())
+    }
+
     /// Indices of the nodes with sums of products.
     pub(super) fn layers(&self) -> Vec<usize> {
         let is_layer = |node: &Node| {

@@ -36,7 +36,7 @@ pub fn export_bundle<'a>(
     let folder = AtomicFolder::create(path)?;
     let mut contents = decoder.contents(&identifier(path), precision)?;
     let accuracy = match precision {
-        BundlePrecision::Double => in_double(&contents)?,
+        BundlePrecision::Double => in_double(&mut contents)?,
         BundlePrecision::Single => in_single(&mut contents)?,
         BundlePrecision::Fixed16 => in_fixed16(&mut contents, &decoder)?,
     };
@@ -115,28 +115,38 @@ fn deviation_in_single(contents: &Contents, wide: usize) -> Result<f64, BundleEr
     Ok(of_taken.deviation(&single, &contents.scales, |_, reading| reading)?)
 }
 
-/// Double precision: rounding errors are those of single precision, measured, in proportion to the digits.
-fn in_double(contents: &Contents) -> Result<Accuracy, BundleError> {
-    /// Factor for other orders of the sums and other functions.
+/// Double precision: the effect of rounding errors is measured by larger errors of the constants, in proportion.
+fn in_double(contents: &mut Contents) -> Result<Accuracy, BundleError> {
+    /// Relative errors of constants, far above those of double precision and small enough for proportion.
+    const ERROR: f64 = 1.0 / (1_u64 << 44) as f64;
+    /// Factor for other orders of the sums, other functions, and errors that do not cancel.
     const SAFETY: f64 = 64.0;
-    if !are_constants_finite(contents, |value| value.is_finite()) {
+    if !are_constants_finite(contents, f64::is_finite) {
         return Err(BundleError::NotFinite(
             "double precision",
             "train again with other settings",
         ));
     }
-    let digits = f64::EPSILON / f64::from(f32::EPSILON);
-    let in_single = deviation_in_single(contents, 0);
-    // Readings or constants beyond the range of single precision amplify nothing by themselves.
-    let amplified = SAFETY * digits * in_single.ok().filter(|deviation| deviation.is_finite()).unwrap_or(1.0);
-    let mut accuracy = Accuracy {
-        limit: DOUBLE,
+    let disturbed = contents.exported.disturbed(ERROR);
+    let found = contents
+        .golden
+        .deviation(&disturbed, &contents.scales, |_, reading| reading)?;
+    let amplification = found / ERROR;
+    let limit = DOUBLE.max(SAFETY * 0.5 * f64::EPSILON * amplification);
+    if limit > DOUBLE {
+        contents.notes.push(format!(
+            "this {} amplifies rounding errors about {amplification:.0e} times (relative to the range of its outputs), so two \
+             programs that evaluate it may differ by up to {limit:.0e}; {} for one that amplifies less",
+            contents.noun,
+            contents.meaning.smaller_weights()
+        ));
+    }
+    Ok(Accuracy {
+        limit,
         rounding: None,
         fixed: None,
         checks: Vec::new(),
-    };
-    accuracy.limit = accuracy.limit.max(amplified);
-    Ok(accuracy)
+    })
 }
 
 /// Single precision for all layers if it is accurate enough, otherwise double precision for as few of the first layers as

@@ -186,8 +186,11 @@ fn answer(header: &Header<'_>) -> String {
          if (!({targets}[k] >= -{most} && {targets}[k] <= {most})) {{\n            return {upper}_BAD_READING;\n        }}\n    }}\n"
     );
     let copied = |id: NodeId| {
-        let name = contents.name_of(id);
-        format!("    for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n        answer->{name}[k] = {name}[k];\n    }}\n")
+        let (name, computed) = (
+            contents.name_of(id),
+            value(contents, id, "k", contents.outer_precision()),
+        );
+        format!("    for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n        answer->{name}[k] = {computed};\n    }}\n")
     };
     text += &copied(contents.exported.targets);
     text += &contents.exported.half_widths.map_or_else(String::new, copied);

@@ -61,7 +61,6 @@ fn program(contents: &Contents) -> String {
     };
     let is_sequence = contents.history().is_some();
     let state = if is_sequence { ", state, time_s" } else { "" };
-    let parts = parts(contents);
     let body: String = contents
         .computed()
         .map(|(id, operation)| statement(contents, id, operation))
@@ -73,7 +72,7 @@ fn program(contents: &Contents) -> String {
          c = CONSTANTS\n{body}    return ({parts},)\n\n\n",
         contents.meaning.purpose_without_stop(),
         contents.noun,
-        parts = parts.join(", "),
+        parts = returned_parts(contents).join(", "),
     );
     if let Some(history) = contents.history() {
         text += &remembering(contents, &history);
@@ -122,6 +121,17 @@ fn parts(contents: &Contents) -> Vec<&str> {
     let exported = &contents.exported;
     let all = [Some(exported.targets), exported.half_widths, exported.outside];
     all.into_iter().flatten().map(|id| contents.name_of(id)).collect()
+}
+
+/// The parts of an answer, in the precision of the bundle.
+fn returned_parts(contents: &Contents) -> Vec<String> {
+    let exported = &contents.exported;
+    let numbers = [Some(exported.targets), exported.half_widths].into_iter().flatten();
+    let mut parts: Vec<String> = numbers
+        .map(|id| value(contents, id, contents.outer_precision()))
+        .collect();
+    parts.extend(exported.outside.map(|id| contents.name_of(id).to_owned()));
+    parts
 }
 
 fn dtype(precision: Precision) -> &'static str {
