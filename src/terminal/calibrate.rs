@@ -9,7 +9,7 @@ use super::{
     output::{print, print_object},
 };
 use decoupler_core::{
-    calibration::{Calibration, ParameterStatus, PressLimits, SensorParameter},
+    calibration::{Calibration, PressLimits, SensorParameter},
     evaluation::pressed_rows,
     sensor::{ArrayScale, SensorModel},
     text::counted,
@@ -131,10 +131,7 @@ impl Report {
             unit: fitted.parameter.unit(),
             nominal: fitted.nominal,
             value: fitted.value,
-            half_width: match fitted.standing {
-                ParameterStatus::Determined(half_width) => Some(half_width),
-                ParameterStatus::Nominal => None,
-            },
+            half_width: fitted.half_width,
         };
         Self {
             frames,
@@ -142,7 +139,7 @@ impl Report {
             parameters: calibration.parameters.iter().map(parameter).collect(),
             nominal_residual: calibration.nominal_residual,
             residual: calibration.residual,
-            warnings: calibration.warnings.iter().map(ToString::to_string).collect(),
+            warnings: calibration.warnings.clone(),
             sensor: calibration.model,
         }
     }

@@ -24,7 +24,7 @@ use decoupler_core::{
     problem::{Channel, Problem},
 };
 use decoupler_files::{
-    export::{describe_channels, describe_determinacy, error_table},
+    export::{describe_determinacy, error_table},
     import::{Dropped, Plan, Recording, Setup, SetupSets},
     machine::memory_budget,
 };
@@ -189,11 +189,7 @@ fn print_folds(
     let gains = nonlinear_gains(set, validated, by);
     let better = better(&problem, &scores);
     let mut warnings = recording.warnings.clone();
-    warnings.extend(describe_channels(
-        &recording.inputs,
-        channels,
-        &channel_remarks(set, by),
-    ));
+    warnings.extend(channel_remarks(set, by, &recording.inputs, channels));
     warnings.extend(optimism);
     warnings.extend(describe_determinacy(channels, &determined));
     let remarks = channels.iter().zip(gains);

@@ -10,13 +10,10 @@ use clap::{
     builder::{PossibleValuesParser, TypedValueParser},
 };
 use decoupler_core::{
-    dataset::{Dataset, Folds, Memory, Seed, SplitBy, Stream},
+    dataset::{Dataset, Folds, Seed, SplitBy, Stream},
     evaluation::{
-        Measured, RunError, RunSettings, TargetErrors, TrainingSize, Workload,
-        recorded::{
-            ChannelImportance, Determinacy, Determination, Findings, FittedModel, Interval, LearningCurve, MemoryGain,
-            StudyStep,
-        },
+        Measured, RunError, RunSettings, Scores, TrainingSize, Workload,
+        recorded::{Determinacy, Determination, Findings, FittedModel, Interval, StudyStep},
     },
     job::Job,
     network::LARGEST_HIDDEN,
@@ -26,7 +23,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{Cell, Table, describe_target, describe_warnings, format_below_one, format_duration, format_number},
-    import::{Dropped, ImportError, Plan, Recording},
+    import::{Dropped, Recording},
 };
 use serde::Serialize;
 
@@ -104,7 +101,7 @@ impl StudyArguments {
         let folds = import.folds.unwrap_or_else(|| by.folds_of(&recording.set, FOLDS));
         // Before the first step is announced.
         Folds::by(&recording.set, folds, by, &mut settings.seed.rng(Stream::Split)).map_err(RunError::from)?;
-        let bar = progress_bar(is_json, 5, "{bar:20} {msg}");
+        let bar = progress_bar(is_json, 4, "{bar:20} {msg}");
         let begun = Instant::now();
         let begin = |stage: StudyStep| {
             bar.inc(1);
@@ -118,9 +115,6 @@ impl StudyArguments {
         let divided = (&plan.division, folds);
         let budget_s = self.budget.or(self.model.is_none().then_some(BUDGET_S));
         let is_spent = || budget_s.is_some_and(|budget_s| begun.elapsed().as_secs_f64() > budget_s);
-        // Steps of ridge regression first.
-        begin(StudyStep::Memory);
-        let gain = memory_gain(&settings, &recording, (by, folds), &Job::new(&is_spent))?;
         let time_of_networks = time_of_networks(&settings, &recording.set, folds);
         let affords_networks = budget_s.is_none_or(|budget_s| time_of_networks.as_secs_f64() <= LONGEST * budget_s);
         let model = self.model.or((!affords_networks).then_some(FittedModel::Ridge));
@@ -134,17 +128,13 @@ impl StudyArguments {
         );
         bar.finish_and_clear();
         let findings = found?;
-        let measured = gain.as_ref().and_then(|gain| gain.as_ref().ok());
-        let mut report = Report::new(&plan, &recording, &settings, folds, (&findings, measured));
+        let mut report = Report::new(by, &recording, &settings, folds, &findings);
         let mut steps = Vec::new();
         if !affords_networks && self.model.is_none() {
             let time = format_duration(time_of_networks);
             steps.push(format!("networks, of which {folds} take about {time} on one thread"));
         }
-        let is_memory_left_out = matches!(gain, Some(Err(Spent)));
-        let left_out_steps = findings.left_out.iter().copied();
-        let left_out_steps = left_out_steps.chain(is_memory_left_out.then_some(StudyStep::Memory));
-        steps.extend(left_out_steps.map(|step| left_out(step).to_owned()));
+        steps.extend(findings.left_out.iter().map(|&step| left_out(step).to_owned()));
         if !steps.is_empty() {
             report.warnings.push(format!(
                 "the budget of {} s does not suffice, so these were left out: {}; --budget SECONDS changes it, and --model \
@@ -182,36 +172,7 @@ fn left_out(step: StudyStep) -> &'static str {
         StudyStep::OtherFolds => "the comparison with a random split",
         StudyStep::Samples => "networks trained on fewer samples (ridge regression instead)",
         StudyStep::Channels => "the importance of channels",
-        StudyStep::Memory => "whether the past helps",
         _ => "another step",
-    }
-}
-
-/// The budget was spent before a step had ended.
-struct Spent;
-
-/// Measures whether the memory of the recording, or the usual one, reduces the held-out error of ridge regression; `None` for
-/// a recording that is too short for a memory.
-fn memory_gain(
-    settings: &RunSettings,
-    recording: &Recording,
-    divided: (SplitBy, usize),
-    in_time: &Job<'_>,
-) -> Result<Option<Result<MemoryGain, Spent>>, Failure> {
-    let history = recording.history();
-    let given = recording.memory().cloned();
-    let memory = given.unwrap_or_else(|| MemoryGain::usual_memory(history));
-    if memory.is_empty() {
-        return Ok(None);
-    }
-    let set = |memory: &Memory| -> Result<Dataset, Failure> {
-        let features = history.features(memory).map_err(ImportError::from)?;
-        Ok(recording.set.with_readings(features))
-    };
-    let (without, with) = (set(&Memory::default())?, set(&memory)?);
-    match MemoryGain::measure(settings, &memory, [&without, &with], divided, in_time) {
-        Err(RunError::Cancelled(_)) => Ok(Some(Err(Spent))),
-        measured => Ok(Some(Ok(measured?))),
     }
 }
 
@@ -249,13 +210,7 @@ struct Target<'a> {
     network_to_ridge: Option<Figure>,
     /// RMSE of the network and of ridge with honest and with random folds.
     splits: Option<Splits>,
-    /// RMSE of ridge with a memory relative to that without.
-    with_memory: Option<Figure>,
-    memory_sentence: Option<String>,
     learning_curve: Vec<Point>,
-    /// RMSE with twice the samples relative to that with all samples.
-    with_twice_the_samples: Option<Figure>,
-    outlook: String,
 }
 
 #[derive(Serialize)]
@@ -313,20 +268,19 @@ fn name_of(model: FittedModel) -> &'static str {
 
 impl<'a> Report<'a> {
     pub(super) fn new(
-        plan: &Plan,
+        by: SplitBy,
         recording: &'a Recording,
         settings: &RunSettings,
         folds: usize,
-        (findings, gain): (&Findings, Option<&MemoryGain>),
+        findings: &Findings,
     ) -> Self {
-        let channels = &recording.inputs;
         let mut warnings = recording.warnings.clone();
-        warnings.extend(describe_warnings(channels, &recording.targets, findings));
-        let worth = |of: &ChannelImportance| Worth {
-            name: &channels[of.channel].name,
-            unit: channels[of.channel].unit.as_deref(),
-            growth: of.growth.iter().map(|growth| growth.map(Figure::from)).collect(),
-            is_dispensable: of.is_dispensable(),
+        warnings.extend(describe_warnings(recording, by, findings));
+        let worth = |(index, growth): (usize, &Vec<Option<Interval>>)| Worth {
+            name: &recording.inputs[index].name,
+            unit: recording.inputs[index].unit.as_deref(),
+            growth: growth.iter().map(|growth| growth.map(Figure::from)).collect(),
+            is_dispensable: findings.is_dispensable(index),
         };
         let targets = recording.targets.iter().enumerate();
         Self {
@@ -334,15 +288,15 @@ impl<'a> Report<'a> {
             rows: recording.rows,
             samples: recording.set.samples(),
             dropped: &recording.dropped,
-            split: plan.division.by.to_string(),
+            split: by.to_string(),
             folds,
             hidden: settings.hidden,
             seed: settings.seed.0,
             model: name_of(findings.model),
             targets: targets
-                .map(|(index, channel)| Target::new(index, channel, findings, gain))
+                .map(|(index, channel)| Target::new(index, channel, findings))
                 .collect(),
-            channels: findings.importance.iter().map(worth).collect(),
+            channels: findings.importance.iter().enumerate().map(worth).collect(),
             warnings,
         }
     }
@@ -359,7 +313,6 @@ impl<'a> Report<'a> {
                 self.samples, self.folds, self.split
             )?;
             self.write_targets(out)?;
-            self.write_memory(out)?;
             self.write_splits(out)?;
             self.write_channels(out)?;
             self.write_curves(out)?;
@@ -384,17 +337,6 @@ impl<'a> Report<'a> {
                     String::new()
                 }
             )?;
-        }
-        writeln!(out)
-    }
-
-    fn write_memory(&self, out: &mut impl Write) -> io::Result<()> {
-        let sentences = Vec::from_iter(self.targets.iter().filter_map(|target| target.memory_sentence.as_ref()));
-        if sentences.is_empty() {
-            return Ok(());
-        }
-        for sentence in sentences {
-            writeln!(out, "{}", capitalised(sentence))?;
         }
         writeln!(out)
     }
@@ -459,19 +401,15 @@ impl<'a> Report<'a> {
         let headings = std::iter::once("samples").chain(self.target_names());
         let table = Table::of_headings(headings, first.learning_curve.iter().enumerate().map(row));
         write!(out, "{}", table.aligned())?;
-        for target in &self.targets {
-            writeln!(out, "{}", capitalised(&target.outlook))?;
-        }
         writeln!(out)
     }
 }
 
 impl<'a> Target<'a> {
-    fn new(index: usize, channel: &'a Channel, findings: &Findings, gain: Option<&MemoryGain>) -> Self {
+    fn new(index: usize, channel: &'a Channel, findings: &Findings) -> Self {
         let of = &findings.targets[index];
         let (best, name) = (of.best(), &channel.name);
         let r2 = |determination: Option<Determination>| determination.map(|of| of.r2.into());
-        let LearningCurve { points, doubling, .. } = &of.curve;
         Self {
             name,
             unit: channel.unit.as_deref(),
@@ -488,29 +426,30 @@ impl<'a> Target<'a> {
             r2_ridge: r2(of.ridge.ok()),
             network_to_ridge: of.gain.map(Figure::from),
             splits: findings.comparison.as_ref().map(|comparison| {
-                let rmse = |errors: &[TargetErrors]| errors[index].rmse;
+                let rmse = |scores: &Scores| {
+                    [&scores.network, &scores.baselines.linear].map(|errors| errors.targets()[index].rmse)
+                };
+                let [network, ridge] = rmse(&comparison.honest);
+                let [random_network, random_ridge] = rmse(&comparison.random);
                 Splits {
                     by: comparison.by.to_string(),
-                    network: rmse(&comparison.network),
-                    ridge: rmse(&comparison.ridge),
-                    random_network: rmse(&comparison.random_network),
-                    random_ridge: rmse(&comparison.random_ridge),
+                    network,
+                    ridge,
+                    random_network,
+                    random_ridge,
                     sentence: comparison.sentence(index, name),
                 }
             }),
-            with_memory: gain.and_then(|gain| gain.ratios[index]).map(Figure::from),
-            memory_sentence: gain.map(|gain| gain.sentence(index, name)),
-            learning_curve: points
+            learning_curve: findings
+                .curve
                 .iter()
                 .map(|point| Point {
                     samples: point.samples,
-                    rmse: point.rmse,
-                    least: point.range[0],
-                    largest: point.range[1],
+                    rmse: point.rmse[index],
+                    least: point.range[index][0],
+                    largest: point.range[index][1],
                 })
                 .collect(),
-            with_twice_the_samples: doubling.map(Figure::from),
-            outlook: of.curve.sentence(name),
         }
     }
 }

@@ -185,7 +185,7 @@ impl Train {
                 ChoosingProgress::Reading(_) => bar.set_message("Reading the recording"),
                 ChoosingProgress::Trying(progress) => {
                     bar.set_position((100.0 * progress.share) as u64);
-                    bar.set_message(progress.to_string());
+                    bar.set_message(progress.text);
                 }
             },
         );

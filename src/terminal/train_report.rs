@@ -225,7 +225,7 @@ impl<'a> Trained<'a> {
         let source = match (&self.sets.recordings, settings.simulation()) {
             (Some(recordings), _) => SourceReport::Recording(Box::new(RecordingFigures {
                 recording: RecordingReport::new(&self.sets.sets, recordings),
-                test_outside_training: self.extrapolation().map_or(0.0, |(found, _)| found.share()),
+                test_outside_training: self.extrapolation().map_or(0.0, |found| found.share),
                 seconds: self.run.wall_time().map(|time| time.as_secs_f64()),
                 targets: targets(&file.problem.targets, &scores.network, &determined, &scores.coverage),
                 baselines: BTreeMap::from([
@@ -281,10 +281,10 @@ impl<'a> Trained<'a> {
     }
 
     /// Test samples of a recording outside the range of its training samples.
-    fn extrapolation(&self) -> Option<(Extrapolation, &Recording)> {
-        let recordings = self.sets.recordings.as_ref()?;
-        let found = Extrapolation::measure(&self.sets.sets.split.training, self.run.test());
-        Some((found, &recordings.training))
+    fn extrapolation(&self) -> Option<Extrapolation> {
+        let Recording { inputs, targets, .. } = &self.sets.recordings.as_ref()?.training;
+        let training = &self.sets.sets.split.training;
+        Some(Extrapolation::measure(training, self.run.test(), inputs, targets))
     }
 
     /// Warnings of the source and of the training.
@@ -296,10 +296,7 @@ impl<'a> Trained<'a> {
         of_array
             .map(ToString::to_string)
             .chain(of_import.into_iter().flatten())
-            .chain(
-                self.extrapolation()
-                    .and_then(|(found, recording)| found.warning(&recording.inputs, &recording.targets)),
-            )
+            .chain(self.extrapolation().and_then(|found| found.warning))
             .chain(describe_samples(self.sets))
             .chain(search(self.file).and_then(AutoRecord::remark))
             .chain(self.optimism.iter().cloned())

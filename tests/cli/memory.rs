@@ -210,21 +210,6 @@ fn every_format_exports_the_history_with_golden_readings_in_series() {
 }
 
 #[test]
-fn inspect_reports_whether_the_past_helps() {
-    let folder = creeping();
-    let inspect = "inspect --data press.csv --time t --inputs u --targets force --model ridge";
-    let report = json(&format!("{inspect} --json"), folder.path());
-    let target = &report["targets"][0];
-    let gain = |name: &str| target["with_memory"][name].as_f64().unwrap();
-    assert!(gain("value") < 0.5 && gain("high") < 1.0, "{target}");
-    let text = succeed(inspect, folder.path());
-    assert!(
-        text.contains("The past helps to predict force: with averages over 0.5s, 5s"),
-        "{text}"
-    );
-}
-
-#[test]
 fn names_in_the_golden_sequence_are_no_formulas() {
     let folder = creeping();
     let path = folder.path().join("press.csv");

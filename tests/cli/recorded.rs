@@ -68,7 +68,15 @@ fn each_target_and_channel_is_judged_with_an_interval() {
         "{warnings}"
     );
     let curve = target(0)["learning_curve"].as_array().unwrap();
-    assert!(curve.len() >= 5 && target(0)["outlook"].is_string());
+    let samples = Vec::from_iter(curve.iter().map(|point| point["samples"].as_u64().unwrap()));
+    assert!(
+        samples.len() >= 5 && samples.is_sorted() && samples[samples.len() - 1] == 240,
+        "{samples:?}"
+    );
+    // Its last error is that of the noise, whose standard deviation is 0.05/√3.
+    let last = &curve[curve.len() - 1];
+    let rmse = last["rmse"].as_f64().unwrap();
+    assert!((rmse / (0.05 / 3.0_f64.sqrt()) - 1.0).abs() < 0.2, "{last}");
     let text = String::from_utf8(decoupler(&format!("{INSPECT} --model ridge"), folder.path()).stdout).unwrap();
     for expected in [
         "The readings determine x (R² 0.99",

@@ -5,7 +5,7 @@
 use std::error::Error;
 
 use decoupler_core::{
-    calibration::{Calibration, ParameterStatus, SensorParameter},
+    calibration::{Calibration, SensorParameter},
     dataset::{Dataset, Division, Seed, Simulation, Stream},
     evaluation::{Errors, Preset, Run, RunSettings, fine_tune, pressed_rows, rebased},
     job::Job,
@@ -88,9 +88,9 @@ fn coverage(
         let calibration = Calibration::fit(nominal, &pressed_rows(&recorded(60, seed)?, nominal)?)?;
         let holds = SensorParameter::ALL.map(|parameter| {
             let (fitted, truth) = (calibration.parameter(parameter), parameter.of(real));
-            match fitted.standing {
-                ParameterStatus::Determined(half_width) => (fitted.value - truth).abs() <= half_width,
-                ParameterStatus::Nominal => fitted.value == truth,
+            match fitted.half_width {
+                Some(half_width) => (fitted.value - truth).abs() <= half_width,
+                None => fitted.value == truth,
             }
         });
         for (count, holds) in of_each.iter_mut().zip(holds) {

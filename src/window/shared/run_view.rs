@@ -266,7 +266,7 @@ fn phase_in_words(shared: &Shared, palette: &Palette) -> (Color32, String) {
         }
         Phase::Idle => (palette.dim, "Ready: press Train".to_owned()),
         Phase::Preparing if is_recording && shared.choosing.is_some() => {
-            let choosing = shared.choosing.as_ref().map(ToString::to_string);
+            let choosing = shared.choosing.as_ref().map(|choosing| choosing.text.clone());
             (palette.accent, choosing.unwrap_or_default())
         }
         Phase::Preparing if is_recording => (palette.accent, "Reading the recording".to_owned()),

@@ -2,7 +2,7 @@ use faer::Mat;
 
 use super::{CalibrationError, PressedRow, SensorParameter};
 use crate::{
-    numerics::{Linearised, Stop, minimise},
+    numerics::{Linearised, minimise},
     sensor::{Axes, RowConductance, SensorModel},
 };
 
@@ -59,20 +59,19 @@ impl<'a> Problem<'a> {
                     }
                 }
                 let [by_x, by_y, by_depth] = by_all;
-                let mut slopes = [0.0; COUNT];
+                // ∂s/∂θ, in the order of `SensorParameter::ALL`.
+                let mut slopes = [
+                    -by_depth,
+                    sample.row as f64 * by_x,
+                    by_node_pitch,
+                    (middle(scale.columns()) - column as f64) * by_y,
+                    -by_x,
+                    0.0,
+                    0.0,
+                ];
                 let mut by_scale = by_displacements + (geometry.row_x0_mm - geometry.column_node_x0_mm) * by_x;
-                for (slope, parameter) in slopes.iter_mut().zip(SensorParameter::ALL) {
-                    *slope = match parameter {
-                        SensorParameter::Height => -by_depth,
-                        SensorParameter::RowPitch => sample.row as f64 * by_x,
-                        SensorParameter::NodePitch => by_node_pitch,
-                        SensorParameter::ColumnPitch => (middle(scale.columns()) - column as f64) * by_y,
-                        SensorParameter::ColumnNodeX => -by_x,
-                        SensorParameter::ColumnNodePitch | SensorParameter::Resistivity => 0.0,
-                    };
-                    if parameter != SensorParameter::ColumnNodeX {
-                        by_scale += *slope * parameter.of(model);
-                    }
+                for (slope, parameter) in slopes.iter().zip(&SensorParameter::ALL[..4]) {
+                    by_scale += slope * parameter.of(model);
                 }
                 if scale.nodes_per_column() > 1 {
                     slopes[COUNT - 2] = -(sum + by_scale) / geometry.column_node_pitch_mm;
@@ -150,11 +149,8 @@ impl<'a> Problem<'a> {
             }
             Some(found)
         };
-        let report = minimise(start, linearise, |squares| share * squares + rounding);
-        match report.stop {
-            Stop::Converged => Ok(report.at),
-            Stop::NoStepHelps | Stop::StepsTaken | Stop::NotFinite => Err(CalibrationError::NotConverged),
-        }
+        let negligible = |squares: f64| share * squares + rounding;
+        minimise(start, linearise, negligible).ok_or(CalibrationError::NotConverged)
     }
 
     /// Fits the parameters `free` with a normal prior around their nominal values, whose standard deviation is `tolerance`

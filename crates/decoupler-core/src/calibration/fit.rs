@@ -1,9 +1,9 @@
 use std::collections::BTreeMap;
 
 use super::{
-    CalibratedParameter, CalibrationError, CalibrationWarning, ParameterStatus, PressLimits, PressedRow,
-    SensorParameter,
+    CalibratedParameter, CalibrationError, PressLimits, PressedRow, SensorParameter,
     equations::{COUNT, Problem, Slopes, restricted},
+    warning::warnings,
 };
 use crate::{
     numerics::{Linearised, Spectrum, two_sided_normal_quantile},
@@ -24,7 +24,7 @@ pub struct Calibration {
     /// Root mean square of the relative errors of the fitted model's resistances.
     pub residual: f64,
     /// Warnings that the readings do not fit the sensor model, with likely causes and remedies.
-    pub warnings: Vec<CalibrationWarning>,
+    pub warnings: Vec<String>,
 }
 
 impl Calibration {
@@ -91,22 +91,20 @@ impl Calibration {
                 continue;
             }
             let of_held = held_variances(&here, &free, &spectrum);
-            let standing = |parameter: SensorParameter| match free.iter().position(|&free| free == parameter) {
-                Some(place) => {
-                    let half_width = factor * (variances[place] + of_held[place]).sqrt();
-                    ParameterStatus::Determined(half_width * problem.references[parameter.index()])
-                }
-                None => ParameterStatus::Nominal,
+            let half_width = |parameter: SensorParameter| {
+                let place = free.iter().position(|&free| free == parameter)?;
+                let half_width = factor * (variances[place] + of_held[place]).sqrt();
+                Some(half_width * problem.references[parameter.index()])
             };
             let parameters = Vec::from(SensorParameter::ALL.map(|parameter| CalibratedParameter {
                 parameter,
                 nominal: parameter.of(nominal),
                 value: parameter.of(&model),
-                standing: standing(parameter),
+                half_width: half_width(parameter),
             }));
             let rms = |squares: f64| (squares / readings as f64).sqrt();
             return Ok(Self {
-                warnings: CalibrationWarning::of(&problem, &model, &parameters),
+                warnings: warnings(&problem, &model, &parameters),
                 model,
                 parameters,
                 readings,

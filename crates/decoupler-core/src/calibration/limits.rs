@@ -1,5 +1,8 @@
 use super::{CalibrationError, PressedRow};
-use crate::{numerics::median, sensor::SensorModel};
+use crate::{
+    numerics::median,
+    sensor::{SensorModel, short},
+};
 
 /// Displacements that nodes may have in samples of known presses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,71 +36,66 @@ impl PressLimits {
     /// resistance or is implausible, or a displacement outside these limits.
     pub fn check(self, nominal: &SensorModel, samples: &[PressedRow]) -> Result<(), CalibrationError> {
         nominal.check()?;
-        for (sample, pressed) in samples.iter().enumerate() {
-            check_shape(nominal, sample, pressed)?;
-            self.check_displacements(nominal, sample, pressed)?;
-            let mut readings = pressed.resistances_ohm.iter().enumerate();
-            if let Some((column, &ohm)) = readings.find(|(_, ohm)| !(**ohm > 0.0 && ohm.is_finite())) {
-                return Err(CalibrationError::Reading { sample, column, ohm });
-            }
+        let mut faults = samples.iter().map(|pressed| self.fault(nominal, pressed)).enumerate();
+        if let Some((sample, Some(fault))) = faults.find(|(_, fault)| fault.is_some()) {
+            return Err(CalibrationError::Sample { sample, fault });
         }
         check_factors(nominal, samples)
     }
 
-    fn check_displacements(
-        self,
-        nominal: &SensorModel,
-        sample: usize,
-        pressed: &PressedRow,
-    ) -> Result<(), CalibrationError> {
-        let height_mm = nominal.geometry.height_mm;
+    /// Returns what is wrong with a sample, if anything.
+    fn fault(self, nominal: &SensorModel, pressed: &PressedRow) -> Option<String> {
+        let (scale, height_mm) = (nominal.scale, nominal.geometry.height_mm);
+        let counts = [
+            ("displacements", pressed.displacements_mm.len(), scale.nodes_per_row()),
+            ("readings", pressed.resistances_ohm.len(), scale.columns()),
+        ];
+        let wrong = counts.into_iter().find(|(_, found, expected)| found != expected);
+        let row = ("as row-wire number", pressed.row + 1, scale.rows());
+        if let Some((what, found, expected)) = wrong.or_else(|| (pressed.row >= scale.rows()).then_some(row)) {
+            return Some(format!(
+                ": {found} {what}, but the array {scale} has {expected}; give samples of this array"
+            ));
+        }
         let tolerance_mm = Self::TOLERANCE * height_mm;
         for (node, displacement) in pressed.displacements_mm.iter().enumerate() {
             if !(displacement.is_finite() && displacement.z < height_mm) {
-                return Err(CalibrationError::Displacement { sample, node });
+                return Some(format!(
+                    ", node {}: this displacement puts the node on or below the column-wires; check the unit (mm, downwards \
+                     positive) and the height of the nominal sensor",
+                    node + 1
+                ));
             }
             let shift_mm = displacement.truncate().abs().max_element();
-            let directions = [
+            for (direction, mm, at_most, largest_mm) in [
                 ("pressed down", displacement.z, "only 0 to", self.largest_depth_mm),
                 ("shifted sideways", shift_mm, "at most", self.largest_shift_mm),
-            ];
-            let is_outside = |mm: f64, largest_mm: f64| mm < -tolerance_mm || mm > largest_mm + tolerance_mm;
-            let outside = directions
-                .into_iter()
-                .find(|&(_, mm, _, largest_mm)| is_outside(mm, largest_mm));
-            if let Some((direction, mm, at_most, largest_mm)) = outside {
-                return Err(CalibrationError::Press {
-                    sample,
-                    node,
-                    direction,
-                    mm,
-                    at_most,
-                    largest_mm,
-                });
+            ] {
+                if mm < -tolerance_mm || mm > largest_mm + tolerance_mm {
+                    return Some(format!(
+                        ", node {}: it is {direction} by {} mm, but {at_most} {} mm is possible; correct it, or leave this \
+                         sample out",
+                        node + 1,
+                        rounded(mm),
+                        short(largest_mm)
+                    ));
+                }
             }
         }
-        Ok(())
+        let mut readings = pressed.resistances_ohm.iter().enumerate();
+        let (column, ohm) = readings.find(|(_, ohm)| !(**ohm > 0.0 && ohm.is_finite()))?;
+        Some(format!(
+            ", column {}: the reading {} is not a resistance; leave this sample out",
+            column + 1,
+            short(*ohm)
+        ))
     }
 }
 
-fn check_shape(nominal: &SensorModel, sample: usize, pressed: &PressedRow) -> Result<(), CalibrationError> {
-    let scale = nominal.scale;
-    let counts = [
-        ("displacements", pressed.displacements_mm.len(), scale.nodes_per_row()),
-        ("readings", pressed.resistances_ohm.len(), scale.columns()),
-    ];
-    let wrong = counts.into_iter().find(|(_, found, expected)| found != expected);
-    let row = ("as row-wire number", pressed.row + 1, scale.rows());
-    match wrong.or_else(|| (pressed.row >= scale.rows()).then_some(row)) {
-        Some((what, found, expected)) => Err(CalibrationError::Shape {
-            sample,
-            what,
-            found,
-            expected,
-            scale: scale.to_string(),
-        }),
-        None => Ok(()),
-    }
+/// Formats as [`short`] does, with four significant digits.
+fn rounded(value: f64) -> String {
+    let digits = format!("{value:.3e}");
+    digits.parse().map_or(digits, short)
 }
 
 /// Compares ln of each reading and of the resistance of `nominal` with the median of their differences.
@@ -113,18 +111,17 @@ fn check_factors(nominal: &SensorModel, samples: &[PressedRow]) -> Result<(), Ca
     }
     let median = median(differences.clone());
     let is_absurd = |difference: &f64| (difference - median).abs() > PressLimits::LARGEST_FACTOR.ln();
-    match differences.iter().position(is_absurd) {
-        Some(place) => {
-            let (sample, column) = (place / nominal.scale.columns(), place % nominal.scale.columns());
-            let ohm = samples[sample].resistances_ohm[column];
-            let expected_ohm = ohm / (differences[place] - median).exp();
-            Err(CalibrationError::Absurd {
-                sample,
-                column,
-                ohm,
-                expected_ohm,
-            })
-        }
-        None => Ok(()),
-    }
+    let Some(place) = differences.iter().position(is_absurd) else {
+        return Ok(());
+    };
+    let (sample, column) = (place / nominal.scale.columns(), place % nominal.scale.columns());
+    let ohm = samples[sample].resistances_ohm[column];
+    let fault = format!(
+        ", column {}: the reading {} ohm is implausible: the sensor model and the other readings suggest {} ohm; correct it, \
+         or leave this sample out",
+        column + 1,
+        short(ohm),
+        rounded(ohm / (differences[place] - median).exp())
+    );
+    Err(CalibrationError::Sample { sample, fault })
 }

@@ -101,44 +101,27 @@ pub struct CalibratedParameter {
     pub nominal: f64,
     /// Value of the fitted model.
     pub value: f64,
-    /// Status of the value.
-    pub standing: ParameterStatus,
-}
-
-/// Status of a calibrated value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ParameterStatus {
-    /// The readings determine it: the true value is within ± this, in the parameter's unit. The intervals of all parameters
-    /// together hold with 95 % confidence (Bonferroni), given readings that follow Eq. (2).
-    Determined(f64),
-    /// The readings do not determine it to ±10 %: it keeps its nominal value.
-    Nominal,
+    /// If the readings determine it: the true value is within ± this, in the parameter's unit. The intervals of all
+    /// parameters together hold with 95 % confidence (Bonferroni), given readings that follow Eq. (2). `None` if they do not
+    /// determine it to ±10 %: it keeps its nominal value.
+    pub half_width: Option<f64>,
 }
 
 impl fmt::Display for CalibratedParameter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            parameter,
-            nominal,
-            value,
-            standing,
-        } = self;
+        let (parameter, value, nominal) = (self.parameter, self.value, short(self.nominal));
         let unit = parameter.unit();
-        match standing {
-            ParameterStatus::Determined(half_width) => {
-                // Two digits of the interval, and the value to the same decimal place.
-                let digits = (1.0 - half_width.log10().floor()).clamp(0.0, 12.0) as usize;
-                write!(
-                    f,
-                    "{parameter}: {value:.digits$} ± {half_width:.digits$} {unit} (nominal {})",
-                    short(*nominal)
-                )
-            }
-            ParameterStatus::Nominal => write!(
+        let Some(half_width) = self.half_width else {
+            return write!(
                 f,
-                "{parameter}: {} {unit}, its nominal value: these readings do not determine it",
-                short(*nominal)
-            ),
-        }
+                "{parameter}: {nominal} {unit}, its nominal value: these readings do not determine it"
+            );
+        };
+        // Two digits of the interval, and the value to the same decimal place.
+        let digits = (1.0 - half_width.log10().floor()).clamp(0.0, 12.0) as usize;
+        write!(
+            f,
+            "{parameter}: {value:.digits$} ± {half_width:.digits$} {unit} (nominal {nominal})"
+        )
     }
 }

@@ -58,9 +58,9 @@ fn frames(real: &SensorModel, rows: &[usize], frames: usize, noise: f64, rng: &m
 /// Returns `true` if every interval contains the true value.
 fn intervals_hold(calibration: &Calibration, real: &SensorModel) -> bool {
     let mut parameters = calibration.parameters.iter();
-    parameters.all(|fitted| match fitted.standing {
-        ParameterStatus::Determined(half_width) => (fitted.value - fitted.parameter.of(real)).abs() <= half_width,
-        ParameterStatus::Nominal => fitted.value == fitted.nominal,
+    parameters.all(|fitted| match fitted.half_width {
+        Some(half_width) => (fitted.value - fitted.parameter.of(real)).abs() <= half_width,
+        None => fitted.value == fitted.nominal,
     })
 }
 
@@ -68,7 +68,7 @@ fn determined(calibration: &Calibration) -> Vec<SensorParameter> {
     let determined = calibration
         .parameters
         .iter()
-        .filter(|fitted| fitted.standing != ParameterStatus::Nominal);
+        .filter(|fitted| fitted.half_width.is_some());
     determined.map(|fitted| fitted.parameter).collect()
 }
 
@@ -88,7 +88,7 @@ fn a_sensor_off_by_5_percent_is_recovered_within_the_stated_intervals() {
             SensorParameter::ColumnNodeX,
         ] {
             let fitted = calibration.parameter(parameter);
-            assert!(fitted.standing != ParameterStatus::Nominal, "seed {seed}: {fitted}");
+            assert!(fitted.half_width.is_some(), "seed {seed}: {fitted}");
         }
         assert!(
             (calibration.residual / 1e-3 - 1.0).abs() < 0.1,
@@ -168,10 +168,8 @@ fn intervals_allow_for_deviating_wires() {
                 .for_each(|(ohm, factor)| *ohm *= factor);
         }
         let calibration = Calibration::fit(&nominal(), &samples).unwrap();
-        match calibration.parameter(SensorParameter::Height).standing {
-            ParameterStatus::Determined(half_width) => half_width / calibration.residual,
-            ParameterStatus::Nominal => f64::INFINITY,
-        }
+        let half_width = calibration.parameter(SensorParameter::Height).half_width;
+        half_width.map_or(f64::INFINITY, |half_width| half_width / calibration.residual)
     };
     let (wide, narrow) = (half_width(0.01), half_width(0.0));
     assert!(wide > 2.0 * narrow, "{wide} and {narrow} of the residual");
@@ -208,7 +206,7 @@ fn few_frames_and_frames_at_rest_converge_within_the_intervals() {
             let calibration =
                 Calibration::fit(&nominal, &samples).unwrap_or_else(|error| panic!("{scale}, seed {seed}: {error}"));
             assert!(calibration.residual < 1.6 * noise, "{scale}: {}", calibration.residual);
-            assert_eq!(calibration.warnings, [], "{scale}, seed {seed}");
+            assert!(calibration.warnings.is_empty(), "{scale}, seed {seed}");
             within += usize::from(at_rest || intervals_hold(&calibration, &real));
             all += 1;
         }
@@ -223,18 +221,19 @@ fn a_wrong_sensor_gives_a_warning() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let samples = frames(&of_scale("4x3_2x8"), &[0, 1, 2, 3], 30, 1e-3, &mut rng);
     let calibration = Calibration::fit(&of_scale("4x3_3x8"), &samples).unwrap();
-    let words = calibration.warnings[0].to_string();
+    let words = &calibration.warnings[0];
     assert!(
         words.contains("resistance per millimetre: 15") && words.contains("check the array scale"),
         "{words}"
     );
-    assert_eq!(Calibration::fit(&of_scale("4x3_2x8"), &samples).unwrap().warnings, []);
+    let calibration = Calibration::fit(&of_scale("4x3_2x8"), &samples).unwrap();
+    assert!(calibration.warnings.is_empty());
     let mut swapped = samples;
     for sample in &mut swapped {
         sample.resistances_ohm.swap(0, 3);
     }
     let warnings = Calibration::fit(&of_scale("4x3_2x8"), &swapped).unwrap().warnings;
-    let is_misfit = |warning: &CalibrationWarning| matches!(warning, CalibrationWarning::Misfit { .. });
+    let is_misfit = |warning: &String| warning.starts_with("the readings of a crossing are off by ");
     assert!(warnings.iter().any(is_misfit), "{warnings:?}");
 }
 

@@ -284,7 +284,8 @@ pub(crate) fn mean(values: ArrayView1<'_, f64>) -> f64 {
             .sum::<f64>()
 }
 
-fn extremes(values: ArrayView1<'_, f64>) -> (f64, f64) {
+/// Returns the smallest and the largest value.
+pub(crate) fn extremes(values: ArrayView1<'_, f64>) -> (f64, f64) {
     values
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {

@@ -5,7 +5,7 @@ use ndarray::{ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::problem::Channel;
+use crate::{numerics::correlation_time, problem::Channel};
 
 /// Description of the training readings against which [`DriftMonitor`] compares later readings: the range over blocks of
 /// training readings of
@@ -118,9 +118,13 @@ impl Statistic {
 /// Sums over the readings of a block.
 #[derive(Clone, Debug)]
 struct Block {
-    /// Scaled readings with which the block begins.
+    /// Latest reading, scaled.
+    scaled: Vec<f64>,
+    /// Squares of the latest reading given the inputs before each.
+    squares: Vec<f64>,
+    /// Scaled reading with which the block begins.
     first: Vec<f64>,
-    /// Sums of the differences from the first readings, of their squares, and of the squares given the inputs before.
+    /// Sums of the differences from the first reading, of their squares, and of the squares given the inputs before.
     sums: Vec<[f64; 3]>,
     count: usize,
 }
@@ -128,44 +132,52 @@ struct Block {
 impl Block {
     fn new(channels: usize) -> Self {
         Self {
+            scaled: vec![0.0; channels],
+            squares: vec![0.0; channels],
             first: vec![0.0; channels],
             sums: vec![[0.0; 3]; channels],
             count: 0,
         }
     }
 
-    fn add(&mut self, scaled: &[f64], squares: impl Iterator<Item = f64>) {
+    /// Takes the next reading, but does not add it yet.
+    fn read<'a>(&mut self, reference: &DriftReference, readings: impl IntoIterator<Item = &'a f64>) {
+        for (channel, (scaled, reading)) in self.scaled.iter_mut().zip(readings).enumerate() {
+            *scaled = reference.scaled(channel, *reading);
+        }
+        whiten(self.scaled.iter().copied(), &reference.factor, &mut self.squares);
+        self.squares.iter_mut().for_each(|square| *square *= *square);
+    }
+
+    /// Adds the latest reading.
+    fn add(&mut self) {
         if self.count == 0 {
-            self.first.copy_from_slice(scaled);
+            self.first.copy_from_slice(&self.scaled);
         }
         self.count += 1;
-        for (((sums, first), scaled), square) in self.sums.iter_mut().zip(&self.first).zip(scaled).zip(squares) {
+        let latest = self.first.iter().zip(&self.scaled).zip(&self.squares);
+        for (sums, ((first, scaled), square)) in self.sums.iter_mut().zip(latest) {
             // Exactly 0 as long as a reading does not change.
             let difference = scaled - first;
-            *sums = [
-                sums[0] + difference,
-                sums[1] + difference * difference,
-                sums[2] + square,
-            ];
+            sums[0] += difference;
+            sums[1] += difference * difference;
+            sums[2] += square;
         }
     }
 
-    /// Writes the statistics and begins the next block.
-    fn finish(&mut self, statistics: &mut [f64]) {
-        let (channels, count) = (self.first.len(), self.count as f64);
-        let (mut variances, mut squares) = (0.0, 0.0);
-        for (channel, (sums, first)) in self.sums.iter_mut().zip(&self.first).enumerate() {
-            let [mean, square_of_difference, square] = sums.map(|sum| sum / count);
-            let variance = (square_of_difference - mean * mean).max(0.0);
-            statistics[1 + channel] = variance;
-            statistics[1 + channels + channel] = first + mean;
-            statistics[2 + 2 * channels + channel] = square;
-            variances += variance / channels as f64;
-            squares += square / channels as f64;
-            *sums = [0.0; 3];
-        }
-        (statistics[0], statistics[1 + 2 * channels]) = (variances, squares);
+    /// Returns the statistics and begins the next block.
+    fn finish(&mut self) -> Vec<f64> {
+        let (channels, count) = (self.first.len() as f64, self.count as f64);
+        let of_channel = |(sums, first): (&mut [f64; 3], &f64)| {
+            let [mean, square_of_difference, square] = std::mem::take(sums).map(|sum| sum / count);
+            [(square_of_difference - mean * mean).max(0.0), first + mean, square]
+        };
+        let of_channels = Vec::from_iter(self.sums.iter_mut().zip(&self.first).map(of_channel));
         self.count = 0;
+        let of = |kind: usize| of_channels.iter().map(move |statistics| statistics[kind]);
+        let of_all = |kind: usize| std::iter::once(of(kind).map(|statistic| statistic / channels).sum());
+        let variances = of_all(0).chain(of(0));
+        variances.chain(of(1)).chain(of_all(2)).chain(of(2)).collect()
     }
 }
 
@@ -218,58 +230,40 @@ impl DriftReference {
         if blocks < Self::MIN_BLOCKS {
             return Err(NoDriftMonitor::TooFewReadings { blocks, block });
         }
-        let moments = (0..Self::PARTS).map(|part| {
-            let range = part * samples / Self::PARTS..(part + 1) * samples / Self::PARTS;
-            let scaled = Mat::from_fn(range.len(), 1 + channels, |sample, column| {
-                match column.checked_sub(1) {
-                    Some(channel) => scaled(range.start + sample, channel),
-                    None => 1.0,
-                }
+        let parts = (0..Self::PARTS).map(|part| part * samples / Self::PARTS..(part + 1) * samples / Self::PARTS);
+        let moments = parts.clone().map(|part| {
+            let scaled = Mat::from_fn(part.len(), 1 + channels, |sample, column| {
+                let channel = column.checked_sub(1);
+                channel.map_or(1.0, |channel| scaled(part.start + sample, channel))
             });
             scaled.transpose() * &scaled
         });
         let moments: Vec<Mat<f64>> = moments.collect();
         let (_, factor) = factor_of(moments.iter()).ok_or(NoDriftMonitor::NotFinite)?;
         (reference.block, reference.blocks, reference.factor) = (block, blocks, factor);
-        reference.measure(readings, &moments)
-    }
-
-    /// Measures the ranges of the statistics.
-    fn measure(mut self, readings: ArrayView2<'_, f64>, moments: &[Mat<f64>]) -> Result<Self, NoDriftMonitor> {
-        let (samples, channels) = readings.dim();
-        let mut block = Block::new(channels);
-        let [mut scaled, mut given, mut held_out] = [(); 3].map(|()| vec![0.0; channels]);
-        let mut statistics = vec![0.0; self.ranges.len()];
-        for part in 0..Self::PARTS {
+        let (mut block, mut held_out) = (Block::new(channels), vec![0.0; channels]);
+        for (part, samples) in parts.enumerate() {
             let others = moments.iter().enumerate().filter(|(other, _)| *other != part);
             let (means, factor) = factor_of(others.map(|(_, moments)| moments)).ok_or(NoDriftMonitor::NotFinite)?;
-            for sample in part * samples / Self::PARTS..(part + 1) * samples / Self::PARTS {
-                for (channel, (scaled, reading)) in scaled.iter_mut().zip(readings.row(sample)).enumerate() {
-                    *scaled = self.scaled(channel, *reading);
+            for sample in samples {
+                block.read(&reference, readings.row(sample));
+                let centred = block.scaled.iter().zip(&means).map(|(scaled, mean)| scaled - mean);
+                whiten(centred, &factor, &mut held_out);
+                for (square, held_out) in block.squares.iter_mut().zip(&held_out) {
+                    *square = square.max(held_out * held_out);
                 }
-                whiten(scaled.iter().copied(), &self.factor, &mut given);
-                whiten(
-                    scaled.iter().zip(&means).map(|(scaled, mean)| scaled - mean),
-                    &factor,
-                    &mut held_out,
-                );
-                let squares = given.iter().zip(&held_out);
-                block.add(
-                    &scaled,
-                    squares.map(|(given, held_out)| (given * given).max(held_out * held_out)),
-                );
-                if block.count == self.block {
-                    block.finish(&mut statistics);
-                    for ([low, high], &value) in self.ranges.iter_mut().zip(&statistics) {
+                block.add();
+                if block.count == reference.block {
+                    for ([low, high], value) in reference.ranges.iter_mut().zip(block.finish()) {
                         (*low, *high) = (low.min(value), high.max(value));
                     }
                 }
             }
         }
-        for (index, range) in self.ranges.iter_mut().enumerate() {
+        for (index, range) in reference.ranges.iter_mut().enumerate() {
             *range = Statistic::at(index, channels).widened(*range);
         }
-        Ok(self)
+        Ok(reference)
     }
 
     fn scaled(&self, channel: usize, reading: f64) -> f64 {
@@ -308,24 +302,16 @@ impl DriftReference {
 
     /// Returns `true` if the parts, which may come from a file, fit together.
     pub fn is_valid(&self) -> bool {
-        let Self {
-            means,
-            inverse_deviations,
-            factor,
-            block,
-            blocks,
-            ranges,
-        } = self;
-        let channels = means.len();
-        let numbers = means.iter().chain(inverse_deviations).chain(factor);
-        let mut numbers = numbers.chain(ranges.iter().flatten());
+        let (channels, factor) = (self.means.len(), &self.factor);
+        let numbers = [&self.means, &self.inverse_deviations, factor].into_iter().flatten();
+        let mut numbers = numbers.chain(self.ranges.iter().flatten());
         let mut diagonal = (0..channels).map(|row| row * (row + 3) / 2);
-        (inverse_deviations.len(), factor.len()) == (channels, channels * (channels + 1) / 2)
-            && ranges.len() == Statistic::count(channels)
+        (self.inverse_deviations.len(), factor.len()) == (channels, channels * (channels + 1) / 2)
+            && self.ranges.len() == Statistic::count(channels)
             && numbers.all(|number| number.is_finite())
             && diagonal.all(|place| factor[place] > 0.0)
-            && *block > 0
-            && *blocks >= Self::MIN_BLOCKS
+            && self.block > 0
+            && self.blocks >= Self::MIN_BLOCKS
     }
 }
 
@@ -347,26 +333,6 @@ fn scale(readings: ArrayView1<'_, f64>) -> Option<(f64, f64)> {
     // NaN if all differences are 0, and infinite if they are too small to divide by.
     let inverse = if inverse.is_finite() { inverse } else { 0.0 };
     is_finite.then_some((mean, inverse))
-}
-
-/// Returns the number of consecutive values of `series` that carry as much information as one independent value, at least
-/// 1: the largest ratio of the variance of means of 2, 4, 8, … values to that of independent values (Flyvbjerg and Petersen
-/// 1989, doi:10.1063/1.457480).
-fn correlation_time(mut series: Vec<f64>) -> f64 {
-    /// Minimum number of means whose variance is known well enough.
-    const MIN_MEANS: usize = 16;
-    let count = series.len() as f64;
-    let mean = series.iter().sum::<f64>() / count;
-    series.iter_mut().for_each(|value| *value -= mean);
-    let mean_square = |series: &[f64]| series.iter().map(|value| value * value).sum::<f64>() / series.len() as f64;
-    let variance = mean_square(&series);
-    let (mut time, mut length) = (1.0_f64, 1.0);
-    while variance > 0.0 && series.len() >= 2 * MIN_MEANS {
-        series = series.chunks_exact(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
-        length *= 2.0;
-        time = time.max(length * mean_square(&series) / variance);
-    }
-    time
 }
 
 /// Returns the means and the Cholesky factor of the regularised covariance of the readings with these `moments` XᵀX, where
@@ -448,10 +414,7 @@ pub enum DriftEvent {
 #[derive(Clone, Debug)]
 pub struct DriftMonitor {
     reference: DriftReference,
-    scaled: Vec<f64>,
-    whitened: Vec<f64>,
     block: Block,
-    statistics: Vec<f64>,
     /// Number of consecutive blocks up to the latest in which each statistic is below and above the training blocks.
     runs: Vec<[usize; 2]>,
     /// True for runs that have become long enough since the drift began.
@@ -470,12 +433,9 @@ impl DriftMonitor {
 
     /// Begins to compare readings with `reference`.
     pub fn new(reference: DriftReference) -> Self {
-        let (channels, statistics) = (reference.channels(), reference.ranges.len());
+        let statistics = reference.ranges.len();
         Self {
-            scaled: vec![0.0; channels],
-            whitened: vec![0.0; channels],
-            block: Block::new(channels),
-            statistics: vec![0.0; statistics],
+            block: Block::new(reference.channels()),
             runs: vec![[0; 2]; statistics],
             is_drifted: vec![[false; 2]; statistics],
             blocks_in_a_row: reference.blocks_in_a_row(),
@@ -499,17 +459,13 @@ impl DriftMonitor {
         if self.block.count == 0 {
             self.begins.push_back(position);
         }
-        for (channel, (scaled, reading)) in self.scaled.iter_mut().zip(readings).enumerate() {
-            *scaled = self.reference.scaled(channel, *reading);
-        }
-        whiten(self.scaled.iter().copied(), &self.reference.factor, &mut self.whitened);
-        self.block
-            .add(&self.scaled, self.whitened.iter().map(|value| value * value));
+        self.block.read(&self.reference, readings);
+        self.block.add();
         if self.block.count < self.reference.block {
             return None;
         }
-        self.block.finish(&mut self.statistics);
-        let event = self.judge(position);
+        let statistics = self.block.finish();
+        let event = self.judge(position, &statistics);
         if self.begins.len() == self.blocks_in_a_row {
             self.begins.pop_front();
         }
@@ -517,16 +473,15 @@ impl DriftMonitor {
     }
 
     /// Judges the block that ends at `position`.
-    fn judge(&mut self, position: u64) -> Option<DriftEvent> {
+    fn judge(&mut self, position: u64, statistics: &[f64]) -> Option<DriftEvent> {
         let mut sign = None;
-        let ranges = self.reference.ranges.iter().zip(&self.statistics);
-        let runs = self.runs.iter_mut().zip(&mut self.is_drifted);
-        for (statistic, (([low, high], value), (runs, is_drifted))) in ranges.zip(runs).enumerate() {
+        for (index, (value, [low, high])) in statistics.iter().zip(&self.reference.ranges).enumerate() {
+            let (runs, is_drifted) = (&mut self.runs[index], &mut self.is_drifted[index]);
             for (side, is_beyond) in [value < low, value > high].into_iter().enumerate() {
                 runs[side] = if is_beyond { runs[side] + 1 } else { 0 };
                 is_drifted[side] |= runs[side] >= self.blocks_in_a_row;
                 if is_beyond && is_drifted[side] {
-                    sign.get_or_insert((statistic, side == 1));
+                    sign.get_or_insert((index, side == 1));
                 }
             }
         }

@@ -6,7 +6,6 @@
 
 mod drift;
 mod left_out_decoder;
-mod partial_decoder;
 mod re_zero;
 mod wire_check;
 

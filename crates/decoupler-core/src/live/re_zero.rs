@@ -1,3 +1,6 @@
+use std::collections::VecDeque;
+
+use ndarray::{Array1, Array2, ArrayViewMut1};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -20,16 +23,12 @@ use crate::{numerics::median, scene::NoiseSource};
 /// A contact on more than half of the rows cannot be distinguished from drift; it is refused if the readings move.
 #[derive(Clone, Debug)]
 pub struct ReZero {
-    rows: usize,
-    columns: usize,
     /// Resistances at rest: rows × columns.
-    rest_ohm: Vec<f64>,
+    rest_ohm: Array2<f64>,
     /// Noise of the readings; none if unknown.
     noise: NoiseSource,
-    /// Ring buffer of the latest frames: frames × rows × columns.
-    frames_ohm: Vec<f64>,
-    next: usize,
-    count: usize,
+    /// Latest frames, each rows × columns.
+    frames_ohm: VecDeque<Vec<f64>>,
 }
 
 /// Gain of every channel in the unloaded state: the reading divided by the resistance at rest.
@@ -100,26 +99,26 @@ impl ReZero {
     pub fn new(rest_ohm: Vec<f64>, columns: usize, noise: NoiseSource) -> Self {
         assert!(columns > 0 && rest_ohm.len().is_multiple_of(columns) && !rest_ohm.is_empty());
         assert!(rest_ohm.iter().all(|&ohm| ohm > 0.0));
+        let shape = (rest_ohm.len() / columns, columns);
         Self {
-            rows: rest_ohm.len() / columns,
-            columns,
+            rest_ohm: Array2::from_shape_vec(shape, rest_ohm).expect("whole rows"),
             noise,
-            frames_ohm: vec![0.0; Self::FRAMES * rest_ohm.len()],
-            rest_ohm,
-            next: 0,
-            count: 0,
+            frames_ohm: VecDeque::with_capacity(Self::FRAMES),
         }
     }
 
-    /// Adds a frame (rows × columns), whose readings must be finite and above 0. Does not allocate.
+    /// Adds a frame (rows × columns), whose readings must be finite and above 0. Allocates only for the first
+    /// [`Self::FRAMES`] frames.
     ///
     /// # Panics
     /// If the frame has the wrong length.
     pub fn observe(&mut self, frame_ohm: &[f64]) {
-        let length = self.rest_ohm.len();
-        self.frames_ohm[self.next * length..][..length].copy_from_slice(frame_ohm);
-        self.next = (self.next + 1) % Self::FRAMES;
-        self.count = (self.count + 1).min(Self::FRAMES);
+        assert_eq!(frame_ohm.len(), self.rest_ohm.len());
+        let oldest = (self.frames_ohm.len() == Self::FRAMES).then(|| self.frames_ohm.pop_front());
+        let mut latest = oldest.flatten().unwrap_or_default();
+        latest.clear();
+        latest.extend_from_slice(frame_ohm);
+        self.frames_ohm.push_back(latest);
     }
 
     /// Returns the gains of the unloaded state estimated from the latest frames.
@@ -127,89 +126,85 @@ impl ReZero {
     /// # Errors
     /// If there are too few frames, too many rows are in contact, or a gain is far from 1.
     pub fn gains(&self) -> Result<ZeroGains, ReZeroError> {
-        if self.count < Self::FRAMES {
-            let (found, needed) = (self.count, Self::FRAMES);
+        let (found, needed) = (self.frames_ohm.len(), Self::FRAMES);
+        if found < needed {
             return Err(ReZeroError::Frames { found, needed });
         }
-        let Ratios {
-            logs: ratios,
-            moves,
-            noise,
-        } = self.ratios();
+        // Logarithms of the readings of each channel relative to its resistance at rest, without the common gain error.
+        let rest_ohm = self.rest_ohm.iter().enumerate();
+        let of_channel = |(channel, rest_ohm): (usize, &f64)| -> Vec<f64> {
+            let frames_ohm = self.frames_ohm.iter();
+            frames_ohm.map(|ohm| (ohm[channel] / rest_ohm).ln()).collect()
+        };
+        let mut channels: Vec<Vec<f64>> = rest_ohm.map(of_channel).collect();
+        let common_of_frames = self.common(&channels);
+        for logs in &mut channels {
+            logs.iter_mut()
+                .zip(&common_of_frames)
+                .for_each(|(log, common)| *log -= common);
+        }
+        let deviations = self.deviations(&channels);
+        let (rows, columns) = self.rest_ohm.dim();
+        let mut moves = vec![false; rows];
+        for (index, (logs, deviation)) in channels.iter().zip(&deviations).enumerate() {
+            let rest_ohm = self.rest_ohm[[index / columns, index % columns]];
+            let (from, to) = self.noise.rounded_from_ohm(rest_ohm).unwrap_or_default();
+            moves[index / columns] |= change(logs) > largest_change(*deviation) + (to - from) / rest_ohm;
+        }
+        let common = median(common_of_frames);
+        let squares = deviations.iter().map(|deviation| deviation * deviation);
+        let noise = (squares.sum::<f64>() / channels.len() as f64).sqrt();
+        let ratios = channels.into_iter().map(|logs| median(logs) + common).collect();
+        let ratios = Array2::from_shape_vec((rows, columns), ratios).expect("a ratio for each resistance");
         let Polished {
             common,
             of_rows,
             of_columns,
             rest,
-        } = Polished::new(&ratios, self.columns);
+        } = Polished::new(ratios.clone());
         // Mean and spread of the residuals of each row, including the row part.
-        let mean = |row: usize| {
-            let of_row = &rest[row * self.columns..(row + 1) * self.columns];
-            of_rows[row] + of_row.iter().sum::<f64>() / self.columns as f64
-        };
         let spread = median(rest.iter().map(|e| e.abs()).collect()) / NORMAL_MAD;
-        let of_mean = spread.max(noise / (Self::FRAMES as f64).sqrt()) / (self.columns as f64).sqrt();
-        let means: Vec<f64> = (0..self.rows).map(mean).collect();
+        let of_mean = spread.max(noise / (Self::FRAMES as f64).sqrt()) / (columns as f64).sqrt();
+        let sums = rest.rows().into_iter().map(|row| row.iter().sum::<f64>());
+        let means = Vec::from_iter(
+            of_rows
+                .iter()
+                .zip(sums)
+                .map(|(of_row, sum)| of_row + sum / columns as f64),
+        );
         let apart = median(means.iter().map(|mean| mean.abs()).collect()) / NORMAL_MAD;
         let limit = -Self::DEVIATIONS * of_mean.max(apart);
-        let in_contact: Vec<bool> = (0..self.rows).map(|row| means[row] < limit || moves[row]).collect();
+        let in_contact: Vec<bool> = means
+            .iter()
+            .zip(moves)
+            .map(|(mean, moves)| *mean < limit || moves)
+            .collect();
         let touched = in_contact.iter().filter(|touched| **touched).count();
-        if 2 * touched >= self.rows && touched > 0 {
-            return Err(ReZeroError::Contact {
-                touched,
-                rows: self.rows,
-            });
+        if 2 * touched >= rows && touched > 0 {
+            return Err(ReZeroError::Contact { touched, rows });
         }
-        let log_gain = |index: usize| {
-            let (row, column) = (index / self.columns, index % self.columns);
-            if in_contact[row] {
+        let gain = |((row, column), ratio): ((usize, usize), &f64)| {
+            let log_gain = if in_contact[row] {
                 common + of_columns[column]
             } else {
-                ratios[index]
-            }
+                *ratio
+            };
+            log_gain.exp()
         };
-        let gains: Vec<f64> = (0..ratios.len()).map(|index| log_gain(index).exp()).collect();
+        let gains = Vec::from_iter(ratios.indexed_iter().map(gain));
         let is_far = |gain: &f64| !(1.0 / LARGEST_GAIN..=LARGEST_GAIN).contains(gain);
         if let Some(index) = gains.iter().position(is_far) {
             return Err(ReZeroError::Gain {
-                row: index / self.columns,
-                column: index % self.columns,
+                row: index / columns,
+                column: index % columns,
                 gain: gains[index],
             });
         }
         Ok(ZeroGains {
-            columns: self.columns,
+            columns,
             gains,
             in_contact,
         })
-    }
-
-    fn ratios(&self) -> Ratios {
-        let length = self.rest_ohm.len();
-        let in_order = || (self.next..self.next + Self::FRAMES).map(|frame| frame % Self::FRAMES);
-        let of_channel = |index: usize| -> Vec<f64> {
-            let logs = in_order().map(|frame| (self.frames_ohm[frame * length + index] / self.rest_ohm[index]).ln());
-            logs.collect()
-        };
-        let mut channels: Vec<Vec<f64>> = (0..length).map(of_channel).collect();
-        let common = self.common(&channels);
-        for logs in &mut channels {
-            logs.iter_mut().zip(&common).for_each(|(log, common)| *log -= common);
-        }
-        let deviations = self.deviations(&channels);
-        let mut moves = vec![false; self.rows];
-        for (index, (logs, deviation)) in channels.iter().zip(&deviations).enumerate() {
-            let (from, to) = self.noise.rounded_from_ohm(self.rest_ohm[index]).unwrap_or_default();
-            let step = (to - from) / self.rest_ohm[index];
-            moves[index / self.columns] |= change(logs) > largest_change(*deviation) + step;
-        }
-        let common = median(common);
-        let squares = deviations.iter().map(|deviation| deviation * deviation);
-        Ratios {
-            logs: channels.into_iter().map(|logs| median(logs) + common).collect(),
-            moves,
-            noise: (squares.sum::<f64>() / length as f64).sqrt(),
-        }
     }
 
     /// Logarithm of the common gain error of each frame; 0 if all rows have moved, which is not noise.
@@ -220,7 +215,7 @@ impl ReZero {
         let drift = if self.noise.is_none() {
             jitter(&common)
         } else {
-            self.noise.drift()
+            self.noise.noise.drift
         };
         if change(&common) <= largest_change(drift) {
             common
@@ -241,16 +236,6 @@ impl ReZero {
         let limited = |deviation: f64| deviation.clamp(middle, 3.0 * middle);
         found.into_iter().map(limited).collect()
     }
-}
-
-/// Ratios of readings to those at rest.
-struct Ratios {
-    /// Logarithm of the ratio of each channel's median to its resistance at rest.
-    logs: Vec<f64>,
-    /// True for rows whose readings changed by more than noise during the frames.
-    moves: Vec<bool>,
-    /// Relative noise of a reading (standard deviation) over all channels.
-    noise: f64,
 }
 
 /// Number of frames at the beginning and at the end whose medians are compared.
@@ -303,41 +288,35 @@ const ROUNDS: usize = 6;
 /// Values decomposed into a common part, row parts and column parts.
 struct Polished {
     common: f64,
-    of_rows: Vec<f64>,
-    of_columns: Vec<f64>,
+    of_rows: Array1<f64>,
+    of_columns: Array1<f64>,
     /// Residuals: rows × columns.
-    rest: Vec<f64>,
+    rest: Array2<f64>,
 }
 
 impl Polished {
     /// Decomposes values (rows × columns) by median polish.
-    fn new(values: &[f64], columns: usize) -> Self {
-        let rows = values.len() / columns;
-        let mut found = Self {
-            common: 0.0,
-            of_rows: vec![0.0; rows],
-            of_columns: vec![0.0; columns],
-            rest: values.to_vec(),
+    fn new(mut rest: Array2<f64>) -> Self {
+        let centre = |mut values: ArrayViewMut1<'_, f64>| {
+            let shift = median(values.to_vec());
+            values.iter_mut().for_each(|value| *value -= shift);
+            shift
         };
+        let (mut common, mut of_rows, mut of_columns) = (0.0, Array1::zeros(rest.nrows()), Array1::zeros(rest.ncols()));
         for _ in 0..ROUNDS {
-            for column in 0..columns {
-                let shift = median((0..rows).map(|row| found.rest[row * columns + column]).collect());
-                (0..rows).for_each(|row| found.rest[row * columns + column] -= shift);
-                found.of_columns[column] += shift;
-            }
-            for row in 0..rows {
-                let of_row = &mut found.rest[row * columns..(row + 1) * columns];
-                let shift = median(of_row.to_vec());
-                of_row.iter_mut().for_each(|e| *e -= shift);
-                found.of_rows[row] += shift;
-            }
-            for parts in [&mut found.of_columns, &mut found.of_rows] {
-                let shift = median(parts.clone());
-                parts.iter_mut().for_each(|part| *part -= shift);
-                found.common += shift;
-            }
+            let columns = of_columns.iter_mut().zip(rest.columns_mut());
+            columns.for_each(|(part, column)| *part += centre(column));
+            let rows = of_rows.iter_mut().zip(rest.rows_mut());
+            rows.for_each(|(part, row)| *part += centre(row));
+            common += centre(of_columns.view_mut());
+            common += centre(of_rows.view_mut());
         }
-        found
+        Self {
+            common,
+            of_rows,
+            of_columns,
+            rest,
+        }
     }
 }
 
@@ -554,13 +533,16 @@ mod tests {
     fn additive_parts_are_found_despite_outliers() {
         let (rows, columns) = ([-2.0, 0.0, 1.0, 0.0, 3.0], [0.5, 0.0, -0.25]);
         let value = |index: usize| 10.0 + rows[index / 3] + columns[index % 3] - if index == 4 { 7.0 } else { 0.0 };
-        let values: Vec<f64> = (0..15).map(value).collect();
-        let found = Polished::new(&values, 3);
+        let found = Polished::new(Array2::from_shape_fn((5, 3), |(row, column)| value(3 * row + column)));
         assert_eq!(
-            (found.common, &found.of_rows[..], &found.of_columns[..]),
+            (
+                found.common,
+                &found.of_rows.to_vec()[..],
+                &found.of_columns.to_vec()[..]
+            ),
             (10.0, &rows[..], &columns[..])
         );
-        assert_eq!(found.rest[4], -7.0);
+        assert_eq!(found.rest[[1, 1]], -7.0);
         assert!(
             found
                 .rest

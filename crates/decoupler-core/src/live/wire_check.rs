@@ -1,8 +1,8 @@
-use std::{f64::consts::TAU, fmt, iter::Sum, mem::discriminant};
+use std::{f64::consts::TAU, fmt, iter::Sum, mem::discriminant, ops::Range};
 
 use faer::{Mat, Side, linalg::solvers::Solve};
 
-use super::partial_decoder::{Missing, PartialDecoder};
+use super::LeftOutDecoder;
 use crate::{
     numerics::chi_squared_quantile,
     scene::{Loading, Scene},
@@ -72,7 +72,7 @@ pub enum FaultEvent {
 /// Faults that Eq. (2) explains by some deformation cannot be found: two row-wires that touch, for example.
 #[derive(Debug)]
 pub struct WireCheck {
-    partial: PartialDecoder,
+    decoder: LeftOutDecoder,
     axes: &'static [usize],
     stroke_mm: f64,
     /// Relative noise of each reading (standard deviation): rows × M4.
@@ -82,6 +82,8 @@ pub struct WireCheck {
     /// Logarithm of the reading above which the converter clips.
     log_full_scale: f64,
     coordinates_mm: Vec<f64>,
+    /// Columns of the latest residual.
+    used: Vec<usize>,
     /// Last event; [`FaultEvent::Recovered`] at first.
     state: FaultEvent,
     /// Consecutive suspicious frames, each rows × M4.
@@ -106,13 +108,6 @@ struct Fit {
     rows: usize,
 }
 
-/// Row without the readings of up to two columns.
-struct PartialRow {
-    fit: Fit,
-    /// The missing readings.
-    missing: [Predicted; 2],
-}
-
 /// A reading predicted from others.
 #[derive(Clone, Copy, Debug, Default)]
 struct Predicted {
@@ -124,12 +119,11 @@ struct Predicted {
     noise: f64,
 }
 
-/// A hypothesis about the fault in some frames.
-struct Hypothesis {
-    wire: FaultyWire,
-    cause: FaultCause,
-    fit: Fit,
-}
+/// Fit of a row without some readings, and these readings.
+type PartialRow = (Fit, Vec<Predicted>);
+
+/// A fault that may explain some frames.
+type Hypothesis = (FaultyWire, FaultCause, Fit);
 
 /// Normal deviate that is exceeded with a probability of 10⁻³.
 const DEVIATE: f64 = 3.090_232_306_167_814;
@@ -175,24 +169,25 @@ impl WireCheck {
             largest_compression: (DEEPER * compression).min(0.5 * (1.0 + compression)),
             ..*scene
         };
-        let partial = PartialDecoder::new(model, scene, rows, &any_press)?;
+        let decoder = LeftOutDecoder::with_prior(model, scene, rows, &any_press)?;
         let noise = scene.noise.in_test();
         let source = noise.source(model)?;
         let own = |&ohm: &f64| source.relative_to(ohm).own.max(SMALLEST_NOISE);
         Ok(Self {
             axes: scene.movement.axes().indices(),
             stroke_mm: scene.stroke_mm(&model.geometry),
-            deviations: partial.half_way_ohm.iter().map(own).collect(),
+            deviations: decoder.half_way_ohm.iter().map(own).collect(),
             // Rows are decoded one by one but share this error: it must not be penalised more than once in total.
             common: noise.drift * (rows.len() as f64).sqrt(),
             log_full_scale: (noise.range_ohm(model)?.1 * (1.0 - 1e-9)).ln(),
-            suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * partial.half_way_ohm.len()),
+            suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * decoder.half_way_ohm.len()),
             coordinates_mm: vec![0.0; model.scale.coordinates_per_row()],
+            used: Vec::with_capacity(model.scale.columns()),
             state: FaultEvent::Recovered,
             suspicious: 0,
             next_comparison: Self::PERSISTENCE,
             normal: 0,
-            partial,
+            decoder,
         })
     }
 
@@ -258,49 +253,29 @@ impl WireCheck {
 
     /// Returns `true` if some deformation explains the readings, excluding those of `left_out`.
     fn is_explained(&mut self, frame_ohm: &[f64], left_out: Option<FaultyWire>) -> bool {
-        let missing = left_out.map_or([None; 2], FaultyWire::columns);
-        let mut all = Fit::default();
-        for (row_index, readings_ohm) in frame_ohm.chunks_exact(self.columns()).enumerate() {
-            if !left_out.is_some_and(|wire| wire.is_row(self.partial.rows[row_index])) {
-                all = [all, self.residual(row_index, readings_ohm, missing).0]
-                    .into_iter()
-                    .sum();
-            }
-        }
+        let missing = left_out.map_or(0..0, FaultyWire::columns);
+        let rows = frame_ohm.chunks_exact(self.columns()).enumerate();
+        let fits = rows.filter_map(|(row_index, readings_ohm)| {
+            let is_left_out = left_out.is_some_and(|wire| wire.is_row(self.decoder.rows[row_index]));
+            (!is_left_out).then(|| self.residual(row_index, readings_ohm, &missing).0)
+        });
+        let all = fits.sum();
         self.is_within_limit(all)
     }
 
     /// Returns `true` if χ² is that of intact wires; `false` for NaN.
     fn is_within_limit(&self, fit: Fit) -> bool {
-        let unknowns = self.axes.len() * self.partial.displacements_mm.len() * fit.rows;
+        let unknowns = self.axes.len() * self.decoder.displacements_mm.len() * fit.rows;
         fit.chi_squared <= chi_squared_quantile(fit.readings, DEVIATE) + OF_PRIOR * unknowns as f64
     }
 
     fn columns(&self) -> usize {
-        self.partial.predicted_ohm.len()
-    }
-
-    /// Column, ln m − ln R and its variance of every reading m that is neither missing nor clipped with R, which is certain.
-    fn misfits(
-        &self,
-        row_index: usize,
-        readings_ohm: &[f64],
-        missing: Missing,
-    ) -> impl Iterator<Item = (usize, f64, f64)> {
-        let pairs = readings_ohm.iter().zip(&self.partial.predicted_ohm).enumerate();
-        let deviations = &self.deviations[row_index * readings_ohm.len()..];
-        pairs
-            .zip(deviations)
-            .filter_map(move |((column, (reading, ohm)), deviation)| {
-                let logs = [reading, ohm].map(|ohm| ohm.ln());
-                let is_used = !missing.contains(&Some(column)) && logs.iter().any(|log| *log < self.log_full_scale);
-                is_used.then_some((column, logs[0] - logs[1], deviation * deviation))
-            })
+        self.decoder.predicted_ohm.len()
     }
 
     /// Decodes a row, and returns its χ² with the most probable logarithm of its gain. The score is not set.
-    fn residual(&mut self, row_index: usize, readings_ohm: &[f64], missing: Missing) -> (Fit, f64) {
-        let decoded = (self.partial).decode_row(row_index, readings_ohm, missing, &mut self.coordinates_mm);
+    fn residual(&mut self, row_index: usize, readings_ohm: &[f64], missing: &Range<usize>) -> (Fit, f64) {
+        let decoded = (self.decoder).decode_without(missing, row_index, readings_ohm, &mut self.coordinates_mm);
         let mut fit = Fit {
             rows: 1,
             ..Fit::default()
@@ -309,13 +284,20 @@ impl WireCheck {
             fit.chi_squared = f64::INFINITY;
             return (fit, 0.0);
         }
+        self.used.clear();
         let (mut sum, mut weights) = (0.0, 0.0);
-        for (_, misfit, variance) in self.misfits(row_index, readings_ohm, missing) {
-            fit.chi_squared += misfit * misfit / variance;
-            sum += misfit / variance;
-            weights += 1.0 / variance;
-            fit.readings += 1;
+        for column in (0..readings_ohm.len()).filter(|column| !missing.contains(column)) {
+            let logs = [readings_ohm[column], self.decoder.predicted_ohm[column]].map(f64::ln);
+            let (misfit, variance) = (logs[0] - logs[1], self.variance(row_index, column));
+            // Where both are clipped, the reading is certain.
+            if logs.iter().any(|log| *log < self.log_full_scale) {
+                fit.chi_squared += misfit * misfit / variance;
+                sum += misfit / variance;
+                weights += 1.0 / variance;
+                self.used.push(column);
+            }
         }
+        fit.readings = self.used.len();
         if self.common == 0.0 {
             return (fit, 0.0);
         }
@@ -324,35 +306,40 @@ impl WireCheck {
         (fit, log_gain)
     }
 
+    /// Variance of the noise of ln m.
+    fn variance(&self, row_index: usize, column: usize) -> f64 {
+        self.deviations[row_index * self.columns() + column].powi(2)
+    }
+
     /// Decodes a row without the missing readings, and predicts these.
-    fn partial_row(&mut self, row_index: usize, readings_ohm: &[f64], missing: Missing) -> PartialRow {
+    fn partial_row(&mut self, row_index: usize, readings_ohm: &[f64], missing: &Range<usize>) -> PartialRow {
         let (mut fit, log_gain) = self.residual(row_index, readings_ohm, missing);
-        let partial = &self.partial;
-        let columns = readings_ohm.len();
-        let nodes = partial.displacements_mm.len();
-        let moving = nodes * self.axes.len();
-        let row = partial.rows[row_index];
-        let Ok(jacobian) = partial.model.row_jacobian(row, &partial.displacements_mm) else {
+        let LeftOutDecoder {
+            model,
+            rows,
+            displacements_mm,
+            predicted_ohm,
+            ..
+        } = &self.decoder;
+        let Ok(jacobian) = model.row_jacobian(rows[row_index], displacements_mm) else {
             fit.score = f64::INFINITY;
-            return PartialRow {
-                fit,
-                missing: [Predicted::default(); 2],
-            };
+            return (fit, vec![Predicted::default(); missing.len()]);
         };
         // Slopes of ln R by the unknowns, in units of their prior standard deviations: the stroke, and that of the gain.
+        let moving = displacements_mm.len() * self.axes.len();
         let slopes = |column: usize| {
             Mat::from_fn(moving + 1, 1, |unknown, _| {
                 let (node, axis) = (unknown / self.axes.len(), unknown % self.axes.len());
                 if unknown == moving {
                     self.common
                 } else {
-                    jacobian[[column, node, self.axes[axis]]] / partial.predicted_ohm[column] * self.stroke_mm
+                    jacobian[[column, node, self.axes[axis]]] / predicted_ohm[column] * self.stroke_mm
                 }
             })
         };
         let mut precision = Mat::<f64>::identity(moving + 1, moving + 1);
-        for (column, _, noise) in self.misfits(row_index, readings_ohm, missing) {
-            let slopes = slopes(column);
+        for &column in &self.used {
+            let (noise, slopes) = (self.variance(row_index, column), slopes(column));
             precision += faer::Scale(1.0 / noise) * &slopes * slopes.transpose();
             fit.score += (TAU * noise).ln();
         }
@@ -361,89 +348,73 @@ impl WireCheck {
             .iter()
             .flat_map(|factor| factor.L().diagonal().column_vector().iter());
         fit.score += fit.chi_squared + 2.0 * diagonal.map(|entry| entry.ln()).sum::<f64>();
-        let variance = |slopes: &Mat<f64>| {
-            let solved = factor.as_ref().map(|factor| factor.solve(slopes));
-            solved.map_or(f64::INFINITY, |solved| (slopes.transpose() * solved)[(0, 0)])
-        };
-        let predicted = missing.map(|column| {
-            column.map_or_else(Predicted::default, |column| {
-                let noise = self.deviations[row_index * columns + column].powi(2);
-                Predicted {
-                    log_reading: readings_ohm[column].ln(),
-                    log_ohm: partial.predicted_ohm[column].ln() + log_gain,
-                    variance: noise + variance(&slopes(column)),
-                    noise,
-                }
-            })
+        let predicted = missing.clone().map(|column| {
+            let (noise, slopes) = (self.variance(row_index, column), slopes(column));
+            let solved = factor.as_ref().map(|factor| slopes.transpose() * factor.solve(&slopes));
+            Predicted {
+                log_reading: readings_ohm[column].ln(),
+                log_ohm: predicted_ohm[column].ln() + log_gain,
+                variance: noise + solved.map_or(f64::INFINITY, |variance| variance[(0, 0)]),
+                noise,
+            }
         });
-        PartialRow {
-            fit,
-            missing: predicted,
-        }
+        (fit, predicted.collect())
     }
 
     /// All rows of the frames without the missing readings.
-    fn partial_rows(&mut self, frames_ohm: &[f64], missing: Missing) -> Vec<PartialRow> {
-        let (columns, rows) = (self.columns(), self.partial.rows.len());
-        let readings = frames_ohm.chunks_exact(columns).enumerate();
+    fn partial_rows(&mut self, frames_ohm: &[f64], missing: Range<usize>) -> Vec<PartialRow> {
+        let rows = self.decoder.rows.len();
+        let readings = frames_ohm.chunks_exact(self.columns()).enumerate();
         readings
-            .map(|(line, ohm)| self.partial_row(line % rows, ohm, missing))
+            .map(|(line, ohm)| self.partial_row(line % rows, ohm, &missing))
             .collect()
     }
 
     /// The fault that explains these frames, if there is one.
     fn compare(&mut self, frames_ohm: &[f64]) -> Option<Diagnosis> {
-        let intact: Vec<Fit> = self
-            .partial_rows(frames_ohm, [None; 2])
-            .iter()
-            .map(|row| row.fit)
-            .collect();
-        let mut hypotheses: Vec<Hypothesis> = (0..self.partial.rows.len())
-            .map(|row_index| self.of_row(frames_ohm, row_index, &intact))
-            .collect();
+        let intact: Vec<Fit> = (self.partial_rows(frames_ohm, 0..0).iter().map(|(fit, _)| *fit)).collect();
+        let rows = 0..self.decoder.rows.len();
+        let mut hypotheses: Vec<Hypothesis> = rows.map(|row| self.of_row(frames_ohm, row, &intact)).collect();
         let suspects = self.suspects(frames_ohm, &intact);
         for &column in &suspects {
-            let rows = self.partial_rows(frames_ohm, [Some(column), None]);
+            let rows = self.partial_rows(frames_ohm, column..column + 1);
             hypotheses.extend(self.of_column(column, &rows));
             if suspects.contains(&(column + 1)) {
-                let rows = self.partial_rows(frames_ohm, [Some(column), Some(column + 1)]);
-                hypotheses.push(of_short(column, &rows));
+                hypotheses.push(of_short(column, &self.partial_rows(frames_ohm, column..column + 2)));
             }
         }
-        hypotheses.retain(|hypothesis| self.is_within_limit(hypothesis.fit));
-        let best = hypotheses.iter().min_by(|a, b| a.fit.score.total_cmp(&b.fit.score))?;
-        let weight = |other: &Hypothesis| (-0.5 * (other.fit.score - best.fit.score)).exp();
-        let of_wire = hypotheses.iter().filter(|other| other.wire == best.wire);
+        hypotheses.retain(|(.., fit)| self.is_within_limit(*fit));
+        let &(wire, cause, best) = hypotheses.iter().min_by(|a, b| a.2.score.total_cmp(&b.2.score))?;
+        let weight = |(.., fit): &Hypothesis| (-0.5 * (fit.score - best.score)).exp();
+        let of_wire = hypotheses.iter().filter(|(other, ..)| *other == wire);
         let probability = of_wire.map(weight).sum::<f64>() / hypotheses.iter().map(weight).sum::<f64>();
         (probability >= Self::SURE).then_some(Diagnosis {
-            wire: best.wire,
-            cause: best.cause,
+            wire,
+            cause,
             probability,
         })
     }
 
     /// A fault of a row-wire, which does not affect the other rows.
     fn of_row(&self, frames_ohm: &[f64], row_index: usize, intact: &[Fit]) -> Hypothesis {
-        let (rows, columns) = (self.partial.rows.len(), self.columns());
+        let (rows, columns) = (self.decoder.rows.len(), self.columns());
         let others = intact.iter().enumerate().filter(|(line, _)| line % rows != row_index);
         let lines = frames_ohm.chunks_exact(columns).skip(row_index).step_by(rows);
-        let half_way_ohm = &self.partial.half_way_ohm[row_index * columns..][..columns];
+        let half_way_ohm = &self.decoder.half_way_ohm[row_index * columns..][..columns];
         let pairs = lines.flat_map(|line| line.iter().zip(half_way_ohm));
         let is_clipped = |ohm: f64| ohm.ln() >= self.log_full_scale;
         let is_open = pairs.clone().all(|(&ohm, half_way)| is_clipped(ohm) || ohm > *half_way);
         // Clipped readings are certain without any current.
         let uncertain = pairs.filter(|(ohm, _)| !(is_open && is_clipped(**ohm))).count();
-        Hypothesis {
-            wire: FaultyWire::Row(self.partial.rows[row_index]),
-            cause: if is_open { FaultCause::Open } else { FaultCause::Unknown },
-            fit: others.map(|(_, fit)| *fit).chain([unpredicted(uncertain)]).sum(),
-        }
+        let cause = if is_open { FaultCause::Open } else { FaultCause::Unknown };
+        let fit = others.map(|(_, fit)| *fit).chain([unpredicted(uncertain)]).sum();
+        (FaultyWire::Row(self.decoder.rows[row_index]), cause, fit)
     }
 
     /// Column-wires without which the worst rows of the last frame have the smallest χ², and the neighbours of the best:
     /// two touching columns mask each other.
     fn suspects(&mut self, frames_ohm: &[f64], intact: &[Fit]) -> Vec<usize> {
-        let (rows, columns) = (self.partial.rows.len(), self.columns());
+        let (rows, columns) = (self.decoder.rows.len(), self.columns());
         let mut lines: Vec<usize> = (intact.len() - rows..intact.len()).collect();
         lines.sort_by(|&a, &b| intact[b].chi_squared.total_cmp(&intact[a].chi_squared));
         lines.truncate(WORST_ROWS);
@@ -451,7 +422,7 @@ impl WireCheck {
         for column in 0..columns {
             let fits = lines.iter().map(|&line| {
                 let readings_ohm = &frames_ohm[line * columns..][..columns];
-                self.residual(line % rows, readings_ohm, [Some(column), None]).0
+                self.residual(line % rows, readings_ohm, &(column..column + 1)).0
             });
             order.push((fits.map(|fit| fit.chi_squared).sum(), column));
         }
@@ -466,11 +437,11 @@ impl WireCheck {
 
     /// Faults of a column-wire, from all rows without it.
     fn of_column(&self, column: usize, rows: &[PartialRow]) -> [Hypothesis; 3] {
-        let rest: Fit = rows.iter().map(|row| row.fit).sum();
-        let readings = rows.iter().map(|row| row.missing[0]);
-        let is_clipped = |reading: &Predicted| reading.log_reading >= self.log_full_scale;
+        let rest: Fit = rows.iter().map(|(fit, _)| *fit).sum();
+        let readings = rows.iter().flat_map(|(_, missing)| missing);
         let (level, of_level) = level(readings.clone().map(|reading| (reading.log_reading, reading.noise)));
-        let constant = if readings.clone().all(|reading| is_clipped(&reading)) {
+        let is_clipped = |reading: &Predicted| reading.log_reading >= self.log_full_scale;
+        let constant = if readings.clone().all(is_clipped) {
             // Certain without any current.
             (FaultCause::Open, Fit::default())
         } else if level >= self.log_full_scale {
@@ -478,41 +449,34 @@ impl WireCheck {
         } else {
             (FaultCause::Stuck, of_level)
         };
-        let misfits = readings
-            .clone()
-            .map(|reading| (reading.log_reading - reading.log_ohm, reading.variance));
-        let (log_gain, of_gain) = self::level(misfits.clone());
-        let gain = FaultCause::Gain {
-            relative: log_gain.exp_m1(),
-        };
+        let misfits = readings.map(|reading| (reading.log_reading - reading.log_ohm, reading.variance));
         // A wire that is broken beyond some of its nodes has higher readings, which vary.
         let is_high = misfits.clone().all(|(misfit, _)| misfit > 0.0);
         let other = if is_high { FaultCause::Open } else { FaultCause::Unknown };
-        [constant, (gain, of_gain), (other, unpredicted(rows.len()))].map(|(cause, fit)| Hypothesis {
-            wire: FaultyWire::Column(column),
-            cause,
-            fit: [rest, fit].into_iter().sum(),
-        })
+        let (log_gain, of_gain) = self::level(misfits);
+        let relative = log_gain.exp_m1();
+        [
+            constant,
+            (FaultCause::Gain { relative }, of_gain),
+            (other, unpredicted(rows.len())),
+        ]
+        .map(|(cause, fit)| (FaultyWire::Column(column), cause, [rest, fit].into_iter().sum()))
     }
 }
 
 /// Two columns that touch: their readings differ only by noise, and have the mean conductance of both.
 fn of_short(column: usize, rows: &[PartialRow]) -> Hypothesis {
-    let of_rows = rows.iter().flat_map(|row| {
-        let [one, other] = row.missing;
+    let of_rows = rows.iter().flat_map(|(fit, missing)| {
+        let [one, other] = [missing[0], missing[1]];
         let noise = one.noise + other.noise;
         let apart = normal(one.log_reading - other.log_reading, noise);
         // The mean conductance is known at least as well as both on average.
         let log_ohm = -(0.5 * ((-one.log_ohm).exp() + (-other.log_ohm).exp())).ln();
         let misfit = 0.5 * (one.log_reading + other.log_reading) - log_ohm;
         let mean = normal(misfit, 0.5 * (one.variance + other.variance) - 0.25 * noise);
-        [row.fit, apart, mean]
+        [*fit, apart, mean]
     });
-    Hypothesis {
-        wire: FaultyWire::Columns(column),
-        cause: FaultCause::Shorted,
-        fit: of_rows.sum(),
-    }
+    (FaultyWire::Columns(column), FaultCause::Shorted, of_rows.sum())
 }
 
 /// Fit of so many readings that nothing predicts.
@@ -562,11 +526,11 @@ impl FaultyWire {
     }
 
     /// Returns the faulty column-wires.
-    pub fn columns(self) -> [Option<usize>; 2] {
+    pub fn columns(self) -> Range<usize> {
         match self {
-            Self::Row(_) => [None; 2],
-            Self::Column(column) => [Some(column), None],
-            Self::Columns(first) => [Some(first), Some(first + 1)],
+            Self::Row(_) => 0..0,
+            Self::Column(column) => column..column + 1,
+            Self::Columns(first) => first..first + 2,
         }
     }
 }

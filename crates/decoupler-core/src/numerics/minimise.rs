@@ -13,54 +13,30 @@ pub(crate) struct Linearised {
     pub(crate) squares: f64,
 }
 
-/// Reason for stopping.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Stop {
-    /// The Gauss-Newton step would lower Σ r² by a negligible amount only.
-    Converged,
-    /// No step lowers Σ r², however short.
-    NoStepHelps,
-    /// The maximum number of steps was reached.
-    StepsTaken,
-    /// Σ r² or its derivatives are not finite at the start.
-    NotFinite,
-}
-
-/// Result of [`minimise`].
-#[derive(Clone, Debug)]
-pub(crate) struct Report {
-    /// The point reached.
-    pub(crate) at: Vec<f64>,
-    pub(crate) stop: Stop,
-}
-
 /// Minimises Σ r² from `start` by damped steps (Marquardt 1963, doi:10.1137/0111030).
 ///
 /// `linearise` returns `None` where Σ r² is not defined. The method has converged when the Gauss-Newton step would lower
 /// Σ r² by at most `negligible(Σ r²)`, whatever the length of the step (the relative offset of Bates and Watts 1981):
 /// patterns of the unknowns that r hardly depends on do not delay convergence.
+///
+/// Returns `None` if it does not converge: Σ r² is not finite at the start, no step lowers it, or too many steps are needed.
 pub(crate) fn minimise(
     start: &[f64],
     linearise: impl Fn(&[f64]) -> Option<Linearised>,
     negligible: impl Fn(f64) -> f64,
-) -> Report {
+) -> Option<Vec<f64>> {
     const MAX_STEPS: usize = 200;
     /// Damping relative to the largest eigenvalue of JᵀJ: of the first step, the smallest and the largest.
     const DAMPINGS: [f64; 3] = [1e-6, 1e-15, 1e6];
-    let report = |at: Vec<f64>, stop| Report { at, stop };
     let mut at = start.to_vec();
-    let Some(mut here) = linearise(&at) else {
-        return report(at, Stop::NotFinite);
-    };
+    let mut here = linearise(&at)?;
     let mut damping = DAMPINGS[0];
     for _ in 0..MAX_STEPS {
-        let Some(spectrum) = Spectrum::of(&here.gram) else {
-            return report(at, Stop::NotFinite);
-        };
+        let spectrum = Spectrum::of(&here.gram)?;
         let newton = spectrum.solve(&here.descent, 0.0);
         let decrease: f64 = newton.iter().zip(&here.descent).map(|(step, slope)| step * slope).sum();
         if decrease <= negligible(here.squares) {
-            return report(at, Stop::Converged);
+            return Some(at);
         }
         loop {
             let step = spectrum.solve(&here.descent, damping * spectrum.largest());
@@ -73,11 +49,11 @@ pub(crate) fn minimise(
             }
             damping *= 10.0;
             if damping > DAMPINGS[2] {
-                return report(at, Stop::NoStepHelps);
+                return None;
             }
         }
     }
-    report(at, Stop::StepsTaken)
+    None
 }
 
 /// Eigenvalues and eigenvectors of JᵀJ.
@@ -165,10 +141,9 @@ mod tests {
                 (1.0 - x[0], [-1.0, 0.0]),
             ])
         };
-        let found = minimise(&[-1.2, 1.0], valley, |_| 1e-28);
-        assert_eq!(found.stop, Stop::Converged, "{found:?}");
+        let found = minimise(&[-1.2, 1.0], valley, |_| 1e-28).unwrap();
         assert!(
-            (found.at[0] - 1.0).abs() < 1e-10 && (found.at[1] - 1.0).abs() < 1e-10,
+            (found[0] - 1.0).abs() < 1e-10 && (found[1] - 1.0).abs() < 1e-10,
             "{found:?}"
         );
     }
@@ -178,10 +153,9 @@ mod tests {
     fn a_line_and_its_variances_match_linear_regression() {
         let points = [(0.0, 1.0), (1.0, 3.0), (2.0, 4.0), (3.0, 4.0)];
         let line = |p: &[f64]| linearised(&points.map(|(x, y)| (p[0] + p[1] * x - y, [1.0, x])));
-        let found = minimise(&[100.0, -50.0], line, |squares| 1e-14 * squares);
-        assert_eq!(found.stop, Stop::Converged);
-        assert!((found.at[0] - 1.5).abs() < 1e-6 && (found.at[1] - 1.0).abs() < 1e-6);
-        let spectrum = Spectrum::of(&line(&found.at).unwrap().gram).unwrap();
+        let found = minimise(&[100.0, -50.0], line, |squares| 1e-14 * squares).unwrap();
+        assert!((found[0] - 1.5).abs() < 1e-6 && (found[1] - 1.0).abs() < 1e-6);
+        let spectrum = Spectrum::of(&line(&found).unwrap().gram).unwrap();
         assert!(
             (spectrum.inverse_diagonal(0) - 0.7).abs() < 1e-12 && (spectrum.inverse_diagonal(1) - 0.2).abs() < 1e-12
         );
@@ -190,19 +164,15 @@ mod tests {
     #[test]
     fn undetermined_unknowns_stay_and_undefined_starts_are_reported() {
         let only_the_sum = |x: &[f64]| linearised(&[(x[0] + x[1] - 4.0, [1.0, 1.0])]);
-        let found = minimise(&[1.0, 2.0], only_the_sum, |_| 1e-20);
-        assert_eq!(found.stop, Stop::Converged);
+        let found = minimise(&[1.0, 2.0], only_the_sum, |_| 1e-20).unwrap();
         assert!(
-            (found.at[0] - 1.5).abs() < 1e-9 && (found.at[1] - 2.5).abs() < 1e-9,
+            (found[0] - 1.5).abs() < 1e-9 && (found[1] - 2.5).abs() < 1e-9,
             "{found:?}"
         );
         let spectrum = Spectrum::of(&only_the_sum(&[0.0; 2]).unwrap().gram).unwrap();
         assert_eq!(spectrum.inverse_diagonal(1), f64::INFINITY);
-        assert_eq!(minimise(&[0.0; 2], |_| None, |_| 0.0).stop, Stop::NotFinite);
+        assert_eq!(minimise(&[0.0; 2], |_| None, |_| 0.0), None);
         let undefined_elsewhere = |x: &[f64]| (x[0] == 0.0).then(|| only_the_sum(x)).flatten();
-        assert_eq!(
-            minimise(&[0.0; 2], undefined_elsewhere, |_| 0.0).stop,
-            Stop::NoStepHelps
-        );
+        assert_eq!(minimise(&[0.0; 2], undefined_elsewhere, |_| 0.0), None);
     }
 }

@@ -4,6 +4,6 @@ mod minimise;
 mod special;
 mod statistics;
 
-pub(crate) use minimise::{Linearised, Spectrum, Stop, minimise};
+pub(crate) use minimise::{Linearised, Spectrum, minimise};
 pub(crate) use special::{chi_squared_quantile, normal_cdf, scaled_k0_k1, student_quantile, two_sided_normal_quantile};
-pub(crate) use statistics::{autocorrelation, median, quantile};
+pub(crate) use statistics::{autocorrelation, correlation_time, median, quantile};

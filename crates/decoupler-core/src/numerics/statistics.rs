@@ -29,6 +29,26 @@ pub(crate) fn autocorrelation(values: ArrayView1<'_, f64>, lag: usize) -> Option
     (variance > 0.0).then(|| products / variance)
 }
 
+/// Returns the number of consecutive values of `series` that carry as much information as one independent value, at least
+/// 1: the largest ratio of the variance of means of 2, 4, 8, … values to that of independent values (Flyvbjerg and Petersen
+/// 1989, doi:10.1063/1.457480).
+pub(crate) fn correlation_time(mut series: Vec<f64>) -> f64 {
+    /// Minimum number of means whose variance is known well enough.
+    const MIN_MEANS: usize = 16;
+    let count = series.len() as f64;
+    let mean = series.iter().sum::<f64>() / count;
+    series.iter_mut().for_each(|value| *value -= mean);
+    let mean_square = |series: &[f64]| series.iter().map(|value| value * value).sum::<f64>() / series.len() as f64;
+    let variance = mean_square(&series);
+    let (mut time, mut length) = (1.0_f64, 1.0);
+    while variance > 0.0 && series.len() >= 2 * MIN_MEANS {
+        series = series.chunks_exact(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        length *= 2.0;
+        time = time.max(length * mean_square(&series) / variance);
+    }
+    time
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -76,18 +76,14 @@ impl FromStr for Fault {
             "short-columns" => {
                 let (first, second) = rest.split_once('-').ok_or_else(unknown)?;
                 let (column, next) = (number(first)?, number(second)?);
-                if next == column + 1 {
-                    Ok(Self::ShortedColumns { column })
-                } else {
-                    Err(unknown())
-                }
+                let short = (next == column + 1).then_some(Self::ShortedColumns { column });
+                short.ok_or_else(unknown)
             }
             "gain" => {
                 let (column, relative) = value()?;
                 let relative: f64 = relative.parse().map_err(|_| unknown())?;
                 if relative > -1.0 && relative <= 10.0 && relative != 0.0 {
-                    let column = number(column)?;
-                    Ok(Self::Gain { column, relative })
+                    number(column).map(|column| Self::Gain { column, relative })
                 } else {
                     Err(SceneError::GainRange(relative))
                 }
@@ -99,8 +95,7 @@ impl FromStr for Fault {
                     "high" => ConverterEnd::High,
                     _ => return Err(unknown()),
                 };
-                let column = number(column)?;
-                Ok(Self::Stuck { column, end })
+                number(column).map(|column| Self::Stuck { column, end })
             }
             _ => Err(unknown()),
         }
@@ -182,7 +177,6 @@ impl FaultySensor {
     pub fn before_noise(&self, read: &[usize], deformation: &Deformation, resistances_ohm: &mut [f64]) {
         let scale = self.model.scale;
         let (columns, full_scale_ohm) = (scale.columns(), self.range_ohm.1);
-        let row_index = |row: usize| read.iter().position(|&other| other == row);
         let mut conductance = RowConductance::new(&self.model, Axes::Z);
         let mut near_ohm = |row: usize, nodes: usize, electrodes: usize| -> Vec<f64> {
             let displacements_mm = &deformation.row_mm(row)[..nodes];
@@ -197,60 +191,53 @@ impl FaultySensor {
             };
             conductance.sums().iter().map(of_sum).collect()
         };
-        match self.fault {
-            Fault::OpenRow { row, before_node } => {
-                if let Some(index) = row_index(row) {
-                    let of_row = near_ohm(row, before_node, scale.nodes_per_column());
-                    resistances_ohm[index * columns..][..columns].copy_from_slice(&of_row);
+        for (&row, ohms) in read.iter().zip(resistances_ohm.chunks_exact_mut(columns)) {
+            match self.fault {
+                Fault::OpenRow { row: open, before_node } if open == row => {
+                    ohms.copy_from_slice(&near_ohm(row, before_node, scale.nodes_per_column()));
                 }
-            }
-            Fault::OpenColumn { column, before_node } => {
-                for (&row, ohms) in read.iter().zip(resistances_ohm.chunks_exact_mut(columns)) {
+                Fault::OpenColumn { column, before_node } => {
                     ohms[column] = near_ohm(row, scale.nodes_per_row(), before_node)[column];
                 }
-            }
-            Fault::ShortedColumns { column } => {
-                for ohms in resistances_ohm.chunks_exact_mut(columns) {
+                Fault::ShortedColumns { column } => {
                     let shared = 2.0 / (1.0 / ohms[column] + 1.0 / ohms[column + 1]);
                     ohms[column..column + 2].fill(shared);
                 }
+                Fault::Gain { column, relative } => ohms[column] *= 1.0 + relative,
+                Fault::OpenRow { .. } | Fault::Stuck { .. } => {}
             }
-            Fault::Gain { column, relative } => {
-                let of_column = resistances_ohm.iter_mut().skip(column).step_by(columns);
-                of_column.for_each(|ohm| *ohm *= 1.0 + relative);
-            }
-            Fault::Stuck { .. } => {}
         }
     }
 
     /// Applies faults of the converter to the readings of one snapshot: without current, or when it is stuck, it reads an
     /// end of its range without noise.
     pub fn after_noise(&self, read: &[usize], readings_ohm: &mut [f64]) {
-        let columns = self.model.scale.columns();
         let (lowest_ohm, full_scale_ohm) = self.range_ohm;
-        let (affected, step) = match self.fault {
-            Fault::OpenRow { row, .. } => {
-                let place = read.iter().position(|&other| other == row);
-                (place.map_or(0..0, |index| index * columns..(index + 1) * columns), 1)
-            }
-            Fault::OpenColumn { column, .. } | Fault::Gain { column, .. } | Fault::Stuck { column, .. } => {
-                (column..readings_ohm.len(), columns)
-            }
-            Fault::ShortedColumns { .. } => return,
-        };
-        for ohm in readings_ohm[affected].iter_mut().step_by(step) {
-            *ohm = match self.fault {
-                Fault::OpenRow { before_node: 0, .. }
-                | Fault::OpenColumn { before_node: 0, .. }
-                | Fault::Stuck {
-                    end: ConverterEnd::High,
-                    ..
-                } => full_scale_ohm,
-                Fault::Stuck {
-                    end: ConverterEnd::Low, ..
-                } => lowest_ohm,
-                _ => ohm.min(full_scale_ohm),
+        for (&row, ohms) in read
+            .iter()
+            .zip(readings_ohm.chunks_exact_mut(self.model.scale.columns()))
+        {
+            let affected = match self.fault {
+                Fault::OpenRow { row: open, .. } if open == row => ohms,
+                Fault::OpenColumn { column, .. } | Fault::Gain { column, .. } | Fault::Stuck { column, .. } => {
+                    &mut ohms[column..=column]
+                }
+                Fault::OpenRow { .. } | Fault::ShortedColumns { .. } => continue,
             };
+            for ohm in affected {
+                *ohm = match self.fault {
+                    Fault::OpenRow { before_node: 0, .. }
+                    | Fault::OpenColumn { before_node: 0, .. }
+                    | Fault::Stuck {
+                        end: ConverterEnd::High,
+                        ..
+                    } => full_scale_ohm,
+                    Fault::Stuck {
+                        end: ConverterEnd::Low, ..
+                    } => lowest_ohm,
+                    _ => ohm.min(full_scale_ohm),
+                };
+            }
         }
     }
 }

@@ -3,25 +3,22 @@
 mod fault;
 mod loading;
 mod noise;
-mod noise_source;
 mod rows;
 
 pub use fault::{ConverterEnd, Fault, FaultySensor};
-pub use loading::{Contact, DeformationSampler, Indenter, IndenterShape, Loading, Span};
+pub use loading::{Contact, DeformationSampler, Indenter, IndenterShape, Loading, Print, Span, Touch};
 pub(crate) use noise::standard_normal;
-pub use noise::{Noise, NoisySets, RelativeNoise};
-pub use noise_source::{NoiseSource, Print, Touch};
+pub use noise::{Noise, NoiseSource, NoisySets, RelativeNoise};
 pub use rows::{RowModel, Rows};
 
 use std::{fmt, str::FromStr};
 
 use glam::DVec3;
-use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::{
-    sensor::{ArrayScale, Axes, Geometry, SensorError, SensorModel, short},
+    sensor::{ArrayScale, Axes, Geometry, SensorModel, short},
     text::{Named, UnknownName},
 };
 
@@ -141,7 +138,11 @@ impl Scene {
         if !(self.largest_compression > 0.0 && self.largest_compression < 1.0) {
             return Err(SceneError::Compression(self.largest_compression));
         }
-        self.movement.check()?;
+        if let Movement::Xyz { largest_shift_mm } = self.movement
+            && !(largest_shift_mm > 0.0 && largest_shift_mm.is_finite())
+        {
+            return Err(SceneError::Shift(largest_shift_mm));
+        }
         self.loading.check()?;
         self.noise.check()
     }
@@ -162,83 +163,30 @@ impl Scene {
     }
 }
 
-/// Analogue-to-digital converter with a range from 0 to twice the largest resistance at rest, beyond which it clips.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Converter {
-    pub(super) step_ohm: f64,
-    steps: f64,
-}
-
-impl Converter {
-    /// Creates a converter with this many bits for the readings of `model`.
-    ///
-    /// # Errors
-    /// If the undeformed sensor has no resistance.
-    pub(super) fn new(bits: u8, model: &SensorModel) -> Result<Self, SensorError> {
-        let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
-        let mut largest_ohm = 0.0_f64;
-        for row in 0..model.scale.rows() {
-            largest_ohm = model
-                .row_resistances(row, &rest)?
-                .into_iter()
-                .fold(largest_ohm, f64::max);
-        }
-        let steps = 2.0_f64.powi(i32::from(bits));
-        Ok(Self {
-            step_ohm: 2.0 * largest_ohm / steps,
-            steps,
-        })
-    }
-
-    /// Lowest and highest reading.
-    pub(super) fn range_ohm(self) -> (f64, f64) {
-        (self.step_ohm, self.step_ohm * self.steps)
-    }
-
-    /// Rounds a reading.
-    pub(super) fn round_ohm(self, reading_ohm: f64) -> f64 {
-        self.step(reading_ohm) * self.step_ohm
-    }
-
-    /// Lowest and highest value that are converted to `reading_ohm`. The last step is open because the converter clips.
-    pub(super) fn rounded_from_ohm(self, reading_ohm: f64) -> (f64, f64) {
-        let Self { step_ohm, steps } = self;
-        let step = self.step(reading_ohm);
-        let lowest_ohm = if step > 1.0 { (step - 0.5) * step_ohm } else { 0.0 };
-        let highest_ohm = if step < steps {
-            (step + 0.5) * step_ohm
-        } else {
-            f64::INFINITY
-        };
-        (lowest_ohm, highest_ohm)
-    }
-
-    fn step(self, reading_ohm: f64) -> f64 {
-        (reading_ohm / self.step_ohm).round().clamp(1.0, self.steps)
-    }
-}
-
 /// Displacement of each upper node at one moment, in millimetres; z is positive downwards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Deformation {
-    /// Row-wires × nodes on a row-wire, in standard (row-major) layout.
-    displacement_mm: Array2<DVec3>,
+    nodes_per_row: usize,
+    /// Row-wires × nodes on a row-wire.
+    displacements_mm: Vec<DVec3>,
 }
 
 impl Deformation {
     /// Creates a deformation with `displacement_mm(row, node)` at every node.
     pub fn from_fn(scale: ArrayScale, mut displacement_mm: impl FnMut(usize, usize) -> DVec3) -> Self {
-        let shape = (scale.rows(), scale.nodes_per_row());
+        let nodes_per_row = scale.nodes_per_row();
+        let nodes = 0..scale.rows() * nodes_per_row;
         Self {
-            displacement_mm: Array2::from_shape_fn(shape, |(row, node)| displacement_mm(row, node)),
+            nodes_per_row,
+            displacements_mm: nodes
+                .map(|node| displacement_mm(node / nodes_per_row, node % nodes_per_row))
+                .collect(),
         }
     }
 
     /// Returns the displacements of the nodes of row-wire `row`, in millimetres.
     pub fn row_mm(&self, row: usize) -> &[DVec3] {
-        let nodes = self.displacement_mm.ncols();
-        let all = self.displacement_mm.as_slice().expect("built in standard layout");
-        &all[row * nodes..(row + 1) * nodes]
+        &self.displacements_mm[row * self.nodes_per_row..][..self.nodes_per_row]
     }
 
     /// Returns the positions of the displaced nodes of row-wire `row`, in millimetres.
@@ -306,15 +254,6 @@ impl Movement {
         match self {
             Self::Z => 0.0,
             Self::Xyz { largest_shift_mm } => largest_shift_mm,
-        }
-    }
-
-    pub(super) fn check(self) -> Result<(), SceneError> {
-        match self {
-            Self::Xyz {
-                largest_shift_mm: shift,
-            } if !(shift > 0.0 && shift.is_finite()) => Err(SceneError::Shift(shift)),
-            _ => Ok(()),
         }
     }
 }

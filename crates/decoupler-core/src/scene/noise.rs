@@ -4,7 +4,7 @@ use glam::DVec3;
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-use super::{Converter, SceneError};
+use super::SceneError;
 pub use crate::sensor::RelativeNoise;
 use crate::sensor::{SensorError, SensorModel};
 
@@ -63,19 +63,17 @@ impl Noise {
 
     /// Returns the noise of the training set.
     pub fn in_training(self) -> Self {
-        if self.sets == NoisySets::Test {
-            Self::default()
-        } else {
-            self
+        match self.sets {
+            NoisySets::Test => Self::default(),
+            NoisySets::Training | NoisySets::Both => self,
         }
     }
 
     /// Returns the noise of the test set.
     pub fn in_test(self) -> Self {
-        if self.sets == NoisySets::Training {
-            Self::default()
-        } else {
-            self
+        match self.sets {
+            NoisySets::Training => Self::default(),
+            NoisySets::Test | NoisySets::Both => self,
         }
     }
 
@@ -96,12 +94,150 @@ impl Noise {
         }
     }
 
+    /// Prepares to disturb readings of `model`.
+    ///
+    /// # Errors
+    /// If the undeformed sensor has no resistance, so that the converter has no range.
+    pub fn source(&self, model: &SensorModel) -> Result<NoiseSource, SensorError> {
+        let converter = self.converter_bits.map(|bits| Converter::new(bits, model));
+        Ok(NoiseSource {
+            noise: *self,
+            converter: converter.transpose()?,
+        })
+    }
+
     /// Returns the lowest and highest reading of the converter, or of a 16-bit converter if there is none.
     ///
     /// # Errors
     /// If the undeformed sensor has no resistance.
     pub(crate) fn range_ohm(&self, model: &SensorModel) -> Result<(f64, f64), SensorError> {
-        Ok(Converter::new(self.converter_bits.unwrap_or(16), model)?.range_ohm())
+        let converter = Converter::new(self.converter_bits.unwrap_or(16), model)?;
+        Ok((converter.step_ohm, converter.step_ohm * converter.steps))
+    }
+}
+
+/// Noise of one sensor, prepared for drawing; none by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NoiseSource {
+    pub(crate) noise: Noise,
+    converter: Option<Converter>,
+}
+
+impl NoiseSource {
+    /// Returns `true` if no reading is changed.
+    pub fn is_none(&self) -> bool {
+        self.noise.is_none()
+    }
+
+    /// Adds noise to the readings of one snapshot in place. Readings remain above 0 and finite: other values are drawn
+    /// again.
+    pub fn disturb(&self, resistances_ohm: &mut [f64], rng: &mut impl Rng) {
+        let Noise {
+            relative,
+            additive_ohm,
+            drift,
+            ..
+        } = self.noise;
+        let gain = positive(|| {
+            if drift > 0.0 {
+                1.0 + drift * standard_normal(rng)
+            } else {
+                1.0
+            }
+        });
+        for value in resistances_ohm {
+            let true_ohm = *value;
+            let mut reading = positive(|| {
+                let mut reading = true_ohm * gain;
+                if relative > 0.0 {
+                    reading *= 1.0 + relative * standard_normal(rng);
+                }
+                if additive_ohm > 0.0 {
+                    reading += additive_ohm * standard_normal(rng);
+                }
+                reading
+            });
+            if let Some(converter) = self.converter {
+                reading = converter.step(reading) * converter.step_ohm;
+            }
+            *value = reading;
+        }
+    }
+
+    /// Lowest and highest value that are converted to `reading_ohm`; `None` without a converter. The last step is open
+    /// because the converter clips.
+    pub(crate) fn rounded_from_ohm(&self, reading_ohm: f64) -> Option<(f64, f64)> {
+        let converter = self.converter?;
+        let (step, step_ohm) = (converter.step(reading_ohm), converter.step_ohm);
+        let lowest_ohm = if step > 1.0 { (step - 0.5) * step_ohm } else { 0.0 };
+        let is_last = step >= converter.steps;
+        let highest_ohm = if is_last {
+            f64::INFINITY
+        } else {
+            (step + 0.5) * step_ohm
+        };
+        Some((lowest_ohm, highest_ohm))
+    }
+
+    /// Returns the relative noise of a reading of `resistance_ohm`. Its own part is
+    /// √(relative² + (additive² + step²/12)/R²), where step/√12 is the standard deviation of rounding to steps.
+    pub fn relative_to(&self, resistance_ohm: f64) -> RelativeNoise {
+        let step_ohm = self.converter.map_or(0.0, |converter| converter.step_ohm);
+        let additive_ohm = libm::hypot(self.noise.additive_ohm, step_ohm / 12.0_f64.sqrt());
+        RelativeNoise {
+            own: libm::hypot(self.noise.relative, additive_ohm / resistance_ohm),
+            common: self.noise.drift,
+        }
+    }
+}
+
+/// Draws until a value is above 0 and finite.
+fn positive(mut draw: impl FnMut() -> f64) -> f64 {
+    /// At least half of the draws are positive; at the largest noise, where sums overflow, a third is accepted. All fail
+    /// for fewer than one in 10⁴⁵ readings.
+    const MAX_DRAWS: usize = 256;
+    let mut value = f64::NAN;
+    for _ in 0..MAX_DRAWS {
+        value = draw();
+        if value > 0.0 && value.is_finite() {
+            break;
+        }
+    }
+    // Reached with an invalid value only if the resistance itself is invalid.
+    value
+}
+
+/// Analogue-to-digital converter with a range from 0 to twice the largest resistance at rest, beyond which it clips.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Converter {
+    step_ohm: f64,
+    steps: f64,
+}
+
+impl Converter {
+    /// Creates a converter with this many bits for the readings of `model`.
+    ///
+    /// # Errors
+    /// If the undeformed sensor has no resistance.
+    fn new(bits: u8, model: &SensorModel) -> Result<Self, SensorError> {
+        let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
+        let mut largest_ohm = 0.0_f64;
+        for row in 0..model.scale.rows() {
+            largest_ohm = model
+                .row_resistances(row, &rest)?
+                .into_iter()
+                .fold(largest_ohm, f64::max);
+        }
+        let steps = 2.0_f64.powi(i32::from(bits));
+        Ok(Self {
+            step_ohm: 2.0 * largest_ohm / steps,
+            steps,
+        })
+    }
+
+    /// Number of the step to which a reading is rounded.
+    fn step(self, reading_ohm: f64) -> f64 {
+        (reading_ohm / self.step_ohm).round().clamp(1.0, self.steps)
     }
 }
 
@@ -134,7 +270,164 @@ pub(crate) fn standard_normal(rng: &mut impl Rng) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sensor::ArrayScale;
+    use crate::{
+        dataset::{Seed, Stream},
+        numerics::normal_cdf,
+        sensor::ArrayScale,
+    };
+
+    fn disturbed(noise: Noise, resistance_ohm: f64, count: usize) -> Vec<f64> {
+        let model = SensorModel::new("10x6_3x18".parse().unwrap());
+        let source = noise.source(&model).unwrap();
+        let mut rng = Seed(0).rng(Stream::TrainingNoise);
+        let mut readings = vec![resistance_ohm; count];
+        source.disturb(&mut readings, &mut rng);
+        readings
+    }
+
+    fn spread(readings: &[f64]) -> (f64, f64) {
+        let mean = readings.iter().sum::<f64>() / readings.len() as f64;
+        let squares = readings.iter().map(|r| (r - mean).powi(2)).sum::<f64>();
+        (mean, (squares / readings.len() as f64).sqrt())
+    }
+
+    #[test]
+    fn each_kind_has_its_documented_spread() {
+        let noise = Noise {
+            relative: 0.01,
+            additive_ohm: 0.5,
+            ..Noise::default()
+        };
+        let (mean, deviation) = spread(&disturbed(noise, 100.0, 100_000));
+        assert!((mean - 100.0).abs() < 0.02, "{mean}");
+        let expected = noise.source(&SensorModel::new("10x6_3x18".parse().unwrap())).unwrap();
+        assert!((deviation / (100.0 * expected.relative_to(100.0).own) - 1.0).abs() < 0.01);
+        assert!((deviation - (1.0 + 0.25_f64).sqrt()).abs() < 0.02, "{deviation}");
+    }
+
+    #[test]
+    fn drift_is_common_to_a_snapshot() {
+        let noise = Noise {
+            drift: 0.1,
+            ..Noise::default()
+        };
+        let readings = disturbed(noise, 50.0, 20);
+        assert!(readings.iter().all(|&r| r == readings[0]) && readings[0] != 50.0);
+    }
+
+    #[test]
+    fn a_converter_gives_whole_steps_and_never_zero() {
+        let noise = Noise {
+            converter_bits: Some(4),
+            ..Noise::default()
+        };
+        let step = disturbed(noise, 1e-9, 1)[0];
+        for ohm in [1.0, 30.0, 77.0, 1e9] {
+            let steps = disturbed(noise, ohm, 1)[0] / step;
+            assert_eq!(steps, steps.round());
+            assert!((1.0..=16.0).contains(&steps));
+        }
+    }
+
+    #[test]
+    fn enormous_noise_leaves_finite_positive_readings() {
+        for additive_ohm in [1e6, 1e308, f64::MAX] {
+            let noise = Noise {
+                relative: 1.0,
+                drift: 1.0,
+                additive_ohm,
+                ..Noise::default()
+            };
+            let readings = disturbed(noise, 10.0, 1000);
+            assert!(readings.iter().all(|&r| r > 0.0 && r.is_finite()), "{additive_ohm}");
+        }
+    }
+
+    /// Kolmogorov-Smirnov test: with 20 000 readings the distance exceeds 0.0138 with a probability of 0.001.
+    #[test]
+    fn readings_follow_the_truncated_normal_distribution_and_do_not_reveal_the_truth() {
+        let cases = [
+            (Noise::relative(1.0), 10.0, 10.0),
+            (Noise::relative(0.5), 10.0, 5.0),
+            (
+                Noise {
+                    additive_ohm: 300.0,
+                    ..Noise::default()
+                },
+                10.0,
+                300.0,
+            ),
+        ];
+        for (noise, mean_ohm, deviation_ohm) in cases {
+            let mut readings = disturbed(noise, mean_ohm, 20_000);
+            readings.sort_by(f64::total_cmp);
+            assert!(
+                readings.windows(2).all(|pair| pair[0] < pair[1]),
+                "no value is drawn twice"
+            );
+            let below = |ohm: f64| normal_cdf((ohm - mean_ohm) / deviation_ohm);
+            let count = readings.len() as f64;
+            let distance = readings.iter().enumerate().map(|(index, &ohm)| {
+                let expected = (below(ohm) - below(0.0)) / (1.0 - below(0.0));
+                ((index as f64 + 0.5) / count - expected).abs()
+            });
+            let distance = distance.fold(0.0, f64::max);
+            assert!(distance < 0.0138, "{noise:?}: {distance}");
+        }
+    }
+
+    #[test]
+    fn drift_makes_no_snapshot_negative() {
+        let noise = Noise {
+            drift: 1.0,
+            ..Noise::default()
+        };
+        let source = noise.source(&SensorModel::new("10x6_3x18".parse().unwrap())).unwrap();
+        let mut rng = Seed(0).rng(Stream::TrainingNoise);
+        let mut gains = Vec::new();
+        for _ in 0..2000 {
+            let mut readings = [10.0, 20.0];
+            source.disturb(&mut readings, &mut rng);
+            assert!((readings[1] / readings[0] - 2.0).abs() < 1e-12);
+            gains.push(readings[0] / 10.0);
+        }
+        // The mean of a normal distribution with mean and standard deviation 1, truncated to values above 0, is 1 +
+        // φ(1)/Φ(1).
+        let (mean, _) = spread(&gains);
+        assert!((mean - 1.2876).abs() < 0.06, "{mean}");
+        assert!(
+            gains.iter().all(|&gain| gain > 0.0 && gain != 1e-6),
+            "the floor carries no information"
+        );
+    }
+
+    /// The first draw is kept if it is positive, so ordinary noise needs one draw per reading.
+    #[test]
+    fn ordinary_noise_takes_one_draw_per_reading() {
+        let noise = Noise {
+            relative: 0.05,
+            additive_ohm: 0.1,
+            drift: 0.02,
+            ..Noise::default()
+        };
+        let readings = disturbed(noise, 10.0, 100);
+        let mut rng = Seed(0).rng(Stream::TrainingNoise);
+        let gain = 1.0 + 0.02 * standard_normal(&mut rng);
+        for reading in readings {
+            let expected = 10.0 * gain * (1.0 + 0.05 * standard_normal(&mut rng)) + 0.1 * standard_normal(&mut rng);
+            assert_eq!(reading, expected);
+        }
+    }
+
+    #[test]
+    fn zero_noise_changes_nothing_and_sets_are_respected() {
+        assert!(disturbed(Noise::default(), 12.5, 5).iter().all(|&r| r == 12.5));
+        let test_only = Noise {
+            sets: NoisySets::Test,
+            ..Noise::relative(0.1)
+        };
+        assert!(test_only.in_training().is_none() && !test_only.in_test().is_none());
+    }
 
     fn of(noise: Noise) -> RelativeNoise {
         let model = SensorModel::new(ArrayScale::default());
@@ -180,7 +473,7 @@ mod tests {
     }
 
     #[test]
-    fn enormous_noise_stays_finite() {
+    fn enormous_noise_relative_to_a_reading_stays_finite() {
         let noise = Noise {
             additive_ohm: f64::MAX,
             ..Noise::default()

@@ -1,10 +1,8 @@
-use std::marker::PhantomData;
-
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
 
 use super::{
-    ArrayScale, Axes, Geometry, SensorModel,
+    Axes, SensorModel,
     geometry::{Differences, SplitLength, two_sum},
 };
 
@@ -15,7 +13,8 @@ use super::{
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowConductance {
     axes: Axes,
-    columns: usize,
+    /// See [`Self::refined`].
+    is_refined: bool,
     /// s_k in 1/mm: M4.
     sums: Vec<f64>,
     /// ∂s_k/∂u in 1/mm²: unknown by unknown (node by node, each node's axes together), each M4 long.
@@ -28,15 +27,19 @@ impl RowConductance {
         let columns = model.scale.columns();
         Self {
             axes,
-            columns,
+            is_refined: false,
             sums: vec![0.0; columns],
             derivatives: vec![0.0; columns * model.scale.nodes_per_row() * axes.count()],
         }
     }
 
-    /// Returns the axes along which the nodes move.
-    pub fn axes(&self) -> Axes {
-        self.axes
+    /// Evaluates with [refined](reciprocal_root) reciprocal roots: in half the time, with errors of a few more units in the
+    /// last place. Distances must be [within reach](Self::is_within_reach).
+    pub(crate) fn refined(self) -> Self {
+        Self {
+            is_refined: true,
+            ..self
+        }
     }
 
     /// Returns the sums s_k in 1/mm: M4.
@@ -46,7 +49,7 @@ impl RowConductance {
 
     /// Returns the derivatives of every s_k by one unknown in 1/mm²: M4.
     pub fn derivatives(&self, unknown: usize) -> &[f64] {
-        &self.derivatives[unknown * self.columns..(unknown + 1) * self.columns]
+        &self.derivatives[unknown * self.sums.len()..][..self.sums.len()]
     }
 
     /// Evaluates sums and derivatives of row-wire `row` whose nodes are displaced by `displacements_mm` (M2 of them).
@@ -55,7 +58,7 @@ impl RowConductance {
     /// If there are not M2 displacements.
     pub fn evaluate(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
         assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
-        self.evaluate_by::<Divided>(model, row, displacements_mm, model.scale.nodes_per_column());
+        self.evaluate_broken(model, row, displacements_mm, model.scale.nodes_per_column());
     }
 
     /// Evaluates sums and derivatives with a broken row-wire or broken column-wires. Only the first nodes contribute:
@@ -66,25 +69,24 @@ impl RowConductance {
     /// If there are more displacements or electrodes than nodes.
     pub fn evaluate_broken(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3], electrodes: usize) {
         assert!(displacements_mm.len() <= model.scale.nodes_per_row() && electrodes <= model.scale.nodes_per_column());
-        self.evaluate_by::<Divided>(model, row, displacements_mm, electrodes);
-    }
-
-    /// Evaluates like [`Self::evaluate`] with [refined](Refined) reciprocal roots: in half the time, with errors of a few
-    /// more units in the last place. Distances must be [within reach](Self::is_within_reach).
-    pub(crate) fn evaluate_refined(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
-        assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
-        self.evaluate_by::<Refined>(model, row, displacements_mm, model.scale.nodes_per_column());
+        let at = (model, row, displacements_mm, electrodes);
+        let (sums, derivatives) = (&mut self.sums[..], &mut self.derivatives[..]);
+        match (self.axes, self.is_refined) {
+            (Axes::Z, false) => sum_reciprocal_distances::<1, false>(at, sums, derivatives),
+            (Axes::Z, true) => sum_reciprocal_distances::<1, true>(at, sums, derivatives),
+            (Axes::Xyz, false) => sum_reciprocal_distances::<3, false>(at, sums, derivatives),
+            (Axes::Xyz, true) => sum_reciprocal_distances::<3, true>(at, sums, derivatives),
+        }
     }
 
     /// Evaluates only the sums, bit-identical to [`Self::evaluate`]; derivatives remain those of the last evaluation.
     pub(crate) fn evaluate_sums(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
-        self.evaluate_sums_by::<Divided>(model, row, displacements_mm);
-    }
-
-    /// Evaluates only the sums, bit-identical to [`Self::evaluate_refined`]; derivatives remain those of the last
-    /// evaluation.
-    pub(crate) fn evaluate_sums_refined(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
-        self.evaluate_sums_by::<Refined>(model, row, displacements_mm);
+        assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
+        let at = (model, row, displacements_mm, model.scale.nodes_per_column());
+        match self.is_refined {
+            false => sum_reciprocal_distances::<0, false>(at, &mut self.sums, &mut []),
+            true => sum_reciprocal_distances::<0, true>(at, &mut self.sums, &mut []),
+        }
     }
 
     /// Returns `true` if refined reciprocal roots are valid for nodes displaced by up to `largest_mm` and at least
@@ -102,60 +104,23 @@ impl RowConductance {
             && SQUARES.contains(&(nearest_mm * nearest_mm))
             && SQUARES.contains(&(farthest_mm * farthest_mm))
     }
-
-    fn evaluate_sums_by<R: ReciprocalRoot>(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
-        assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
-        let sensor = (model.scale, &model.geometry);
-        let electrodes = model.scale.nodes_per_column();
-        sum_reciprocal_distances::<0, R>(sensor, row, displacements_mm, electrodes, &mut self.sums, &mut []);
-    }
-
-    fn evaluate_by<R: ReciprocalRoot>(
-        &mut self,
-        model: &SensorModel,
-        row: usize,
-        displacements_mm: &[DVec3],
-        electrodes: usize,
-    ) {
-        let (sums, derivatives) = (&mut self.sums[..], &mut self.derivatives[..]);
-        let sensor = (model.scale, &model.geometry);
-        match self.axes {
-            Axes::Z => sum_reciprocal_distances::<1, R>(sensor, row, displacements_mm, electrodes, sums, derivatives),
-            Axes::Xyz => sum_reciprocal_distances::<3, R>(sensor, row, displacements_mm, electrodes, sums, derivatives),
-        }
-    }
 }
 
-/// Method of computing 1/√x for the distances of Eq. (2).
-pub(super) trait ReciprocalRoot {
-    fn of(square: f64) -> f64;
-}
+/// Squares whose refined reciprocal root stays within the range of single precision.
+const SQUARES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
 
-/// A square root and a division.
-pub(super) struct Divided;
-
-/// Single-precision estimate, whose square root and division take a quarter of the time, refined by one third-order step
-/// (Householder 1970): with e = 1 − x y², `y (1 + e/2 + 3e²/8)` leaves an error of 5e³/16, below 1e-19. Accurate to 2
-/// units in the last place for squares in [`SQUARES`].
-pub(super) struct Refined;
-
-/// Squares whose [refined](Refined) reciprocal root stays within the range of single precision.
-pub(super) const SQUARES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
-
-impl ReciprocalRoot for Divided {
-    #[inline(always)]
-    fn of(square: f64) -> f64 {
-        1.0 / square.sqrt()
+/// Returns 1/√x: by a square root and a division or, if refined, by a single-precision estimate, whose square root and
+/// division take a quarter of the time, and one third-order step (Householder 1970): with e = 1 − x y²,
+/// `y (1 + e/2 + 3e²/8)` leaves an error of 5e³/16, below 1e-19. Accurate to 2 units in the last place for squares in
+/// [`SQUARES`].
+#[inline(always)]
+fn reciprocal_root<const IS_REFINED: bool>(square: f64) -> f64 {
+    if !IS_REFINED {
+        return 1.0 / square.sqrt();
     }
-}
-
-impl ReciprocalRoot for Refined {
-    #[inline(always)]
-    fn of(square: f64) -> f64 {
-        let first = f64::from(1.0 / (square as f32).sqrt());
-        let error = 1.0 - square * first * first;
-        first + first * (error * (0.5 + 0.375 * error))
-    }
+    let first = f64::from(1.0 / (square as f32).sqrt());
+    let error = 1.0 - square * first * first;
+    first + first * (error * (0.5 + 0.375 * error))
 }
 
 /// Number of columns per block, whose sums stay in registers. The padding of the last block is discarded.
@@ -177,39 +142,32 @@ const ELECTRODES: usize = 8;
 /// units in the last place for any number of nodes.
 ///
 /// There are no fused operations, so results are bit-identical on all machines.
-pub(super) fn sum_reciprocal_distances<const AXES: usize, R: ReciprocalRoot>(
-    (scale, geometry): (ArrayScale, &Geometry),
-    row: usize,
-    displacements_mm: &[DVec3],
-    electrodes: usize,
+pub(super) fn sum_reciprocal_distances<const AXES: usize, const IS_REFINED: bool>(
+    (model, row, displacements_mm, electrodes): (&SensorModel, usize, &[DVec3], usize),
     sums: &mut [f64],
     derivatives: &mut [f64],
 ) {
-    pulp::Arch::new().dispatch(Summation::<AXES, R> {
-        scale,
-        geometry,
+    pulp::Arch::new().dispatch(Summation::<AXES, IS_REFINED> {
+        model,
         row,
         displacements_mm,
         electrodes,
         sums,
         derivatives,
-        root: PhantomData,
     });
 }
 
 /// A struct instead of a closure so that the body is inlined into the SIMD-dispatched function.
-struct Summation<'a, const AXES: usize, R> {
-    scale: ArrayScale,
-    geometry: &'a Geometry,
+struct Summation<'a, const AXES: usize, const IS_REFINED: bool> {
+    model: &'a SensorModel,
     row: usize,
     displacements_mm: &'a [DVec3],
     electrodes: usize,
     sums: &'a mut [f64],
     derivatives: &'a mut [f64],
-    root: PhantomData<R>,
 }
 
-impl<const AXES: usize, R: ReciprocalRoot> WithSimd for Summation<'_, AXES, R> {
+impl<const AXES: usize, const IS_REFINED: bool> WithSimd for Summation<'_, AXES, IS_REFINED> {
     type Output = ();
 
     #[inline(always)]
@@ -217,7 +175,7 @@ impl<const AXES: usize, R: ReciprocalRoot> WithSimd for Summation<'_, AXES, R> {
         let shift_mm = self.displacements_mm.iter().fold(0.0_f64, |largest, displacement| {
             largest.max(displacement.x.abs()).max(displacement.y.abs())
         });
-        let differences = self.geometry.differences(self.scale, self.row, shift_mm);
+        let differences = self.model.geometry.differences(self.model.scale, self.row, shift_mm);
         self.sums.fill(0.0);
         // The first chunk, usually the only one, has separate code, which does not read derivatives.
         self.add_electrodes(&differences, 0, true);
@@ -227,33 +185,43 @@ impl<const AXES: usize, R: ReciprocalRoot> WithSimd for Summation<'_, AXES, R> {
     }
 }
 
-impl<const AXES: usize, R: ReciprocalRoot> Summation<'_, AXES, R> {
+impl<const AXES: usize, const IS_REFINED: bool> Summation<'_, AXES, IS_REFINED> {
     /// Adds the terms of one chunk of electrodes, from `first_electrode` on, of every column-wire.
     #[inline(always)]
     fn add_electrodes(&mut self, differences: &Differences, first_electrode: usize, are_first: bool) {
-        let Self {
-            geometry, electrodes, ..
-        } = *self;
+        let Self { model, electrodes, .. } = *self;
         let columns = self.sums.len();
+        let Differences {
+            grid,
+            row_x,
+            electrode_pitch,
+            half_node_pitch,
+            half_column_pitch,
+        } = *differences;
+        // x of the first node on the column-wires minus that of each electrode.
         let electrodes_x: [SplitLength; ELECTRODES] =
-            std::array::from_fn(|electrode| differences.electrode_x(first_electrode + electrode));
+            std::array::from_fn(|electrode| electrode_pitch.times(-((first_electrode + electrode) as f64)));
         let electrodes_x = &electrodes_x[..ELECTRODES.min(electrodes - first_electrode)];
         for (block, sums) in self.sums.chunks_mut(LANES).enumerate() {
             let first = block * LANES;
-            let columns_y: [SplitLength; LANES] = std::array::from_fn(|lane| differences.column_y(first + lane));
+            // y of the middle of the array minus that of each column-wire.
+            let columns_y: [SplitLength; LANES] =
+                std::array::from_fn(|lane| half_column_pitch.times((columns - 1) as f64 - (2 * (first + lane)) as f64));
             let mut totals = [0.0; LANES];
             let mut rests = [0.0; LANES];
             totals[..sums.len()].copy_from_slice(sums);
             for (node, displacement) in self.displacements_mm.iter().enumerate() {
-                let x = differences.node_x(displacement.x);
-                let y = differences.node_y(node, displacement.y);
-                let z = geometry.height_mm - displacement.z;
+                // x of the node minus that of the first node on the column-wires, and y minus that of the middle.
+                let x = row_x.plus(grid.split(displacement.x));
+                let twice_from_middle = (2 * node) as f64 - (model.scale.nodes_per_row() - 1) as f64;
+                let y = (half_node_pitch.times(twice_from_middle)).plus(grid.split(displacement.y));
+                let z = model.geometry.height_mm - displacement.z;
                 let dy = columns_y.map(|column_y| y.plus(column_y).rounded());
                 let mut of_node = [0.0; LANES];
                 let mut slopes = [[0.0; LANES]; AXES];
                 for &electrode_x in electrodes_x {
                     let dx = x.plus(electrode_x).rounded();
-                    add_electrode::<AXES, R>([dx, z], &dy, &mut of_node, &mut slopes);
+                    add_electrode::<AXES, IS_REFINED>([dx, z], &dy, &mut of_node, &mut slopes);
                 }
                 for lane in 0..LANES {
                     let (total, rest) = two_sum(totals[lane], of_node[lane]);
@@ -283,7 +251,7 @@ impl<const AXES: usize, R: ReciprocalRoot> Summation<'_, AXES, R> {
 
 /// Adds 1/d and its derivatives for an electrode of each column-wire of a block.
 #[inline(always)]
-fn add_electrode<const AXES: usize, R: ReciprocalRoot>(
+fn add_electrode<const AXES: usize, const IS_REFINED: bool>(
     [dx, z]: [f64; 2],
     dy: &[f64; LANES],
     sums: &mut [f64; LANES],
@@ -292,7 +260,7 @@ fn add_electrode<const AXES: usize, R: ReciprocalRoot>(
     let across2 = dx * dx + z * z;
     for lane in 0..LANES {
         let dy = dy[lane];
-        let inverse = R::of(across2 + dy * dy);
+        let inverse = reciprocal_root::<IS_REFINED>(across2 + dy * dy);
         sums[lane] += inverse;
         if AXES > 0 {
             let cubed = inverse * inverse * inverse;
@@ -308,7 +276,6 @@ fn add_electrode<const AXES: usize, R: ReciprocalRoot>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sensor::{Axes, RowConductance};
 
     /// Compared with the evaluation by square roots and divisions, whose rounding is tested in high precision elsewhere.
     #[test]
@@ -320,12 +287,13 @@ mod tests {
                 .map(|i| DVec3::new(0.07 * i as f64, -0.05 * i as f64, 0.09 * i as f64))
                 .collect();
             for axes in [Axes::Z, Axes::Xyz] {
-                let (mut exact, mut refined) = (RowConductance::new(&model, axes), RowConductance::new(&model, axes));
+                let mut exact = RowConductance::new(&model, axes);
+                let mut refined = exact.clone().refined();
                 exact.evaluate(&model, 1, &at);
-                refined.evaluate_refined(&model, 1, &at);
+                refined.evaluate(&model, 1, &at);
                 let mut alone = refined.clone();
-                alone.evaluate_sums_refined(&model, 2.min(model.scale.rows() - 1), &at);
-                alone.evaluate_sums_refined(&model, 1, &at);
+                alone.evaluate_sums(&model, 2.min(model.scale.rows() - 1), &at);
+                alone.evaluate_sums(&model, 1, &at);
                 assert_eq!(alone, refined);
                 let mut alone = exact.clone();
                 alone.evaluate_sums(&model, 2.min(model.scale.rows() - 1), &at);
@@ -437,7 +405,7 @@ mod tests {
     fn refined_roots_are_accurate_to_two_units_in_the_last_place() {
         let (mut square, mut worst) = (*SQUARES.start(), 0.0_f64);
         while square < *SQUARES.end() {
-            let root = Refined::of(square);
+            let root = reciprocal_root::<true>(square);
             // x y² with the rounding error of y²: fused operations round once.
             let upper = root * root;
             let lower = root.mul_add(root, -upper);

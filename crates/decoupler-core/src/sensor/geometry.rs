@@ -54,39 +54,26 @@ impl Geometry {
     /// # Errors
     /// If a length is not.
     pub fn check(&self) -> Result<(), SensorError> {
-        let Self {
-            height_mm,
-            row_x0_mm,
-            row_pitch_mm,
-            node_pitch_mm,
-            column_y0_mm,
-            column_pitch_mm,
-            column_node_x0_mm,
-            column_node_pitch_mm,
-        } = *self;
         let offsets = [
-            ("the first row-wire's x", row_x0_mm),
-            ("the first column-wire's y", column_y0_mm),
-            ("the first column node's x", column_node_x0_mm),
+            ("the first row-wire's x", self.row_x0_mm),
+            ("the first column-wire's y", self.column_y0_mm),
+            ("the first column node's x", self.column_node_x0_mm),
         ];
         let lengths = [
-            ("the height", height_mm),
-            ("the row pitch", row_pitch_mm),
-            ("the node pitch", node_pitch_mm),
-            ("the column pitch", column_pitch_mm),
-            ("the column node pitch", column_node_pitch_mm),
+            ("the height", self.height_mm),
+            ("the row pitch", self.row_pitch_mm),
+            ("the node pitch", self.node_pitch_mm),
+            ("the column pitch", self.column_pitch_mm),
+            ("the column node pitch", self.column_node_pitch_mm),
         ];
-        for (what, value) in offsets.into_iter().chain(lengths) {
-            if !value.is_finite() {
-                return Err(SensorError::NotFinite { what, value });
-            }
+        let mut all = offsets.into_iter().chain(lengths);
+        if let Some((what, value)) = all.find(|(_, value)| !value.is_finite()) {
+            return Err(SensorError::NotFinite { what, value });
         }
-        for (what, value) in lengths {
-            if value <= 0.0 {
-                return Err(SensorError::NotPositive { what, value });
-            }
+        match lengths.into_iter().find(|(_, value)| *value <= 0.0) {
+            Some((what, value)) => Err(SensorError::NotPositive { what, value }),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Returns x of row-wire `row`.
@@ -114,17 +101,6 @@ impl Geometry {
         DVec3::new(self.row_x_mm(row), self.node_y_mm(scale, node), self.height_mm)
     }
 
-    /// Returns the position of node `node` on row-wire `row` displaced by `displacement_mm`, whose z is positive
-    /// downwards (compression).
-    pub fn displaced_mm(&self, scale: ArrayScale, row: usize, node: usize, displacement_mm: DVec3) -> DVec3 {
-        let rest = self.row_node_mm(scale, row, node);
-        DVec3::new(
-            rest.x + displacement_mm.x,
-            rest.y + displacement_mm.y,
-            rest.z - displacement_mm.z,
-        )
-    }
-
     /// Returns the position of node `node` on column-wire `column`; the bottom layer does not move.
     pub fn column_node_mm(&self, column: usize, node: usize) -> DVec3 {
         DVec3::new(
@@ -148,8 +124,6 @@ impl Geometry {
             electrode_pitch: grid.split(self.column_node_pitch_mm),
             half_node_pitch: grid.split(0.5 * self.node_pitch_mm),
             half_column_pitch: grid.split(0.5 * self.column_pitch_mm),
-            nodes: scale.nodes_per_row(),
-            columns: scale.columns(),
         }
     }
 }
@@ -158,44 +132,12 @@ impl Geometry {
 /// cancels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Differences {
-    grid: FixedPoint,
+    pub(super) grid: FixedPoint,
     /// x of the row-wire minus that of the first node on the column-wires.
-    row_x: SplitLength,
-    electrode_pitch: SplitLength,
-    half_node_pitch: SplitLength,
-    half_column_pitch: SplitLength,
-    nodes: usize,
-    columns: usize,
-}
-
-impl Differences {
-    /// x of a node shifted by `shift_mm` minus that of the first node on the column-wires.
-    #[inline(always)]
-    pub(super) fn node_x(&self, shift_mm: f64) -> SplitLength {
-        self.row_x.plus(self.grid.split(shift_mm))
-    }
-
-    /// x of the first node on the column-wires minus that of node `electrode`.
-    #[inline(always)]
-    pub(super) fn electrode_x(&self, electrode: usize) -> SplitLength {
-        self.electrode_pitch.times(-(electrode as f64))
-    }
-
-    /// y of node `node` shifted by `shift_mm` minus that of the middle of the array.
-    #[inline(always)]
-    pub(super) fn node_y(&self, node: usize, shift_mm: f64) -> SplitLength {
-        let twice_from_centre = (2 * node) as f64 - (self.nodes - 1) as f64;
-        self.half_node_pitch
-            .times(twice_from_centre)
-            .plus(self.grid.split(shift_mm))
-    }
-
-    /// y of the middle of the array minus that of column-wire `column`.
-    #[inline(always)]
-    pub(super) fn column_y(&self, column: usize) -> SplitLength {
-        let twice_to_centre = (self.columns - 1) as f64 - (2 * column) as f64;
-        self.half_column_pitch.times(twice_to_centre)
-    }
+    pub(super) row_x: SplitLength,
+    pub(super) electrode_pitch: SplitLength,
+    pub(super) half_node_pitch: SplitLength,
+    pub(super) half_column_pitch: SplitLength,
 }
 
 /// Axes along which the nodes of the row-wires move, which determine the number of unknowns per node.

@@ -3,10 +3,7 @@ use ndarray::Array3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{
-    ArrayScale, Geometry, LARGEST_COUNT,
-    conductance::{Divided, sum_reciprocal_distances},
-};
+use super::{ArrayScale, Axes, Geometry, LARGEST_COUNT, RowConductance, conductance::sum_reciprocal_distances};
 
 /// Default resistance per millimetre of rubber. The paper gives none: g scales all resistances alike, so relative errors
 /// do not depend on it.
@@ -109,7 +106,8 @@ impl SensorModel {
 
     /// Returns the position of a node displaced by `displacement_mm`, whose z is positive downwards (compression).
     pub fn displaced_mm(&self, row: usize, node: usize, displacement_mm: DVec3) -> DVec3 {
-        self.geometry.displaced_mm(self.scale, row, node, displacement_mm)
+        let rest_mm = self.geometry.row_node_mm(self.scale, row, node);
+        rest_mm + DVec3::new(displacement_mm.x, displacement_mm.y, -displacement_mm.z)
     }
 
     /// Returns the displacement of a node at `position_mm`, z positive downwards: the inverse of [`Self::displaced_mm`].
@@ -137,14 +135,8 @@ impl SensorModel {
         assert_eq!(displacements_mm.len(), self.scale.nodes_per_row());
         assert_eq!(resistances_ohm.len(), self.scale.columns());
         // The sum of reciprocal distances, per millimetre, is accumulated in place of the resistance.
-        sum_reciprocal_distances::<0, Divided>(
-            (self.scale, &self.geometry),
-            row,
-            displacements_mm,
-            self.scale.nodes_per_column(),
-            resistances_ohm,
-            &mut [],
-        );
+        let at = (self, row, displacements_mm, self.scale.nodes_per_column());
+        sum_reciprocal_distances::<0, false>(at, resistances_ohm, &mut []);
         for (column, value) in resistances_ohm.iter_mut().enumerate() {
             *value = self.resistivity_ohm_per_mm / *value;
             if !(*value > 0.0 && value.is_finite()) {
@@ -177,13 +169,12 @@ impl SensorModel {
     /// If a resistance is not positive and finite.
     pub fn row_jacobian(&self, row: usize, displacements_mm: &[DVec3]) -> Result<Array3<f64>, SensorError> {
         let resistances_ohm = self.row_resistances(row, displacements_mm)?;
-        let (columns, nodes) = (self.scale.columns(), self.scale.nodes_per_row());
-        let (mut sums, mut derivatives) = (vec![0.0; columns], vec![0.0; 3 * nodes * columns]);
-        let sensor = (self.scale, &self.geometry);
-        let electrodes = self.scale.nodes_per_column();
-        sum_reciprocal_distances::<3, Divided>(sensor, row, displacements_mm, electrodes, &mut sums, &mut derivatives);
-        Ok(Array3::from_shape_fn((columns, nodes, 3), |(column, node, axis)| {
-            -resistances_ohm[column] / sums[column] * derivatives[(3 * node + axis) * columns + column]
+        let mut conductance = RowConductance::new(self, Axes::Xyz);
+        conductance.evaluate(self, row, displacements_mm);
+        let shape = (self.scale.columns(), self.scale.nodes_per_row(), 3);
+        Ok(Array3::from_shape_fn(shape, |(column, node, axis)| {
+            let slope = conductance.derivatives(3 * node + axis)[column];
+            -resistances_ohm[column] / conductance.sums()[column] * slope
         }))
     }
 }

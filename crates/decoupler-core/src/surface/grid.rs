@@ -10,15 +10,11 @@ use super::error::{Axis, SurfaceError};
 /// Values on it are `x points × y points`, x-major: point `(ix, iy)` has the index `ix · y_mm().len() + iy`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
-    x: GridAxis,
-    y: GridAxis,
+    pub(super) x: GridAxis,
+    pub(super) y: GridAxis,
 }
 
 impl Grid {
-    pub(super) fn new(x: GridAxis, y: GridAxis) -> Self {
-        Self { x, y }
-    }
-
     /// Returns the coordinates along x in millimetres, ascending.
     pub fn x_mm(&self) -> &[f64] {
         &self.x.points_mm

@@ -1,9 +1,13 @@
 /// Points that are the nodes of a lattice: every x with every y, in any order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lattice {
-    x_mm: Vec<f64>,
-    y_mm: Vec<f64>,
-    places: Vec<usize>,
+    /// Coordinates of the lines along x in millimetres, ascending.
+    pub x_mm: Vec<f64>,
+    /// Coordinates of the lines along y in millimetres, ascending.
+    pub y_mm: Vec<f64>,
+    /// Index of the point at each node, in the order of the values of a [`SurfaceMap`](super::SurfaceMap): all y of the
+    /// first x, then those of the next.
+    pub places: Vec<usize>,
 }
 
 /// Largest difference of the coordinates along a line of the lattice, relative to the distance of the nearest neighbours.
@@ -22,69 +26,42 @@ impl Lattice {
             return None;
         }
         let nearest_mm = nearest_distance_mm(places_mm);
-        let [x, y] =
-            [0, 1].map(|axis| Lines::of(&Vec::from_iter(places_mm.iter().map(|place| place[axis])), nearest_mm));
-        let (x, y) = (x?, y?);
-        if x.means_mm.len() * y.means_mm.len() != places_mm.len() {
+        let [x, y] = [0, 1].map(|axis| Vec::from_iter(places_mm.iter().map(|place| place[axis])));
+        let (x_mm, line_of_x) = lines(&x, nearest_mm)?;
+        let (y_mm, line_of_y) = lines(&y, nearest_mm)?;
+        if x_mm.len() * y_mm.len() != places_mm.len() {
             return None;
         }
         let mut places = vec![None; places_mm.len()];
-        for (place, (ix, iy)) in x.line_of.iter().zip(&y.line_of).enumerate() {
+        for (place, (ix, iy)) in line_of_x.iter().zip(&line_of_y).enumerate() {
             // There are as many points as nodes: if a node has none, another has two.
-            let node = &mut places[ix * y.means_mm.len() + iy];
+            let node = &mut places[ix * y_mm.len() + iy];
             if node.replace(place).is_some() {
                 return None;
             }
         }
-        Some(Self {
-            x_mm: x.means_mm,
-            y_mm: y.means_mm,
-            places: places.into_iter().collect::<Option<_>>()?,
-        })
-    }
-
-    /// Returns the coordinates of the lines along x in millimetres, ascending.
-    pub fn x_mm(&self) -> &[f64] {
-        &self.x_mm
-    }
-
-    /// Returns the coordinates of the lines along y in millimetres, ascending.
-    pub fn y_mm(&self) -> &[f64] {
-        &self.y_mm
-    }
-
-    /// Returns the index of the point at each node, in the order of the values of a [`SurfaceMap`](super::SurfaceMap):
-    /// all y of the first x, then those of the next.
-    pub fn places(&self) -> &[usize] {
-        &self.places
+        let places = places.into_iter().collect::<Option<_>>()?;
+        Some(Self { x_mm, y_mm, places })
     }
 }
 
-/// Coordinates along one axis, grouped into lines.
-struct Lines {
-    /// Mean of each line, ascending.
-    means_mm: Vec<f64>,
-    /// Line of each coordinate.
-    line_of: Vec<usize>,
-}
-
-impl Lines {
-    fn of(coordinates_mm: &[f64], nearest_mm: f64) -> Option<Self> {
-        let mut order = Vec::from_iter(0..coordinates_mm.len());
-        order.sort_by(|&one, &other| coordinates_mm[one].total_cmp(&coordinates_mm[other]));
-        let lines = order.chunk_by(|&one, &next| coordinates_mm[next] - coordinates_mm[one] <= 0.5 * nearest_mm);
-        let (mut means_mm, mut line_of) = (Vec::new(), vec![0; coordinates_mm.len()]);
-        for (number, line) in lines.enumerate() {
-            let (first_mm, last_mm) = (coordinates_mm[line[0]], coordinates_mm[line[line.len() - 1]]);
-            if last_mm - first_mm > SPREAD * nearest_mm {
-                return None;
-            }
-            line.iter().for_each(|&place| line_of[place] = number);
-            let sum_mm = line.iter().map(|&place| coordinates_mm[place] - first_mm).sum::<f64>();
-            means_mm.push(first_mm + sum_mm / line.len() as f64);
+/// Returns the mean of each line of coordinates along one axis, ascending, and the line of each coordinate; `None` if there
+/// are none, or the coordinates of a line differ too much.
+fn lines(coordinates_mm: &[f64], nearest_mm: f64) -> Option<(Vec<f64>, Vec<usize>)> {
+    let mut order = Vec::from_iter(0..coordinates_mm.len());
+    order.sort_by(|&one, &other| coordinates_mm[one].total_cmp(&coordinates_mm[other]));
+    let lines = order.chunk_by(|&one, &next| coordinates_mm[next] - coordinates_mm[one] <= 0.5 * nearest_mm);
+    let (mut means_mm, mut line_of) = (Vec::new(), vec![0; coordinates_mm.len()]);
+    for line in lines {
+        let (first_mm, last_mm) = (coordinates_mm[line[0]], coordinates_mm[line[line.len() - 1]]);
+        if last_mm - first_mm > SPREAD * nearest_mm {
+            return None;
         }
-        (!means_mm.is_empty()).then_some(Self { means_mm, line_of })
+        line.iter().for_each(|&place| line_of[place] = means_mm.len());
+        let sum_mm = line.iter().map(|&place| coordinates_mm[place] - first_mm).sum::<f64>();
+        means_mm.push(first_mm + sum_mm / line.len() as f64);
     }
+    (!means_mm.is_empty()).then_some((means_mm, line_of))
 }
 
 /// Distance of the nearest two points; 0 for fewer.
@@ -119,22 +96,22 @@ mod tests {
         for jitter in [0.0, 0.05] {
             let places = places(jitter);
             let lattice = Lattice::of(&places).unwrap();
-            assert_eq!((lattice.x_mm().len(), lattice.y_mm().len()), (3, 4));
+            assert_eq!((lattice.x_mm.len(), lattice.y_mm.len()), (3, 4));
             let nodes = lattice
-                .x_mm()
+                .x_mm
                 .iter()
-                .flat_map(|x| lattice.y_mm().iter().map(move |y| [*x, *y]));
-            for (node, &place) in nodes.zip(lattice.places()) {
+                .flat_map(|x| lattice.y_mm.iter().map(move |y| [*x, *y]));
+            for (node, &place) in nodes.zip(&lattice.places) {
                 let off = (node[0] - places[place][0]).hypot(node[1] - places[place][1]);
                 assert!(off <= 2.0 * jitter, "{node:?} {:?}", places[place]);
             }
         }
         let line = Lattice::of(&[[0.0, 3.0], [0.0, 1.0], [0.0, 2.0]]).unwrap();
         assert_eq!(
-            (line.x_mm(), line.y_mm(), line.places()),
+            (&line.x_mm[..], &line.y_mm[..], &line.places[..]),
             (&[0.0][..], &[1.0, 2.0, 3.0][..], &[1, 2, 0][..])
         );
-        assert_eq!(Lattice::of(&[[4.0, 2.0]]).unwrap().places(), [0]);
+        assert_eq!(Lattice::of(&[[4.0, 2.0]]).unwrap().places, [0]);
     }
 
     #[test]

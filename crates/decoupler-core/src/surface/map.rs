@@ -8,12 +8,11 @@ use glam::DVec2;
 use super::{
     error::{Axis, SurfaceError},
     grid::{Grid, GridAxis, SortedAxis},
-    scattered::Scattered,
     spline::{Point, Weights},
 };
 
 /// Maximum number of nodes for a spline; for more nodes, the cost of factorisation and matrix outweighs the benefit.
-const MAX_SPLINE_NODES: usize = 1000;
+pub(super) const MAX_SPLINE_NODES: usize = 1000;
 
 /// Maximum number of weights (grid points × nodes): about a millisecond per frame, limited by memory bandwidth.
 const MAX_WEIGHTS: usize = 1_100_000;
@@ -48,25 +47,21 @@ impl fmt::Display for Interpolation {
 /// Interpolation through nodes, factored once, so that each frame takes one matrix-vector product.
 #[derive(Clone, Debug)]
 pub struct SurfaceMap {
-    grid: Grid,
-    nodes: usize,
-    interpolation: Interpolation,
+    pub(super) grid: Grid,
+    pub(super) nodes: usize,
+    pub(super) interpolation: Interpolation,
     /// Weights of the spline; `None` if it is not used.
-    weights: Option<Weights>,
+    pub(super) weights: Option<Weights>,
     /// Row of the weights at each grid point; `None` where there is no surface.
-    rows: Vec<Option<usize>>,
+    pub(super) rows: Vec<Option<usize>>,
     /// See [`Self::beyond`].
-    beyond: Vec<f64>,
+    pub(super) beyond: Vec<f64>,
     /// Coordinates x and y of the nodes of a lattice.
-    lattice: Option<[SortedAxis; 2]>,
+    pub(super) lattice: Option<[SortedAxis; 2]>,
 }
 
 /// A map in use, with its coordinates x and y.
-struct Shared {
-    x_mm: Vec<f64>,
-    y_mm: Vec<f64>,
-    map: Weak<SurfaceMap>,
-}
+type Shared = ([Vec<f64>; 2], Weak<SurfaceMap>);
 
 /// Maps in use; of few lattices at a time.
 static SHARED: Mutex<Vec<Shared>> = Mutex::new(Vec::new());
@@ -80,17 +75,13 @@ impl SurfaceMap {
     pub fn shared(x_mm: &[f64], y_mm: &[f64]) -> Result<Arc<Self>, SurfaceError> {
         // While it is prepared, others who want the same wait for it. A panic leaves the list as it was.
         let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
-        shared.retain(|shared| shared.map.strong_count() > 0);
-        let same = shared.iter().find(|shared| shared.x_mm == x_mm && shared.y_mm == y_mm);
-        if let Some(map) = same.and_then(|shared| shared.map.upgrade()) {
+        shared.retain(|(_, map)| map.strong_count() > 0);
+        let same = shared.iter().find(|(places_mm, _)| *places_mm == [x_mm, y_mm]);
+        if let Some(map) = same.and_then(|(_, map)| map.upgrade()) {
             return Ok(map);
         }
         let map = Arc::new(Self::new(x_mm, y_mm)?);
-        shared.push(Shared {
-            x_mm: x_mm.to_owned(),
-            y_mm: y_mm.to_owned(),
-            map: Arc::downgrade(&map),
-        });
+        shared.push(([x_mm, y_mm].map(<[f64]>::to_owned), Arc::downgrade(&map)));
         Ok(map)
     }
 
@@ -103,33 +94,39 @@ impl SurfaceMap {
         let lattice = [SortedAxis::new(Axis::X, x_mm)?, SortedAxis::new(Axis::Y, y_mm)?];
         let nodes = x_mm.len() * y_mm.len();
         let is_line = x_mm.len() == 1 || y_mm.len() == 1;
-        let mut interpolation = if is_line {
-            Interpolation::CubicSpline
-        } else {
-            Interpolation::ThinPlateSpline
-        };
         let mut grid = self::grid(&lattice, if is_line { GRID_POINTS } else { affordable(nodes) });
-        let mut points = Vec::new();
-        let mut rows = Vec::with_capacity(grid.len());
-        for ix in 0..grid.x_mm().len() {
-            for iy in 0..grid.y_mm().len() {
-                // A curve along a line of nodes is constant across it.
-                let row = match (x_mm.len(), y_mm.len()) {
-                    (1, _) => iy,
-                    (_, 1) => ix,
-                    _ => grid.index(ix, iy),
-                };
-                rows.push(Some(row));
-                if row == points.len() {
-                    points.push(point_of(&grid, (ix, iy), (x_mm, y_mm)));
-                }
+        let (mut points, mut rows) = (Vec::new(), Vec::with_capacity(grid.len()));
+        for (index, place_mm) in grid.places_mm().enumerate() {
+            let (ix, iy) = (index / grid.y_mm().len(), index % grid.y_mm().len());
+            // A curve along a line of nodes is constant across it.
+            let row = match (x_mm, y_mm) {
+                ([_], _) => iy,
+                (_, [_]) => ix,
+                _ => index,
+            };
+            rows.push(Some(row));
+            if row == points.len() {
+                let x = if let [only_mm] = x_mm { *only_mm } else { place_mm.x };
+                let y = if let [only_mm] = y_mm { *only_mm } else { place_mm.y };
+                let node_at =
+                    |nodes_mm: &[f64], point_mm: f64| nodes_mm.iter().position(|node_mm| *node_mm == point_mm);
+                let (row, node) = (node_at(x_mm, x), node_at(y_mm, y));
+                points.push(Point {
+                    place_mm: DVec2::new(x, y),
+                    is_inside: grid.is_inside(ix, iy),
+                    node: row.zip(node).map(|(row, node)| row * y_mm.len() + node),
+                });
             }
         }
         let places_mm = x_mm.iter().flat_map(|&x| y_mm.iter().map(move |&y| DVec2::new(x, y)));
         let weights = (nodes <= MAX_SPLINE_NODES).then(|| Weights::new(&Vec::from_iter(places_mm), &points));
         let weights = weights.flatten();
+        let interpolation = match weights {
+            Some(_) if is_line => Interpolation::CubicSpline,
+            Some(_) => Interpolation::ThinPlateSpline,
+            None => Interpolation::Bilinear,
+        };
         if weights.is_none() {
-            interpolation = Interpolation::Bilinear;
             grid = self::grid(&lattice, GRID_POINTS);
         }
         Ok(Self {
@@ -140,38 +137,6 @@ impl SurfaceMap {
             weights,
             rows,
             lattice: Some(lattice),
-        })
-    }
-
-    /// Prepares the thin-plate spline through nodes at these points (x, y), in millimetres, which need not form a
-    /// lattice. It has gaps (NaN) outside their convex hull, except for a margin of half the mean distance between
-    /// neighbours, and at points far from every node.
-    ///
-    /// # Errors
-    /// [`SurfaceError`] if there are no nodes, or more than a thousand, a coordinate is not finite, two nodes coincide or
-    /// nearly so, or all are on one line. A line along x or y is a lattice: see [`Self::new`].
-    pub fn scattered(places_mm: &[[f64; 2]]) -> Result<Self, SurfaceError> {
-        let nodes = places_mm.len();
-        if nodes > MAX_SPLINE_NODES {
-            return Err(SurfaceError::TooMany {
-                count: nodes,
-                most: MAX_SPLINE_NODES,
-            });
-        }
-        let Scattered {
-            grid,
-            rows,
-            beyond,
-            weights,
-        } = Scattered::new(places_mm, affordable(nodes))?;
-        Ok(Self {
-            grid,
-            nodes,
-            interpolation: Interpolation::ThinPlateSpline,
-            weights: Some(weights),
-            rows,
-            beyond,
-            lattice: None,
         })
     }
 
@@ -223,36 +188,15 @@ impl SurfaceMap {
 }
 
 /// Number of grid points per side for a spline through this many nodes.
-fn affordable(nodes: usize) -> usize {
+pub(super) fn affordable(nodes: usize) -> usize {
     ((MAX_WEIGHTS as f64 / nodes.max(1) as f64).sqrt() as usize).min(GRID_POINTS)
 }
 
 fn grid([x, y]: &[SortedAxis; 2], target: usize) -> Grid {
     // A single coordinate gets the pitch of the other axis; a single node gets a millimetre.
     let lone_margin_mm = 0.5 * x.pitch_mm().or(y.pitch_mm()).unwrap_or(1.0);
-    Grid::new(
-        GridAxis::through(&x.nodes_mm, target, lone_margin_mm),
-        GridAxis::through(&y.nodes_mm, target, lone_margin_mm),
-    )
-}
-
-/// A grid point of the lattice `x_mm × y_mm`; on a line of nodes, the nearest point on that line.
-fn point_of(grid: &Grid, (ix, iy): (usize, usize), (x_mm, y_mm): (&[f64], &[f64])) -> Point {
-    let on_axis = |nodes_mm: &[f64], point_mm: f64| match nodes_mm {
-        [only_mm] => *only_mm,
-        _ => point_mm,
-    };
-    let (x, y) = (on_axis(x_mm, grid.x_mm()[ix]), on_axis(y_mm, grid.y_mm()[iy]));
-    let (row, node) = (node_at(x_mm, x), node_at(y_mm, y));
-    Point {
-        place_mm: DVec2::new(x, y),
-        is_inside: grid.is_inside(ix, iy),
-        node: row.zip(node).map(|(row, node)| row * y_mm.len() + node),
-    }
-}
-
-fn node_at(nodes_mm: &[f64], point_mm: f64) -> Option<usize> {
-    nodes_mm.iter().position(|&node_mm| node_mm == point_mm)
+    let [x, y] = [x, y].map(|axis| GridAxis::through(&axis.nodes_mm, target, lone_margin_mm));
+    Grid { x, y }
 }
 
 /// Bilinear interpolation on a lattice, defined for every array. Beyond the outermost nodes the surface keeps its slope.

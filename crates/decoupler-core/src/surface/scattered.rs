@@ -8,6 +8,7 @@ use glam::DVec2;
 use super::{
     error::{Axis, SurfaceError},
     grid::{CLOSEST_RELATIVE, Grid, GridAxis, check_coordinates},
+    map::{Interpolation, MAX_SPLINE_NODES, SurfaceMap, affordable},
     spline::{Point, Weights},
 };
 
@@ -17,34 +18,36 @@ const THINNEST: f64 = 1e-6;
 /// Maximum distance of the surface from the nearest point, relative to the largest nearest-neighbour distance.
 const REACH: f64 = 1.5;
 
-/// The grid points between scattered nodes.
-pub(super) struct Scattered {
-    pub(super) grid: Grid,
-    /// Row of the weights at each grid point that has a surface.
-    pub(super) rows: Vec<Option<usize>>,
-    /// Distance of each grid point from the hull as a fraction of the margin; 1 where there is no surface.
-    pub(super) beyond: Vec<f64>,
-    /// Weights at these points, followed by those at the nodes.
-    pub(super) weights: Weights,
-}
-
-impl Scattered {
-    /// Prepares the spline, with a grid of about `target` points per side.
-    pub(super) fn new(places_mm: &[[f64; 2]], target: usize) -> Result<Self, SurfaceError> {
+impl SurfaceMap {
+    /// Prepares the thin-plate spline through nodes at these points (x, y), in millimetres, which need not form a
+    /// lattice. It has gaps (NaN) outside their convex hull, except for a margin of half the mean distance between
+    /// neighbours, and at points far from every node.
+    ///
+    /// # Errors
+    /// [`SurfaceError`] if there are no nodes, or more than a thousand, a coordinate is not finite, two nodes coincide or
+    /// nearly so, or all are on one line. A line along x or y is a lattice: see [`Self::new`].
+    pub fn scattered(places_mm: &[[f64; 2]]) -> Result<Self, SurfaceError> {
+        let (nodes, target) = (places_mm.len(), affordable(places_mm.len()));
+        if nodes > MAX_SPLINE_NODES {
+            return Err(SurfaceError::TooMany {
+                count: nodes,
+                most: MAX_SPLINE_NODES,
+            });
+        }
         for (axis, place) in [(Axis::X, 0), (Axis::Y, 1)] {
             check_coordinates(axis, &Vec::from_iter(places_mm.iter().map(|at| at[place])))?;
         }
         let places = Vec::from_iter(places_mm.iter().copied().map(DVec2::from));
         let neighbours_mm = distances_of_neighbours(&places)?;
         let hull = Hull::of(&places).ok_or(SurfaceError::OnOneLine)?;
-        let margin_mm = 0.5 * neighbours_mm.iter().sum::<f64>() / places.len() as f64;
+        let margin_mm = 0.5 * neighbours_mm.iter().sum::<f64>() / nodes as f64;
         let reach_mm = REACH * neighbours_mm.iter().copied().fold(0.0, f64::max);
         let low = places.iter().copied().fold(DVec2::INFINITY, DVec2::min);
         let high = places.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
-        let grid = Grid::new(
-            GridAxis::spanning(low.x, high.x, target, margin_mm),
-            GridAxis::spanning(low.y, high.y, target, margin_mm),
-        );
+        let grid = Grid {
+            x: GridAxis::spanning(low.x, high.x, target, margin_mm),
+            y: GridAxis::spanning(low.y, high.y, target, margin_mm),
+        };
         let (mut rows, mut beyond) = (vec![None; grid.len()], vec![1.0; grid.len()]);
         let mut points = Vec::new();
         for (index, place_mm) in grid.places_mm().enumerate() {
@@ -66,10 +69,13 @@ impl Scattered {
             node: Some(node),
         }));
         Ok(Self {
-            weights: Weights::new(&places, &points).ok_or(SurfaceError::Uneven)?,
             grid,
+            nodes,
+            interpolation: Interpolation::ThinPlateSpline,
+            weights: Some(Weights::new(&places, &points).ok_or(SurfaceError::Uneven)?),
             rows,
             beyond,
+            lattice: None,
         })
     }
 }

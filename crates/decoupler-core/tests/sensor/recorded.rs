@@ -1,12 +1,10 @@
 //! Analysis of recorded readings, on sets whose truth is known by construction.
 
 use decoupler_core::{
-    dataset::{Dataset, DividedSamples, Division, Folds, Seed, SplitBy, Stream},
+    dataset::{Dataset, Division, Folds, Seed, SplitBy, Stream},
     evaluation::{
         CrossValidated, Measured, RunError, RunSettings,
-        recorded::{
-            FittedModel, Interval, LearningCurve, SplitComparison, channel_importance, nonlinear_gains, ridge_remark,
-        },
+        recorded::{Findings, FittedModel, SplitComparison, nonlinear_gains, ridge_remark},
     },
     job::Job,
     scene::RowModel,
@@ -116,99 +114,64 @@ fn a_relation_that_drifts_is_said_to_change_over_time() {
     );
 }
 
+/// Findings with this model on a set whose last part of this share is for testing.
+fn findings(set: &Dataset, folds: usize, by: SplitBy, test_fraction: f64, model: FittedModel) -> Findings {
+    let division = Division {
+        by,
+        test_fraction,
+        validation_fraction: 0.0,
+    };
+    let ends: (&Job<'_>, &dyn Fn() -> bool) = (&Job::UNINTERRUPTED, &|| false);
+    Findings::measure(&settings(), set, (&division, folds), Some(model), &|_| (), ends).unwrap()
+}
+
 #[test]
 fn the_error_grows_by_the_information_unique_to_a_left_out_channel() {
     let set = set(2000, 4, 5, |c, rng| 2.0 * c[0] + 0.5 * c[1] + 0.5 * normal(rng));
-    let folds = Folds::by(&set, 5, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
-    let importance = |set: &Dataset, model| {
-        let found = channel_importance(&settings(), set, (&folds, SplitBy::Time), model, &Job::UNINTERRUPTED);
-        found.unwrap()
-    };
-    let found = importance(&set, FittedModel::Ridge);
+    let found = findings(&set, 5, SplitBy::Time, 0.2, FittedModel::Ridge);
     // √(2² + 0.5²)/0.5, √(0.5² + 0.5²)/0.5, and no growth.
     for (channel, expected) in [(0, 4.123), (1, 1.414), (2, 1.0), (3, 1.0)] {
-        let growth = found[channel].growth[0].unwrap();
+        let growth = found.importance[channel][0].unwrap();
         assert!((growth.value / expected - 1.0).abs() < 0.05, "{channel}: {growth:?}");
         assert!(
             growth.low - 0.01 < expected && expected < growth.high + 0.01,
             "{channel}: {growth:?}"
         );
-        assert_eq!(found[channel].is_dispensable(), channel > 1, "{channel}: {growth:?}");
+        assert_eq!(found.is_dispensable(channel), channel > 1, "{channel}: {growth:?}");
     }
     // A copy makes the channel redundant, which permuting it would not show.
     let copied = set.of_channels(&[0, 1, 2, 0]);
-    let found = importance(&copied, FittedModel::Ridge);
-    assert!(found[0].largest().unwrap().value < 1.01 && found[1].largest().unwrap().value > 1.3);
+    let growth = |found: &Findings| Vec::from_iter(found.importance.iter().map(|of| of[0].unwrap().value));
+    let found = growth(&findings(&copied, 5, SplitBy::Time, 0.2, FittedModel::Ridge));
+    assert!(found[0] < 1.01 && found[1] > 1.3, "{found:?}");
     let few = set.select(&Vec::from_iter(0..300));
-    let folds = Folds::by(&few, 3, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
-    let found = channel_importance(
-        &settings(),
-        &few,
-        (&folds, SplitBy::Time),
-        FittedModel::Network,
-        &Job::UNINTERRUPTED,
-    );
-    let growth: Vec<f64> = found.unwrap().iter().map(|of| of.growth[0].unwrap().value).collect();
+    let found = growth(&findings(&few, 3, SplitBy::Time, 0.2, FittedModel::Network));
     assert!(
-        growth[0] > 3.0 && (1.1..2.0).contains(&growth[1]) && growth[2] < 1.1,
-        "{growth:?}"
+        found[0] > 3.0 && (1.1..2.0).contains(&found[1]) && found[2] < 1.1,
+        "{found:?}"
     );
 }
 
 #[test]
-fn a_learning_curve_predicts_the_error_with_twice_the_samples() {
+fn a_learning_curve_has_the_errors_of_theory() {
     // Least squares with p = 20 readings: the error is σ √(1 + p/(n − p − 1)) for n samples, on average.
     let all = set(4000, 20, 6, |c, rng| c.iter().sum::<f64>() + 3.0 * normal(rng));
-    let curve = |samples: usize, by| {
-        let parts = DividedSamples {
-            training: (0..samples).collect(),
-            validation: Vec::new(),
-            test: (2000..4000).collect(),
-        };
-        let found = LearningCurve::measure(&settings(), &all, (&parts, by), FittedModel::Ridge, &Job::UNINTERRUPTED);
-        found.unwrap().remove(0)
-    };
     let theory = |samples: f64| 3.0 * (1.0 + 20.0 / (samples - 21.0)).sqrt();
     for by in [SplitBy::Time, SplitBy::Random, SplitBy::Group] {
-        for samples in [60, 80, 120] {
-            let n = samples as f64;
-            let expected = theory(2.0 * n) / theory(n);
-            let ratio = curve(samples, by).doubling.unwrap();
-            assert!(
-                ratio.low < expected && expected < ratio.high,
-                "{by}, {samples}: {ratio:?}, {expected}"
-            );
-            assert!(ratio.value < 0.99, "{by}, {samples}: {ratio:?}");
+        let curve = findings(&all, 5, by, 0.5, FittedModel::Ridge).curve;
+        assert_eq!(curve.len(), 7);
+        assert_eq!((curve[0].samples, curve[6].samples), (250, 2000), "{by}");
+        assert!(curve.windows(2).all(|pair| pair[0].samples < pair[1].samples));
+        for point in &curve {
+            let (rmse, [best, worst]) = (point.rmse[0], point.range[0]);
+            let expected = theory(point.samples as f64);
+            assert!((rmse / expected - 1.0).abs() < 0.05, "{by}, {expected}: {point:?}");
+            assert!(best <= rmse && rmse <= worst, "{point:?}");
         }
     }
-    let ratio = Interval {
-        value: 0.9,
-        low: 0.85,
-        high: 0.95,
-    };
-    let few = LearningCurve {
-        doubling: Some(ratio),
-        ..curve(80, SplitBy::Time)
-    };
-    assert!(few.gains());
-    assert_eq!(
-        few.sentence("y"),
-        "twice the samples would lower the error of y by about 10 % (5 to 15 %)"
-    );
-    let many = curve(2000, SplitBy::Time);
-    assert!(!many.gains(), "{:?}", many.doubling);
-    assert!(
-        many.sentence("y").starts_with("no gain found for y"),
-        "{}",
-        many.sentence("y")
-    );
-    assert_eq!(many.points.len(), 7);
-    assert!(many.points.windows(2).all(|pair| pair[0].samples < pair[1].samples));
-    let least = many.points.last().unwrap();
-    assert!((least.rmse / theory(2000.0) - 1.0).abs() < 0.05, "{least:?}");
-    let none = curve(9, SplitBy::Time);
-    assert_eq!((none.law, none.doubling), (None, None));
-    assert!(none.sentence("y").contains("too few"));
+    let few = all.select(&Vec::from_iter(0..18));
+    let curve = findings(&few, 2, SplitBy::Time, 0.5, FittedModel::Ridge).curve;
+    assert_eq!(curve.len(), 1, "fits to fewer than 8 samples are left out: {curve:?}");
 }
 
 #[test]

@@ -70,9 +70,8 @@ pub use sweep::{
 };
 pub use table::{Cell, Table, TableColumn, TableForm};
 pub use tables::{
-    decoder_table, describe_channels, describe_coverage, describe_determinacy, describe_half_widths,
-    describe_positions, describe_samples, describe_target, describe_warnings, describe_worse_than_ridge, error_table,
-    write_loss_curves,
+    decoder_table, describe_coverage, describe_determinacy, describe_half_widths, describe_positions, describe_samples,
+    describe_target, describe_warnings, describe_worse_than_ridge, error_table, write_loss_curves,
 };
 pub use trade_tables::{describe_recorded_workload, describe_workload, trade_off_points, trade_off_summary};
 pub use unfinished::exit_leaving_nothing;

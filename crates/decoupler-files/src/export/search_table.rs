@@ -27,13 +27,15 @@ pub fn search_table(record: &AutoRecord) -> Table {
         vec![
             if place == record.chosen { "*".into() } else { "".into() },
             tried.features().into(),
-            tried.model().into(),
+            tried.model.to_string().into(),
             tried
-                .begin()
-                .map_or_else(|| "".into(), |begin| begin.to_string().into()),
+                .training()
+                .map_or_else(|| "".into(), |(begin, _)| begin.to_string().into()),
             (100.0 * tried.error).into(),
             (100.0 * tried.standard_error).into(),
-            tried.epochs().map_or_else(|| "".into(), Cell::from),
+            tried
+                .training()
+                .map_or_else(|| "".into(), |(_, epochs)| Cell::from(epochs)),
             tried.seconds.into(),
         ]
     };

@@ -6,8 +6,8 @@ use decoupler_core::{
         Coverage, DecoderReport, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, HalfWidth, Intervals, Scores,
         TargetErrors, TestErrors,
         recorded::{
-            ChannelRemark, Determinacy, Determination, Findings, FittedModel, TargetFindings, Undetermined,
-            ridge_remark, target_remarks,
+            Determinacy, Determination, Findings, TargetFindings, Undetermined, channel_remarks, ridge_remark,
+            target_remarks,
         },
     },
     problem::{Channel, Problem, TargetPosition},
@@ -231,7 +231,7 @@ pub fn describe_determinacy(targets: &[Channel], measured: &[Result<Determinatio
     let of = |(target, measured): (&Channel, &Result<Determination, Undetermined>)| match measured {
         Err(cause) => Some(format!("{}: {cause}", target.name)),
         Ok(measured) => (measured.determinacy() != Determinacy::Determined)
-            .then(|| measured.sentence(&target.name, &[FittedModel::Network])),
+            .then(|| measured.sentence(&target.name, "the network explains")),
     };
     targets.iter().zip(measured).filter_map(of).collect()
 }
@@ -299,7 +299,7 @@ pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
         count => format!("{count} targets have positions"),
     };
     Some(match TargetPosition::lattice(positions) {
-        Some(lattice) => format!("{count}: a grid of {} × {}", lattice.x_mm().len(), lattice.y_mm().len()),
+        Some(lattice) => format!("{count}: a grid of {} × {}", lattice.x_mm.len(), lattice.y_mm.len()),
         None => format!("{count}, scattered over the skin"),
     })
 }
@@ -307,24 +307,14 @@ pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
 /// Describes how much of a target the readings explain, judged by the better of network and ridge.
 pub fn describe_target(name: &str, found: &TargetFindings) -> String {
     match found.best() {
-        Some((_, best)) if found.network.is_some() => best.sentence(name, &[FittedModel::Ridge, FittedModel::Network]),
-        Some((_, best)) => best.sentence(name, &[FittedModel::Ridge]),
+        Some((_, best)) if found.network.is_some() => best.sentence(name, "ridge regression and the network explain"),
+        Some((_, best)) => best.sentence(name, "ridge regression explains"),
         None => {
             let cause = found.ridge.err();
             let cause = cause.map_or_else(|| "nothing can be judged".to_owned(), |cause| cause.to_string());
             format!("{name}: {cause}")
         }
     }
-}
-
-/// Describes remarks on channels and targets.
-pub fn describe_channels(inputs: &[Channel], targets: &[Channel], remarks: &[ChannelRemark]) -> Vec<String> {
-    let name = |channel: usize| inputs[channel].name.clone();
-    let target_name = |target: usize| targets[target].name.clone();
-    remarks
-        .iter()
-        .map(|remark| remark.sentence(name, target_name))
-        .collect()
 }
 
 /// Warns of readings that may be leaks, and of changes of the targets that were not tested, in the samples of a recording.
@@ -337,9 +327,7 @@ pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
         inputs, targets, set, ..
     } = &recordings.training;
     let division = recordings.recorded.plan.division;
-    // With a memory, the readings are followed by values from the past.
-    let remarks = target_remarks(training, inputs.len().min(training.channels()), division.by);
-    let mut warnings = describe_channels(inputs, targets, &remarks);
+    let mut warnings = target_remarks(training, division.by, inputs, targets);
     let parts = division.divide(set, &mut Seed(0).rng(Stream::Split));
     let tests_first = parts.is_ok_and(|parts| parts.test.first() == Some(&0));
     if division.by == SplitBy::Time && recordings.test.is_none() && tests_first {
@@ -364,10 +352,11 @@ pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
     warnings
 }
 
-/// Warns of remarks on channels and targets, and of targets for which a network is no better than ridge.
-pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Findings) -> Vec<String> {
-    let mut warnings = describe_channels(inputs, targets, &findings.remarks);
-    for (target, found) in targets.iter().zip(&findings.targets) {
+/// Returns remarks on the channels and targets of a recording that is divided by `by`, and on the targets for which a
+/// network is no better than ridge.
+pub fn describe_warnings(recording: &Recording, by: SplitBy, findings: &Findings) -> Vec<String> {
+    let mut warnings = channel_remarks(&recording.set, by, &recording.inputs, &recording.targets);
+    for (target, found) in recording.targets.iter().zip(&findings.targets) {
         warnings.extend(found.gain.and_then(|gain| ridge_remark(gain, &target.name)));
     }
     warnings

@@ -20,7 +20,7 @@ pub mod surface;
 
 pub use axis::{AxisScale, PlotAxis, TickRule, Ticks, multiples, share, step_for, tick_text};
 pub use colour_map::{ColourMap, HeatMap, Rgb, SequentialMap, is_light};
-pub use of_epochs::{EpochOutline, compared_losses_figure, learning_curve_figure, loss_figure, training_state_figure};
+pub use of_epochs::{EpochOutline, compared_losses_figure, loss_figure, training_state_figure};
 pub use of_errors::{
     ErrorBins, RegressionLine, error_histogram_figure, pair_sample, regression_figure, target_histogram_figure,
     target_pairs, target_regression_figure,

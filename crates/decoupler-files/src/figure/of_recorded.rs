@@ -185,8 +185,8 @@ impl TargetSurface {
         let first = positions.first().and_then(|first| targets.get(first.target));
         let (map, nodes) = match TargetPosition::lattice(positions) {
             Some(lattice) => (
-                SurfaceMap::shared(lattice.x_mm(), lattice.y_mm())?,
-                lattice.places().iter().map(|&place| positions[place]).collect(),
+                SurfaceMap::shared(&lattice.x_mm, &lattice.y_mm)?,
+                lattice.places.iter().map(|&place| positions[place]).collect(),
             ),
             None => (
                 Arc::new(SurfaceMap::scattered(&TargetPosition::places_mm(positions))?),
@@ -259,6 +259,7 @@ impl TargetSurface {
 
 #[cfg(test)]
 mod tests {
+    use decoupler_core::dataset::{Dataset, SplitBy};
     use ndarray::array;
 
     use super::*;
@@ -270,7 +271,8 @@ mod tests {
         let decoded = Array2::from_shape_fn((400, 1), |(sample, _)| {
             actual[[sample, 0]] + if rises(sample) { -0.1 } else { 0.1 }
         });
-        let found = HysteresisLoop::measure(actual.view(), decoded.view(), &[0; 400])
+        let test = Dataset::new(actual.clone(), actual, None, (0..400).collect()).unwrap();
+        let found = HysteresisLoop::of_test(&test, decoded.view(), SplitBy::Time)
             .remove(0)
             .unwrap();
         let force = Channel::new("force", Some("N"));

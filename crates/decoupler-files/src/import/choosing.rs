@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::{Memory, Seed, Stream},
     evaluation::{
         Intervals,
-        auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, SamplePast, choose_settings},
+        auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, choose_settings},
     },
     job::Job,
     scene::RowModel,
@@ -79,10 +79,7 @@ impl Setup {
             let set = raw.set.select(&training);
             let samples = AutoSamples {
                 set: &set,
-                past: Some(SamplePast {
-                    history: raw.history(),
-                    samples: &training,
-                }),
+                past: Some((raw.history(), &training)),
                 by: plan.division.by,
             };
             let fixed = AutoFixed {

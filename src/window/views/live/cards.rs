@@ -147,7 +147,7 @@ impl DropScale {
             Watched::Off(_) | Watched::Normal | Watched::Unexplained => None,
         };
         let is_healthy = |row: usize, column: usize| {
-            wire.is_none_or(|wire| !wire.is_row(frame.rows[row]) && !wire.columns().contains(&Some(column)))
+            wire.is_none_or(|wire| !wire.is_row(frame.rows[row]) && !wire.columns().contains(&column))
         };
         let drops = frame.drops_percent.indexed_iter();
         let drops = drops.filter(|((row, column), drop)| is_healthy(*row, *column) && drop.is_finite());
@@ -299,7 +299,7 @@ fn marked(frame: &LiveFrame) -> (Vec<usize>, Vec<usize>) {
     let rows = rows
         .filter(|(_, row)| diagnosis.wire.is_row(**row))
         .map(|(place, _)| place);
-    let columns = diagnosis.wire.columns().into_iter().flatten();
+    let columns = diagnosis.wire.columns();
     (rows.collect(), columns.collect())
 }
 

@@ -119,16 +119,19 @@ fn tried_ui(ui: &mut Ui, tried: &Tried, is_chosen: bool) {
     ui.spacing_mut().item_spacing.y = 0.0;
     ui.spacing_mut().interact_size.y = space(5);
     ui.horizontal(|ui| {
-        ui.label(RichText::new(format!("{mark}{}", tried.model())).color(colour));
+        ui.label(RichText::new(format!("{mark}{}", tried.model)).color(colour));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.label(RichText::new(error).color(colour));
         });
     });
-    let begin = tried.begin().filter(|begin| *begin != Initialization::default());
-    let begin = begin.map(|begin| format!(" from {begin}"));
-    let epochs = tried.epochs().map(|epochs| format!("; {}", counted(epochs, "epoch")));
-    let [begin, epochs] = [begin, epochs].map(Option::unwrap_or_default);
-    dim_ui(ui, &format!("{}{epochs}{begin}", tried.features()));
+    let mut text = tried.features();
+    if let Some((begin, epochs)) = tried.training() {
+        text += &format!("; {}", counted(epochs, "epoch"));
+        if begin != Initialization::default() {
+            text += &format!(" from {begin}");
+        }
+    }
+    dim_ui(ui, &text);
     ui.add_space(space(1));
 }
 

@@ -12,7 +12,7 @@ use crate::scene::NoiseSource;
 /// Readings at an end of the converter's range only bound P. The noise is at least the rounding of the readings.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ReadingNoise {
-    noise: NoiseSource,
+    source: NoiseSource,
     relative: f64,
 }
 
@@ -33,34 +33,37 @@ const SMALLEST_RATIO: f64 = 1e-100;
 const LARGEST_ADDITIVE: f64 = 1e100;
 
 impl ReadingNoise {
-    pub(super) fn new(noise: NoiseSource) -> Self {
+    pub(super) fn new(source: NoiseSource) -> Self {
         Self {
-            relative: libm::hypot(noise.relative(), ROUNDING),
-            noise,
+            relative: libm::hypot(source.noise.relative, ROUNDING),
+            source,
         }
     }
 
     /// True if readings are exact apart from their rounding.
     pub(super) fn is_none(&self) -> bool {
-        self.noise.is_none()
+        self.source.is_none()
     }
 
     /// Standard deviation of the gain error that a snapshot's readings share.
     pub(super) fn drift(&self) -> f64 {
-        self.noise.drift()
+        self.source.noise.drift
     }
 
     /// Expands the likelihood of `reading_ohm` at this misfit.
     pub(super) fn expand(&self, reading_ohm: f64, misfit: f64) -> Expansion {
-        match self.noise.rounded_from_ohm(reading_ohm) {
+        match self.source.rounded_from_ohm(reading_ohm) {
             Some((0.0, f64::INFINITY)) => Expansion::default(),
             Some((lowest, f64::INFINITY)) => self.expand_bound(lowest / reading_ohm, reading_ohm, misfit, 1.0),
             Some((0.0, highest)) => self.expand_bound(highest / reading_ohm, reading_ohm, misfit, -1.0),
             Some((lowest, highest)) => {
                 let step_ohm = (highest - lowest) / 12.0_f64.sqrt();
-                self.expand_normal(libm::hypot(self.noise.additive_ohm(), step_ohm) / reading_ohm, misfit)
+                self.expand_normal(
+                    libm::hypot(self.source.noise.additive_ohm, step_ohm) / reading_ohm,
+                    misfit,
+                )
             }
-            None => self.expand_normal(self.noise.additive_ohm() / reading_ohm, misfit),
+            None => self.expand_normal(self.source.noise.additive_ohm / reading_ohm, misfit),
         }
     }
 
@@ -88,7 +91,7 @@ impl ReadingNoise {
         if sign * beyond <= 0.0 {
             return Expansion::default();
         }
-        let deviation = self.deviation(self.noise.additive_ohm() / (edge * reading_ohm), ratio);
+        let deviation = self.deviation(self.source.noise.additive_ohm / (edge * reading_ohm), ratio);
         let (standardised, scale) = (beyond / deviation, edge / deviation);
         Expansion {
             standardised,

@@ -14,8 +14,6 @@ use crate::{
 pub(crate) struct RowProblem {
     model: SensorModel,
     axes: Axes,
-    /// True if reciprocal roots are refined: faster, but only within reach.
-    is_refined: bool,
     conductance: RowConductance,
     displacements_mm: Vec<DVec3>,
     readings_ohm: Vec<f64>,
@@ -96,7 +94,6 @@ impl RowProblem {
         Self {
             model: *model,
             axes,
-            is_refined: false,
             conductance: RowConductance::new(model, axes),
             displacements_mm: vec![DVec3::ZERO; model.scale.nodes_per_row()],
             readings_ohm: vec![0.0; model.scale.columns()],
@@ -113,7 +110,7 @@ impl RowProblem {
             .iter()
             .fold(0.0, |most: f64, range| most.max(-range.lowest).max(range.highest));
         RowConductance::is_within_reach(model, smallest_gap_mm(model, scene), largest_mm).then(|| Self {
-            is_refined: true,
+            conductance: RowConductance::new(model, scene.movement.axes()).refined(),
             ..Self::new(model, scene.movement.axes())
         })
     }
@@ -155,27 +152,15 @@ impl RowProblem {
 
     /// Evaluates residuals and derivatives at `unknowns_mm`; returns the rms residual.
     pub(crate) fn evaluate(&mut self, unknowns_mm: &[f64]) -> f64 {
-        match self.is_refined {
-            true => self.evaluate_by(unknowns_mm, RowConductance::evaluate_refined),
-            false => self.evaluate_by(unknowns_mm, RowConductance::evaluate),
-        }
+        self.displace(unknowns_mm);
+        (self.conductance).evaluate(&self.model, self.row, &self.displacements_mm);
+        self.write_residuals()
     }
 
     /// Evaluates only the residuals at `unknowns_mm`; derivatives remain those of the last [`Self::evaluate`].
     pub(crate) fn evaluate_residuals(&mut self, unknowns_mm: &[f64]) -> f64 {
-        match self.is_refined {
-            true => self.evaluate_by(unknowns_mm, RowConductance::evaluate_sums_refined),
-            false => self.evaluate_by(unknowns_mm, RowConductance::evaluate_sums),
-        }
-    }
-
-    fn evaluate_by(
-        &mut self,
-        unknowns_mm: &[f64],
-        evaluate: impl FnOnce(&mut RowConductance, &SensorModel, usize, &[DVec3]),
-    ) -> f64 {
         self.displace(unknowns_mm);
-        evaluate(&mut self.conductance, &self.model, self.row, &self.displacements_mm);
+        (self.conductance).evaluate_sums(&self.model, self.row, &self.displacements_mm);
         self.write_residuals()
     }
 

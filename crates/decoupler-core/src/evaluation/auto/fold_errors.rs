@@ -11,40 +11,32 @@ use crate::dataset::Folds;
 pub(super) struct FoldErrors {
     /// Mean of e/σ² in each fold.
     of_folds: Vec<f64>,
-    /// Share of the samples in each fold.
-    shares: Vec<f64>,
+    /// Mean of e/σ² over all samples.
+    mean_square: f64,
 }
 
 impl FoldErrors {
     /// Evaluates the sums of squared errors `squares` (fold × target) of answers to targets with these [`variances`].
     pub(super) fn new(squares: &[Vec<f64>], variances: &[f64], folds: &Folds) -> Self {
-        let samples: usize = (0..folds.count()).map(|fold| folds.test(fold).len()).sum();
+        let sizes = Vec::from_iter((0..folds.count()).map(|fold| folds.test(fold).len()));
+        let samples = sizes.iter().sum::<usize>() as f64;
         let varying = variances.iter().filter(|variance| **variance > 0.0).count().max(1) as f64;
-        let of_fold = |(fold, squares): (usize, &Vec<f64>)| {
+        let of_fold = |(squares, size): (&Vec<f64>, &usize)| {
             let relative = squares.iter().zip(variances).filter(|(_, variance)| **variance > 0.0);
             let sum: f64 = relative.map(|(square, variance)| square / variance).sum();
-            sum / varying / folds.test(fold).len().max(1) as f64
+            sum / varying / (*size).max(1) as f64
         };
+        let of_folds = Vec::from_iter(squares.iter().zip(&sizes).map(of_fold));
+        let shares = sizes.iter().map(|&size| size as f64 / samples);
         Self {
-            of_folds: squares.iter().enumerate().map(of_fold).collect(),
-            shares: (0..folds.count())
-                .map(|fold| folds.test(fold).len() as f64 / samples as f64)
-                .collect(),
+            mean_square: of_folds.iter().zip(shares).map(|(error, share)| error * share).sum(),
+            of_folds,
         }
-    }
-
-    /// Mean of e/σ² over all samples.
-    fn mean_square(&self) -> f64 {
-        self.of_folds
-            .iter()
-            .zip(&self.shares)
-            .map(|(error, share)| error * share)
-            .sum()
     }
 
     /// Relative error over all samples.
     pub(super) fn relative(&self) -> f64 {
-        self.mean_square().sqrt()
+        self.mean_square.sqrt()
     }
 
     /// Standard error of [`Self::relative`], from the differences between folds.
@@ -61,13 +53,12 @@ impl FoldErrors {
     /// Returns `true` if these errors exceed those of `other` on the same folds by no more than the standard error of
     /// the difference.
     pub(super) fn is_as_good_as(&self, other: &Self) -> bool {
-        let differences: Vec<f64> = self
+        let differences = self
             .of_folds
             .iter()
             .zip(&other.of_folds)
-            .map(|(one, other)| one - other)
-            .collect();
-        self.mean_square() - other.mean_square() <= standard_error(&differences)
+            .map(|(one, other)| one - other);
+        self.mean_square - other.mean_square <= standard_error(&Vec::from_iter(differences))
     }
 }
 

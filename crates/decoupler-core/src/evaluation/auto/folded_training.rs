@@ -13,6 +13,7 @@ use crate::{
     dataset::{Dataset, Folds, Split},
     job::Job,
     machine::MemoryBudget,
+    network::Shape,
     scene::RowModel,
     training::{StoppingRules, TrainingError},
 };
@@ -24,10 +25,11 @@ pub(super) struct FoldedTraining<'a> {
     variances: Vec<f64>,
     parts: Vec<Part>,
     /// Epoch of the latest weights.
-    epoch: usize,
-    /// Number of multiplications of one epoch of all trainings.
-    epoch_multiplications: f64,
-    best: Option<BestEpoch>,
+    pub(super) epoch: usize,
+    /// Number of multiplications of one epoch of all trainings, from the shapes alone.
+    pub(super) epoch_multiplications: f64,
+    /// Best epoch so far; `None` if no epoch had finite answers.
+    pub(super) best: Option<BestEpoch>,
     /// Last epoch that lowered the error noticeably, and the error then.
     gain: (usize, f64),
 }
@@ -49,13 +51,17 @@ struct Part {
     inputs: Array2<f64>,
     targets: Array2<f64>,
     answers: Array2<f64>,
-    squares: Vec<f64>,
 }
 
-/// Factor by which an error must fall for the epochs since the last such fall to count as worth their time.
-const NOTICEABLE: f64 = 0.99;
-/// Cost of the tanh of a hidden node, in multiplications.
-const TANH: usize = 12;
+/// Returns the number of multiplications of an epoch of all starts on this many samples, and of their answers to `answered`
+/// others.
+pub(super) fn training_multiplications(settings: &RunSettings, shape: Shape, samples: usize, answered: usize) -> f64 {
+    /// Cost of the tanh of a hidden node, in multiplications.
+    const TANH: usize = 12;
+    let training = settings.training.method.epoch_multiplications(shape, samples);
+    let answers = answered * (shape.weights() + TANH * shape.hidden);
+    settings.starts as f64 * (training + answers as f64)
+}
 
 impl<'a> FoldedTraining<'a> {
     /// Prepares trainings with `settings` on every `stride`th sample of `set` outside each fold.
@@ -84,10 +90,7 @@ impl<'a> FoldedTraining<'a> {
         let of_part = |part: &Part| {
             let Some(run) = &part.run else { return 0.0 };
             let first = &run.leader().rows()[0];
-            let shape = first.present().shape();
-            let training = settings.training.method.epoch_multiplications(shape, first.samples());
-            let answers = part.inputs.nrows() * (shape.weights() + TANH * shape.hidden);
-            settings.starts as f64 * (training + answers as f64)
+            training_multiplications(settings, first.present().shape(), first.samples(), part.targets.nrows())
         };
         Ok(Self {
             folds,
@@ -100,23 +103,18 @@ impl<'a> FoldedTraining<'a> {
         })
     }
 
-    /// Number of multiplications of one epoch of all trainings, from the shapes alone.
-    pub(super) fn epoch_multiplications(&self) -> f64 {
-        self.epoch_multiplications
-    }
-
     /// Runs one epoch of all trainings.
     pub(super) fn step(&mut self) {
         self.parts.par_iter_mut().for_each(Part::step);
         self.epoch += 1;
-        let squares: Vec<Vec<f64>> = self.parts.iter().map(|part| part.squares.clone()).collect();
+        let squares = Vec::from_iter(self.parts.iter().map(Part::squared_errors));
         let errors = FoldErrors::new(&squares, &self.variances, self.folds);
-        if errors.upper() < NOTICEABLE * self.gain.1 {
+        if errors.upper() < Self::NOTICEABLE * self.gain.1 {
             self.gain = (self.epoch, errors.upper());
         }
         let is_best = |best: &BestEpoch| errors.upper() < best.errors.upper();
         if errors.relative().is_finite() && self.best.as_ref().is_none_or(is_best) {
-            let samples = (0..self.folds.count()).map(|fold| self.folds.test(fold).len()).sum();
+            let samples = self.parts.iter().map(|part| part.targets.nrows()).sum();
             let mut answers = Array2::zeros((samples, self.variances.len()));
             for (fold, part) in self.parts.iter().enumerate() {
                 scatter(&mut answers, self.folds.test(fold), &part.answers);
@@ -129,6 +127,9 @@ impl<'a> FoldedTraining<'a> {
         }
     }
 
+    /// Factor by which an error must fall for the epochs since the last such fall to count as worth their time.
+    const NOTICEABLE: f64 = 0.99;
+
     /// Returns `true` if further epochs are unlikely to be noticeably better: half as many epochs as the last noticeable
     /// gain took, and `patience` more, have passed since, or all trainings have ended.
     pub(super) fn has_passed_its_best(&self, patience: usize) -> bool {
@@ -136,26 +137,16 @@ impl<'a> FoldedTraining<'a> {
         let mut runs = self.parts.iter().filter_map(|part| part.run.as_ref());
         self.epoch >= gain + gain / 2 + patience || runs.all(|run| run.stop_reason().is_some())
     }
-
-    /// Epoch of the latest weights.
-    pub(super) fn epoch(&self) -> usize {
-        self.epoch
-    }
-
-    /// Returns the best epoch; `None` if no epoch had finite answers.
-    pub(super) fn best(self) -> Option<BestEpoch> {
-        self.best
-    }
 }
 
 impl Part {
     fn new(settings: RunSettings, training: Dataset, test: &Dataset, memory: MemoryBudget) -> Result<Self, RunError> {
+        let constant = |(_, target)| training.targets()[[0, target]];
         let mut part = Self {
             run: None,
             inputs: Array2::zeros((0, 0)),
             targets: test.targets().to_owned(),
-            answers: Array2::zeros(test.targets().dim()),
-            squares: vec![f64::INFINITY; test.outputs()],
+            answers: Array2::from_shape_fn(test.targets().dim(), constant),
         };
         if training.has_varying_target() {
             let validation = None;
@@ -163,9 +154,6 @@ impl Part {
             let run = Run::new(settings, sets, Begin::Initialize, &Job::UNINTERRUPTED)?;
             part.inputs = run.scalings.at(0).0.of(test.readings());
             part.run = Some(run);
-        } else {
-            let constant = |(_, target)| training.targets()[[0, target]];
-            part.answer(Array2::from_shape_fn(test.targets().dim(), constant));
         }
         Ok(part)
     }
@@ -177,20 +165,19 @@ impl Part {
         let scaled = present.map(|network| network.forward(self.inputs.view()));
         let sum = scaled.reduce(|sum, scaled| sum + scaled).expect("a run has a start");
         let mean = sum / run.trainers().len() as f64;
-        let answers = run.scalings.at(0).1.restore(mean.view());
-        self.answer(answers);
+        self.answers = run.scalings.at(0).1.restore(mean.view());
     }
 
-    /// Sets the answers and their squared errors.
-    fn answer(&mut self, answers: Array2<f64>) {
-        self.answers = answers;
-        for (target, square) in self.squares.iter_mut().enumerate() {
-            let (answers, targets) = (self.answers.column(target), self.targets.column(target));
+    /// Returns the sum of the squared errors of each target.
+    fn squared_errors(&self) -> Vec<f64> {
+        let columns = self.answers.columns().into_iter().zip(self.targets.columns());
+        let squares = columns.map(|(answers, targets)| {
             let errors = answers
                 .iter()
                 .zip(targets)
                 .map(|(answer, target)| (answer - target).powi(2));
-            *square = errors.sum();
-        }
+            errors.sum()
+        });
+        squares.collect()
     }
 }

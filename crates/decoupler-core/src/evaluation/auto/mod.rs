@@ -15,7 +15,6 @@ mod fold_errors;
 mod folded_training;
 mod search;
 mod spans;
-mod stages;
 #[cfg(test)]
 mod tests;
 
@@ -24,16 +23,15 @@ use std::fmt;
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
 
-use super::{Initialization, RunError, RunSettings};
+use super::{Initialization, RunSettings};
 use crate::{
     dataset::{Dataset, Folds, History, Memory, Span, SplitBy},
-    job::Job,
-    machine::MemoryBudget,
     network::{InputChoice, Quantity, ScalingChoice},
     text::format_percent,
     training::Method,
 };
 use fold_errors::FoldErrors;
+pub use search::choose_settings;
 
 /// Time on one core that a search may take if nothing else is given, in seconds.
 pub const DEFAULT_BUDGET_S: f64 = 60.0;
@@ -47,19 +45,11 @@ const MULTIPLICATIONS_PER_SECOND: f64 = 8e9;
 pub struct AutoSamples<'a> {
     /// Readings without memory, and targets.
     pub set: &'a Dataset,
-    /// Past of the samples; without it, no memory is tried.
-    pub past: Option<SamplePast<'a>>,
+    /// Everything that the sensor has read, and the index of each sample among the samples of this history; without it, no
+    /// memory is tried.
+    pub past: Option<(&'a History, &'a [usize])>,
     /// Rule by which folds are made: blocks of time, whole groups, or single samples.
     pub by: SplitBy,
-}
-
-/// Past of samples.
-#[derive(Clone, Copy, Debug)]
-pub struct SamplePast<'a> {
-    /// Everything that the sensor has read.
-    pub history: &'a History,
-    /// Index of each sample among the samples of the history.
-    pub samples: &'a [usize],
 }
 
 impl AutoSamples<'_> {
@@ -68,9 +58,9 @@ impl AutoSamples<'_> {
         if memory.is_empty() {
             return Some(self.set.clone());
         }
-        let past = self.past?;
-        let features = past.history.features(memory).ok()?;
-        Some(self.set.with_readings(features.select(Axis(0), past.samples)))
+        let (history, samples) = self.past?;
+        let features = history.features(memory).ok()?;
+        Some(self.set.with_readings(features.select(Axis(0), samples)))
     }
 }
 
@@ -94,33 +84,10 @@ pub struct AutoFixed {
 /// Progress of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AutoProgress {
-    /// Number of the candidate that is being tried, from 1.
-    pub candidate: usize,
-    /// Number of candidates expected; it may change as results come in.
-    pub candidates: usize,
-    /// Description of the candidate.
-    pub name: String,
-    /// Smallest cross-validated error of a network so far, relative to the spread of the targets.
-    pub best: Option<f64>,
+    /// Description of the candidate that is being tried, its number, and the smallest error so far.
+    pub text: String,
     /// Share of the budget used so far.
     pub share: f64,
-}
-
-impl fmt::Display for AutoProgress {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            candidate,
-            candidates,
-            name,
-            best,
-            ..
-        } = self;
-        write!(f, "Trying candidate {candidate} of {candidates}: {name}")?;
-        match best {
-            Some(best) => write!(f, ", best error so far {}", format_percent(100.0 * best)),
-            None => Ok(()),
-        }
-    }
 }
 
 /// Result of a search.
@@ -202,29 +169,30 @@ impl Tried {
         describe_features(&self.memory, self.inputs)
     }
 
-    /// Describes the model: `ridge`, `5 × 8 hidden nodes, br`.
-    pub fn model(&self) -> String {
-        match &self.model {
-            TriedModel::Ridge => "ridge".to_owned(),
-            TriedModel::Network {
-                hidden, method, starts, ..
-            } => describe_network(*hidden, method, *starts),
-        }
-    }
-
-    /// Weights with which the training of a network begins.
-    pub fn begin(&self) -> Option<Initialization> {
+    /// Weights with which the training of a network begins, and its number of epochs; `None` for ridge regression.
+    pub fn training(&self) -> Option<(Initialization, usize)> {
         match self.model {
             TriedModel::Ridge => None,
-            TriedModel::Network { begin, .. } => Some(begin),
+            TriedModel::Network { begin, epochs, .. } => Some((begin, epochs)),
         }
     }
+}
 
-    /// Number of epochs of a network.
-    pub fn epochs(&self) -> Option<usize> {
-        match self.model {
-            TriedModel::Ridge => None,
-            TriedModel::Network { epochs, .. } => Some(epochs),
+impl fmt::Display for TriedModel {
+    /// Writes `ridge`, or `5 × 8 hidden nodes, br`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self::Network {
+            hidden, method, starts, ..
+        } = self
+        else {
+            return f.write_str("ridge");
+        };
+        write!(f, "{starts} × {hidden} hidden nodes, {}", method.short_name())?;
+        match method {
+            Method::BayesianRegularization(settings) if settings.correlation_epoch > 0.0 => {
+                f.write_str(", errors correlated")
+            }
+            _ => Ok(()),
         }
     }
 }
@@ -235,12 +203,6 @@ impl AutoRecord {
         self.tried.get(self.chosen)
     }
 
-    /// Returns the best ridge regression.
-    pub fn ridge(&self) -> Option<&Tried> {
-        let ridges = self.tried.iter().filter(|tried| tried.model == TriedModel::Ridge);
-        ridges.min_by(|one, other| one.error.total_cmp(&other.error))
-    }
-
     /// Estimated time of the search on one core in seconds.
     pub fn seconds(&self) -> f64 {
         self.tried.iter().map(|tried| tried.seconds).sum()
@@ -248,7 +210,9 @@ impl AutoRecord {
 
     /// Remarks that no network was better than ridge regression; `None` if the choice was.
     pub fn remark(&self) -> Option<String> {
-        let (choice, ridge) = (self.choice()?, self.ridge()?);
+        let ridges = self.tried.iter().filter(|tried| tried.model == TriedModel::Ridge);
+        let best = ridges.min_by(|one, other| one.error.total_cmp(&other.error));
+        let (choice, ridge) = (self.choice()?, best?);
         (choice.error >= ridge.error).then(|| {
             format!(
                 "in cross-validation, no network that was tried is better than ridge regression: error {} of the spread of \
@@ -281,30 +245,4 @@ fn describe_features(memory: &Memory, inputs: InputChoice) -> String {
         parts.push("whitened".to_owned());
     }
     parts.join(", ")
-}
-
-fn describe_network(hidden: usize, method: &Method, starts: usize) -> String {
-    let name = method.short_name();
-    let correlated = match method {
-        Method::BayesianRegularization(settings) if settings.correlation_epoch > 0.0 => ", errors correlated",
-        _ => "",
-    };
-    format!("{starts} × {hidden} hidden nodes, {name}{correlated}")
-}
-
-/// Chooses settings for `samples` by cross-validation. `base` gives the source, the seed, and whatever is not searched;
-/// its inputs are raw readings. Networks whose equations do not fit into `memory` are not tried.
-///
-/// # Errors
-/// If the samples cannot be divided into folds, or cannot be scaled, or the job is cancelled.
-pub fn choose_settings(
-    base: &RunSettings,
-    fixed: &AutoFixed,
-    samples: &AutoSamples<'_>,
-    budget_s: f64,
-    memory: MemoryBudget,
-    job: &Job<'_>,
-    on_progress: &mut dyn FnMut(AutoProgress),
-) -> Result<AutoChoice, RunError> {
-    search::Search::new(base, fixed, samples, budget_s, memory, job, on_progress)?.run()
 }

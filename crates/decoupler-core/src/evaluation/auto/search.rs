@@ -1,183 +1,270 @@
 use super::{
-    super::{Combination, Initialization, RunError, RunSettings},
+    super::{Combination, Initialization, RunError, RunSettings, errors::extremes},
     AutoChoice, AutoFixed, AutoProgress, AutoRecord, AutoSamples, MULTIPLICATIONS_PER_SECOND, Tried, TriedModel,
-    describe_features, describe_network,
+    describe_features,
     fold_errors::{FoldErrors, variances},
-    folded_training::{BestEpoch, FoldedTraining},
+    folded_training::{BestEpoch, FoldedTraining, training_multiplications},
+    spans::memories,
 };
 use crate::{
     dataset::{Dataset, Folds, Memory, Seed, SplitBy, Stream},
+    decoupling::{Regression, ridge},
     job::Job,
     machine::MemoryBudget,
-    network::{InputChoice, InputScaling, Inputs, LARGEST_HIDDEN, ScalingChoice, Shape},
-    training::{Method, TrainingError},
+    network::{InputChoice, InputScaling, Inputs, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
+    text::format_percent,
+    training::{Damping, Method, RegularizationSettings, ScaledConjugateGradientSettings, TrainingError},
 };
 
 /// Number of blocks or sets of groups in the cross-validation.
 const FOLDS: usize = 4;
 /// Networks of a committee.
-pub(super) const COMMITTEE: usize = 5;
+const COMMITTEE: usize = 5;
 /// Networks of a committee while settings are compared.
-pub(super) const SCREENED: usize = 2;
-/// Maximum number of epochs.
-const MAX_EPOCHS: usize = 400;
-/// Maximum number of epochs of the scaled conjugate gradient, which are short.
-const MAX_SHORT_EPOCHS: usize = 3000;
-/// Epochs to wait for a noticeable gain in any case.
-const PATIENCE: usize = 15;
-/// As [`PATIENCE`], for the scaled conjugate gradient.
-const SHORT_PATIENCE: usize = 300;
+const SCREENED: usize = 2;
+/// Minimum number of epochs of a candidate.
+const MIN_EPOCHS: usize = 10;
+/// Number of epochs for which samples are thinned out.
+const TYPICAL_EPOCHS: usize = 30;
+/// Maximum number of epochs, and epochs to wait for a noticeable gain in any case.
+const EPOCHS: (usize, usize) = (400, 15);
+/// As [`EPOCHS`], for the scaled conjugate gradient, whose epochs are short.
+const SHORT_EPOCHS: (usize, usize) = (3000, 300);
+/// Numbers of hidden nodes to try, in ascending order.
+const HIDDEN: [usize; 6] = [2, 4, 8, 16, 32, 64];
+/// Hidden nodes with which features are compared.
+const FIRST_HIDDEN: usize = 4;
+/// Hidden nodes with which features are compared where samples are fewer than weights.
+const FIRST_HIDDEN_WIDE: usize = 16;
+/// Weight decays to try, for each sample; the first one first.
+const DECAYS: [f64; 3] = [3e-4, 3e-5, 3e-3];
+/// Feature sets that networks try, next to the plain readings.
+const FEATURE_SETS: usize = 2;
+/// Candidates that are compared again as committees.
+const FINALISTS: usize = 2;
+/// Usual number of candidates with other hidden nodes, and of those with other scalings and methods.
+const USUAL: [usize; 2] = [4, 3];
+/// Epoch after which the correlation of errors is measured, if it is: not for trainings that end before.
+const CORRELATION_EPOCH: f64 = 20.0;
+
+/// Initial damping, and its factor after each epoch. Gauss-Newton steps without damping fit noise within an epoch or two
+/// where weights are many; with damping that falls gradually, the number of epochs regularises.
+const DAMPING: Damping = Damping {
+    mu: 1e3,
+    mu_decrease: 0.3,
+    mu_increase: 10.0,
+    mu_max: 1e10,
+};
+
+/// Ratio of the damping of Bayesian regularisation, which is relative to the noise, to that of Levenberg-Marquardt.
+const PER_NOISE: f64 = 100.0;
+
 /// A network with its features.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Candidate {
-    pub(super) memory: Memory,
-    pub(super) inputs: InputChoice,
-    pub(super) hidden: usize,
-    pub(super) method: Method,
-    pub(super) starts: usize,
-    pub(super) initialization: Initialization,
+struct Candidate {
+    memory: Memory,
+    settings: RunSettings,
+}
+
+impl Candidate {
+    fn has_features_of(&self, other: &Self) -> bool {
+        self.memory == other.memory && self.settings.inputs == other.settings.inputs
+    }
+
+    fn with(&self, change: impl FnOnce(&mut RunSettings)) -> Self {
+        let mut changed = self.clone();
+        change(&mut changed.settings);
+        changed
+    }
+
+    fn model(&self, epochs: usize) -> TriedModel {
+        TriedModel::Network {
+            hidden: self.settings.hidden,
+            method: self.settings.training.method,
+            starts: self.settings.starts,
+            epochs,
+            begin: self.settings.initialization,
+        }
+    }
+}
+
+/// Candidates that are tried one after the other.
+struct Stage {
+    candidates: Vec<Candidate>,
+    /// Share of the budget that may be used up when the last of them has been tried.
+    share: f64,
+    /// Epochs without which a candidate is not worth trying.
+    needed: usize,
+    /// Number of candidates of later stages with the same share.
+    reserve: usize,
+    /// Number of candidates expected in all later stages.
+    later: usize,
+    /// Ends with the first candidate that is no better than all before it with the same features.
+    while_better: bool,
+}
+
+impl Stage {
+    fn new(candidates: Vec<Candidate>, share: f64) -> Self {
+        Self {
+            candidates,
+            share,
+            needed: MIN_EPOCHS,
+            reserve: 0,
+            later: FINALISTS,
+            while_better: false,
+        }
+    }
 }
 
 /// A candidate that was cross-validated.
-pub(super) struct Measured {
-    pub(super) candidate: Candidate,
+struct Measured {
+    candidate: Candidate,
     /// Index of its record.
     place: usize,
-    pub(super) best: BestEpoch,
-    /// Number of weights of one network.
-    pub(super) weights: usize,
+    best: BestEpoch,
 }
 
 /// A search in progress.
-pub(super) struct Search<'a> {
+struct Search<'a> {
     base: RunSettings,
-    pub(super) fixed: &'a AutoFixed,
-    pub(super) samples: &'a AutoSamples<'a>,
-    pub(super) folds: Folds,
+    fixed: &'a AutoFixed,
+    samples: &'a AutoSamples<'a>,
+    folds: Folds,
     budget_s: f64,
     memory: MemoryBudget,
+    /// `true` if even a small network has more weights than there are samples. Levenberg-Marquardt then fits noise within
+    /// an epoch or two, and its epochs are expensive.
+    is_wide: bool,
     /// Multiplications used so far.
-    pub(super) work: f64,
+    work: f64,
     tried: Vec<Tried>,
-    pub(super) networks: Vec<Measured>,
+    networks: Vec<Measured>,
     /// Number of candidates still expected.
-    pub(super) expected: usize,
+    expected: usize,
     job: &'a Job<'a>,
     on_progress: &'a mut dyn FnMut(AutoProgress),
 }
 
-impl<'a> Search<'a> {
-    pub(super) fn new(
-        base: &RunSettings,
-        fixed: &'a AutoFixed,
-        samples: &'a AutoSamples<'a>,
-        budget_s: f64,
-        memory: MemoryBudget,
-        job: &'a Job<'a>,
-        on_progress: &'a mut dyn FnMut(AutoProgress),
-    ) -> Result<Self, RunError> {
-        if variances(samples.set.targets()).iter().all(|variance| *variance == 0.0) {
-            return Err(TrainingError::NothingVaries.into());
+/// Chooses settings for `samples` by cross-validation. `base` gives the source, the seed, and whatever is not searched;
+/// its inputs are raw readings. Networks whose equations do not fit into `memory` are not tried.
+///
+/// # Errors
+/// If the samples cannot be divided into folds, or cannot be scaled, or the job is cancelled.
+pub fn choose_settings(
+    base: &RunSettings,
+    fixed: &AutoFixed,
+    samples: &AutoSamples<'_>,
+    budget_s: f64,
+    memory: MemoryBudget,
+    job: &Job<'_>,
+    on_progress: &mut dyn FnMut(AutoProgress),
+) -> Result<AutoChoice, RunError> {
+    if variances(samples.set.targets()).iter().all(|variance| *variance == 0.0) {
+        return Err(TrainingError::NothingVaries.into());
+    }
+    let search = Search {
+        base: *base,
+        fixed,
+        samples,
+        folds: folds(samples, base.seed)?,
+        budget_s,
+        memory,
+        is_wide: shape(samples.set, FIRST_HIDDEN).weights() > samples.set.samples(),
+        work: 0.0,
+        tried: Vec::new(),
+        networks: Vec::new(),
+        expected: 0,
+        job,
+        on_progress,
+    };
+    search.run()
+}
+
+impl Search<'_> {
+    /// Tries features, then hidden nodes, then scalings and methods, then committees.
+    fn run(mut self) -> Result<AutoChoice, RunError> {
+        let candidates = self.screen_features()?;
+        self.try_stage(Stage {
+            later: USUAL.iter().sum::<usize>() + FINALISTS,
+            ..Stage::new(candidates, 0.35)
+        })?;
+        if self.fixed.hidden.is_none() {
+            self.vary_hidden(0.7)?;
         }
-        let folds = folds(samples, base.seed)?;
-        Ok(Self {
-            base: *base,
-            fixed,
-            samples,
-            folds,
-            budget_s,
-            memory,
-            work: 0.0,
-            tried: Vec::new(),
-            networks: Vec::new(),
-            expected: 0,
-            job,
-            on_progress,
-        })
+        self.refine(0.85)?;
+        self.try_committees(1.0)?;
+        self.decide()
     }
 
-    pub(super) fn run(mut self) -> Result<AutoChoice, RunError> {
-        let chosen = self.stages()?;
-        Ok(self.choice(chosen))
+    /// Cross-validates the candidates of a stage; returns `true` if the first was better than all before it with the same
+    /// features, or the stage tries all of its candidates in any case.
+    fn try_stage(&mut self, stage: Stage) -> Result<bool, RunError> {
+        let count = stage.candidates.len();
+        for (number, candidate) in stage.candidates.into_iter().enumerate() {
+            let left = count - number;
+            self.expected = left + stage.later;
+            let alike = self
+                .networks
+                .iter()
+                .filter(|network| network.candidate.has_features_of(&candidate));
+            let before = alike
+                .map(|network| network.best.errors.relative())
+                .min_by(f64::total_cmp);
+            let to_come = if stage.while_better { 2 } else { left + stage.reserve };
+            let limit = (stage.share * self.budget() - self.work).max(0.0) / to_come as f64;
+            let error = self.try_network(candidate, limit, stage.needed)?;
+            let is_better = error.zip(before).is_some_and(|(error, before)| error < before);
+            if stage.while_better && !is_better {
+                return Ok(number > 0);
+            }
+        }
+        Ok(count > 0)
     }
 
-    /// Cross-validates a network within its part of the budget: what is left until `share`, divided by the number of
-    /// candidates still to come in this stage. Returns its error; `None` if the `needed` epochs are too expensive.
-    pub(super) fn try_network(
-        &mut self,
-        mut candidate: Candidate,
-        share: f64,
-        to_come: usize,
-        needed: usize,
-    ) -> Result<Option<f64>, RunError> {
-        if let Some(place) = self.networks.iter().position(|network| network.candidate == candidate) {
-            return Ok(Some(self.networks[place].best.errors.relative()));
+    /// Cross-validates a network within `limit` multiplications. Returns its error; `None` if the `needed` epochs are too
+    /// expensive.
+    fn try_network(&mut self, mut candidate: Candidate, limit: f64, needed: usize) -> Result<Option<f64>, RunError> {
+        if let Some(network) = self.networks.iter().find(|network| network.candidate == candidate) {
+            return Ok(Some(network.best.errors.relative()));
         }
         let is_first = self.networks.is_empty();
-        let limit = (share * self.budget() - self.work).max(0.0) / to_come.max(1) as f64;
         let Some(set) = self.samples.with_memory(&candidate.memory) else {
             return Ok(None);
         };
-        let mut settings = RunSettings {
-            inputs: candidate.inputs,
-            hidden: candidate.hidden,
-            starts: candidate.starts,
-            initialization: candidate.initialization,
-            ..self.base
-        };
-        settings.training.method = candidate.method;
+        let stride = |settings: &RunSettings| self.stride(settings, &set, limit, needed);
         // Fewer samples would call for fewer hidden nodes; one start instead of two only makes the comparison less certain.
-        if candidate.starts == SCREENED
-            && self.fixed.starts.is_none()
-            && self.stride(&settings, &set, limit, needed) != Some(1)
-        {
-            settings.starts = 1;
-            candidate.starts = 1;
+        let may_shrink = candidate.settings.starts == SCREENED && self.fixed.starts.is_none();
+        if may_shrink && stride(&candidate.settings) != Some(1) {
+            candidate.settings.starts = 1;
         }
-        let stride = self.stride(&settings, &set, limit, needed);
-        let Some(stride) = stride.or(is_first.then_some(self.largest_stride())) else {
-            return Ok(None);
-        };
-        let name = format!(
-            "{}, {}",
-            describe_features(&candidate.memory, candidate.inputs),
-            describe_network(candidate.hidden, &candidate.method, candidate.starts)
-        );
-        self.announce(name)?;
-        let mut training = match FoldedTraining::new(&settings, &set, &self.folds, stride, self.memory) {
+        let stride = stride(&candidate.settings).or(is_first.then_some(self.largest_stride()));
+        let Some(stride) = stride else { return Ok(None) };
+        self.announce(&candidate.memory, candidate.settings.inputs, &candidate.model(0))?;
+        let mut training = match FoldedTraining::new(&candidate.settings, &set, &self.folds, stride, self.memory) {
             Ok(training) => training,
             Err(_) if !is_first => return Ok(None),
             Err(error) => return Err(error),
         };
-        let weights = shape(&set, candidate.hidden).weights();
-        let epoch = training.epoch_multiplications();
-        let (most, patience) = match candidate.method {
-            Method::ScaledConjugateGradient(_) => (MAX_SHORT_EPOCHS, SHORT_PATIENCE),
-            _ => (MAX_EPOCHS, PATIENCE),
+        let (max_epochs, patience) = match candidate.settings.training.method {
+            Method::ScaledConjugateGradient(_) => SHORT_EPOCHS,
+            _ => EPOCHS,
         };
-        let max_epochs = self.fixed.epochs.unwrap_or(most);
+        let max_epochs = self.fixed.epochs.unwrap_or(max_epochs);
         let mut used = 0.0;
-        while training.epoch() < max_epochs && !training.has_passed_its_best(patience) {
-            if used + epoch > limit && training.epoch() >= MIN_EPOCHS {
+        while training.epoch < max_epochs && !training.has_passed_its_best(patience) {
+            if used + training.epoch_multiplications > limit && training.epoch >= MIN_EPOCHS {
                 break;
             }
             self.job.check()?;
             training.step();
-            used += epoch;
+            used += training.epoch_multiplications;
         }
         self.work += used;
-        let Some(best) = training.best() else { return Ok(None) };
+        let Some(best) = training.best else { return Ok(None) };
+        let model = candidate.model(self.fixed.epochs.unwrap_or(best.epoch));
+        self.record(&candidate.memory, candidate.settings.inputs, model, &best.errors, used);
         let error = best.errors.relative();
-        let model = TriedModel::Network {
-            hidden: candidate.hidden,
-            method: candidate.method,
-            starts: candidate.starts,
-            epochs: self.fixed.epochs.unwrap_or(best.epoch),
-            begin: candidate.initialization,
-        };
-        self.record(&candidate.memory, candidate.inputs, model, &best.errors, used);
         self.networks.push(Measured {
-            weights,
             place: self.tried.len() - 1,
             candidate,
             best,
@@ -188,25 +275,16 @@ impl<'a> Search<'a> {
     /// Returns the smallest number such that, with every so manieth sample, trainings of [`TYPICAL_EPOCHS`] stay within
     /// `limit` multiplications; `None` if too few samples would be left, even for the `needed` epochs.
     fn stride(&self, settings: &RunSettings, set: &Dataset, limit: f64, needed: usize) -> Option<usize> {
-        let inputs = match settings.inputs.scaling {
-            ScalingChoice::MinMax => set.channels(),
-            ScalingChoice::Whitening => {
-                let inputs = Inputs::fit(settings.inputs, set.readings(), crate::scene::NoiseSource::default()).ok()?;
-                match inputs.scaling() {
-                    InputScaling::Whitening(whitening) => whitening.components(),
-                    InputScaling::MinMax(_) => set.channels(),
-                }
+        let mut shape = shape(set, settings.hidden);
+        if settings.inputs.scaling == ScalingChoice::Whitening {
+            let inputs = Inputs::fit(settings.inputs, set.readings(), crate::scene::NoiseSource::default()).ok()?;
+            if let InputScaling::Whitening(whitening) = inputs.scaling() {
+                shape.inputs = whitening.components();
             }
-        };
-        let shape = Shape {
-            inputs,
-            ..shape(set, settings.hidden)
-        };
+        }
         let samples = set.samples() * (self.folds.count() - 1) / self.folds.count();
         let epoch = |stride: usize| {
-            let method = &settings.training.method;
-            let trainings = (self.folds.count() * settings.starts) as f64;
-            trainings * method.epoch_multiplications(shape, samples.div_ceil(stride))
+            self.folds.count() as f64 * training_multiplications(settings, shape, samples.div_ceil(stride), 0)
         };
         let largest = self.largest_stride();
         let fits = |epochs: usize| (1..=largest).find(|&stride| epoch(stride) * epochs as f64 <= limit);
@@ -221,36 +299,26 @@ impl<'a> Search<'a> {
     }
 
     /// Budget in multiplications.
-    pub(super) fn budget(&self) -> f64 {
+    fn budget(&self) -> f64 {
         self.budget_s * MULTIPLICATIONS_PER_SECOND
     }
 
-    pub(super) fn announce(&mut self, name: String) -> Result<(), RunError> {
+    fn announce(&mut self, memory: &Memory, inputs: InputChoice, model: &TriedModel) -> Result<(), RunError> {
         self.job.check()?;
-        let best = self
-            .ranked()
-            .first()
-            .map(|&place| self.networks[place].best.errors.relative());
-        let candidate = self.tried.len() + 1;
+        let number = self.tried.len() + 1;
+        let expected = number + self.expected.saturating_sub(1);
+        let features = describe_features(memory, inputs);
+        let mut text = format!("Trying candidate {number} of {expected}: {features}, {model}");
+        if let Some(best) = self.ranked().first() {
+            let error = format_percent(100.0 * best.best.errors.relative());
+            text += &format!(", best error so far {error}");
+        }
         let share = (self.work / self.budget()).min(1.0);
-        (self.on_progress)(AutoProgress {
-            candidate,
-            candidates: candidate + self.expected.saturating_sub(1),
-            name,
-            best,
-            share,
-        });
+        (self.on_progress)(AutoProgress { text, share });
         Ok(())
     }
 
-    pub(super) fn record(
-        &mut self,
-        memory: &Memory,
-        inputs: InputChoice,
-        model: TriedModel,
-        errors: &FoldErrors,
-        work: f64,
-    ) {
+    fn record(&mut self, memory: &Memory, inputs: InputChoice, model: TriedModel, errors: &FoldErrors, work: f64) {
         self.tried.push(Tried {
             memory: memory.clone(),
             inputs,
@@ -261,51 +329,276 @@ impl<'a> Search<'a> {
         });
     }
 
-    /// Indices of the networks, best first.
-    pub(super) fn ranked(&self) -> Vec<usize> {
-        let error = |place: usize| self.networks[place].best.errors.upper();
-        let mut places = Vec::from_iter(0..self.networks.len());
-        places.sort_by(|&one, &other| error(one).total_cmp(&error(other)));
-        places
+    /// Networks, best first.
+    fn ranked(&self) -> Vec<&Measured> {
+        let mut networks = Vec::from_iter(&self.networks);
+        networks.sort_by(|one, other| one.best.errors.upper().total_cmp(&other.best.errors.upper()));
+        networks
     }
 
-    fn choice(mut self, chosen: usize) -> AutoChoice {
-        let Measured {
-            candidate, place, best, ..
-        } = self.networks.swap_remove(chosen);
+    /// Returns the best candidate so far among those that suit.
+    fn best(&self, suits: impl Fn(&Candidate) -> bool) -> Option<Candidate> {
+        let mut candidates = self.ranked().into_iter().map(|network| &network.candidate);
+        candidates.find(|candidate| suits(candidate)).cloned()
+    }
+
+    fn first_hidden(&self) -> usize {
+        match self.is_wide {
+            true => FIRST_HIDDEN_WIDE,
+            false => FIRST_HIDDEN,
+        }
+    }
+
+    /// Compares features by ridge regression; returns networks on the plain readings and on the best others.
+    fn screen_features(&mut self) -> Result<Vec<Candidate>, RunError> {
+        let plain = InputChoice {
+            quantity: Quantity::Raw,
+            scaling: self.fixed.scaling.unwrap_or_default(),
+        };
+        let first = self.fixed.memory.clone().unwrap_or_default();
+        let mut features = vec![(first.clone(), plain)];
+        if self.fixed.memory.is_none() && self.samples.by != SplitBy::Random {
+            features.extend(memories(self.samples).into_iter().map(|memory| (memory, plain)));
+        }
+        for quantity in [Quantity::LogResistance, Quantity::Conductance] {
+            if self.suits(quantity) {
+                features.push((first.clone(), InputChoice { quantity, ..plain }));
+            }
+        }
+        let count = features.len();
+        let mut plain_error: Option<f64> = None;
+        let mut measured: Vec<(f64, (Memory, InputChoice))> = Vec::new();
+        for (number, (memory, inputs)) in features.into_iter().enumerate() {
+            self.expected = count - number + FEATURE_SETS + 1 + USUAL.iter().sum::<usize>() + FINALISTS;
+            let width = memory.features(self.samples.set.channels());
+            let work = Regression::multiplications(self.samples.set.samples(), width, self.folds.count());
+            if number > 0 && self.work + work > 0.2 * self.budget() {
+                continue;
+            }
+            self.announce(&memory, inputs, &TriedModel::Ridge)?;
+            let Some(set) = self.samples.with_memory(&memory) else {
+                continue;
+            };
+            let values = set.readings().mapv(|reading| inputs.quantity.of(reading));
+            self.work += work;
+            let error = match ridge(values.view(), set.targets(), &self.folds) {
+                Ok(fit) => {
+                    let errors = FoldErrors::new(&fit.squares, &variances(set.targets()), &self.folds);
+                    self.record(&memory, inputs, TriedModel::Ridge, &errors, work);
+                    errors.relative()
+                }
+                Err(_) => f64::INFINITY,
+            };
+            // The plain readings are always tried, and many inputs are not multiplied unless that helps.
+            let plain = plain_error.get_or_insert(error);
+            if number > 0 && self.is_wide && error >= *plain {
+                continue;
+            }
+            let rank = if number == 0 { -1.0 } else { error };
+            measured.push((rank, (memory, inputs)));
+        }
+        measured.sort_by(|(one, _), (other, _)| one.total_cmp(other));
+        measured.truncate(1 + FEATURE_SETS);
+        let networks = measured
+            .into_iter()
+            .flat_map(|(_, (memory, inputs))| self.first_candidates(memory, inputs));
+        Ok(networks.collect())
+    }
+
+    /// Networks with which features are compared.
+    fn first_candidates(&self, mut memory: Memory, inputs: InputChoice) -> Vec<Candidate> {
+        // To ridge regression, averages and their differences from the readings are the same; not to a network.
+        memory.differences |= self.fixed.memory.is_none() && !memory.is_empty() && inputs.quantity == Quantity::Raw;
+        // A regression on many averages that overlap may be worse to begin with than random weights, and one on
+        // nearly as many inputs as samples is.
+        let begins: &[Initialization] = match (self.is_wide, memory.is_empty()) {
+            (true, _) => &[Initialization::Random],
+            (false, true) => &[Initialization::Ridge],
+            (false, false) => &[Initialization::Ridge, Initialization::Random],
+        };
         let mut settings = RunSettings {
-            inputs: candidate.inputs,
-            hidden: candidate.hidden,
-            starts: self
-                .fixed
-                .starts
-                .unwrap_or(COMMITTEE)
-                .min(LARGEST_HIDDEN / candidate.hidden)
-                .max(1),
-            combine: Combination::Mean,
-            initialization: candidate.initialization,
+            inputs,
+            hidden: self.fixed.hidden.unwrap_or(self.first_hidden()),
+            starts: self.fixed.starts.unwrap_or(SCREENED).min(SCREENED),
             ..self.base
         };
-        settings.training.method = candidate.method;
+        settings.training.method = self.fixed.method.unwrap_or(if self.is_wide {
+            self.decaying(DECAYS[0])
+        } else {
+            Method::LevenbergMarquardt(DAMPING)
+        });
+        let candidate = Candidate { memory, settings };
+        let begins = begins
+            .iter()
+            .map(|&begin| candidate.with(|settings| settings.initialization = begin));
+        begins.collect()
+    }
+
+    /// Returns `true` if the quantity is defined for all readings and clearly not linear in them.
+    fn suits(&self, quantity: Quantity) -> bool {
+        /// Ratio of the largest to the smallest reading of a channel.
+        const RATIO: f64 = 3.0;
+        let readings = self.samples.set.readings();
+        let is_curved = |column| {
+            let (low, high) = extremes(column);
+            high > RATIO * low
+        };
+        readings.iter().all(|&reading| quantity.accepts(reading)) && readings.columns().into_iter().any(is_curved)
+    }
+
+    /// The scaled conjugate gradient with this weight decay for each sample.
+    fn decaying(&self, decay: f64) -> Method {
+        Method::ScaledConjugateGradient(ScaledConjugateGradientSettings {
+            decay: decay * self.samples.set.samples() as f64,
+            ..ScaledConjugateGradientSettings::default()
+        })
+    }
+
+    /// Tries other numbers of hidden nodes on the best features and on the plain readings, which need more of them: more
+    /// while it helps, and fewer if it does not. Then tries the second best features with the number found.
+    fn vary_hidden(&mut self, share: f64) -> Result<(), RunError> {
+        let Some(best) = self.best(|_| true) else {
+            return Ok(());
+        };
+        let is_other = |candidate: &Candidate| !candidate.has_features_of(&best);
+        let plain = self.best(|candidate| is_other(candidate) && candidate.memory.is_empty());
+        let first = self.first_hidden();
+        for base in std::iter::once(best.clone()).chain(plain) {
+            let with = |hidden| base.with(|settings| settings.hidden = hidden);
+            let stage = |candidates| Stage {
+                later: 1 + USUAL[1] + FINALISTS,
+                while_better: true,
+                ..Stage::new(candidates, share)
+            };
+            let more = HIDDEN.into_iter().filter(|&hidden| hidden > first).map(with);
+            if !self.try_stage(stage(more.collect()))? {
+                let fewer = HIDDEN.into_iter().rev().filter(|&hidden| hidden < first).map(with);
+                self.try_stage(stage(fewer.collect()))?;
+            }
+        }
+        let hidden = self.best(|_| true).map_or(first, |best| best.settings.hidden);
+        let second = self.best(|candidate| is_other(candidate) && !candidate.memory.is_empty());
+        let second = second.map(|second| second.with(|settings| settings.hidden = hidden));
+        self.try_stage(Stage {
+            later: USUAL[1] + FINALISTS,
+            ..Stage::new(Vec::from_iter(second), share)
+        })?;
+        Ok(())
+    }
+
+    /// Varies scaling, regularisation and method of the best network.
+    fn refine(&mut self, share: f64) -> Result<(), RunError> {
+        let Some(best) = self.best(|_| true) else {
+            return Ok(());
+        };
+        let mut variants = Vec::new();
+        if self.fixed.scaling.is_none() {
+            variants.push(best.with(|settings| settings.inputs.scaling = ScalingChoice::Whitening));
+        }
+        if self.fixed.method.is_none() {
+            let methods = if self.is_wide {
+                DECAYS[1..].iter().map(|&decay| self.decaying(decay)).collect()
+            } else {
+                vec![regularized(0.0)]
+            };
+            let with = |method| best.with(|settings| settings.training.method = method);
+            variants.extend(methods.into_iter().map(with));
+        }
+        self.try_stage(Stage {
+            reserve: 1,
+            later: 1 + FINALISTS,
+            ..Stage::new(variants, share)
+        })?;
+        let is_regularized = |network: &&Measured| {
+            network.candidate.settings.training.method == regularized(0.0)
+                && network.best.epoch > CORRELATION_EPOCH as usize
+        };
+        let correlated = self.networks.last().filter(is_regularized).map(|network| {
+            let method = regularized(CORRELATION_EPOCH);
+            network.candidate.with(|settings| settings.training.method = method)
+        });
+        self.try_stage(Stage::new(Vec::from_iter(correlated), share))?;
+        Ok(())
+    }
+
+    /// Number of networks of a committee with this many hidden nodes each.
+    fn committee(&self, hidden: usize) -> usize {
+        let wanted = self.fixed.starts.unwrap_or(COMMITTEE);
+        wanted.min(LARGEST_HIDDEN / hidden).max(1)
+    }
+
+    /// Cross-validates the best candidates again as committees.
+    fn try_committees(&mut self, share: f64) -> Result<(), RunError> {
+        /// Epochs beyond the best.
+        const BEYOND: usize = 5;
+        let finalists = self.ranked().into_iter().take(FINALISTS).map(|network| {
+            let starts = self.committee(network.candidate.settings.hidden);
+            let committee = network.candidate.with(|settings| settings.starts = starts);
+            (committee, network.best.epoch)
+        });
+        let finalists = Vec::from_iter(finalists);
+        let mut left = finalists.len();
+        for (committee, epochs) in finalists {
+            left -= 1;
+            self.try_stage(Stage {
+                needed: epochs + BEYOND,
+                reserve: left,
+                later: left,
+                ..Stage::new(vec![committee], share)
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Returns the smallest network that is about as good as the best.
+    ///
+    /// A committee is compared with a smaller one where it was too expensive: it would hardly be worse.
+    fn decide(self) -> Result<AutoChoice, RunError> {
+        let ranked = self.ranked();
+        let best = *ranked.first().ok_or(TrainingError::NothingVaries)?;
+        // A few folds do not show that features are dispensable: only networks with the same are compared.
+        let smallest = ranked
+            .into_iter()
+            .filter(|network| network.candidate.has_features_of(&best.candidate))
+            .filter(|network| network.best.errors.is_as_good_as(&best.best.errors))
+            .min_by_key(|network| network.candidate.settings.hidden);
+        let chosen = smallest.unwrap_or(best);
+        let (chosen, Candidate { memory, settings }, best) =
+            (chosen.place, chosen.candidate.clone(), chosen.best.clone());
+        let mut settings = RunSettings {
+            starts: self.committee(settings.hidden),
+            combine: Combination::Mean,
+            ..settings
+        };
         settings.training.stopping.epochs = self.fixed.epochs.unwrap_or(best.epoch);
-        AutoChoice {
+        Ok(AutoChoice {
             settings,
-            memory: candidate.memory,
+            memory,
             record: AutoRecord {
                 budget_s: self.budget_s,
                 folds: self.folds.count(),
                 by: self.samples.by,
                 tried: self.tried,
-                chosen: place,
+                chosen,
             },
             folds: self.folds,
             answers: best.answers,
-        }
+        })
     }
 }
 
+/// Bayesian regularisation for recordings.
+fn regularized(correlation_epoch: f64) -> Method {
+    Method::BayesianRegularization(RegularizationSettings {
+        mu: PER_NOISE * DAMPING.mu,
+        mu_decrease: DAMPING.mu_decrease,
+        correlation_epoch,
+        ..RegularizationSettings::recorded()
+    })
+}
+
 /// Shape of a network with this many hidden nodes for the samples of `set`.
-pub(super) fn shape(set: &Dataset, hidden: usize) -> Shape {
+fn shape(set: &Dataset, hidden: usize) -> Shape {
     Shape {
         inputs: set.channels(),
         hidden,
@@ -317,18 +610,10 @@ pub(super) fn shape(set: &Dataset, hidden: usize) -> Shape {
 fn folds(samples: &AutoSamples<'_>, seed: Seed) -> Result<Folds, RunError> {
     let mut rng = seed.rng(Stream::Folds);
     let (set, groups) = (samples.set, samples.set.snapshots().len());
-    match samples.by {
-        SplitBy::Random => Ok(Folds::by(set, FOLDS, SplitBy::Random, &mut rng)?),
-        SplitBy::Group if groups >= 2 => Ok(Folds::by(set, FOLDS.min(groups), SplitBy::Group, &mut rng)?),
-        SplitBy::Time if groups >= 2 * FOLDS => Ok(Folds::by(set, FOLDS, SplitBy::Time, &mut rng)?),
-        SplitBy::Time | SplitBy::Group => {
-            let ungrouped = set.ungrouped();
-            Ok(Folds::by(&ungrouped, FOLDS, SplitBy::Time, &mut rng)?)
-        }
-    }
+    Ok(match samples.by {
+        SplitBy::Random => Folds::by(set, FOLDS, SplitBy::Random, &mut rng)?,
+        SplitBy::Group if groups >= 2 => Folds::by(set, FOLDS.min(groups), SplitBy::Group, &mut rng)?,
+        SplitBy::Time if groups >= 2 * FOLDS => Folds::by(set, FOLDS, SplitBy::Time, &mut rng)?,
+        SplitBy::Time | SplitBy::Group => Folds::by(&set.ungrouped(), FOLDS, SplitBy::Time, &mut rng)?,
+    })
 }
-
-/// Minimum number of epochs of a candidate.
-pub(super) const MIN_EPOCHS: usize = 10;
-/// Number of epochs for which samples are thinned out.
-const TYPICAL_EPOCHS: usize = 30;

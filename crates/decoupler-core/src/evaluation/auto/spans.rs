@@ -1,8 +1,8 @@
 use ndarray::Axis;
 
-use super::{super::errors::varies, AutoSamples, SamplePast};
+use super::{super::errors::varies, AutoSamples};
 use crate::{
-    dataset::{Memory, Span},
+    dataset::{Dataset, History, Memory, Span},
     numerics::{autocorrelation, median},
 };
 
@@ -13,12 +13,13 @@ const SHORTEST: f64 = 2.0;
 /// lag at which their autocorrelation falls to 1/e. Sensors that forget within a sample, or drift over the whole
 /// recording, are covered by the shortest and the longest.
 pub(super) fn memories(samples: &AutoSamples<'_>) -> Vec<Memory> {
-    let Some(past) = &samples.past else {
+    let Some((history, of_history)) = samples.past else {
         return Vec::new();
     };
     let longest = samples.set.samples() as f64 / 10.0;
-    let correlation = correlation_time(samples, past).clamp(2.0 * SHORTEST, longest.max(2.0 * SHORTEST));
-    let interval_s = past.history.interval_s();
+    let correlation =
+        correlation_time(samples.set, history, of_history).clamp(2.0 * SHORTEST, longest.max(2.0 * SHORTEST));
+    let interval_s = history.interval_s();
     let span = |length: f64| match interval_s {
         Some(interval_s) => Span::Seconds(rounded(length * interval_s)),
         None => Span::Samples(length.round()),
@@ -26,10 +27,8 @@ pub(super) fn memories(samples: &AutoSamples<'_>) -> Vec<Memory> {
     let factors: [&[f64]; 4] = [&[0.25, 1.0], &[1.0, 4.0], &[4.0, 16.0], &[0.125, 0.5, 2.0]];
     let mut memories: Vec<Memory> = Vec::new();
     for factors in factors {
-        let mut lengths: Vec<f64> = factors
-            .iter()
-            .map(|factor| (factor * correlation).clamp(SHORTEST, longest.max(SHORTEST)))
-            .collect();
+        let length = |factor: &f64| (factor * correlation).clamp(SHORTEST, longest.max(SHORTEST));
+        let mut lengths = Vec::from_iter(factors.iter().map(length));
         lengths.dedup();
         let memory = Memory {
             averages: lengths.into_iter().map(span).collect(),
@@ -56,15 +55,15 @@ fn rounded(value: f64) -> f64 {
 
 /// Median over the targets of the lag in samples at which the autocorrelation falls to 1/e, with stretches one after the
 /// other.
-fn correlation_time(samples: &AutoSamples<'_>, past: &SamplePast<'_>) -> f64 {
-    let row = |sample: usize| past.history.samples()[past.samples[sample]];
-    let stretches = past.history.stretches();
+fn correlation_time(set: &Dataset, history: &History, samples: &[usize]) -> f64 {
+    let row = |sample: usize| history.samples()[samples[sample]];
+    let stretches = history.stretches();
     // Rows of groups whose times overlap are interleaved.
-    let count = samples.set.samples();
+    let count = set.samples();
     let mut order = Vec::from_iter(0..count);
     order.sort_by_key(|&sample| (stretches[row(sample)], row(sample)));
     let mut times: Vec<f64> = Vec::new();
-    for column in samples.set.targets().columns() {
+    for column in set.targets().columns() {
         if !varies(column) {
             continue;
         }

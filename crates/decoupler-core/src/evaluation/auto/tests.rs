@@ -4,7 +4,8 @@ use rand::RngExt as _;
 use super::*;
 use crate::{
     dataset::{Seed, SplitBy, Stream},
-    evaluation::{Begin, Combination, Measured, Run, RunSets},
+    evaluation::{Begin, Combination, Measured, Run, RunError, RunSets},
+    job::Job,
     machine::MemoryBudget,
     scene::RowModel,
     training::Method,
@@ -37,10 +38,7 @@ fn choose(by: SplitBy, groups: Vec<usize>, fixed: &AutoFixed, job: &Job<'_>) -> 
     let history = History::new(readings, None, None, None, samples.clone());
     let samples = AutoSamples {
         set: &set,
-        past: Some(SamplePast {
-            history: &history,
-            samples: &samples,
-        }),
+        past: Some((&history, &samples)),
         by,
     };
     let base = RunSettings::from(Measured { rows: RowModel::Shared });

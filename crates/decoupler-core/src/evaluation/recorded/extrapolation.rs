@@ -1,93 +1,71 @@
+use std::cmp::Reverse;
+
 use ndarray::ArrayView2;
 
-use crate::{dataset::Dataset, problem::Channel};
+use crate::{dataset::Dataset, evaluation::errors::extremes, problem::Channel};
 
-/// Fraction of the range by which a value may be outside it: the extremes of few training samples are exceeded slightly by
-/// others of the same kind.
-const MARGIN: f64 = 0.1;
-/// Number of columns that a sentence names.
-const NAMED: usize = 3;
-
-/// Test samples outside the range of the training samples, where a network extrapolates.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Test samples outside the range of the training samples, where a network extrapolates: those with a reading or a target
+/// outside it by more than a tenth of its width.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Extrapolation {
-    /// Number of test samples.
-    pub samples: usize,
-    /// Number of test samples with a reading or a target outside the training range by more than a tenth of its width.
-    pub outside: usize,
-    /// Channels with such readings and the number of samples, most first.
-    pub readings: Vec<(usize, usize)>,
-    /// Targets with such values and the number of samples, most first.
-    pub targets: Vec<(usize, usize)>,
+    /// Share of the test samples that are outside.
+    pub share: f64,
+    /// Warning with the names of the columns, if that is more than one in a hundred.
+    pub warning: Option<String>,
 }
 
 impl Extrapolation {
+    /// Fraction of the range by which a value may be outside it: the extremes of few training samples are exceeded slightly by
+    /// others of the same kind.
+    const MARGIN: f64 = 0.1;
     /// Minimum share of the test samples that is worth a warning.
     const MIN_SHARE: f64 = 0.01;
+    /// Number of columns that a warning names.
+    const NAMED: usize = 3;
 
-    /// Compares the samples of `test` with the ranges of the samples of `training`, which have the same channels and outputs.
-    pub fn measure(training: &Dataset, test: &Dataset) -> Self {
+    /// Compares the samples of `test` with the ranges of the samples of `training`; both have these channels and targets.
+    pub fn measure(training: &Dataset, test: &Dataset, inputs: &[Channel], targets: &[Channel]) -> Self {
         let mut is_outside = vec![false; test.samples()];
-        let mut count = |training: ArrayView2<'_, f64>, test: ArrayView2<'_, f64>| {
-            let columns = training.columns().into_iter().zip(test.columns()).enumerate();
-            let mut counts = Vec::from_iter(columns.map(|(column, (training, test))| {
-                let low = training.fold(f64::INFINITY, |low, &value| low.min(value));
-                let high = training.fold(f64::NEG_INFINITY, |high, &value| high.max(value));
-                let margin = MARGIN * (high - low);
-                let mut outside = 0;
-                for (is_outside, value) in is_outside.iter_mut().zip(test) {
-                    if !(low - margin..=high + margin).contains(value) {
-                        outside += 1;
-                        *is_outside = true;
-                    }
-                }
-                (column, outside)
-            }));
-            counts.retain(|(_, outside)| *outside > 0);
-            counts.sort_by_key(|(_, outside)| usize::MAX - outside);
-            counts
-        };
-        let readings = count(training.readings(), test.readings());
-        let targets = count(training.targets(), test.targets());
-        Self {
-            samples: test.samples(),
-            outside: is_outside.iter().filter(|is_outside| **is_outside).count(),
-            readings,
-            targets,
-        }
-    }
-
-    /// Share of the test samples that are outside.
-    pub fn share(&self) -> f64 {
-        self.outside as f64 / self.samples.max(1) as f64
-    }
-
-    /// Returns a warning with the names of the columns, if more than one in a hundred test samples is outside.
-    pub fn warning(&self, inputs: &[Channel], targets: &[Channel]) -> Option<String> {
-        if self.share() < Self::MIN_SHARE {
-            return None;
-        }
-        let of = |counts: &[(usize, usize)], channels: &[Channel], kind: &str| {
-            let named = counts.iter().take(NAMED);
-            let mut parts =
-                Vec::from_iter(named.map(|(column, count)| format!("{} in {count}", channels[*column].name)));
-            if counts.len() > NAMED {
-                parts.push(format!("{} others", counts.len() - NAMED));
+        let mut list = |kind: &str, channels: &[Channel], [training, test]: [ArrayView2<'_, f64>; 2]| {
+            let mut counts = Vec::new();
+            for ((channel, training), test) in channels.iter().zip(training.columns()).zip(test.columns()) {
+                let (low, high) = extremes(training);
+                let margin = Self::MARGIN * (high - low);
+                let range = low - margin..=high + margin;
+                let outside = test
+                    .iter()
+                    .zip(&mut is_outside)
+                    .filter(|(value, _)| !range.contains(value));
+                counts.push((outside.map(|(_, is_outside)| *is_outside = true).count(), &channel.name));
+            }
+            counts.retain(|(count, _)| *count > 0);
+            counts.sort_by_key(|(count, _)| Reverse(*count));
+            let named = counts.iter().take(Self::NAMED);
+            let mut parts = Vec::from_iter(named.map(|(count, name)| format!("{name} in {count}")));
+            if counts.len() > Self::NAMED {
+                parts.push(format!("{} others", counts.len() - Self::NAMED));
             }
             (!parts.is_empty()).then(|| format!("{kind} {}", parts.join(", ")))
         };
-        let columns = [
-            of(&self.readings, inputs, "readings"),
-            of(&self.targets, targets, "targets"),
+        let listed = [
+            list("readings", inputs, [training.readings(), test.readings()]),
+            list("targets", targets, [training.targets(), test.targets()]),
         ];
-        Some(format!(
-            "{:.0} % of the test samples ({} of {}) are outside the range of the training samples by more than a tenth of \
-             it ({}); the network extrapolates there, so that its error within the range may be smaller",
-            100.0 * self.share(),
-            self.outside,
-            self.samples,
-            Vec::from_iter(columns.into_iter().flatten()).join("; ")
-        ))
+        let (samples, outside) = (
+            test.samples(),
+            is_outside.iter().filter(|is_outside| **is_outside).count(),
+        );
+        let share = outside as f64 / samples.max(1) as f64;
+        let warning = format!(
+            "{:.0} % of the test samples ({outside} of {samples}) are outside the range of the training samples by more than \
+             a tenth of it ({}); the network extrapolates there, so that its error within the range may be smaller",
+            100.0 * share,
+            Vec::from_iter(listed.into_iter().flatten()).join("; ")
+        );
+        Self {
+            share,
+            warning: (share >= Self::MIN_SHARE).then_some(warning),
+        }
     }
 }
 
@@ -114,16 +92,16 @@ mod tests {
             array![[10.9, 5.0], [11.1, 5.0], [-2.0, 5.1], [5.0, 5.0]],
             array![[0.5], [0.5], [2.0], [-0.11]],
         );
-        let found = Extrapolation::measure(&training, &test);
-        assert_eq!((found.samples, found.outside), (4, 3));
-        assert_eq!(found.readings, [(0, 2), (1, 1)]);
-        assert_eq!(found.targets, [(0, 2)]);
-        let warning = found.warning(&channels(&["a", "b"]), &channels(&["force"])).unwrap();
+        let (inputs, targets) = (channels(&["a", "b"]), channels(&["force"]));
+        let found = Extrapolation::measure(&training, &test, &inputs, &targets);
+        assert_eq!(found.share, 0.75);
+        let warning = found.warning.unwrap();
         assert!(
-            warning.contains("75 %") && warning.contains("readings a in 2, b in 1; targets force in 2"),
+            warning.contains("75 % of the test samples (3 of 4)")
+                && warning.contains("readings a in 2, b in 1; targets force in 2"),
             "{warning}"
         );
-        let inside = Extrapolation::measure(&training, &training);
-        assert_eq!((inside.share(), inside.warning(&[], &[])), (0.0, None));
+        let inside = Extrapolation::measure(&training, &training, &inputs, &targets);
+        assert_eq!((inside.share, inside.warning), (0.0, None));
     }
 }

@@ -3,7 +3,7 @@ use serde::Serialize;
 
 use crate::{
     dataset::{Dataset, SplitBy},
-    evaluation::TargetErrors,
+    evaluation::{TargetErrors, errors::extremes},
     numerics::student_quantile,
 };
 
@@ -46,11 +46,8 @@ pub struct LoopLevel {
     pub unloading: f64,
 }
 
-/// Part of an excursion off its turning points.
-struct Passage {
-    is_loading: bool,
-    samples: Vec<usize>,
-}
+/// Part of an excursion off its turning points: the index of its branch, 0 for loading and 1 for unloading, and its samples.
+type Passage = (usize, Vec<usize>);
 
 impl HysteresisLoop {
     /// Reversal that makes a turning point, relative to the range.
@@ -67,87 +64,71 @@ impl HysteresisLoop {
     /// Minimum hysteresis in percent of the range, above which it is more than rounding.
     const MIN_PERCENT: f64 = 0.05;
 
-    /// Measures `answers` against `targets` (both samples × outputs), target by target. Samples are in order of time
-    /// within each stretch, whose number is in `stretches` (one for each sample). `None` for a target that does not
-    /// rise and fall through enough levels, or whose branches do not differ significantly.
-    ///
-    /// # Panics
-    /// If the shapes differ.
-    pub fn measure(
-        targets: ArrayView2<'_, f64>,
-        answers: ArrayView2<'_, f64>,
-        stretches: &[usize],
-    ) -> Vec<Option<Self>> {
-        assert_eq!(targets.dim(), answers.dim());
-        assert_eq!(targets.nrows(), stretches.len());
-        let pairs = targets.columns().into_iter().zip(answers.columns());
-        pairs
-            .map(|(targets, answers)| Self::of_one(&targets.to_vec(), &answers.to_vec(), stretches))
-            .collect()
-    }
-
-    /// Measures `answers` (samples × outputs) to a test set that was divided by `by`: its groups are the stretches, or
-    /// all of it by time. `None` for all targets if samples were drawn at random, which loses their order in time.
+    /// Measures `answers` (samples × outputs) to a test set that was divided by `by`, target by target: its groups are the
+    /// stretches in order of time, or all of it by time. `None` for a target that does not rise and fall through enough
+    /// levels, or whose branches do not differ significantly, and for all targets if samples were drawn at random, which
+    /// loses their order in time.
     ///
     /// # Panics
     /// If the shapes differ.
     pub fn of_test(test: &Dataset, answers: ArrayView2<'_, f64>, by: SplitBy) -> Vec<Option<Self>> {
+        let targets = test.targets();
+        assert_eq!(targets.dim(), answers.dim());
         let stretches = match by {
             SplitBy::Time => vec![0; test.samples()],
             SplitBy::Group => test.groups().to_vec(),
             SplitBy::Random => return vec![None; test.outputs()],
         };
-        Self::measure(test.targets(), answers, &stretches)
+        let pairs = targets.columns().into_iter().zip(answers.columns());
+        pairs
+            .map(|(targets, answers)| Self::of_one(&targets.to_vec(), &answers.to_vec(), &stretches))
+            .collect()
     }
 
+    /// Measures the answers for one target; the samples of each stretch have the same number in `stretches`.
     fn of_one(actual: &[f64], decoded: &[f64], stretches: &[usize]) -> Option<Self> {
-        let lowest = actual.iter().copied().fold(f64::INFINITY, f64::min);
-        let range = actual.iter().copied().fold(f64::NEG_INFINITY, f64::max) - lowest;
+        let (lowest, highest) = extremes(actual.into());
+        let range = highest - lowest;
         if !(range > 0.0 && range.is_finite()) {
             return None;
         }
-        let samples: Vec<usize> = (0..actual.len()).collect();
-        let mut passages = Vec::new();
-        for stretch in samples.chunk_by(|&one, &next| stretches[one] == stretches[next]) {
-            passages.extend(passages_of(actual, stretch, range));
-        }
+        let samples = Vec::from_iter(0..actual.len());
+        let stretches = samples.chunk_by(|&one, &next| stretches[one] == stretches[next]);
+        let mut passages = Vec::from_iter(stretches.flat_map(|stretch| passages_of(actual, stretch, range)));
         let excursions = passages.len();
-        passages.retain(|passage| passage.samples.len() >= Self::MIN_PASSAGE);
+        passages.retain(|(_, samples)| samples.len() >= Self::MIN_PASSAGE);
         if 2 * passages.len() < excursions {
             return None;
         }
-        let of_branch = |is_loading: bool| passages.iter().filter(move |passage| passage.is_loading == is_loading);
-        let branches = [true, false].map(|is_loading| {
-            let samples = of_branch(is_loading).flat_map(|passage| &passage.samples);
-            samples.copied().collect::<Vec<usize>>()
-        });
+        let error = |sample: usize| decoded[sample] - actual[sample];
         let level_of = |sample: usize| {
             let level = ((actual[sample] - lowest) / range * Self::LEVELS as f64) as usize;
             level.min(Self::LEVELS - 1)
         };
         // Mean error of each branch at each level, which does not depend on where the samples are within the level.
         let mut sums = [[(0, 0.0); 2]; Self::LEVELS];
-        for (branch, samples) in branches.iter().enumerate() {
+        for (branch, samples) in &passages {
             for &sample in samples {
-                let (count, sum) = &mut sums[level_of(sample)][branch];
+                let (count, sum) = &mut sums[level_of(sample)][*branch];
                 *count += 1;
-                *sum += decoded[sample] - actual[sample];
+                *sum += error(sample);
             }
         }
         let means = sums.map(|branches| {
             let is_common = branches.iter().all(|(count, _)| *count >= Self::MIN_SAMPLES);
             is_common.then(|| branches.map(|(count, sum)| sum / count as f64))
         });
-        let off_middle = |passage: &Passage| {
-            let off = |&sample: &usize| {
+        // Mean distance of each excursion from the middle of the branches.
+        let mut distances = [Vec::new(), Vec::new()];
+        for (branch, samples) in &passages {
+            let distance = |&sample: &usize| {
                 let [loading, unloading] = means[level_of(sample)]?;
-                Some(decoded[sample] - actual[sample] - 0.5 * (loading + unloading))
+                Some(error(sample) - 0.5 * (loading + unloading))
             };
-            let off = Vec::from_iter(passage.samples.iter().filter_map(off));
-            (!off.is_empty()).then(|| mean(&off))
-        };
-        if !differ([true, false].map(|is_loading| of_branch(is_loading).filter_map(off_middle).collect())) {
-            return None;
+            let of_passage = Vec::from_iter(samples.iter().filter_map(distance));
+            if !of_passage.is_empty() {
+                distances[*branch].push(mean(&of_passage));
+            }
         }
         let level = |(level, means): (usize, &Option<[f64; 2]>)| {
             let [loading, unloading] = (*means)?;
@@ -161,9 +142,13 @@ impl HysteresisLoop {
         let levels = Vec::from_iter(means.iter().enumerate().filter_map(level));
         let apart = levels.iter().map(|level| (level.loading - level.unloading).abs());
         let percent_of_range = 100.0 * apart.fold(0.0, f64::max) / range;
-        if levels.len() < Self::MIN_LEVELS || percent_of_range < Self::MIN_PERCENT {
+        if !differ(distances) || levels.len() < Self::MIN_LEVELS || percent_of_range < Self::MIN_PERCENT {
             return None;
         }
+        let branches = [0, 1].map(|branch| {
+            let of_branch = passages.iter().filter(|(of, _)| *of == branch);
+            Vec::from_iter(of_branch.flat_map(|(_, samples)| samples.iter().copied()))
+        });
         let [loading, unloading] = branches.each_ref().map(|samples| {
             let column =
                 |values: &[f64]| Array2::from_shape_fn((samples.len(), 1), |(place, _)| values[samples[place]]);
@@ -236,10 +221,7 @@ fn passages_of(all: &[f64], stretch: &[usize], range: f64) -> Vec<Passage> {
         let (from, to) = (actual[pair[0]], actual[pair[1]]);
         let is_moving = |sample: &usize| (actual[*sample] - from).abs() >= rest && (actual[*sample] - to).abs() >= rest;
         let moving = (pair[0]..=pair[1]).filter(is_moving);
-        Passage {
-            is_loading: to > from,
-            samples: moving.map(|sample| first + sample).collect(),
-        }
+        (usize::from(to <= from), moving.map(|sample| first + sample).collect())
     };
     turning_points.windows(2).map(passage).collect()
 }
@@ -255,9 +237,13 @@ mod tests {
         Array2::from_shape_vec((values.len(), 1), values.to_vec()).unwrap()
     }
 
+    fn in_stretches(actual: &[f64], decoded: &[f64], stretches: Vec<usize>) -> Option<HysteresisLoop> {
+        let test = Dataset::new(column(actual), column(actual), None, stretches).unwrap();
+        HysteresisLoop::of_test(&test, column(decoded).view(), SplitBy::Group).remove(0)
+    }
+
     fn measure(actual: &[f64], decoded: &[f64]) -> Option<HysteresisLoop> {
-        let stretches = vec![0; actual.len()];
-        HysteresisLoop::measure(column(actual).view(), column(decoded).view(), &stretches).remove(0)
+        in_stretches(actual, decoded, vec![0; actual.len()])
     }
 
     /// Cycles of a sine between 0 and 10 that begin and end in the middle of an excursion.
@@ -377,10 +363,10 @@ mod tests {
         let rising: Vec<f64> = (0..100).map(f64::from).collect();
         let actual = [rising.clone(), rising].concat();
         let stretches: Vec<usize> = (0..200).map(|sample| sample / 100).collect();
-        let targets = column(&actual);
-        let found = HysteresisLoop::measure(targets.view(), targets.view(), &stretches);
-        assert_eq!(found, [None], "it never falls");
+        assert_eq!(in_stretches(&actual, &actual, stretches), None, "it never falls");
         assert!(measure(&[1.0; 50], &[1.0; 50]).is_none(), "constant");
-        assert!(measure(&[], &[]).is_none());
+        let set = Dataset::new(column(&[1.0]), column(&[1.0]), None, vec![0]).unwrap();
+        let found = HysteresisLoop::of_test(&set.select(&[]), column(&[]).view(), SplitBy::Time);
+        assert_eq!(found, [None], "no samples");
     }
 }

@@ -1,11 +1,10 @@
 use super::{
     Interval,
-    channel_remark::rmse_ratio,
-    evidence::{Evidence, SumVariance},
+    interval::{Evidence, SumVariance, squared_errors},
 };
 use crate::{
     dataset::{Dataset, Folds, SplitBy, Stream},
-    evaluation::{CrossValidated, Run, RunError, RunSettings, Scores, TargetErrors},
+    evaluation::{CrossValidated, Run, RunError, RunSettings, Scores},
     job::Job,
     numerics::autocorrelation,
 };
@@ -16,14 +15,10 @@ use crate::{
 pub struct SplitComparison {
     /// Rule of the folds that are not random.
     pub by: SplitBy,
-    /// Errors of the network by that rule, target by target.
-    pub network: Vec<TargetErrors>,
-    /// Errors of ridge regression by that rule.
-    pub ridge: Vec<TargetErrors>,
-    /// Errors of the network on random folds.
-    pub random_network: Vec<TargetErrors>,
-    /// Errors of ridge regression on random folds.
-    pub random_ridge: Vec<TargetErrors>,
+    /// Errors by that rule.
+    pub honest: Scores,
+    /// Errors on random folds.
+    pub random: Scores,
     /// Ratio of the RMSE of the network on random folds to that by [`Self::by`] for each target, with its interval: below 1
     /// if random folds are optimistic. `None` if it is not determined.
     pub ratios: Vec<Option<Interval>>,
@@ -57,61 +52,50 @@ impl SplitComparison {
             let folds = Folds::by(set, folds, rule, &mut settings.seed.rng(Stream::Split))?;
             CrossValidated::on_folds(settings, set, folds, job)
         };
-        let honest = SplitBy::honest(set);
-        let (of_honest, random) = (validate(honest)?, validate(SplitBy::Random)?);
-        let answers = [random.network.view(), of_honest.network.view()];
-        let ratio = |target| rmse_ratio(set, answers, target, honest);
-        let ratios = (0..set.outputs()).map(ratio).collect();
-        let scores = [of_honest.scores(set), random.scores(set)];
-        Ok(Self::of(set, honest, scores, ratios))
+        let by = SplitBy::honest(set);
+        let (honest, random) = (validate(by)?, validate(SplitBy::Random)?);
+        let answers = [random.network.view(), honest.network.view()];
+        let ratio = |target| Interval::of_rmse(set, answers, target, by);
+        Ok(Self::of(set, by, [honest.scores(set), random.scores(set)], ratio))
     }
 
     /// Compares the test errors of two runs on parts of `set`, split by `by` and at random; `None` if a run is of a single fold.
-    pub fn of_runs(set: &Dataset, by: SplitBy, [honest, random]: [&Run; 2]) -> Option<Self> {
+    pub fn of_runs(set: &Dataset, by: SplitBy, runs: [&Run; 2]) -> Option<Self> {
+        let [honest, random] = runs;
         let scores = [honest.scores()?, random.scores()?];
-        let spreads = [random, honest].map(|run| {
-            let (test, answers) = (run.test(), run.decouple_test());
-            let evidence = Evidence::of(test, by);
-            let of_target = move |target: usize| {
-                let truth = test.targets();
-                let pairs = answers.column(target).into_iter().zip(truth.column(target));
-                let squares = Vec::from_iter(pairs.map(|(answer, truth)| (answer - truth).powi(2)));
-                evidence.variance_of_log_mean(&squares)
-            };
-            (0..set.outputs()).map(of_target).collect::<Vec<_>>()
-        });
-        // The test samples differ, so that the variances of the logarithms add up.
-        let ratio = |target: usize| {
-            let [random, honest] = [&spreads[0][target], &spreads[1][target]];
+        let tested = runs.map(|run| (run.test(), run.decouple_test()));
+        let ratio = |target| {
+            // Mean squared error, and the variance of its logarithm.
+            let [honest, random] = tested.each_ref().map(|(test, answers)| {
+                let squares = squared_errors(test, answers.view(), target);
+                let total = squares.iter().sum::<f64>();
+                let mean = total / squares.len() as f64;
+                (mean, Evidence::of(test, by).variance(&((squares - mean) / total)))
+            });
             let ratio = random.0 / honest.0;
+            // The test samples differ, so that the variances of the logarithms add up.
             let spread = SumVariance {
                 variance: ratio * ratio * (random.1.variance + honest.1.variance),
                 units: random.1.units.min(honest.1.units),
-                freedom: random.1.freedom.min(honest.1.freedom),
             };
             Some(Interval::of_ratio(ratio, spread)?.map(f64::sqrt))
         };
-        let ratios = (0..set.outputs()).map(ratio).collect();
-        Some(Self::of(set, by, scores, ratios))
+        Some(Self::of(set, by, scores, ratio))
     }
 
-    fn of(set: &Dataset, by: SplitBy, [honest, random]: [Scores; 2], ratios: Vec<Option<Interval>>) -> Self {
-        let errors =
-            |scores: Scores| [&scores.baselines.linear, &scores.network].map(|errors| errors.targets().to_vec());
-        let ([ridge, network], [random_ridge, random_network]) = (errors(honest), errors(random));
+    fn of(
+        set: &Dataset,
+        by: SplitBy,
+        [honest, random]: [Scores; 2],
+        ratio: impl Fn(usize) -> Option<Interval>,
+    ) -> Self {
+        let targets = set.targets();
         Self {
             by,
-            network,
-            ridge,
-            random_network,
-            random_ridge,
-            ratios,
-            successive: set
-                .targets()
-                .columns()
-                .into_iter()
-                .map(|column| autocorrelation(column, 1))
-                .collect(),
+            honest,
+            random,
+            ratios: (0..set.outputs()).map(ratio).collect(),
+            successive: targets.columns().into_iter().map(|of| autocorrelation(of, 1)).collect(),
         }
     }
 
@@ -138,7 +122,7 @@ impl SplitComparison {
 
     /// Returns a sentence on the error that a random split would have reported for the target of this name.
     pub fn sentence(&self, target: usize, name: &str) -> String {
-        let (honest, random) = (self.network[target].rmse, self.random_network[target].rmse);
+        let [honest, random] = [&self.honest, &self.random].map(|scores| scores.network.targets()[target].rmse);
         let by = self.by;
         match self.ratios[target] {
             Some(ratio) if ratio.high < 1.0 && ratio.value < 1.0 - Self::MIN_OPTIMISM => format!(

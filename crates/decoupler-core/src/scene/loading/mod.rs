@@ -4,7 +4,7 @@ mod indenter;
 mod press;
 mod sampler;
 
-pub use indenter::{Indenter, IndenterShape, Span};
+pub use indenter::{Indenter, IndenterShape, Print, Span, Touch};
 pub use press::Contact;
 pub use sampler::DeformationSampler;
 
@@ -73,17 +73,11 @@ impl FromStr for Loading {
 impl Loading {
     pub(super) fn check(&self) -> Result<(), SceneError> {
         match self {
-            Self::RandomNodes => Ok(()),
             Self::SmoothField {
                 correlation_length_mm: length,
-            } => {
-                if *length > 0.0 && length.is_finite() {
-                    Ok(())
-                } else {
-                    Err(SceneError::CorrelationLength(*length))
-                }
-            }
+            } if !(*length > 0.0 && length.is_finite()) => Err(SceneError::CorrelationLength(*length)),
             Self::Indenter(indenter) => indenter.check(),
+            Self::RandomNodes | Self::SmoothField { .. } => Ok(()),
         }
     }
 }

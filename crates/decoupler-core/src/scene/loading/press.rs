@@ -31,7 +31,9 @@ pub enum Contact {
 /// One press of an indenter, prepared for evaluation at many nodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Press {
-    face: Face,
+    body: Body,
+    /// The contact of a ball or a punch.
+    contact: RoundContact,
     place: DVec2,
     /// Depth at the centre of the body.
     depth_mm: f64,
@@ -42,30 +44,18 @@ pub(super) struct Press {
     spread_mm: f64,
 }
 
-/// A body with its contact, if it is the same everywhere.
-#[derive(Clone, Copy, Debug)]
-enum Face {
-    Sphere { radius_mm: f64, contact: RoundContact },
-    FlatPunch(RoundContact),
-    Cylinder { radius_mm: f64 },
-    Edge,
-}
-
 impl Press {
     /// Presses `body` to a depth of `depth_mm` at `place`, inclined by `slope` along `direction`, on a surface of decay
     /// length `spread_mm`.
     pub(super) fn new(body: Body, place: DVec2, depth_mm: f64, direction: DVec2, slope: f64, spread_mm: f64) -> Self {
-        let face = match body {
-            Body::Sphere(radius_mm) => Face::Sphere {
-                radius_mm,
-                contact: RoundContact::of_ball(radius_mm, depth_mm, spread_mm),
-            },
-            Body::FlatPunch(radius_mm) => Face::FlatPunch(RoundContact::new(radius_mm, spread_mm)),
-            Body::Cylinder(radius_mm) => Face::Cylinder { radius_mm },
-            Body::Edge => Face::Edge,
+        let contact_mm = match body {
+            Body::Sphere(radius_mm) => contact_radius_mm(radius_mm, depth_mm, spread_mm),
+            Body::FlatPunch(radius_mm) => radius_mm,
+            Body::Cylinder(_) | Body::Edge => 0.0,
         };
         Self {
-            face,
+            body,
+            contact: RoundContact::new(contact_mm, spread_mm),
             place,
             depth_mm,
             direction,
@@ -79,46 +69,44 @@ impl Press {
         let apart = DVec2::new(x, y) - self.place;
         let (along, across) = (apart.dot(self.direction), apart.perp_dot(self.direction));
         let distance = apart.length();
-        match self.face {
-            Face::Sphere { radius_mm, contact } => {
-                let inside = distance.min(contact.radius_mm);
+        let contact_mm = self.contact.radius_mm;
+        match self.body {
+            Body::Sphere(radius_mm) => {
+                let inside = distance.min(contact_mm);
                 let at_body = self.depth_mm - inside * inside / (2.0 * radius_mm);
-                at_body * contact.share_at(distance)
+                at_body * self.contact.share_at(distance)
             }
-            Face::Cylinder { radius_mm } => self.cylinder(self.depth_mm + self.slope * along, radius_mm, across),
-            Face::FlatPunch(contact) => {
+            Body::FlatPunch(_) => {
                 // Outside, the surface starts from the nearest point of the face.
-                let inside = (contact.radius_mm / distance).min(1.0);
-                (self.depth_mm + self.slope * along * inside) * contact.share_at(distance)
+                let inside = (contact_mm / distance).min(1.0);
+                (self.depth_mm + self.slope * along * inside) * self.contact.share_at(distance)
             }
-            Face::Edge => (self.depth_mm + self.slope * along) * (-across.max(0.0) / self.spread_mm).exp(),
+            Body::Cylinder(radius_mm) => {
+                let depth_mm = self.depth_mm + self.slope * along;
+                if depth_mm <= 0.0 {
+                    return 0.0;
+                }
+                // The parabola depth − distance²/(2 radius) up to the distance a where its slope equals that of the free
+                // surface, a/radius = depth(a)/spread, and the free surface beyond.
+                let inside = across.abs().min(self.half_width_mm(depth_mm, radius_mm));
+                let at_body = depth_mm - inside * inside / (2.0 * radius_mm);
+                at_body * (-(across.abs() - inside) / self.spread_mm).exp()
+            }
+            Body::Edge => (self.depth_mm + self.slope * along) * (-across.max(0.0) / self.spread_mm).exp(),
         }
     }
 
     /// The part of the surface that touches the body if it is upright.
     pub(super) fn contact(&self) -> Contact {
-        match self.face {
-            Face::Sphere { contact, .. } | Face::FlatPunch(contact) => Contact::Disc {
-                radius_mm: contact.radius_mm,
+        match self.body {
+            Body::Sphere(_) | Body::FlatPunch(_) => Contact::Disc {
+                radius_mm: self.contact.radius_mm,
             },
-            Face::Cylinder { radius_mm } => Contact::Strip {
+            Body::Cylinder(radius_mm) => Contact::Strip {
                 half_width_mm: self.half_width_mm(self.depth_mm, radius_mm),
             },
-            Face::Edge => Contact::HalfPlane,
+            Body::Edge => Contact::HalfPlane,
         }
-    }
-
-    /// Depth at `distance` from the axis of a cylinder: the parabola depth − distance²/(2 radius) up to the distance a
-    /// where its slope equals that of the free surface, a/radius = depth(a)/spread, and the free surface beyond.
-    fn cylinder(&self, depth_mm: f64, radius: f64, distance: f64) -> f64 {
-        if depth_mm <= 0.0 {
-            return 0.0;
-        }
-        let contact = self.half_width_mm(depth_mm, radius);
-        let distance = distance.abs();
-        let inside = distance.min(contact);
-        let at_body = depth_mm - inside * inside / (2.0 * radius);
-        at_body * (-(distance - inside) / self.spread_mm).exp()
     }
 
     /// Distance from its axis up to which a cylinder touches the surface.
@@ -157,13 +145,6 @@ impl RoundContact {
         }
     }
 
-    /// Creates the contact of a ball of radius `ball_mm` pressed `depth_mm` deep, whose face is depth − r²/(2·ball). It
-    /// ends where the slopes of face and free surface are equal, a/ball = w(a)/λ · K₁(a/λ)/K₀(a/λ), so that there is no
-    /// kink.
-    pub(super) fn of_ball(ball_mm: f64, depth_mm: f64, decay_length_mm: f64) -> Self {
-        Self::new(contact_radius_mm(ball_mm, depth_mm, decay_length_mm), decay_length_mm)
-    }
-
     /// Deflection at `distance_mm` from the axis relative to that at the edge of the contact; 1 inside.
     pub(super) fn share_at(&self, distance_mm: f64) -> f64 {
         let beyond = distance_mm - self.radius_mm;
@@ -175,8 +156,10 @@ impl RoundContact {
     }
 }
 
-/// Solves the condition of [`RoundContact::of_ball`] in the unit of r₀ = √(2 ball·depth), where the face would meet the
-/// undeformed surface: with y = a/r₀, L = λ/r₀ and q(x) = K₀(x)/K₁(x), it is
+/// Radius of the contact of a ball of radius `ball_mm` pressed `depth_mm` deep, whose face is depth − r²/(2·ball). It ends
+/// where the slopes of face and free surface are equal, a/ball = w(a)/λ · K₁(a/λ)/K₀(a/λ), so that there is no kink.
+///
+/// In the unit of r₀ = √(2 ball·depth), where the face would meet the undeformed surface, with y = a/r₀, L = λ/r₀ and q(x) = K₀(x)/K₁(x), it is
 ///
 /// `y² + 2 L y q(y/L) = 1`, whose left side increases with y from 0.
 ///
@@ -363,7 +346,7 @@ mod tests {
         for ball in sizes {
             for depth in [0.0, 5e-324, 1e-9, 1.0, 1e9] {
                 for decay_length in sizes {
-                    let contact = RoundContact::of_ball(ball, depth, decay_length);
+                    let contact = RoundContact::new(contact_radius_mm(ball, depth, decay_length), decay_length);
                     let radius = contact.radius_mm;
                     assert!(radius >= 0.0 && radius.is_finite(), "{ball} {depth} {decay_length}");
                     let shares = [0.0, 1e-300, 1e-9, 0.5, 1.0, 7.0, 1e9, 1e300].map(|r| contact.share_at(r));

@@ -2,7 +2,7 @@ use faer::{Mat, Side};
 use glam::DVec3;
 use rand::{Rng, RngExt};
 
-use super::{Indenter, Loading};
+use super::Loading;
 use crate::{
     numerics::normal_cdf,
     scene::{Deformation, Movement, Scene, standard_normal},
@@ -13,72 +13,61 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct DeformationSampler {
     model: SensorModel,
-    movement: Movement,
-    stroke_mm: f64,
-    loading: Prepared,
-}
-
-#[derive(Clone, Debug)]
-enum Prepared {
-    RandomNodes,
-    SmoothField(SmoothField),
-    Indenter(Indenter),
+    scene: Scene,
+    /// The field of a smooth loading.
+    field: Option<SmoothField>,
 }
 
 impl DeformationSampler {
     pub(in crate::scene) fn new(scene: &Scene, model: &SensorModel) -> Self {
-        let loading = match scene.loading {
-            Loading::RandomNodes => Prepared::RandomNodes,
+        let field = match scene.loading {
             Loading::SmoothField { correlation_length_mm } => {
-                Prepared::SmoothField(SmoothField::new(model.scale, &model.geometry, correlation_length_mm))
+                Some(SmoothField::new(model.scale, &model.geometry, correlation_length_mm))
             }
-            Loading::Indenter(indenter) => Prepared::Indenter(indenter),
+            Loading::RandomNodes | Loading::Indenter(_) => None,
         };
         Self {
             model: *model,
-            movement: scene.movement,
-            stroke_mm: scene.stroke_mm(&model.geometry),
-            loading,
+            scene: *scene,
+            field,
         }
     }
 
     /// Draws the deformation of the whole array at one moment.
     pub fn draw(&self, rng: &mut impl Rng) -> Deformation {
-        let scale = self.model.scale;
-        let shift_mm = match self.movement {
-            Movement::Z => None,
-            Movement::Xyz { largest_shift_mm } => Some(largest_shift_mm),
+        let (scale, stroke_mm) = (self.model.scale, self.scene.stroke_mm(&self.model.geometry));
+        let (is_sideways, shift_mm) = match self.scene.movement {
+            Movement::Z => (false, 0.0),
+            Movement::Xyz { largest_shift_mm } => (true, largest_shift_mm),
         };
-        let shifted_mm = |uniform: f64| shift_mm.unwrap_or(0.0) * (2.0 * uniform - 1.0);
-        match &self.loading {
-            Prepared::RandomNodes => Deformation::from_fn(scale, |_, _| {
-                let z = self.stroke_mm * rng.random::<f64>();
-                let mut sideways = || shift_mm.map_or(0.0, |_| shifted_mm(rng.random()));
-                DVec3::new(sideways(), sideways(), z)
-            }),
-            Prepared::SmoothField(field) => {
-                let z = field.draw(rng);
-                let sideways = shift_mm.map(|_| [field.draw(rng), field.draw(rng)]);
-                Deformation::from_fn(scale, |row, node| {
-                    let at = (row, node);
-                    let [x, y] = sideways
-                        .as_ref()
-                        .map_or([0.0; 2], |[x, y]| [x[at], y[at]].map(shifted_mm));
-                    DVec3::new(x, y, self.stroke_mm * z[at])
-                })
-            }
-            Prepared::Indenter(indenter) => {
-                let press = indenter.draw(&self.model, self.stroke_mm, rng);
-                let mut sideways = || shift_mm.map_or(0.0, |_| shifted_mm(rng.random()));
+        let shifted_mm = |uniform: f64| shift_mm * (2.0 * uniform - 1.0);
+        match (self.scene.loading, &self.field) {
+            (Loading::Indenter(indenter), _) => {
+                let press = indenter.draw(&self.model, stroke_mm, rng);
+                let mut sideways = || if is_sideways { shifted_mm(rng.random()) } else { 0.0 };
                 let (x, y) = (sideways(), sideways());
                 Deformation::from_fn(scale, |row, node| {
                     let rest_mm = self.model.geometry.row_node_mm(scale, row, node);
-                    let z = press.depth_at_mm(rest_mm.x, rest_mm.y).clamp(0.0, self.stroke_mm);
+                    let z = press.depth_at_mm(rest_mm.x, rest_mm.y).clamp(0.0, stroke_mm);
                     // Friction drags the surface along with the body, in proportion to the depth.
-                    let dragged = z / self.stroke_mm;
+                    let dragged = z / stroke_mm;
                     DVec3::new(x * dragged, y * dragged, z)
                 })
             }
+            (_, Some(field)) => {
+                let z = field.draw(rng);
+                let sideways = is_sideways.then(|| [field.draw(rng), field.draw(rng)]);
+                Deformation::from_fn(scale, |row, node| {
+                    let at = (row, node);
+                    let [x, y] = (sideways.as_ref()).map_or([0.0; 2], |[x, y]| [x[at], y[at]].map(shifted_mm));
+                    DVec3::new(x, y, stroke_mm * z[at])
+                })
+            }
+            (_, None) => Deformation::from_fn(scale, |_, _| {
+                let z = stroke_mm * rng.random::<f64>();
+                let mut sideways = || if is_sideways { shifted_mm(rng.random()) } else { 0.0 };
+                DVec3::new(sideways(), sideways(), z)
+            }),
         }
     }
 }
@@ -89,7 +78,7 @@ impl DeformationSampler {
 /// On a grid the covariance is a Kronecker product of a factor along x and one along y. The field is therefore Rx Z Ryᵀ,
 /// where Z is white noise and Rx and Ry are square roots of the factors.
 #[derive(Clone, Debug)]
-pub(super) struct SmoothField {
+struct SmoothField {
     /// Row-wires × row-wires.
     along_x: Mat<f64>,
     /// Nodes × nodes.
@@ -97,17 +86,15 @@ pub(super) struct SmoothField {
 }
 
 impl SmoothField {
-    pub(super) fn new(scale: ArrayScale, geometry: &Geometry, length_mm: f64) -> Self {
-        let row_step = geometry.row_pitch_mm / length_mm;
-        let node_step = geometry.node_pitch_mm / length_mm;
+    fn new(scale: ArrayScale, geometry: &Geometry, length_mm: f64) -> Self {
         Self {
-            along_x: root(scale.rows(), row_step),
-            along_y: root(scale.nodes_per_row(), node_step),
+            along_x: root(scale.rows(), geometry.row_pitch_mm / length_mm),
+            along_y: root(scale.nodes_per_row(), geometry.node_pitch_mm / length_mm),
         }
     }
 
     /// Draws the field: row-wires × nodes, in [0, 1].
-    pub(super) fn draw(&self, rng: &mut impl Rng) -> Mat<f64> {
+    fn draw(&self, rng: &mut impl Rng) -> Mat<f64> {
         let mut white = Mat::zeros(self.along_x.ncols(), self.along_y.ncols());
         for row in 0..white.nrows() {
             for node in 0..white.ncols() {

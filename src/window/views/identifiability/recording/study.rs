@@ -17,7 +17,7 @@ use decoupler_core::{
     problem::Channel,
 };
 use decoupler_files::{
-    export::describe_channels,
+    export::describe_warnings,
     import::{Plan, Progress, Recording, Setup},
     machine::memory_budget,
 };
@@ -43,8 +43,6 @@ pub struct RecordingStudy {
     pub(super) model: Option<FittedModel>,
     /// Extent of a cross-validation.
     pub(super) choice: FoldsChoice,
-    /// Target of the learning curve.
-    pub(super) target: usize,
 }
 
 /// Extent of a cross-validation.
@@ -94,7 +92,6 @@ impl RecordingStudy {
                 folds: 5,
                 compares_random: false,
             },
-            target: 0,
         }
     }
 
@@ -185,6 +182,8 @@ pub struct RecordingFindings {
     pub targets: Vec<Channel>,
     /// The findings.
     pub findings: Findings,
+    /// Warnings about channels, targets and networks.
+    pub warnings: Vec<String>,
     /// Time that it took, without reading the files.
     pub time: Duration,
 }
@@ -245,8 +244,10 @@ fn find(
     let is_cancelled = || report.is_cancelled();
     let ends: (&Job<'_>, &dyn Fn() -> bool) = (&Job::new(&is_cancelled), &|| false);
     let found = Findings::measure(setup.settings(), &recording.set, division, model, &begin, ends);
+    let findings = found.map_err(|error| error.to_string())?;
     report.send(StudyEvent::Found(Box::new(RecordingFindings {
-        findings: found.map_err(|error| error.to_string())?,
+        warnings: describe_warnings(&recording, plan.division.by, &findings),
+        findings,
         setup,
         folds: describe_folds(folds, plan.division.by),
         samples: recording.set.samples(),
@@ -282,11 +283,11 @@ fn validate(
     };
     let determined = Determination::measure(set, validated.network.view(), by);
     let gains = nonlinear_gains(set, &validated, by);
-    let mut remarks = describe_channels(&recording.inputs, &recording.targets, &channel_remarks(set, by));
+    let mut remarks = channel_remarks(set, by, &recording.inputs, &recording.targets);
     for (target, channel) in recording.targets.iter().enumerate() {
         let name = &channel.name;
         remarks.push(match &determined[target] {
-            Ok(determined) => determined.sentence(name, &[FittedModel::Network]),
+            Ok(determined) => determined.sentence(name, "the network explains"),
             Err(cause) => format!("{name}: {cause}"),
         });
         remarks.extend(gains[target].and_then(|gain| ridge_remark(gain, name)));

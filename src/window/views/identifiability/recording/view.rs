@@ -7,24 +7,19 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        Cell, Table, TableColumn as ExportColumn, describe_target, describe_warnings, error_table, format_below_one,
-        format_duration, format_number,
+        Cell, Table, TableColumn as ExportColumn, describe_target, error_table, format_below_one, format_duration,
+        format_number,
     },
-    figure::{Figure, PlotFigure, learning_curve_figure},
     import::Setup,
 };
-use eframe::egui::{Key, Modifiers, RichText, Sense, Ui, vec2};
+use eframe::egui::{Key, Modifiers, RichText, Sense, Ui};
 
 use super::{
     RecordingStudy,
     study::{FoldsChoice, FoldsResult, RecordingFindings, UnderWay},
 };
 use crate::window::{
-    plotting::{Pointer, legend_ui, plots_ui},
-    shared::{
-        Export, FileWords, Offers, Shared, copy_exports, csv_export, error_table_ui, picture_exports, sentence,
-        target_choice_ui,
-    },
+    shared::{Export, FileWords, Offers, Shared, copy_exports, csv_export, error_table_ui, sentence},
     theme::{Theme, space, type_size},
     widgets::{
         TableCell, TableColumn, TableRow, TableView, card_ui, dim_ui, explained_options_ui,
@@ -47,12 +42,7 @@ pub fn body_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {
     }
     let setup = shared.setup().ok();
     let (left, right) = whole.split_left_right_at_x(whole.center().x);
-    let RecordingStudy {
-        found,
-        validated,
-        target,
-        ..
-    } = study;
+    let RecordingStudy { found, validated, .. } = study;
     card_ui(ui, left.with_max_x(left.max.x - space(1)), |ui| {
         scrolled_ui(ui, "findings", |ui| match found {
             Some(found) => {
@@ -65,7 +55,7 @@ pub fn body_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {
     card_ui(ui, right.with_min_x(right.min.x + space(1)), |ui| {
         scrolled_ui(ui, "study", |ui| {
             if let Some(found) = found {
-                curve_ui(ui, found, target);
+                curve_ui(ui, found);
             }
             match validated {
                 Some(validated) => {
@@ -95,9 +85,9 @@ fn empty_ui(ui: &mut Ui, study: &mut RecordingStudy, ready: Option<Setup>, share
         (Some(under_way), _) => placeholder_ui(ui, &progress(under_way, study)),
         (None, Err(obstacle)) => placeholder_ui(ui, &obstacle),
         (None, Ok(_)) => {
-            let text = "How well the readings determine each target, what each channel contributes, and what more samples \
-                        would bring: measured by cross-validation, with confidence intervals of 95 % from independent \
-                        stretches or groups of samples.";
+            let text = "How well the readings determine each target, what each channel contributes, and how the error falls \
+                        with the number of samples: measured on held-out samples, with confidence intervals of 95 % from \
+                        independent stretches or groups of samples.";
             if invitation_ui(ui, text, "Analyse now", ready.is_some())
                 && let Some(setup) = ready
             {
@@ -165,9 +155,6 @@ pub fn folds_ui(ui: &mut Ui, validated: &FoldsResult) {
     }
 }
 
-/// Height of the learning curve.
-const CURVE_HEIGHT: f32 = space(60);
-
 /// Shows what the readings determine, target by target, and the contribution of each channel.
 pub fn findings_ui(ui: &mut Ui, found: &RecordingFindings) {
     targets_ui(ui, found);
@@ -192,8 +179,8 @@ fn targets_ui(ui: &mut Ui, found: &RecordingFindings) {
         }
         ui.add_space(space(1));
     }
-    for warning in describe_warnings(&found.inputs, targets, findings) {
-        note_ui(ui, &sentence(&warning));
+    for warning in &found.warnings {
+        note_ui(ui, &sentence(warning));
     }
     dim_ui(
         ui,
@@ -224,14 +211,14 @@ fn channels_ui(ui: &mut Ui, found: &RecordingFindings) {
     let columns: Vec<TableColumn<'_>> = std::iter::once(TableColumn::text("channel"))
         .chain(titles.iter().map(|title| TableColumn::figure(title)))
         .collect();
-    let rows = found.findings.importance.iter().map(|channel| {
-        let colour = if channel.is_dispensable() {
+    let rows = found.findings.importance.iter().enumerate().map(|(channel, growth)| {
+        let colour = if found.findings.is_dispensable(channel) {
             palette.dim
         } else {
             palette.text
         };
-        let name = found.inputs[channel.channel].title();
-        let growth = channel.growth.iter().map(|growth| match growth {
+        let name = found.inputs[channel].title();
+        let growth = growth.iter().map(|growth| match growth {
             Some(growth) => growth.to_string(),
             None => format_number(None),
         });
@@ -241,35 +228,34 @@ fn channels_ui(ui: &mut Ui, found: &RecordingFindings) {
     TableView::new("channels", &columns).show_all(ui, rows.collect());
 }
 
-/// Shows the learning curve of a target and the gain from more samples.
-pub fn curve_ui(ui: &mut Ui, found: &RecordingFindings, target: &mut usize) {
-    section_heading_ui(ui, "More samples");
-    for (channel, of_target) in found.targets.iter().zip(&found.findings.targets) {
-        ui.label(sentence(&of_target.curve.sentence(&channel.name)));
+/// Shows the errors on the test samples by the number of training samples.
+pub fn curve_ui(ui: &mut Ui, found: &RecordingFindings) {
+    if found.findings.curve.is_empty() {
+        return;
     }
-    target_choice_ui(ui, "Target", "learning curve target", &found.targets, target);
-    let figure = curve_figure(found, *target);
-    legend_ui(ui, &figure.keys);
-    ui.allocate_ui(vec2(ui.available_width(), CURVE_HEIGHT), |ui| {
-        ui.set_min_height(CURVE_HEIGHT);
-        plots_ui(ui, "learning curve", &figure, Pointer::Moves);
+    section_heading_ui(ui, "Learning curve");
+    dim_ui(
+        ui,
+        &format!(
+            "RMSE on the test samples by the number of training samples: mean of the fits, from best to worst; {} is fitted \
+             again for each.",
+            name_of(found.findings.model)
+        ),
+    );
+    let titles: Vec<String> = found.targets.iter().map(Channel::title).collect();
+    let columns: Vec<TableColumn<'_>> = std::iter::once(TableColumn::figure("samples"))
+        .chain(titles.iter().map(|title| TableColumn::figure(title)))
+        .collect();
+    let rows = found.findings.curve.iter().map(|point| {
+        let samples = point.samples.to_string();
+        let errors = point.rmse.iter().zip(&point.range).map(|(&rmse, &range)| {
+            let [best, worst] = range.map(format_number);
+            format!("{} ({best} to {worst})", format_number(rmse))
+        });
+        let cells = std::iter::once(samples.clone()).chain(errors).map(TableCell::new);
+        TableRow::new(cells).named(counted(point.samples, "sample"))
     });
-}
-
-fn curve_figure(found: &RecordingFindings, target: usize) -> PlotFigure {
-    let channel = &found.targets[target];
-    learning_curve_figure(
-        &found.findings.targets[target].curve,
-        &channel.name,
-        channel.unit.as_deref(),
-    )
-}
-
-/// Returns the displayed learning curve.
-pub(super) fn shown_curve_figure(study: &RecordingStudy) -> Option<PlotFigure> {
-    let found = study.found.as_ref()?;
-    let last = found.targets.len().checked_sub(1)?;
-    Some(curve_figure(found, study.target.min(last)))
+    TableView::new("learning curve", &columns).show_all(ui, rows.collect());
 }
 
 fn name_of(model: FittedModel) -> &'static str {
@@ -282,6 +268,12 @@ fn name_of(model: FittedModel) -> &'static str {
 const CHANNELS: FileWords = FileWords {
     kind: "channel table",
     description: "How much the error of each target grows without each channel, with every digit, as CSV.",
+    extensions: &["csv"],
+};
+
+const CURVE: FileWords = FileWords {
+    kind: "learning curve",
+    description: "RMSE of each target on the test samples by the number of training samples, with every digit, as CSV.",
     extensions: &["csv"],
 };
 
@@ -301,9 +293,14 @@ pub fn study_exports(study: &RecordingStudy) -> Vec<Export<'_>> {
         let source = found.as_ref().map_or(String::new(), |found| found.setup.source_name());
         of_source(&source, what)
     };
-    let curve = shown_curve_figure(study).ok_or_else(nothing);
-    let curve = curve.map(|figure| move || Figure::from(figure.clone()));
-    let mut exports: Vec<Export<'_>> = picture_exports("Learning curve", stem("learning-curve"), curve).collect();
+    let curve = found.clone().map(|found| move || curve_table(found));
+    let mut exports = vec![csv_export(
+        "Learning curve",
+        CURVE,
+        stem("learning-curve"),
+        curve.clone(),
+    )];
+    exports.extend(copy_exports("Learning curve", curve));
     let channels = found.clone().map(|found| move || channel_table(found));
     exports.push(csv_export(
         "Channel table",
@@ -329,9 +326,9 @@ pub fn study_exports(study: &RecordingStudy) -> Vec<Export<'_>> {
 /// Returns the growth of the error of each target without each channel.
 fn channel_table(found: &RecordingFindings) -> Table {
     let mut rows = Vec::new();
-    for channel in &found.findings.importance {
-        for (target, growth) in found.targets.iter().zip(&channel.growth) {
-            let names = [&found.inputs[channel.channel].name, &target.name];
+    for (channel, growth) in found.inputs.iter().zip(&found.findings.importance) {
+        for (target, growth) in found.targets.iter().zip(growth) {
+            let names = [&channel.name, &target.name];
             let figures = [
                 growth.map(|growth| growth.value),
                 growth.map(|growth| growth.low),
@@ -347,6 +344,32 @@ fn channel_table(found: &RecordingFindings) -> Table {
         ("rmse_ratio", "RMSE without it / with all"),
         ("low", "from"),
         ("high", "to"),
+    ];
+    Table {
+        columns: columns
+            .map(|(field, heading)| ExportColumn::new(field, heading, ""))
+            .into(),
+        rows,
+    }
+}
+
+/// Returns the errors of each target by the number of training samples.
+fn curve_table(found: &RecordingFindings) -> Table {
+    let mut rows = Vec::new();
+    for point in &found.findings.curve {
+        for (index, target) in found.targets.iter().enumerate() {
+            let [best, worst] = point.range[index];
+            let figures = [point.rmse[index], best, worst].map(Cell::from);
+            let names = [Cell::from(point.samples), Cell::from(target.name.clone())];
+            rows.push(names.into_iter().chain(figures).collect());
+        }
+    }
+    let columns = [
+        ("samples", "Training samples"),
+        ("target", "Target"),
+        ("rmse", "RMSE"),
+        ("min", "best fit"),
+        ("max", "worst fit"),
     ];
     Table {
         columns: columns
@@ -438,8 +461,8 @@ fn buttons_ui(ui: &mut Ui, study: &mut RecordingStudy, ready: Option<Setup>) {
     let why_not = "Open a recording in the Train view, and wait until no training is running.";
     ui.vertical_centered_justified(|ui| {
         let analyse = ui.add_enabled(ready.is_some(), primary_button("Analyse readings"));
-        let hint = "Measures by cross-validation how well the readings determine each target, what each channel contributes, \
-                    and what more samples would bring";
+        let hint = "Measures on held-out samples how well the readings determine each target, what each channel contributes, \
+                    and how the error falls with the number of samples";
         let is_analysed = analyse.on_hover_text(with_shortcut(ui, hint, Key::Enter)).on_disabled_hover_text(why_not).clicked();
         let validate = ui.add_enabled(ready.is_some(), ghost_button("Cross-validate"));
         let hint = "Tests on every sample with networks trained on the other folds: one training per fold.";

@@ -441,7 +441,7 @@ impl Watch {
     /// Returns `true` for a reading that is left out.
     pub(super) fn leaves_out(&self, row: usize, column: usize) -> bool {
         match &self.state {
-            Watched::Named(diagnosis) => diagnosis.wire.is_row(row) || diagnosis.wire.columns().contains(&Some(column)),
+            Watched::Named(diagnosis) => diagnosis.wire.is_row(row) || diagnosis.wire.columns().contains(&column),
             Watched::Off(_) | Watched::Normal | Watched::Unexplained => false,
         }
     }

@@ -47,7 +47,7 @@ pub(super) fn automatic_choice_ui(ui: &mut Ui, shared: &Shared, has_one_network:
 fn note(shared: &Shared) -> String {
     let search = shared.chosen_run().and_then(|run| run.search.as_ref());
     match search.and_then(AutoRecord::choice) {
-        Some(choice) => format!("Chosen: {}; {}.", choice.model(), choice.features()),
+        Some(choice) => format!("Chosen: {}; {}.", choice.model, choice.features()),
         None if shared.phase == Phase::Preparing => "Settings are being chosen.".to_owned(),
         None => "Train tries several settings, and keeps those with the lowest error in cross-validation.".to_owned(),
     }

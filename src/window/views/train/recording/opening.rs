@@ -13,9 +13,7 @@ use decoupler_core::{
     evaluation::recorded::{Extrapolation, channel_remarks},
 };
 use decoupler_files::{
-    export::{
-        CheckpointFile, DocumentKind, NetworkFile, RecipeFile, RecipeSource, describe_channels, describe_positions,
-    },
+    export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, RecipeSource, describe_positions},
     import::{
         Dropped, FileReport, FileSet, Format, InspectedFile, Joined, Plan, Progress, Recipe, Recording, Watch,
         holds_positions, suggested_plan, suggested_plan_in_order,
@@ -461,10 +459,8 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
     let Recording {
         inputs, targets, set, ..
     } = &sets.recording;
-    let remarks = channel_remarks(set, plan.division.by);
-    warnings.extend(describe_channels(inputs, targets, &remarks));
-    let outside = Extrapolation::measure(&sets.split.training, &sets.test);
-    warnings.extend(outside.warning(&sets.recording.inputs, &sets.recording.targets));
+    warnings.extend(channel_remarks(set, plan.division.by, inputs, targets));
+    warnings.extend(Extrapolation::measure(&sets.split.training, &sets.test, inputs, targets).warning);
     let validation = sets.split.validation.as_ref().map_or(0, Dataset::samples);
     Ok(Box::new(Checked {
         samples: [sets.split.training.samples(), validation, sets.test.samples()],
