@@ -176,9 +176,7 @@ impl Sensor {
             own: noise,
             common: 0.0,
         };
-        let found = detached(py, || {
-            Identifiability::of_row_with_gain(&self.0, row, &displacements, axes, own)
-        })?;
+        let found = detached(py, || Identifiability::of_row(&self.0, row, &displacements, axes, own))?;
         let rows_of = |vectors: &[DVec3]| Array2::from_shape_fn((vectors.len(), 3), |(node, axis)| vectors[node][axis]);
         Ok((
             found.singular_values_per_mm.clone().into_pyarray(py),

@@ -249,7 +249,7 @@ pub fn train(
     })?;
     let mut interruption = step_to_the_end(py, &mut run, callback.as_ref());
     run.stop();
-    let mut warning = run.defect().map(|defect| defect.to_string());
+    let mut warning = run.defect();
     let calibrated = calibration
         .filter(|_| interruption.is_none())
         .map(|set| calibrate(py, &run_settings, &set, by));

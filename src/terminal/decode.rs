@@ -9,7 +9,7 @@ use clap::Args;
 use decoupler_core::{
     calibration::PressLimits,
     dataset::{Dataset, Division, SimulationError, SplitBy, Stream},
-    evaluation::{Errors, TestErrors, fine_tune, press_limits, pressed_rows},
+    evaluation::{Errors, TestErrors, fine_tune, pressed_rows},
     job::Job,
     network::{DecouplingNetwork, Networks},
     problem::{Channel, Problem},
@@ -453,7 +453,11 @@ impl FineTune {
         };
         let simulation = file.problem.sensor.ok_or_else(no_array)?;
         let settings = file.settings;
-        let limits = press_limits(&simulation);
+        // Samples outside are not presses, or require answers that the network was not trained for.
+        let limits = PressLimits {
+            largest_depth_mm: simulation.stroke_mm(),
+            largest_shift_mm: simulation.scene.movement.largest_shift_mm(),
+        };
         let frames = self.frames.read(&simulation.sensor, limits, self.json)?;
         let read = simulation.scene.rows.read(simulation.sensor.scale.rows());
         let read = read.map_err(decoupler_core::dataset::SimulationError::from)?;

@@ -8,7 +8,7 @@ use std::{
 use decoupler_core::{
     calibration::CalibrationError,
     dataset::{DatasetError, SimulationError, SplitBy},
-    evaluation::{RunError, experiments::ExperimentError},
+    evaluation::RunError,
     scene::Rows,
     sensor::SensorError,
     text::counted,
@@ -63,8 +63,6 @@ pub(super) enum Failure {
         "interrupted during the second training; the first is complete, but the optimism of its random test samples was not measured: use --split {by}"
     )]
     InterruptedComparison { by: SplitBy },
-    #[error(transparent)]
-    Threads(ExperimentError),
     #[error("interrupted after {done} of {trials} trials")]
     InterruptedTrials { done: usize, trials: usize },
     #[error("{place}: {cause}; only earlier results are printed")]
@@ -176,15 +174,6 @@ impl From<SetupError> for Failure {
     }
 }
 
-impl From<ExperimentError> for Failure {
-    fn from(error: ExperimentError) -> Self {
-        match error {
-            ExperimentError::Threads(_) => Self::Threads(error),
-            _ => Self::Arguments(error.to_string()),
-        }
-    }
-}
-
 /// The cure of an import error in terms of arguments.
 fn in_arguments(cure: &Cure) -> String {
     match cure {
@@ -244,7 +233,7 @@ impl Failure {
 fn is_argument_error(error: &RunError) -> bool {
     matches!(
         error,
-        RunError::Count(_)
+        RunError::Count { .. }
             | RunError::TooManySamples { .. }
             | RunError::Scene(_)
             | RunError::Simulation(SimulationError::Count(_) | SimulationError::Scene(_))

@@ -10,10 +10,10 @@ use clap::{Args, ValueEnum};
 use decoupler_core::{
     dataset::{Seed, SplitBy},
     evaluation::{
-        CrossValidation, MAX_STARTS,
+        CrossValidation, ErrorMeasure, MAX_STARTS, RunError,
         experiments::{
-            Axis, AxisKind, CellSummary, Experiment, ExperimentResults, Figure, PaperTable, SummaryErrors,
-            TrialSamples, run_experiments, worker_threads,
+            Axis, AxisKind, CellSummary, Experiment, ExperimentResults, Figure, PaperTable, TrialSamples,
+            run_experiments, worker_threads,
         },
     },
     network::LARGEST_HIDDEN,
@@ -144,7 +144,11 @@ impl Reproduce {
                     bar.set_message(format!("about {} left", format_duration(time)));
                 }
             },
-        )?;
+        )
+        .map_err(|error| match error {
+            RunError::Threads(_) => Failure::Run(error),
+            error => Failure::Arguments(error.to_string()),
+        })?;
         bar.finish_and_clear();
         drop(graceful);
         let reproduced: Vec<Reproduced> = tables.into_iter().zip(results).collect();
@@ -185,7 +189,7 @@ impl Reproduce {
         if let Some(starts) = self.starts {
             experiment.base.starts = starts;
         }
-        match experiment.axis.kind() {
+        match experiment.axis.kind {
             AxisKind::Hidden if !self.hidden.is_empty() => {
                 let hidden = self.hidden.iter().map(|&hidden| hidden as u64);
                 experiment.axis = Axis::integers(AxisKind::Hidden, hidden);
@@ -296,14 +300,7 @@ struct CellReport {
 impl CellReport {
     /// `None` for a recording, which does not occur in the paper's tables.
     fn of(summary: CellSummary) -> Option<Self> {
-        let SummaryErrors::Nodes {
-            x_percent,
-            y_percent,
-            z_mm,
-        } = summary.errors
-        else {
-            return None;
-        };
+        let figure = |measure| summary.error(measure).cloned();
         let settings = summary.cell.settings;
         let simulation = settings.simulation()?;
         Some(Self {
@@ -316,10 +313,10 @@ impl CellReport {
             seed: settings.seed,
             trials: summary.trials,
             expected_trials: summary.expected_trials,
-            z_percent: summary.percent,
-            x_percent,
-            y_percent,
-            z_mm,
+            z_percent: figure(ErrorMeasure::ZPercent)?,
+            x_percent: figure(ErrorMeasure::XPercent)?,
+            y_percent: figure(ErrorMeasure::YPercent)?,
+            z_mm: figure(ErrorMeasure::ZMm)?,
             mean_z_percent: summary.mean_percent,
             linear_z_percent: summary.linear_percent,
             epochs_run: summary.epochs_run,

@@ -183,14 +183,12 @@ impl Simulate {
         for first in (0..snapshots).step_by(block) {
             let samples = block.min(snapshots - first) * rows.len();
             let mut set = Dataset::simulate(sensor, scene, samples, &mut rng)?;
-            if let Some(faulty) = &faulty {
-                set.break_before_noise(sensor, faulty);
-            }
-            set.disturb(sensor, &scene.noise.in_test(), &mut noise_rng)
-                .map_err(RunError::from)?;
-            if let Some(faulty) = &faulty {
-                set.break_after_noise(faulty);
-            }
+            let noise = scene.noise.in_test();
+            let disturbed = match &faulty {
+                Some(faulty) => set.disturb_faulty(sensor, faulty, &noise, &mut noise_rng),
+                None => set.disturb(sensor, &noise, &mut noise_rng),
+            };
+            disturbed.map_err(RunError::from)?;
             let decoded_mm = match &mut decoder {
                 Some(decoder) => Some(decode_set(&mut **decoder, &set).map_err(RunError::from)?),
                 None => None,

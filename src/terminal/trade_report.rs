@@ -188,11 +188,9 @@ impl MeasuredLevel {
     /// The fastest and the most accurate point within the given `limits`.
     fn choices(&self, limits: Limits) -> [Option<Choice>; 2] {
         let points = &self.level.points;
-        let choice = |limit: Option<f64>, choose: fn(&[TradeOffPoint], f64) -> Option<&TradeOffPoint>| {
+        let choice = |limit: Option<f64>, choose: fn(&[TradeOffPoint], f64) -> Option<usize>| {
             let limit = limit?;
-            let chosen = choose(points, limit);
-            let is_chosen = |point: &TradeOffPoint| chosen.is_some_and(|chosen| std::ptr::eq(point, chosen));
-            let point = points.iter().position(is_chosen);
+            let point = choose(points, limit);
             Some(Choice {
                 limit,
                 point,

@@ -127,7 +127,7 @@ impl Train {
             let report = RunReport {
                 name: None,
                 file: &file,
-                defect: defect.as_ref(),
+                defect: defect.as_deref(),
                 decoders: &decoders,
                 test: run.test(),
             };

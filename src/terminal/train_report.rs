@@ -15,7 +15,7 @@ use super::{
 use decoupler_core::{
     dataset::Simulation,
     evaluation::{
-        Baselines, Combination, DecoderReport, Errors, Outlook, Run, RunError, StartRecord, TestErrors,
+        Combination, DecoderReport, Errors, Outlook, Run, RunError, StartRecord, TestErrors,
         auto::AutoRecord,
         best_start, error_remarks,
         recorded::{Determination, Extrapolation, HysteresisLoop, Undetermined},
@@ -78,6 +78,13 @@ enum SourceReport<'a> {
 }
 
 #[derive(Serialize)]
+struct ArrayBaselines {
+    mean: Errors,
+    linear: Errors,
+    model_based: Option<Errors>,
+}
+
+#[derive(Serialize)]
 struct ArrayReport<'a> {
     array: ArrayScale,
     samples: usize,
@@ -88,7 +95,7 @@ struct ArrayReport<'a> {
     validation_mse: Option<f64>,
     epoch_ms: f64,
     errors: Errors,
-    baselines: Baselines<Errors>,
+    baselines: ArrayBaselines,
     published: Option<Published>,
     scene: Scene,
     inputs: InputChoice,
@@ -170,7 +177,9 @@ impl<'a> ArrayReport<'a> {
         let best = training.history.get(training.best_epoch);
         let size = source.model_size()?;
         let best_start = best_start(&training.starts).and_then(|number| training.starts.get(number));
-        let scores = file.scores.nodes().expect("the targets are nodes");
+        let nodes = |errors: &TestErrors| *errors.nodes().expect("the targets are nodes");
+        let baselines = &file.scores.baselines;
+        let model_based = baselines.model_based.as_ref().map(nodes);
         Ok(Self {
             array: source.sensor.scale,
             samples: source.samples,
@@ -186,8 +195,12 @@ impl<'a> ArrayReport<'a> {
                 |start| start.validation_mse,
             ),
             epoch_ms: 1e3 * epoch_seconds(training),
-            errors: scores.network,
-            baselines: scores.baselines,
+            errors: nodes(&file.scores.network),
+            baselines: ArrayBaselines {
+                mean: nodes(&baselines.mean),
+                linear: nodes(&baselines.linear),
+                model_based,
+            },
             published: settings.published().map(|row| Published {
                 z_percent: row.z_percent,
                 x_percent: row.x_percent,
@@ -199,7 +212,7 @@ impl<'a> ArrayReport<'a> {
             equations: size.equations,
             condition: condition(Outlook::of(source).ok().as_ref()),
             remarks,
-            model_based: scores.baselines.model_based.map(|errors| ModelBased {
+            model_based: model_based.map(|errors| ModelBased {
                 z_percent: errors.z_percent,
                 z_mm: errors.z_mm,
             }),
@@ -300,7 +313,7 @@ impl<'a> Trained<'a> {
             .chain(describe_samples(self.sets))
             .chain(search(self.file).and_then(AutoRecord::remark))
             .chain(self.optimism.iter().cloned())
-            .chain(self.run.defect().map(|defect| defect.to_string()))
+            .chain(self.run.defect())
             .chain(describe_determinacy(&self.file.problem.targets, determined))
             .chain(describe_worse_than_ridge(problem, scores))
             .chain(describe_coverage(&problem.targets, &scores.coverage))

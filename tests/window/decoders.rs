@@ -54,13 +54,9 @@ fn table_of(run: &Run) -> Vec<String> {
         &Job::UNINTERRUPTED,
     )
     .unwrap();
-    let model_based = run
-        .baselines()
-        .unwrap()
-        .nodes()
-        .unwrap()
-        .model_based
-        .filter(|errors| !errors.is_rounding());
+    let model_based = run.baselines().unwrap().model_based.as_ref();
+    let model_based = model_based.and_then(|errors| errors.nodes());
+    let model_based = model_based.filter(|errors| !errors.is_rounding());
     let of_decoder = |(wanted, name): (DecoderResult, &str)| {
         let report = set.measure(wanted.kind, wanted.precision, run.test()).unwrap().unwrap();
         let errors = *report.errors.nodes().unwrap();

@@ -105,7 +105,7 @@ fn a_table_ends_with_the_librarys_own_numbers() {
     wait_for_the_network(&mut driver);
     assert_eq!(driver.state().draft, experiment.cells()[1].settings);
     assert_eq!(driver.state().run.as_ref().unwrap().history.len(), 1 + 3);
-    let z = results.cells[1].trials[0].errors.percent();
+    let z = results.cells[1].trials[0].scores.network.percent();
     let shown = driver.state().result().unwrap().errors.percent();
     assert_eq!(shown.map(f64::to_bits), z.map(f64::to_bits), "it is the cell's network");
 }
@@ -227,7 +227,7 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     let outcome = driver.views().experiments.outcome().unwrap();
     let results = by_library(&outcome.results.experiment);
     for (cell, z) in results.cells.iter().zip(["2, 50", "3, 50", "2, 100", "3, 100"]) {
-        let percent = decoupler_files::export::format_percent(cell.percent().map(|spread| spread.median));
+        let percent = decoupler_files::export::format_percent(cell.summary().percent().median);
         let label = format!("{z}: median Z error {percent}");
         assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
     }
@@ -357,10 +357,17 @@ fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
     assert!(results.is_complete() && results.cells.len() == 4);
     let alone = trained(&plan(&path));
     let trial = &results.cells[1].trials[0];
-    assert_eq!(trial.errors, alone.errors(), "12 hidden nodes, scaled to [−1, 1]");
+    assert_eq!(
+        trial.scores.network,
+        alone.errors(),
+        "12 hidden nodes, scaled to [−1, 1]"
+    );
     let baselines = alone.baselines().unwrap();
-    assert_eq!([&trial.mean, &trial.linear], [&baselines.mean, &baselines.linear]);
-    let percent = decoupler_files::export::format_percent(trial.errors.percent());
+    assert_eq!(
+        [&trial.scores.baselines.mean, &trial.scores.baselines.linear],
+        [&baselines.mean, &baselines.linear]
+    );
+    let percent = decoupler_files::export::format_percent(trial.scores.network.percent());
     let label = format!("12, minmax: median mean absolute error {percent}");
     assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
     driver.click("Cell 12, minmax");

@@ -11,7 +11,7 @@ use decoupler_core::{
     },
     identifiability::Identifiability,
     job::Job,
-    sensor::SensorModel,
+    sensor::{RelativeNoise, SensorModel},
 };
 use decoupler_files::{
     export::{describe_target, format_number},
@@ -48,7 +48,8 @@ fn analysis(driver: &Driver) -> &Analysis {
 fn worst_row(sensor: &SensorModel, compression: f64) -> Identifiability {
     let axes = decoupler_core::sensor::Axes::Z;
     let pressed = vec![DVec3::Z * compression * sensor.geometry.height_mm; sensor.scale.nodes_per_row()];
-    let rows = (0..sensor.scale.rows()).map(|row| Identifiability::of_row(sensor, row, &pressed, axes).unwrap());
+    let rows = (0..sensor.scale.rows())
+        .map(|row| Identifiability::of_row(sensor, row, &pressed, axes, RelativeNoise::default()).unwrap());
     let smallest = |row: &Identifiability| *row.singular_values_per_mm.last().unwrap();
     rows.min_by(|a, b| smallest(a).total_cmp(&smallest(b))).unwrap()
 }

@@ -27,8 +27,9 @@ fn file() -> (tempfile::TempDir, PathBuf) {
 #[track_caller]
 fn shows_the_baselines_of(driver: &Driver, settings: RunSettings) {
     let run = Run::prepare(settings).unwrap();
-    let baselines = run.baselines().unwrap().nodes().unwrap();
-    for (name, errors) in [("training mean", baselines.mean), ("linear map", baselines.linear)] {
+    let baselines = run.baselines().unwrap();
+    for (name, errors) in [("training mean", &baselines.mean), ("linear map", &baselines.linear)] {
+        let errors = errors.nodes().unwrap();
         let cells = [
             format!("{name}, Z %: {}", format_number(errors.z_percent)),
             format!("{name}, mm: {}", format_number(errors.z_mm)),
@@ -110,7 +111,8 @@ fn a_linear_map_that_beats_the_network_is_marked() {
     driver.train();
     driver.settle();
     let result = *driver.state().result().unwrap().errors.nodes().unwrap();
-    let linear = driver.state().run.as_ref().unwrap().baselines.nodes().unwrap().linear;
+    let linear = driver.state().run.as_ref().unwrap().baselines.linear.clone();
+    let linear = *linear.nodes().unwrap();
     assert!(linear.z_mm < result.z_mm, "one epoch is too few");
     assert!(driver.has(MARK), "{:#?}", driver.texts());
     driver.enter("Epochs", "60");

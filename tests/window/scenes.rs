@@ -153,7 +153,8 @@ fn a_training_with_noise_is_compared_with_the_limit_that_noise_sets() {
     settings.inputs.scaling = ScalingChoice::Whitening;
     let run = trained(settings);
     assert_eq!(driver.table(), table_of(&run));
-    let model_based = run.baselines().unwrap().nodes().unwrap().model_based.unwrap();
+    let model_based = run.baselines().unwrap().model_based.clone().unwrap();
+    let model_based = model_based.nodes().unwrap();
     assert!(model_based.z_mm > 0.0);
     let ratio = run.errors().nodes().unwrap().z_mm / model_based.z_mm;
     let said = format!("{} times the model-based error", format_number(ratio));

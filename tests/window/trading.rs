@@ -103,8 +103,8 @@ fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
     driver.enter("Fastest under", "5");
     driver.enter("Most accurate under", "1e9");
     let level = driver.views().trade_off.shown().unwrap();
-    let fastest = fastest_under(&level.points, 5.0).unwrap().clone();
-    let best = most_accurate_under(&level.points, 1e9).unwrap().clone();
+    let fastest = level.points[fastest_under(&level.points, 5.0).unwrap()].clone();
+    let best = level.points[most_accurate_under(&level.points, 1e9).unwrap()].clone();
     let is_best = format_percent(best.report.errors.percent());
     let answer = driver
         .texts()

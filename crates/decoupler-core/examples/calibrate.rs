@@ -7,7 +7,8 @@ use std::error::Error;
 use decoupler_core::{
     calibration::{Calibration, SensorParameter},
     dataset::{Dataset, Division, Seed, Simulation, Stream},
-    evaluation::{Errors, Preset, Run, RunSettings, fine_tune, pressed_rows, rebased},
+    evaluation::{Errors, Preset, Run, RunSettings, fine_tune, pressed_rows},
+    glam::DVec3,
     job::Job,
     machine::MemoryBudget,
     network::Networks,
@@ -38,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let scene = source.scene;
         let mut set = Dataset::simulate(&real, &scene, 10 * snapshots, &mut Seed(seed).rng(Stream::Training))?;
         set.disturb(&real, &scene.noise, &mut Seed(seed).rng(Stream::TrainingNoise))?;
-        Ok(rebased(&set, &real, &nominal)?) // Only displacements are known, not the true positions.
+        rebased(&set, &real, &nominal) // Only displacements are known, not the true positions.
     };
     let (frames, test) = (recorded(60, 1)?, recorded(100, 2)?);
 
@@ -104,6 +105,23 @@ fn coverage(
         "Within its interval, of {SEEDS} recordings: {}; all together {of_all}",
         of_each.join(", ")
     ))
+}
+
+/// Returns `set` with coordinates of the model `to` instead of `from`: displacements stay, and rest positions move.
+fn rebased(set: &Dataset, from: &SensorModel, to: &SensorModel) -> Result<Dataset, Box<dyn Error>> {
+    let rows = (0..set.samples()).map(|sample| set.row_wire(sample));
+    let rows: Vec<usize> = rows.collect::<Option<_>>().ok_or("samples without row-wires")?;
+    let mut targets = set.targets().to_owned();
+    for (mut coordinates, &row) in targets.rows_mut().into_iter().zip(&rows) {
+        for node in 0..from.scale.nodes_per_row() {
+            let [before, after] = [from, to].map(|model| model.displaced_mm(row, node, DVec3::ZERO));
+            for (axis, moved) in (after - before).to_array().into_iter().enumerate() {
+                coordinates[3 * node + axis] += moved;
+            }
+        }
+    }
+    let moved = Dataset::new(set.readings().to_owned(), targets, Some(&rows), set.groups().to_vec())?;
+    Ok(moved.among_rows(set.row_wires_read().unwrap_or_default())?)
 }
 
 fn train(settings: RunSettings) -> Result<Networks, Box<dyn Error>> {

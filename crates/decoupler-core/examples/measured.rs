@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         repeats: 1,
         by: SplitBy::Group,
     };
-    let validated = folds.run(&settings, &set, 0, &Job::UNINTERRUPTED)?;
+    let validated = folds.run(&settings, (&set, &set), 0, &Job::UNINTERRUPTED)?;
     let scores = validated.scores(&set);
     let rows = [
         ("training mean", scores.baselines.mean),

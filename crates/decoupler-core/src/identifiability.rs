@@ -1,7 +1,5 @@
 //! Identifiability: how well the readings of a row-wire determine its deformation.
 
-use std::fmt;
-
 use faer::Mat;
 use glam::DVec3;
 use thiserror::Error;
@@ -35,24 +33,13 @@ pub struct Identifiability {
 impl Identifiability {
     /// Analyses row-wire `row` whose nodes are displaced by `displacements_mm` (M2 of them) and move along `axes`.
     ///
+    /// If `noise` has a common error, such as the gain of a snapshot, a change common to all readings counts only as far as
+    /// that error allows. Readings with independent errors alone (`noise.own`) and these singular values then determine as
+    /// much as the readings with both.
+    ///
     /// # Errors
     /// If there is no such row, no resistance for the deformation, or the decomposition does not converge.
     pub fn of_row(
-        model: &SensorModel,
-        row: usize,
-        displacements_mm: &[DVec3],
-        axes: Axes,
-    ) -> Result<Self, IdentifiabilityError> {
-        Self::of_row_with_gain(model, row, displacements_mm, axes, RelativeNoise::default())
-    }
-
-    /// As [`Self::of_row`], for readings with this noise: if they have a common error, such as the gain of a
-    /// snapshot, a change common to all readings counts only as far as that error allows. Readings with independent
-    /// errors alone (`noise.own`) and these singular values then determine as much as the readings with both.
-    ///
-    /// # Errors
-    /// As [`Self::of_row`].
-    pub fn of_row_with_gain(
         model: &SensorModel,
         row: usize,
         displacements_mm: &[DVec3],
@@ -86,9 +73,8 @@ impl Identifiability {
             .thin_svd()
             .map_err(|_| IdentifiabilityError::NotConverged(row))?;
         // Rounding would turn the zeros of the added rows into about 1e-17.
-        let singular_values_per_mm = svd.S().column_vector().iter().enumerate();
-        let singular_values_per_mm =
-            singular_values_per_mm.map(|(pattern, &value)| if pattern < equations { value } else { 0.0 });
+        let singular_values = svd.S().column_vector().iter().enumerate();
+        let singular_values = singular_values.map(|(pattern, &value)| if pattern < equations { value } else { 0.0 });
         let worst = svd.V().col(unknowns - 1);
         let nodes = 0..displacements_mm.len();
         let by_axis = |value: &dyn Fn(usize) -> f64, node: usize| {
@@ -105,7 +91,7 @@ impl Identifiability {
             row,
             axes,
             equations,
-            singular_values_per_mm: singular_values_per_mm.collect(),
+            singular_values_per_mm: singular_values.collect(),
             worst_pattern: nodes.clone().map(|node| by_axis(&|u| sign * worst[u], node)).collect(),
             sensitivity_per_mm: nodes.map(|node| by_axis(&rms, node)).collect(),
         })
@@ -223,98 +209,54 @@ pub enum IdentifiabilityError {
     NotConverged(usize),
 }
 
-/// An obstacle to decoupling, and what to change.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum IdentifiabilityWarning {
-    /// Fewer readings than unknowns.
-    TooFewReadings {
-        /// Number of readings of a row.
-        equations: usize,
-        /// Number of unknowns of a row.
-        unknowns: usize,
-    },
-    /// Two rows have the same readings.
-    RowsAlike {
-        /// The two rows.
-        pair: RowPair,
-        /// Relative error of a reading.
-        noise: f64,
-    },
-    /// Noise hides the deformation.
-    Hopeless {
-        /// Relative error of a reading.
-        noise: f64,
-        /// Share of the prior spread that remains.
-        share: f64,
-    },
-    /// Some deformation pattern hardly changes the readings.
-    IllConditioned {
-        /// Largest singular value over the smallest.
-        condition: f64,
-    },
-}
-
-impl fmt::Display for IdentifiabilityWarning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::TooFewReadings { equations, unknowns } => write!(
-                f,
-                "a row has {unknowns} unknowns but only {}: some deformations cannot be determined; use at \
-                 least {unknowns} column-wires, or let nodes move along z only",
-                counted(equations, "reading")
-            ),
-            Self::RowsAlike { pair, noise } => {
-                let (first, second) = (pair.first + 1, pair.second + 1);
-                write!(
-                    f,
-                    "row-wires {first} and {second} cannot be told apart: at rest their readings differ by {:.1e}, the \
-                     noise is {noise:.1e}; shift the column nodes so that no row mirrors another, or use a known row",
-                    pair.difference
-                )
-            }
-            Self::Hopeless { noise, share } => write!(
-                f,
-                "with noise of {noise:.1e} the readings hardly constrain the deformation ({:.0} % of its spread remains); \
-                 lower the noise, reduce the height, widen the node pitch, or add column-wires",
-                100.0 * share
-            ),
-            Self::IllConditioned { condition } if condition.is_infinite() => f.write_str(
-                "some deformation pattern changes no reading at all; reduce the height, widen the node pitch, add column-wires, or \
-                 let nodes move along z only",
-            ),
-            Self::IllConditioned { condition } => write!(
-                f,
-                "some deformation pattern is determined {condition:.0e} times worse than another: even rounding hides it; reduce the \
-                 height, widen the node pitch, add column-wires, or let nodes move along z only"
-            ),
-        }
-    }
-}
-
 impl Identifiability {
-    /// Condition number from which [`IdentifiabilityWarning::IllConditioned`] is given: readings exact to 16 digits
-    /// then leave fewer than 6 in the worst-determined pattern.
+    /// Condition number from which a row is reported as ill-conditioned: readings exact to 16 digits then leave fewer than 6
+    /// in the worst-determined pattern.
     pub const LARGEST_CONDITION: f64 = 1e10;
     /// Remaining share of the prior spread from which noise is reported: the readings then explain less than a tenth
     /// of the variance.
     pub const HOPELESS_SHARE: f64 = 0.95;
-    /// Returns warnings for the user, most severe first. `noise` is the independent relative error of a reading (for
-    /// a common error see [`Self::of_row_with_gain`] and [`Self::most_alike_rows`]), `prior_mm` the standard
-    /// deviation of each unknown before reading; `alike` the most similar rows if the row is not known beforehand.
-    pub fn warnings(&self, noise: f64, prior_mm: f64, alike: Option<RowPair>) -> Vec<IdentifiabilityWarning> {
-        let condition = self.condition();
+    /// Describes obstacles to decoupling and what to change, most severe first. `noise` is the independent relative error of
+    /// a reading (for a common error see [`Self::of_row`] and [`Self::most_alike_rows`]), `prior_mm` the standard deviation
+    /// of each unknown before reading; `alike` the most similar rows if the row is not known beforehand.
+    pub fn warnings(&self, noise: f64, prior_mm: f64, alike: Option<RowPair>) -> Vec<String> {
+        let (equations, unknowns, condition) = (self.equations, self.unknowns(), self.condition());
+        let mut warnings = Vec::new();
+        if equations < unknowns {
+            warnings.push(format!(
+                "a row has {unknowns} unknowns but only {}: some deformations cannot be determined; use at least {unknowns} \
+                 column-wires, or let nodes move along z only",
+                counted(equations, "reading")
+            ));
+        }
+        if let Some(pair) = alike.filter(|pair| pair.difference <= noise.max(Self::SAME_ROWS)) {
+            warnings.push(format!(
+                "row-wires {} and {} cannot be told apart: at rest their readings differ by {:.1e}, the noise is {noise:.1e}; \
+                 shift the column nodes so that no row mirrors another, or use a known row",
+                pair.first + 1,
+                pair.second + 1,
+                pair.difference
+            ));
+        }
         let share = self.remaining_share(noise, prior_mm);
-        let alike = alike.filter(|pair| pair.difference <= noise.max(Self::SAME_ROWS));
-        let warnings = [
-            (self.equations < self.unknowns()).then_some(IdentifiabilityWarning::TooFewReadings {
-                equations: self.equations,
-                unknowns: self.unknowns(),
-            }),
-            alike.map(|pair| IdentifiabilityWarning::RowsAlike { pair, noise }),
-            (share >= Self::HOPELESS_SHARE).then_some(IdentifiabilityWarning::Hopeless { noise, share }),
-            (condition >= Self::LARGEST_CONDITION).then_some(IdentifiabilityWarning::IllConditioned { condition }),
-        ];
-        warnings.into_iter().flatten().collect()
+        if share >= Self::HOPELESS_SHARE {
+            warnings.push(format!(
+                "with noise of {noise:.1e} the readings hardly constrain the deformation ({:.0} % of its spread remains); \
+                 lower the noise, reduce the height, widen the node pitch, or add column-wires",
+                100.0 * share
+            ));
+        }
+        if condition >= Self::LARGEST_CONDITION {
+            let finding = match condition {
+                f64::INFINITY => "changes no reading at all".to_owned(),
+                _ => format!("is determined {condition:.0e} times worse than another: even rounding hides it"),
+            };
+            warnings.push(format!(
+                "some deformation pattern {finding}; reduce the height, widen the node pitch, add column-wires, or let nodes \
+                 move along z only"
+            ));
+        }
+        warnings
     }
 }
 
@@ -328,7 +270,7 @@ mod tests {
 
     pub(super) fn at_rest(model: &SensorModel, row: usize, axes: Axes) -> Identifiability {
         let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
-        Identifiability::of_row(model, row, &rest, axes).unwrap()
+        Identifiability::of_row(model, row, &rest, axes, RelativeNoise::default()).unwrap()
     }
 
     /// One node over one column node: R = g·d, so ∂ ln R/∂uz = −z/d².
@@ -350,7 +292,7 @@ mod tests {
         let model = SensorModel::new("3x2_2x8".parse().unwrap());
         let noise = RelativeNoise { own: 1e-3, common: 0.1 };
         let rest = [DVec3::ZERO; 2];
-        let seen = Identifiability::of_row_with_gain(&model, 1, &rest, Axes::Z, noise).unwrap();
+        let seen = Identifiability::of_row(&model, 1, &rest, Axes::Z, noise).unwrap();
         let ln_ohm = |u: [f64; 2]| -> Vec<f64> {
             let ohm = model.row_resistances(1, &u.map(|z| DVec3::Z * z)).unwrap();
             ohm.into_iter().map(f64::ln).collect()
@@ -377,7 +319,7 @@ mod tests {
         assert!((found[0] * found[1] / determinant - 1.0).abs() < 1e-6);
         // One reading of one unknown: the spread of the gain alone remains.
         let single = SensorModel::new("1x1_1x1".parse().unwrap());
-        let seen = |noise| Identifiability::of_row_with_gain(&single, 0, &[DVec3::ZERO], Axes::Z, noise).unwrap();
+        let seen = |noise| Identifiability::of_row(&single, 0, &[DVec3::ZERO], Axes::Z, noise).unwrap();
         let exact = RelativeNoise { own: 0.0, ..noise };
         let spread = seen(noise).worst_spread_mm(noise.own);
         let alone = at_rest(&single, 0, Axes::Z).worst_spread_mm(noise.total());
@@ -440,10 +382,10 @@ mod tests {
             .unwrap();
         assert!(pair.difference < 1e-14, "{pair:?}");
         assert_eq!(pair.first + pair.second, 9);
-        let warnings = Identifiability::of_row(&model, 0, &[DVec3::ZERO; 6], Axes::Z)
+        let warnings = Identifiability::of_row(&model, 0, &[DVec3::ZERO; 6], Axes::Z, RelativeNoise::default())
             .unwrap()
             .warnings(0.0, 0.3, Some(pair));
-        let words = warnings[0].to_string();
+        let words = &warnings[0];
         assert!(
             words.contains("cannot be told apart") && words.contains("shift"),
             "{words}"
@@ -457,7 +399,8 @@ mod tests {
     #[test]
     fn errors_count_rows_from_one() {
         let model = SensorModel::new(ArrayScale::default());
-        let error = Identifiability::of_row(&model, 10, &[DVec3::ZERO; 10], Axes::Z).unwrap_err();
+        let error =
+            Identifiability::of_row(&model, 10, &[DVec3::ZERO; 10], Axes::Z, RelativeNoise::default()).unwrap_err();
         assert_eq!(error.to_string(), "row 11 does not exist: the array has rows 1 to 10");
         assert!(IdentifiabilityError::NotConverged(0).to_string().contains("row 1 "));
     }
@@ -471,13 +414,7 @@ mod tests {
         let length = seen.worst_pattern.iter().map(|p| p.length_squared()).sum::<f64>();
         assert!((length - 1.0).abs() < 1e-12);
         let warnings = seen.warnings(0.0, 0.3, None);
-        assert!(matches!(
-            warnings[0],
-            IdentifiabilityWarning::TooFewReadings {
-                equations: 4,
-                unknowns: 6
-            }
-        ));
+        assert!(warnings[0].contains("6 unknowns but only 4 readings"), "{warnings:?}");
     }
 
     #[test]
@@ -486,7 +423,7 @@ mod tests {
         assert_eq!(seen.remaining_share(0.0, 0.3), 0.0);
         assert!(seen.warnings(1e-4, 0.3, None).is_empty());
         assert!((seen.remaining_share(1e3, 0.3) - 1.0).abs() < 1e-6);
-        let words = seen.warnings(1.0, 0.3, None)[0].to_string();
+        let words = &seen.warnings(1.0, 0.3, None)[0];
         assert!(words.contains("100 %") || words.contains("99 %"), "{words}");
     }
 }

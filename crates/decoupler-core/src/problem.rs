@@ -41,20 +41,12 @@ pub struct SavedProblem {
 
 impl From<Problem> for SavedProblem {
     fn from(problem: Problem) -> Self {
-        let has_nodes = problem.has_nodes();
-        let Problem {
-            inputs,
-            targets,
-            memory,
-            positions,
-            sensor: _,
-        } = problem;
         Self {
-            inputs,
-            targets,
-            memory,
-            positions,
-            has_nodes,
+            has_nodes: problem.has_nodes(),
+            inputs: problem.inputs,
+            targets: problem.targets,
+            memory: problem.memory,
+            positions: problem.positions,
         }
     }
 }
@@ -62,26 +54,14 @@ impl From<Problem> for SavedProblem {
 impl SavedProblem {
     /// Returns the problem with this sensor, if its targets are nodes; `None` if there is no sensor for them.
     pub fn with_sensor(self, sensor: Option<&Simulation>) -> Option<Problem> {
-        let sensor = if self.has_nodes { Some(*sensor?) } else { None };
         Some(Problem {
+            sensor: if self.has_nodes { Some(*sensor?) } else { None },
             inputs: self.inputs,
             targets: self.targets,
             memory: self.memory,
             positions: self.positions,
-            sensor,
         })
     }
-}
-
-/// Names and units of the features of these channels.
-fn features(memory: &Memory, channels: &[Channel]) -> Vec<Channel> {
-    let names = memory.names(channels.iter().map(|channel| channel.name.as_str()));
-    let units = channels.iter().map(|channel| &channel.unit).cycle();
-    names
-        .into_iter()
-        .zip(units)
-        .map(|(name, unit)| Channel::new(name, unit.as_deref()))
-        .collect()
 }
 
 /// Name and unit of a reading or target.
@@ -121,10 +101,16 @@ pub struct TargetPosition {
 impl Problem {
     /// Names and units of the inputs of a network: the readings and, with a memory, the values computed from their past.
     pub fn features(&self) -> Vec<Channel> {
-        match &self.memory {
-            Some(memory) => features(memory, &self.inputs),
-            None => self.inputs.clone(),
-        }
+        let Some(memory) = &self.memory else {
+            return self.inputs.clone();
+        };
+        let names = memory.names(self.inputs.iter().map(|channel| channel.name.as_str()));
+        let units = self.inputs.iter().map(|channel| channel.unit.as_deref()).cycle();
+        names
+            .into_iter()
+            .zip(units)
+            .map(|(name, unit)| Channel::new(name, unit))
+            .collect()
     }
 
     /// Number of inputs of a network.
@@ -163,9 +149,8 @@ impl Problem {
     /// Returns the description of channels without names: readings `c1`, `c2`, … and targets `t1`, `t2`, ….
     pub fn unnamed(inputs: usize, targets: usize) -> Self {
         let channels = |letter: &str, count: usize| {
-            let numbers = 1..=count;
-            let channel = |number| Channel::new(format!("{letter}{number}"), None);
-            numbers.map(channel).collect()
+            let names = (1..=count).map(|number| format!("{letter}{number}"));
+            names.map(|name| Channel::new(name, None)).collect()
         };
         Self {
             inputs: channels("c", inputs),
@@ -183,21 +168,24 @@ impl Problem {
 }
 
 impl Simulation {
+    /// Returns `true` if exact readings of a row-wire determine its deformation: there are more of them than unknowns, or
+    /// one unknown, in which a resistance is monotonic.
+    pub(crate) fn is_determined(&self) -> bool {
+        let unknowns = self.scene.unknowns_per_row(self.sensor.scale);
+        self.sensor.scale.columns() > unknowns || unknowns == 1
+    }
+
     /// Returns the description of the channels of a row-wire: its resistances and the coordinates of its nodes.
     pub fn problem(&self) -> Problem {
         let scale = self.sensor.scale;
-        let channel = |name: String, unit: &str| Channel::new(name, Some(unit));
         let nodes = 1..=scale.nodes_per_row();
+        let coordinates = nodes.flat_map(|node| ["x", "y", "z"].map(|axis| format!("{axis}_{node}")));
+        let resistances = (1..=scale.columns()).map(|column| format!("r_{column}"));
         Problem {
-            inputs: (1..=scale.columns())
-                .map(|column| channel(format!("r_{column}"), "Ω"))
-                .collect(),
-            targets: nodes
-                .flat_map(|node| ["x", "y", "z"].map(|axis| channel(format!("{axis}_{node}"), "mm")))
-                .collect(),
-            positions: Vec::new(),
-            memory: None,
+            inputs: resistances.map(|name| Channel::new(name, Some("Ω"))).collect(),
+            targets: coordinates.map(|name| Channel::new(name, Some("mm"))).collect(),
             sensor: Some(*self),
+            ..Problem::default()
         }
     }
 }

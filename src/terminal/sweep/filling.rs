@@ -21,7 +21,7 @@ use super::{
     trials::{Trials, train},
 };
 use crate::terminal::{failure::Failure, output::messages};
-use decoupler_core::evaluation::experiments::ExperimentError;
+use decoupler_core::evaluation::RunError;
 use decoupler_files::export::WriteError;
 
 /// Interval of checking a trial that another program trains.
@@ -66,7 +66,7 @@ pub(super) fn fill(
             .build()
     };
     let pools: Result<Vec<ThreadPool>, _> = (0..threads).map(pool).collect();
-    let pools = pools.map_err(|error| Failure::Threads(ExperimentError::Threads(error.to_string())))?;
+    let pools = pools.map_err(|error| Failure::Run(RunError::Threads(error.to_string())))?;
     let worker = Worker {
         folder,
         trials,

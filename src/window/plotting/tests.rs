@@ -18,7 +18,7 @@ use decoupler_core::{
     identifiability::Identifiability,
     job::Job,
     machine::MemoryBudget,
-    sensor::Axes,
+    sensor::{Axes, RelativeNoise},
     training::EpochRecord,
 };
 use decoupler_files::figure::{
@@ -234,7 +234,16 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
     }
     let settings = small(Preset::Paper);
     let pressed = [glam::DVec3::Z * 0.3; 4];
-    let row = |row| Identifiability::of_row(&settings.simulation().unwrap().sensor, row, &pressed, Axes::Z).unwrap();
+    let row = |row| {
+        Identifiability::of_row(
+            &settings.simulation().unwrap().sensor,
+            row,
+            &pressed,
+            Axes::Z,
+            RelativeNoise::default(),
+        )
+        .unwrap()
+    };
     let rows: Vec<_> = (0..4).map(row).collect();
     let singular_values = same("singular values", singular_values_figure(&rows, 2, 0.01));
     assert_eq!(singular_values.circles, rows[2].unknowns() + 1);

@@ -247,7 +247,7 @@ fn report_task(source: &NetworkSource, decoders: Vec<DecoderReport>) -> FileTask
             let report = RunReport {
                 name: name.as_deref(),
                 file: &file,
-                defect: defect.as_ref(),
+                defect: defect.as_deref(),
                 decoders: &decoders,
                 test: &test,
             };

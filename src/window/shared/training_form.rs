@@ -3,6 +3,7 @@ use std::{path::PathBuf, sync::Arc};
 use decoupler_core::{
     evaluation::{Combination, MAX_STARTS, RunSettings},
     settings::{Field, Kind},
+    text::Named,
     training::{Method, StoppingRules, TrainerState},
 };
 use decoupler_files::{
@@ -73,7 +74,7 @@ pub fn method_settings_ui(ui: &mut Ui, settings: &mut RunSettings, is_new: bool)
         let label = ui.label("Combine starts").on_hover_text(glossary::COMBINE.hint);
         let combo = ComboBox::from_id_salt("combine").selected_text(combination_name(settings.combine));
         let shown = combo.show_ui(ui, |ui| {
-            for option in Combination::ALL {
+            for &option in Combination::ALL {
                 ui.selectable_value(&mut settings.combine, option, combination_name(option));
             }
         });

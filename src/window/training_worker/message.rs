@@ -12,7 +12,7 @@ use std::{
 
 use decoupler_core::{
     evaluation::{
-        Baselines, Coverage, PastNetworks, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors,
+        Baselines, Coverage, PastNetworks, Run, RunError, RunSettings, StartRecord, TestErrors,
         auto::{AutoProgress, AutoRecord},
     },
     live::{DriftReference, NoDriftMonitor},
@@ -216,7 +216,7 @@ pub struct RunResult {
     /// Epoch of the network.
     pub best_epoch: usize,
     /// Problem of the training, when it has ended.
-    pub defect: Option<RunDefect>,
+    pub defect: Option<String>,
     /// Number of epochs of the start that is furthest ahead.
     pub epochs_run: usize,
     /// Number of starts that have ended.

@@ -1,4 +1,4 @@
-use std::{collections::HashMap, hash::Hash};
+use std::collections::HashMap;
 
 /// Number of usual intervals after which a series starts again.
 pub const GAP: f64 = 50.0;
@@ -45,13 +45,6 @@ pub enum Place {
     AfterPause(f64),
     /// First row after the time stepped back, by how many seconds.
     AfterStepBack(f64),
-}
-
-impl Place {
-    /// `true` if the row does not continue the row before.
-    pub fn is_restart(self) -> bool {
-        !matches!(self, Self::After(_))
-    }
 }
 
 impl<S> Continuation<S> {
@@ -129,14 +122,12 @@ pub enum RowOrder {
 impl RowOrder {
     /// Finds the order of rows with this series and time each, in their order in the file.
     pub fn of(rows: impl IntoIterator<Item = (Series, f64)>) -> Self {
-        let mut before_s = HashMap::new();
+        let mut times_s = HashMap::new();
         let (mut count, mut first_row, mut total) = (0, None, 0);
         for (row, (series, time_s)) in rows.into_iter().enumerate() {
             total += 1;
-            if before_s
-                .insert(series, time_s)
-                .is_some_and(|before_s| time_s < before_s)
-            {
+            let before_s = times_s.insert(series, time_s);
+            if before_s.is_some_and(|before_s| time_s < before_s) {
                 count += 1;
                 first_row.get_or_insert(row);
             }
@@ -150,7 +141,7 @@ impl RowOrder {
 }
 
 /// Median of the positive intervals between successive rows of the same series, in seconds; `None` without any.
-pub(super) fn usual_interval_s<K: Eq + Hash>(rows: impl IntoIterator<Item = (K, f64)>) -> Option<f64> {
+pub(super) fn usual_interval_s(rows: impl IntoIterator<Item = (Series, f64)>) -> Option<f64> {
     let mut latest = HashMap::new();
     let intervals = rows.into_iter().filter_map(|(series, time_s)| {
         let before_s = latest.insert(series, time_s)?;

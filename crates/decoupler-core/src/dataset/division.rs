@@ -55,15 +55,13 @@ impl Division {
     /// # Errors
     /// If a share is out of range, or the set is a single unit.
     pub fn divide(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DatasetError> {
-        self.check()?;
-        let units = self.by.ordered_units(set, rng);
-        if units.len() < 2 {
-            return Err(DatasetError::TooFew {
-                samples: set.samples(),
-                unit: self.by.unit_name(units.len(), set.samples()),
-            });
+        let parts = self.parts_with_variation(set, self.test_fraction, rng)?;
+        if parts.test.is_empty() {
+            let samples = set.samples();
+            let unit = self.by.unit_name(1, samples);
+            return Err(DatasetError::TooFew { samples, unit });
         }
-        Ok(self.parts_with_variation(set, units, self.test_fraction))
+        Ok(parts)
     }
 
     /// Divides `set` into training and validation samples, for a separate test set; see [`Self::divide`].
@@ -71,8 +69,7 @@ impl Division {
     /// # Errors
     /// If a share is out of range.
     pub fn divide_for_training(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DatasetError> {
-        self.check()?;
-        Ok(self.parts_with_variation(set, self.by.ordered_units(set, rng), 0.0))
+        self.parts_with_variation(set, 0.0, rng)
     }
 
     /// Divides `set` for a run with this seed, and returns its training, validation and test samples: those of `test` if it is
@@ -82,21 +79,25 @@ impl Division {
     /// If a share is out of range, the set is a single unit, or `test` has other row-wires.
     pub fn sets(&self, set: &Dataset, test: Option<&Dataset>, seed: Seed) -> Result<(Split, Dataset), DatasetError> {
         let mut rng = seed.rng(Stream::Split);
-        Ok(match test {
-            None => {
-                let parts = self.divide(set, &mut rng)?;
-                (parts.split(set), parts.test_set(set))
-            }
-            Some(test) => {
-                let parts = self.divide_for_training(set, &mut rng)?;
-                let read = set.row_wires_read().unwrap_or_default();
-                (parts.split(set), test.clone().among_rows(read)?)
-            }
-        })
+        let Some(test) = test else {
+            let parts = self.divide(set, &mut rng)?;
+            return Ok((parts.split(set), parts.test_set(set)));
+        };
+        let parts = self.divide_for_training(set, &mut rng)?;
+        let read = set.row_wires_read().unwrap_or_default();
+        Ok((parts.split(set), test.clone().among_rows(read)?))
     }
 
-    /// Holds out the last units, or the first if no target varies in what the last leave.
-    fn parts_with_variation(&self, set: &Dataset, mut units: Vec<Vec<usize>>, test_fraction: f64) -> DividedSamples {
+    /// Holds out the last units, or the first if no target varies in what the last leave. The test set is empty if there is
+    /// only one unit.
+    fn parts_with_variation(
+        &self,
+        set: &Dataset,
+        test_fraction: f64,
+        rng: &mut impl Rng,
+    ) -> Result<DividedSamples, DatasetError> {
+        self.check()?;
+        let mut units = self.by.ordered_units(set, rng);
         let targets = set.targets();
         let varies = |parts: &DividedSamples| {
             let mut training = parts.training.windows(2);
@@ -104,27 +105,17 @@ impl Division {
         };
         let parts = self.parts(units.clone(), test_fraction);
         if varies(&parts) {
-            return parts;
+            return Ok(parts);
         }
         units.reverse();
-        Some(self.parts(units, test_fraction)).filter(varies).unwrap_or(parts)
+        Ok(Some(self.parts(units, test_fraction)).filter(varies).unwrap_or(parts))
     }
 
     fn parts(&self, mut units: Vec<Vec<usize>>, test_fraction: f64) -> DividedSamples {
-        let test = if test_fraction > 0.0 {
-            take_last(&mut units, test_fraction)
-        } else {
-            Vec::new()
-        };
-        let validation = if units.len() > 1 && self.validation_fraction > 0.0 {
-            take_last(&mut units, self.validation_fraction)
-        } else {
-            Vec::new()
-        };
         DividedSamples {
+            test: take_last(&mut units, test_fraction),
+            validation: take_last(&mut units, self.validation_fraction),
             training: ascending(units.concat()),
-            validation,
-            test,
         }
     }
 
@@ -133,16 +124,14 @@ impl Division {
     /// # Errors
     /// If a share is out of range.
     pub fn check(&self) -> Result<(), DatasetError> {
-        let fractions = [
-            ("test", self.test_fraction, f64::MIN_POSITIVE, "above 0"),
-            ("validation", self.validation_fraction, 0.0, "0"),
-        ];
-        for (part, value, smallest, least) in fractions {
-            if !(smallest..1.0).contains(&value) {
-                return Err(DatasetError::Fraction { part, value, least });
-            }
-        }
-        Ok(())
+        let check = |part, value: f64, smallest: f64, least| {
+            let is_valid = (smallest..1.0).contains(&value);
+            is_valid
+                .then_some(())
+                .ok_or(DatasetError::Fraction { part, value, least })
+        };
+        check("test", self.test_fraction, f64::MIN_POSITIVE, "above 0")?;
+        check("validation", self.validation_fraction, 0.0, "0")
     }
 }
 
@@ -167,8 +156,12 @@ impl DividedSamples {
     }
 }
 
-/// Moves the last units to a part with about this share of all samples: at least one unit, and never all.
+/// Moves the last units to a part with about this share of all samples: at least one unit, and never all. Takes none if
+/// the share is 0, or there is only one unit.
 fn take_last(units: &mut Vec<Vec<usize>>, share: f64) -> Vec<usize> {
+    if share == 0.0 || units.len() < 2 {
+        return Vec::new();
+    }
     let samples: usize = units.iter().map(Vec::len).sum();
     let wanted = share * samples as f64;
     let (mut first, mut taken) = (units.len() - 1, units[units.len() - 1].len());

@@ -4,10 +4,10 @@ use super::{Dataset, DatasetError, DividedSamples, SplitBy, division::ascending}
 
 /// Folds of a k-fold cross-validation: every sample is in exactly one.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Folds {
+pub struct Folds(
     /// Indices of the samples in each fold, ascending.
-    folds: Vec<Vec<usize>>,
-}
+    Vec<Vec<usize>>,
+);
 
 impl Folds {
     /// Divides `set` into `folds` folds by the rule of a split: consecutive blocks of about the same number of samples,
@@ -19,14 +19,10 @@ impl Folds {
         let units = by.units(set).len();
         DatasetError::check_folds(folds, units, by.unit_name(units, set.samples()))?;
         let units = by.ordered_units(set, rng);
+        let deal = |fold| ascending(units.iter().skip(fold).step_by(folds).flatten().copied());
         Ok(match by {
             SplitBy::Time => Self::blocks(&units, folds),
-            SplitBy::Group | SplitBy::Random => {
-                let deal = |fold| ascending(units.iter().skip(fold).step_by(folds).flatten().copied());
-                Self {
-                    folds: (0..folds).map(deal).collect(),
-                }
-            }
+            SplitBy::Group | SplitBy::Random => Self((0..folds).map(deal).collect()),
         })
     }
 
@@ -53,17 +49,17 @@ impl Folds {
             blocks.push(units[first..end].concat());
             (first, before) = (end, within);
         }
-        Self { folds: blocks }
+        Self(blocks)
     }
 
     /// Number of folds, k.
     pub fn count(&self) -> usize {
-        self.folds.len()
+        self.0.len()
     }
 
     /// Indices of the test samples of fold `fold`.
     pub fn test(&self, fold: usize) -> &[usize] {
-        &self.folds[fold]
+        &self.0[fold]
     }
 
     /// Divides the samples with fold `fold` for the test. If `holds_out` and there are at least three folds, the next fold
@@ -80,7 +76,7 @@ impl Folds {
 
     /// Indices of the samples in all folds except those given, ascending.
     pub fn without(&self, folds: &[usize]) -> Vec<usize> {
-        let kept = self.folds.iter().enumerate().filter(|(fold, _)| !folds.contains(fold));
+        let kept = self.0.iter().enumerate().filter(|(fold, _)| !folds.contains(fold));
         ascending(kept.flat_map(|(_, samples)| samples).copied())
     }
 }

@@ -1,5 +1,3 @@
-use ndarray::{Array3, ArrayView2, Axis};
-
 use super::{Dataset, DatasetError};
 use crate::scene::RowModel;
 
@@ -7,69 +5,54 @@ use crate::scene::RowModel;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frames {
     /// Snapshots × rows × channels.
-    readings: Array3<f64>,
-    /// Index of the sample behind each row of each snapshot, snapshot by snapshot.
-    samples: Vec<usize>,
+    readings: Vec<f64>,
+    count: usize,
+    rows: usize,
 }
 
 impl Frames {
     /// Number of snapshots.
     pub fn count(&self) -> usize {
-        self.readings.len_of(Axis(0))
+        self.count
     }
 
     /// Number of row-wires in a frame.
     pub fn rows(&self) -> usize {
-        self.readings.len_of(Axis(1))
+        self.rows
     }
 
-    /// Readings of one frame: rows × channels.
-    pub fn readings(&self, snapshot: usize) -> ArrayView2<'_, f64> {
-        self.readings.index_axis(Axis(0), snapshot)
-    }
-
-    /// Readings of one frame as a slice, row by row.
+    /// Readings of one frame, row by row.
     pub fn frame(&self, snapshot: usize) -> &[f64] {
-        let all = self.readings.as_slice().expect("built in standard layout");
-        let length = all.len() / self.count();
-        &all[snapshot * length..(snapshot + 1) * length]
-    }
-
-    /// Indices of the samples behind the rows of one frame.
-    pub fn samples(&self, snapshot: usize) -> &[usize] {
-        &self.samples[snapshot * self.rows()..(snapshot + 1) * self.rows()]
+        let length = self.readings.len() / self.count;
+        &self.readings[snapshot * length..(snapshot + 1) * length]
     }
 }
 
 impl Dataset {
-    /// Groups the samples into whole frames, in the order in which snapshots first occur, rows in ascending order.
+    /// Groups the samples into whole frames, in the order of [`Self::snapshots`], rows in ascending order.
     ///
     /// # Errors
     /// If a snapshot lacks a row-wire, or has one twice.
     pub fn frames(&self) -> Result<Frames, DatasetError> {
-        let rows = self.row_count();
-        let mut samples = Vec::with_capacity(self.samples());
-        for snapshot in self.snapshots() {
+        let (rows, snapshots) = (self.row_count(), self.snapshots());
+        let mut readings = Vec::with_capacity(self.samples() * self.channels());
+        for snapshot in &snapshots {
             for row_index in 0..rows {
-                let mut of_row = snapshot.iter().filter(|&&sample| self.row_index(sample) == row_index);
-                match (of_row.next(), of_row.count()) {
-                    (Some(&sample), 0) => samples.push(sample),
-                    (first, others) => {
-                        return Err(DatasetError::Incomplete {
-                            sample: snapshot[0],
-                            row_wire: self.row_wires_read().map_or(0, |read| read[row_index]),
-                            found: others + usize::from(first.is_some()),
-                        });
-                    }
-                }
+                let of_row = snapshot.iter().filter(|&&sample| self.row_index(sample) == row_index);
+                let [&sample] = Vec::from_iter(of_row.clone())[..] else {
+                    return Err(DatasetError::Incomplete {
+                        sample: snapshot[0],
+                        row_wire: self.row_wires_read().map_or(0, |read| read[row_index]),
+                        found: of_row.count(),
+                    });
+                };
+                readings.extend(self.sample_readings(sample));
             }
         }
-        let shape = (samples.len() / rows, rows, self.channels());
-        let readings = samples.iter().flat_map(|&sample| self.sample_readings(sample));
-        let readings = Array3::from_shape_vec(shape, readings.copied().collect());
         Ok(Frames {
-            readings: readings.expect("one sample for each row of each snapshot"),
-            samples,
+            readings,
+            count: snapshots.len(),
+            rows,
         })
     }
 }
@@ -169,10 +152,8 @@ mod tests {
     fn frames_follow_groups_and_row_wires_in_any_order() {
         let frames = set(Some(&[5, 3, 3, 5]), &[8, 8, 2, 2]).frames().unwrap();
         assert_eq!((frames.count(), frames.rows()), (2, 2));
-        assert_eq!(frames.samples(0), [1, 0]);
-        assert_eq!(frames.samples(1), [2, 3]);
         assert_eq!(frames.frame(0), [10.0, 11.0, 0.0, 1.0]);
-        assert_eq!(frames.readings(1)[[1, 0]], 30.0);
+        assert_eq!(frames.frame(1), [20.0, 21.0, 30.0, 31.0]);
     }
 
     #[test]

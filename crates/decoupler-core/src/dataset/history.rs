@@ -3,7 +3,7 @@ use std::collections::HashMap;
 use ndarray::{ArcArray2, Array2, ArrayView2, Axis};
 
 use super::{
-    DatasetError, Memory, MemoryState,
+    DatasetError, Memory, MemoryState, Span,
     continuation::{Continuation, Place, RowOrder, Series, usual_interval_s},
 };
 
@@ -41,10 +41,8 @@ impl History {
             row_wires.map(<[_]>::len),
             times_s.as_ref().map(Vec::len),
         ];
-        assert!(
-            lengths.into_iter().flatten().all(|length| length == rows),
-            "one entry per row"
-        );
+        let mut lengths = lengths.into_iter().flatten();
+        assert!(lengths.all(|length| length == rows), "one entry per row");
         assert!(samples.iter().all(|&row| row < rows), "samples are rows");
         let series = (0..rows).map(|row| Series {
             group: groups.map_or(0, |groups| groups[row]),
@@ -59,11 +57,9 @@ impl History {
             samples,
             interval_s: None,
         };
-        let sequence = history.sequence();
-        history.interval_s = history
-            .times_s
-            .as_ref()
-            .and_then(|times_s| usual_interval_s(sequence.iter().map(|&row| (history.series[row], times_s[row]))));
+        let rows = history.sequence().into_iter();
+        let timed = rows.filter_map(|row| Some((history.series[row], history.time_s(row)?)));
+        history.interval_s = usual_interval_s(timed);
         history
     }
 
@@ -78,25 +74,16 @@ impl History {
         let appended = readings.append(Axis(0), other.readings.view());
         appended.expect("histories of the same channels");
         self.readings = readings.into_shared();
-        let next = self.next_group;
-        let mut groups = HashMap::new();
-        self.series.extend(other.series.iter().map(|series| {
-            let known = groups.len() as u64;
-            Series {
-                group: next + *groups.entry(series.group).or_insert(known),
-                ..*series
-            }
-        }));
+        let (next, mut groups) = (self.next_group, HashMap::new());
+        for &Series { group, row_wire } in &other.series {
+            let known = next + groups.len() as u64;
+            let group = *groups.entry(group).or_insert(known);
+            self.series.push(Series { group, row_wire });
+        }
         self.next_group += groups.len() as u64;
         self.samples.extend(other.samples.iter().map(|row| rows + row));
-        self.times_s = self
-            .times_s
-            .take()
-            .zip(other.times_s.as_ref())
-            .map(|(mut times_s, more)| {
-                times_s.extend(more);
-                times_s
-            });
+        let times_s = self.times_s.take().zip(other.times_s.as_deref());
+        self.times_s = times_s.map(|(times_s, more)| [&times_s, more].concat());
     }
 
     /// Readings of all rows: rows × channels.
@@ -107,11 +94,10 @@ impl History {
     /// Number of the stretch of each row, in which rows follow each other without a restart.
     pub fn stretches(&self) -> Vec<usize> {
         let mut rows = Continuation::new(self.interval_s, usize::MAX);
-        let mut stretches = vec![0; self.series.len()];
-        let mut count = 0;
+        let (mut stretches, mut count) = (vec![0; self.series.len()], 0);
         for row in self.sequence() {
             let (stretch, place) = rows.next(self.series[row], self.time_s(row), || 0);
-            if place.is_restart() {
+            if !matches!(place, Place::After(_)) {
                 *stretch = count;
                 count += 1;
             }
@@ -171,15 +157,18 @@ impl History {
     /// If a span is in seconds and the interval is not known, or a time constant is shorter than the interval.
     pub fn checked(&self, memory: &Memory) -> Result<Memory, DatasetError> {
         let resolved = self.resolved(memory);
-        let in_seconds = resolved.spans().find(|span| span.is_in_seconds());
-        if let (Some(span), None) = (in_seconds, resolved.interval_s) {
+        let interval_s = resolved.interval_s;
+        if let Some(span) = resolved.spans().find(|span| span.samples(interval_s).is_none()) {
             return Err(match self.times_s {
                 Some(_) => DatasetError::NoInterval(span),
                 None => DatasetError::NoClock(span),
             });
         }
-        resolved.check_lengths()?;
-        Ok(resolved)
+        let is_too_short = |span: &&Span| span.samples(interval_s).is_some_and(|samples| samples < 1.0);
+        match resolved.averages.iter().find(is_too_short) {
+            Some(&span) => Err(DatasetError::TooShort { span, interval_s }),
+            None => Ok(resolved),
+        }
     }
 
     /// Returns the features of the samples: samples × features.

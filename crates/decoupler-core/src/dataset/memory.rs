@@ -68,7 +68,7 @@ impl Memory {
 
     /// `true` if a span is in seconds.
     pub fn needs_clock(&self) -> bool {
-        self.spans().any(Span::is_in_seconds)
+        self.spans().any(|span| matches!(span, Span::Seconds(_)))
     }
 
     /// Number of features of `channels` channels.
@@ -82,14 +82,14 @@ impl Memory {
         let mut names: Vec<String> = channels.iter().map(|name| (*name).to_owned()).collect();
         for past in self.past() {
             names.extend(channels.iter().map(|name| {
-                let before = match past {
-                    Past::Lag(span) => format!("{name}[-{span}]"),
-                    Past::Average(span) => format!("{name}~{span}"),
-                };
-                if self.differences {
-                    format!("{name}-{before}")
+                let prefix = if self.differences {
+                    format!("{name}-")
                 } else {
-                    before
+                    String::new()
+                };
+                match past {
+                    Past::Lag(span) => format!("{prefix}{name}[-{span}]"),
+                    Past::Average(span) => format!("{prefix}{name}~{span}"),
                 }
             }));
         }
@@ -102,18 +102,6 @@ impl Memory {
     /// If a span in seconds has no interval, or a lag, a time constant, or the number of features is out of range.
     pub fn check(&self, channels: usize) -> Result<(), DatasetError> {
         MemoryConstants::of(self, channels).map(drop)
-    }
-
-    /// Checks that every average extends over more than one sample.
-    pub(super) fn check_lengths(&self) -> Result<(), DatasetError> {
-        let too_short = |span: &&Span| span.samples(self.interval_s).is_some_and(|samples| samples < 1.0);
-        match self.averages.iter().find(too_short) {
-            Some(&span) => Err(DatasetError::TooShort {
-                span,
-                interval_s: self.interval_s,
-            }),
-            None => Ok(()),
-        }
     }
 
     /// Lags and time constants.
@@ -133,13 +121,12 @@ impl Memory {
 /// In words: `averages over 2s, 10s and lags of 5, 10, as differences`.
 impl fmt::Display for Memory {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let list = |spans: &[Span]| Vec::from_iter(spans.iter().map(Span::to_string)).join(", ");
         let mut parts = Vec::new();
-        if !self.averages.is_empty() {
-            parts.push(format!("averages over {}", list(&self.averages)));
-        }
-        if !self.lags.is_empty() {
-            parts.push(format!("lags of {}", list(&self.lags)));
+        for (what, spans) in [("averages over", &self.averages), ("lags of", &self.lags)] {
+            if !spans.is_empty() {
+                let spans = Vec::from_iter(spans.iter().map(Span::to_string));
+                parts.push(format!("{what} {}", spans.join(", ")));
+            }
         }
         match (parts.is_empty(), self.differences) {
             (true, false) => f.write_str("none"),
@@ -178,10 +165,8 @@ impl MemoryConstants {
     /// # Errors
     /// See [`Memory::check`].
     pub fn of(memory: &Memory, channels: usize) -> Result<Self, DatasetError> {
-        if let Some(interval_s) = memory
-            .interval_s
-            .filter(|interval_s| !(*interval_s > 0.0 && interval_s.is_finite()))
-        {
+        let interval_s = memory.interval_s.unwrap_or(1.0);
+        if !(interval_s > 0.0 && interval_s.is_finite()) {
             return Err(DatasetError::MemoryInterval(interval_s));
         }
         let (mut lags, mut averages) = (Vec::new(), Vec::new());
@@ -205,7 +190,7 @@ impl MemoryConstants {
             lags,
             averages,
             differences: memory.differences,
-            interval_s: memory.interval_s.unwrap_or(1.0),
+            interval_s,
         };
         let (features, state) = (constants.features(), constants.state());
         if features > MAX_FEATURES.max(channels) || state > MAX_STATE {
@@ -297,13 +282,11 @@ impl MemoryState {
 
     /// Seconds since the row before; forgets the past if the next row does not continue it.
     pub(super) fn elapsed_s(&mut self, place: Place) -> Option<f64> {
-        match place {
-            Place::After(elapsed_s) => elapsed_s,
-            Place::First | Place::AfterPause(_) | Place::AfterStepBack(_) => {
-                self.restart();
-                None
-            }
+        if let Place::After(elapsed_s) = place {
+            return elapsed_s;
         }
+        self.restart();
+        None
     }
 
     /// Takes in the readings of the next sample, `interval_s` seconds after the one before (the usual interval if `None`),

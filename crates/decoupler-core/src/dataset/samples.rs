@@ -2,11 +2,12 @@ use std::{collections::HashMap, sync::Arc};
 
 use glam::DVec3;
 use ndarray::{ArcArray2, ArrayView2, Axis};
+use rand::Rng;
 
 use super::DatasetError;
 use crate::{
-    scene::{Deformation, FaultySensor},
-    sensor::SensorModel,
+    scene::{Deformation, FaultySensor, Noise},
+    sensor::{SensorError, SensorModel},
 };
 
 /// Largest number of samples in a set, limited by memory.
@@ -249,10 +250,8 @@ impl Dataset {
     /// unknown.
     #[must_use]
     pub fn of_row(&self, row_index: usize) -> Self {
-        let samples: Vec<usize> = (0..self.samples())
-            .filter(|&sample| self.rows.is_none() || self.row_index(sample) == row_index)
-            .collect();
-        self.select(&samples)
+        let is_in = |sample: &usize| self.rows.is_none() || self.row_index(*sample) == row_index;
+        self.select(&Vec::from_iter((0..self.samples()).filter(is_in)))
     }
 }
 
@@ -272,29 +271,30 @@ fn contiguous(values: &ArcArray2<f64>, sample: usize) -> &[f64] {
 }
 
 impl Dataset {
-    /// Replaces the readings of simulated snapshots by those of a faulty sensor (wires and amplifiers), before noise
-    /// is added. `model` is the sensor without its fault.
-    pub fn break_before_noise(&mut self, model: &SensorModel, faulty: &FaultySensor) {
-        let deformations: Vec<Deformation> = (0..self.samples())
-            .step_by(self.row_count())
-            .map(|first| self.simulated_deformation(model, first))
-            .collect();
+    /// Replaces the readings of simulated snapshots by those of a faulty sensor with noise: its wires and amplifiers come
+    /// before the noise, its converter after. `model` is the sensor without its fault.
+    ///
+    /// # Errors
+    /// See [`Self::disturb`].
+    pub fn disturb_faulty(
+        &mut self,
+        model: &SensorModel,
+        faulty: &FaultySensor,
+        noise: &Noise,
+        rng: &mut impl Rng,
+    ) -> Result<(), SensorError> {
+        let firsts = (0..self.samples()).step_by(self.row_count());
+        let deformations = Vec::from_iter(firsts.map(|first| self.simulated_deformation(model, first)));
         let read = self.row_wires_read().map_or_else(Vec::new, <[usize]>::to_vec);
         let length = read.len() * self.channels();
-        let snapshots = self.readings_mut().chunks_exact_mut(length);
-        for (snapshot, deformation) in snapshots.zip(&deformations) {
+        for (snapshot, deformation) in self.readings_mut().chunks_exact_mut(length).zip(&deformations) {
             faulty.before_noise(&read, deformation, snapshot);
         }
-    }
-
-    /// Replaces the readings of simulated snapshots by the output of the converter of a faulty sensor, after noise
-    /// was added.
-    pub fn break_after_noise(&mut self, faulty: &FaultySensor) {
-        let read = self.row_wires_read().map_or_else(Vec::new, <[usize]>::to_vec);
-        let length = read.len() * self.channels();
+        self.disturb(model, noise, rng)?;
         for snapshot in self.readings_mut().chunks_exact_mut(length) {
             faulty.after_noise(&read, snapshot);
         }
+        Ok(())
     }
 
     /// Deformation of the simulated snapshot that begins with sample `first`. Row-wires that are not read are at rest.

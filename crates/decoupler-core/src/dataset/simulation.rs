@@ -59,14 +59,12 @@ impl Simulation {
     pub fn model_size(&self) -> Result<ModelSize, SceneError> {
         let scale = self.sensor.scale;
         let rows = self.scene.rows.read(scale.rows())?.len();
+        let is_shared = self.scene.rows.model() == RowModel::Shared;
         Ok(ModelSize {
             rows,
             unknowns: rows * self.scene.unknowns_per_row(scale),
             equations: rows * scale.columns(),
-            networks: match self.scene.rows.model() {
-                RowModel::Shared => 1,
-                RowModel::Each => rows,
-            },
+            networks: if is_shared { 1 } else { rows },
         })
     }
 
@@ -140,13 +138,10 @@ impl Dataset {
                 model
                     .row_resistances_into(row_wire, deformation.row_mm(row_wire), readings)
                     .map_err(|source| SimulationError::Sensor { snapshot, source })?;
-                let coordinates = deformation
-                    .row_positions_mm(model, row_wire)
-                    .flat_map(|position| position.to_array());
-                positions
-                    .iter_mut()
-                    .zip(coordinates)
-                    .for_each(|(to, value)| *to = value);
+                let nodes = deformation.row_positions_mm(model, row_wire);
+                for (to, value) in positions.iter_mut().zip(nodes.flat_map(|node| node.to_array())) {
+                    *to = value;
+                }
             }
         }
         let row_wires: Vec<usize> = read.iter().copied().cycle().take(samples).collect();

@@ -25,11 +25,6 @@ impl Span {
         }
     }
 
-    /// `true` if the span is in seconds, so that it needs a clock.
-    pub fn is_in_seconds(self) -> bool {
-        matches!(self, Self::Seconds(_))
-    }
-
     pub(super) fn is_valid(self) -> bool {
         let (Self::Samples(length) | Self::Seconds(length)) = self;
         length > 0.0 && length.is_finite()

@@ -1,9 +1,7 @@
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Coverage, Errors, RunError, RunSets, RunSettings, TestErrors, cross_validation::scatter, run_sets::check_sets,
-};
+use super::{Coverage, RunError, RunSets, RunSettings, TestErrors, cross_validation::scatter, run_sets::check_sets};
 use crate::{
     dataset::{Dataset, PerRow, Simulation},
     decoupling::{NewtonDecoder, Program, ProgramDecoder, decode_set},
@@ -14,30 +12,29 @@ use crate::{
     sensor::ArrayScale,
 };
 
-/// Errors of the baselines, listed next to those of the network in every error table. `E` is [`Errors`] where the
-/// targets are known to be nodes.
+/// Errors of the baselines, listed next to those of the network in every error table.
 // Unknown fields are ignored: those of version 0.1.0 had another row.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Baselines<E = TestErrors> {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Baselines {
     /// Errors of always answering the mean of the training set.
-    pub mean: E,
+    pub mean: TestErrors,
     /// Errors of the best affine map on the readings, one for each row-wire where rows are known; ridge regression for
     /// recordings.
-    pub linear: E,
+    pub linear: TestErrors,
     /// Errors of [`DecoderKind::Newton`](crate::decoupling::DecoderKind::Newton), which knows the equations, the noise, and
     /// mean and covariance of the loading. Recordings have no sensor model, and files of version 0.1.0 not this row; for
     /// test sets of many large rows it would take too long.
-    pub model_based: Option<E>,
+    pub model_based: Option<TestErrors>,
 }
 
 /// Errors of the network and of the baselines on the same test set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Scores<E = TestErrors> {
+pub struct Scores {
     /// Errors of the network.
-    pub network: E,
+    pub network: TestErrors,
     /// Errors of the baselines.
-    pub baselines: Baselines<E>,
+    pub baselines: Baselines,
     /// Coverage of the network's intervals for each target on the test set; empty if it has no intervals.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub coverage: Vec<Option<Coverage>>,
@@ -49,23 +46,25 @@ impl Baselines {
     /// # Errors
     /// If the settings are invalid, the sets do not belong together, samples cannot be scaled, or the job is cancelled.
     pub fn measure(settings: &RunSettings, sets: &RunSets, job: &Job<'_>) -> Result<Self, RunError> {
-        let [mean, linear] = mean_and_linear(settings, sets)?;
+        let fitted = Self::fitted(settings, sets)?;
         job.check()?;
         let model_based = model_based(&sets.problem, &sets.test, job)?;
         job.check()?;
-        Ok(Self {
-            mean,
-            linear,
-            model_based,
-        })
+        Ok(Self { model_based, ..fitted })
     }
 
-    /// Returns the errors on the nodes, if the targets are nodes of an array.
-    pub fn nodes(&self) -> Option<Baselines<Errors>> {
-        Some(Baselines {
-            mean: *self.mean.nodes()?,
-            linear: *self.linear.nodes()?,
-            model_based: self.model_based.as_ref().and_then(TestErrors::nodes).copied(),
+    /// Measures the baselines that are fitted to the training set.
+    ///
+    /// # Errors
+    /// If the settings are invalid, the sets do not belong together, or samples cannot be scaled.
+    pub(super) fn fitted(settings: &RunSettings, sets: &RunSets) -> Result<Self, RunError> {
+        check_sets(settings, sets)?;
+        let (mut mean, mut linear) = fit_baselines(&sets.split.training, settings)?;
+        let errors = |answers| TestErrors::measure(&sets.problem, &sets.test, &answers);
+        Ok(Self {
+            mean: errors(decode_set(&mut mean, &sets.test)?),
+            linear: errors(decode_set(&mut linear, &sets.test)?),
+            model_based: None,
         })
     }
 
@@ -88,17 +87,6 @@ impl Baselines {
     }
 }
 
-impl Scores {
-    /// Returns the errors on the nodes, if the targets are nodes of an array.
-    pub fn nodes(&self) -> Option<Scores<Errors>> {
-        Some(Scores {
-            network: *self.network.nodes()?,
-            baselines: self.baselines.nodes()?,
-            coverage: self.coverage.clone(),
-        })
-    }
-}
-
 /// Returns the errors on `test` of Newton's method with the noise of the scene and mean and covariance of its loading;
 /// `None` without a sensor model, and if it would take more than some seconds.
 ///
@@ -113,15 +101,13 @@ fn model_based(problem: &Problem, test: &Dataset, job: &Job<'_>) -> Result<Optio
     const STEPS: f64 = 8.0;
     /// As [`STEPS`], if exact readings leave the deformation open: nothing but the bounds and a weak prior ends the search.
     const OPEN_STEPS: f64 = 500.0;
-    let Some(Simulation { sensor, scene, .. }) = &problem.sensor else {
+    let Some(simulation) = &problem.sensor else {
         return Ok(None);
     };
+    let Simulation { sensor, scene, .. } = simulation;
     let rows = test.row_wires_read().expect("samples of a scene know their row-wire");
-    let (readings, unknowns) = (
-        sensor.scale.columns(),
-        sensor.scale.nodes_per_row() * scene.movement.axes().count(),
-    );
-    let (is_exact, is_determined) = (scene.noise.in_test().is_none(), readings > unknowns);
+    let (readings, unknowns) = (sensor.scale.columns(), scene.unknowns_per_row(sensor.scale));
+    let (is_exact, is_determined) = (scene.noise.in_test().is_none(), simulation.is_determined());
     // Only exact readings that determine the deformation tell row-wires apart before each was tried.
     let is_each_tried = scene.rows.model() == RowModel::Shared && !(is_exact && is_determined);
     let tried = if is_each_tried { rows.len() } else { 1 };
@@ -140,20 +126,6 @@ fn model_based(problem: &Problem, test: &Dataset, job: &Job<'_>) -> Result<Optio
         scatter(&mut answers, block, &decode_set(&mut decoder, &test.select(block))?);
     }
     Ok(Some(TestErrors::measure(problem, test, &answers)))
-}
-
-/// Returns the errors of the training mean and of the linear baseline on the test set.
-///
-/// # Errors
-/// If the settings are invalid, the sets do not belong together, or samples cannot be scaled.
-pub(super) fn mean_and_linear(settings: &RunSettings, sets: &RunSets) -> Result<[TestErrors; 2], RunError> {
-    check_sets(settings, sets)?;
-    let (mut mean, mut linear) = fit_baselines(&sets.split.training, settings)?;
-    let errors = |answers| TestErrors::measure(&sets.problem, &sets.test, &answers);
-    Ok([
-        errors(decode_set(&mut mean, &sets.test)?),
-        errors(decode_set(&mut linear, &sets.test)?),
-    ])
 }
 
 /// Fits the baselines: the training mean and an affine map on the readings, one for each row-wire if networks know the
@@ -221,21 +193,15 @@ impl PublishedErrors {
     /// Number of the table obtained by cross-validation.
     const CROSS_VALIDATION: u8 = 2;
 
-    /// Returns the errors reported for this configuration without cross-validation, if there are any.
-    pub fn of(array: ArrayScale, hidden: usize, training_samples: usize) -> Option<Self> {
-        Self::find(array, hidden, training_samples, |table| table != Self::CROSS_VALIDATION)
-    }
-
-    /// Returns the errors reported for this configuration by cross-validation of all `samples`, if there are any.
-    pub(super) fn of_cross_validation(array: ArrayScale, hidden: usize, samples: usize) -> Option<Self> {
-        Self::find(array, hidden, samples, |table| table == Self::CROSS_VALIDATION)
-    }
-
-    fn find(array: ArrayScale, hidden: usize, samples: usize, in_table: impl Fn(u8) -> bool) -> Option<Self> {
-        let matches = |row: &Self| {
-            in_table(row.table) && (row.array, row.hidden, row.training_samples) == (array, hidden, samples)
+    /// Returns the errors reported for this configuration, if there are any: on a test set, or by `cross_validation` of all
+    /// samples.
+    pub(super) fn of(array: ArrayScale, hidden: usize, samples: usize, cross_validation: bool) -> Option<Self> {
+        let wanted = (array, hidden, samples, cross_validation);
+        let of_row = |row: &Self| {
+            let in_table = row.table == Self::CROSS_VALIDATION;
+            (row.array, row.hidden, row.training_samples, in_table)
         };
-        published_errors().into_iter().find(matches)
+        published_errors().into_iter().find(|row| of_row(row) == wanted)
     }
 }
 
@@ -245,7 +211,7 @@ mod tests {
     use crate::{
         dataset::{Simulation, Stream},
         decoupling::decode_set,
-        evaluation::RunSettings,
+        evaluation::{Errors, RunSettings},
         machine::MemoryBudget,
         scene::{Movement, Noise, Scene},
         sensor::SensorModel,
@@ -316,16 +282,15 @@ mod tests {
     fn published_errors_are_found_by_configuration() {
         assert_eq!(published_errors().len(), 11);
         let array = ArrayScale::default();
-        assert_eq!(PublishedErrors::of(array, 12, 1000).unwrap().z_percent, 2.28);
+        let tested = |array, hidden, samples| PublishedErrors::of(array, hidden, samples, false);
+        assert_eq!(tested(array, 12, 1000).unwrap().z_percent, 2.28);
         assert_eq!(
-            PublishedErrors::of("10x8_4x24".parse().unwrap(), 12, 1000)
-                .unwrap()
-                .y_percent,
+            tested("10x8_4x24".parse().unwrap(), 12, 1000).unwrap().y_percent,
             2.36e-12
         );
-        assert_eq!(PublishedErrors::of(array, 12, 100), None, "Table 2 is cross-validation");
-        assert_eq!(PublishedErrors::of(array, 13, 1000), None);
-        let cross_validated = |samples| PublishedErrors::of_cross_validation(array, 12, samples);
+        assert_eq!(tested(array, 12, 100), None, "Table 2 is cross-validation");
+        assert_eq!(tested(array, 13, 1000), None);
+        let cross_validated = |samples| PublishedErrors::of(array, 12, samples, true);
         assert_eq!(cross_validated(1000).unwrap().z_percent, 2.01);
         assert_eq!(cross_validated(100).unwrap().x_percent, 0.30);
         assert_eq!(cross_validated(500), None);

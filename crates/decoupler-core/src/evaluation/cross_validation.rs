@@ -56,9 +56,11 @@ pub struct CrossValidated {
     pub effort: Effort,
 }
 
-/// Number and time of the epochs trained.
+/// Networks trained, with the number and time of their epochs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
+    /// Number of networks trained, each with all starts: 1, or one per fold.
+    pub networks: usize,
     /// Number of epochs, over all starts and folds.
     pub epochs: usize,
     /// Total time of the epochs.
@@ -68,24 +70,12 @@ pub struct Effort {
 }
 
 impl CrossValidation {
-    /// Runs repeat `repeat` (from 0) of the cross-validation on `set`; each repeat has its own seed, derived from that
-    /// of `settings`.
+    /// Runs repeat `repeat` (from 0) of the cross-validation: trains on folds of `set` and tests on the same samples of
+    /// `tested`, whose readings may have other noise. Each repeat has its own seed, derived from that of `settings`.
     ///
     /// # Errors
     /// If the folds cannot be filled, the settings are invalid, or the job is cancelled.
     pub fn run(
-        &self,
-        settings: &RunSettings,
-        set: &Dataset,
-        repeat: usize,
-        job: &Job<'_>,
-    ) -> Result<CrossValidated, RunError> {
-        self.run_with_tested(settings, (set, set), repeat, job)
-    }
-
-    /// As [`Self::run`], on folds of `set`, tested on the same samples of `tested`, whose readings may have other
-    /// noise.
-    pub(super) fn run_with_tested(
         &self,
         settings: &RunSettings,
         (set, tested): (&Dataset, &Dataset),
@@ -156,7 +146,12 @@ impl CrossValidated {
     /// # Panics
     /// If the set has a different shape.
     pub fn scores(&self, set: &Dataset) -> Scores {
-        let errors = |answers: &Array2<f64>| TestErrors::of_targets(set, answers.view());
+        self.scores_of(&Problem::unnamed(set.channels(), set.outputs()), set)
+    }
+
+    /// As [`Self::scores`], for a set that `problem` describes.
+    pub(super) fn scores_of(&self, problem: &Problem, set: &Dataset) -> Scores {
+        let errors = |answers| TestErrors::measure(problem, set, answers);
         Scores {
             network: errors(&self.network),
             baselines: Baselines {
@@ -172,6 +167,7 @@ impl CrossValidated {
 impl Default for Effort {
     fn default() -> Self {
         Self {
+            networks: 0,
             epochs: 0,
             seconds: 0.0,
             min_epoch_seconds: f64::INFINITY,
@@ -191,6 +187,7 @@ impl Effort {
             run.step();
             effort.min_epoch_seconds = effort.min_epoch_seconds.min(begun.elapsed().as_secs_f64() / at_work);
         }
+        effort.networks = 1;
         for trainer in run.trainers() {
             effort.epochs += trainer.latest().epoch;
             effort.seconds += trainer.elapsed().as_secs_f64();
@@ -199,6 +196,7 @@ impl Effort {
     }
 
     fn add(&mut self, other: Self) {
+        self.networks += other.networks;
         self.epochs += other.epochs;
         self.seconds += other.seconds;
         self.min_epoch_seconds = self.min_epoch_seconds.min(other.min_epoch_seconds);

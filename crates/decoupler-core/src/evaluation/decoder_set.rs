@@ -3,7 +3,7 @@ use std::time::Instant;
 use ndarray::Array2;
 
 use super::{
-    RunError, RunSets, RunSettings, TestErrors,
+    RunError, RunSets, RunSettings, TestErrors, TrainingSize,
     baselines::fit_baselines,
     preparation::unseen_noise,
     remark::{cause, missing_figures, worse_than_mean},
@@ -16,7 +16,6 @@ use crate::{
     machine::MemoryBudget,
     network::Networks,
     problem::Problem,
-    scene::RowModel,
     sensor::SensorModel,
 };
 
@@ -104,16 +103,13 @@ impl DecoderSet {
     /// # Errors
     /// If samples cannot be scaled, or the sensor has no resistances at rest.
     pub fn decoder(&self, kind: DecoderKind, precision: Precision) -> Result<Option<Box<dyn Decoder>>, RunError> {
+        let sensor = self.problem.sensor.as_ref();
         Ok(kind.fit(&FitProblem {
             training: &self.training,
             row_model: self.settings.source.row_model(),
             inputs: self.settings.inputs,
-            unseen: unseen_noise(self.problem.sensor.as_ref())?,
-            sensor: self
-                .problem
-                .sensor
-                .as_ref()
-                .map(|simulation| (&simulation.sensor, &simulation.scene)),
+            unseen: unseen_noise(sensor)?,
+            sensor: sensor.map(|simulation| (&simulation.sensor, &simulation.scene)),
             networks: self.networks.as_ref(),
             precision,
             seed: self.settings.seed,
@@ -147,15 +143,22 @@ impl DecoderSet {
         precision: Precision,
         test: &Dataset,
     ) -> Result<Option<DecoderReport>, RunError> {
-        let Some((answers, solved, cost)) = self.answer(kind, precision, test)? else {
+        let begun = Instant::now();
+        let Some(mut decoder) = self.decoder(kind, precision)? else {
             return Ok(None);
         };
+        let fit_seconds = begun.elapsed().as_secs_f64();
+        let answers = decode_set(&mut *decoder, test)?;
+        let solved = decoder.take_solved_rows();
+        let frame_us = frame_us(&mut *decoder, test)?;
+        let mean = self.decoder(DecoderKind::Mean, Precision::Double)?;
+        let mut mean = mean.expect("the mean needs neither networks nor a sensor");
+        let mean = TestErrors::measure(&self.problem, test, &decode_set(&mut *mean, test)?);
         let errors = TestErrors::measure(&self.problem, test, &answers);
-        let mean = TestErrors::measure(&self.problem, test, &self.mean_answers(test)?);
         let sensor = self.problem.sensor.as_ref();
         let residual = sensor.map(|simulation| rms_residual(&simulation.sensor, test, &answers));
-        let cause = cause(kind, &self.settings, self.size_of_fits(), None);
-        let mut remarks = worse_than_mean(&errors, &mean, &cause);
+        let size = TrainingSize::of(&self.settings, &self.training);
+        let mut remarks = worse_than_mean(&errors, &mean, &cause(kind, &self.settings, size, None));
         remarks.extend(missing_figures(precision, &errors, residual).map(str::to_owned));
         remarks.extend((!solved.are_reliable()).then(|| solved.to_string()));
         Ok(Some(DecoderReport {
@@ -165,44 +168,8 @@ impl DecoderSet {
             remarks,
             residual,
             solved,
-            cost,
+            cost: DecoderCost { frame_us, fit_seconds },
         }))
-    }
-
-    /// Returns the answers of the training mean to `test`.
-    fn mean_answers(&self, test: &Dataset) -> Result<Array2<f64>, RunError> {
-        let mean = self.decoder(DecoderKind::Mean, Precision::Double)?;
-        Ok(decode_set(
-            &mut *mean.expect("the mean needs neither networks nor a sensor"),
-            test,
-        )?)
-    }
-
-    /// Returns the number of training samples of each fit, and the number of readings of each sample.
-    fn size_of_fits(&self) -> (usize, usize) {
-        let fits = match self.settings.source.row_model() {
-            RowModel::Shared => 1,
-            RowModel::Each => self.training.row_count().max(1),
-        };
-        (self.training.samples() / fits, self.training.channels())
-    }
-
-    /// Fits a decoder and returns its answers to `test`, the numbers of rows solved, and its computing time.
-    fn answer(
-        &self,
-        kind: DecoderKind,
-        precision: Precision,
-        test: &Dataset,
-    ) -> Result<Option<(Array2<f64>, SolvedRows, DecoderCost)>, RunError> {
-        let begun = Instant::now();
-        let Some(mut decoder) = self.decoder(kind, precision)? else {
-            return Ok(None);
-        };
-        let fit_seconds = begun.elapsed().as_secs_f64();
-        let answers = decode_set(&mut *decoder, test)?;
-        let solved = decoder.take_solved_rows();
-        let frame_us = frame_us(&mut *decoder, test)?;
-        Ok(Some((answers, solved, DecoderCost { frame_us, fit_seconds })))
     }
 }
 

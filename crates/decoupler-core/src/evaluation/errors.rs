@@ -1,6 +1,7 @@
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
+use super::table::{ErrorMeasure, Figures};
 use crate::{dataset::Dataset, problem::Problem};
 
 /// Errors of decoupled coordinates of the nodes in a test set.
@@ -159,41 +160,28 @@ impl TestErrors {
         }
     }
 
-    /// Returns the ratio of the error to that of `other` answers: [`Errors::times`].
-    pub fn times(&self, other: &Self) -> Option<f64> {
-        self.nodes()?.times(other.nodes()?)
+    /// Returns this measure of the errors; over all targets of a recording, with the [error in percent](Self::percent).
+    pub fn figure(&self, measure: ErrorMeasure) -> Option<f64> {
+        match self {
+            Self::Nodes(errors) => measure.of(Figures::Nodes(errors)),
+            Self::Targets(_) if measure == ErrorMeasure::RangePercent => self.percent(),
+            Self::Targets(targets) => measure.of_target(&TargetErrors::over_all(targets)?),
+        }
     }
 
     /// Returns the name of the first figure that is not a finite number.
     pub fn infinite_figure(&self) -> Option<String> {
-        let figures: Vec<(String, Option<f64>)> = match self {
-            Self::Nodes(errors) => [
-                ("z_percent", errors.z_percent),
-                ("x_percent", errors.x_percent),
-                ("y_percent", errors.y_percent),
-                ("z_mm", Some(errors.z_mm)),
-                ("z_full_scale_percent", Some(errors.z_full_scale_percent)),
-                ("worst_mm", Some(errors.worst_mm)),
-            ]
-            .map(|(name, figure)| (name.to_owned(), figure))
-            .into(),
-            Self::Targets(targets) => {
-                let of_target = |(index, errors): (usize, &TargetErrors)| {
-                    [
-                        ("rmse", Some(errors.rmse)),
-                        ("mae", Some(errors.mae)),
-                        ("r2", errors.r2),
-                        ("worst", Some(errors.worst)),
-                        ("percent_of_range", errors.percent_of_range),
-                    ]
-                    .map(|(name, figure)| (format!("{index}.{name}"), figure))
-                };
-                targets.iter().enumerate().flat_map(of_target).collect()
-            }
+        let first = |measures: &[ErrorMeasure], figures: Figures<'_>| {
+            let is_infinite = |measure: &&ErrorMeasure| measure.of(figures).is_some_and(|figure| !figure.is_finite());
+            measures.iter().find(is_infinite).map(|measure| measure.field())
         };
-        let is_infinite = |figure: &Option<f64>| figure.is_some_and(|figure| !figure.is_finite());
-        let mut infinite = figures.into_iter().filter(|(_, figure)| is_infinite(figure));
-        infinite.next().map(|(name, _)| name)
+        match self {
+            Self::Nodes(errors) => first(&ErrorMeasure::OF_NODES, Figures::Nodes(errors)).map(str::to_owned),
+            Self::Targets(targets) => targets.iter().enumerate().find_map(|(index, errors)| {
+                let name = first(ErrorMeasure::OF_TARGETS, Figures::Target(errors))?;
+                Some(format!("{index}.{name}"))
+            }),
+        }
     }
 }
 

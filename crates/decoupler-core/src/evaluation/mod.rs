@@ -31,22 +31,19 @@ pub use baselines::{Baselines, PublishedErrors, Scores, published_errors};
 pub use cross_validation::{CrossValidated, CrossValidation, Effort};
 pub use decoder_set::{DecoderCost, DecoderReport, DecoderSet};
 pub use errors::{Errors, NodeAddress, Spread, TargetErrors, TestErrors, node_rms_mm};
-pub use intervals::{Coverage, HalfWidth, Intervals, IntervalsDefect, NoIntervals};
+pub use intervals::{Coverage, HalfWidth, Intervals, NoIntervals};
 pub use past_networks::{PastNetwork, PastNetworks};
 pub use preparation::Begin;
-pub use presets::{Preset, PresetError, ready_settings};
-pub use pressed::{Pressed, PressedAnswer, fine_tune, press_limits, pressed_rows, rebased};
+pub use presets::{Preset, ready_settings};
+pub use pressed::{Pressed, PressedAnswer, fine_tune, pressed_rows};
 pub use remark::error_remarks;
-pub use run::{Run, RunDefect, RunError};
+pub use run::{Run, RunError};
 pub use run_sets::RunSets;
-pub use settings::{
-    Combination, CombinationError, CountError, Initialization, InitializationError, MAX_STARTS, Measured, RunSettings,
-    Source,
-};
+pub use settings::{Combination, Initialization, MAX_STARTS, Measured, RunSettings, Source};
 pub use starts::{StartRecord, StartTrainer, best_start};
 pub use table::{ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, decoded_unit, network_frame_time};
 pub use trade::{
-    Outlook, OutlookError, TradeOffCost, TradeOffLevel, TradeOffLimits, TradeOffPoint, fastest_under,
-    measure_trade_off, most_accurate_under,
+    Outlook, TradeOffCost, TradeOffLevel, TradeOffLimits, TradeOffPoint, fastest_under, measure_trade_off,
+    most_accurate_under,
 };
 pub use workload::{TrainingSize, Workload, WorkloadTime};

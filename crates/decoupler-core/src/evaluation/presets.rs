@@ -1,14 +1,13 @@
 use std::{fmt, str::FromStr};
 
-use thiserror::Error;
-
 use super::RunSettings;
 use crate::{
     dataset::Simulation,
     machine::node_pairs_per_row,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Indenter, Loading, Noise, Rows, Scene},
-    training::{StoppingRules, TrainingSettings},
+    text::{Named, UnknownName},
+    training::StoppingRules,
 };
 
 /// Preset settings of a run.
@@ -20,11 +19,6 @@ pub enum Preset {
     /// Best settings found in experiments: known rows, whitened conductances, more samples, and later early stopping.
     Best,
 }
-
-/// Error for an unknown preset.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{0}' is not a preset: give paper or best")]
-pub struct PresetError(String);
 
 impl Preset {
     /// All presets, in the order offered to the user.
@@ -38,65 +32,55 @@ impl Preset {
     /// Returns the settings of the preset for readings with `noise`. Accuracy then depends on the number of samples,
     /// and few epochs are enough.
     pub fn settings_in(self, noise: Noise) -> RunSettings {
-        let source = self.simulation_in(noise);
-        match self {
-            Self::Paper => source.into(),
-            Self::Best => RunSettings {
-                inputs: InputChoice::BEST,
-                training: TrainingSettings {
-                    stopping: StoppingRules {
-                        epochs: if noise.is_none() { 1000 } else { 100 },
-                        max_fail: 30,
-                        min_gradient: 0.0,
-                        ..StoppingRules::default()
-                    },
-                    ..TrainingSettings::default()
-                },
-                ..source.into()
-            },
+        let mut settings = RunSettings::from(self.simulation_in(noise));
+        if self == Self::Best {
+            settings.inputs = InputChoice::BEST;
+            settings.training.stopping = StoppingRules {
+                epochs: if noise.is_none() { 1000 } else { 100 },
+                max_fail: 30,
+                min_gradient: 0.0,
+                ..StoppingRules::default()
+            };
         }
+        settings
     }
 
     /// Returns the sensor, the scene and the numbers of samples of [`Self::settings_in`].
     pub fn simulation_in(self, noise: Noise) -> Simulation {
-        let paper = Simulation {
-            scene: Scene {
-                noise,
-                ..Scene::default()
-            },
-            ..Simulation::default()
-        };
-        let (samples, validation_samples) = if noise.is_none() { (5000, 1000) } else { (50_000, 5000) };
+        let mut simulation = Simulation::default();
+        simulation.scene.noise = noise;
+        if self == Self::Best {
+            simulation.scene.rows = Rows::Known;
+            let (samples, validation) = if noise.is_none() { (5000, 1000) } else { (50_000, 5000) };
+            (simulation.samples, simulation.validation_samples) = (samples, validation);
+        }
+        simulation
+    }
+}
+
+impl Named for Preset {
+    const WHAT: &'static str = "a preset";
+    const ALL: &'static [Self] = &Self::ALL;
+
+    fn name(self) -> &'static str {
         match self {
-            Self::Paper => paper,
-            Self::Best => Simulation {
-                scene: Scene {
-                    rows: Rows::Known,
-                    ..paper.scene
-                },
-                samples,
-                validation_samples,
-                ..paper
-            },
+            Self::Paper => "paper",
+            Self::Best => "best",
         }
     }
 }
 
 impl fmt::Display for Preset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Paper => "paper",
-            Self::Best => "best",
-        })
+        f.pad(self.name())
     }
 }
 
 impl FromStr for Preset {
-    type Err = PresetError;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, PresetError> {
-        let found = Self::ALL.into_iter().find(|preset| preset.to_string() == text.trim());
-        found.ok_or_else(|| PresetError(text.to_owned()))
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        Self::parse(text)
     }
 }
 
@@ -126,28 +110,20 @@ pub fn ready_settings(source: &Simulation) -> Option<RunSettings> {
         noise: Noise::default(),
         ..source.scene
     };
-    let source = Simulation {
+    let mut settings = RunSettings::from(Simulation {
         sensor: source.sensor,
         scene,
         samples,
         validation_samples: 0,
         test_samples: rows.rows,
+    });
+    settings.inputs = InputChoice {
+        quantity: Quantity::Conductance,
+        scaling: ScalingChoice::MinMax,
     };
-    Some(RunSettings {
-        inputs: InputChoice {
-            quantity: Quantity::Conductance,
-            scaling: ScalingChoice::MinMax,
-        },
-        hidden: 6,
-        training: TrainingSettings {
-            stopping: StoppingRules {
-                epochs: 30,
-                ..StoppingRules::default()
-            },
-            ..TrainingSettings::default()
-        },
-        ..source.into()
-    })
+    settings.hidden = 6;
+    settings.training.stopping.epochs = 30;
+    Some(settings)
 }
 
 #[cfg(test)]
@@ -157,6 +133,7 @@ mod tests {
     use super::*;
     use crate::{
         evaluation::{Pressed, Run},
+        job::Job,
         scene::{Print, Touch},
     };
 
@@ -182,7 +159,7 @@ mod tests {
         };
         let pressed = Pressed::new(&sensor, &rows, &touch, 1.0).unwrap();
         let mut decoder = run.network().decoder();
-        let answer = pressed.answer(&mut decoder, &|| false).unwrap().unwrap();
+        let answer = pressed.answer(&mut decoder, &Job::UNINTERRUPTED).unwrap();
         let depths = pressed.nodes_mm().map(|node| sensor.geometry.height_mm - node.z);
         let nodes = pressed.nodes_mm().count() as f64;
         [answer.mean_mm, depths.sum::<f64>() / nodes]

@@ -8,8 +8,8 @@ use ndarray::Array2;
 
 use super::{RunError, run_sets::check_networks};
 use crate::{
-    calibration::{PressLimits, PressedRow},
-    dataset::{Dataset, PerRow, Simulation, Split},
+    calibration::PressedRow,
+    dataset::{Dataset, PerRow, Split},
     decoupling::{DecodeError, Decoder},
     job::Job,
     machine::{MemoryBudget, node_pairs_per_row},
@@ -80,20 +80,16 @@ impl Pressed {
         &self.readings_ohm
     }
 
-    /// Decodes the readings; returns `None` once `is_stale`, that is, when the answer is no longer needed.
+    /// Decodes the readings.
     ///
     /// # Errors
-    /// If a reading cannot be decoded.
+    /// If a reading cannot be decoded, or the job is cancelled since the answer is no longer needed.
     ///
     /// # Panics
     /// If the decoder was fitted to other rows.
-    pub fn answer(
-        &self,
-        decoder: &mut dyn Decoder,
-        is_stale: &dyn Fn() -> bool,
-    ) -> Result<Option<PressedAnswer>, DecodeError> {
+    pub fn answer(&self, decoder: &mut dyn Decoder, job: &Job<'_>) -> Result<PressedAnswer, RunError> {
         let begun = Instant::now();
-        self.answer_by(&|| begun.elapsed(), decoder, is_stale)
+        self.answer_by(&|| begun.elapsed(), decoder, job)
     }
 
     /// As [`Self::answer`], with the times of a clock.
@@ -101,63 +97,55 @@ impl Pressed {
         &self,
         clock: &dyn Fn() -> Duration,
         decoder: &mut dyn Decoder,
-        is_stale: &dyn Fn() -> bool,
-    ) -> Result<Option<PressedAnswer>, DecodeError> {
+        job: &Job<'_>,
+    ) -> Result<PressedAnswer, RunError> {
         /// Number of timed repeats, of which the shortest counts.
         const TIMES: RangeInclusive<usize> = 3..=5;
         /// Maximum time spent on the repeats.
         const LONGEST: Duration = Duration::from_millis(30);
-        let mut coordinates_mm = vec![0.0; self.coordinates_mm.len()];
-        let Some(first) = self.decode(clock, decoder, &mut coordinates_mm, is_stale)? else {
-            return Ok(None);
+        let mut decode = |coordinates_mm: &mut [f64]| {
+            let begun = clock();
+            self.decode(decoder, coordinates_mm, job).map(|()| clock() - begun)
         };
-        let (mut shortest, mut spent, mut times) = (first, first, 1);
+        let mut coordinates_mm = vec![0.0; self.coordinates_mm.len()];
+        let mut times = vec![decode(&mut coordinates_mm)?];
         // Repeats have a separate buffer: an interrupted one must not change the answer.
         let mut again_mm = coordinates_mm.clone();
-        while times < *TIMES.end() && spent < LONGEST {
-            let Some(time) = self.decode(clock, decoder, &mut again_mm, is_stale)? else {
-                break;
-            };
-            (shortest, spent, times) = (shortest.min(time), spent + time, times + 1);
+        while times.len() < *TIMES.end() && times.iter().sum::<Duration>() < LONGEST {
+            match decode(&mut again_mm) {
+                Err(RunError::Cancelled(_)) => break,
+                time => times.push(time?),
+            }
         }
         let errors = coordinates_mm.iter().zip(&self.coordinates_mm).skip(2).step_by(3);
-        let errors = errors.map(|(decoded, actual)| (decoded - actual).abs());
-        let (total_mm, worst_mm, nodes) = errors.fold((0.0, 0.0_f64, 0), |(total, worst, nodes), error| {
-            // Keeps NaN: the error of a NaN answer is NaN.
-            (
-                total + error,
-                if error > worst || error.is_nan() { error } else { worst },
-                nodes + 1,
-            )
-        });
-        Ok(Some(PressedAnswer {
-            mean_mm: total_mm / f64::from(nodes),
-            worst_mm,
-            time: TIMES.contains(&times).then_some(shortest),
+        let errors_mm = Vec::from_iter(errors.map(|(decoded, actual)| (decoded - actual).abs()));
+        // Keeps NaN: the error of a NaN answer is NaN.
+        let larger = |worst: f64, error: &f64| {
+            if *error > worst || error.is_nan() {
+                *error
+            } else {
+                worst
+            }
+        };
+        Ok(PressedAnswer {
+            mean_mm: errors_mm.iter().sum::<f64>() / errors_mm.len() as f64,
+            worst_mm: errors_mm.iter().fold(0.0, larger),
+            time: times.iter().min().copied().filter(|_| TIMES.contains(&times.len())),
             coordinates_mm,
-        }))
+        })
     }
 
-    /// Decodes row by row, so that slow decoders can be interrupted; returns the time.
-    fn decode(
-        &self,
-        clock: &dyn Fn() -> Duration,
-        decoder: &mut dyn Decoder,
-        coordinates_mm: &mut [f64],
-        is_stale: &dyn Fn() -> bool,
-    ) -> Result<Option<Duration>, DecodeError> {
-        let begun = clock();
+    /// Decodes row by row, so that slow decoders can be interrupted.
+    fn decode(&self, decoder: &mut dyn Decoder, coordinates_mm: &mut [f64], job: &Job<'_>) -> Result<(), RunError> {
         let answers = coordinates_mm.chunks_exact_mut(decoder.outputs());
         for (row_index, (readings, answer)) in self.readings_ohm.rows().into_iter().zip(answers).enumerate() {
-            if is_stale() {
-                return Ok(None);
-            }
+            job.check()?;
             let readings = readings.to_slice().expect("a row of a standard array is contiguous");
             decoder
                 .decode_row(row_index, readings, answer)
                 .map_err(|error| DecodeError { row_index, ..error })?;
         }
-        Ok(Some(clock() - begun))
+        Ok(())
     }
 }
 
@@ -178,61 +166,27 @@ impl PressedAnswer {
 /// # Panics
 /// If there are not 3·M2 targets, or the array lacks a row-wire.
 pub fn pressed_rows(set: &Dataset, sensor: &SensorModel) -> Result<Vec<PressedRow>, RunError> {
+    assert_eq!(
+        set.outputs(),
+        sensor.scale.coordinates_per_row(),
+        "targets are coordinates of the row's nodes"
+    );
     let pressed = |sample: usize| {
         let row = set.row_wire(sample).ok_or(RunError::NoRowWires)?;
+        let position = |(node, mm): (usize, &[f64])| sensor.displacement_mm(row, node, DVec3::from_slice(mm));
         Ok(PressedRow {
             frame: set.groups()[sample],
             row,
-            displacements_mm: displacements_mm(set, sample, row, sensor),
+            displacements_mm: set
+                .sample_targets(sample)
+                .chunks_exact(3)
+                .enumerate()
+                .map(position)
+                .collect(),
             resistances_ohm: set.sample_readings(sample).to_vec(),
         })
     };
     (0..set.samples()).map(pressed).collect()
-}
-
-/// Returns `set` with its targets converted from model `from` to model `to` of the sensor. Targets are coordinates in
-/// millimetres; displacements stay the same, and rest positions change. A network trained on one model can thus be
-/// tested or trained on samples described by another.
-///
-/// # Errors
-/// If the samples have no row-wires.
-///
-/// # Panics
-/// If there are not 3·M2 targets, or one of the arrays lacks a row-wire.
-pub fn rebased(set: &Dataset, from: &SensorModel, to: &SensorModel) -> Result<Dataset, RunError> {
-    let rows = (0..set.samples()).map(|sample| set.row_wire(sample));
-    let rows: Vec<usize> = rows.collect::<Option<_>>().ok_or(RunError::NoRowWires)?;
-    let mut targets = Array2::zeros(set.targets().dim());
-    for (sample, (&row, mut moved)) in rows.iter().zip(targets.rows_mut()).enumerate() {
-        let displacements = displacements_mm(set, sample, row, from).into_iter().enumerate();
-        let coordinates =
-            displacements.flat_map(|(node, displacement)| to.displaced_mm(row, node, displacement).to_array());
-        moved.iter_mut().zip(coordinates).for_each(|(to, value)| *to = value);
-    }
-    let read = set.row_wires_read().unwrap_or_default();
-    let moved = Dataset::new(set.readings().to_owned(), targets, Some(&rows), set.groups().to_vec());
-    let moved = moved.and_then(|moved| moved.among_rows(read));
-    Ok(moved.expect("the parts are those of a set"))
-}
-
-fn displacements_mm(set: &Dataset, sample: usize, row: usize, sensor: &SensorModel) -> Vec<DVec3> {
-    let targets = set.sample_targets(sample);
-    assert_eq!(
-        targets.len(),
-        sensor.scale.coordinates_per_row(),
-        "targets are coordinates of the row's nodes"
-    );
-    let position = |(node, mm): (usize, &[f64])| sensor.displacement_mm(row, node, DVec3::from_slice(mm));
-    targets.chunks_exact(3).enumerate().map(position).collect()
-}
-
-/// Returns the range of displacements for which a network of this simulated scene is trained. Samples outside are not
-/// presses, or require answers that the network was not trained for.
-pub fn press_limits(simulation: &Simulation) -> PressLimits {
-    PressLimits {
-        largest_depth_mm: simulation.stroke_mm(),
-        largest_shift_mm: simulation.scene.movement.largest_shift_mm(),
-    }
 }
 
 /// Continues the training of `networks` on other samples, such as frames of the real sensor after training on its
@@ -321,12 +275,13 @@ mod tests {
         let moved = pressed.nodes_mm().nth(8 * 6 + 1).unwrap();
         assert_eq!(moved, sensor.displaced_mm(8, 1, DVec3::Z * 0.35));
         let mut newton = NewtonDecoder::new(&sensor, &Scene::default(), &rows).unwrap();
-        let answer = pressed.answer(&mut newton, &|| false).unwrap().unwrap();
+        let answer = pressed.answer(&mut newton, &Job::UNINTERRUPTED).unwrap();
         assert!(
             answer.worst_mm < 1e-9 && answer.mean_mm <= answer.worst_mm,
             "{answer:?}"
         );
-        assert!(pressed.answer(&mut newton, &|| true).unwrap().is_none());
+        let cancelled = pressed.answer(&mut newton, &Job::new(&|| true));
+        assert!(matches!(cancelled, Err(RunError::Cancelled(_))), "{cancelled:?}");
     }
 
     /// Decoder that is slow for the first frames, as on a busy machine, by a clock of its own.
@@ -377,8 +332,8 @@ mod tests {
             let asked = std::cell::Cell::new(0);
             let is_stale = || asked.replace(asked.get() + 1) >= stale_after;
             let clock = || Duration::from_millis(clock_ms.load(Ordering::Relaxed));
-            let answer = pressed.answer_by(&clock, &mut decoder, &is_stale).unwrap();
-            answer.map(|answer| answer.time)
+            let answer = pressed.answer_by(&clock, &mut decoder, &Job::new(&is_stale));
+            answer.ok().map(|answer| answer.time)
         };
         let never = usize::MAX;
         let [quick, slow] = [Hampered::QUICK_MS, Hampered::SLOW_MS].map(Duration::from_millis);
@@ -401,7 +356,7 @@ mod tests {
         let targets = Array2::from_shape_vec((3, 18), pressed.coordinates_mm.clone()).unwrap();
         let set = Dataset::new(pressed.readings_ohm.clone(), targets, Some(&rows), vec![0; 3]).unwrap();
         let mut mean = ProgramDecoder::new(Program::mean(run.test()));
-        let answer = pressed.answer(&mut mean, &|| false).unwrap().unwrap();
+        let answer = pressed.answer(&mut mean, &Job::UNINTERRUPTED).unwrap();
         let decoded = Array2::from_shape_vec((3, 18), answer.coordinates_mm.clone()).unwrap();
         let errors = Errors::measure(&set, &decoded, 1.0);
         assert!(

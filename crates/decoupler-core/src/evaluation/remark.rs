@@ -1,4 +1,4 @@
-use super::{Errors, RunSettings, Scores, TestErrors};
+use super::{ErrorMeasure, RunSettings, Scores, TestErrors, TrainingSize};
 use crate::{
     decoupling::{DecoderKind, Precision},
     scene::{Noise, NoisySets},
@@ -16,17 +16,19 @@ pub fn error_remarks(
     let Some(simulation) = settings.simulation() else {
         return Vec::new();
     };
-    let readings = simulation.sensor.scale.columns();
-    let networks = simulation.model_size().map_or(1, |size| size.networks);
+    let size = TrainingSize {
+        samples: simulation.samples,
+        inputs: simulation.sensor.scale.columns(),
+        targets: simulation.sensor.scale.coordinates_per_row(),
+        networks: simulation.model_size().map_or(1, |size| size.networks),
+    };
     let end = reason.map(|reason| (reason, settings.training.method));
-    let samples = simulation.samples / networks;
     let rows = [
         ("linear map", DecoderKind::Ridge, &baselines.linear, None),
         ("network", DecoderKind::Network, network, end),
     ];
     let of_row = |(name, kind, errors, end)| {
-        let cause = cause(kind, settings, (samples, readings), end);
-        let mut remarks = worse_than_mean(errors, &baselines.mean, &cause);
+        let mut remarks = worse_than_mean(errors, &baselines.mean, &cause(kind, settings, size, end));
         remarks.extend(missing_figures(Precision::Double, errors, None).map(str::to_owned));
         remarks.into_iter().map(move |remark| (name, remark))
     };
@@ -34,19 +36,18 @@ pub fn error_remarks(
 }
 
 /// Returns a circumstance that may be the cause of errors worse than those of the mean, with what may help: for a decoder
-/// fitted with `settings` to `samples` training samples of `readings` each, whose training ended as in `end`. The
-/// circumstance is known; that it is the cause is not.
+/// fitted with `settings` to training samples of this `size`, whose training ended as in `end`. The circumstance is known;
+/// that it is the cause is not.
 pub(super) fn cause(
     kind: DecoderKind,
     settings: &RunSettings,
-    (samples, readings): (usize, usize),
+    size: TrainingSize,
     end: Option<(StopReason, Method)>,
 ) -> String {
     /// Samples per reading below which more samples would help most.
     const FEW: usize = 4;
-    let noise = settings
-        .simulation()
-        .map_or(Noise::default(), |simulation| simulation.scene.noise);
+    let simulation = settings.simulation();
+    let noise = simulation.map_or(Noise::default(), |simulation| simulation.scene.noise);
     let is_noisy = !noise.in_test().is_none();
     let is_fitted = kind != DecoderKind::Newton;
     if is_fitted && is_noisy && noise.sets == NoisySets::Test {
@@ -55,6 +56,7 @@ pub(super) fn cause(
     if let Some((reason, method)) = end {
         return reason.remedy(&method).to_string();
     }
+    let (samples, readings) = (size.samples / size.networks.max(1), size.inputs);
     if is_fitted && samples < FEW * readings {
         let (samples, readings) = (counted(samples, "training sample"), counted(readings, "reading"));
         return format!("it was fitted to {samples} of {readings}; more samples may help");
@@ -74,20 +76,20 @@ pub(super) fn cause(
 pub(super) fn worse_than_mean(errors: &TestErrors, mean: &TestErrors, cause: &str) -> Vec<String> {
     /// Largest error in percent that counts as rounding of coordinates.
     const ROUNDING: f64 = 1e-9;
-    let (pairs, rounding): (Vec<(String, f64, f64)>, f64) = match (errors, mean) {
-        (TestErrors::Nodes(errors), TestErrors::Nodes(mean)) => {
-            let percent = |errors: &Errors| [Some(errors.z_full_scale_percent), errors.x_percent, errors.y_percent];
-            let pairs = ["z", "x", "y"].into_iter().zip(percent(errors)).zip(percent(mean));
-            let pair = |((name, error), of_mean): ((&str, _), Option<f64>)| Some((name.to_owned(), error?, of_mean?));
-            (pairs.filter_map(pair).collect(), ROUNDING)
-        }
-        _ => {
-            let pairs = errors.targets().iter().zip(mean.targets()).enumerate();
-            // A target that is constant in the test samples cannot be judged.
-            let judged = pairs.filter(|(_, (errors, _))| errors.r2.is_some());
-            let named = judged.map(|(index, (errors, mean))| (format!("target {}", index + 1), errors.mae, mean.mae));
-            (named.collect(), 0.0)
-        }
+    let (pairs, rounding): (Vec<(String, f64, f64)>, f64) = if errors.nodes().is_some() {
+        let axes = [
+            ("z", ErrorMeasure::ZStrokePercent),
+            ("x", ErrorMeasure::XPercent),
+            ("y", ErrorMeasure::YPercent),
+        ];
+        let pair = |(name, measure): (&str, _)| Some((name.to_owned(), errors.figure(measure)?, mean.figure(measure)?));
+        (axes.into_iter().filter_map(pair).collect(), ROUNDING)
+    } else {
+        let pairs = errors.targets().iter().zip(mean.targets()).enumerate();
+        // A target that is constant in the test samples cannot be judged.
+        let judged = pairs.filter(|(_, (errors, _))| errors.r2.is_some());
+        let named = judged.map(|(index, (errors, mean))| (format!("target {}", index + 1), errors.mae, mean.mae));
+        (named.collect(), 0.0)
     };
     let worse = pairs
         .into_iter()
@@ -132,15 +134,21 @@ pub(super) fn missing_figures(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::TargetErrors;
+    use crate::evaluation::{Errors, TargetErrors};
 
     fn remarks_on(
         kind: DecoderKind,
         (errors, mean): (&TestErrors, &TestErrors),
         settings: &RunSettings,
-        sizes: (usize, usize),
+        (samples, inputs): (usize, usize),
     ) -> Vec<String> {
-        worse_than_mean(errors, mean, &cause(kind, settings, sizes, None))
+        let size = TrainingSize {
+            samples,
+            inputs,
+            targets: 30,
+            networks: 1,
+        };
+        worse_than_mean(errors, mean, &cause(kind, settings, size, None))
     }
 
     fn errors(z_mm: f64, x_percent: Option<f64>) -> Errors {

@@ -1,5 +1,5 @@
 use std::{
-    fmt,
+    ops::RangeInclusive,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -9,12 +9,13 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::{
-    Baselines, Combination, CountError, Coverage, Intervals, RunSettings, Scores, StartRecord, StartTrainer,
-    TestErrors, starts::lowest,
+    Baselines, Combination, Coverage, Intervals, RunSettings, Scores, StartRecord, StartTrainer, TestErrors,
+    starts::lowest,
 };
 use crate::{
     dataset::{Dataset, DatasetError, PerRow, SimulationError, SplitBy},
     decoupling::{DecodeError, FitError},
+    identifiability::IdentifiabilityError,
     job::{Cancelled, Job},
     machine::MemoryBudget,
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, NetworkError, Networks},
@@ -22,7 +23,8 @@ use crate::{
     scene::SceneError,
     sensor::SensorError,
     training::{
-        Method, SettingError, StopReason, StoppingRules, TrainerState, TrainingDefect, TrainingError, check_width,
+        Method, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingDefect, TrainingError,
+        check_width,
     },
 };
 
@@ -98,7 +100,7 @@ impl Run {
 
     /// Stops every start at the user's request.
     pub fn stop(&mut self) {
-        self.starts.iter_mut().for_each(StartTrainer::stop);
+        self.trainers_mut().for_each(Trainer::stop);
     }
 
     /// Returns the reason for stopping once every start has ended: the leader's, or [`StopReason::Stopped`] if the
@@ -112,12 +114,12 @@ impl Run {
         self.leader().stop_reason()
     }
 
-    /// Returns the defect of the leader, or of the first start with one if their mean is kept, once the trainings have
-    /// ended; `None` if there is none.
-    pub fn defect(&self) -> Option<RunDefect> {
+    /// Describes the defect of the leader, or of the first start with one if their mean is kept, once the trainings have
+    /// ended: some failed or diverged. The text includes the remedy; `None` if there is no defect.
+    pub fn defect(&self) -> Option<String> {
         match self.settings.combine {
-            Combination::Best => RunDefect::of(self.leader()),
-            Combination::Mean => self.starts.iter().find_map(RunDefect::of),
+            Combination::Best => defect_of(self.leader()),
+            Combination::Mean => self.starts.iter().find_map(defect_of),
         }
     }
 
@@ -131,10 +133,9 @@ impl Run {
         let trainings = rows.len() * self.starts.len();
         let samples = rows[0].samples();
         check_width(&method, rows[0].present().shape(), samples, trainings, self.memory)?;
-        // Starts have the same shapes, so either the first is rejected or none.
-        for start in &mut self.starts {
-            start.continue_with(method)?;
-        }
+        // They have the same shapes, so either the first is rejected or none.
+        self.trainers_mut()
+            .try_for_each(|trainer| trainer.continue_with(method))?;
         self.settings.training.method = method;
         Ok(())
     }
@@ -144,11 +145,14 @@ impl Run {
     /// # Errors
     /// If a setting is out of range; nothing is then changed.
     pub fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
-        for start in &mut self.starts {
-            start.set_stopping(stopping)?;
-        }
+        self.trainers_mut()
+            .try_for_each(|trainer| trainer.set_stopping(stopping))?;
         self.settings.training.stopping = stopping;
         Ok(())
+    }
+
+    fn trainers_mut(&mut self) -> impl Iterator<Item = &mut Trainer> {
+        self.starts.iter_mut().flat_map(|start| &mut start.rows)
     }
 
     /// Returns the trainings of all starts.
@@ -187,7 +191,11 @@ impl Run {
 
     /// Returns the states of all trainings for [`Begin::Resume`](super::Begin::Resume): start by start, and in each row by row.
     pub fn states(&self) -> Vec<TrainerState> {
-        self.starts.iter().flat_map(StartTrainer::states).collect()
+        self.starts
+            .iter()
+            .flat_map(StartTrainer::rows)
+            .map(Trainer::state)
+            .collect()
     }
 
     /// Returns the test set.
@@ -275,61 +283,33 @@ impl Run {
     }
 }
 
-/// Defect of a run that has ended: trainings of its leader failed or diverged. Its text includes the remedy.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RunDefect {
-    /// Number of networks: one, or one for each row-wire.
-    pub networks: usize,
-    /// Number of networks whose training has a defect.
-    pub defective: usize,
-    /// Index of the first defective network, from 0.
-    pub first: usize,
-    /// Defect of the first defective network.
-    pub defect: TrainingDefect,
+/// Describes the defect of a start whose trainings have all ended, with its remedy.
+fn defect_of(start: &StartTrainer) -> Option<String> {
+    start.stop_reason()?;
+    let numbered = start.rows().iter().enumerate();
+    let mut defects = numbered.filter_map(|(index, trainer)| Some((index + 1, TrainingDefect::of(trainer)?)));
+    let (first, defect) = defects.next()?;
+    let (defective, networks) = (1 + defects.count(), start.rows().len());
+    Some(match networks {
+        1 => defect.to_string(),
+        _ => format!("{defective} of {networks} networks, the first being number {first}: {defect}"),
+    })
 }
 
-impl RunDefect {
-    /// Returns the defect of a start whose trainings have all ended.
-    pub(super) fn of(start: &StartTrainer) -> Option<Self> {
-        start.stop_reason()?;
-        let numbered = start.rows().iter().enumerate();
-        let mut defects = numbered.filter_map(|(index, trainer)| Some((index, TrainingDefect::of(trainer)?)));
-        let (first, defect) = defects.next()?;
-        Some(Self {
-            networks: start.rows().len(),
-            defective: 1 + defects.count(),
-            first,
-            defect,
-        })
-    }
-}
-
-impl fmt::Display for RunDefect {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            networks,
-            defective,
-            first,
-            defect,
-        } = self;
-        if *networks > 1 {
-            write!(
-                f,
-                "{defective} of {networks} networks, the first being number {}: ",
-                first + 1
-            )?;
-        }
-        defect.fmt(f)
-    }
-}
-
-/// Error in preparing a run.
+/// Error in preparing a run, an experiment of many runs, or the analysis of a scene.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum RunError {
     /// A number is out of range.
-    #[error(transparent)]
-    Count(#[from] CountError),
+    #[error("{what}: {count} is not possible, give from {} to {}", .allowed.start(), .allowed.end())]
+    Count {
+        /// Name of the setting.
+        what: &'static str,
+        /// Given number.
+        count: usize,
+        /// Allowed range.
+        allowed: RangeInclusive<usize>,
+    },
     /// There are more samples than a run can hold.
     #[error(
         "{training} training and {validation} validation samples, held together as whole snapshots of {rows} rows, are \
@@ -444,4 +424,51 @@ pub enum RunError {
         /// Number of trainings expected.
         expected: usize,
     },
+    /// An axis of an experiment has no values.
+    #[error("there are no values for {0}: give at least one")]
+    NoValues(&'static str),
+    /// Both axes of an experiment vary the same setting.
+    #[error("both axes vary {0}: choose two different ones")]
+    SameAxes(&'static str),
+    /// Runs on this source do not have the setting that an axis varies.
+    #[error("{of} have no setting '{axis}': vary another one")]
+    NoSetting {
+        /// Name of the setting.
+        axis: &'static str,
+        /// Source of the samples.
+        of: &'static str,
+    },
+    /// The settings of an experiment are those of another source than the samples.
+    #[error("settings and samples have different sources: one is simulated, the other recorded")]
+    OtherSamples,
+    /// A recording without groups is divided by group.
+    #[error("split group: the recording has no column of groups; choose one, or omit this split")]
+    NoGroups,
+    /// An experiment cross-validates a recording.
+    #[error("a recording is divided again for each seed: give seeds instead of a cross-validation")]
+    CrossValidation,
+    /// An experiment has too many trainings.
+    #[error("{trainings} trainings: give fewer values, seeds or repeats, so that there are at most {max}")]
+    TooManyTrainings {
+        /// Number of trainings.
+        trainings: usize,
+        /// Maximum number of trainings.
+        max: usize,
+    },
+    /// The operating system provides no threads.
+    #[error("cannot start worker threads: {0}")]
+    Threads(String),
+    /// A scene cannot be analysed.
+    #[error(transparent)]
+    Identifiability(#[from] IdentifiabilityError),
+}
+
+impl RunError {
+    /// Checks that a number is in its range.
+    pub(super) fn check_count(what: &'static str, count: usize, allowed: RangeInclusive<usize>) -> Result<(), Self> {
+        if allowed.contains(&count) {
+            return Ok(());
+        }
+        Err(Self::Count { what, count, allowed })
+    }
 }

@@ -101,47 +101,46 @@ impl RunSets {
 /// Checks the settings of the networks, and that the sets of a run match each other and these settings.
 pub(super) fn check_sets(settings: &RunSettings, sets: &RunSets) -> Result<(), RunError> {
     settings.check_counts()?;
-    let RunSets { split, test, .. } = sets;
-    let training = &split.training;
+    let training = &sets.split.training;
     if settings.simulation().is_some() && training.row_wires_read().is_none() {
         return Err(RunError::NoRowWires);
     }
     if settings.simulation() != sets.problem.sensor.as_ref() {
         return Err(RunError::OtherSensor);
     }
-    let sets = [("validation", split.validation.as_ref()), ("test", Some(&**test))];
-    let sets = sets.into_iter().filter_map(|(name, set)| Some((name, set?)));
-    for (name, set) in sets.clone() {
-        let sizes = [
-            ("channels", set.channels(), training.channels()),
-            ("targets", set.outputs(), training.outputs()),
-        ];
-        let mut differences = sizes
-            .into_iter()
-            .filter(|(_, found, expected)| found != expected)
-            .map(|(what, found, expected)| (format!("{found} {what}"), expected.to_string()));
-        let rows = || (describe_rows(set), describe_rows(training));
-        let rows_differ = set.row_wires_read() != training.row_wires_read();
-        if let Some((found, expected)) = differences.next().or_else(|| rows_differ.then(rows)) {
-            return Err(RunError::Sets {
-                set: name,
-                found,
-                expected,
-            });
+    let parts = |set: &Dataset| {
+        [
+            (set.channels().to_string(), " channels"),
+            (set.outputs().to_string(), " targets"),
+            (describe_rows(set), ""),
+        ]
+    };
+    let validation = sets.split.validation.as_ref().map(|set| ("validation", set));
+    for (set, held_out) in validation.into_iter().chain([("test", &*sets.test)]) {
+        let mut pairs = parts(held_out).into_iter().zip(parts(training));
+        if let Some(((found, what), (expected, _))) = pairs.find(|(found, expected)| found != expected) {
+            let found = format!("{found}{what}");
+            return Err(RunError::Sets { set, found, expected });
         }
     }
     if settings.source.row_model() == RowModel::Each {
         // A test set may lack a row; the sets that fit a network and select its weights may not.
-        for (name, set) in [("training", training)].into_iter().chain(sets) {
-            let mut has_samples = vec![name == "test"; set.row_count()];
-            (0..set.samples()).for_each(|sample| has_samples[set.row_index(sample)] = true);
-            if let Some(row_index) = has_samples.iter().position(|has_samples| !has_samples) {
-                let row_wire = set.row_wires_read().map_or(0, |read| read[row_index]);
-                return Err(RunError::RowWithoutSamples { row_wire, set: name });
-            }
+        for (name, set) in [("training", training)].into_iter().chain(validation) {
+            check_rows(set, name)?;
         }
     }
     Ok(())
+}
+
+/// Checks that every row-wire read has samples.
+fn check_rows(set: &Dataset, name: &'static str) -> Result<(), RunError> {
+    let mut has_samples = vec![false; set.row_count()];
+    (0..set.samples()).for_each(|sample| has_samples[set.row_index(sample)] = true);
+    let Some(row_index) = has_samples.iter().position(|has_samples| !has_samples) else {
+        return Ok(());
+    };
+    let row_wire = set.row_wires_read().map_or(0, |read| read[row_index]);
+    Err(RunError::RowWithoutSamples { row_wire, set: name })
 }
 
 /// Checks that the sets of a split match `networks`.
@@ -165,10 +164,8 @@ pub(super) fn check_networks(networks: &Networks, split: &Split) -> Result<(), R
                 expected,
             });
         }
-        let row_without = (0..count).find(|&row| count > 1 && samples.of_row(row).samples() == 0);
-        if let Some(row) = row_without {
-            let row_wire = samples.row_wires_read().map_or(0, |read| read[row]);
-            return Err(RunError::RowWithoutSamples { row_wire, set });
+        if count > 1 {
+            check_rows(samples, set)?;
         }
     }
     Ok(())

@@ -1,13 +1,13 @@
-use std::{fmt, ops::RangeInclusive, str::FromStr};
+use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::{PublishedErrors, RunError};
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed, Simulation},
     network::{InputChoice, LARGEST_HIDDEN},
     scene::{RowModel, Scene},
+    text::{Named, UnknownName},
     training::{Method, StoppingRules, TrainingSettings},
 };
 
@@ -92,35 +92,35 @@ pub enum Combination {
     Mean,
 }
 
-/// Error for an unknown combination.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{0}' does not combine starts: give best or mean")]
-pub struct CombinationError(String);
-
 impl Combination {
-    /// All combinations, in the order offered to the user.
-    pub const ALL: [Self; 2] = [Self::Best, Self::Mean];
-
     fn is_best(&self) -> bool {
         *self == Self::Best
     }
 }
 
-impl fmt::Display for Combination {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
+impl Named for Combination {
+    const WHAT: &'static str = "a combination of starts";
+    const ALL: &'static [Self] = &[Self::Best, Self::Mean];
+
+    fn name(self) -> &'static str {
+        match self {
             Self::Best => "best",
             Self::Mean => "mean",
-        })
+        }
+    }
+}
+
+impl fmt::Display for Combination {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
     }
 }
 
 impl FromStr for Combination {
-    type Err = CombinationError;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, CombinationError> {
-        let found = Self::ALL.into_iter().find(|choice| choice.to_string() == text.trim());
-        found.ok_or_else(|| CombinationError(text.to_owned()))
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        Self::parse(text)
     }
 }
 
@@ -136,50 +136,40 @@ pub enum Initialization {
     Ridge,
 }
 
-/// Error for an unknown initialisation.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{0}' is not an initialisation: give random or ridge")]
-pub struct InitializationError(String);
-
 impl Initialization {
     pub(super) fn is_random(&self) -> bool {
         *self == Self::Random
     }
 }
 
-impl fmt::Display for Initialization {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
+impl Named for Initialization {
+    const WHAT: &'static str = "an initialisation";
+    const ALL: &'static [Self] = &[Self::Random, Self::Ridge];
+
+    fn name(self) -> &'static str {
+        match self {
             Self::Random => "random",
             Self::Ridge => "ridge",
-        })
+        }
+    }
+}
+
+impl fmt::Display for Initialization {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
     }
 }
 
 impl FromStr for Initialization {
-    type Err = InitializationError;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, InitializationError> {
-        let mut choices = [Self::Random, Self::Ridge].into_iter();
-        let found = choices.find(|choice| choice.to_string() == text.trim());
-        found.ok_or_else(|| InitializationError(text.to_owned()))
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        Self::parse(text)
     }
 }
 
 /// Maximum number of starts in a run: enough for the distribution of its results, and limited for memory.
 pub const MAX_STARTS: usize = 100;
-
-/// Error for a number out of its range.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[error("{what}: {count} is not possible, give from {} to {}", .allowed.start(), .allowed.end())]
-pub struct CountError {
-    /// Name of the setting.
-    pub what: &'static str,
-    /// Given number.
-    pub count: usize,
-    /// Allowed range.
-    pub allowed: RangeInclusive<usize>,
-}
 
 impl Default for RunSettings {
     /// Returns the paper's main experiment: 10×10_5×30, 12 hidden nodes, 1000 training and 100 test samples.
@@ -255,24 +245,17 @@ impl RunSettings {
     ///
     /// # Errors
     /// The first number out of range.
-    pub fn check_counts(&self) -> Result<(), CountError> {
-        check([
-            ("hidden nodes", self.hidden, 1..=LARGEST_HIDDEN),
-            ("starts", self.starts, 1..=MAX_STARTS),
-            (
-                "hidden nodes of all starts together",
-                self.network_hidden(),
-                1..=LARGEST_HIDDEN,
-            ),
-        ])?;
+    pub fn check_counts(&self) -> Result<(), RunError> {
+        RunError::check_count("hidden nodes", self.hidden, 1..=LARGEST_HIDDEN)?;
+        RunError::check_count("starts", self.starts, 1..=MAX_STARTS)?;
+        let of_all = "hidden nodes of all starts together";
+        RunError::check_count(of_all, self.network_hidden(), 1..=LARGEST_HIDDEN)?;
         let Some(simulation) = self.simulation() else {
             return Ok(());
         };
-        check([
-            ("training samples", simulation.samples, 1..=LARGEST_SAMPLES),
-            ("validation samples", simulation.validation_samples, 0..=LARGEST_SAMPLES),
-            ("test samples", simulation.test_samples, 1..=LARGEST_SAMPLES),
-        ])
+        RunError::check_count("training samples", simulation.samples, 1..=LARGEST_SAMPLES)?;
+        RunError::check_count("validation samples", simulation.validation_samples, 0..=LARGEST_SAMPLES)?;
+        RunError::check_count("test samples", simulation.test_samples, 1..=LARGEST_SAMPLES)
     }
 
     /// Number of hidden nodes of the network that a run answers with: those of all starts if their mean is kept.
@@ -316,22 +299,15 @@ impl RunSettings {
 
     /// Returns the errors that the paper reports for this configuration, if there are any.
     pub fn published(&self) -> Option<PublishedErrors> {
-        let simulation = self.of_paper()?;
-        PublishedErrors::of(simulation.sensor.scale, self.hidden, simulation.samples)
+        self.published_by(false)
     }
 
-    /// Returns the simulation if its scene and the inputs are those of the paper's experiments.
-    pub(super) fn of_paper(&self) -> Option<&Simulation> {
-        let is_papers =
-            |simulation: &&Simulation| simulation.scene == Scene::default() && self.inputs == InputChoice::PAPER;
-        self.simulation().filter(is_papers)
-    }
-}
-
-fn check<const N: usize>(counts: [(&'static str, usize, RangeInclusive<usize>); N]) -> Result<(), CountError> {
-    match counts.into_iter().find(|(_, count, allowed)| !allowed.contains(count)) {
-        Some((what, count, allowed)) => Err(CountError { what, count, allowed }),
-        None => Ok(()),
+    /// Returns the errors that the paper reports for this configuration, tested by cross-validation or on a test set.
+    pub(super) fn published_by(&self, cross_validation: bool) -> Option<PublishedErrors> {
+        let simulation = self.simulation()?;
+        let is_papers = simulation.scene == Scene::default() && self.inputs == InputChoice::PAPER;
+        let (array, samples) = (simulation.sensor.scale, simulation.samples);
+        PublishedErrors::of(array, self.hidden, samples, cross_validation).filter(|_| is_papers)
     }
 }
 

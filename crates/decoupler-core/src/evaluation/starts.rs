@@ -5,9 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     network::Mlp,
-    training::{
-        EpochRecord, Method, SettingError, Stage, StopReason, StoppingRules, Trainer, TrainerState, TrainingError,
-    },
+    training::{EpochRecord, Stage, StopReason, Trainer},
 };
 
 /// Result of one start of a run.
@@ -62,7 +60,7 @@ pub(super) fn lowest(errors: impl IntoIterator<Item = f64>) -> Option<usize> {
 ///
 /// Values for several trainings are their means, epoch by epoch; a training that has ended keeps its last values.
 pub struct StartTrainer {
-    rows: Vec<Trainer>,
+    pub(super) rows: Vec<Trainer>,
     /// History averaged over all rows; empty for a single training, which has its own.
     history: Vec<EpochRecord>,
 }
@@ -117,10 +115,6 @@ impl StartTrainer {
         }
     }
 
-    pub(super) fn stop(&mut self) {
-        self.rows.iter_mut().for_each(Trainer::stop);
-    }
-
     /// Returns the reason for stopping once all trainings have ended: [`StopReason::Stopped`] if the user stopped any
     /// before its end, otherwise that of the longest training.
     pub fn stop_reason(&self) -> Option<StopReason> {
@@ -133,31 +127,9 @@ impl StartTrainer {
 
     /// Returns the first training with the most epochs.
     fn longest(&self) -> &Trainer {
-        let mut longest = &self.rows[0];
-        for trainer in &self.rows[1..] {
-            if trainer.history().len() > longest.history().len() {
-                longest = trainer;
-            }
-        }
-        longest
-    }
-
-    pub(super) fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
-        // All rows have the same method, so either the first is rejected or none.
-        self.rows
-            .iter_mut()
-            .try_for_each(|trainer| trainer.continue_with(method))
-    }
-
-    pub(super) fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
-        // All rows have the same rules, so either the first is rejected or none.
-        self.rows
-            .iter_mut()
-            .try_for_each(|trainer| trainer.set_stopping(stopping))
-    }
-
-    pub(super) fn states(&self) -> impl Iterator<Item = TrainerState> + '_ {
-        self.rows.iter().map(Trainer::state)
+        let epochs = |trainer: &&Trainer| trainer.history().len();
+        let last = self.rows.iter().rev().max_by_key(epochs);
+        last.expect("a start has trainings")
     }
 
     /// Returns the records of all epochs so far, beginning with the initialisation.

@@ -1,8 +1,11 @@
-use std::time::{Duration, Instant};
+use std::{
+    hint::black_box,
+    time::{Duration, Instant},
+};
 
 use super::{Coverage, Errors, PublishedErrors, Run, Scores, TargetErrors, TestErrors, recorded::HysteresisLoop};
 use crate::{
-    dataset::Dataset,
+    dataset::{Dataset, Frames},
     decoupling::{DecodeError, Decoder},
     numerics::median,
     problem::{Channel, Problem},
@@ -77,7 +80,7 @@ const MODEL_BASED: &str = "model-based";
 const ALL_TARGETS: &str = "all targets";
 
 impl ErrorMeasure {
-    const OF_NODES: [Self; 6] = [
+    pub(super) const OF_NODES: [Self; 6] = [
         Self::ZPercent,
         Self::XPercent,
         Self::YPercent,
@@ -94,7 +97,7 @@ impl ErrorMeasure {
         Self::HalfWidth,
         Self::CoveragePercent,
     ];
-    const OF_TARGETS: &[Self] = Self::OF_TARGETS_WITH_INTERVALS.split_at(5).0;
+    pub(super) const OF_TARGETS: &[Self] = Self::OF_TARGETS_WITH_INTERVALS.split_at(5).0;
 
     /// Name in files, such as `z_percent`.
     pub fn field(self) -> &'static str {
@@ -169,7 +172,7 @@ impl ErrorMeasure {
         self.of(Figures::Target(errors))
     }
 
-    fn of(self, figures: Figures<'_>) -> Option<f64> {
+    pub(super) fn of(self, figures: Figures<'_>) -> Option<f64> {
         match (self, figures) {
             (Self::ZPercent, Figures::Nodes(errors)) => errors.z_percent,
             (Self::XPercent, Figures::Nodes(errors)) => errors.x_percent,
@@ -194,7 +197,7 @@ impl ErrorMeasure {
 
 /// Figures in which a measure is looked up.
 #[derive(Clone, Copy)]
-enum Figures<'a> {
+pub(super) enum Figures<'a> {
     Nodes(&'a Errors),
     Published(&'a PublishedErrors),
     Target(&'a TargetErrors),
@@ -320,24 +323,20 @@ pub(super) fn frame_us(decoder: &mut dyn Decoder, test: &Dataset) -> Result<f64,
     const BLOCK_SECONDS: f64 = 100e-6;
     const MAX_SECONDS: f64 = 0.03;
     let frames = test.frames().ok();
+    let count = frames.as_ref().map_or(test.samples(), Frames::count);
+    let mut places = (0..count).cycle();
     let mut answer = vec![0.0; test.row_count() * test.outputs()];
-    let mut at = 0;
     let mut decode = |count: usize| -> Result<f64, DecodeError> {
         let begun = Instant::now();
-        for _ in 0..count {
+        for place in places.by_ref().take(count) {
             match &frames {
-                Some(frames) => {
-                    let readings = std::hint::black_box(frames.frame(at % frames.count()));
-                    decoder.decode(readings, &mut answer)?;
-                }
+                Some(frames) => decoder.decode(black_box(frames.frame(place)), &mut answer)?,
                 None => {
-                    let sample = at % test.samples();
-                    let readings = std::hint::black_box(test.sample_readings(sample));
-                    decoder.decode_row(test.row_index(sample), readings, &mut answer[..test.outputs()])?;
+                    let readings = black_box(test.sample_readings(place));
+                    decoder.decode_row(test.row_index(place), readings, &mut answer[..test.outputs()])?;
                 }
             }
-            std::hint::black_box(&answer);
-            at += 1;
+            black_box(&answer);
         }
         Ok(begun.elapsed().as_secs_f64())
     };

@@ -91,14 +91,6 @@ impl Workload {
     /// Computes the workload of `settings` with a training of this size. Samples of a recording, which have been read by
     /// then, are not counted.
     pub fn of(settings: &RunSettings, size: TrainingSize) -> Self {
-        let trainings = Self::of_trainings(settings, size);
-        match settings.simulation() {
-            Some(simulation) => trainings.with_drawing(simulation, size),
-            None => trainings,
-        }
-    }
-
-    fn of_trainings(settings: &RunSettings, size: TrainingSize) -> Self {
         let shape = Shape {
             inputs: size.inputs,
             hidden: settings.hidden,
@@ -115,39 +107,13 @@ impl Workload {
         let with_inputs = |inputs| method.equations_bytes(Shape { inputs, ..shape }, of_each);
         let equations_bytes = (fewest..=shape.inputs).map(with_inputs).max().unwrap_or(0);
         let bytes = (equations_bytes as u64).saturating_add(float_bytes(shape.weights(), Self::VECTORS));
+        let drawing = settings.simulation().and_then(|simulation| drawing(simulation, size));
+        let (drawn_bytes, node_pairs) = drawing.unwrap_or_default();
         Self {
-            bytes: bytes.saturating_mul(trainings as u64),
-            node_pairs: 0.0,
+            bytes: bytes.saturating_mul(trainings as u64).saturating_add(drawn_bytes),
+            node_pairs,
             epoch_multiplications: trainings as f64 * method.epoch_multiplications(shape, of_each),
             epochs: settings.training.stopping.epochs,
-        }
-    }
-
-    /// Adds what drawing takes: the samples, the pairs of their nodes, and the priors of the rows.
-    fn with_drawing(self, simulation: &Simulation, size: TrainingSize) -> Self {
-        let Ok(model) = simulation.model_size() else {
-            // Without the rows of the scene, nothing can be drawn.
-            return self;
-        };
-        let scale = simulation.sensor.scale;
-        let whole = |samples: usize| samples.div_ceil(model.rows) * model.rows;
-        let held_out = whole(simulation.validation_samples) + whole(simulation.test_samples);
-        let drawn = size.samples.saturating_add(held_out);
-        // Readings and targets are drawn, split, scaled, and copied to blocks for the training.
-        let per_sample = 3 * scale.columns() + 3 * scale.coordinates_per_row() + size.inputs + 1 + size.targets;
-        let unknowns = model.unknowns / model.rows;
-        // Exact readings that determine the deformation need no prior.
-        let has_priors = !simulation.scene.noise.in_test().is_none() || scale.columns() <= unknowns;
-        let priors = if has_priors {
-            GaussianPrior::bytes(simulation.scene.loading, model.rows, unknowns)
-        } else {
-            0
-        };
-        let bytes = self.bytes.saturating_add(float_bytes(drawn, per_sample));
-        Self {
-            bytes: bytes.saturating_add(priors),
-            node_pairs: drawn as f64 * node_pairs_per_row(&simulation.sensor),
-            ..self
         }
     }
 
@@ -188,11 +154,6 @@ impl Workload {
         self.bytes > 1_000_000_000 || self.node_pairs > 1e10 || self.epoch_multiplications > 1e10
     }
 
-    /// Returns `true` if samples are drawn, not read.
-    pub fn draws_samples(&self) -> bool {
-        self.node_pairs > 0.0
-    }
-
     /// Computes the time on this machine. The first call measures its speed, which takes about 20 ms.
     pub fn time(&self) -> WorkloadTime {
         let speed = Speed::measured();
@@ -218,6 +179,23 @@ impl Workload {
         }
         Ok(())
     }
+}
+
+/// Returns the memory of drawn samples and the priors of their rows in bytes, and the number of pairs of their nodes; `None`
+/// without the rows of the scene, where nothing can be drawn.
+fn drawing(simulation: &Simulation, size: TrainingSize) -> Option<(u64, f64)> {
+    let (model, scale) = (simulation.model_size().ok()?, simulation.sensor.scale);
+    let whole = |samples: usize| samples.div_ceil(model.rows) * model.rows;
+    let held_out = whole(simulation.validation_samples) + whole(simulation.test_samples);
+    let drawn = size.samples.saturating_add(held_out);
+    // Readings and targets are drawn, split, scaled, and copied to blocks for the training.
+    let per_sample = 3 * scale.columns() + 3 * scale.coordinates_per_row() + size.inputs + 1 + size.targets;
+    let needs_prior = !(simulation.scene.noise.in_test().is_none() && simulation.is_determined());
+    let unknowns = model.unknowns / model.rows;
+    let prior = || GaussianPrior::bytes(simulation.scene.loading, model.rows, unknowns);
+    let prior = if needs_prior { prior() } else { 0 };
+    let node_pairs = drawn as f64 * node_pairs_per_row(&simulation.sensor);
+    Some((float_bytes(drawn, per_sample).saturating_add(prior), node_pairs))
 }
 
 /// Returns the number of bytes in this many rows of numbers.
@@ -315,6 +293,6 @@ mod tests {
             faster.iter().any(|(method, _)| method.short_name() == "scg"),
             "{faster:?}"
         );
-        assert!(!workload.draws_samples());
+        assert_eq!(workload.node_pairs, 0.0, "nothing is drawn");
     }
 }

@@ -1,3 +1,4 @@
+use ndarray::ArrayView2;
 use thiserror::Error;
 
 /// Error in fitting or reading a scaling or a network.
@@ -27,8 +28,12 @@ pub enum NetworkError {
         /// Reading found.
         value: f64,
     },
-    /// The range of a channel overflows.
-    #[error("channel {} ranges from {minimum:?} to {maximum:?}: too wide to scale; use a larger unit", .channel + 1)]
+    /// The range of a channel overflows, or its reciprocal does.
+    #[error(
+        "channel {} ranges from {minimum:?} to {maximum:?}: too {}",
+        .channel + 1,
+        if *.is_wide { "wide to scale; use a larger unit" } else { "narrow to scale; use a smaller unit" }
+    )]
     Range {
         /// Index of the channel, from 0.
         channel: usize,
@@ -36,16 +41,8 @@ pub enum NetworkError {
         minimum: f64,
         /// Largest value of the channel.
         maximum: f64,
-    },
-    /// The range of a channel is so narrow that its reciprocal overflows.
-    #[error("channel {} ranges from {minimum:?} to {maximum:?}: too narrow to scale; use a smaller unit", .channel + 1)]
-    Narrow {
-        /// Index of the channel, from 0.
-        channel: usize,
-        /// Smallest value of the channel.
-        minimum: f64,
-        /// Largest value of the channel.
-        maximum: f64,
+        /// `true` if the range itself overflows.
+        is_wide: bool,
     },
     /// A decomposition did not converge, or sums overflowed.
     #[error(
@@ -53,9 +50,6 @@ pub enum NetworkError {
          readings and targets, or scale the readings by their range"
     )]
     NotConverged,
-    /// The scaling in a file is inconsistent.
-    #[error("its parts are missing, not finite, or of sizes that do not fit")]
-    Damaged,
     /// The limits of a scaling, or of the readings in the training set, are missing, not finite, or out of order.
     #[error("the {0} scaling is damaged: its limits are missing, not finite, or out of order")]
     DamagedScaling(&'static str),
@@ -77,4 +71,17 @@ pub enum NetworkError {
         /// Index of the weight, row by row from 0.
         index: usize,
     },
+}
+
+impl NetworkError {
+    /// Checks that all values (samples × channels) are finite.
+    ///
+    /// # Errors
+    /// [`Self::NotFinite`] at the first that is not.
+    pub(super) fn check_finite(values: ArrayView2<'_, f64>) -> Result<(), Self> {
+        match values.indexed_iter().find(|(_, value)| !value.is_finite()) {
+            Some(((sample, channel), &value)) => Err(Self::NotFinite { sample, channel, value }),
+            None => Ok(()),
+        }
+    }
 }

@@ -4,7 +4,7 @@ use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    ChannelNoise, MinMax, NetworkError, Quantity, ReadingRange, Whitening,
+    ChannelNoise, MinMax, NetworkError, Quantity, Whitening,
     quantity::{root_mean_square, rounding},
 };
 use crate::{
@@ -57,7 +57,7 @@ pub struct Inputs {
     quantity: Quantity,
     scaling: InputScaling,
     /// `None` if the training set is not known.
-    range: Option<ReadingRange>,
+    range: Option<MinMax>,
 }
 
 /// Scaling fitted to a training set.
@@ -96,27 +96,14 @@ impl FromStr for ScalingChoice {
     }
 }
 
-impl From<MinMax> for Inputs {
-    /// Creates inputs from resistances scaled by their range.
-    fn from(scaling: MinMax) -> Self {
-        Self::new(Quantity::Resistance, InputScaling::MinMax(scaling))
-    }
-}
-
 impl Inputs {
-    /// Creates inputs from a quantity and its fitted scaling, without the range of the training set.
-    pub fn new(quantity: Quantity, scaling: InputScaling) -> Self {
+    /// Creates inputs from a quantity, its fitted scaling, and the range of the readings in the training set, if it is known.
+    pub fn new(quantity: Quantity, scaling: InputScaling, range: Option<MinMax>) -> Self {
         Self {
             quantity,
             scaling,
-            range: None,
+            range,
         }
-    }
-
-    /// Adds the range of the readings in the training set.
-    #[must_use]
-    pub(super) fn with_range(self, range: Option<ReadingRange>) -> Self {
-        Self { range, ..self }
     }
 
     /// Fits the scaling to training resistances in ohm (samples × M4).
@@ -144,11 +131,11 @@ impl Inputs {
                 InputScaling::Whitening(Whitening::fit(values.view(), &rounding, &unseen, max_components)?)
             }
         };
-        Ok(Self::new(quantity, scaling).with_range(ReadingRange::of(resistances_ohm)))
+        Ok(Self::new(quantity, scaling, MinMax::of(resistances_ohm)))
     }
 
     /// Returns the range of the readings in the training set, if it is known.
-    pub fn range(&self) -> Option<&ReadingRange> {
+    pub fn range(&self) -> Option<&MinMax> {
         self.range.as_ref()
     }
 
@@ -191,20 +178,23 @@ impl Inputs {
     pub fn affine(&self) -> (Vec<f64>, Array2<f64>) {
         match &self.scaling {
             InputScaling::MinMax(scaling) => scaling.affine(),
-            InputScaling::Whitening(scaling) => (scaling.mean().to_vec(), scaling.matrix()),
+            InputScaling::Whitening(scaling) => scaling.affine(),
         }
     }
 
     /// Returns `true` if the limits, which may come from a file, are valid.
-    pub(crate) fn is_valid(&self) -> bool {
+    pub(super) fn is_valid(&self) -> bool {
         let is_scaling_valid = match &self.scaling {
             InputScaling::MinMax(scaling) => scaling.is_valid(),
-            // Validated when it is deserialised.
-            InputScaling::Whitening(_) => true,
+            InputScaling::Whitening(scaling) => scaling.is_valid(),
         };
-        let (quantity, channels) = (self.quantity, self.channels());
-        let mut range = self.range.iter();
-        is_scaling_valid && range.all(|range| range.is_valid(quantity, channels))
+        let is_accepted = |range: &MinMax| {
+            let mut extremes = (0..range.channels()).map(|channel| range.extremes(channel));
+            extremes.all(|(low, high)| self.quantity.accepts(low) && self.quantity.accepts(high))
+        };
+        let is_range_valid =
+            |range: &MinMax| range.is_valid() && range.channels() == self.channels() && is_accepted(range);
+        is_scaling_valid && self.range.as_ref().is_none_or(is_range_valid)
     }
 }
 

@@ -130,27 +130,21 @@ pub fn nguyen_widrow(shape: Shape, rng: &mut impl Rng) -> Mlp {
     let Shape { inputs, hidden, .. } = shape;
     let mut mlp = Mlp::zeros(shape);
     let (w, v) = mlp.weights_mut().split_at_mut(shape.hidden_weights());
-    let length = if inputs == 0 {
-        0.0
-    } else {
-        ACTIVE * 0.7 * (hidden as f64).powf(1.0 / inputs as f64)
+    let length = match inputs {
+        0 => 0.0,
+        _ => ACTIVE * 0.7 * (hidden as f64).powf(1.0 / inputs as f64),
     };
     for node in 0..hidden {
         let direction: Vec<f64> = (0..inputs).map(|_| rng.random_range(-1.0..1.0)).collect();
         // A vector of length 0 has no direction; it is as improbable as 53 zero bits for every input.
-        let norm = direction
-            .iter()
-            .map(|x| x * x)
-            .sum::<f64>()
-            .sqrt()
-            .max(f64::MIN_POSITIVE);
+        let squares: f64 = direction.iter().map(|x| x * x).sum();
+        let norm = squares.sqrt().max(f64::MIN_POSITIVE);
         for (input, x) in direction.iter().enumerate() {
             w[input * hidden + node] = length * x / norm;
         }
-        let place = if hidden == 1 {
-            0.0
-        } else {
-            2.0 * node as f64 / (hidden - 1) as f64 - 1.0
+        let place = match hidden {
+            1 => 0.0,
+            _ => 2.0 * node as f64 / (hidden - 1) as f64 - 1.0,
         };
         let sign = direction.first().map_or(1.0, |x| x.signum());
         w[inputs * hidden + node] = length * place * sign;

@@ -18,7 +18,7 @@ pub use inputs::{InputChoice, InputScaling, Inputs, ScalingChoice};
 pub use mlp::{Mlp, Shape, nguyen_widrow};
 pub use networks::{DecouplingNetwork, HiddenSuggestions, LARGEST_HIDDEN, Networks};
 pub use quantity::{ChannelNoise, Quantity};
-pub use scaling::{MinMax, ReadingRange};
+pub use scaling::MinMax;
 pub(crate) use tanh::{exp, tanh, tanh_single};
 pub use tanh::{tanh_in_place, tanh_in_place_single};
 pub use whitening::Whitening;

@@ -2,10 +2,13 @@ use std::{fmt, ops::RangeInclusive};
 
 use serde::{
     Deserialize, Deserializer, Serialize, Serializer,
-    de::{MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
+    de::{
+        MapAccess, SeqAccess, Visitor,
+        value::{MapAccessDeserializer, SeqAccessDeserializer},
+    },
 };
 
-use super::{InputScaling, Inputs, MinMax, Mlp, NetworkError, Quantity, ReadingRange, Shape};
+use super::{InputScaling, Inputs, MinMax, Mlp, NetworkError, Quantity, Shape};
 use crate::dataset::PerRow;
 
 /// Trained networks: one shared by all row-wires read, or one per row-wire where the row is known.
@@ -48,12 +51,9 @@ impl<'de> Visitor<'de> for OneOrMany {
         DecouplingNetwork::deserialize(MapAccessDeserializer::new(map)).map(Networks::shared)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Networks, A::Error> {
-        let mut all = Vec::new();
-        while let Some(network) = sequence.next_element()? {
-            all.push(network);
-        }
-        let Some(first): Option<&DecouplingNetwork> = all.first() else {
+    fn visit_seq<A: SeqAccess<'de>>(self, sequence: A) -> Result<Networks, A::Error> {
+        let all = Vec::<DecouplingNetwork>::deserialize(SeqAccessDeserializer::new(sequence))?;
+        let Some(first) = all.first() else {
             return Err(serde::de::Error::custom("the list of networks is empty"));
         };
         let shape = |network: &DecouplingNetwork| {
@@ -106,8 +106,7 @@ impl DecouplingNetwork {
     ///
     /// # Panics
     /// If the inputs or outputs of the network do not match the scaling.
-    pub fn new(inputs: impl Into<Inputs>, mlp: Mlp, outputs: MinMax) -> Self {
-        let inputs = inputs.into();
+    pub fn new(inputs: Inputs, mlp: Mlp, outputs: MinMax) -> Self {
         assert_eq!(inputs.count(), mlp.shape().inputs);
         assert_eq!(outputs.varying().len(), mlp.shape().outputs);
         Self { inputs, mlp, outputs }
@@ -137,7 +136,7 @@ struct Record {
     input_quantity: Quantity,
     input_scaling: InputScaling,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    reading_range: Option<ReadingRange>,
+    reading_range: Option<MinMax>,
     hidden_nodes: usize,
     /// (varying inputs + 1) × hidden nodes.
     hidden_layer: Vec<f64>,
@@ -165,45 +164,29 @@ impl TryFrom<Record> for DecouplingNetwork {
     type Error = NetworkError;
 
     fn try_from(record: Record) -> Result<Self, NetworkError> {
-        let inputs = Inputs::new(record.input_quantity, record.input_scaling).with_range(record.reading_range);
-        for (side, is_valid) in [
-            ("input", inputs.is_valid()),
-            ("output", record.output_scaling.is_valid()),
-        ] {
-            if !is_valid {
-                return Err(NetworkError::DamagedScaling(side));
-            }
+        let inputs = Inputs::new(record.input_quantity, record.input_scaling, record.reading_range);
+        if !inputs.is_valid() {
+            return Err(NetworkError::DamagedScaling("input"));
+        }
+        if !record.output_scaling.is_valid() {
+            return Err(NetworkError::DamagedScaling("output"));
         }
         let shape = Shape {
             inputs: inputs.count(),
             hidden: record.hidden_nodes,
             outputs: record.output_scaling.varying().len(),
         };
-        let layers = [
-            (
-                "hidden",
-                &record.hidden_layer,
-                (shape.inputs + 1).checked_mul(shape.hidden),
-            ),
-            (
-                "output",
-                &record.output_layer,
-                shape.hidden.saturating_add(1).checked_mul(shape.outputs),
-            ),
-        ];
-        for (layer, weights, expected) in layers {
-            let found = weights.len();
-            if Some(found) != expected {
-                return Err(NetworkError::LayerSize {
-                    layer,
-                    found,
-                    expected: expected.unwrap_or(usize::MAX),
-                });
+        let check = |layer, weights: &[f64], expected: Option<usize>| {
+            let (found, expected) = (weights.len(), expected.unwrap_or(usize::MAX));
+            if found != expected {
+                return Err(NetworkError::LayerSize { layer, found, expected });
             }
-            if let Some(index) = weights.iter().position(|weight| !weight.is_finite()) {
-                return Err(NetworkError::Weight { layer, index });
-            }
-        }
+            let wrong = weights.iter().position(|weight| !weight.is_finite());
+            wrong.map_or(Ok(()), |index| Err(NetworkError::Weight { layer, index }))
+        };
+        let (of_hidden, of_outputs) = (shape.inputs + 1, shape.hidden.saturating_add(1));
+        check("hidden", &record.hidden_layer, of_hidden.checked_mul(shape.hidden))?;
+        check("output", &record.output_layer, of_outputs.checked_mul(shape.outputs))?;
         let mlp = Mlp::from_weights(shape, [record.hidden_layer, record.output_layer].concat());
         Ok(Self::new(inputs, mlp, record.output_scaling))
     }

@@ -161,8 +161,9 @@ fn step(channel: ArrayView1<'_, f64>) -> Option<f64> {
 pub(super) fn root_mean_square(values: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
     let count = values.len().max(1) as f64;
     let largest = values.clone().fold(0.0, f64::max);
+    let relative: f64 = values.map(|value| (value / largest).powi(2)).sum();
     if largest > 0.0 {
-        largest * (values.map(|value| (value / largest).powi(2)).sum::<f64>() / count).sqrt()
+        largest * (relative / count).sqrt()
     } else {
         0.0
     }
@@ -191,14 +192,12 @@ impl ChannelNoise {
     pub(crate) fn changes(&self, scale: &[f64]) -> Array2<f64> {
         let own: Vec<usize> = (0..scale.len()).filter(|&channel| self.own[channel] > 0.0).collect();
         let has_common = self.common.iter().any(|&deviation| deviation > 0.0);
-        Array2::from_shape_fn(
-            (own.len() + usize::from(has_common), scale.len()),
-            |(source, channel)| match own.get(source) {
-                Some(&of) if of == channel => self.own[channel] * scale[channel],
-                Some(_) => 0.0,
-                None => self.common[channel] * scale[channel],
-            },
-        )
+        let sources = own.len() + usize::from(has_common);
+        Array2::from_shape_fn((sources, scale.len()), |(source, channel)| match own.get(source) {
+            Some(&of) if of == channel => self.own[channel] * scale[channel],
+            Some(_) => 0.0,
+            None => self.common[channel] * scale[channel],
+        })
     }
 
     /// Returns the variance of the error of Σ weight · value.

@@ -3,9 +3,16 @@ use serde::{Deserialize, Serialize};
 
 use super::{NetworkError, Quantity};
 
+/// Fraction of a channel's range by which a reading may be outside it: new samples of the same scene slightly exceed
+/// the extremes of a few hundred samples, which does not deserve a warning.
+const MARGIN: f64 = 0.1;
+/// Relative rounding error allowed for a channel that is constant in the training set.
+const ROUNDING: f64 = 1e-9;
+
 /// Scaling of channels to [−1, 1] by their training minimum and maximum; constant channels are removed and restored.
 ///
-/// Equivalent to `removeconstantrows` and `mapminmax` of the field's reference toolbox.
+/// Equivalent to `removeconstantrows` and `mapminmax` of the field's reference toolbox. The ranges of the readings also tell
+/// where a network extrapolates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MinMax {
@@ -16,43 +23,42 @@ pub struct MinMax {
 }
 
 impl MinMax {
+    /// Returns the ranges of `values` (samples × channels); `None` if there are no samples.
+    pub fn of(values: ArrayView2<'_, f64>) -> Option<Self> {
+        let extreme = |pick: fn(f64, f64) -> f64| -> Vec<f64> {
+            let mut extreme = values.row(0).to_owned();
+            for sample in values.rows() {
+                extreme.zip_mut_with(&sample, |extreme, &value| *extreme = pick(*extreme, value));
+            }
+            extreme.to_vec()
+        };
+        (values.nrows() > 0).then(|| Self {
+            minimum: extreme(f64::min),
+            maximum: extreme(f64::max),
+        })
+    }
+
     /// Fits the ranges of `values` (samples × channels).
     ///
     /// # Errors
     /// If there are no samples, a value is not finite, or a range or its reciprocal overflows.
     pub fn fit(values: ArrayView2<'_, f64>) -> Result<Self, NetworkError> {
-        if values.nrows() == 0 {
-            return Err(NetworkError::Empty);
-        }
-        if let Some(((sample, channel), &value)) = values.indexed_iter().find(|(_, value)| !value.is_finite()) {
-            return Err(NetworkError::NotFinite { sample, channel, value });
-        }
-        let extreme = |pick: fn(f64, f64) -> f64| -> Vec<f64> {
-            let first = values.row(0).to_owned();
-            let folded = values.axis_iter(Axis(0)).fold(first, |mut extreme, sample| {
-                extreme.zip_mut_with(&sample, |extreme, &value| *extreme = pick(*extreme, value));
-                extreme
-            });
-            folded.to_vec()
-        };
-        let (minimum, maximum) = (extreme(f64::min), extreme(f64::max));
-        for (channel, (&minimum, &maximum)) in minimum.iter().zip(&maximum).enumerate() {
-            if !(maximum - minimum).is_finite() {
+        NetworkError::check_finite(values)?;
+        let fitted = Self::of(values).ok_or(NetworkError::Empty)?;
+        for channel in 0..fitted.channels() {
+            let (minimum, maximum) = fitted.extremes(channel);
+            let half_width = 0.5 * (maximum - minimum);
+            let is_wide = !(maximum - minimum).is_finite();
+            if is_wide || minimum < maximum && !half_width.recip().is_finite() {
                 return Err(NetworkError::Range {
                     channel,
                     minimum,
                     maximum,
-                });
-            }
-            if minimum < maximum && !(0.5 * (maximum - minimum)).recip().is_finite() {
-                return Err(NetworkError::Narrow {
-                    channel,
-                    minimum,
-                    maximum,
+                    is_wide,
                 });
             }
         }
-        Ok(Self { minimum, maximum })
+        Ok(fitted)
     }
 
     /// Number of channels, including constant ones.
@@ -61,13 +67,9 @@ impl MinMax {
     }
 
     /// Returns `true` if there are as many minima as maxima, finite and in order, which a file does not guarantee.
-    pub(crate) fn is_valid(&self) -> bool {
-        self.minimum.len() == self.maximum.len()
-            && self
-                .minimum
-                .iter()
-                .zip(&self.maximum)
-                .all(|(low, high)| low <= high && (high - low).is_finite())
+    pub(super) fn is_valid(&self) -> bool {
+        let mut pairs = self.minimum.iter().zip(&self.maximum);
+        self.minimum.len() == self.maximum.len() && pairs.all(|(low, high)| low <= high && (high - low).is_finite())
     }
 
     /// Returns the indices of the channels that vary; a network sees only these.
@@ -138,46 +140,6 @@ impl MinMax {
         }
         values
     }
-}
-
-/// Smallest and largest reading of each channel in the training set; beyond them a network extrapolates.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ReadingRange {
-    minimum: Vec<f64>,
-    maximum: Vec<f64>,
-}
-
-/// Fraction of a channel's range by which a reading may be outside it: new samples of the same scene slightly exceed
-/// the extremes of a few hundred samples, which does not deserve a warning.
-const MARGIN: f64 = 0.1;
-/// Relative rounding error allowed for a channel that is constant in the training set.
-const ROUNDING: f64 = 1e-9;
-
-impl ReadingRange {
-    /// Returns the range of readings (samples × channels); `None` if there are no samples.
-    pub fn of(readings: ArrayView2<'_, f64>) -> Option<Self> {
-        let extreme = |pick: fn(f64, f64) -> f64| {
-            let columns = readings.columns().into_iter();
-            columns
-                .map(|column| column.iter().copied().reduce(pick))
-                .collect::<Option<Vec<f64>>>()
-        };
-        Some(Self {
-            minimum: extreme(f64::min)?,
-            maximum: extreme(f64::max)?,
-        })
-    }
-
-    /// Number of channels.
-    pub fn channels(&self) -> usize {
-        self.minimum.len()
-    }
-
-    /// Returns the smallest and largest reading of a channel in the training set.
-    pub fn extremes(&self, channel: usize) -> (f64, f64) {
-        (self.minimum[channel], self.maximum[channel])
-    }
 
     /// Returns the limits beyond which a reading of a channel counts as outside: the extremes, extended by a tenth of
     /// their distance. For resistances the distance is measured in logarithms, so that 1/R has the same limits.
@@ -198,13 +160,6 @@ impl ReadingRange {
             let (low, high) = self.limits(quantity, channel);
             !(low..=high).contains(&readings[channel])
         })
-    }
-
-    /// Returns `true` if the extremes, which may come from a file, are in order and accepted by `quantity`.
-    pub(super) fn is_valid(&self, quantity: Quantity, channels: usize) -> bool {
-        let mut pairs = self.minimum.iter().zip(&self.maximum);
-        (self.minimum.len(), self.maximum.len()) == (channels, channels)
-            && pairs.all(|(&low, &high)| low <= high && quantity.accepts(low) && quantity.accepts(high))
     }
 }
 
@@ -255,16 +210,30 @@ mod tests {
             }
         ));
         let wide = MinMax::fit(array![[-1e308], [1e308]].view()).unwrap_err();
-        assert!(matches!(wide, NetworkError::Range { channel: 0, .. }));
+        assert!(matches!(
+            wide,
+            NetworkError::Range {
+                channel: 0,
+                is_wide: true,
+                ..
+            }
+        ));
         let narrow = MinMax::fit(array![[1.0, 0.0], [2.0, 1e-309]].view()).unwrap_err();
-        assert!(matches!(narrow, NetworkError::Narrow { channel: 1, .. }));
+        assert!(matches!(
+            narrow,
+            NetworkError::Range {
+                channel: 1,
+                is_wide: false,
+                ..
+            }
+        ));
         assert!(MinMax::fit(array![[0.0], [1e-307]].view()).is_ok());
         assert_eq!(MinMax::fit(Array2::zeros((0, 3)).view()), Err(NetworkError::Empty));
     }
 
     #[test]
     fn a_reading_is_outside_beyond_a_tenth_of_the_range() {
-        let range = ReadingRange::of(array![[10.0, -5.0], [40.0, 5.0], [20.0, 0.0]].view()).unwrap();
+        let range = MinMax::of(array![[10.0, -5.0], [40.0, 5.0], [20.0, 0.0]].view()).unwrap();
         assert_eq!((range.extremes(0), range.extremes(1)), ((10.0, 40.0), (-5.0, 5.0)));
         let outside = |quantity, first| range.outside(quantity, &[first, 0.0]).collect::<Vec<_>>();
         // 4^0.1 = 1.1487
@@ -286,8 +255,8 @@ mod tests {
     #[test]
     fn resistances_and_their_conductances_have_the_same_limits() {
         let (low, high) = (3.0, 17.0);
-        let of_resistance = ReadingRange::of(array![[low], [high]].view()).unwrap();
-        let of_inverse = ReadingRange::of(array![[1.0 / low], [1.0 / high]].view()).unwrap();
+        let of_resistance = MinMax::of(array![[low], [high]].view()).unwrap();
+        let of_inverse = MinMax::of(array![[1.0 / low], [1.0 / high]].view()).unwrap();
         let (below, above) = of_resistance.limits(Quantity::Conductance, 0);
         let inverse = of_inverse.limits(Quantity::Conductance, 0);
         assert!((below * inverse.1 - 1.0).abs() < 1e-12 && (above * inverse.0 - 1.0).abs() < 1e-12);
@@ -295,9 +264,9 @@ mod tests {
 
     #[test]
     fn a_constant_channel_may_change_only_by_rounding() {
-        let range = ReadingRange::of(array![[7.0]].view()).unwrap();
+        let range = MinMax::of(array![[7.0]].view()).unwrap();
         let outside = |reading| range.outside(Quantity::LogResistance, &[reading]).count();
         assert_eq!((outside(7.0), outside(7.000_000_001), outside(7.001)), (0, 0, 1));
-        assert_eq!(ReadingRange::of(ndarray::Array2::zeros((0, 2)).view()), None);
+        assert_eq!(MinMax::of(ndarray::Array2::zeros((0, 2)).view()), None);
     }
 }

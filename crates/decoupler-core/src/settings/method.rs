@@ -9,7 +9,7 @@ use crate::{sensor::short, text::UnknownName};
 
 /// A training method with its settings.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Method {
     /// Damped Gauss-Newton steps (`trainlm`). The normal equations are factored or, where factoring costs more (for
     /// wide networks, depending on their shape and the number of samples), solved by conjugate gradients to a relative
@@ -29,7 +29,10 @@ pub enum Method {
     /// Gradient descent with momentum of gradients, Eq. (11).
     Momentum(MomentumSettings),
     /// Conventional back-propagation, Eq. (5)-(10) (`traingd`).
-    GradientDescent(GradientDescentSettings),
+    GradientDescent {
+        /// Step length relative to the length of the gradient.
+        learning_rate: f64,
+    },
 }
 
 /// Settings of the damping mu (Hagan and Menhaj 1994), with the field's usual defaults.
@@ -57,18 +60,13 @@ impl Default for Damping {
     }
 }
 
-/// Settings of Bayesian regularisation: the damping mu, as in [`Damping`], and the correlation of errors.
+/// Settings of Bayesian regularisation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RegularizationSettings {
-    /// Initial damping.
-    pub mu: f64,
-    /// Factor on mu after a step that lowers the error.
-    pub mu_decrease: f64,
-    /// Factor on mu after a step that does not lower the error.
-    pub mu_increase: f64,
-    /// Training ends when mu exceeds this.
-    pub mu_max: f64,
+    /// Damping mu.
+    #[serde(flatten)]
+    pub damping: Damping,
     /// Epoch after which the correlation of neighbouring errors is measured, an integer; 0 for never.
     pub correlation_epoch: f64,
     /// Number of groups of weights with their own strength of regularisation, an integer from 1 to 4.
@@ -80,10 +78,10 @@ pub struct RegularizationSettings {
 impl Default for RegularizationSettings {
     fn default() -> Self {
         Self {
-            mu: 0.005,
-            mu_decrease: 0.1,
-            mu_increase: 10.0,
-            mu_max: 1e10,
+            damping: Damping {
+                mu: 0.005,
+                ..Damping::default()
+            },
             correlation_epoch: 0.0,
             groups: 1.0,
             own_noise: 0.0,
@@ -103,16 +101,6 @@ impl RegularizationSettings {
             groups: 4.0,
             own_noise: 1.0,
             ..Self::default()
-        }
-    }
-
-    /// Returns the damping.
-    pub fn damping(&self) -> Damping {
-        Damping {
-            mu: self.mu,
-            mu_decrease: self.mu_decrease,
-            mu_increase: self.mu_increase,
-            mu_max: self.mu_max,
         }
     }
 }
@@ -213,20 +201,6 @@ impl Default for MomentumSettings {
     }
 }
 
-/// Settings of gradient descent, with the field's usual default (`traingd`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GradientDescentSettings {
-    /// Step length relative to the length of the gradient.
-    pub learning_rate: f64,
-}
-
-impl Default for GradientDescentSettings {
-    fn default() -> Self {
-        Self { learning_rate: 0.01 }
-    }
-}
-
 /// Texts that describe a method.
 struct Description {
     short_name: &'static str,
@@ -236,62 +210,6 @@ struct Description {
     /// Advice for a training that diverged or did not lower the error, in the imperative.
     remedy: &'static str,
 }
-
-const LEVENBERG_MARQUARDT: Description = Description {
-    short_name: "lm",
-    name: "Levenberg-Marquardt",
-    summary: "Damped Gauss-Newton steps: the fewest epochs, and here also the shortest training time.",
-    parameter_name: "mu",
-    remedy: "try another seed, more samples, or fewer hidden nodes",
-};
-const BAYESIAN_REGULARIZATION: Description = Description {
-    short_name: "br",
-    name: "Bayesian regularisation",
-    summary: "Levenberg-Marquardt with a penalty on the weights whose strength is estimated from the data: for few or \
-              noisy samples.",
-    parameter_name: "mu",
-    remedy: "try another seed, more samples, or Levenberg-Marquardt (lm)",
-};
-const SCALED_CONJUGATE_GRADIENT: Description = Description {
-    short_name: "scg",
-    name: "Scaled conjugate gradient",
-    summary: "Conjugate directions, step length from the curvature: little memory, for very large networks.",
-    parameter_name: "lambda",
-    remedy: "try another seed, or Levenberg-Marquardt (lm)",
-};
-const RESILIENT: Description = Description {
-    short_name: "rp",
-    name: "Resilient back-propagation",
-    summary: "Each weight has its own step length and uses only the sign of its slope.",
-    parameter_name: "mean step length",
-    remedy: "lower the first and the largest step length, or try another seed",
-};
-const ADAPTIVE_DESCENT: Description = Description {
-    short_name: "gdx",
-    name: "Adaptive rate with momentum",
-    summary: "Gradient descent with momentum whose learning rate grows while the error falls.",
-    parameter_name: "learning rate",
-    remedy: "lower the learning rate, run more epochs, or try another seed",
-};
-const GRADIENT_DESCENT: Description = Description {
-    short_name: "gd",
-    name: "Gradient descent",
-    summary: "Conventional back-propagation, Eq. (5)-(10): a step down the gradient each epoch.",
-    parameter_name: "learning rate",
-    remedy: "change the learning rate, run more epochs, or try another method",
-};
-const STEP_MOMENTUM: Description = Description {
-    short_name: "gdms",
-    name: "Momentum of steps",
-    summary: "Gradient descent that mixes the previous step into each step, as traingdm does.",
-    ..GRADIENT_DESCENT
-};
-const MOMENTUM: Description = Description {
-    short_name: "gdm",
-    name: "Momentum, Eq. (11)",
-    summary: "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does.",
-    ..GRADIENT_DESCENT
-};
 
 impl Default for Method {
     fn default() -> Self {
@@ -310,7 +228,7 @@ impl Method {
             Self::AdaptiveDescent(AdaptiveDescentSettings::default()),
             Self::StepMomentum(MomentumSettings::default()),
             Self::Momentum(MomentumSettings::default()),
-            Self::GradientDescent(GradientDescentSettings::default()),
+            Self::GradientDescent { learning_rate: 0.01 },
         ]
     }
 
@@ -319,13 +237,12 @@ impl Method {
     /// # Errors
     /// If no method has this name.
     pub fn named(short_name: &str) -> Result<Self, UnknownName> {
-        let mut all = Self::all().into_iter();
-        all.find(|method| method.short_name() == short_name)
-            .ok_or_else(|| UnknownName {
-                name: short_name.to_owned(),
-                what: "a training method",
-                known: Self::all().map(|method| method.short_name()).to_vec(),
-            })
+        let found = Self::all().into_iter().find(|method| method.short_name() == short_name);
+        found.ok_or_else(|| UnknownName {
+            name: short_name.to_owned(),
+            what: "a training method",
+            known: Self::all().map(|method| method.short_name()).to_vec(),
+        })
     }
 
     /// Returns Bayesian regularisation with its defaults.
@@ -346,21 +263,68 @@ impl Method {
 
     /// Returns this method with its defaults.
     pub fn with_defaults(&self) -> Self {
-        let mut all = Self::all().into_iter();
-        all.find(|method| method.short_name() == self.short_name())
-            .unwrap_or(*self)
+        Self::named(self.short_name()).unwrap_or(*self)
     }
 
-    fn description(&self) -> &'static Description {
+    fn description(&self) -> Description {
         match self {
-            Self::LevenbergMarquardt(_) => &LEVENBERG_MARQUARDT,
-            Self::BayesianRegularization(_) => &BAYESIAN_REGULARIZATION,
-            Self::ScaledConjugateGradient(_) => &SCALED_CONJUGATE_GRADIENT,
-            Self::Resilient(_) => &RESILIENT,
-            Self::AdaptiveDescent(_) => &ADAPTIVE_DESCENT,
-            Self::StepMomentum(_) => &STEP_MOMENTUM,
-            Self::Momentum(_) => &MOMENTUM,
-            Self::GradientDescent(_) => &GRADIENT_DESCENT,
+            Self::LevenbergMarquardt(_) => Description {
+                short_name: "lm",
+                name: "Levenberg-Marquardt",
+                summary: "Damped Gauss-Newton steps: the fewest epochs, and here also the shortest training time.",
+                parameter_name: "mu",
+                remedy: "try another seed, more samples, or fewer hidden nodes",
+            },
+            Self::BayesianRegularization(_) => Description {
+                short_name: "br",
+                name: "Bayesian regularisation",
+                summary: "Levenberg-Marquardt with a penalty on the weights whose strength is estimated from the data: for few or \
+                          noisy samples.",
+                parameter_name: "mu",
+                remedy: "try another seed, more samples, or Levenberg-Marquardt (lm)",
+            },
+            Self::ScaledConjugateGradient(_) => Description {
+                short_name: "scg",
+                name: "Scaled conjugate gradient",
+                summary: "Conjugate directions, step length from the curvature: little memory, for very large networks.",
+                parameter_name: "lambda",
+                remedy: "try another seed, or Levenberg-Marquardt (lm)",
+            },
+            Self::Resilient(_) => Description {
+                short_name: "rp",
+                name: "Resilient back-propagation",
+                summary: "Each weight has its own step length and uses only the sign of its slope.",
+                parameter_name: "mean step length",
+                remedy: "lower the first and the largest step length, or try another seed",
+            },
+            Self::AdaptiveDescent(_) => Description {
+                short_name: "gdx",
+                name: "Adaptive rate with momentum",
+                summary: "Gradient descent with momentum whose learning rate grows while the error falls.",
+                parameter_name: "learning rate",
+                remedy: "lower the learning rate, run more epochs, or try another seed",
+            },
+            Self::StepMomentum(_) => Description {
+                short_name: "gdms",
+                name: "Momentum of steps",
+                summary: "Gradient descent that mixes the previous step into each step, as traingdm does.",
+                parameter_name: "learning rate",
+                remedy: "change the learning rate, run more epochs, or try another method",
+            },
+            Self::Momentum(_) => Description {
+                short_name: "gdm",
+                name: "Momentum, Eq. (11)",
+                summary: "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does.",
+                parameter_name: "learning rate",
+                remedy: "change the learning rate, run more epochs, or try another method",
+            },
+            Self::GradientDescent { .. } => Description {
+                short_name: "gd",
+                name: "Gradient descent",
+                summary: "Conventional back-propagation, Eq. (5)-(10): a step down the gradient each epoch.",
+                parameter_name: "learning rate",
+                remedy: "change the learning rate, run more epochs, or try another method",
+            },
         }
     }
 
@@ -405,9 +369,8 @@ impl Method {
         METHOD.iter().try_for_each(|setting| setting.check(self))?;
         let number = |name| self.settings().find(|setting| setting.name == name)?.number(self);
         for (name, limit_name) in LIMITS {
-            if let Some((value, limit)) = number(name)
-                .zip(number(limit_name))
-                .filter(|(value, limit)| value > limit)
+            if let (Some(value), Some(limit)) = (number(name), number(limit_name))
+                && value > limit
             {
                 return Err(SettingError::AboveLimit {
                     name,
@@ -429,11 +392,11 @@ impl Method {
             let name = setting.name;
             (value != default).then(|| format!("{name} to {} (now {})", short(default), short(value)))
         });
-        let changes = Vec::from_iter(changes);
+        let (changes, remedy) = (Vec::from_iter(changes).join(", "), self.description().remedy);
         if changes.is_empty() {
-            return self.description().remedy.to_owned();
+            return remedy.to_owned();
         }
-        format!("reset {}; or {}", changes.join(", "), self.description().remedy)
+        format!("reset {changes}; or {remedy}")
     }
 }
 

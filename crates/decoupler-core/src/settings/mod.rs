@@ -6,9 +6,10 @@ mod rows;
 mod training;
 
 pub use method::{
-    AdaptiveDescentSettings, Damping, GradientDescentSettings, Method, MomentumSettings, RegularizationSettings,
-    ResilientSettings, ScaledConjugateGradientSettings,
+    AdaptiveDescentSettings, Damping, Method, MomentumSettings, RegularizationSettings, ResilientSettings,
+    ScaledConjugateGradientSettings,
 };
 pub use rows::{AsText, Field, Kind, Setting, SettingError, Value};
+use training::METHOD;
 pub(crate) use training::MIN_MU;
-pub use training::{EPOCHS, METHOD, STOPPING, StoppingRules, TrainingSettings};
+pub use training::{EPOCHS, StoppingRules, TrainingSettings};

@@ -17,8 +17,6 @@ use crate::sensor::short;
 pub struct Setting<S: 'static> {
     /// Name in sentences, in lower case; options and keywords put dashes or underscores for its spaces.
     pub name: &'static str,
-    /// Heading under which it is listed.
-    pub heading: &'static str,
     /// Explanation, in one or two sentences.
     pub help: &'static str,
     /// Allowed values.
@@ -30,8 +28,8 @@ pub struct Setting<S: 'static> {
 /// Allowed values of a setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// Number with its unit (empty for none) and its smallest and largest value.
-    Number(&'static str, f64, f64),
+    /// Number with its smallest and largest value.
+    Number(f64, f64),
     /// Integer with its smallest and largest value.
     Integer(u64, u64),
     /// One of the names, as [`Field::Text`] lists them in its error.
@@ -194,15 +192,9 @@ impl<S: Clone> Setting<S> {
             }
             (Some(Field::Integer(field)), Value::Integer(value)) => *field = *value,
             (Some(Field::Text(field)), Value::Text(text)) => {
-                let name = self.name;
-                field
-                    .read(text)
-                    .map_err(|message| SettingError::Text { name, message })?;
+                field.read(text).map_err(|message| self.refusal(message))?;
             }
-            (Some(_), value) => {
-                let (name, message) = (self.name, format!("'{value}' is not {}", self.kind));
-                return Err(SettingError::Text { name, message });
-            }
+            (Some(_), value) => return Err(self.refusal(format!("'{value}' is not {}", self.kind))),
         }
         Ok(())
     }
@@ -227,10 +219,25 @@ impl<S: Clone> Setting<S> {
 }
 
 impl<S> Setting<S> {
+    /// Creates a row.
+    pub const fn new(
+        name: &'static str,
+        kind: Kind,
+        help: &'static str,
+        field: fn(&mut S) -> Option<Field<'_>>,
+    ) -> Self {
+        Self {
+            name,
+            help,
+            kind,
+            field,
+        }
+    }
+
     /// Returns the allowed values of a number.
     pub fn range(&self) -> Option<RangeInclusive<f64>> {
         match self.kind {
-            Kind::Number(_, min, max) => Some(min..=max),
+            Kind::Number(min, max) => Some(min..=max),
             Kind::Integer(min, max) => Some(min as f64..=max as f64),
             Kind::Choice | Kind::Text => None,
         }
@@ -246,10 +253,12 @@ impl<S> Setting<S> {
             Kind::Integer(..) => text.parse().ok().map(Value::Integer),
             Kind::Choice | Kind::Text => Some(Value::Text(text.to_owned())),
         };
-        value.ok_or_else(|| SettingError::Text {
-            name: self.name,
-            message: format!("'{text}' is not {}", self.kind),
-        })
+        value.ok_or_else(|| self.refusal(format!("'{text}' is not {}", self.kind)))
+    }
+
+    fn refusal(&self, message: String) -> SettingError {
+        let name = self.name;
+        SettingError::Text { name, message }
     }
 
     /// Returns the name with `between` in place of its spaces, as an option or a keyword.
@@ -282,9 +291,8 @@ mod tests {
 
     const LENGTH: Setting<Two> = Setting {
         name: "step length",
-        heading: "Steps",
         help: "Length.",
-        kind: Kind::Number("mm", 0.0, 2.0),
+        kind: Kind::Number(0.0, 2.0),
         field: |two| Some(Field::Number(&mut two.length)),
     };
 

@@ -85,189 +85,167 @@ impl StoppingRules {
 }
 
 const COUNT: Kind = Kind::Integer(1, StoppingRules::MAX_EPOCHS as u64);
-const NOT_NEGATIVE: Kind = Kind::Number("", 0.0, f64::MAX);
+const NOT_NEGATIVE: Kind = Kind::Number(0.0, f64::MAX);
 
 /// Rows of the rules that end a training.
-pub static STOPPING: &[Setting<StoppingRules>] = &[
+static STOPPING: &[Setting<StoppingRules>] = &[
     EPOCHS,
-    Setting {
-        name: "goal",
-        help: "Training error (mean squared, in scaled units) at which training ends.",
-        kind: NOT_NEGATIVE,
-        field: |rules| Some(Field::Number(&mut rules.goal_mse)),
-        ..EPOCHS
-    },
-    Setting {
-        name: "smallest gradient",
-        help: "Length of the gradient at which training ends.",
-        kind: NOT_NEGATIVE,
-        field: |rules| Some(Field::Number(&mut rules.min_gradient)),
-        ..EPOCHS
-    },
-    Setting {
-        name: "validation failures",
-        help: "Training ends after this many epochs whose validation error is above the best since the last new best.",
-        kind: COUNT,
-        field: |rules| Some(Field::Count(&mut rules.max_fail)),
-        ..EPOCHS
-    },
+    Setting::new(
+        "goal",
+        NOT_NEGATIVE,
+        "Training error (mean squared, in scaled units) at which training ends.",
+        |rules| Some(Field::Number(&mut rules.goal_mse)),
+    ),
+    Setting::new(
+        "smallest gradient",
+        NOT_NEGATIVE,
+        "Length of the gradient at which training ends.",
+        |rules| Some(Field::Number(&mut rules.min_gradient)),
+    ),
+    Setting::new(
+        "validation failures",
+        COUNT,
+        "Training ends after this many epochs whose validation error is above the best since the last new best.",
+        |rules| Some(Field::Count(&mut rules.max_fail)),
+    ),
 ];
 
 /// Row of the maximum number of epochs.
-pub const EPOCHS: Setting<StoppingRules> = Setting {
-    name: "epochs",
-    heading: "Stopping",
-    help: "Maximum number of epochs.",
-    kind: COUNT,
-    field: |rules| Some(Field::Count(&mut rules.epochs)),
-};
+pub const EPOCHS: Setting<StoppingRules> = Setting::new("epochs", COUNT, "Maximum number of epochs.", |rules| {
+    Some(Field::Count(&mut rules.epochs))
+});
 
 /// Maximum share of the previous step in each step. At 1 the gradient has no share, and no weight ever moves.
 const MAX_MOMENTUM: f64 = 0.999_999;
 /// Smaller values of mu are lost in rounding when added to the diagonal.
 pub(crate) const MIN_MU: f64 = 1e-20;
 
-const LENGTH: Kind = Kind::Number("", f64::MIN_POSITIVE, 1e300);
-const GROWTH: Kind = Kind::Number("", 1.0, 1e3);
-const REDUCTION: Kind = Kind::Number("", 1e-6, 0.999);
-
-/// Returns the row of a number that some methods have.
-const fn row(
-    name: &'static str,
-    kind: Kind,
-    help: &'static str,
-    field: fn(&mut Method) -> Option<Field<'_>>,
-) -> Setting<Method> {
-    Setting {
-        name,
-        heading: "Method",
-        help,
-        kind,
-        field,
-    }
-}
+const LENGTH: Kind = Kind::Number(f64::MIN_POSITIVE, 1e300);
+const GROWTH: Kind = Kind::Number(1.0, 1e3);
+const REDUCTION: Kind = Kind::Number(1e-6, 0.999);
+const MU: Kind = Kind::Number(MIN_MU, 1e300);
 
 /// Rows of the methods; the rows of each method are in the order in which it is offered.
-pub static METHOD: &[Setting<Method>] = &[
-    row(
+pub(super) static METHOD: &[Setting<Method>] = &[
+    Setting::new(
         "mu",
-        Kind::Number("", MIN_MU, 1e300),
+        MU,
         "Initial damping. Large: short steps down the gradient; small: full Gauss-Newton steps.",
-        |method| damping(method).map(|[mu, ..]| Field::Number(mu)),
+        |method| Some(Field::Number(&mut damping(method)?.mu)),
     ),
-    row(
+    Setting::new(
         "mu decrease",
         REDUCTION,
         "Factor on mu after a step that lowers the error.",
-        |method| damping(method).map(|[_, decrease, ..]| Field::Number(decrease)),
+        |method| Some(Field::Number(&mut damping(method)?.mu_decrease)),
     ),
-    row(
+    Setting::new(
         "mu increase",
-        Kind::Number("", 1.001, 1e6),
+        Kind::Number(1.001, 1e6),
         "Factor on mu after a step that does not lower the error.",
-        |method| damping(method).map(|[_, _, increase, _]| Field::Number(increase)),
+        |method| Some(Field::Number(&mut damping(method)?.mu_increase)),
     ),
-    row(
+    Setting::new(
         "largest mu",
-        Kind::Number("", MIN_MU, 1e300),
+        MU,
         "Training ends when mu exceeds this: no step lowers the error any more.",
-        |method| damping(method).map(|[.., max]| Field::Number(max)),
+        |method| Some(Field::Number(&mut damping(method)?.mu_max)),
     ),
-    row(
+    Setting::new(
         "correlation epoch",
         Kind::Integer(0, 1_000_000),
         "Epoch after which the correlation of neighbouring errors is measured, as in a recording: from then on fewer \
          errors count as independent, and weights are smaller. 0: never.",
-        |method| regularization(method).map(|settings| Field::Number(&mut settings.correlation_epoch)),
+        |method| Some(Field::Number(&mut regularization(method)?.correlation_epoch)),
     ),
-    row(
+    Setting::new(
         "groups of weights",
         Kind::Integer(1, 4),
         "Groups of weights, each with its own strength of regularisation. 1: all together. 2: hidden layer and output \
          layer. 3: the biases of the hidden layer separate, too. 4: all biases separate. From 2 on, output biases are \
          drawn towards the means of the targets, not towards 0.",
-        |method| regularization(method).map(|settings| Field::Number(&mut settings.groups)),
+        |method| Some(Field::Number(&mut regularization(method)?.groups)),
     ),
-    row(
+    Setting::new(
         "own noise",
         Kind::Integer(0, 1),
         "1: every target has its own noise level, so that a noisy or jittering target does not spoil the others, if \
          there are at least as many samples as weights. 0: one noise level for all.",
-        |method| regularization(method).map(|settings| Field::Number(&mut settings.own_noise)),
+        |method| Some(Field::Number(&mut regularization(method)?.own_noise)),
     ),
-    row(
+    Setting::new(
         "sigma",
-        Kind::Number("", 1e-12, 1.0),
+        Kind::Number(1e-12, 1.0),
         "Length of the finite difference from which the curvature is estimated.",
-        |method| conjugate(method).map(|settings| Field::Number(&mut settings.sigma)),
+        |method| Some(Field::Number(&mut conjugate(method)?.sigma)),
     ),
-    row(
+    Setting::new(
         "lambda",
         LENGTH,
         "Initial scale of the curvature: it shortens steps where the error is not convex.",
-        |method| conjugate(method).map(|settings| Field::Number(&mut settings.lambda)),
+        |method| Some(Field::Number(&mut conjugate(method)?.lambda)),
     ),
-    row(
+    Setting::new(
         "weight decay",
-        Kind::Number("", 0.0, 1e12),
+        Kind::Number(0.0, 1e12),
         "Penalty on large weights: this times the sum of the squared weights is added to the sum of the squared errors.",
-        |method| conjugate(method).map(|settings| Field::Number(&mut settings.decay)),
+        |method| Some(Field::Number(&mut conjugate(method)?.decay)),
     ),
-    row(
+    Setting::new(
         "first step length",
         LENGTH,
         "Step length of every weight in the first epoch (delta0).",
-        |method| resilient(method).map(|settings| Field::Number(&mut settings.first_length)),
+        |method| Some(Field::Number(&mut resilient(method)?.first_length)),
     ),
-    row(
+    Setting::new(
         "length increase",
         GROWTH,
         "Factor on a weight's step length while its slope keeps its sign.",
-        |method| resilient(method).map(|settings| Field::Number(&mut settings.length_increase)),
+        |method| Some(Field::Number(&mut resilient(method)?.length_increase)),
     ),
-    row(
+    Setting::new(
         "length decrease",
         REDUCTION,
         "Factor on a weight's step length when its slope changes sign.",
-        |method| resilient(method).map(|settings| Field::Number(&mut settings.length_decrease)),
+        |method| Some(Field::Number(&mut resilient(method)?.length_decrease)),
     ),
-    row(
+    Setting::new(
         "largest step length",
         LENGTH,
         "Largest step of a weight in one epoch (deltamax).",
-        |method| resilient(method).map(|settings| Field::Number(&mut settings.largest_length)),
+        |method| Some(Field::Number(&mut resilient(method)?.largest_length)),
     ),
-    row(
+    Setting::new(
         "learning rate",
         LENGTH,
         "Initial step length relative to the length of the gradient; it adapts from there.",
-        |method| adaptive(method).map(|settings| Field::Number(&mut settings.learning_rate)),
+        |method| Some(Field::Number(&mut adaptive(method)?.learning_rate)),
     ),
-    row(
+    Setting::new(
         "learning rate",
         LENGTH,
         "Step length relative to the length of the gradient (alpha).",
-        |method| momentum(method).map(|settings| Field::Number(&mut settings.learning_rate)),
+        |method| Some(Field::Number(&mut momentum(method)?.learning_rate)),
     ),
-    row(
+    Setting::new(
         "learning rate",
         LENGTH,
         "Step length relative to the length of the gradient.",
         |method| match method {
-            Method::GradientDescent(settings) => Some(Field::Number(&mut settings.learning_rate)),
+            Method::GradientDescent { learning_rate } => Some(Field::Number(learning_rate)),
             Method::StepMomentum(settings) => Some(Field::Number(&mut settings.learning_rate)),
             _ => None,
         },
     ),
-    row(
+    Setting::new(
         "momentum",
-        Kind::Number("", 0.0, 1.0),
+        Kind::Number(0.0, 1.0),
         "Share of the previous gradient in each step (eta), from 0 to 1.",
-        |method| momentum(method).map(|settings| Field::Number(&mut settings.momentum)),
+        |method| Some(Field::Number(&mut momentum(method)?.momentum)),
     ),
-    row(
+    Setting::new(
         "momentum",
-        Kind::Number("", 0.0, MAX_MOMENTUM),
+        Kind::Number(0.0, MAX_MOMENTUM),
         "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.",
         |method| match method {
             Method::AdaptiveDescent(settings) => Some(Field::Number(&mut settings.momentum)),
@@ -275,42 +253,30 @@ pub static METHOD: &[Setting<Method>] = &[
             _ => None,
         },
     ),
-    row(
+    Setting::new(
         "rate increase",
         GROWTH,
         "Factor on the learning rate after a step that lowers the error.",
-        |method| adaptive(method).map(|settings| Field::Number(&mut settings.rate_increase)),
+        |method| Some(Field::Number(&mut adaptive(method)?.rate_increase)),
     ),
-    row(
+    Setting::new(
         "rate decrease",
         REDUCTION,
         "Factor on the learning rate after a rejected step.",
-        |method| adaptive(method).map(|settings| Field::Number(&mut settings.rate_decrease)),
+        |method| Some(Field::Number(&mut adaptive(method)?.rate_decrease)),
     ),
-    row(
+    Setting::new(
         "largest error increase",
-        Kind::Number("", 1.0, 1e6),
+        Kind::Number(1.0, 1e6),
         "A step that raises the error by more than this factor is rejected.",
-        |method| adaptive(method).map(|settings| Field::Number(&mut settings.largest_error_increase)),
+        |method| Some(Field::Number(&mut adaptive(method)?.largest_error_increase)),
     ),
 ];
 
-/// Returns mu, its decrease, its increase and its largest value.
-fn damping(method: &mut Method) -> Option<[&mut f64; 4]> {
+fn damping(method: &mut Method) -> Option<&mut Damping> {
     match method {
-        Method::LevenbergMarquardt(Damping {
-            mu,
-            mu_decrease,
-            mu_increase,
-            mu_max,
-        })
-        | Method::BayesianRegularization(RegularizationSettings {
-            mu,
-            mu_decrease,
-            mu_increase,
-            mu_max,
-            ..
-        }) => Some([mu, mu_decrease, mu_increase, mu_max]),
+        Method::LevenbergMarquardt(damping) => Some(damping),
+        Method::BayesianRegularization(settings) => Some(&mut settings.damping),
         _ => None,
     }
 }

@@ -19,9 +19,9 @@ const MAX_KEPT_BYTES: usize = 32 << 20;
 #[derive(Clone, Debug)]
 pub(super) struct Activations {
     /// H̃ = [H, 1]: block × (hidden + 1).
-    pub(super) hidden: Mat<f64>,
+    hidden: Mat<f64>,
     /// E = H̃V − T: block × outputs.
-    pub(super) errors: Mat<f64>,
+    errors: Mat<f64>,
 }
 
 impl Activations {
@@ -58,14 +58,20 @@ impl Activations {
         squares
     }
 
+    /// H̃ of `block`, on which the network was run last: samples × (hidden + 1).
+    pub(super) fn hidden(&self, block: &Block) -> MatRef<'_, f64> {
+        self.hidden.as_ref().subrows(0, block.samples())
+    }
+
+    /// E of `block`, on which the network was run last: samples × outputs.
+    pub(super) fn errors(&self, block: &Block) -> MatRef<'_, f64> {
+        self.errors.as_ref().subrows(0, block.samples())
+    }
+
     /// Returns the mean squared error of `mlp` over samples and outputs.
     pub(super) fn mse(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
-        let squares = examples
-            .blocks()
-            .iter()
-            .map(|block| self.forward(mlp, block))
-            .sum::<f64>();
-        squares / examples.errors()
+        let squares = examples.blocks().iter().map(|block| self.forward(mlp, block));
+        squares.sum::<f64>() / examples.errors()
     }
 }
 
@@ -83,15 +89,15 @@ pub(super) struct KeptActivations {
 }
 
 impl KeptActivations {
-    /// Approximate number of bytes kept for this many samples.
+    /// Approximate number of bytes kept for this many samples; 0 if they would be too many.
     pub(super) fn bytes(shape: Shape, samples: usize) -> usize {
-        let bytes = all_bytes(shape, samples);
+        let bytes = samples.saturating_mul((shape.hidden + 1 + shape.outputs) * size_of::<f64>());
         if bytes > MAX_KEPT_BYTES { 0 } else { bytes }
     }
 
     /// Allocates for samples processed in up to `parts` parts.
     pub(super) fn new(shape: Shape, examples: &Examples, parts: usize) -> Self {
-        let recomputed = all_bytes(shape, examples.samples()) > MAX_KEPT_BYTES;
+        let recomputed = Self::bytes(shape, examples.samples()) == 0;
         let count = if recomputed { parts } else { examples.blocks().len() };
         Self {
             buffers: vec![Activations::new(shape); count],
@@ -105,9 +111,12 @@ impl KeptActivations {
     /// Runs the network on all examples; returns the sum of squared errors.
     pub(super) fn evaluate(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
         if self.weights != mlp.weights() {
-            self.squares = self.run(mlp, examples);
-            self.weights.clear();
-            self.weights.extend_from_slice(mlp.weights());
+            let mut squares = vec![0.0; self.parts];
+            self.for_each_part(examples, &mut squares, |squares, block, activations| {
+                *squares += activations.forward(mlp, block);
+            });
+            self.squares = squares.iter().sum();
+            mlp.weights().clone_into(&mut self.weights);
         }
         self.squares
     }
@@ -116,21 +125,13 @@ impl KeptActivations {
     pub(super) fn squares_of_outputs(&mut self, mlp: &Mlp, examples: &Examples) -> Vec<f64> {
         self.evaluate(mlp, examples);
         let mut parts = vec![vec![0.0; examples.outputs()]; self.parts];
-        self.for_each_block(mlp, examples, &mut parts, |sums, now| {
-            for (sum, errors) in sums.iter_mut().zip(now.errors().col_iter()) {
+        self.for_each_block(mlp, examples, &mut parts, |sums, block, now| {
+            for (sum, errors) in sums.iter_mut().zip(now.errors(block).col_iter()) {
                 *sum += errors.squared_norm_l2();
             }
         });
         let of_output = |output: usize| parts.iter().map(|sums| sums[output]).sum();
         (0..examples.outputs()).map(of_output).collect()
-    }
-
-    fn run(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
-        let mut squares = vec![0.0; self.parts];
-        self.for_each_part(examples, &mut squares, |squares, number, activations| {
-            *squares += activations.forward(mlp, &examples.blocks()[number]);
-        });
-        squares.iter().sum()
     }
 
     /// Calls `work` for every block at the weights last evaluated, which are those of `mlp`. The samples are divided
@@ -140,63 +141,39 @@ impl KeptActivations {
         mlp: &Mlp,
         examples: &Examples,
         sums: &mut [S],
-        work: impl Fn(&mut S, &BlockNow<'_>) + Sync + Send,
+        work: impl Fn(&mut S, &Block, &Activations) + Sync + Send,
     ) {
         let recomputed = self.recomputed;
-        self.for_each_part(examples, sums, |sums, number, activations| {
-            let block = &examples.blocks()[number];
+        self.for_each_part(examples, sums, |sums, block, activations| {
             if recomputed {
                 activations.forward(mlp, block);
             }
-            work(sums, &BlockNow { block, activations });
+            work(sums, block, activations);
         });
     }
 
-    /// Divides the blocks into as many parts as there are `sums`; calls `work` with the sums of the part, the number of
-    /// each block, and its buffer.
+    /// Divides the blocks into as many parts as there are `sums`; calls `work` with the sums of the part, each block, and
+    /// its buffer.
     fn for_each_part<S: Send>(
         &mut self,
         examples: &Examples,
         sums: &mut [S],
-        work: impl Fn(&mut S, usize, &mut Activations) + Sync + Send,
+        work: impl Fn(&mut S, &Block, &mut Activations) + Sync + Send,
     ) {
         let mut buffers = self.buffers.as_mut_slice();
         let part = |(blocks, sums): (Range<usize>, _)| {
             let count = if self.recomputed { 1 } else { blocks.len() };
             let (own, others) = std::mem::take(&mut buffers).split_at_mut(count);
             buffers = others;
-            (blocks, own, sums)
+            (&examples.blocks()[blocks], own, sums)
         };
         let divided = parts(examples.blocks().len(), sums.len()).zip(sums);
         let mut parts: Vec<_> = divided.map(part).collect();
         for_each_part(&mut parts, |(blocks, own, sums)| {
-            for (index, number) in blocks.clone().enumerate() {
-                work(sums, number, &mut own[index % own.len()]);
+            for (index, block) in blocks.iter().enumerate() {
+                work(sums, block, &mut own[index % own.len()]);
             }
         });
-    }
-}
-
-/// Bytes of the activations of this many samples.
-fn all_bytes(shape: Shape, samples: usize) -> usize {
-    samples.saturating_mul((shape.hidden + 1 + shape.outputs) * size_of::<f64>())
-}
-
-/// A block of samples with its activations.
-pub(super) struct BlockNow<'a> {
-    pub(super) block: &'a Block,
-    activations: &'a Activations,
-}
-
-impl BlockNow<'_> {
-    /// H̃: samples × (hidden + 1).
-    pub(super) fn hidden(&self) -> MatRef<'_, f64> {
-        self.activations.hidden.as_ref().subrows(0, self.block.samples())
-    }
-
-    /// E: samples × outputs.
-    pub(super) fn errors(&self) -> MatRef<'_, f64> {
-        self.activations.errors.as_ref().subrows(0, self.block.samples())
     }
 }
 
@@ -243,7 +220,30 @@ fn subtract(outputs: &mut [f64], targets: &[f64]) -> f64 {
     sums.iter().sum()
 }
 
-/// Computes the gradient of the mean squared error by back-propagation (section 3.1 of the paper).
+/// Adds `factor`·Jᵀe of a block of samples to `gradient`, in the order of [`Mlp::weights`], by back-propagation (section 3.1
+/// of the paper) through the weights `v` of the output layer. `add` adds a product; `delta` is a buffer for the errors at the
+/// hidden nodes' net input: block × hidden.
+pub(super) fn add_gradient(
+    gradient: &mut [f64],
+    factor: f64,
+    (shape, v): (Shape, &[f64]),
+    (block, now): (&Block, &Activations),
+    delta: MatMut<'_, f64>,
+    add: impl Fn(MatMut<'_, f64>, MatRef<'_, f64>, MatRef<'_, f64>, f64),
+) {
+    let (gradient_w, gradient_v) = gradient.split_at_mut(shape.hidden_weights());
+    let gradient_w = MatMut::from_row_major_slice_mut(gradient_w, shape.inputs + 1, shape.hidden);
+    let gradient_v = MatMut::from_row_major_slice_mut(gradient_v, shape.hidden + 1, shape.outputs);
+    let v = MatRef::from_row_major_slice(v, shape.hidden + 1, shape.outputs);
+    let (hidden, errors) = (now.hidden(block), now.errors(block));
+    add(gradient_v, hidden.transpose(), errors, factor);
+    let mut delta = delta.subrows_mut(0, block.samples());
+    product(delta.as_mut(), errors, v.subrows(0, shape.hidden).transpose());
+    multiply_by_tanh_slopes(delta.as_mut(), hidden);
+    add(gradient_w, block.inputs.transpose(), delta.as_ref(), factor);
+}
+
+/// Computes the gradient of the mean squared error.
 #[derive(Clone, Debug)]
 pub(super) struct Backpropagation {
     activations: Activations,
@@ -264,24 +264,13 @@ impl Backpropagation {
 
     /// Returns the error at the weights of `mlp` and computes its gradient.
     pub(super) fn evaluate(&mut self, mlp: &Mlp, examples: &Examples) -> Evaluation {
-        let shape = mlp.shape();
         self.gradient.fill(0.0);
-        let (gradient_w, gradient_v) = self.gradient.split_at_mut(shape.hidden_weights());
-        let mut gradient_w = MatMut::from_row_major_slice_mut(gradient_w, shape.inputs + 1, shape.hidden);
-        let mut gradient_v = MatMut::from_row_major_slice_mut(gradient_v, shape.hidden + 1, shape.outputs);
-        let v = MatRef::from_row_major_slice(mlp.layers().1, shape.hidden + 1, shape.outputs);
-        let per_error = 2.0 / examples.errors();
+        let (output_layer, per_error) = ((mlp.shape(), mlp.layers().1), 2.0 / examples.errors());
         let mut squares = 0.0;
         for block in examples.blocks() {
-            let samples = block.samples();
             squares += self.activations.forward(mlp, block);
-            let hidden = self.activations.hidden.as_ref().subrows(0, samples);
-            let errors = self.activations.errors.as_ref().subrows(0, samples);
-            accumulate(gradient_v.as_mut(), hidden.transpose(), errors, per_error);
-            let mut delta = self.delta.as_mut().subrows_mut(0, samples);
-            product(delta.as_mut(), errors, v.subrows(0, shape.hidden).transpose());
-            multiply_by_tanh_slopes(delta.as_mut(), hidden);
-            accumulate(gradient_w.as_mut(), block.inputs.transpose(), delta.as_ref(), per_error);
+            let (now, delta) = ((block, &self.activations), self.delta.as_mut());
+            add_gradient(&mut self.gradient, per_error, output_layer, now, delta, accumulate);
         }
         Evaluation {
             mse: squares / examples.errors(),

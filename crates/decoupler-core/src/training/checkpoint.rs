@@ -1,6 +1,9 @@
 //! Saving and resuming the state of a training, and continuing it with another method or other stopping rules.
 
-use std::time::{Duration, Instant};
+use std::{
+    mem::discriminant,
+    time::{Duration, Instant},
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -46,43 +49,44 @@ impl TrainerState {
 
     /// Checks everything that does not depend on the samples.
     fn check(&self) -> Result<(), TrainingError> {
-        self.settings.method.check()?;
-        self.settings.stopping.check()?;
-        let Shape {
-            inputs,
-            hidden,
-            outputs,
-        } = self.shape;
+        self.settings.check()?;
+        self.stages.iter().try_for_each(|stage| stage.method.check())?;
+        let Shape { inputs, hidden, .. } = self.shape;
+        let outputs = self.shape.outputs;
         // Checked, since the sizes come from a file.
         let w = inputs.checked_add(1).and_then(|n1| n1.checked_mul(hidden));
         let v = hidden.checked_add(1).and_then(|h1| h1.checked_mul(outputs));
         let expected = w.zip(v).and_then(|(w, v)| w.checked_add(v));
-        let sizes = [self.weights.len(), self.best_weights.len()];
-        if hidden == 0 || outputs == 0 || sizes.iter().any(|size| Some(*size) != expected) {
-            return Err(TrainingError::Damaged("its weights do not fit its layers"));
-        }
-        let mut weights = self.weights.iter().chain(&self.best_weights);
-        if !weights.all(|weight| weight.is_finite()) {
-            return Err(TrainingError::Damaged("a weight is not a finite number"));
-        }
-        let history = self.history();
-        if history.is_empty() || history.iter().enumerate().any(|(epoch, kept)| kept.epoch != epoch) {
-            return Err(TrainingError::Damaged("its history has gaps"));
-        }
-        if self.best_epoch >= history.len() {
-            return Err(TrainingError::Damaged("its best epoch is after the last"));
-        }
+        let fit = |weights: &Vec<f64>| Some(weights.len()) == expected;
+        let (mut weights, history) = (self.weights.iter().chain(&self.best_weights), self.history());
         let first_epochs = || self.stages.iter().map(|stage| stage.first_epoch);
-        if first_epochs().next() != Some(0) || !first_epochs().is_sorted() {
-            return Err(TrainingError::Damaged("its methods are out of order"));
-        }
-        self.stages.iter().try_for_each(|stage| stage.method.check())?;
-        if !self.method.fits(self.weights.len()) {
-            return Err(TrainingError::Damaged(
+        let parts = [
+            (
+                hidden > 0 && outputs > 0 && fit(&self.weights) && fit(&self.best_weights),
+                "its weights do not fit its layers",
+            ),
+            (
+                weights.all(|weight| weight.is_finite()),
+                "a weight is not a finite number",
+            ),
+            (
+                !history.is_empty() && history.iter().enumerate().all(|(epoch, kept)| kept.epoch == epoch),
+                "its history has gaps",
+            ),
+            (self.best_epoch < history.len(), "its best epoch is after the last"),
+            (
+                first_epochs().next() == Some(0) && first_epochs().is_sorted(),
+                "its methods are out of order",
+            ),
+            (
+                self.method.fits(self.weights.len()),
                 "the state of its method does not fit its weights",
-            ));
+            ),
+        ];
+        match parts.into_iter().find(|(is_sound, _)| !is_sound) {
+            Some((_, defect)) => Err(TrainingError::Damaged(defect)),
+            None => Ok(()),
         }
-        Ok(())
     }
 }
 
@@ -121,15 +125,17 @@ impl Trainer {
         }
         let mlp = Mlp::from_weights(shape, state.weights);
         let mut activations = Activations::new(shape);
-        let found = activations.mse(&mlp, training);
-        let saved = state.mse;
+        let (saved, found) = (state.mse, activations.mse(&mlp, training));
         // False for NaN.
         let is_same = (found - saved).abs() <= SAME_ERROR * saved.abs();
         if !is_same {
             return Err(TrainingError::OtherSamples { saved, found });
         }
-        let algorithm = state.settings.method.resume(state.method, &mlp, training);
-        let algorithm = algorithm.ok_or(TrainingError::Damaged("the state belongs to another method"))?;
+        let (mut algorithm, _) = state.settings.method.start(&mlp, training);
+        if discriminant(&algorithm.state()) != discriminant(&state.method) {
+            return Err(TrainingError::Damaged("the state belongs to another method"));
+        }
+        algorithm.restore(state.method);
         let best = state.history.0[state.best_epoch];
         let best_mse = best.validation_mse.unwrap_or(best.training_mse);
         Ok(Self {
@@ -150,9 +156,7 @@ impl Trainer {
             problem,
         })
     }
-}
 
-impl Trainer {
     /// Continues from the current weights with another method (momentum first, Levenberg-Marquardt to finish), even if
     /// the training has ended, unless all epochs were run. The epoch count continues; the count of validation failures
     /// restarts from 0, but the best validation error so far remains the one to beat.
@@ -181,13 +185,10 @@ impl Trainer {
     /// If a setting is out of range; nothing is then changed.
     pub fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
         stopping.check()?;
-        if stopping == self.settings.stopping {
-            return Ok(());
-        }
+        let is_changed = stopping != self.settings.stopping;
         self.settings.stopping = stopping;
-        if self.stop_reason.is_none_or(StopReason::depends_on_rules) {
-            let latest = *self.latest();
-            self.stop_reason = self.reason_to_stop(&latest);
+        if is_changed && self.stop_reason.is_none_or(StopReason::depends_on_rules) {
+            self.stop_reason = self.reason_to_stop(self.latest());
         }
         Ok(())
     }

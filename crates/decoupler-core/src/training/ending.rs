@@ -7,21 +7,15 @@ use serde::{Deserialize, Serialize};
 use super::{EpochRecord, Method, Trainer};
 use crate::text::counted;
 
-/// Defect of a training that has ended. Its text describes the problem and the remedy.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Defect of a training that has ended.
+#[derive(Clone, Debug, PartialEq)]
 pub struct TrainingDefect {
     /// Epoch from which on the error stayed above its initial value, if the training diverged.
     pub diverged_in: Option<usize>,
     /// `true` if the best network is hardly better than the random start: [`TrainingDefect::MIN_GAIN`].
     pub is_at_start: bool,
-    /// Epoch of the best network.
-    pub best_epoch: usize,
-    /// Number of epochs run.
-    pub epochs: usize,
-    /// Reason why the training ended.
-    pub reason: StopReason,
-    /// The method with its settings.
-    pub method: Method,
+    /// The problem and its remedy.
+    pub text: String,
 }
 
 impl TrainingDefect {
@@ -31,32 +25,39 @@ impl TrainingDefect {
 
     /// Returns the defect of a training; `None` if it has no defect or has not ended.
     pub fn of(trainer: &Trainer) -> Option<Self> {
-        let reason = trainer.stop_reason()?;
+        let (reason, method) = (trainer.stop_reason()?, trainer.settings().method);
         let start = trainer.history().first()?;
         let start_mse = start.validation_mse.unwrap_or(start.training_mse);
         let enough = (1.0 - Self::MIN_GAIN) * start_mse;
-        let defect = Self {
-            diverged_in: diverged_in(trainer.history(), reason),
-            // False if the start has no error, which nothing can improve; true if its error is NaN.
-            is_at_start: start_mse != 0.0 && (trainer.best_mse() >= enough || enough.is_nan()),
-            best_epoch: trainer.best_epoch(),
-            epochs: trainer.latest().epoch,
-            reason,
-            method: trainer.settings().method,
-        };
-        (defect.diverged_in.is_some() || defect.is_at_start).then_some(defect)
-    }
-
-    /// Returns advice on the setting to change.
-    pub fn remedy(&self) -> String {
-        match self.reason {
-            StopReason::GoalReached => "set a lower goal".to_owned(),
-            StopReason::GradientSmall if self.diverged_in.is_none() => {
-                format!("set a lower smallest gradient; or {}", self.method.remedy())
+        // False if the start has no error, which nothing can improve; true if its error is NaN.
+        let is_at_start = start_mse != 0.0 && (trainer.best_mse() >= enough || enough.is_nan());
+        let diverged_in = diverged_in(trainer.history(), reason);
+        let (epochs, best_epoch) = (counted(trainer.latest().epoch, "epoch"), trainer.best_epoch());
+        let problem = match (diverged_in, is_at_start) {
+            (Some(epoch), true) => {
+                format!("training diverged in epoch {epoch}, and the network is no better than its random start")
             }
-            StopReason::Stopped if self.diverged_in.is_none() => "let it run longer".to_owned(),
-            _ => self.method.remedy(),
-        }
+            (Some(epoch), false) => {
+                format!(
+                    "training diverged in epoch {epoch}; the network is the best before that, of epoch {best_epoch}"
+                )
+            }
+            (None, true) => format!("the network is no better than its random start after {epochs} ({reason})"),
+            (None, false) => return None,
+        };
+        let remedy = match reason {
+            StopReason::GoalReached => "set a lower goal".to_owned(),
+            StopReason::GradientSmall if diverged_in.is_none() => {
+                format!("set a lower smallest gradient; or {}", method.remedy())
+            }
+            StopReason::Stopped if diverged_in.is_none() => "let it run longer".to_owned(),
+            _ => method.remedy(),
+        };
+        Some(Self {
+            diverged_in,
+            is_at_start,
+            text: format!("{problem}: {remedy}"),
+        })
     }
 }
 
@@ -71,24 +72,7 @@ fn diverged_in(history: &[EpochRecord], reason: StopReason) -> Option<usize> {
 
 impl fmt::Display for TrainingDefect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { epochs, best_epoch, .. } = self;
-        match (self.diverged_in, self.is_at_start) {
-            (Some(epoch), true) => write!(
-                f,
-                "training diverged in epoch {epoch}, and the network is no better than its random start"
-            )?,
-            (Some(epoch), false) => write!(
-                f,
-                "training diverged in epoch {epoch}; the network is the best before that, of epoch {best_epoch}"
-            )?,
-            (None, _) => write!(
-                f,
-                "the network is no better than its random start after {} ({})",
-                counted(*epochs, "epoch"),
-                self.reason
-            )?,
-        }
-        write!(f, ": {}", self.remedy())
+        f.pad(&self.text)
     }
 }
 

@@ -101,8 +101,8 @@ impl GradientDescent {
     fn move_candidate(&mut self) {
         let weights = self.candidate.weights_mut().iter_mut().zip(&self.gradient);
         match (self.method, &mut self.state) {
-            (Method::GradientDescent(settings), _) => {
-                weights.for_each(|(weight, slope)| *weight -= settings.learning_rate * slope);
+            (Method::GradientDescent { learning_rate }, _) => {
+                weights.for_each(|(weight, slope)| *weight -= learning_rate * slope);
             }
             (Method::Momentum(settings), MethodState::Momentum(previous)) => {
                 let (rate, momentum) = (settings.learning_rate, settings.momentum);
@@ -182,7 +182,7 @@ impl Algorithm for GradientDescent {
         match (&self.state, self.method) {
             (MethodState::AdaptiveDescent(state), _) => state.learning_rate,
             (MethodState::Resilient(state), _) => state.lengths.iter().sum::<f64>() / state.lengths.len() as f64,
-            (_, Method::GradientDescent(settings)) => settings.learning_rate,
+            (_, Method::GradientDescent { learning_rate }) => learning_rate,
             (_, Method::Momentum(settings) | Method::StepMomentum(settings)) => settings.learning_rate,
             _ => f64::NAN,
         }
@@ -192,12 +192,8 @@ impl Algorithm for GradientDescent {
         self.state.clone()
     }
 
-    fn restore(&mut self, state: MethodState) -> bool {
-        let is_same = std::mem::discriminant(&state) == std::mem::discriminant(&self.state);
-        if is_same {
-            self.state = state;
-        }
-        is_same
+    fn restore(&mut self, state: MethodState) {
+        self.state = state;
     }
 }
 

@@ -65,12 +65,10 @@ impl Algorithm for LevenbergMarquardt {
         MethodState::LevenbergMarquardt(DampedState { mu: self.mu })
     }
 
-    fn restore(&mut self, state: MethodState) -> bool {
-        let MethodState::LevenbergMarquardt(DampedState { mu }) = state else {
-            return false;
-        };
-        self.mu = mu;
-        true
+    fn restore(&mut self, state: MethodState) {
+        if let MethodState::LevenbergMarquardt(DampedState { mu }) = state {
+            self.mu = mu;
+        }
     }
 }
 

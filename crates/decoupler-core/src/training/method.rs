@@ -34,8 +34,8 @@ pub(super) trait Algorithm: Send + Sync {
     /// Returns the state for saving.
     fn state(&self) -> MethodState;
 
-    /// Restores the state of an interrupted training; returns `false` if it is the state of another method.
-    fn restore(&mut self, state: MethodState) -> bool;
+    /// Restores the state of an interrupted training of this method.
+    fn restore(&mut self, state: MethodState);
 }
 
 /// State that a method carries from epoch to epoch in addition to the weights. A training resumed from it gives
@@ -66,13 +66,15 @@ impl MethodState {
     pub(super) fn fits(&self, weights: usize) -> bool {
         let vectors = match self {
             Self::LevenbergMarquardt(_) | Self::BayesianRegularization(_) | Self::GradientDescent => Vec::new(),
-            Self::ScaledConjugateGradient(state) => state.vectors().to_vec(),
+            Self::ScaledConjugateGradient(state) => vec![&state.p[..], &state.r],
             Self::Resilient(state) => vec![&state.previous_gradient[..], &state.lengths],
             Self::AdaptiveDescent(state) => vec![&state.step[..]],
             Self::StepMomentum(previous) | Self::Momentum(previous) => vec![&previous[..]],
         };
-        let fits = |vector: &&[f64]| vector.len() == weights && vector.iter().all(|value| value.is_finite());
-        vectors.iter().all(fits)
+        let is_finite = |vector: &[f64]| vector.iter().all(|value| value.is_finite());
+        vectors
+            .into_iter()
+            .all(|vector| vector.len() == weights && is_finite(vector))
     }
 }
 
@@ -88,12 +90,6 @@ impl Method {
             Self::ScaledConjugateGradient(settings) => boxed(ScaledConjugateGradient::new(settings, mlp, examples)),
             _ => boxed(GradientDescent::new(*self, mlp, examples)),
         }
-    }
-
-    /// Resumes the method from the state of an interrupted training; `None` if `state` belongs to another method.
-    pub(super) fn resume(&self, state: MethodState, mlp: &Mlp, examples: &Examples) -> Option<Box<dyn Algorithm>> {
-        let (mut running, _) = self.start(mlp, examples);
-        running.restore(state).then_some(running)
     }
 
     /// Approximate memory in bytes of the method's equations for a network of this shape and this many samples.

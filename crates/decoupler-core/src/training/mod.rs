@@ -20,8 +20,8 @@ mod tests;
 mod trainer;
 
 pub use crate::settings::{
-    AdaptiveDescentSettings, Damping, GradientDescentSettings, Method, MomentumSettings, RegularizationSettings,
-    ResilientSettings, ScaledConjugateGradientSettings, SettingError, StoppingRules, TrainingSettings,
+    AdaptiveDescentSettings, Damping, Method, MomentumSettings, RegularizationSettings, ResilientSettings,
+    ScaledConjugateGradientSettings, SettingError, StoppingRules, TrainingSettings,
 };
 pub use checkpoint::TrainerState;
 pub use ending::{StopReason, TrainingDefect};

@@ -1,4 +1,4 @@
-//! Division of work among the threads of the current rayon pool.
+//! Products, Cholesky factors and triangular solves, divided among the threads of the current rayon pool.
 //!
 //! One large product is split by rows and columns of its result; many small products, one for each block of samples,
 //! are split by samples. The splits depend on sizes alone, so every entry is summed in the same order and the bits are
@@ -12,9 +12,14 @@ use std::ops::Range;
 
 use faer::{
     Accum, MatMut, MatRef, Par,
-    linalg::matmul::{
-        matmul,
-        triangular::{self, BlockStructure},
+    dyn_stack::{MemBuffer, MemStack},
+    linalg::{
+        cholesky::llt,
+        matmul::{
+            matmul,
+            triangular::{self, BlockStructure},
+        },
+        triangular_solve::solve_lower_triangular_in_place,
     },
 };
 use rayon::prelude::*;
@@ -57,7 +62,7 @@ pub(super) fn is_large(multiplications: usize) -> bool {
 }
 
 /// Number of pieces to split a product of this many multiplications into: a power of two.
-pub(super) fn pieces(multiplications: usize) -> usize {
+fn pieces(multiplications: usize) -> usize {
     let pieces = (multiplications / LARGE).clamp(1, MAX_PIECES);
     1 << pieces.ilog2()
 }
@@ -107,6 +112,115 @@ fn add_in_pieces(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, 
 }
 
 /// Returns half of `length`, rounded up to whole SIMD registers.
-pub(super) fn half(length: usize) -> usize {
+fn half(length: usize) -> usize {
     (length / 2).next_multiple_of(MIN_WIDTH)
+}
+
+/// Maximum order of a matrix that is factored in one piece.
+const MAX_UNSPLIT_FACTOR: usize = 512;
+/// Maximum order of a triangular system that is solved in one piece.
+const MAX_UNSPLIT_SOLVE: usize = 128;
+
+/// Replaces the lower triangle of a symmetric matrix by its Cholesky factor, on all threads if it is large; `None` if it is
+/// not positive definite.
+///
+/// The algorithm is recursive: it factors the first half, solves the rows below against it, subtracts their square from
+/// the remaining block and factors that in turn. Nearly all of the work is then in a few large products (Gustavson
+/// 1997, IBM Journal of Research and Development 41).
+pub(super) fn cholesky(matrix: MatMut<'_, f64>) -> Option<()> {
+    let order = matrix.nrows();
+    if order <= MAX_UNSPLIT_FACTOR {
+        let scratch = llt::factor::cholesky_in_place_scratch::<f64>(order, Par::Seq, Default::default());
+        let mut memory = MemBuffer::new(scratch);
+        let stack = MemStack::new(&mut memory);
+        let factored = llt::factor::cholesky_in_place(matrix, Default::default(), Par::Seq, stack, Default::default());
+        return factored.ok().map(drop);
+    }
+    let (mut first, _, mut below, mut corner) = matrix.split_at_mut(half(order), half(order));
+    cholesky(first.as_mut())?;
+    solve_rows(first.as_ref(), below.as_mut());
+    subtract_square(corner.as_mut(), below.as_ref());
+    cholesky(corner)
+}
+
+/// Subtracts F Fᵀ from the lower triangle of `matrix`.
+fn subtract_square(matrix: MatMut<'_, f64>, f: MatRef<'_, f64>) {
+    let order = matrix.nrows();
+    if !is_large(order * order * f.ncols()) {
+        return accumulate_lower(matrix, f, f.transpose(), -1.0);
+    }
+    let (above, _, below, corner) = matrix.split_at_mut(half(order), half(order));
+    let (first, second) = f.split_at_row(half(order));
+    rayon::join(
+        || add_product(below, second, first.transpose(), -1.0),
+        || rayon::join(|| subtract_square(above, first), || subtract_square(corner, second)),
+    );
+}
+
+/// Replaces `right` by the solution for a matrix given by its Cholesky factor.
+pub(super) fn substitute(factor: MatRef<'_, f64>, right: MatMut<'_, f64>) {
+    // Needs no scratch memory.
+    llt::solve::solve_in_place(factor, right, Par::Seq, MemStack::new(&mut []));
+}
+
+/// Replaces each row r of `rows` by r L⁻ᵀ, on all threads if there are many.
+pub(super) fn solve_rows(factor: MatRef<'_, f64>, rows: MatMut<'_, f64>) {
+    let (count, order) = (rows.nrows(), factor.nrows());
+    solve_in_pieces(factor, rows, pieces(count * order * order / 2));
+}
+
+fn solve_in_pieces(factor: MatRef<'_, f64>, rows: MatMut<'_, f64>, pieces: usize) {
+    let count = rows.nrows();
+    if pieces == 1 || count == 1 {
+        solve_by_halves(factor, rows);
+        return;
+    }
+    let (first, second) = rows.split_at_row_mut(count / 2);
+    rayon::join(
+        || solve_in_pieces(factor, first, pieces / 2),
+        || solve_in_pieces(factor, second, pieces / 2),
+    );
+}
+
+fn solve_by_halves(factor: MatRef<'_, f64>, rows: MatMut<'_, f64>) {
+    let order = factor.nrows();
+    if order <= MAX_UNSPLIT_SOLVE {
+        solve_lower_triangular_in_place(factor, rows.transpose_mut(), Par::Seq);
+        return;
+    }
+    let (above, _, below, corner) = factor.split_at(half(order), half(order));
+    let (mut first, mut second) = rows.split_at_col_mut(half(order));
+    solve_by_halves(above, first.as_mut());
+    accumulate(second.as_mut(), first.as_ref(), below.transpose(), -1.0);
+    solve_by_halves(corner, second);
+}
+
+#[cfg(test)]
+mod tests {
+    use faer::Mat;
+
+    use super::*;
+
+    #[test]
+    fn a_matrix_factored_in_pieces_equals_the_product_of_its_factors() {
+        let order = 3 * MAX_UNSPLIT_FACTOR / 2 + 7;
+        let entry = |row: usize, column: usize| ((row * 31 + column * 17 + row * column) as f64).sin();
+        let root = Mat::from_fn(order, order, entry);
+        let matrix = &root * root.transpose() + Mat::<f64>::identity(order, order);
+        let mut factor = matrix.clone();
+        assert!(cholesky(factor.as_mut()).is_some());
+        for (row, column) in (0..order).flat_map(|row| (row + 1..order).map(move |column| (row, column))) {
+            factor[(row, column)] = 0.0;
+        }
+        let error = (&factor * factor.transpose() - &matrix).norm_max();
+        assert!(error < 1e-10 * matrix.norm_max(), "{error}");
+    }
+
+    #[test]
+    fn a_matrix_that_is_not_positive_definite_is_rejected() {
+        let order = MAX_UNSPLIT_FACTOR + 50;
+        let mut matrix = Mat::<f64>::identity(order, order);
+        matrix[(order - 3, order - 3)] = -1.0;
+        assert!(cholesky(matrix.as_mut()).is_none());
+    }
 }

@@ -29,9 +29,9 @@ pub(super) struct ScaledConjugateGradient {
 #[serde(deny_unknown_fields)]
 pub struct ConjugateState {
     /// Direction p.
-    p: Vec<f64>,
+    pub(super) p: Vec<f64>,
     /// Residual r: the negative gradient.
-    r: Vec<f64>,
+    pub(super) r: Vec<f64>,
     /// Curvature δ along p.
     delta: f64,
     lambda: f64,
@@ -40,13 +40,6 @@ pub struct ConjugateState {
     success: bool,
     /// Number of accepted steps since the last restart of p from the gradient.
     since_restart: usize,
-}
-
-impl ConjugateState {
-    /// Vectors with an entry for each weight.
-    pub(super) fn vectors(&self) -> [&[f64]; 2] {
-        [&self.p, &self.r]
-    }
 }
 
 impl ScaledConjugateGradient {
@@ -91,13 +84,10 @@ impl ScaledConjugateGradient {
             square += slope * slope;
             mixed -= slope * r;
         }
-        let beta = if state.since_restart >= state.r.len() {
-            state.since_restart = 0;
-            0.0
-        } else {
-            (square - mixed) / mu
-        };
-        let beta = if beta.is_finite() { beta } else { 0.0 };
+        state.since_restart %= state.r.len();
+        let beta = (square - mixed) / mu;
+        let is_kept = state.since_restart > 0 && beta.is_finite();
+        let beta = if is_kept { beta } else { 0.0 };
         for ((p, r), slope) in state.p.iter_mut().zip(&mut state.r).zip(&self.backpropagation.gradient) {
             *r = -slope;
             *p = *r + beta * *p;
@@ -139,11 +129,9 @@ impl Algorithm for ScaledConjugateGradient {
         let (then, objective) = self.evaluate_along(mlp, length, examples);
         let predicted = 2.0 * delta * (self.objective - objective) / (mu * mu);
         // A non-finite error counts as much worse than predicted.
-        let comparison = if then.if_finite().is_ok() {
-            predicted.max(MIN_COMPARISON)
-        } else {
-            MIN_COMPARISON
-        };
+        let comparison = then
+            .if_finite()
+            .map_or(MIN_COMPARISON, |_| predicted.max(MIN_COMPARISON));
         self.state.success = comparison >= 0.0;
         if self.state.success {
             std::mem::swap(mlp, &mut self.moved);
@@ -159,7 +147,8 @@ impl Algorithm for ScaledConjugateGradient {
         if comparison < 0.25 {
             self.state.lambda += delta * (1.0 - comparison) / square;
         }
-        if self.state.lambda.is_finite() {
+        let is_finite = self.state.lambda.is_finite();
+        if is_finite {
             Ok(self.now)
         } else {
             Err(StopReason::LambdaLarge)
@@ -174,18 +163,16 @@ impl Algorithm for ScaledConjugateGradient {
         MethodState::ScaledConjugateGradient(self.state.clone())
     }
 
-    fn restore(&mut self, state: MethodState) -> bool {
-        let MethodState::ScaledConjugateGradient(state) = state else {
-            return false;
-        };
-        self.state = state;
-        true
+    fn restore(&mut self, state: MethodState) {
+        if let MethodState::ScaledConjugateGradient(state) = state {
+            self.state = state;
+        }
     }
 }
 
 /// Evaluates the errors of `mlp`, and E with its gradient: the mean squared error and the penalty on the weights.
 fn penalized(backpropagation: &mut Backpropagation, decay: f64, mlp: &Mlp, examples: &Examples) -> (Evaluation, f64) {
-    let evaluation = backpropagation.evaluate(mlp, examples);
+    let mut evaluation = backpropagation.evaluate(mlp, examples);
     if decay == 0.0 {
         return (evaluation, evaluation.mse);
     }
@@ -193,14 +180,10 @@ fn penalized(backpropagation: &mut Backpropagation, decay: f64, mlp: &Mlp, examp
     for (slope, weight) in backpropagation.gradient.iter_mut().zip(mlp.weights()) {
         *slope += 2.0 * per_error * weight;
     }
-    let gradient_norm = dot(&backpropagation.gradient, &backpropagation.gradient).sqrt();
-    let objective = evaluation.mse + per_error * dot(mlp.weights(), mlp.weights());
+    evaluation.gradient_norm = dot(&backpropagation.gradient, &backpropagation.gradient).sqrt();
     (
-        Evaluation {
-            gradient_norm,
-            ..evaluation
-        },
-        objective,
+        evaluation,
+        evaluation.mse + per_error * dot(mlp.weights(), mlp.weights()),
     )
 }
 

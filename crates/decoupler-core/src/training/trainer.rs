@@ -13,6 +13,7 @@ use super::{
 use crate::{
     machine::MemoryBudget,
     network::{Mlp, Shape},
+    text::counted,
 };
 
 /// Scaled training, validation and test sets.
@@ -43,9 +44,9 @@ pub enum TrainingError {
     NoHiddenNodes,
     /// The method's equations need more memory than is available.
     #[error(
-        "the network is too wide for this method: the equations of {} would take {:.1} GB, and {memory}; use the scaled \
+        "the network is too wide for this method: the equations of {}{} would take {:.1} GB, and {memory}; use the scaled \
          conjugate gradient (scg), fewer hidden nodes, or fewer starts",
-        counted(*.trainings), *.bytes as f64 * 1e-9
+        counted(*.trainings as u64, "training"), if *.trainings > 1 { " at once" } else { "" }, *.bytes as f64 * 1e-9
     )]
     TooWide {
         /// Number of simultaneous trainings.
@@ -85,14 +86,6 @@ pub enum TrainingError {
     },
 }
 
-/// Returns `1 training` or `2 trainings at once`.
-fn counted(count: usize) -> String {
-    match count {
-        1 => "1 training".to_owned(),
-        _ => format!("{count} trainings at once"),
-    }
-}
-
 /// Checks that the equations of the method fit into `memory`, with this many simultaneous trainings of this shape.
 ///
 /// # Errors
@@ -105,14 +98,12 @@ pub fn check_width(
     memory: MemoryBudget,
 ) -> Result<(), TrainingError> {
     let bytes = (method.equations_bytes(shape, samples) as u64).saturating_mul(trainings as u64);
-    if bytes > memory.bytes {
-        return Err(TrainingError::TooWide {
-            trainings,
-            bytes,
-            memory,
-        });
-    }
-    Ok(())
+    let too_wide = TrainingError::TooWide {
+        trainings,
+        bytes,
+        memory,
+    };
+    if bytes > memory.bytes { Err(too_wide) } else { Ok(()) }
 }
 
 /// A training in progress. It runs one epoch for each call of [`Self::step`], so pausing only means not calling `step`.
@@ -215,20 +206,14 @@ impl Trainer {
 
     fn record(&mut self, evaluation: Evaluation) {
         let Evaluation { mse, gradient_norm } = evaluation;
-        let mut watch = |examples: &Option<Examples>| {
-            let examples = examples.as_ref()?;
-            Some(self.activations.mse(&self.mlp, examples))
-        };
-        let (validation_mse, test_mse) = (watch(&self.problem.validation), watch(&self.problem.test));
+        let mut watch = |examples| self.activations.mse(&self.mlp, examples);
+        let validation_mse = self.problem.validation.as_ref().map(&mut watch);
+        let test_mse = self.problem.test.as_ref().map(&mut watch);
         let deciding = validation_mse.unwrap_or(mse);
         let epoch = self.history.len();
         // Regularised weights are best at the minimum of the regularised error, not of the training error.
         let is_regularized = validation_mse.is_none() && !self.settings.method.needs_validation();
-        let is_best = if is_regularized {
-            deciding.is_finite()
-        } else {
-            deciding < self.best.mse
-        };
+        let is_best = deciding < self.best.mse || is_regularized && deciding.is_finite();
         if is_best {
             self.best.mse = deciding;
             self.best.epoch = epoch;
@@ -381,11 +366,8 @@ impl Evaluation {
     /// # Errors
     /// [`StopReason::Diverged`] if it does not.
     pub(super) fn if_finite(self) -> Result<Self, StopReason> {
-        if self.mse.is_finite() && self.gradient_norm.is_finite() {
-            Ok(self)
-        } else {
-            Err(StopReason::Diverged)
-        }
+        let is_finite = self.mse.is_finite() && self.gradient_norm.is_finite();
+        if is_finite { Ok(self) } else { Err(StopReason::Diverged) }
     }
 }
 
@@ -399,16 +381,14 @@ pub(super) fn correlation_time(mlp: &Mlp, examples: &Examples, lags: usize) -> f
     for block in examples.blocks() {
         activations.forward(mlp, block);
         for (index, errors) in outputs.iter_mut().enumerate() {
-            errors.extend_from_slice(&column(activations.errors.as_ref(), index)[..block.samples()]);
+            errors.extend_from_slice(column(activations.errors(block), index));
         }
     }
-    let products = |lag: usize| -> f64 {
-        let of_output = |errors: &Vec<f64>| {
-            let pairs = errors.iter().zip(errors.get(lag..).unwrap_or_default());
-            pairs.map(|(one, other)| one * other).sum::<f64>()
-        };
-        outputs.iter().map(of_output).sum()
+    let of_output = |errors: &Vec<f64>, lag: usize| -> f64 {
+        let pairs = errors.iter().zip(errors.get(lag..).unwrap_or_default());
+        pairs.map(|(one, other)| one * other).sum()
     };
+    let products = |lag: usize| -> f64 { outputs.iter().map(|errors| of_output(errors, lag)).sum() };
     let squares = products(0);
     let correlations = (1..=lags).map(|lag| products(lag) / squares);
     // False for NaN, as when there are no errors.

@@ -236,6 +236,7 @@ fn programs_of_row_wires_with_other_sizes_are_joined() {
         let inputs = Inputs::new(
             Quantity::Resistance,
             InputScaling::MinMax(MinMax::fit(readings.view()).unwrap()),
+            None,
         );
         let outputs = MinMax::fit(random(&mut rng, 9, 3).view()).unwrap();
         let shape = Shape {
@@ -268,7 +269,11 @@ fn single_precision_keeps_the_digits_of_readings_that_hardly_differ() {
     for quantity in Quantity::ALL {
         let readings = Array2::from_shape_fn((20, 3), |(s, c)| 50.0 + 1e-4 * ((3 * s + 7 * c) as f64).sin());
         let values = readings.mapv(|ohm| quantity.of(ohm));
-        let inputs = Inputs::new(quantity, InputScaling::MinMax(MinMax::fit(values.view()).unwrap()));
+        let inputs = Inputs::new(
+            quantity,
+            InputScaling::MinMax(MinMax::fit(values.view()).unwrap()),
+            None,
+        );
         let outputs = MinMax::fit(array![[0.0], [1.0]].view()).unwrap();
         let shape = Shape {
             inputs: 3,

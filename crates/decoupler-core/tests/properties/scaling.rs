@@ -73,7 +73,7 @@ proptest! {
 
     /// For channels of one magnitude: whitening treats the weakest patterns of very different ones as rounding.
     #[test]
-    fn whitened_samples_are_uncorrelated_and_restored(
+    fn whitened_samples_are_uncorrelated(
         values in (12..30_usize, 1..6_usize).prop_flat_map(|(samples, channels)| {
             let values = prop::collection::vec(-1.0..1.0_f64, samples * channels);
             values.prop_map(move |values| Array2::from_shape_vec((samples, channels), values).unwrap())
@@ -88,7 +88,5 @@ proptest! {
             let expected = if row == column { 1.0 } else { 0.0 };
             prop_assert!((value - expected).abs() < 1e-10, "({row}, {column}): {value}");
         }
-        let off = largest_difference(&whitening.restore(whitened.view()), &values);
-        prop_assert!(off < 1e-12, "{off:e}");
     }
 }

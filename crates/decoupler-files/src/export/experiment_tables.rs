@@ -8,10 +8,9 @@ use std::{
 use decoupler_core::{
     dataset::{Simulation, SplitBy},
     evaluation::{
-        Combination, CrossValidation, TargetErrors,
+        Combination, CrossValidation, ErrorMeasure, TargetErrors,
         experiments::{
-            AxisKind, CellResults, CellSummary, Experiment, ExperimentRecording, ExperimentResults, Figure,
-            SummaryErrors, Trial,
+            AxisKind, CellResults, CellSummary, Experiment, ExperimentRecording, ExperimentResults, Figure, Trial,
         },
     },
     network::HiddenSuggestions,
@@ -137,10 +136,12 @@ fn figures(summary: &CellSummary, has_published: bool) -> Vec<CellFigure> {
         let value = figure.published;
         has_published.then(|| number(heading, Published, value))
     };
-    let percent = &summary.percent;
-    let [publ, median, mean, linear] = match summary.errors {
-        SummaryErrors::Nodes { .. } => ["Z % publ.", "Z % median", "mean Z %", "linear Z %"],
-        SummaryErrors::Targets { .. } => ["error % publ.", "error % median", "mean %", "ridge %"],
+    let percent = summary.percent();
+    let is_array = summary.cell.settings.simulation().is_some();
+    let [publ, median, mean, linear] = if is_array {
+        ["Z % publ.", "Z % median", "mean Z %", "linear Z %"]
+    } else {
+        ["error % publ.", "error % median", "mean %", "ridge %"]
     };
     let mut figures = Vec::from_iter(published(publ, percent));
     figures.extend([
@@ -148,16 +149,15 @@ fn figures(summary: &CellSummary, has_published: bool) -> Vec<CellFigure> {
         number("min", Other, percent.min),
         number("max", Other, percent.max),
     ]);
-    match &summary.errors {
-        SummaryErrors::Nodes {
-            x_percent, y_percent, ..
-        } => {
-            figures.extend(published("X % publ.", x_percent));
-            figures.push(number("X % median", Other, x_percent.median));
-            figures.extend(published("Y % publ.", y_percent));
-            figures.push(number("Y % median", Other, y_percent.median));
-        }
-        SummaryErrors::Targets { r2 } => figures.push(number("R² median", Other, r2.median)),
+    for (measure, figure) in &summary.errors {
+        let (publ, median) = match measure {
+            ErrorMeasure::XPercent => (Some("X % publ."), "X % median"),
+            ErrorMeasure::YPercent => (Some("Y % publ."), "Y % median"),
+            ErrorMeasure::R2 => (None, "R² median"),
+            _ => continue,
+        };
+        figures.extend(publ.and_then(|publ| published(publ, figure)));
+        figures.push(number(median, Other, figure.median));
     }
     figures.push(number(mean, Other, summary.mean_percent));
     figures.push(number(linear, Linear, summary.linear_percent));
@@ -188,21 +188,13 @@ pub fn cells_table(results: &ExperimentResults) -> Table {
             let figures = published.into_iter().chain(of_trials);
             Vec::from_iter(figures.map(|(which, value)| field(&format!("{name}_{which}"), value.into())))
         };
-        let name = match &summary.errors {
-            SummaryErrors::Nodes {
-                x_percent, y_percent, ..
-            } => {
-                fields.extend(figure("z_percent", &summary.percent, true));
-                fields.extend(figure("x_percent", x_percent, true));
-                fields.extend(figure("y_percent", y_percent, true));
-                "z_percent"
+        let is_array = summary.cell.settings.simulation().is_some();
+        for (measure, of_trials) in &summary.errors {
+            if *measure != ErrorMeasure::ZMm {
+                fields.extend(figure(measure.field(), of_trials, is_array));
             }
-            SummaryErrors::Targets { r2 } => {
-                fields.extend(figure("percent_of_range", &summary.percent, false));
-                fields.extend(figure("r2", r2, false));
-                "percent_of_range"
-            }
-        };
+        }
+        let name = summary.errors[0].0.field();
         fields.extend([
             field(&format!("mean_{name}"), summary.mean_percent.into()),
             field(&format!("linear_{name}"), summary.linear_percent.into()),
@@ -228,7 +220,7 @@ pub fn trials_table(results: &ExperimentResults) -> Table {
             field("seed", Cell::Count(trial.seed.0)),
             field("repeat", (trial.repeat + 1).into()),
         ]);
-        let name = match trial.errors.nodes() {
+        let name = match trial.scores.network.nodes() {
             Some(errors) => {
                 fields.extend([
                     field("z_percent", errors.z_percent.into()),
@@ -245,10 +237,13 @@ pub fn trials_table(results: &ExperimentResults) -> Table {
             }
         };
         fields.extend([
-            field(&format!("mean_{name}"), trial.mean.percent().into()),
-            field(&format!("linear_{name}"), trial.linear.percent().into()),
-            field("epochs_run", trial.epochs.into()),
-            field("seconds", trial.seconds.into()),
+            field(&format!("mean_{name}"), trial.scores.baselines.mean.percent().into()),
+            field(
+                &format!("linear_{name}"),
+                trial.scores.baselines.linear.percent().into(),
+            ),
+            field("epochs_run", trial.effort.epochs.into()),
+            field("seconds", trial.effort.seconds.into()),
         ]);
         fields
     }))
@@ -288,10 +283,10 @@ fn settings_fields(cell: &CellResults) -> Vec<Field> {
 
 /// Errors of a trial on a recording: over all targets, and of each in its unit.
 fn target_fields(trial: &Trial, targets: &[Channel]) -> Vec<Field> {
-    let errors = trial.errors.targets();
+    let errors = trial.scores.network.targets();
     let r2 = TargetErrors::over_all(errors).and_then(|errors| errors.r2);
     let mut fields = vec![
-        field("percent_of_range", trial.errors.percent().into()),
+        field("percent_of_range", trial.scores.network.percent().into()),
         field("r2", r2.into()),
     ];
     for (number, errors) in errors.iter().enumerate() {
@@ -344,7 +339,7 @@ pub fn write_experiment_markdown(
 pub fn describe_conditions(experiment: &Experiment) -> String {
     let base = &experiment.base;
     let simulation = base.simulation();
-    let varies = |kind| experiment.axes().any(|axis| axis.kind() == kind);
+    let varies = |kind| experiment.axes().any(|axis| axis.kind == kind);
     let mut said = vec![base.training.method.name().to_owned()];
     if let Some(recording) = &experiment.recording {
         said.insert(0, recording.name.clone());
@@ -352,10 +347,10 @@ pub fn describe_conditions(experiment: &Experiment) -> String {
             said.pop();
         }
     }
-    if let Some(source) = simulation.filter(|_| experiment.axis.kind() != AxisKind::Array) {
+    if let Some(source) = simulation.filter(|_| experiment.axis.kind != AxisKind::Array) {
         said.push(source.sensor.scale.to_string());
     }
-    if experiment.axis.kind() != AxisKind::Hidden {
+    if experiment.axis.kind != AxisKind::Hidden {
         said.push(counted(base.hidden, "hidden node"));
     }
     said.push(counted(base.training.stopping.epochs, "epoch"));
@@ -374,7 +369,7 @@ pub fn describe_conditions(experiment: &Experiment) -> String {
     said.extend(simulation.map(|source| describe_samples(source, experiment.cross_validation)));
     said.extend(division.map(|recording| describe_division(recording, varies(AxisKind::Split))));
     let mut conditions = said.join(", ");
-    if let Some(source) = simulation.filter(|_| experiment.axis.kind() == AxisKind::Hidden) {
+    if let Some(source) = simulation.filter(|_| experiment.axis.kind == AxisKind::Hidden) {
         let scale = source.sensor.scale;
         let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
         let (root, logarithm) = (suggested.square_root, suggested.logarithm);
@@ -453,12 +448,12 @@ pub fn describe_worse_than_mean(results: &ExperimentResults) -> Vec<String> {
 }
 
 fn is_worse_than_mean(trial: &Trial) -> bool {
-    let mean = &trial.mean;
-    match (trial.errors.nodes(), mean.nodes()) {
+    let mean = &trial.scores.baselines.mean;
+    match (trial.scores.network.nodes(), mean.nodes()) {
         (Some(errors), Some(mean)) => errors.z_mm > mean.z_mm,
         // An error that is not finite counts as worse.
         _ => mean
             .percent()
-            .is_some_and(|mean| trial.errors.percent().is_none_or(|percent| percent > mean)),
+            .is_some_and(|mean| trial.scores.network.percent().is_none_or(|percent| percent > mean)),
     }
 }

@@ -11,10 +11,9 @@ use super::{
 use crate::figure::Figure;
 use decoupler_core::{
     evaluation::{
-        TestErrors,
+        ErrorMeasure, TestErrors,
         experiments::{
-            Axis, AxisKind, CellResults, CellSummary, Experiment, ExperimentResults, Figure as Measured, SummaryErrors,
-            Trial,
+            Axis, AxisKind, CellResults, CellSummary, Experiment, ExperimentResults, Figure as Measured, Trial,
         },
     },
     network::HiddenSuggestions,
@@ -52,17 +51,17 @@ fn error_axis(results: &ExperimentResults) -> &'static str {
 }
 
 fn labels(axis: &Axis) -> Vec<String> {
-    (0..axis.len()).map(|index| axis.label(index)).collect()
+    (0..axis.values.len()).map(|index| axis.label(index)).collect()
 }
 
 fn heat_map(results: &ExperimentResults, summaries: &[CellSummary], rows: &Axis) -> HeatMap {
     let columns = &results.experiment.axis;
-    let shape = [rows.len(), columns.len()];
+    let shape = [rows.values.len(), columns.values.len()];
     let mut values = Array2::from_elem(shape, f64::NAN);
     let mut notes = Array2::from_elem(shape, String::new());
     for (cell, summary) in results.cells.iter().zip(summaries) {
         let at = [cell.cell.row, cell.cell.column];
-        let Measured { median, min, max, .. } = summary.percent;
+        let &Measured { median, min, max, .. } = summary.percent();
         values[at] = median.unwrap_or(f64::NAN);
         let name = results.cell_labels(cell).join(", ");
         notes[at] = format!("{name}: median {} {}", error_name(results), format_percent(median));
@@ -84,7 +83,7 @@ fn heat_map(results: &ExperimentResults, summaries: &[CellSummary], rows: &Axis)
 
 /// Position of a cell on the axis: the value itself, or its index in the list.
 fn position(axis: &Axis, index: usize, cell: &CellSummary) -> f64 {
-    match axis.kind() {
+    match axis.kind {
         AxisKind::Hidden => cell.cell.settings.hidden as f64,
         _ => index as f64,
     }
@@ -92,7 +91,7 @@ fn position(axis: &Axis, index: usize, cell: &CellSummary) -> f64 {
 
 fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure {
     let axis = &results.experiment.axis;
-    let is_number = axis.kind() == AxisKind::Hidden;
+    let is_number = axis.kind == AxisKind::Hidden;
     let mut cells: Vec<(f64, &CellSummary)> = summaries
         .iter()
         .enumerate()
@@ -110,7 +109,7 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
         false => Look::marker(Hue::Grey, Marker::Ring),
     };
     let ours = cells.iter().filter_map(|(x, cell)| {
-        let Measured { median, min, max, .. } = cell.percent;
+        let &Measured { median, min, max, .. } = cell.percent();
         Some(PlotPoint {
             bar: min.zip(max).map(|(least, largest)| [least, largest]),
             ..PlotPoint::from([*x, median?])
@@ -129,7 +128,7 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
             reference,
             points(|cell| cell.linear_percent),
         ),
-        Series::new("published", published, points(|cell| cell.percent.published)),
+        Series::new("published", published, points(|cell| cell.percent().published)),
         Series {
             points: ours.collect(),
             ..Series::new(
@@ -145,7 +144,7 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
         true => x.ticked(TickRule::Whole),
         false => x
             .ticked(TickRule::Names(labels(axis)))
-            .including([-0.5, axis.len() as f64 - 0.5]),
+            .including([-0.5, axis.values.len() as f64 - 0.5]),
     };
     let keys = series
         .iter()
@@ -182,12 +181,12 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
 
 /// R² of the networks along the axis; `None` for the nodes of an array.
 fn r2_plot(x: PlotAxis, cells: &[(f64, &CellSummary)], look: Look) -> Option<Plot> {
-    let points = cells.iter().map(|(x, cell)| match &cell.errors {
-        SummaryErrors::Nodes { .. } => None,
-        SummaryErrors::Targets { r2 } => Some(r2.median.map(|median| PlotPoint {
+    let points = cells.iter().map(|(x, cell)| {
+        let r2 = cell.error(ErrorMeasure::R2)?;
+        Some(r2.median.map(|median| PlotPoint {
             bar: r2.min.zip(r2.max).map(|(least, largest)| [least, largest]),
             ..PlotPoint::from([*x, median])
-        })),
+        }))
     });
     let points: Vec<_> = points.collect::<Option<_>>()?;
     let series = Series {
@@ -209,18 +208,18 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
     let errors: [(PlotAxis, PublishedError, TrialError); 3] = [
         (
             linear("Z error (%)"),
-            |cell| cell.percent.published,
+            |cell| cell.percent().published,
             TestErrors::percent,
         ),
         (
             linear("X error (%)"),
-            |cell| node_figures(cell)[0]?.published,
+            |cell| cell.error(ErrorMeasure::XPercent)?.published,
             |errors| errors.nodes()?.x_percent,
         ),
         // Y is constant, so its error may be exactly 0 or of the size of rounding errors.
         (
             PlotAxis::logarithmic("Y error (%)"),
-            |cell| node_figures(cell)[1]?.published,
+            |cell| cell.error(ErrorMeasure::YPercent)?.published,
             |errors| errors.nodes()?.y_percent,
         ),
     ];
@@ -253,7 +252,10 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
     let published = Key::new("published", Look::line(Hue::Ink, LineStyle::Dashed));
     let is_published = plots.iter().any(|plot| !plot.lines.is_empty());
     let keys = keys.chain(is_published.then_some(published)).collect();
-    let is_zero = |cell: &CellSummary| node_figures(cell)[1].is_some_and(|y| y.median == Some(0.0));
+    let is_zero = |cell: &CellSummary| {
+        cell.error(ErrorMeasure::YPercent)
+            .is_some_and(|y| y.median == Some(0.0))
+    };
     let note = "Y is constant: its error is 0 and lies below the axis.";
     PlotFigure {
         plots: plots.into(),
@@ -276,18 +278,8 @@ fn trial_points(experiment: &Experiment, cell: &CellResults, error: TrialError) 
     };
     let points = cell.trials.iter();
     points
-        .filter_map(|trial| Some([number(trial), error(&trial.errors)?]))
+        .filter_map(|trial| Some([number(trial), error(&trial.scores.network)?]))
         .collect()
-}
-
-/// Errors in x and y; `None` for a recording.
-fn node_figures(cell: &CellSummary) -> [Option<&Measured>; 2] {
-    match &cell.errors {
-        SummaryErrors::Nodes {
-            x_percent, y_percent, ..
-        } => [Some(x_percent), Some(y_percent)],
-        SummaryErrors::Targets { .. } => [None, None],
-    }
 }
 
 /// Returns the name of the trial axis of a cross-validation.

@@ -210,7 +210,7 @@ fn node_words(name: &str, point: &PlotPoint, node: usize, nodes_per_row: usize) 
 
 #[cfg(test)]
 mod tests {
-    use decoupler_core::sensor::{Axes, SensorModel};
+    use decoupler_core::sensor::{Axes, RelativeNoise, SensorModel};
     use glam::DVec3;
 
     use super::*;
@@ -261,7 +261,7 @@ mod tests {
     #[test]
     fn patterns_without_effect_are_not_on_a_logarithmic_axis() {
         let model = SensorModel::new("2x6_3x4".parse().unwrap());
-        let row = Identifiability::of_row(&model, 0, &[DVec3::ZERO; 6], Axes::Z).unwrap();
+        let row = Identifiability::of_row(&model, 0, &[DVec3::ZERO; 6], Axes::Z, RelativeNoise::default()).unwrap();
         let points = numbered(&row);
         assert_eq!((row.unknowns(), points.len()), (6, 4));
         assert_eq!(points[0], [1.0, row.singular_values_per_mm[0]]);

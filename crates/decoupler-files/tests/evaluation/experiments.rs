@@ -14,11 +14,8 @@ use std::{
 use decoupler_core::{
     dataset::{Seed, Simulation, SplitBy},
     evaluation::{
-        Begin, CrossValidation, Measured, Run, RunSets, RunSettings, TestErrors,
-        experiments::{
-            Axis, AxisKind, Experiment, ExperimentError, ExperimentResults, SummaryErrors, Trial, TrialSamples,
-            run_experiments,
-        },
+        Begin, CrossValidation, Effort, ErrorMeasure, Measured, Run, RunError, RunSets, RunSettings, TestErrors,
+        experiments::{Axis, AxisKind, Experiment, ExperimentResults, Trial, TrialSamples, run_experiments},
     },
     job::Job,
     machine::{MemoryBudget, MemorySource},
@@ -104,8 +101,11 @@ fn timeless(results: &[ExperimentResults]) -> Vec<Vec<Trial>> {
     let cells = results.iter().flat_map(|results| &results.cells);
     let trials = cells.map(|cell| {
         let timeless = |trial: &Trial| Trial {
-            seconds: 0.0,
-            min_epoch_seconds: 0.0,
+            effort: Effort {
+                seconds: 0.0,
+                min_epoch_seconds: 0.0,
+                ..trial.effort
+            },
             states: Vec::new(),
             ..trial.clone()
         };
@@ -144,9 +144,12 @@ fn a_trial_equals_the_run_with_its_settings() {
             let mut alone = Run::prepare(settings).unwrap();
             while alone.step().is_none() {}
             assert_eq!(trial.seed, Seed(seed));
-            assert_eq!(trial.errors, alone.scores().unwrap().network);
+            assert_eq!(trial.scores.network, alone.scores().unwrap().network);
             let baselines = alone.baselines().unwrap();
-            assert_eq!([&trial.mean, &trial.linear], [&baselines.mean, &baselines.linear]);
+            assert_eq!(
+                [&trial.scores.baselines.mean, &trial.scores.baselines.linear],
+                [&baselines.mean, &baselines.linear]
+            );
             let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
             let begin = Begin::Resume(trial.states.clone());
             let taken_up = Run::new(settings, sets, begin, &Job::UNINTERRUPTED).unwrap();
@@ -156,10 +159,10 @@ fn a_trial_equals_the_run_with_its_settings() {
         }
         z_percent.sort_by(f64::total_cmp);
         let summary = cell.summary();
-        let z = &summary.percent;
+        let z = summary.percent();
         assert_eq!([z.min, z.median, z.max].map(Option::unwrap), z_percent[..]);
         let median = cell.median_trial().unwrap();
-        assert_eq!(median.errors.percent(), Some(z_percent[1]));
+        assert_eq!(median.scores.network.percent(), Some(z_percent[1]));
     }
 }
 
@@ -171,13 +174,16 @@ fn cross_validation_decouples_every_sample_with_a_network_that_was_not_trained_o
         for cell in &run(&[experiment], 2)[0].cells {
             for trial in &cell.trials {
                 // A sample left out would be decoupled as (0, 0, 0), 4 mm below any node.
-                assert!(worst_mm(&trial.mean) < 1.0, "{unit}: {trial:?}");
-                assert!(worst_mm(&trial.errors) < 4.0, "{unit}: {trial:?}");
-                assert_eq!((trial.networks, trial.states.is_empty()), (4, true));
+                assert!(worst_mm(&trial.scores.baselines.mean) < 1.0, "{unit}: {trial:?}");
+                assert!(worst_mm(&trial.scores.network) < 4.0, "{unit}: {trial:?}");
+                assert_eq!((trial.effort.networks, trial.states.is_empty()), (4, true));
             }
             let [first, second] = [0, 1].map(|repeat| &cell.trials[repeat]);
             assert_eq!(first.seed, second.seed);
-            assert_ne!(first.errors, second.errors, "each repeat draws new folds");
+            assert_ne!(
+                first.scores.network, second.scores.network,
+                "each repeat draws new folds"
+            );
         }
     }
 }
@@ -264,7 +270,7 @@ fn a_cell_that_cannot_be_trained_gives_the_reason_and_the_others_continue() {
         message.contains("seed 0") && message.contains("memory") && message.contains("hidden nodes"),
         "{message}"
     );
-    assert_eq!(results.cells[1].summary().percent.median, None);
+    assert_eq!(results.cells[1].summary().percent().median, None);
 }
 
 #[test]
@@ -276,7 +282,9 @@ fn cells_with_networks_worse_than_the_mean_are_named() {
     let z_mm = |errors: &TestErrors| errors.nodes().unwrap().z_mm;
     let worse = |cell: usize| {
         let trials = results.cells[cell].trials.iter();
-        trials.filter(|trial| z_mm(&trial.errors) > z_mm(&trial.mean)).count()
+        trials
+            .filter(|trial| z_mm(&trial.scores.network) > z_mm(&trial.scores.baselines.mean))
+            .count()
     };
     assert!(worse(0) > 0, "one epoch of gradient descent is not enough");
     let sentences = describe_worse_than_mean(results);
@@ -381,9 +389,12 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
             .unwrap();
             while alone.step().is_none() {}
             assert_eq!(trial.seed, seed);
-            assert_eq!(trial.errors, alone.errors(), "cell {place}");
+            assert_eq!(trial.scores.network, alone.errors(), "cell {place}");
             let baselines = alone.baselines().unwrap();
-            assert_eq!([&trial.mean, &trial.linear], [&baselines.mean, &baselines.linear]);
+            assert_eq!(
+                [&trial.scores.baselines.mean, &trial.scores.baselines.linear],
+                [&baselines.mean, &baselines.linear]
+            );
             let sets = plan
                 .sets(Path::new(""), seed, &mut |_| ControlFlow::Continue(()))
                 .unwrap();
@@ -397,26 +408,26 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
             assert_eq!(taken_up.network(), alone.network());
         }
         let summary = cell.summary();
-        let SummaryErrors::Targets { r2 } = &summary.errors else {
-            panic!("a recording has targets");
-        };
+        let r2 = summary.error(ErrorMeasure::R2).expect("a recording has targets");
         let mean_r2 = |trial: &Trial| {
-            let targets = trial.errors.targets();
+            let targets = trial.scores.network.targets();
             Some((targets[0].r2.unwrap() + targets[1].r2.unwrap()) / 2.0)
         };
         assert_eq!(r2.values, cell.trials.iter().map(mean_r2).collect::<Vec<_>>());
         assert_eq!(
-            summary.percent.values,
+            summary.percent().values,
             cell.trials
                 .iter()
-                .map(|trial| trial.errors.percent())
+                .map(|trial| trial.scores.network.percent())
                 .collect::<Vec<_>>()
         );
     }
     // A split by time has the same test samples for each seed; other splits are drawn.
     let ridge = |cell: usize| {
         let trials = results.cells[cell].trials.iter();
-        trials.map(|trial| trial.linear.clone()).collect::<Vec<_>>()
+        trials
+            .map(|trial| trial.scores.baselines.linear.clone())
+            .collect::<Vec<_>>()
     };
     assert_eq!(ridge(0)[0], ridge(0)[1]);
     assert_ne!(ridge(2)[0], ridge(2)[1]);
@@ -460,7 +471,7 @@ fn axes_belong_to_their_source() {
     let message = |experiment: &Experiment| experiment.check().unwrap_err().to_string();
     for axis in [
         Axis::integers(AxisKind::Samples, [10]),
-        Axis::numbers(AxisKind::Noise, [0.1]),
+        Axis::parse(AxisKind::Noise, ["0.1"]).unwrap(),
         Axis::names(AxisKind::Array, [ArrayScale::default()]),
     ] {
         let name = axis.name();
@@ -488,7 +499,7 @@ fn axes_belong_to_their_source() {
         (small(hidden), samples_of(&setup)),
     ] {
         let refused = run_experiments(&[experiment], &samples, threads(1), || false, |one| panic!("{one:?}"));
-        assert_eq!(refused, Err(ExperimentError::OtherSamples));
+        assert_eq!(refused, Err(RunError::OtherSamples));
     }
 }
 

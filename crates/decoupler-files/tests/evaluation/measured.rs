@@ -82,7 +82,7 @@ fn a_network_learns_a_nonlinear_map_that_a_linear_map_cannot() {
     }
     let targets = scores.network.targets();
     assert!(targets.iter().all(|target| target.r2.unwrap() > 0.999));
-    assert_eq!(scores.nodes(), None, "there are no nodes");
+    assert_eq!(scores.network.nodes(), None, "there are no nodes");
     assert_eq!(baselines.model_based, None, "there is no model of the sensor");
 }
 
@@ -129,7 +129,7 @@ fn every_fold_is_answered_by_networks_not_trained_on_it() {
             by: unit,
         };
         let validated = validation
-            .run(&settings(RowModel::Shared), &set, 0, &Job::UNINTERRUPTED)
+            .run(&settings(RowModel::Shared), (&set, &set), 0, &Job::UNINTERRUPTED)
             .unwrap();
         validated.scores(&set).network.targets()[0].r2.unwrap()
     };

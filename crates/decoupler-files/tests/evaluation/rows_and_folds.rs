@@ -4,8 +4,8 @@ use decoupler_core::{
     dataset::{Dataset, Seed, Simulation, SplitBy, Stream},
     decoupling::{NewtonDecoder, decode_set},
     evaluation::{
-        CrossValidation, Errors, RunSettings,
-        experiments::{Axis, AxisKind, Experiment, ExperimentError, ExperimentResults, TrialSamples, run_experiments},
+        CrossValidation, Errors, RunError, RunSettings,
+        experiments::{Axis, AxisKind, Experiment, ExperimentResults, TrialSamples, run_experiments},
     },
     machine::MemoryBudget,
     scene::{Noise, NoisySets, Rows, Scene},
@@ -87,7 +87,7 @@ fn folds_are_counted_by_the_rows_read() {
         assert_eq!(experiment(rows, folds, unit).check().is_ok(), is_possible, "{sentence}");
     }
     let missing = experiment(Rows::One(4), 2, SplitBy::Random).check();
-    assert!(matches!(missing, Err(ExperimentError::Scene(_))), "{missing:?}");
+    assert!(matches!(missing, Err(RunError::Scene(_))), "{missing:?}");
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn cross_validation_by_samples_works_for_one_row_and_for_known_rows() {
         settings.simulation_mut().unwrap().samples = 240;
         let results = finished(experiment_on(settings, 3, SplitBy::Random));
         assert_eq!(results.cells[0].failures, []);
-        let errors = &results.cells[0].trials[0].errors;
+        let errors = &results.cells[0].trials[0].scores.network;
         assert!(errors.percent().unwrap() < 50.0, "{rows}: {errors:?}");
     }
 }
@@ -166,7 +166,7 @@ fn folds_are_tested_with_the_noise_of_the_test_set() {
             ..Noise::relative(relative)
         };
         let results = finished(experiment_on(settings, 4, SplitBy::Group));
-        results.cells[0].trials[0].errors.nodes().unwrap().z_mm
+        results.cells[0].trials[0].scores.network.nodes().unwrap().z_mm
     };
     let clean = z_mm(NoisySets::Both, 0.0);
     assert!(z_mm(NoisySets::Test, 0.2) > 1.1 * clean);

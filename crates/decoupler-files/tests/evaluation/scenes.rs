@@ -228,10 +228,10 @@ fn a_trade_off_has_a_point_for_every_choice() {
     // Five without a network; network in two precisions and polish, each with two numbers of hidden nodes.
     assert_eq!(points.len(), 5 + 2 * 3);
     assert_eq!(points.iter().filter(|point| point.hidden() == Some(3)).count(), 3);
-    let best = most_accurate_under(&points, f64::INFINITY).unwrap();
+    let best = &points[most_accurate_under(&points, f64::INFINITY).unwrap()];
     assert!(matches!(best.report.kind, DecoderKind::Newton | DecoderKind::Polish));
     assert!(fastest_under(&points, -1.0).is_none());
-    let fastest = fastest_under(&points, f64::INFINITY).unwrap();
+    let fastest = &points[fastest_under(&points, f64::INFINITY).unwrap()];
     assert!(
         points
             .iter()

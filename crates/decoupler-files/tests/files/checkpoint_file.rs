@@ -7,7 +7,7 @@ use decoupler_core::{
     evaluation::{Run, RunSettings},
     job::Job,
     sensor::SensorModel,
-    training::{EpochRecord, GradientDescentSettings, Method, StopReason},
+    training::{EpochRecord, Method, StopReason},
 };
 use decoupler_files::export::{CheckpointFile, DocumentError, NetworkFile};
 use tempfile::TempDir;
@@ -126,7 +126,7 @@ fn the_wall_time_is_that_of_all_sessions_or_unknown() {
 #[test]
 fn a_diverged_training_can_be_saved_and_continued_with_another_method() {
     let (_folder, path) = place();
-    let diverging = Method::GradientDescent(GradientDescentSettings { learning_rate: 1e3 });
+    let diverging = Method::GradientDescent { learning_rate: 1e3 };
     let mut run = stepped(settings(diverging), 9);
     assert_eq!(run.stop_reason(), Some(StopReason::Diverged));
     CheckpointFile::from_run(&run, None).unwrap().save(&path).unwrap();

@@ -3,7 +3,7 @@
 use decoupler_core::{
     dataset::Dataset,
     decoupling::{DecoderKind, Precision, decode_set},
-    evaluation::{DecoderReport, DecoderSet, Outlook, Run, RunDefect, RunSets, RunSettings},
+    evaluation::{DecoderReport, DecoderSet, Outlook, Run, RunSets, RunSettings, TestErrors},
     machine::MemoryBudget,
     ndarray::Array2,
     scene::{Loading, Rows},
@@ -35,7 +35,7 @@ fn z_mm(test: &Dataset, answers: &Array2<f64>) -> f64 {
 const EXPLAINED: f64 = 3.0;
 
 /// Returns the program's remark on a decoder that explains an error of this many times the mean's, if there is one.
-fn remark(report: &DecoderReport, times: f64, defect: Option<&RunDefect>, outlook: Option<&Outlook>) -> Option<String> {
+fn remark(report: &DecoderReport, times: f64, defect: Option<&str>, outlook: Option<&Outlook>) -> Option<String> {
     if let Some(remark) = report.remarks.first() {
         return Some(remark.to_string());
     }
@@ -52,7 +52,7 @@ struct Measured {
     run: Run,
     set: DecoderSet,
     outlook: Option<Outlook>,
-    defect: Option<RunDefect>,
+    defect: Option<String>,
     /// Error of always answering the mean of the training targets.
     mean_mm: f64,
 }
@@ -102,7 +102,7 @@ fn judge_decoder(seen: &Measured, settings: &RunSettings, kind: DecoderKind, pre
     let errors = *report.errors.nodes().expect("the targets are nodes");
     let found = z_mm(test, &answers);
     let times = found / seen.mean_mm;
-    let remark = remark(&report, times, seen.defect.as_ref(), seen.outlook.as_ref());
+    let remark = remark(&report, times, seen.defect.as_deref(), seen.outlook.as_ref());
     let or_flagged = |what: String| remark.as_ref().map_or_else(|| wrong(what), flagged);
     if !found.is_finite() || !errors.z_mm.is_finite() {
         return or_flagged(format!("{kind}: the error is {found}, without a reason"));
@@ -134,7 +134,7 @@ fn judge_decoder(seen: &Measured, settings: &RunSettings, kind: DecoderKind, pre
 fn judge_model_based(seen: &Measured, settings: &RunSettings) -> Verdict {
     let scene = settings.simulation().unwrap().scene;
     let baselines = seen.run.baselines().expect("they are measured");
-    let Some(found) = baselines.nodes().and_then(|baselines| baselines.model_based) else {
+    let Some(found) = baselines.model_based.as_ref().and_then(TestErrors::nodes) else {
         let note = baselines.model_based_note();
         return note.map_or_else(
             || wrong("there is no model-based row, and no reason"),
@@ -145,7 +145,7 @@ fn judge_model_based(seen: &Measured, settings: &RunSettings) -> Verdict {
         .set
         .measure(DecoderKind::Newton, Precision::Double, seen.run.test());
     let newton = report.ok().flatten().and_then(|report| report.errors.nodes().copied());
-    if newton != Some(found) {
+    if newton.as_ref() != Some(found) {
         return wrong(format!("the model-based errors are {found:?}, not {newton:?}"));
     }
     // Every node's depth is uniform, so the mean absolute error without readings is a quarter of the stroke.

@@ -237,7 +237,7 @@ pub fn facts_ui(ui: &mut Ui, analysis: &Analysis) {
         ui.label(text.color(Theme::of(ui).palette.good));
     }
     for warning in &analysis.warnings {
-        note_ui(ui, &format!("{}.", capitalised(&warning.to_string())));
+        note_ui(ui, &format!("{}.", capitalised(warning)));
     }
     ui.add_space(space(2));
     for (name, meaning, value) in facts(analysis) {

@@ -7,8 +7,8 @@ use std::time::Duration;
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
-        Baselines, Combination, ErrorTable, Errors, Initialization, NodeAddress, Outlook, Scores, Spread, StartRecord,
-        TestErrors, auto::Tried, best_start, error_remarks,
+        Combination, ErrorTable, Errors, Initialization, NodeAddress, Outlook, Scores, Spread, StartRecord, TestErrors,
+        auto::Tried, best_start, error_remarks,
     },
     identifiability::Identifiability,
     problem::Problem,
@@ -186,9 +186,9 @@ const NETWORK: &str = "network";
 fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
     let Some(reason) = run.stop_reason else { return };
     ui.add_space(space(2));
-    match (result.errors.nodes(), run.baselines.nodes()) {
-        (Some(errors), Some(baselines)) => {
-            verdict_on_nodes_ui(ui, (run, result, reason), errors, &baselines);
+    match (result.errors.nodes(), run.baselines.linear.nodes()) {
+        (Some(errors), Some(linear)) => {
+            verdict_on_nodes_ui(ui, (run, result, reason), errors, linear);
         }
         _ => verdict_on_targets_ui(ui, run, result),
     }
@@ -199,7 +199,7 @@ fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
 
 /// Remarks on the errors of a recording, or by how much the network is better than ridge regression.
 fn verdict_on_targets_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
-    let defect = result.defect.as_ref().map(|defect| capitalised(&defect.to_string()));
+    let defect = result.defect.as_ref().map(|defect| capitalised(defect));
     for remark in defect.iter().chain(&result.remarks) {
         note_ui(ui, &sentence(remark));
     }
@@ -226,16 +226,16 @@ fn verdict_on_nodes_ui(
     ui: &mut Ui,
     (run, result, reason): (&RunView, &RunResult, StopReason),
     errors: &Errors,
-    baselines: &Baselines<Errors>,
+    linear: &Errors,
 ) {
     let settings = run.settings();
     let remarks = error_remarks(settings, &run.scores(result), Some(reason));
     let of_network = remarks.iter().find(|(row, _)| *row == NETWORK);
     let fault = if let Some(defect) = &result.defect {
-        Some(defect.to_string())
+        Some(defect.clone())
     } else if let Some((row, remark)) = of_network {
         Some(format!("{row}: {remark}"))
-    } else if errors.z_mm > baselines.linear.z_mm {
+    } else if errors.z_mm > linear.z_mm {
         let remedy = reason.remedy(&settings.training.method);
         Some(format!(
             "a linear map of the resistances is better on z than this network: {remedy}"
@@ -246,8 +246,9 @@ fn verdict_on_nodes_ui(
     if let Some(fault) = fault {
         note_ui(ui, &sentence(&capitalised(&fault)));
     } else if errors.z_mm > 0.0 {
-        let times = format_number(baselines.linear.z_mm / errors.z_mm);
-        let ratio = baselines.model_based.and_then(|model_based| errors.times(&model_based));
+        let times = format_number(linear.z_mm / errors.z_mm);
+        let model_based = run.baselines.model_based.as_ref().and_then(TestErrors::nodes);
+        let ratio = model_based.and_then(|model_based| errors.times(model_based));
         let text = match ratio.map(format_number) {
             None => format!("On z {times} times as accurate as the linear map."),
             Some(ratio) => {

@@ -589,11 +589,15 @@ impl Search<'_> {
 
 /// Bayesian regularisation for recordings.
 fn regularized(correlation_epoch: f64) -> Method {
+    let usual = RegularizationSettings::recorded();
     Method::BayesianRegularization(RegularizationSettings {
-        mu: PER_NOISE * DAMPING.mu,
-        mu_decrease: DAMPING.mu_decrease,
+        damping: Damping {
+            mu: PER_NOISE * DAMPING.mu,
+            mu_decrease: DAMPING.mu_decrease,
+            ..usual.damping
+        },
         correlation_epoch,
-        ..RegularizationSettings::recorded()
+        ..usual
     })
 }
 

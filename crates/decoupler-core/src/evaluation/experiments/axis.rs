@@ -2,8 +2,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Cell;
 use crate::{
-    dataset::{Division, LARGEST_SAMPLES, Simulation},
-    evaluation::{MAX_STARTS, RunSettings, Source},
+    dataset::{Division, LARGEST_SAMPLES},
+    evaluation::{MAX_STARTS, RunSettings},
     network::LARGEST_HIDDEN,
     settings::{EPOCHS, Field, Kind, Setting, SettingError, Value},
     training::Method,
@@ -12,8 +12,10 @@ use crate::{
 /// A setting that an experiment varies, with its values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
-    kind: AxisKind,
-    values: Vec<Value>,
+    /// Setting that it varies.
+    pub kind: AxisKind,
+    /// Values of the setting.
+    pub values: Vec<Value>,
 }
 
 /// Setting that an axis varies.
@@ -44,80 +46,64 @@ pub enum AxisKind {
     Seed,
 }
 
-/// Rows of the settings of a cell, in the order of [`AxisKind::ALL`].
-static ROWS: [Setting<Cell>; 11] = [
-    row("hidden nodes", Kind::Integer(1, LARGEST_HIDDEN as u64), |cell| {
+const HIDDEN: Kind = Kind::Integer(1, LARGEST_HIDDEN as u64);
+const SAMPLES: Kind = Kind::Integer(1, LARGEST_SAMPLES as u64);
+const STARTS: Kind = Kind::Integer(1, MAX_STARTS as u64);
+
+/// Settings of a cell that an axis can vary, in the order of [`AxisKind`], which is the one offered to the user.
+static ROWS: [(AxisKind, Setting<Cell>); 11] = [
+    row(AxisKind::Hidden, "hidden nodes", HIDDEN, |cell| {
         Some(Field::Count(&mut cell.settings.hidden))
     }),
-    row("array", Kind::Text, |cell| {
-        simulation(cell).map(|source| Field::Text(&mut source.sensor.scale))
+    row(AxisKind::Array, "array", Kind::Text, |cell| {
+        let source = cell.settings.simulation_mut()?;
+        Some(Field::Text(&mut source.sensor.scale))
     }),
-    row("samples", Kind::Integer(1, LARGEST_SAMPLES as u64), |cell| {
-        simulation(cell).map(|source| Field::Count(&mut source.samples))
+    row(AxisKind::Samples, "samples", SAMPLES, |cell| {
+        let source = cell.settings.simulation_mut()?;
+        Some(Field::Count(&mut source.samples))
     }),
-    row("noise", Kind::Number("", 0.0, f64::MAX), |cell| {
-        simulation(cell).map(|source| Field::Number(&mut source.scene.noise.relative))
+    row(AxisKind::Noise, "noise", Kind::Number(0.0, f64::MAX), |cell| {
+        let source = cell.settings.simulation_mut()?;
+        Some(Field::Number(&mut source.scene.noise.relative))
     }),
-    row("inputs", Kind::Choice, |cell| {
-        let is_simulated = simulation(cell).is_some();
-        is_simulated.then_some(Field::Text(&mut cell.settings.inputs.quantity))
+    row(AxisKind::Inputs, "inputs", Kind::Choice, |cell| {
+        cell.settings.simulation()?;
+        Some(Field::Text(&mut cell.settings.inputs.quantity))
     }),
-    row("scaling", Kind::Choice, |cell| {
+    row(AxisKind::Scaling, "scaling", Kind::Choice, |cell| {
         Some(Field::Text(&mut cell.settings.inputs.scaling))
     }),
-    row("method", Kind::Choice, |cell| {
+    row(AxisKind::Method, "method", Kind::Choice, |cell| {
         Some(Field::Text(&mut cell.settings.training.method))
     }),
-    row(EPOCHS.name, EPOCHS.kind, |cell| {
+    row(AxisKind::Epochs, EPOCHS.name, EPOCHS.kind, |cell| {
         (EPOCHS.field)(&mut cell.settings.training.stopping)
     }),
-    row("starts", Kind::Integer(1, MAX_STARTS as u64), |cell| {
+    row(AxisKind::Starts, "starts", STARTS, |cell| {
         Some(Field::Count(&mut cell.settings.starts))
     }),
-    row("split", Kind::Choice, |cell| {
-        cell.division.as_mut().map(|division| Field::Text(&mut division.by))
+    row(AxisKind::Split, "split", Kind::Choice, |cell| {
+        Some(Field::Text(&mut cell.division.as_mut()?.by))
     }),
-    row("seed", Kind::Integer(0, u64::MAX), |cell| {
+    row(AxisKind::Seed, "seed", Kind::Integer(0, u64::MAX), |cell| {
         Some(Field::Integer(&mut cell.settings.seed.0))
     }),
 ];
 
-const fn row(name: &'static str, kind: Kind, field: fn(&mut Cell) -> Option<Field<'_>>) -> Setting<Cell> {
-    Setting {
-        name,
-        heading: "Axes",
-        help: "",
-        kind,
-        field,
-    }
-}
-
-fn simulation(cell: &mut Cell) -> Option<&mut Simulation> {
-    match &mut cell.settings.source {
-        Source::Simulated(simulation) => Some(simulation),
-        Source::Measured(_) => None,
-    }
+const fn row(
+    axis: AxisKind,
+    name: &'static str,
+    kind: Kind,
+    field: fn(&mut Cell) -> Option<Field<'_>>,
+) -> (AxisKind, Setting<Cell>) {
+    (axis, Setting::new(name, kind, "", field))
 }
 
 impl AxisKind {
-    /// All settings, in the order offered to the user.
-    pub const ALL: [Self; 11] = [
-        Self::Hidden,
-        Self::Array,
-        Self::Samples,
-        Self::Noise,
-        Self::Inputs,
-        Self::Scaling,
-        Self::Method,
-        Self::Epochs,
-        Self::Starts,
-        Self::Split,
-        Self::Seed,
-    ];
-
     /// Returns the row of the table of settings.
     pub fn setting(self) -> &'static Setting<Cell> {
-        &ROWS[self as usize]
+        &ROWS[self as usize].1
     }
 
     /// Name of the setting.
@@ -127,21 +113,13 @@ impl AxisKind {
 
     /// Returns the settings of runs with the source of `settings`, in the order offered to the user.
     pub fn of_runs(settings: &RunSettings) -> impl Iterator<Item = Self> + use<> {
-        let mut cell = any_cell();
-        cell.settings.source = settings.source;
-        cell.division = settings.simulation().is_none().then(Division::default);
-        Self::ALL.into_iter().filter(move |kind| kind.setting().applies(&cell))
-    }
-}
-
-/// Returns a cell that has every setting.
-fn any_cell() -> Cell {
-    Cell {
-        column: 0,
-        row: 0,
-        settings: RunSettings::default(),
-        division: Some(Division::default()),
-        published: None,
+        let cell = Cell {
+            settings: *settings,
+            division: settings.simulation().is_none().then(Division::default),
+            ..Cell::default()
+        };
+        let rows = ROWS.iter().filter(move |(_, setting)| setting.applies(&cell));
+        rows.map(|(kind, _)| *kind)
     }
 }
 
@@ -152,19 +130,10 @@ impl Axis {
         Self { kind, values }
     }
 
-    /// Creates an axis of numbers.
-    pub fn numbers(kind: AxisKind, values: impl IntoIterator<Item = f64>) -> Self {
-        let values = values.into_iter().map(Value::Number).collect();
-        Self { kind, values }
-    }
-
     /// Creates an axis of names.
     pub fn names(kind: AxisKind, values: impl IntoIterator<Item: ToString>) -> Self {
-        let values = values.into_iter().map(|value| Value::Text(value.to_string()));
-        Self {
-            kind,
-            values: values.collect(),
-        }
+        let values = values.into_iter().map(|value| Value::Text(value.to_string())).collect();
+        Self { kind, values }
     }
 
     /// Creates an axis from text.
@@ -172,7 +141,11 @@ impl Axis {
     /// # Errors
     /// The first text that is not a value of the setting.
     pub fn parse<'a>(kind: AxisKind, texts: impl IntoIterator<Item = &'a str>) -> Result<Self, SettingError> {
-        let (setting, mut cell) = (kind.setting(), any_cell());
+        let setting = kind.setting();
+        let mut cell = Cell {
+            division: Some(Division::default()),
+            ..Cell::default()
+        };
         let value = |text: &str| {
             let value = setting.parse(text)?;
             setting.set(&mut cell, &value)?;
@@ -183,29 +156,9 @@ impl Axis {
         Ok(Self { kind, values })
     }
 
-    /// Returns the setting that the axis varies.
-    pub fn kind(&self) -> AxisKind {
-        self.kind
-    }
-
     /// Returns the name of the setting.
     pub fn name(&self) -> &'static str {
         self.kind.name()
-    }
-
-    /// Returns the values.
-    pub fn values(&self) -> &[Value] {
-        &self.values
-    }
-
-    /// Number of values.
-    pub fn len(&self) -> usize {
-        self.values.len()
-    }
-
-    /// Returns `true` if there are no values.
-    pub fn is_empty(&self) -> bool {
-        self.values.is_empty()
     }
 
     /// Returns value `index` as text.

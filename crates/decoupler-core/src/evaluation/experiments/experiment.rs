@@ -1,13 +1,11 @@
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::{Axis, AxisKind};
 use crate::{
     dataset::{DatasetError, Division, Seed, SplitBy},
-    evaluation::{CountError, CrossValidation, PublishedErrors, RunSettings},
-    scene::SceneError,
+    evaluation::{CrossValidation, PublishedErrors, RunError, RunSettings},
     sensor::ArrayScale,
-    training::{SettingError, StoppingRules},
+    training::{StoppingRules, TrainingError},
 };
 
 /// Grid of cells over one or two axes, each cell run with several seeds.
@@ -43,7 +41,7 @@ pub struct ExperimentRecording {
 }
 
 /// Cell of the grid.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cell {
     /// Index of its value on the first axis.
     pub column: usize,
@@ -57,53 +55,6 @@ pub struct Cell {
     pub published: Option<PublishedErrors>,
 }
 
-/// Error in setting up an experiment.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum ExperimentError {
-    /// An axis has no values.
-    #[error("there are no values for {0}: give at least one")]
-    Empty(&'static str),
-    /// Both axes vary the same setting.
-    #[error("both axes vary {0}: choose two different ones")]
-    SameAxes(&'static str),
-    /// A number is out of range.
-    #[error(transparent)]
-    Count(#[from] CountError),
-    /// A setting of the method is out of range.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// The array has no such row-wire.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// Runs on this source do not have the setting.
-    #[error("{of} have no setting '{axis}': vary another one")]
-    NoSetting {
-        /// Name of the setting.
-        axis: &'static str,
-        /// Source of the samples.
-        of: &'static str,
-    },
-    /// The settings are those of another source than the samples.
-    #[error("settings and samples have different sources: one is simulated, the other recorded")]
-    OtherSamples,
-    /// A recording cannot be divided in this way.
-    #[error(transparent)]
-    Division(#[from] DatasetError),
-    /// A recording without groups is divided by group.
-    #[error("split group: the recording has no column of groups; choose one, or omit this split")]
-    NoGroups,
-    /// A recording is cross-validated.
-    #[error("a recording is divided again for each seed: give seeds instead of a cross-validation")]
-    CrossValidation,
-    /// There are too many trainings.
-    #[error("{0} trainings: give fewer values, seeds or repeats, so that there are at most {MAX_TRAININGS}")]
-    TooMany(usize),
-    /// The operating system provides no threads.
-    #[error("cannot start worker threads: {0}")]
-    Threads(String),
-}
-
 /// Maximum number of trainings in one experiment.
 const MAX_TRAININGS: usize = 1_000_000;
 
@@ -113,9 +64,11 @@ const MAX_TRIALS: usize = 1000;
 impl Experiment {
     /// Returns the cells, row by row; at least one if [`Self::check`] succeeds.
     pub fn cells(&self) -> Vec<Cell> {
-        let rows = self.second_axis.as_ref().map_or(1, Axis::len);
-        let places = (0..rows).flat_map(|row| (0..self.axis.len()).map(move |column| (row, column)));
-        places.map(|(row, column)| self.cell(row, column)).collect()
+        let rows = self.second_axis.as_ref().map_or(1, |axis| axis.values.len());
+        let columns = self.axis.values.len();
+        (0..rows * columns)
+            .map(|place| self.cell(place / columns, place % columns))
+            .collect()
     }
 
     fn cell(&self, row: usize, column: usize) -> Cell {
@@ -130,17 +83,8 @@ impl Experiment {
             // A value that the setting does not have is refused by `check`.
             let _ = axis.apply(index, &mut cell);
         }
-        cell.published = self.published(&cell.settings);
+        cell.published = cell.settings.published_by(self.cross_validation.is_some());
         cell
-    }
-
-    fn published(&self, settings: &RunSettings) -> Option<PublishedErrors> {
-        let simulation = settings.of_paper()?;
-        let published = match self.cross_validation {
-            None => PublishedErrors::of,
-            Some(_) => PublishedErrors::of_cross_validation,
-        };
-        published(simulation.sensor.scale, settings.hidden, simulation.samples)
     }
 
     /// Returns the axes, one or two.
@@ -150,105 +94,97 @@ impl Experiment {
 
     /// Returns the seeds of the cell with these settings.
     pub fn seeds_of(&self, settings: &RunSettings) -> impl Iterator<Item = Seed> + use<> {
-        let seeds = if self.axes().any(|axis| axis.kind() == AxisKind::Seed) {
-            1
-        } else {
-            self.seeds
-        };
-        let first = settings.seed.0;
+        let is_axis = self.axes().any(|axis| axis.kind == AxisKind::Seed);
+        let (first, seeds) = (settings.seed.0, if is_axis { 1 } else { self.seeds });
         (0..seeds as u64).map(move |offset| Seed(first.wrapping_add(offset)))
     }
 
-    /// Number of trials per seed.
-    pub(super) fn repeats(&self) -> usize {
-        self.cross_validation
-            .map_or(1, |cross_validation| cross_validation.repeats)
+    /// Returns the seed and the repeat of each trial of the cell with these settings.
+    pub(super) fn trials_of(&self, settings: &RunSettings) -> impl Iterator<Item = (Seed, usize)> + use<> {
+        let repeats = self.repeats_and_folds().0;
+        let of_seed = move |seed| (0..repeats).map(move |repeat| (seed, repeat));
+        self.seeds_of(settings).flat_map(of_seed)
     }
 
-    /// Number of networks trained per trial, each with the number of starts in the settings.
-    pub(super) fn folds(&self) -> usize {
+    /// Number of trials per seed, and of networks trained per trial, each with the number of starts in the settings.
+    pub(super) fn repeats_and_folds(&self) -> (usize, usize) {
         self.cross_validation
-            .map_or(1, |cross_validation| cross_validation.folds)
+            .map_or((1, 1), |validation| (validation.repeats, validation.folds))
     }
 
     /// Checks everything that can be checked before samples are drawn.
     ///
     /// # Errors
     /// The first problem found.
-    pub fn check(&self) -> Result<(), ExperimentError> {
-        if let Some(empty) = self.axes().find(|axis| axis.is_empty()) {
-            return Err(ExperimentError::Empty(empty.name()));
+    pub fn check(&self) -> Result<(), RunError> {
+        if let Some(empty) = self.axes().find(|axis| axis.values.is_empty()) {
+            return Err(RunError::NoValues(empty.name()));
         }
         if self
             .second_axis
             .as_ref()
-            .is_some_and(|second| second.kind() == self.axis.kind())
+            .is_some_and(|second| second.kind == self.axis.kind)
         {
-            return Err(ExperimentError::SameAxes(self.axis.name()));
+            return Err(RunError::SameAxes(self.axis.name()));
         }
-        for (what, count) in [("seeds", self.seeds), ("repeats", self.repeats())] {
-            let allowed = 1..=MAX_TRIALS;
-            if !allowed.contains(&count) {
-                return Err(CountError { what, count, allowed }.into());
-            }
-        }
-        let cells = self
-            .axes()
-            .fold(1, |cells: usize, axis| cells.saturating_mul(axis.len()));
-        let factors = [self.seeds, self.repeats(), self.folds(), self.base.starts];
-        let trainings = factors.into_iter().fold(cells, usize::saturating_mul);
+        let (repeats, folds) = self.repeats_and_folds();
+        RunError::check_count("seeds", self.seeds, 1..=MAX_TRIALS)?;
+        RunError::check_count("repeats", repeats, 1..=MAX_TRIALS)?;
+        let factors = [self.seeds, repeats, folds, self.base.starts];
+        let factors = self.axes().map(|axis| axis.values.len()).chain(factors);
+        let trainings = factors.fold(1, usize::saturating_mul);
         if trainings > MAX_TRAININGS {
-            return Err(ExperimentError::TooMany(trainings));
+            let max = MAX_TRAININGS;
+            return Err(RunError::TooManyTrainings { trainings, max });
         }
         self.check_source()?;
         self.cells().iter().try_for_each(|cell| self.check_cell(cell))
     }
 
     /// Checks that source and axes match.
-    fn check_source(&self) -> Result<(), ExperimentError> {
+    fn check_source(&self) -> Result<(), RunError> {
         let of = match (self.base.simulation(), &self.recording) {
             (Some(_), None) => "simulated arrays",
             (None, Some(_)) => "recordings",
-            _ => return Err(ExperimentError::OtherSamples),
+            _ => return Err(RunError::OtherSamples),
         };
+        if self.recording.is_some() && self.cross_validation.is_some() {
+            return Err(RunError::CrossValidation);
+        }
         for axis in self.axes() {
-            if !AxisKind::of_runs(&self.base).any(|kind| kind == axis.kind()) {
-                return Err(ExperimentError::NoSetting { axis: axis.name(), of });
+            if !AxisKind::of_runs(&self.base).any(|kind| kind == axis.kind) {
+                return Err(RunError::NoSetting { axis: axis.name(), of });
             }
             let mut cell = self.cell(0, 0);
-            (0..axis.len()).try_for_each(|index| axis.apply(index, &mut cell))?;
+            let mut values = 0..axis.values.len();
+            values
+                .try_for_each(|index| axis.apply(index, &mut cell))
+                .map_err(TrainingError::from)?;
         }
         Ok(())
     }
 
-    fn check_cell(&self, cell: &Cell) -> Result<(), ExperimentError> {
-        cell.settings.training.check()?;
+    fn check_cell(&self, cell: &Cell) -> Result<(), RunError> {
+        cell.settings.training.check().map_err(TrainingError::from)?;
         cell.settings.check_counts()?;
-        let Some(simulation) = cell.settings.simulation() else {
-            return self.check_recorded_cell(cell);
-        };
-        simulation.scene.check()?;
-        let Some(CrossValidation { folds, by, .. }) = self.cross_validation else {
-            return Ok(());
-        };
-        let rows = simulation.model_size()?.rows;
-        let snapshots = simulation.samples.div_ceil(rows);
-        let (units, unit) = match by {
-            SplitBy::Random => (snapshots * rows, "sample"),
-            SplitBy::Time | SplitBy::Group => (snapshots, "snapshot"),
-        };
-        Ok(DatasetError::check_folds(folds, units, unit)?)
-    }
-
-    fn check_recorded_cell(&self, cell: &Cell) -> Result<(), ExperimentError> {
-        if self.cross_validation.is_some() {
-            return Err(ExperimentError::CrossValidation);
-        }
-        if let Some((recording, division)) = self.recording.as_ref().zip(cell.division) {
+        if let (Some(recording), Some(division)) = (&self.recording, cell.division) {
             division.check()?;
             if division.by == SplitBy::Group && !recording.has_groups {
-                return Err(ExperimentError::NoGroups);
+                return Err(RunError::NoGroups);
             }
+        }
+        let Some(simulation) = cell.settings.simulation() else {
+            return Ok(());
+        };
+        simulation.scene.check()?;
+        if let Some(CrossValidation { folds, by, .. }) = self.cross_validation {
+            let rows = simulation.model_size()?.rows;
+            let snapshots = simulation.samples.div_ceil(rows);
+            let (units, unit) = match by {
+                SplitBy::Random => (snapshots * rows, "sample"),
+                SplitBy::Time | SplitBy::Group => (snapshots, "snapshot"),
+            };
+            DatasetError::check_folds(folds, units, unit)?;
         }
         Ok(())
     }
@@ -272,11 +208,7 @@ impl PaperTable {
 
     /// Number of the table in the paper.
     pub fn number(self) -> u8 {
-        match self {
-            Self::HiddenNodes => 1,
-            Self::CrossValidation => 2,
-            Self::ArrayScales => 3,
-        }
+        self as u8 + 1
     }
 
     /// Returns the title of the table.
@@ -297,27 +229,25 @@ impl PaperTable {
     /// starts are chosen to reproduce all tables in about a minute on two cores. All epochs are run; the validation set
     /// only selects the weights.
     pub fn experiment(self) -> Experiment {
-        let with = |axis, epochs, starts, cross_validation| {
-            let mut base = RunSettings::default();
-            base.training.stopping.epochs = epochs;
-            base.training.stopping.max_fail = StoppingRules::MAX_EPOCHS;
-            base.starts = starts;
-            Experiment {
-                base,
-                recording: None,
-                axis,
-                second_axis: None,
-                seeds: 5,
-                cross_validation,
-            }
-        };
-        match self {
-            Self::HiddenNodes => with(Axis::integers(AxisKind::Hidden, [6, 8, 10, 12, 14, 16]), 300, 3, None),
+        let (axis, epochs, starts, cross_validation) = match self {
+            Self::HiddenNodes => (Axis::integers(AxisKind::Hidden, [6, 8, 10, 12, 14, 16]), 300, 3, None),
             Self::CrossValidation => {
                 let sizes = Axis::integers(AxisKind::Samples, [1000, 100]);
-                with(sizes, 80, 1, Some(CrossValidation::default()))
+                (sizes, 80, 1, Some(CrossValidation::default()))
             }
-            Self::ArrayScales => with(Axis::names(AxisKind::Array, ArrayScale::PRESETS), 300, 3, None),
+            Self::ArrayScales => (Axis::names(AxisKind::Array, ArrayScale::PRESETS), 300, 3, None),
+        };
+        let mut base = RunSettings::default();
+        base.training.stopping.epochs = epochs;
+        base.training.stopping.max_fail = StoppingRules::MAX_EPOCHS;
+        base.starts = starts;
+        Experiment {
+            base,
+            recording: None,
+            axis,
+            second_axis: None,
+            seeds: 5,
+            cross_validation,
         }
     }
 }

@@ -11,7 +11,7 @@ mod runner;
 mod trial;
 
 pub use axis::{Axis, AxisKind};
-pub use experiment::{Cell, Experiment, ExperimentError, ExperimentRecording, PaperTable};
-pub use results::{CellResults, CellSummary, ExperimentResults, Figure, SummaryErrors};
+pub use experiment::{Cell, Experiment, ExperimentRecording, PaperTable};
+pub use results::{CellResults, CellSummary, ExperimentResults, Figure};
 pub use runner::{Finished, run_experiments, worker_threads};
 pub use trial::{RecordedSamples, Trial, TrialFailure, TrialSamples};

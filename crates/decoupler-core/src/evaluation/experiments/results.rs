@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{Cell, Experiment, Trial, TrialFailure};
 use crate::{
-    evaluation::{Errors, PublishedErrors, Spread, TargetErrors},
+    evaluation::{ErrorMeasure, Spread, table::Figures},
     problem::Problem,
 };
 
@@ -37,7 +37,7 @@ impl ExperimentResults {
     pub fn new(experiment: Experiment) -> Self {
         let cells = experiment.cells().into_iter().map(|cell| CellResults {
             cell,
-            expected: experiment.seeds_of(&cell.settings).count() * experiment.repeats(),
+            expected: experiment.trials_of(&cell.settings).count(),
             trials: Vec::new(),
             failures: Vec::new(),
         });
@@ -56,18 +56,14 @@ impl ExperimentResults {
     /// # Panics
     /// If there is no such cell.
     pub fn record(&mut self, cell: usize, outcome: Result<Trial, TrialFailure>) {
-        let cell = &mut self.cells[cell];
+        fn insert<T>(sorted: &mut Vec<T>, one: T, key: impl Fn(&T) -> (u64, usize)) {
+            let place = sorted.partition_point(|other| key(other) < key(&one));
+            sorted.insert(place, one);
+        }
+        let CellResults { trials, failures, .. } = &mut self.cells[cell];
         match outcome {
-            Ok(trial) => {
-                let key = |trial: &Trial| (trial.seed.0, trial.repeat);
-                let place = cell.trials.partition_point(|other| key(other) < key(&trial));
-                cell.trials.insert(place, trial);
-            }
-            Err(failure) => {
-                let key = |failure: &TrialFailure| (failure.seed.0, failure.repeat);
-                let place = cell.failures.partition_point(|other| key(other) < key(&failure));
-                cell.failures.insert(place, failure);
-            }
+            Ok(trial) => insert(trials, trial, |trial| (trial.seed.0, trial.repeat)),
+            Err(failure) => insert(failures, failure, |failure| (failure.seed.0, failure.repeat)),
         }
     }
 
@@ -92,28 +88,10 @@ impl CellResults {
         self.trials.len() + self.failures.len() == self.expected
     }
 
-    /// Returns the spread of a figure over the trials that have it.
-    pub fn spread(&self, figure: impl Fn(&Trial) -> Option<f64>) -> Option<Spread> {
-        Spread::of(self.trials.iter().filter_map(figure))
-    }
-
-    /// Returns the spread of [`TestErrors::percent`](crate::evaluation::TestErrors::percent) over the trials.
-    pub fn percent(&self) -> Option<Spread> {
-        self.spread(|trial| trial.errors.percent())
-    }
-
-    /// Returns the time of the fastest epoch, which is least affected by other load on the machine.
-    pub fn min_epoch_seconds(&self) -> Option<f64> {
-        self.spread(|trial| Some(trial.min_epoch_seconds))
-            .map(|spread| spread.smallest)
-    }
-
     /// Returns the trial with the median error in percent (the lower of two), as representative for the cell.
     pub fn median_trial(&self) -> Option<&Trial> {
-        let with_errors = self
-            .trials
-            .iter()
-            .filter_map(|trial| Some((trial, trial.errors.percent()?)));
+        let percent = |trial: &Trial| trial.scores.network.percent();
+        let with_errors = self.trials.iter().filter_map(|trial| Some((trial, percent(trial)?)));
         let mut trials: Vec<_> = with_errors.collect();
         trials.sort_by(|(_, one), (_, other)| one.total_cmp(other));
         let middle = trials.len().checked_sub(1)? / 2;
@@ -130,11 +108,8 @@ pub struct CellSummary {
     pub trials: usize,
     /// Number of trials planned.
     pub expected_trials: usize,
-    /// Error of the network in percent, by which cells are ranked: see
-    /// [`TestErrors::percent`](crate::evaluation::TestErrors::percent).
-    pub percent: Figure,
-    /// Further errors on the nodes of an array, or on the targets of a recording.
-    pub errors: SummaryErrors,
+    /// Errors of the network, the first of which ranks the cells: see [`TestErrors::figure`](crate::evaluation::TestErrors::figure).
+    pub errors: Vec<(ErrorMeasure, Figure)>,
     /// Error in percent of always answering the mean of the training set.
     pub mean_percent: Option<f64>,
     /// Error in percent of the linear baseline.
@@ -147,23 +122,28 @@ pub struct CellSummary {
     pub epoch_ms: Option<f64>,
 }
 
-/// Errors of a cell in addition to the one by which it is ranked.
-#[derive(Clone, Debug, PartialEq)]
-pub enum SummaryErrors {
-    /// Errors on the nodes of an array.
-    Nodes {
-        /// AveXerr, in percent.
-        x_percent: Figure,
-        /// AveYerr, in percent.
-        y_percent: Figure,
-        /// Mean |decoupled z − z|, in millimetres.
-        z_mm: Figure,
-    },
-    /// Errors on the targets of a recording.
-    Targets {
-        /// Coefficient of determination R², the mean over the targets that vary.
-        r2: Figure,
-    },
+impl CellSummary {
+    /// Errors of the nodes of an array.
+    const OF_NODES: &[ErrorMeasure] = &[
+        ErrorMeasure::ZPercent,
+        ErrorMeasure::XPercent,
+        ErrorMeasure::YPercent,
+        ErrorMeasure::ZMm,
+    ];
+    /// Errors over all targets of a recording.
+    const OF_TARGETS: &[ErrorMeasure] = &[ErrorMeasure::RangePercent, ErrorMeasure::R2];
+
+    /// Returns the error in percent by which cells are ranked.
+    pub fn percent(&self) -> &Figure {
+        &self.errors[0].1
+    }
+
+    /// Returns this error; `None` if the source has another one.
+    pub fn error(&self, measure: ErrorMeasure) -> Option<&Figure> {
+        self.errors
+            .iter()
+            .find_map(|(of, figure)| (*of == measure).then_some(figure))
+    }
 }
 
 /// Measured figure, with the published one for comparison.
@@ -192,47 +172,37 @@ impl CellResults {
     /// Returns the figures of this cell.
     pub fn summary(&self) -> CellSummary {
         let settings = &self.cell.settings;
-        let median = |figure: fn(&Trial) -> Option<f64>| self.spread(figure).map(|spread| spread.median);
-        let starts = settings.starts;
-        let epochs_run = self.spread(|trial| Some(trial.epochs as f64 / (trial.networks * starts).max(1) as f64));
+        let spread = |figure: &dyn Fn(&Trial) -> Option<f64>| Spread::of(self.trials.iter().filter_map(figure));
+        let median = |figure: &dyn Fn(&Trial) -> Option<f64>| spread(figure).map(|spread| spread.median);
+        let figure = |measure: ErrorMeasure| {
+            let measured = |trial: &Trial| trial.scores.network.figure(measure);
+            let spread = spread(&measured);
+            let published = self.cell.published.as_ref();
+            Figure {
+                published: published.and_then(|published| measure.of(Figures::Published(published))),
+                median: spread.map(|spread| spread.median),
+                min: spread.map(|spread| spread.smallest),
+                max: spread.map(|spread| spread.largest),
+                values: self.trials.iter().map(measured).collect(),
+            }
+        };
+        let measures = match settings.simulation() {
+            Some(_) => CellSummary::OF_NODES,
+            None => CellSummary::OF_TARGETS,
+        };
+        let epochs =
+            |trial: &Trial| trial.effort.epochs as f64 / (trial.effort.networks * settings.starts).max(1) as f64;
+        let seconds = |trial: &Trial| trial.effort.seconds / trial.effort.networks.max(1) as f64;
         CellSummary {
             cell: self.cell,
             trials: self.trials.len(),
             expected_trials: self.expected,
-            percent: self.figure(|published| Some(published.z_percent), |trial| trial.errors.percent()),
-            errors: match settings.simulation() {
-                Some(_) => self.node_errors(),
-                None => SummaryErrors::Targets {
-                    r2: self.figure(|_| None, |trial| TargetErrors::over_all(trial.errors.targets())?.r2),
-                },
-            },
-            mean_percent: median(|trial| trial.mean.percent()),
-            linear_percent: median(|trial| trial.linear.percent()),
-            epochs_run: epochs_run.map(|spread| spread.median),
-            training_seconds: median(|trial| Some(trial.seconds_per_network())),
-            epoch_ms: self.min_epoch_seconds().map(|seconds| 1e3 * seconds),
-        }
-    }
-
-    fn node_errors(&self) -> SummaryErrors {
-        fn nodes(trial: &Trial) -> Option<&Errors> {
-            trial.errors.nodes()
-        }
-        SummaryErrors::Nodes {
-            x_percent: self.figure(|published| Some(published.x_percent), |trial| nodes(trial)?.x_percent),
-            y_percent: self.figure(|published| Some(published.y_percent), |trial| nodes(trial)?.y_percent),
-            z_mm: self.figure(|_| None, |trial| Some(nodes(trial)?.z_mm)),
-        }
-    }
-
-    fn figure(&self, published: fn(&PublishedErrors) -> Option<f64>, measured: fn(&Trial) -> Option<f64>) -> Figure {
-        let spread: Option<Spread> = self.spread(measured);
-        Figure {
-            published: self.cell.published.as_ref().and_then(published),
-            median: spread.map(|spread| spread.median),
-            min: spread.map(|spread| spread.smallest),
-            max: spread.map(|spread| spread.largest),
-            values: self.trials.iter().map(measured).collect(),
+            errors: measures.iter().map(|&measure| (measure, figure(measure))).collect(),
+            mean_percent: median(&|trial| trial.scores.baselines.mean.percent()),
+            linear_percent: median(&|trial| trial.scores.baselines.linear.percent()),
+            epochs_run: median(&|trial| Some(epochs(trial))),
+            training_seconds: median(&|trial| Some(seconds(trial))),
+            epoch_ms: spread(&|trial| Some(trial.effort.min_epoch_seconds)).map(|spread| 1e3 * spread.smallest),
         }
     }
 }
@@ -242,7 +212,7 @@ mod tests {
     use super::*;
     use crate::{
         dataset::Seed,
-        evaluation::{Errors, NodeAddress, TestErrors, experiments::PaperTable},
+        evaluation::{Baselines, Effort, Errors, NodeAddress, Scores, TestErrors, experiments::PaperTable},
     };
 
     fn errors(z_percent: f64) -> TestErrors {
@@ -262,13 +232,21 @@ mod tests {
         Trial {
             seed: Seed(seed),
             repeat: 0,
-            errors: errors(z_percent),
-            mean: errors(5.5),
-            linear: errors(1.6),
-            networks: 1,
-            epochs: 10,
-            seconds: 10.0,
-            min_epoch_seconds: 1.0,
+            scores: Scores {
+                network: errors(z_percent),
+                baselines: Baselines {
+                    mean: errors(5.5),
+                    linear: errors(1.6),
+                    model_based: None,
+                },
+                coverage: Vec::new(),
+            },
+            effort: Effort {
+                networks: 1,
+                epochs: 10,
+                seconds: 10.0,
+                min_epoch_seconds: 1.0,
+            },
             states: Vec::new(),
         }
     }
@@ -288,7 +266,8 @@ mod tests {
         assert_eq!(backwards.cells[2].trials, trials);
         assert_eq!(forwards.cells[2].median_trial().unwrap().seed, Seed(2));
         assert!(!forwards.cells[2].is_complete());
-        let z = forwards.cells[2].summary().percent;
+        let summary = forwards.cells[2].summary();
+        let z = summary.percent();
         assert_eq!(
             [z.published, z.min, z.median, z.max],
             [Some(2.37), Some(1.0), Some(2.5), Some(9.0)]

@@ -11,13 +11,8 @@ use std::{
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::{Cell, Experiment, ExperimentError, Trial, TrialFailure, TrialSamples};
-use crate::{
-    dataset::Seed,
-    evaluation::{CrossValidation, RunError, RunSettings},
-    job::{Cancelled, Job},
-    network::Shape,
-};
+use super::{Cell, Experiment, RecordedSamples, Trial, TrialFailure, TrialSamples};
+use crate::{dataset::Seed, evaluation::RunError, job::Job, network::Shape};
 
 /// A finished trial.
 #[derive(Clone, Debug)]
@@ -60,40 +55,39 @@ pub fn run_experiments(
     threads: NonZero<usize>,
     is_cancelled: impl Fn() -> bool + Sync,
     mut on_finished: impl FnMut(Finished),
-) -> Result<(), ExperimentError> {
+) -> Result<(), RunError> {
     for experiment in experiments {
         experiment.check()?;
         if experiment.recording.is_some() != matches!(samples, TrialSamples::Recorded(_)) {
-            return Err(ExperimentError::OtherSamples);
+            return Err(RunError::OtherSamples);
         }
     }
-    let jobs = queue(experiments, samples);
-    let all_work: f64 = jobs.iter().map(|job| job.work).sum();
+    let planned = planned(experiments, samples);
+    let all_work: f64 = planned.iter().map(|trial| trial.work).sum();
     let (mut work, mut seconds) = (0.0, 0.0);
-    let threads = threads.get().min(jobs.len());
+    let threads = threads.get().min(planned.len());
     // One single-threaded pool per worker: parallel code within a training stays on its thread, so that other trainings
     // do not affect its times.
     let pool = |_| {
-        ThreadPoolBuilder::new()
-            .num_threads(1)
-            .thread_name(|_| "experiment".to_owned())
-            .build()
+        let builder = ThreadPoolBuilder::new().num_threads(1);
+        builder.thread_name(|_| "experiment".to_owned()).build()
     };
     let pools: Result<Vec<ThreadPool>, _> = (0..threads).map(pool).collect();
-    let pools = pools.map_err(|error| ExperimentError::Threads(error.to_string()))?;
+    let pools = pools.map_err(|error| RunError::Threads(error.to_string()))?;
     let next = AtomicUsize::new(0);
     let (sender, receiver) = channel();
     thread::scope(|scope| {
         let workers = Vec::from_iter(pools.iter().map(|pool| {
-            let (sender, jobs, next, is_cancelled) = (sender.clone(), &jobs, &next, &is_cancelled);
+            let (sender, planned, next, is_cancelled) = (sender.clone(), &planned, &next, &is_cancelled);
             let work_off = move || {
-                while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
+                while let Some(trial) = planned.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let begun = Instant::now();
-                    let Ok(outcome) = job.run(samples, &Job::new(is_cancelled)) else {
-                        break;
-                    };
+                    let (of, at) = (&trial.cell, trial.seed_and_repeat);
+                    let outcome = Trial::run(trial.experiment, of, at, samples, &Job::new(is_cancelled));
                     // The receiver is dropped only if the calling thread panicked.
-                    if sender.send((job, outcome, begun.elapsed())).is_err() {
+                    if matches!(outcome, Err(RunError::Cancelled(_)))
+                        || sender.send((trial, outcome, begun.elapsed())).is_err()
+                    {
                         break;
                     }
                 }
@@ -101,15 +95,16 @@ pub fn run_experiments(
             scope.spawn(move || pool.install(work_off))
         }));
         drop(sender);
-        for (done, (job, outcome, took)) in (1..).zip(receiver) {
-            work += job.work;
+        for (done, (trial, outcome, took)) in (1..).zip(receiver) {
+            work += trial.work;
             seconds += took.as_secs_f64();
+            let (seed, repeat) = trial.seed_and_repeat;
             on_finished(Finished {
-                experiment: job.experiment,
-                cell: job.cell,
-                outcome,
+                experiment: trial.place.0,
+                cell: trial.place.1,
+                outcome: outcome.map_err(|reason| TrialFailure { seed, repeat, reason }),
                 done,
-                trials: jobs.len(),
+                trials: planned.len(),
                 time_left: time_left((work, all_work), seconds, threads),
             });
         }
@@ -122,95 +117,63 @@ pub fn run_experiments(
 }
 
 /// A single trial.
-struct TrialJob {
-    experiment: usize,
-    cell: usize,
-    /// Settings of the cell.
-    of_cell: Cell,
-    seed: Seed,
-    cross_validation: Option<CrossValidation>,
-    repeat: usize,
+struct Planned<'a> {
+    experiment: &'a Experiment,
+    cell: Cell,
+    /// Indices of the experiment and of the cell.
+    place: (usize, usize),
+    seed_and_repeat: (Seed, usize),
     /// Approximate number of multiplications.
     work: f64,
     /// Number of earlier trials of the same cell.
     round: usize,
 }
 
-/// Returns the jobs in the order of execution: first one trial of every cell, so that preliminary tables appear early, then
-/// the second trials, and so on; in each round the longest first, so that no core is idle for long at the end.
-fn queue(experiments: &[Experiment], samples: &TrialSamples) -> Vec<TrialJob> {
-    let mut jobs: Vec<TrialJob> = Vec::new();
+/// Returns the trials in the order of execution: first one trial of every cell, so that preliminary tables appear early,
+/// then the second trials, and so on; in each round the longest first, so that no core is idle for long at the end.
+fn planned<'a>(experiments: &'a [Experiment], samples: &TrialSamples) -> Vec<Planned<'a>> {
+    let mut planned = Vec::new();
     for (number, experiment) in experiments.iter().enumerate() {
-        for (cell_number, cell) in experiment.cells().iter().enumerate() {
-            let work = work(experiment, cell, samples);
-            let seeds = experiment.seeds_of(&cell.settings);
-            let trials = seeds.flat_map(|seed| (0..experiment.repeats()).map(move |repeat| (seed, repeat)));
-            jobs.extend(trials.enumerate().map(|(round, (seed, repeat))| TrialJob {
-                experiment: number,
-                cell: cell_number,
-                of_cell: *cell,
-                seed,
-                cross_validation: experiment.cross_validation,
-                repeat,
+        for (cell_number, cell) in experiment.cells().into_iter().enumerate() {
+            let work = work(experiment, &cell, samples);
+            let trials = experiment.trials_of(&cell.settings).enumerate();
+            planned.extend(trials.map(|(round, seed_and_repeat)| Planned {
+                experiment,
+                cell,
+                place: (number, cell_number),
+                seed_and_repeat,
                 work,
                 round,
             }));
         }
     }
-    jobs.sort_by(|one, other| one.round.cmp(&other.round).then(other.work.total_cmp(&one.work)));
-    jobs
+    planned.sort_by(|one, other| one.round.cmp(&other.round).then(other.work.total_cmp(&one.work)));
+    planned
 }
 
-impl TrialJob {
-    /// Runs the trial.
-    fn run(&self, samples: &TrialSamples, job: &Job<'_>) -> Result<Result<Trial, TrialFailure>, Cancelled> {
-        job.check()?;
-        let trial = match self.cross_validation {
-            None => Trial::on_sets(&self.of_cell, self.seed, samples, job),
-            Some(validation) => {
-                let settings = RunSettings {
-                    seed: self.seed,
-                    ..self.of_cell.settings
-                };
-                Trial::by_cross_validation(settings, validation, self.repeat, job)
-            }
-        };
-        match trial {
-            Err(RunError::Cancelled(cancelled)) => Err(cancelled),
-            trial => Ok(trial.map_err(|reason| TrialFailure {
-                seed: self.seed,
-                repeat: self.repeat,
-                reason,
-            })),
-        }
-    }
-}
-
-/// Estimates the time until all jobs are finished, at the speed of the finished ones: `work` of all `all_work`
+/// Estimates the time until all trials are finished, at the speed of the finished ones: `work` of all `all_work`
 /// multiplications in `seconds` on one thread.
 fn time_left((work, all_work): (f64, f64), seconds: f64, threads: usize) -> Option<Duration> {
     Duration::try_from_secs_f64((all_work - work) * seconds / (work * threads as f64)).ok()
 }
 
-/// Approximate number of multiplications in one job of `cell`, if it runs all of its epochs.
+/// Approximate number of multiplications in one trial of `cell`, if it runs all of its epochs.
 fn work(experiment: &Experiment, cell: &Cell, samples: &TrialSamples) -> f64 {
     let settings = &cell.settings;
-    let (inputs, outputs, samples) = match (settings.simulation(), samples) {
-        (Some(source), _) => {
+    let sizes = match samples {
+        TrialSamples::Recorded(RecordedSamples { set, .. }) => Some((set.channels(), set.outputs(), set.samples())),
+        TrialSamples::Drawn(_) => settings.simulation().map(|source| {
             let scale = source.sensor.scale;
             (scale.columns(), scale.coordinates_per_row(), source.samples)
-        }
-        (None, TrialSamples::Recorded(recorded)) => {
-            (recorded.set.channels(), recorded.set.outputs(), recorded.set.samples())
-        }
-        (None, TrialSamples::Drawn(_)) => (1, 1, 1),
+        }),
     };
+    let (inputs, outputs, samples) = sizes.unwrap_or((1, 1, 1));
     let shape = Shape {
         inputs,
         hidden: settings.hidden,
         outputs,
     };
-    let epochs = experiment.folds() * settings.starts * settings.training.stopping.epochs;
+    let epochs = experiment.repeats_and_folds().1 * settings.starts * settings.training.stopping.epochs;
     settings.training.method.epoch_multiplications(shape, samples) * epochs as f64
 }
 

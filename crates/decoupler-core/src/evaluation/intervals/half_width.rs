@@ -44,26 +44,18 @@ impl HalfWidth {
             return None;
         }
         let (constant, effective_samples) = conformal_quantile(errors, evidence)?;
-        let points = (effective_samples / Self::SAMPLES_PER_POINT) as usize;
-        let points = points.min(Self::MAX_POINTS);
+        let points = ((effective_samples / Self::SAMPLES_PER_POINT) as usize).min(Self::MAX_POINTS);
         let all = Vec::from_iter(0..errors.len());
         let scaled = folds.and_then(|folds| {
             let spreads = held_out_spreads(answers, errors, folds, points)?;
-            let scores: Vec<f64> = errors
-                .iter()
-                .zip(&spreads)
-                .map(|(error, spread)| error / spread)
-                .collect();
+            let scores = Vec::from_iter(errors.iter().zip(&spreads).map(|(error, spread)| error / spread));
             // Mean half-widths at a coverage that is exactly the nominal one on the held-out samples.
             let mean_spread = spreads.iter().sum::<f64>() / spreads.len() as f64;
             let is_narrower = quantile(&scores, Intervals::NOMINAL) * mean_spread
                 < (1.0 - Self::MIN_GAIN) * quantile(errors, Intervals::NOMINAL);
-            let points = spread_points(answers, errors, &all, points)?;
+            let mut points = spread_points(answers, errors, &all, points)?;
             let (factor, effective_samples) = conformal_quantile(&scores, evidence).filter(|_| is_narrower)?;
-            let points: Points = points
-                .into_iter()
-                .map(|[answer, spread]| [answer, factor * spread])
-                .collect();
+            points.iter_mut().for_each(|[_, spread]| *spread *= factor);
             Some((points, effective_samples))
         });
         let (by_answer, effective_samples) = scaled.unwrap_or((Points::new(), effective_samples));

@@ -137,23 +137,20 @@ impl Intervals {
     pub fn coverage(&self, test: &Dataset, answers: ArrayView2<'_, f64>, by: SplitBy) -> Vec<Option<Coverage>> {
         assert_eq!(test.targets().dim(), answers.dim());
         let evidence = Evidence::of(test, by);
-        let targets = test.targets();
         let of = |(target, half_width): (usize, &Option<HalfWidth>)| {
-            let (truth, answers) = (targets.column(target), answers.column(target));
-            Some(
-                half_width
-                    .as_ref()?
-                    .coverage(truth.iter().copied().zip(answers.iter().copied()).collect(), &evidence),
-            )
+            let half_width = half_width.as_ref()?;
+            let (truth, answers) = (test.targets().column(target).to_vec(), answers.column(target));
+            let pairs = truth.into_iter().zip(answers.iter().copied());
+            Some(half_width.coverage(pairs.collect(), &evidence))
         };
         self.targets.iter().enumerate().map(of).collect()
     }
 
     /// Describes the first invalid value, for files.
-    pub fn check(&self, targets: usize) -> Result<(), IntervalsDefect> {
+    pub fn check(&self, targets: usize) -> Result<(), NoIntervals> {
         if self.targets.len() != targets {
             let found = self.targets.len();
-            return Err(IntervalsDefect::Targets {
+            return Err(NoIntervals::Targets {
                 found,
                 expected: targets,
             });
@@ -166,13 +163,13 @@ impl Intervals {
                 && half_width.by_answer.windows(2).all(|pair| pair[0][0] < pair[1][0])
         };
         match self.targets.iter().position(|of| !of.as_ref().is_none_or(is_valid)) {
-            Some(target) => Err(IntervalsDefect::HalfWidth(target)),
+            Some(target) => Err(NoIntervals::HalfWidth(target)),
             None => Ok(()),
         }
     }
 }
 
-/// Reason why a network has no intervals.
+/// Reason why a network has no intervals, or saved ones are not valid.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum NoIntervals {
     /// No target has enough effective samples.
@@ -189,12 +186,7 @@ pub enum NoIntervals {
     /// A training failed.
     #[error(transparent)]
     Run(#[from] RunError),
-}
-
-/// Invalid value of intervals.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-pub enum IntervalsDefect {
-    /// The number of intervals is not the number of targets.
+    /// The number of saved intervals is not the number of targets.
     #[error("{} for {}", counted(*.found, "interval"), counted(*.expected, "target"))]
     Targets {
         /// Number of intervals.
@@ -202,7 +194,7 @@ pub enum IntervalsDefect {
         /// Number of targets.
         expected: usize,
     },
-    /// A half-width is negative or not finite, or its answers are not ascending.
+    /// A saved half-width is negative or not finite, or its answers are not ascending.
     #[error("the interval of target {0} is not valid")]
     HalfWidth(usize),
 }

@@ -1,13 +1,10 @@
-//! Bayesian regularisation (`trainbr`): `state` is what a checkpoint keeps, and `weighting` estimates it from the data.
+//! Bayesian regularisation (`trainbr`): `weighting` estimates strengths of regularisation and noise levels from the data.
 
-mod state;
 #[cfg(test)]
 mod tests;
 mod weighting;
 
-pub use state::BayesianState;
-
-use state::{GroupState, TargetState};
+use serde::{Deserialize, Serialize};
 
 use super::{
     Evaluation, Examples, RegularizationSettings, StopReason,
@@ -72,33 +69,69 @@ pub(super) struct BayesianRegularization {
     scaled: Mlp,
 }
 
+/// State of Bayesian regularisation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BayesianState {
+    mu: f64,
+    /// α, the weight of Σw² of the first group.
+    alpha: f64,
+    /// β, the weight of Σe².
+    beta: f64,
+    /// γ, the effective number of parameters of all weights.
+    effective_parameters: f64,
+    /// The groups after the first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    further: Vec<GroupState>,
+    /// Number of epochs so far.
+    #[serde(default)]
+    epochs: usize,
+    /// τ, once measured.
+    #[serde(default)]
+    correlation_time: Option<f64>,
+    /// Noise level and γₜ of each target; empty if all have the same noise level.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    targets: Vec<TargetState>,
+}
+
+/// State of a target with its own noise level.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TargetState {
+    /// ρₜ = βₜ/β.
+    precision: f64,
+    /// γₜ.
+    effective_parameters: f64,
+}
+
+/// State of a group of weights.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GroupState {
+    alpha: f64,
+    effective_parameters: f64,
+}
+
 /// Maximum lag in samples; the sum of the correlations ends at the first that is not positive.
 const MAX_LAG: usize = 50;
-
-/// Group of each class of weights, from 0, for this number of groups.
-fn group_of_classes(groups: f64) -> Classes<usize> {
-    match groups as usize {
-        ..=1 => [0, 0, 0, 0],
-        2 => [0, 0, 1, 1],
-        3 => [0, 1, 2, 2],
-        _ => [0, 1, 2, 3],
-    }
-}
 
 impl BayesianRegularization {
     /// Starts with γ = N, as if the data determined all weights.
     pub(super) fn new(settings: RegularizationSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let (weights, outputs) = (mlp.weights().len(), examples.outputs());
-        let group_of = group_of_classes(settings.groups);
-        let size_of = |group| {
-            let classes = group_of.into_iter().zip(class_sizes(mlp.shape()));
-            classes
-                .map(|(of, size)| if of == group { size as f64 } else { 0.0 })
-                .sum()
+        let group_of = match settings.groups as usize {
+            ..=1 => [0, 0, 0, 0],
+            2 => [0, 0, 1, 1],
+            3 => [0, 1, 2, 2],
+            _ => [0, 1, 2, 3],
         };
-        let group = |group| GroupState {
-            alpha: 1.0,
-            effective_parameters: size_of(group),
+        let group = |group| {
+            let classes = group_of.into_iter().zip(class_sizes(mlp.shape()));
+            let sizes = classes.filter(|(of, _)| *of == group).map(|(_, size)| size as f64);
+            GroupState {
+                alpha: 1.0,
+                effective_parameters: sizes.sum(),
+            }
         };
         let target = TargetState {
             precision: 1.0,
@@ -106,17 +139,17 @@ impl BayesianRegularization {
         };
         // Fewer samples do not determine the noise of each target: with 20, networks came out worse than ridge.
         let has_own_noise = settings.own_noise != 0.0 && examples.samples() >= weights;
-        let draws_to_means = settings.groups >= 2.0;
+        let means = if settings.groups >= 2.0 {
+            examples.target_means()
+        } else {
+            Vec::new()
+        };
         let mut method = Self {
             settings,
             group_of,
-            means: if draws_to_means {
-                examples.target_means()
-            } else {
-                Vec::new()
-            },
+            means,
             state: BayesianState {
-                mu: settings.mu,
+                mu: settings.damping.mu,
                 alpha: 1.0,
                 beta: 1.0,
                 effective_parameters: weights as f64,
@@ -143,11 +176,11 @@ impl BayesianRegularization {
 
 impl Algorithm for BayesianRegularization {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
-        let (alphas, beta) = (self.state.decays(self.group_of), self.state.beta);
+        let (alphas, beta) = (self.decays(), self.state.beta);
         let (objective, slopes) = (self.objective(self.weighted_mse, &self.scaled), self.slopes());
         let hidden_weights = mlp.shape().hidden_weights();
         let (mut mu, mut candidate) = (self.state.mu, mlp.clone());
-        let found = self.settings.damping().search(&mut mu, |mu| {
+        let found = self.settings.damping.search(&mut mu, |mu| {
             let damping = alphas.map(|alpha| (mu + alpha) / beta);
             self.equations
                 .solve(&self.scaled, examples, damping, &slopes, &mut self.step)?;
@@ -186,9 +219,9 @@ impl Algorithm for BayesianRegularization {
         MethodState::BayesianRegularization(self.state.clone())
     }
 
-    fn restore(&mut self, state: MethodState) -> bool {
+    fn restore(&mut self, state: MethodState) {
         let MethodState::BayesianRegularization(state) = state else {
-            return false;
+            return;
         };
         let fresh = std::mem::replace(&mut self.state, state);
         // A state has as many groups and targets as the settings it was saved with, unless it is damaged.
@@ -197,7 +230,6 @@ impl Algorithm for BayesianRegularization {
         // Before the first step every precision is 1.
         let mlp = self.scaled.clone();
         self.gather(&mlp);
-        true
     }
 }
 

@@ -30,24 +30,20 @@ impl BayesianRegularization {
     /// ratio of any two cannot overflow.
     pub(super) fn update_weighting(&mut self) {
         let bounded = |value: f64| {
-            if value > 0.0 && value.is_finite() {
-                value.clamp(1e-150, 1e150)
-            } else {
-                1.0
-            }
+            let is_possible = value > 0.0 && value.is_finite();
+            if is_possible { value.clamp(1e-150, 1e150) } else { 1.0 }
         };
         let (gamma, errors) = (self.state.effective_parameters, self.examples.errors());
         let squares = self.by_group(class_squares(&self.scaled, &self.scaled_means()));
         let further = self.state.further.iter().map(|group| group.effective_parameters);
-        let gammas = std::iter::once(gamma - further.clone().sum::<f64>()).chain(further);
-        let of_groups = gammas.zip(squares).enumerate().map(|(group, (gamma, squares))| {
-            let alpha = self.alpha_of_outputs(group);
-            bounded(alpha.unwrap_or(gamma / (2.0 * squares)))
-        });
-        let alphas = Vec::from_iter(of_groups);
-        self.state.alpha = alphas[0];
-        for (group, alpha) in self.state.further.iter_mut().zip(&alphas[1..]) {
-            group.alpha = *alpha;
+        let mut gammas = vec![gamma - further.clone().sum::<f64>()];
+        gammas.extend(further);
+        for (group, (gamma, squares)) in gammas.into_iter().zip(squares).enumerate() {
+            let alpha = bounded(self.alpha_of_outputs(group).unwrap_or(gamma / (2.0 * squares)));
+            match group {
+                0 => self.state.alpha = alpha,
+                group => self.state.further[group - 1].alpha = alpha,
+            }
         }
         self.state.beta = bounded(self.free(errors, gamma) / (2.0 * self.weighted_mse * errors));
     }
@@ -61,26 +57,29 @@ impl BayesianRegularization {
         if group == self.group_of[HIDDEN_WEIGHTS] || group == self.group_of[HIDDEN_BIASES] {
             return None;
         }
-        let Shape { hidden, outputs, .. } = self.scaled.shape();
-        let (nodes, biases) = self.scaled.layers().1.split_at(hidden * outputs);
-        let means = self.scaled_means();
-        let of_target = |(target, gamma): (usize, &[f64; 2])| {
-            let weights = nodes.iter().skip(target).step_by(outputs);
-            let squares = [
-                weights.map(|weight| weight * weight).sum(),
-                (biases[target] - means.get(target).unwrap_or(&0.0)).powi(2),
-            ];
-            let of_group = |values: &[f64; 2]| -> f64 {
-                let classes = [OUTPUT_WEIGHTS, OUTPUT_BIASES].map(|class| self.group_of[class] == group);
-                let values = classes.into_iter().zip(values).filter(|(is_in, _)| *is_in);
-                values.map(|(_, value)| value).sum()
-            };
-            of_group(gamma) / (2.0 * of_group(&squares))
+        let of_group = |values: [f64; 2]| -> f64 {
+            let values = [OUTPUT_WEIGHTS, OUTPUT_BIASES].into_iter().zip(values);
+            let values = values.filter(|(class, _)| self.group_of[*class] == group);
+            values.map(|(_, value)| value).sum()
         };
-        let alphas = self.of_outputs.iter().enumerate().map(of_target);
+        let targets = self.of_outputs.iter().zip(self.squares_of_outputs());
+        let alphas = targets.map(|(gamma, squares)| of_group(*gamma) / (2.0 * of_group(squares)));
         alphas
             .filter(|alpha| alpha.is_finite() && *alpha > 0.0)
             .reduce(f64::min)
+    }
+
+    /// Returns Σw² of the weights and of the bias of each output of the scaled network.
+    fn squares_of_outputs(&self) -> Vec<[f64; 2]> {
+        let Shape { hidden, outputs, .. } = self.scaled.shape();
+        let (nodes, biases) = self.scaled.layers().1.split_at(hidden * outputs);
+        let means = self.scaled_means();
+        let of_output = |output: usize| {
+            let weights = nodes.iter().skip(output).step_by(outputs);
+            let distance = biases[output] - means.get(output).unwrap_or(&0.0);
+            [weights.map(|weight| weight * weight).sum(), distance * distance]
+        };
+        (0..outputs).map(of_output).collect()
     }
 
     /// Updates the noise level of each target at the weights of `mlp`, if each has its own.
@@ -92,7 +91,7 @@ impl BayesianRegularization {
             return;
         }
         let samples = self.examples.samples() as f64;
-        let squares = self.equations.squares_of_targets(mlp, &self.examples);
+        let squares = self.equations.activations.squares_of_outputs(mlp, &self.examples);
         let of_targets = squares.iter().zip(&self.state.targets).map(|(squares, target)| {
             self.free(samples, target.effective_parameters) / squares.max(samples * MIN_NOISE * MIN_NOISE)
         });
@@ -131,25 +130,33 @@ impl BayesianRegularization {
 
     /// Returns the mean of ρe².
     pub(super) fn weighted_mse(&mut self, mlp: &Mlp) -> f64 {
-        let squares = self.equations.squares_of_targets(mlp, &self.examples);
-        let weighted = squares
-            .iter()
-            .zip(&self.precisions)
-            .map(|(squares, precision)| squares * precision);
-        weighted.sum::<f64>() / self.examples.errors()
+        let squares = self.equations.activations.squares_of_outputs(mlp, &self.examples);
+        let weighted = squares.iter().zip(&self.precisions);
+        let sum: f64 = weighted.map(|(squares, precision)| squares * precision).sum();
+        sum / self.examples.errors()
     }
 
     /// Returns β Σρe² + Σ α Σw², with the mean of ρe² and the weights of the scaled network.
     pub(super) fn objective(&self, weighted_mse: f64, scaled: &Mlp) -> f64 {
-        let squares = class_squares(scaled, &self.scaled_means());
-        let products = self.state.decays(self.group_of).into_iter().zip(squares);
+        let products = self
+            .decays()
+            .into_iter()
+            .zip(class_squares(scaled, &self.scaled_means()));
         let of_weights: f64 = products.map(|(decay, squares)| decay * squares).sum();
         self.state.beta * weighted_mse * self.examples.errors() + of_weights
     }
 
+    /// Returns α of each class of weights.
+    pub(super) fn decays(&self) -> Classes {
+        self.group_of.map(|group| match group {
+            0 => self.state.alpha,
+            group => self.state.further[group - 1].alpha,
+        })
+    }
+
     /// Returns α/β of each class of weights.
     fn rates(&self) -> Classes {
-        self.state.decays(self.group_of).map(|alpha| alpha / self.state.beta)
+        self.decays().map(|alpha| alpha / self.state.beta)
     }
 
     /// Returns half the gradient of F/β with respect to the weights of the scaled network.
@@ -185,10 +192,8 @@ impl BayesianRegularization {
         let Some(traces) = self.equations.traces_of_inverse(&self.scaled, rates) else {
             return;
         };
-        let (sizes, of_classes) = (
-            class_sizes(self.scaled.shape()).map(|size| size as f64),
-            traces.classes(),
-        );
+        let (shape, of_classes) = (self.scaled.shape(), traces.classes());
+        let sizes = class_sizes(shape).map(|size| size as f64);
         let decayed = self.by_group(std::array::from_fn(|class| rates[class] * of_classes[class]));
         let groups = self.by_group(sizes).into_iter().zip(decayed);
         let groups = Vec::from_iter(groups.map(|(size, decayed)| (size - decayed).clamp(0.0, size)));
@@ -199,24 +204,23 @@ impl BayesianRegularization {
         if self.state.targets.is_empty() {
             return;
         }
-        let Shape { hidden, outputs, .. } = self.scaled.shape();
         let determined = |size: f64, class: usize, trace: f64| size - rates[class] * trace;
         let of_hidden = determined(sizes[HIDDEN_WEIGHTS], HIDDEN_WEIGHTS, traces.hidden[0])
             + determined(sizes[HIDDEN_BIASES], HIDDEN_BIASES, traces.hidden[1]);
         let of_output = |[weights, bias]: [f64; 2]| {
-            [
-                determined(hidden as f64, OUTPUT_WEIGHTS, weights).max(0.0),
-                determined(1.0, OUTPUT_BIASES, bias).max(0.0),
-            ]
+            let weights = determined(shape.hidden as f64, OUTPUT_WEIGHTS, weights);
+            [weights, determined(1.0, OUTPUT_BIASES, bias)].map(|gamma| gamma.max(0.0))
         };
         self.of_outputs = traces.outputs.into_iter().map(of_output).collect();
-        let mut shares = vec![0.0; outputs];
-        for (index, weight) in self.scaled.layers().1[..hidden * outputs].iter().enumerate() {
-            shares[index % outputs] += weight * weight;
-        }
-        let sum: f64 = shares.iter().sum();
-        for ((target, [weights, bias]), share) in self.state.targets.iter_mut().zip(&self.of_outputs).zip(shares) {
-            let share = if sum > 0.0 { share / sum } else { 1.0 / outputs as f64 };
+        let squares = self.squares_of_outputs();
+        let sum: f64 = squares.iter().map(|[weights, _]| weights).sum();
+        for ((target, [weights, bias]), [share, _]) in self.state.targets.iter_mut().zip(&self.of_outputs).zip(squares)
+        {
+            let share = if sum > 0.0 {
+                share / sum
+            } else {
+                1.0 / shape.outputs as f64
+            };
             target.effective_parameters = weights + bias + share * of_hidden.max(0.0);
         }
     }

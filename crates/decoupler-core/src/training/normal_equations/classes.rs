@@ -19,12 +19,8 @@ pub(in crate::training) const OUTPUT_BIASES: usize = 3;
 
 /// Returns the number of weights in each class.
 pub(in crate::training) fn class_sizes(shape: Shape) -> Classes<usize> {
-    let Shape {
-        inputs,
-        hidden,
-        outputs,
-    } = shape;
-    [inputs * hidden, hidden, hidden * outputs, outputs]
+    let weights = shape.hidden * shape.inputs;
+    [weights, shape.hidden, shape.hidden * shape.outputs, shape.outputs]
 }
 
 /// Returns the weights of each class, less the values towards which they decay: zero, or `biases` for those of the

@@ -3,9 +3,7 @@
 use faer::{Mat, MatMut, MatRef};
 
 use super::{
-    Classes,
-    cholesky::{Cholesky, substitute},
-    classes::{HIDDEN_BIASES, HIDDEN_WEIGHTS},
+    Classes, HIDDEN_BIASES, HIDDEN_WEIGHTS,
     elimination::{Elimination, output_weights},
     products::Sums,
 };
@@ -13,9 +11,11 @@ use crate::{
     network::{Mlp, Shape},
     training::{
         Examples,
-        activations::{BlockNow, KeptActivations, change_each, multiply_by_tanh_slopes},
-        examples::{BLOCK, column, column_mut},
-        parallel::{LARGE, accumulate, accumulate_lower, for_each_part, number_of_parts, product},
+        activations::{KeptActivations, change_each, multiply_by_tanh_slopes},
+        examples::{BLOCK, Block, column, column_mut},
+        parallel::{
+            LARGE, accumulate, accumulate_lower, cholesky, for_each_part, number_of_parts, product, substitute,
+        },
     },
 };
 
@@ -50,19 +50,13 @@ pub(super) struct ConjugateGradient {
     blocks: Mat<f64>,
     /// F, with the entries of each node contiguous: n1 × h·(h+1).
     f: Mat<f64>,
-    cholesky: Cholesky,
     max_iterations: usize,
-    /// Buffers for each part of the samples; the first receives the sum.
-    parts: Vec<PartBuffers>,
-    /// FᵀP, and FᵀP V̄V̄ᵀ: (h+1) × h.
-    eliminated: [Mat<f64>; 2],
-    residual: Vec<f64>,
-    preconditioned: Vec<f64>,
-    direction: Vec<f64>,
+    /// Buffers for each part of the samples that is processed in parallel; the first receives the sum.
+    pub(super) parts: Vec<PartBuffers>,
 }
 
 /// Buffers for one part of the samples.
-struct PartBuffers {
+pub(super) struct PartBuffers {
     /// n1 × h.
     sum: Mat<f64>,
     /// D ∘ AP, and (D ∘ AP) V̄V̄ᵀ: block × h.
@@ -92,24 +86,14 @@ impl ConjugateGradient {
             mixing: Mat::zeros(h, h),
             blocks: Mat::zeros(n1, order),
             f: Mat::zeros(n1, h * (h + 1)),
-            cholesky: Cholesky::new(n1),
             max_iterations: MAX_ITERATIONS,
             parts: (0..parts).map(part).collect(),
-            eliminated: [h + 1; 2].map(|h1| Mat::zeros(h1, h)),
-            residual: vec![0.0; order],
-            preconditioned: vec![0.0; order],
-            direction: vec![0.0; order],
         }
-    }
-
-    /// Number of parts of the samples that are processed in parallel.
-    pub(super) fn parts(&self) -> usize {
-        self.parts.len()
     }
 
     /// Gathers F by nodes, and factors the diagonal blocks of S; `None` if one of them is not numerically positive
     /// definite.
-    pub(super) fn factor(&mut self, sums: &Sums, elimination: &Elimination, mlp: &Mlp, damping: Classes) -> Option<()> {
+    pub(super) fn factor(&mut self, elimination: &Elimination, sums: &Sums, mlp: &Mlp, damping: Classes) -> Option<()> {
         let (h1, n1) = (self.shape.hidden + 1, self.shape.inputs + 1);
         let v = output_weights(mlp);
         product(self.mixing.as_mut(), v, v.transpose());
@@ -128,7 +112,7 @@ impl ConjugateGradient {
                 let class = if index + 1 == n1 { HIDDEN_BIASES } else { HIDDEN_WEIGHTS };
                 block[(index, index)] += damping[class] + RIDGE * weight * largest;
             }
-            self.cholesky.factor(block)?;
+            cholesky(block)?;
         }
         Some(())
     }
@@ -144,55 +128,55 @@ impl ConjugateGradient {
     ) -> Option<()> {
         // A rejected candidate may have been evaluated since.
         kept.evaluate(mlp, examples);
-        self.residual.copy_from_slice(solution);
+        let mut residual = solution.to_vec();
         solution.fill(0.0);
-        let mut length = self.precondition();
-        self.direction.copy_from_slice(&self.preconditioned);
+        let mut preconditioned = residual.clone();
+        let mut length = self.precondition(&residual, &mut preconditioned);
+        let mut direction = preconditioned.clone();
         let goal = TOLERANCE * TOLERANCE * length;
         for _ in 0..self.max_iterations {
             if length <= goal {
                 return Some(());
             }
-            self.apply(mlp, examples, kept);
+            self.apply(&direction, mlp, examples, kept);
             let product = self.parts[0].sum.as_ref();
             let product = || product.col_iter().flat_map(|column| column.iter());
-            let curvature: f64 = product().zip(&self.direction).map(|(a, b)| a * b).sum();
+            let curvature: f64 = product().zip(&direction).map(|(a, b)| a * b).sum();
             // Otherwise rounding errors dominate. False for NaN.
             let is_convex = curvature > 0.0;
             if !is_convex {
                 return None;
             }
             let distance = length / curvature;
-            for (value, direction) in solution.iter_mut().zip(&self.direction) {
-                *value += distance * direction;
-            }
-            for (residual, product) in self.residual.iter_mut().zip(product()) {
+            change_each(solution, &direction, |value, direction| *value += distance * direction);
+            for (residual, product) in residual.iter_mut().zip(product()) {
                 *residual -= distance * product;
             }
             let before = length;
-            length = self.precondition();
-            for (direction, value) in self.direction.iter_mut().zip(&self.preconditioned) {
+            length = self.precondition(&residual, &mut preconditioned);
+            change_each(&mut direction, &preconditioned, |direction, value| {
                 *direction = value + length / before * *direction;
-            }
+            });
         }
         let worst = MAX_RESIDUAL / TOLERANCE;
         (length <= worst * worst * goal).then_some(())
     }
 
-    /// Writes S·direction to the first part's sum.
-    fn apply(&mut self, mlp: &Mlp, examples: &Examples, kept: &mut KeptActivations) {
+    /// Writes S times `direction` to the first part's sum.
+    fn apply(&mut self, direction: &[f64], mlp: &Mlp, examples: &Examples, kept: &mut KeptActivations) {
         let (h, h1, n1) = (self.shape.hidden, self.shape.hidden + 1, self.shape.inputs + 1);
-        let direction = MatRef::from_column_major_slice(&self.direction, n1, h);
+        let direction = MatRef::from_column_major_slice(direction, n1, h);
         let mixing = self.mixing.as_ref();
         for_each_part(&mut self.parts, |part| part.sum.fill(0.0));
-        kept.for_each_block(mlp, examples, &mut self.parts, |part, now| {
-            part.add(now, direction, mixing);
+        kept.for_each_block(mlp, examples, &mut self.parts, |part, block, now| {
+            part.add(block, now.hidden(block), direction, mixing);
         });
         let (first, others) = self.parts.split_at_mut(1);
         let sum = &mut first[0].sum;
         others.iter().for_each(|other| *sum += &other.sum);
         let f = |node: usize| self.f.as_ref().subcols(node * h1, h1);
-        let [reduced, mixed] = &mut self.eliminated;
+        // FᵀP, and FᵀP V̄V̄ᵀ.
+        let (mut reduced, mut mixed) = (Mat::zeros(h1, h), Mat::zeros(h1, h));
         for node in 0..h {
             let p = direction.subcols(node, 1);
             product(reduced.as_mut().subcols_mut(node, 1), f(node).transpose(), p);
@@ -209,30 +193,29 @@ impl ConjugateGradient {
         }
     }
 
-    /// Applies the inverse of the preconditioner to the residual; returns the product of the residual with the result.
-    fn precondition(&mut self) -> f64 {
+    /// Writes the inverse of the preconditioner times the residual; returns the product of the residual with the result.
+    fn precondition(&self, residual: &[f64], preconditioned: &mut [f64]) -> f64 {
         let n1 = self.shape.inputs + 1;
-        self.preconditioned.copy_from_slice(&self.residual);
-        for (node, part) in self.preconditioned.chunks_exact_mut(n1).enumerate() {
+        preconditioned.copy_from_slice(residual);
+        for (node, part) in preconditioned.chunks_exact_mut(n1).enumerate() {
             let factor = self.blocks.as_ref().subcols(node * n1, n1);
             substitute(factor, MatMut::from_column_major_slice_mut(part, n1, 1));
         }
-        let pairs = self.residual.iter().zip(&self.preconditioned);
-        pairs.map(|(a, b)| a * b).sum()
+        residual.iter().zip(&*preconditioned).map(|(a, b)| a * b).sum()
     }
 }
 
 impl PartBuffers {
     /// Adds Aᵀ(D ∘ ((D ∘ AP) V̄V̄ᵀ)) of one block.
-    fn add(&mut self, now: &BlockNow<'_>, p: MatRef<'_, f64>, mixing: MatRef<'_, f64>) {
-        let (inputs, samples) = (now.block.inputs.as_ref(), now.block.samples());
+    fn add(&mut self, block: &Block, h: MatRef<'_, f64>, p: MatRef<'_, f64>, mixing: MatRef<'_, f64>) {
+        let (inputs, samples) = (block.inputs.as_ref(), block.samples());
         let [pushed, mixed] = &mut self.hidden;
         let mut pushed = pushed.as_mut().subrows_mut(0, samples);
         let mut mixed = mixed.as_mut().subrows_mut(0, samples);
         product(pushed.as_mut(), inputs, p);
-        multiply_by_tanh_slopes(pushed.as_mut(), now.hidden());
+        multiply_by_tanh_slopes(pushed.as_mut(), h);
         product(mixed.as_mut(), pushed.as_ref(), mixing);
-        multiply_by_tanh_slopes(mixed.as_mut(), now.hidden());
+        multiply_by_tanh_slopes(mixed.as_mut(), h);
         accumulate(self.sum.as_mut(), inputs.transpose(), mixed.as_ref(), 1.0);
     }
 }

@@ -8,52 +8,51 @@
 //! S = μI + (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − C G⁻¹ Cᵀ),   G = H̃ᵀH̃ + μI       (Schur complement on W)
 //! ```
 //!
-//! `products` sums BᵀB, C, H̃ᵀH̃ and Jᵀe over blocks of samples, `elimination` eliminates V, and one of two solvers
-//! finds the step of W: `schur` forms and factors S. Its order is h·n1, so for wide networks `conjugate`, which never
-//! forms S, is cheaper. The choice depends on the number of multiplications, which follows from sizes alone, so that it
+//! `products` sums BᵀB, C, H̃ᵀH̃ and Jᵀe over blocks of samples, `elimination` eliminates V, and forms and factors S to find
+//! the step of W. The order of S is h·n1, so for wide networks `conjugate`, which never forms S, is cheaper. The choice depends on the number of multiplications, which follows from sizes alone, so that it
 //! is the same on every machine and for a resumed training.
 //!
 //! Hidden weights are numbered node by node here: weight (i, a) is i·n1 + a.
 
-mod cholesky;
 mod classes;
 mod conjugate;
 mod elimination;
 mod plan;
 mod products;
-mod schur;
 #[cfg(test)]
 pub(super) mod tests;
+
+use faer::{Mat, MatMut};
 
 pub(super) use classes::{
     Classes, HIDDEN_BIASES, HIDDEN_WEIGHTS, OUTPUT_BIASES, OUTPUT_WEIGHTS, class_sizes, class_squares, decay_slopes,
 };
-pub(super) use plan::Plan;
-pub(super) use schur::Traces;
-
 use conjugate::ConjugateGradient;
-use elimination::Elimination;
+use elimination::{Elimination, Traces};
+pub(super) use plan::Plan;
 use plan::Solution;
 use products::Sums;
-use schur::SchurComplement;
 
-use super::{Evaluation, Examples, activations::KeptActivations, parallel::for_each_part};
+use super::{
+    Evaluation, Examples,
+    activations::KeptActivations,
+    parallel::{for_each_part, substitute},
+};
 use crate::network::Mlp;
 
 /// Normal equations of a network and its examples: evaluated, gathered, and solved for any damping.
 pub(super) struct NormalEquations {
-    activations: KeptActivations,
+    pub(super) activations: KeptActivations,
     /// Sums for each part of the samples; once gathered, the first contains the total.
     parts: Vec<Sums>,
     elimination: Elimination,
-    /// Right-hand side of the hidden layer, then its negative step, node by node.
-    reduced: Vec<f64>,
     solver: Solver,
 }
 
 /// Solver of S δ = r on W.
 enum Solver {
-    Factored(Box<SchurComplement>),
+    /// S, then its Cholesky factor: the lower triangle.
+    Factored(Mat<f64>),
     Iterated(Box<ConjugateGradient>),
 }
 
@@ -61,12 +60,12 @@ impl NormalEquations {
     /// Allocates for these examples.
     pub(super) fn new(plan: &Plan, examples: &Examples) -> Self {
         let (shape, blocks) = (plan.shape, examples.blocks().len());
-        let gathering = plan.gathering_parts(blocks);
+        let (gathering, order) = (plan.gathering_parts(blocks), shape.hidden_weights());
         let (solver, solving) = match plan.solution {
-            Solution::Factored => (Solver::Factored(Box::new(SchurComplement::new(shape))), 1),
+            Solution::Factored => (Solver::Factored(Mat::zeros(order, order)), 1),
             Solution::Iterated => {
                 let solver = ConjugateGradient::new(shape, blocks);
-                let parts = solver.parts();
+                let parts = solver.parts.len();
                 (Solver::Iterated(Box::new(solver)), parts)
             }
         };
@@ -74,7 +73,6 @@ impl NormalEquations {
             activations: KeptActivations::new(shape, examples, gathering.max(solving)),
             parts: (0..gathering).map(|_| Sums::new(plan)).collect(),
             elimination: Elimination::new(shape),
-            reduced: vec![0.0; shape.hidden_weights()],
             solver,
         }
     }
@@ -83,11 +81,6 @@ impl NormalEquations {
     /// network a second time.
     pub(super) fn mse(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
         self.activations.evaluate(mlp, examples) / examples.errors()
-    }
-
-    /// Returns the sum of squared errors of each target at the weights of `mlp`.
-    pub(super) fn squares_of_targets(&mut self, mlp: &Mlp, examples: &Examples) -> Vec<f64> {
-        self.activations.squares_of_outputs(mlp, examples)
     }
 
     /// Gathers all products at the weights of `mlp`. If `precisions` ρ of the targets are given, they are the products
@@ -102,7 +95,9 @@ impl NormalEquations {
         }
         for_each_part(&mut self.parts, Sums::clear);
         self.activations
-            .for_each_block(mlp, examples, &mut self.parts, |sums, now| sums.add_block(&v, now));
+            .for_each_block(mlp, examples, &mut self.parts, |sums, block, now| {
+                sums.add_block(&v, block, now);
+            });
         let (sums, others) = self.parts.split_first_mut().expect("there is at least one part");
         others.iter().for_each(|other| sums.add(other));
         let of_outputs = sums.gradient[mlp.shape().hidden_weights()..].iter_mut();
@@ -131,20 +126,21 @@ impl NormalEquations {
         right: &[f64],
         step: &mut [f64],
     ) -> Option<()> {
-        let (sums, elimination, reduced) = (&self.parts[0], &mut self.elimination, &mut self.reduced);
+        let (sums, elimination) = (&self.parts[0], &mut self.elimination);
         elimination.factor(sums, damping)?;
-        elimination.reduce(sums, mlp, right, reduced);
+        let mut reduced = elimination.reduce(sums, mlp, right);
         match &mut self.solver {
-            Solver::Factored(schur) => {
-                schur.factor(sums, elimination, mlp, damping)?;
-                schur.solve(reduced);
+            Solver::Factored(s) => {
+                elimination.factor_schur(s, sums, mlp, damping)?;
+                let column = MatMut::from_column_major_slice_mut(&mut reduced, s.nrows(), 1);
+                substitute(s.as_ref(), column);
             }
             Solver::Iterated(conjugate) => {
-                conjugate.factor(sums, elimination, mlp, damping)?;
-                conjugate.solve(mlp, examples, &mut self.activations, reduced)?;
+                conjugate.factor(elimination, sums, mlp, damping)?;
+                conjugate.solve(mlp, examples, &mut self.activations, &mut reduced)?;
             }
         }
-        elimination.complete(sums, mlp, right, reduced, step);
+        elimination.complete(sums, mlp, right, &reduced, step);
         step.iter().all(|value| value.is_finite()).then_some(())
     }
 
@@ -152,12 +148,12 @@ impl NormalEquations {
     /// the matrix is not numerically positive definite, or if it is not factored.
     pub(super) fn traces_of_inverse(&mut self, mlp: &Mlp, damping: Classes) -> Option<Traces> {
         let (sums, elimination) = (&self.parts[0], &mut self.elimination);
-        let Solver::Factored(schur) = &mut self.solver else {
+        let Solver::Factored(s) = &mut self.solver else {
             return None;
         };
         elimination.factor(sums, damping)?;
-        schur.factor(sums, elimination, mlp, damping)?;
-        let traces = schur.traces_of_inverse(elimination, mlp);
+        elimination.factor_schur(s, sums, mlp, damping)?;
+        let traces = elimination.traces_of_inverse(s.as_ref(), mlp);
         let is_finite = traces.classes().iter().all(|trace| trace.is_finite());
         is_finite.then_some(traces)
     }

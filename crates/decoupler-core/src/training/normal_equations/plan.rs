@@ -35,31 +35,29 @@ pub(in crate::training) struct Plan {
 }
 
 impl Plan {
-    /// Equations that are always factored.
-    pub(in crate::training) fn factored(shape: Shape, samples: usize) -> Self {
+    fn new(shape: Shape, samples: usize, solution: Solution) -> Self {
         Self {
             shape,
             samples,
-            solution: Solution::Factored,
+            solution,
         }
+    }
+
+    /// Equations that are always factored.
+    pub(in crate::training) fn factored(shape: Shape, samples: usize) -> Self {
+        Self::new(shape, samples, Solution::Factored)
     }
 
     /// Equations that are solved by conjugate gradients.
     pub(super) fn iterated(shape: Shape, samples: usize) -> Self {
-        Self {
-            solution: Solution::Iterated,
-            ..Self::factored(shape, samples)
-        }
+        Self::new(shape, samples, Solution::Iterated)
     }
 
     /// Equations with the cheaper solver.
     pub(in crate::training) fn cheapest(shape: Shape, samples: usize) -> Self {
         let (factored, iterated) = (Self::factored(shape, samples), Self::iterated(shape, samples));
-        if factored.multiplications() <= SPEED * iterated.multiplications() {
-            factored
-        } else {
-            iterated
-        }
+        let is_factored = factored.multiplications() <= SPEED * iterated.multiplications();
+        if is_factored { factored } else { iterated }
     }
 
     /// Approximate number of multiplications to gather and to solve once.

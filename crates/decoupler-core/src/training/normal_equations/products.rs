@@ -6,9 +6,9 @@ use super::plan::{CHUNK, Plan, Solution};
 use crate::{
     network::Shape,
     training::{
-        activations::{BlockNow, change_each, multiply_by_tanh_slopes, multiply_into},
-        examples::{BLOCK, column, column_mut, fill_pairs, pairs},
-        parallel::{accumulate_lower, add_product, product},
+        activations::{Activations, add_gradient, change_each, multiply_into},
+        examples::{BLOCK, Block, column, column_mut, fill_pairs, pairs},
+        parallel::{accumulate_lower, add_product},
     },
 };
 
@@ -62,34 +62,26 @@ impl Sums {
     }
 
     pub(super) fn clear(&mut self) {
-        for sum in [&mut self.gram, &mut self.g] {
-            sum.fill(0.0);
-        }
-        for sum in [&mut self.c, &mut self.gradient] {
-            sum.fill(0.0);
-        }
+        self.gram.fill(0.0);
+        self.g.fill(0.0);
+        self.c.fill(0.0);
+        self.gradient.fill(0.0);
     }
 
     /// Adds the sums of another part.
     pub(super) fn add(&mut self, other: &Self) {
         self.gram += &other.gram;
         self.g += &other.g;
-        for (sum, other) in [(&mut self.c, &other.c), (&mut self.gradient, &other.gradient)] {
-            change_each(sum, other, |sum, value| *sum += value);
-        }
+        change_each(&mut self.c, &other.c, |sum, value| *sum += value);
+        change_each(&mut self.gradient, &other.gradient, |sum, value| *sum += value);
     }
 
     /// Adds a block of samples, with the weights `v` of the output layer from errors to hidden nodes.
-    pub(super) fn add_block(&mut self, v: &[f64], now: &BlockNow<'_>) {
-        let Shape {
-            inputs,
-            hidden: h,
-            outputs,
-        } = self.shape;
-        let (a, hidden, errors) = (now.block.inputs.as_ref(), now.hidden(), now.errors());
-        let mut slopes = self.slopes.as_mut().subrows_mut(0, now.block.samples());
-        let mut delta = self.delta.as_mut().subrows_mut(0, now.block.samples());
-        let mut columns = self.columns.as_mut().subrows_mut(0, now.block.samples());
+    pub(super) fn add_block(&mut self, v: &[f64], block: &Block, now: &Activations) {
+        let (inputs, h) = (self.shape.inputs, self.shape.hidden);
+        let (a, hidden) = (block.inputs.as_ref(), now.hidden(block));
+        let mut slopes = self.slopes.as_mut().subrows_mut(0, block.samples());
+        let mut columns = self.columns.as_mut().subrows_mut(0, block.samples());
         for node in 0..h {
             let slopes = column_mut(slopes.as_mut(), node);
             change_each(slopes, column(hidden, node), |slope, h| *slope = 1.0 - h * h);
@@ -98,7 +90,7 @@ impl Sums {
 
         match self.solution {
             Solution::Factored => {
-                let mut pairs = self.pairs.as_mut().subcols_mut(0, now.block.samples());
+                let mut pairs = self.pairs.as_mut().subcols_mut(0, block.samples());
                 fill_pairs(a, pairs.as_mut());
                 let nodes = (0..h).flat_map(|i| (0..=i).map(move |j| (i, j)));
                 let factors = nodes.map(|(i, j)| (slope(i), slope(j)));
@@ -123,14 +115,15 @@ impl Sums {
         add_products(c, a.transpose(), columns, factors);
         add_product(self.g.as_mut(), hidden.transpose(), hidden, 1.0);
 
-        let (gradient_w, gradient_v) = self.gradient.split_at_mut(self.shape.hidden_weights());
-        let gradient_w = MatMut::from_row_major_slice_mut(gradient_w, inputs + 1, h);
-        let gradient_v = MatMut::from_row_major_slice_mut(gradient_v, h + 1, outputs);
-        add_product(gradient_v, hidden.transpose(), errors, 1.0);
-        let v = MatRef::from_row_major_slice(v, h + 1, outputs).subrows(0, h);
-        product(delta.as_mut(), errors, v.transpose());
-        multiply_by_tanh_slopes(delta.as_mut(), hidden);
-        add_product(gradient_w, a.transpose(), delta.as_ref(), 1.0);
+        let delta = self.delta.as_mut();
+        add_gradient(
+            &mut self.gradient,
+            1.0,
+            (self.shape, v),
+            (block, now),
+            delta,
+            add_product,
+        );
     }
 }
 
@@ -159,7 +152,7 @@ mod tests {
         super::{
             NormalEquations,
             elimination::output_weights,
-            schur::unpack,
+            elimination::unpack,
             tests::dense::{errors, jacobian},
         },
         *,

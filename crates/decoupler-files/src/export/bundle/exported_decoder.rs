@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::{Dataset, GAP, PerRow, Seed, Simulation, Stream},
     decoupling::{DecoderKind, Function, NodeId, NotDescribed, Operation, Precision, Program, decode_set},
     evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
-    network::{Networks, ReadingRange},
+    network::{MinMax, Networks},
     problem::{Channel, Problem},
 };
 use rand::RngExt;
@@ -148,7 +148,7 @@ impl<'a> ExportedDecoder<'a> {
     /// each; `None` if the range in training is not known.
     pub(super) fn limits(&self) -> Option<Limits> {
         let quantity = ExportedProgram::quantity_of(&self.fitted.program);
-        let of_row = |range: &Option<ReadingRange>| {
+        let of_row = |range: &Option<MinMax>| {
             let range = range.as_ref()?;
             Some(
                 (0..range.channels())
@@ -260,7 +260,7 @@ impl<'a> ExportedDecoder<'a> {
     fn corners(&self) -> Vec<GoldenRow> {
         let ranges = self.fitted.reading_ranges.iter().enumerate();
         let known = ranges.filter_map(|(row, range)| Some((row, range.as_ref()?)));
-        let of_range = |(row, range): (usize, &ReadingRange)| {
+        let of_range = |(row, range): (usize, &MinMax)| {
             let at = |place: f64| {
                 let between = |channel| {
                     let (low, high) = range.extremes(channel);
@@ -375,7 +375,7 @@ impl<'a> ExportedDecoder<'a> {
 
     /// Smallest and largest readings in training, row by row; with a history, of all features.
     fn ranges(&self) -> Vec<Option<Value>> {
-        let range = |range: &ReadingRange| {
+        let range = |range: &MinMax| {
             let extremes = (0..range.channels()).map(|channel| range.extremes(channel));
             let (minimum, maximum): (Vec<f64>, Vec<f64>) = extremes.unzip();
             json!({ "minimum": minimum, "maximum": maximum })
@@ -436,7 +436,7 @@ pub(super) struct FittedDecoder {
     pub(super) kind: BundleDecoder,
     pub(super) program: Program,
     /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
-    pub(super) reading_ranges: Vec<Option<ReadingRange>>,
+    pub(super) reading_ranges: Vec<Option<MinMax>>,
     /// Ranges of the targets in training: one for all row-wires, or one for each if the row is an argument.
     pub(super) target_extremes: Vec<Vec<(f64, f64)>>,
     /// Errors on the test samples.
@@ -481,7 +481,7 @@ impl FittedDecoder {
                 let both = |(low, high): (f64, f64), &value: &f64| (low.min(value), high.max(value));
                 column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), both)
             });
-            Ok::<_, BundleError>((ReadingRange::of(set.readings()), extremes.collect::<Vec<_>>()))
+            Ok::<_, BundleError>((MinMax::of(set.readings()), extremes.collect::<Vec<_>>()))
         };
         let in_training = PerRow::fit(&training, settings.source.row_model(), of_row)?;
         let (reading_ranges, target_extremes) = in_training.values().iter().cloned().unzip();

@@ -3,7 +3,7 @@ use std::{path::Path, time::Duration};
 use decoupler_core::{
     dataset::{Dataset, Simulation},
     evaluation::{
-        DecoderReport, Outlook, RunDefect, StartRecord, TestErrors, error_remarks,
+        DecoderReport, Errors, Outlook, StartRecord, TestErrors, error_remarks,
         recorded::{Determination, HysteresisLoop},
     },
     sensor::Geometry,
@@ -33,7 +33,7 @@ pub struct RunReport<'a> {
     /// Its network, record and errors.
     pub file: &'a NetworkFile,
     /// Defect of its training, if there is one.
-    pub defect: Option<&'a RunDefect>,
+    pub defect: Option<&'a str>,
     /// Other decoders that were measured on its test set.
     pub decoders: &'a [DecoderReport],
     /// Its test set: [`Run::test`](decoupler_core::evaluation::Run::test), or [`NetworkFile::test_set`], which draws or reads it again.
@@ -183,7 +183,7 @@ impl RunReport<'_> {
 
     /// Returns all warnings and remarks on the run, with cause and remedy.
     fn remarks(&self, setup: &Setup, answers: &ndarray::Array2<f64>) -> Vec<String> {
-        let mut remarks = Vec::from_iter(self.defect.map(ToString::to_string));
+        let mut remarks = Vec::from_iter(self.defect.map(str::to_owned));
         match (setup.settings().simulation(), setup.plan()) {
             (Some(simulation), _) => remarks.extend(self.array_remarks(simulation)),
             (None, Some(plan)) => remarks.extend(self.recording_remarks(plan, answers)),
@@ -204,10 +204,11 @@ impl RunReport<'_> {
         let reason = file.training.stop_reason;
         let of_rows = error_remarks(&file.settings, &file.scores, reason);
         remarks.extend(of_rows.iter().map(|(row, remark)| format!("{row}: {remark}")));
-        let Some(scores) = file.scores.nodes() else {
+        let baselines = &file.scores.baselines;
+        let (Some(network), Some(linear)) = (file.scores.network.nodes(), baselines.linear.nodes()) else {
             return remarks;
         };
-        if scores.network.z_mm > scores.baselines.linear.z_mm
+        if network.z_mm > linear.z_mm
             && let Some(reason) = reason
         {
             let remedy = reason.remedy(&file.settings.training.method);
@@ -215,8 +216,9 @@ impl RunReport<'_> {
                 "a linear map of the resistances is better on z than this network: {remedy}"
             ));
         }
-        remarks.extend(file.scores.baselines.model_based_note().map(str::to_owned));
-        if scores.baselines.model_based.is_some_and(|errors| errors.is_rounding()) {
+        remarks.extend(baselines.model_based_note().map(str::to_owned));
+        let model_based = baselines.model_based.as_ref().and_then(TestErrors::nodes);
+        if model_based.is_some_and(Errors::is_rounding) {
             let text = "the model-based error is nothing but rounding: the readings determine the deformation, and no \
                         ratio to it is given";
             remarks.push(text.to_owned());

@@ -45,7 +45,7 @@ fn report(name: &str, file: &NetworkFile, run: &Run) -> String {
     let report = RunReport {
         name: Some(name),
         file,
-        defect: defect.as_ref(),
+        defect: defect.as_deref(),
         decoders: &decoders,
         test: run.test(),
     };

@@ -144,8 +144,8 @@ pub fn sweep_specification(experiment: &Experiment, plan: Option<&Plan>) -> Resu
     let mut train = train_options(&experiment.base, &[DecoderKind::Network]);
     let mut axes = Map::new();
     for axis in experiment.axes() {
-        axes.insert(option(axis.kind()).to_owned(), values(axis));
-        if axis.kind() == AxisKind::Method {
+        axes.insert(option(axis.kind).to_owned(), values(axis));
+        if axis.kind == AxisKind::Method {
             // `set` belongs to one method; here, each method has its own settings.
             train.remove("set");
         }
@@ -197,7 +197,7 @@ fn values(axis: &Axis) -> Value {
         settings::Value::Integer(value) => Value::from(*value),
         settings::Value::Text(value) => Value::from(value.replace('×', "x")),
     };
-    axis.values().iter().map(value).collect()
+    axis.values.iter().map(value).collect()
 }
 
 /// Returns the decoders in the order in which they are offered, without duplicates: order and duplicates change no

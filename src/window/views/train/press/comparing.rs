@@ -4,7 +4,7 @@ use super::{section::Shown, state::Subject};
 use crate::window::job::{Background, JobError, Report, Wake};
 use decoupler_core::{
     decoupling::{Decoder, DecoderKind, Precision},
-    evaluation::{DecoderSet, Pressed, PressedAnswer},
+    evaluation::{DecoderSet, Pressed, PressedAnswer, RunError},
     job::Job,
 };
 use decoupler_files::machine::memory_budget;
@@ -141,9 +141,9 @@ impl Comparing {
             move |report| {
                 let mut answers = Vec::new();
                 for (kind, decoder) in &mut decoders {
-                    match pressed.answer(&mut **decoder, &|| report.is_cancelled()) {
-                        Ok(Some(answer)) => answers.push((*kind, Ok(answer))),
-                        Ok(None) => break,
+                    match pressed.answer(&mut **decoder, &Job::new(&|| report.is_cancelled())) {
+                        Ok(answer) => answers.push((*kind, Ok(answer))),
+                        Err(RunError::Cancelled(_)) => break,
                         Err(error) => answers.push((*kind, Err(error.to_string()))),
                     }
                 }
