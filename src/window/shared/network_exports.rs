@@ -2,7 +2,10 @@
 //!
 //! Exports of single decoders, offered next to their errors.
 
-use std::{path::Path, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
@@ -144,10 +147,25 @@ fn bundle_export<'a>(
 /// The contents that `export` writes and verifies.
 fn bundle_contents(export: impl Fn(&Path) -> Result<BundleReport, BundleError> + Send + Sync + 'static) -> Contents {
     Contents::with_message(move |path| {
-        export(path)
+        export(&free_folder(path))
             .map(|report| said_of(&report))
             .map_err(|error| error.to_string())
     })
+}
+
+/// The folder, or if there is one with files, the first of its name with -2, -3, … that is free: no folder is overwritten, and
+/// a second export does not fail.
+fn free_folder(path: &Path) -> PathBuf {
+    let is_taken = |path: &Path| match path.read_dir() {
+        Ok(mut entries) => entries.next().is_some(),
+        Err(_) => path.exists(),
+    };
+    let name = path
+        .file_name()
+        .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let numbered = (2..).map(|number| path.with_file_name(format!("{name}-{number}")));
+    let mut all = std::iter::once(path.to_owned()).chain(numbered);
+    all.find(|path| !is_taken(path)).unwrap_or_else(|| path.to_owned())
 }
 
 /// Words for a network or another decoder in a format.
@@ -283,7 +301,7 @@ impl DecoderSource {
         let words = bundle_words(format, decoder);
         let what = format!("{kind}-{format}-{precision}");
         let write = move |path: &Path, exported: Result<ExportedDecoder<'_>, BundleError>| {
-            let report = exported.and_then(|exported| export_bundle(exported, format, precision, path));
+            let report = exported.and_then(|exported| export_bundle(exported, format, precision, &free_folder(path)));
             report.map(|report| said_of(&report)).map_err(|error| error.to_string())
         };
         match self {

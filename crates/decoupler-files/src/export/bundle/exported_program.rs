@@ -71,6 +71,12 @@ impl ExportedProgram {
                 }
             }
         }
+        // A checked value has the precision of the value.
+        for index in 0..nodes.len() {
+            if let Operation::Valid { of, .. } = nodes[index].operation {
+                nodes[index].precision = nodes[of.index()].precision;
+            }
+        }
         Self {
             program: Program::new(nodes, self.program.output()),
             ..self.clone()

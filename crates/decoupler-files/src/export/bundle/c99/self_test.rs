@@ -84,14 +84,23 @@ impl SelfTest<'_> {
             true => format!("rows[{index}], "),
             false => String::new(),
         };
-        let (function, state, declared, started) = match contents.history() {
-            Some(_) => (
-                "step",
-                "&state, ",
-                format!("    {name}_state state;\n    {name}_start(&state);\n"),
-                format!("        if (is_new_series[v]) {{\n            {name}_start(&state);\n        }}\n"),
+        let is_sequence = contents.history().is_some();
+        let function = if is_sequence { "step" } else { "decode" };
+        // One state for each row-wire.
+        let rows = contents.rows;
+        let state = |index: &str| match (is_sequence, contents.takes_row()) {
+            (true, true) => format!("&states[rows[{index}] - 1], "),
+            (true, false) => "&states[0], ".to_owned(),
+            (false, _) => String::new(),
+        };
+        let (declared, started) = match is_sequence {
+            true => (
+                format!("    {name}_state states[{rows}];\n"),
+                format!(
+                    "        for (int r = 0; is_new_series[v] && r < {rows}; ++r) {{\n            {name}_start(&states[r]);\n        }}\n"
+                ),
             ),
-            None => ("decode", "", String::new(), String::new()),
+            false => (String::new(), String::new()),
         };
         let time = |index: &str| match contents.history() {
             Some(_) => format!("times_s[{index}], "),
@@ -113,14 +122,16 @@ impl SelfTest<'_> {
                  {name}_{function}({state}{upper}_ROWS + 1, {time}taken, &answer) != {upper}_NO_SUCH_ROW) {{\n        \
                  puts(\"a row that does not exist is not refused\");\n        return 1;\n    }}\n",
                 time = time("0"),
+                state = state("0"),
             ),
             false => String::new(),
         };
         let bad_reading = match contents.exported.are_positive() {
             true => format!(
                 "    taken[{upper}_CHANNELS - 1] = 0;\n    \
-                 if ({name}_{function}({state}{}{}taken, &answer) != {upper}_BAD_READING) {{\n        \
+                 if ({name}_{function}({}{}{}taken, &answer) != {upper}_BAD_READING) {{\n        \
                  puts(\"a reading of 0 is not refused\");\n        return 1;\n    }}\n",
+                state("0"),
                 row("0"),
                 time("0"),
             ),
@@ -141,6 +152,7 @@ impl SelfTest<'_> {
              printf(\"largest deviation: %.3e of the range of the outputs, limit {limit:.1e}\\n\", largest);\n    \
              return largest <= {limit:e} ? 0 : 1;\n}}\n",
             reading = header.reading,
+            state = state("v"),
             row = row("v"),
             time = time("v"),
         )

@@ -57,7 +57,8 @@ impl Printer<'_> {
             restarts = builder.op("Or", &[&restarts, &is_pause]);
         }
         let is_unknown = builder.op("IsNaN", &[&elapsed]);
-        let elapsed = builder.op("Where", &[&is_unknown, &usual, &elapsed]);
+        let is_usual = builder.op("Or", &[&is_unknown, &restarts]);
+        let elapsed = builder.op("Where", &[&is_usual, &usual, &elapsed]);
         let no_time = builder.op("IsNaN", &["time_s"]);
         let nan = builder.scalar(DOUBLE, f64::NAN);
         let before = builder.op("Where", &[&has_started, &latest, &nan]);

@@ -187,10 +187,11 @@ impl Printer<'_> {
             Operation::Valid { of, domain } => {
                 let x = contents.name_of(*of);
                 let precision = contents.precision_of(*of);
-                let (zero, infinity) = (builder.scalar(precision, 0.0), builder.scalar(precision, f64::INFINITY));
+                let infinity = builder.scalar(precision, f64::INFINITY);
                 let size = builder.op("Abs", &[x]);
                 let mut is_valid = builder.op("Less", &[&size, &infinity]);
                 if *domain == Domain::Positive {
+                    let zero = builder.scalar(precision, 0.0);
                     let is_positive = builder.op("Greater", &[x, &zero]);
                     is_valid = builder.op("And", &[&is_valid, &is_positive]);
                 }
