@@ -1,7 +1,7 @@
 //! What a bundle contains, whatever its format.
 
 use decoupler_core::{
-    dataset::MemoryConstants,
+    dataset::{GAP, MemoryConstants, Span},
     decoupling::{NodeId, Operation, Precision},
 };
 
@@ -41,6 +41,17 @@ pub(super) struct PrintedHistory {
     pub(super) constants: MemoryConstants,
     /// Pause in seconds after which it restarts, if the usual interval is known.
     pub(super) pause_s: f64,
+}
+
+impl PrintedHistory {
+    /// Rates of the averages: per second, and per reading; one of the two is 0.
+    pub(super) fn rates(&self) -> (Vec<f64>, Vec<f64>) {
+        let rates = self.constants.averages.iter().map(|average| match average {
+            Span::Seconds(seconds) => (1.0 / seconds, 0.0),
+            Span::Samples(samples) => (0.0, 1.0 / samples),
+        });
+        rates.unzip()
+    }
 }
 
 impl Contents {
@@ -91,6 +102,27 @@ impl Contents {
         })
     }
 
+    /// Names of the parts of an answer.
+    pub(super) fn parts(&self) -> Vec<&str> {
+        let exported = &self.exported;
+        let all = [Some(exported.targets), exported.half_widths, exported.outside];
+        all.into_iter().flatten().map(|id| self.name_of(id)).collect()
+    }
+
+    /// Shape of a constant in a file: of each row-wire, if they differ, and as a matrix or vector.
+    pub(super) fn full_shape(&self, id: NodeId, tables: usize) -> Vec<usize> {
+        let (rows, columns) = self.shape(id);
+        let mut shape = if self.is_matrix(id) {
+            vec![rows, columns]
+        } else {
+            vec![columns]
+        };
+        if tables > 1 {
+            shape.insert(0, tables);
+        }
+        shape
+    }
+
     /// The notes as lines for a comment of any language.
     pub(super) fn note_lines(&self) -> impl Iterator<Item = String> {
         self.notes
@@ -135,9 +167,7 @@ impl Contents {
                 let constants = MemoryConstants::of(memory, self.size(*of));
                 Some(PrintedHistory {
                     constants: constants.expect("checked when the program was built"),
-                    pause_s: memory
-                        .interval_s
-                        .map_or(f64::INFINITY, |usual_s| decoupler_core::dataset::GAP * usual_s),
+                    pause_s: memory.interval_s.map_or(f64::INFINITY, |usual_s| GAP * usual_s),
                 })
             }
             _ => None,

@@ -3,7 +3,6 @@
 use std::fmt::Write;
 
 use decoupler_core::{
-    dataset::Span,
     decoupling::{Domain, Function, NodeId, Operation},
     text::counted,
 };
@@ -28,7 +27,7 @@ fn function(contents: &Contents) -> String {
     let name = format!("{}_decode", contents.name);
     let (input, channels) = (contents.meaning.readings(), contents.channels());
     let history = contents.history();
-    let parts = parts(contents);
+    let parts = contents.parts();
     let returned = match history {
         Some(_) => format!("{}, state", parts.join(", ")),
         None => parts.join(", "),
@@ -120,13 +119,6 @@ fn function(contents: &Contents) -> String {
     text
 }
 
-/// Names of the parts of an answer.
-fn parts(contents: &Contents) -> Vec<&str> {
-    let exported = &contents.exported;
-    let all = [Some(exported.targets), exported.half_widths, exported.outside];
-    all.into_iter().flatten().map(|id| contents.name_of(id)).collect()
-}
-
 fn arguments(contents: &Contents) -> String {
     let mut arguments = contents.meaning.readings().to_owned();
     if contents.history().is_some() {
@@ -203,13 +195,8 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
 fn remembering(history: &PrintedHistory) -> String {
     let constants = &history.constants;
     let list = |values: Vec<String>| format!("[{}]", values.join("; "));
-    let rates = constants.averages.iter().map(|average| match average {
-        Span::Seconds(seconds) => (1.0 / seconds, 0.0),
-        Span::Samples(samples) => (0.0, 1.0 / samples),
-    });
-    let (per_second, per_reading): (Vec<_>, Vec<_>) = rates
-        .map(|(rate, constant)| (format!("{rate:e}"), format!("{constant:e}")))
-        .unzip();
+    let (per_second, per_reading) = history.rates();
+    let texts = |values: Vec<f64>| values.iter().map(|value| format!("{value:e}")).collect();
     let kept = constants.longest_lag();
     let pause = match history.pause_s {
         f64::INFINITY => "Inf".to_owned(),
@@ -230,8 +217,8 @@ fn remembering(history: &PrintedHistory) -> String {
          {shift}{difference}features = [now, reshape(past', 1, [])];\nend\n",
         usual = constants.interval_s,
         lags = list(constants.lags.iter().map(|lag| (lag + 2).to_string()).collect()),
-        per_second = list(per_second),
-        per_reading = list(per_reading),
+        per_second = list(texts(per_second)),
+        per_reading = list(texts(per_reading)),
         averages = 2 + kept,
         shift = match kept {
             0 => String::new(),
@@ -260,24 +247,18 @@ fn push_matrix(text: &mut String, name: &str, matrix: &Array2<f64>) {
     text.push_str("];\n");
 }
 
-/// Returns the usage section of the README.
+/// Lines of a program that decodes.
 pub(super) fn usage(contents: &Contents) -> String {
-    let (input, channels) = (contents.meaning.readings(), contents.channels());
-    let parts = parts(contents).join(", ");
-    let row_text = match contents.takes_row() {
-        true => ";\nrow is the row of each sample, from 1",
-        false => "",
-    };
-    let (state, order) = match contents.history() {
-        Some(_) => (", state", " in order of time; state is [] at the start"),
-        None => ("", ""),
-    };
+    let state = if contents.history().is_some() { ", state" } else { "" };
     format!(
-        "    [{parts}{state}] = {}_decode({})\n\nin MATLAB (from R2016b) or GNU Octave. {input} is samples x {channels}{order}, {} \
-         samples x {}{row_text}.\n",
+        "    [{}{state}] = {}_decode({})\n\nin MATLAB (from R2016b) or GNU Octave.{}\n",
+        contents.parts().join(", "),
         contents.name,
         arguments(contents),
-        contents.meaning.outputs(),
-        contents.outputs(),
+        if state.is_empty() {
+            ""
+        } else {
+            " state is [] at the start."
+        },
     )
 }

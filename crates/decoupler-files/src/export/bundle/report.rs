@@ -106,7 +106,11 @@ pub(super) fn readme(contents: &Contents, decoder: BundleDecoder, usage: &str, r
             contents.noun, contents.rows
         );
     }
-    text += &format!("\nUsage\n\n{usage}");
+    text += &format!(
+        "\nUsage\n\n{usage}\nA line of readings has {}, a line of the answer {}.\n",
+        counted(contents.channels(), "number"),
+        counted(contents.outputs(), "number"),
+    );
     if let Some(state) = contents.state_in_words() {
         text += &format!("\n{}\n", super::meaning::wrapped(&state).join("\n"));
     }

@@ -58,39 +58,37 @@ pub(super) fn print(
     }
 }
 
-/// Returns the usage section of the README.
+/// Lines of a program that decodes.
 pub(super) fn usage(contents: &Contents, fixed: Option<&FixedProgram>) -> String {
     let header = Header::of(contents, fixed);
     let (name, upper) = (&contents.name, header.upper());
     let row = if contents.takes_row() { "1, " } else { "" };
     let (function, state, time) = match contents.history() {
-        Some(_) => (
-            "step",
-            format!("    {name}_state state;\n    {name}_start(&state);\n"),
-            "&state, time_s, ",
-        ),
-        None => ("decode", String::new(), ""),
+        Some(_) => ("step", "&state, ", "time_s, "),
+        None => ("decode", "", ""),
     };
-    let mut text = format!(
-        "    #include \"{name}_decode.h\"\n{state}    {reading} {readings}[{upper}_CHANNELS];\n    {name}_answer answer;\n    \
-         int status = {name}_{function}({time}{row}{readings}, &answer);\n\n\
-         The status is {upper}_OK, or the reason why there is no answer, which is then left as it is. Otherwise it has the\n\
-         {outputs}{parts}. Compile {name}_decode.c with your program{library}. The self-test compares the\n\
-         golden answers:\n\n    \
-         cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n",
-        reading = header.reading,
-        readings = header.readings,
-        outputs = header.outputs.replace('_', " in "),
-        parts = contents.parts_in_words(),
-        library = if fixed.is_some() { "" } else { ", and link with -lm" },
-    );
-    if fixed.is_some() && !contents.meaning.is_array() {
-        text += &format!(
-            "\nReadings and targets are integers in the units {upper}_READING_UNITS and {upper}_TARGET_UNITS in the header:\n\
+    let declared = match contents.history() {
+        Some(_) => format!("    {name}_state state;\n    {name}_start(&state);\n"),
+        None => String::new(),
+    };
+    let units = match fixed.is_some() && !contents.meaning.is_array() {
+        true => format!(
+            "Readings and targets are integers in the units {upper}_READING_UNITS and {upper}_TARGET_UNITS in the header:\n\
              round(reading / unit) goes in, and unit * number comes out.\n"
-        );
-    }
-    text
+        ),
+        false => String::new(),
+    };
+    format!(
+        "    #include \"{name}_decode.h\"\n{declared}    {} {}[{upper}_CHANNELS];\n    {name}_answer answer;\n    \
+         int status = {name}_{function}({state}{row}{time}{}, &answer);\n\n\
+         The status is {upper}_OK, or the reason why there is no answer. Compile {name}_decode.c with your program{}.\n\
+         {units}The self-test compares the golden answers:\n\n    \
+         cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n",
+        header.reading,
+        header.readings,
+        header.readings,
+        if fixed.is_some() { "" } else { ", and link with -lm" },
+    )
 }
 
 /// Name of the C type of this precision.

@@ -2,10 +2,7 @@
 
 use std::fmt::Write;
 
-use decoupler_core::{
-    dataset::Span,
-    decoupling::{Domain, Function, NodeId, Operation, Precision},
-};
+use decoupler_core::decoupling::{Domain, Function, NodeId, Operation, Precision};
 
 use super::{header::Header, number, push_array, type_name};
 use crate::export::bundle::contents::{Contents, PrintedHistory};
@@ -18,14 +15,7 @@ pub(super) fn source(header: &Header<'_>) -> String {
         contents.name
     );
     for (id, tables) in contents.constants() {
-        let (rows, columns) = contents.shape(id);
-        let mut shape = vec![columns];
-        if rows > 1 || contents.is_matrix(id) {
-            shape.insert(0, rows);
-        }
-        if tables.len() > 1 {
-            shape.insert(0, tables.len());
-        }
+        let shape = contents.full_shape(id, tables.len());
         let (precision, brackets) = (contents.precision_of(id), brackets(&shape));
         let declaration = format!(
             "static const {} {}{brackets}",
@@ -219,17 +209,10 @@ fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
     };
     array("int", "lags", constants.lags.iter().map(usize::to_string).collect());
     let double = |value: f64| number(Precision::Double, value);
-    let (mut per_second, mut per_reading) = (Vec::new(), Vec::new());
-    for average in &constants.averages {
-        let (rate, constant) = match average {
-            Span::Seconds(seconds) => (1.0 / seconds, 0.0),
-            Span::Samples(samples) => (0.0, 1.0 / samples),
-        };
-        per_second.push(double(rate));
-        per_reading.push(double(constant));
-    }
-    array("double", "per_second", per_second);
-    array("double", "per_reading", per_reading);
+    let (per_second, per_reading) = history.rates();
+    let doubles = |values: Vec<f64>| values.into_iter().map(double).collect();
+    array("double", "per_second", doubles(per_second));
+    array("double", "per_reading", doubles(per_reading));
     let past = |value: &str| match constants.differences {
         true => format!("now - {value}"),
         false => value.to_owned(),

@@ -2,10 +2,7 @@
 
 mod npz;
 
-use decoupler_core::{
-    dataset::Span,
-    decoupling::{Domain, Function, NodeId, Operation, Precision},
-};
+use decoupler_core::decoupling::{Domain, Function, NodeId, Operation, Precision};
 
 use super::{
     contents::{Contents, PrintedHistory},
@@ -19,27 +16,11 @@ use npz::NamedArray;
 /// # Errors
 /// The operating system refuses.
 pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<(), BundleError> {
-    let arrays = contents.constants().map(|(id, tables)| {
-        let (rows, columns) = contents.shape(id);
-        let of_row = if contents.is_matrix(id) {
-            vec![rows, columns]
-        } else {
-            vec![columns]
-        };
-        NamedArray {
-            name: contents.name_of(id).to_owned(),
-            precision: contents.precision_of(id),
-            shape: [
-                if tables.len() > 1 {
-                    vec![tables.len()]
-                } else {
-                    Vec::new()
-                },
-                of_row,
-            ]
-            .concat(),
-            values: tables.iter().flat_map(|table| table.iter().copied()).collect(),
-        }
+    let arrays = contents.constants().map(|(id, tables)| NamedArray {
+        name: contents.name_of(id).to_owned(),
+        precision: contents.precision_of(id),
+        shape: contents.full_shape(id, tables.len()),
+        values: tables.iter().flat_map(|table| table.iter().copied()).collect(),
     });
     folder.write(&format!("{}.npz", contents.noun), npz::write(&Vec::from_iter(arrays)))?;
     folder.write("decode.py", program(contents))
@@ -114,13 +95,6 @@ fn program(contents: &Contents) -> String {
          return joined if len(joined) > 1 else joined[0]\n",
         rows = contents.rows,
     )
-}
-
-/// Names of the parts of an answer.
-fn parts(contents: &Contents) -> Vec<&str> {
-    let exported = &contents.exported;
-    let all = [Some(exported.targets), exported.half_widths, exported.outside];
-    all.into_iter().flatten().map(|id| contents.name_of(id)).collect()
 }
 
 /// The parts of an answer, in the precision of the bundle.
@@ -207,11 +181,7 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
 fn remembering(contents: &Contents, history: &PrintedHistory) -> String {
     let constants = &history.constants;
     let (kept, averages) = (constants.longest_lag(), constants.averages.len());
-    let rates = constants.averages.iter().map(|average| match average {
-        Span::Seconds(seconds) => (1.0 / seconds, 0.0),
-        Span::Samples(samples) => (0.0, 1.0 / samples),
-    });
-    let (per_second, per_reading): (Vec<f64>, Vec<f64>) = rates.unzip();
+    let (per_second, per_reading) = history.rates();
     let lags = Vec::from_iter(constants.lags.iter().map(|lag| lag - 1));
     let pause = match history.pause_s {
         f64::INFINITY => "np.inf".to_owned(),
@@ -250,25 +220,15 @@ fn remembering(contents: &Contents, history: &PrintedHistory) -> String {
     )
 }
 
-/// Returns the usage section of the README.
+/// Lines of a program that decodes.
 pub(super) fn usage(contents: &Contents) -> String {
-    let (input, channels) = (contents.meaning.readings(), contents.channels());
-    let parts = parts(contents).join(", ");
-    let (row, row_text) = match contents.takes_row() {
-        true => (", row", ";\nrow is the row of each sample, from 1"),
-        false => ("", ""),
-    };
-    if contents.history().is_some() {
-        let row = if contents.takes_row() { ", row" } else { "" };
-        return format!(
+    let (input, parts) = (contents.meaning.readings(), contents.parts().join(", "));
+    let row = if contents.takes_row() { ", row" } else { "" };
+    match contents.history() {
+        Some(_) => format!(
             "    from decode import decode\n    state = None\n    {parts}, state = decode({input}, time_s, state{row})\n\n\
-             {input} is samples x {channels} in order of time, as many as have come since the last call{row_text}.\n"
-        );
+             takes as many samples as have come since the last call.\n"
+        ),
+        None => format!("    from decode import decode\n    {parts} = decode({input}{row})\n"),
     }
-    format!(
-        "    from decode import decode\n    {parts} = decode({input}{row})\n\n\
-         {input} is samples x {channels}, {output} samples x {outputs}{row_text}.\n",
-        output = contents.meaning.outputs(),
-        outputs = contents.outputs(),
-    )
 }

@@ -1,7 +1,7 @@
 //! The state of a history in a graph: whether it has started, the latest time, the latest readings (the newest first), and
 //! the averages.
 
-use decoupler_core::{dataset::Span, decoupling::Precision};
+use decoupler_core::decoupling::Precision;
 
 use super::Printer;
 use crate::export::bundle::contents::Contents;
@@ -84,11 +84,7 @@ impl Printer<'_> {
         if averages > 0 {
             let of_state = rows!("state", 2 + kept, 2 + kept + averages);
             let of_state = builder.op("Where", &[&restarts, now, &of_state]);
-            let rates = constants.averages.iter().map(|average| match average {
-                Span::Seconds(seconds) => (1.0 / seconds, 0.0),
-                Span::Samples(samples) => (0.0, 1.0 / samples),
-            });
-            let (per_second, per_reading): (Vec<f64>, Vec<f64>) = rates.unzip();
+            let (per_second, per_reading) = history.rates();
             let per_second = builder.numbers("per_second", DOUBLE, &[averages, 1], per_second.into_iter());
             let per_reading = builder.numbers("per_reading", DOUBLE, &[averages, 1], per_reading.into_iter());
             let exponent = builder.op("Mul", &[&elapsed, &per_second]);

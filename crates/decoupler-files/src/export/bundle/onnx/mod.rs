@@ -97,21 +97,7 @@ impl Printer<'_> {
         };
         printer.check_row();
         for (id, tables) in contents.constants() {
-            let (rows, columns) = contents.shape(id);
-            let of_row = if contents.is_matrix(id) {
-                vec![rows, columns]
-            } else {
-                vec![columns]
-            };
-            let shape = [
-                if tables.len() > 1 {
-                    vec![tables.len()]
-                } else {
-                    Vec::new()
-                },
-                of_row,
-            ]
-            .concat();
+            let shape = contents.full_shape(id, tables.len());
             let values = tables.iter().flat_map(|table| table.iter().copied());
             let precision = contents.precision_of(id);
             if tables.len() > 1 {
@@ -364,56 +350,37 @@ fn channel_names(what: &str, channels: &[Channel], is_array: bool) -> String {
     format!("{what}: {}", Vec::from_iter(channels.iter().map(name)).join(", "))
 }
 
-/// Returns the usage section of the README.
+/// Lines of a program that decodes.
 pub(super) fn usage(contents: &Contents) -> String {
-    let (channels, outputs) = (contents.channels(), contents.outputs());
-    let meaning = &contents.meaning;
-    let (input, output) = (meaning.readings(), meaning.outputs());
+    let (input, output) = (contents.meaning.readings(), contents.meaning.outputs());
     let kind = match contents.outer_precision() {
         Precision::Single => "float32",
         Precision::Double => "float64",
     };
-    let (row, row_text) = match contents.takes_row() {
-        true => (", \"row\": np.array([1], np.int64)", ", or the row does not exist"),
-        false => ("", ""),
-    };
-    let above = if contents.exported.are_positive() {
-        " above 0"
+    let row = if contents.takes_row() {
+        ", \"row\": np.array([1], np.int64)"
     } else {
         ""
-    };
-    let further = match contents.exported.outside {
-        Some(_) => format!(
-            " A further output, readings_outside: {}.",
-            contents.outside_in_words().to_lowercase()
-        ),
-        None => String::new(),
     };
     let loaded = format!(
         "    import numpy as np\n    import onnxruntime\n    session = onnxruntime.InferenceSession(\"{}.onnx\")\n",
         contents.noun
     );
     if contents.history().is_some() {
-        let size = |part: Option<usize>| part.map_or(1, |size| size);
-        let [rows, columns] = history::state_shape(contents).map(size);
+        let [rows, columns] = history::state_shape(contents).map(|size| size.unwrap_or(1));
         return format!(
             "{loaded}    state = np.zeros(({rows}, {columns}))\n    \
              {output}, state = session.run([\"{output}\", \"next_state\"],\n        \
              {{\"{input}\": readings.astype(np.{kind}), \"time_s\": np.array([[time_s]]), \"state\": state{row}}})\n\n\
-             takes one sample (1 x {channels}) at a time. Where a reading is not a finite number{above}{row_text},\n\
-             the {}s are NaN and the state stays.{further}\n",
-            meaning.output()
+             takes one sample at a time. Invalid readings give NaN, and the state stays.\n"
         );
     }
+    let first = usize::from(contents.takes_row());
     format!(
-        "{loaded}    readings = np.loadtxt(\"golden.csv\", delimiter=\",\", skiprows=1, ndmin=2)[:1, {first}:{end}]\n    \
-         inputs = {{\"{input}\": readings.astype(np.{kind}){row}}}\n    \
-         {output} = session.run([\"{output}\"], inputs)[0]\n\n\
-         {input} is batch x {channels}, {output} batch x {outputs}; where a reading is not a finite \
-         number{above}{row_text},\nthe {}s are NaN.{further}\n",
-        meaning.output(),
-        first = usize::from(contents.takes_row()),
-        end = channels + usize::from(contents.takes_row()),
+        "{loaded}    readings = np.loadtxt(\"golden.csv\", delimiter=\",\", skiprows=1, ndmin=2)[:1, {first}:{}]\n    \
+         {output} = session.run([\"{output}\"], {{\"{input}\": readings.astype(np.{kind}){row}}})[0]\n\n\
+         Invalid readings and rows give NaN.\n",
+        first + contents.channels(),
     )
 }
 
