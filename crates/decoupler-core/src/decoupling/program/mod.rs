@@ -162,16 +162,10 @@ impl Domain {
 /// A function of one value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Function {
-    /// ln x.
-    Log,
     /// ln(1 + x).
     Log1p,
-    /// 1/x.
-    Reciprocal,
     /// Hyperbolic tangent.
     Tanh,
-    /// eˣ.
-    Exp,
     /// e⁻ˣ, a Gaussian of a squared distance.
     Gaussian,
 }

@@ -155,11 +155,8 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
         Operation::Subtract(one, other) => format!("{} - {}", of(*one), of(*other)),
         Operation::Divide(one, other) => format!("{} ./ {}", of(*one), of(*other)),
         Operation::Map(function, x) => match function {
-            Function::Log => format!("log({})", of(*x)),
             Function::Log1p => format!("log1p({})", of(*x)),
-            Function::Reciprocal => format!("1 ./ {}", of(*x)),
             Function::Tanh => format!("tanh({})", of(*x)),
-            Function::Exp => format!("exp({})", of(*x)),
             Function::Gaussian => format!("exp(-{})", of(*x)),
         },
         Operation::Affine { of: x, weights, biases } => format!("{} * {} + {}", of(*x), of(*weights), of(*biases)),

@@ -99,11 +99,8 @@ fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operatio
         Operation::Map(function, values) => {
             let x = of(*values, "i");
             assigned(match function {
-                Function::Log => format!("log{suffix}({x})"),
                 Function::Log1p => format!("log1p{suffix}({x})"),
-                Function::Reciprocal => format!("1 / {x}"),
                 Function::Tanh => format!("tanh{suffix}({x})"),
-                Function::Exp => format!("exp{suffix}({x})"),
                 Function::Gaussian => format!("exp{suffix}(-{x})"),
             })
         }

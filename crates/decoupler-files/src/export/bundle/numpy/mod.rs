@@ -146,11 +146,8 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
         Operation::Subtract(one, other) => format!("{} - {}", of(*one), of(*other)),
         Operation::Divide(one, other) => format!("{} / {}", of(*one), of(*other)),
         Operation::Map(function, x) => match function {
-            Function::Log => format!("np.log({})", of(*x)),
             Function::Log1p => format!("np.log1p({})", of(*x)),
-            Function::Reciprocal => format!("1 / {}", of(*x)),
             Function::Tanh => format!("np.tanh({})", of(*x)),
-            Function::Exp => format!("np.exp({})", of(*x)),
             Function::Gaussian => format!("np.exp(-{})", of(*x)),
         },
         Operation::Affine { of: x, weights, biases } => format!("{} @ {} + {}", of(*x), of(*weights), of(*biases)),

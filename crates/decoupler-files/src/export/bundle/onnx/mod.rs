@@ -231,10 +231,7 @@ impl Printer<'_> {
     fn map(&mut self, function: Function, x: &str, precision: Precision, name: &str) {
         let builder = &mut self.builder;
         match function {
-            Function::Log => drop(builder.named("Log", &[x], &[], name)),
             Function::Tanh => drop(builder.named("Tanh", &[x], &[], name)),
-            Function::Exp => drop(builder.named("Exp", &[x], &[], name)),
-            Function::Reciprocal => drop(builder.named("Reciprocal", &[x], &[], name)),
             Function::Gaussian => {
                 let negative = builder.op("Neg", &[x]);
                 builder.named("Exp", &[&negative], &[], name);
