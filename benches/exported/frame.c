@@ -1,5 +1,5 @@
 /* Measures the time per frame of 10 row-wires of a decoder in C. BUNDLE is the prefix of its names, READING the type
- * of a reading. */
+ * of a reading, COORDINATES the name of the decoded coordinates in an answer. */
 #define JOINED(a, b) a##b
 #define NAME(a, b) JOINED(a, b)
 #define _POSIX_C_SOURCE 199309L
@@ -10,7 +10,7 @@
 
 #define ROWS 10
 #define CHANNELS 30
-#define OUTPUTS 30
+#define ANSWER NAME(BUNDLE, _answer)
 
 static double seconds(void)
 {
@@ -22,7 +22,7 @@ static double seconds(void)
 int main(int count, char **arguments)
 {
     static READING readings[ROWS][CHANNELS];
-    static COORDINATE decoded[ROWS][OUTPUTS];
+    static ANSWER answers[ROWS];
     const int frames = 2000;
     double best = 1e9, sum = 0;
     FILE *file = count > 1 ? fopen(arguments[1], "r") : NULL;
@@ -40,12 +40,12 @@ int main(int count, char **arguments)
         for (int frame = 0; frame < frames; ++frame) {
             for (int row = 0; row < ROWS; ++row) {
 #ifdef TAKES_ROW
-                NAME(BUNDLE, _decode)(row + 1, readings[row], decoded[row]);
+                NAME(BUNDLE, _decode)(row + 1, readings[row], &answers[row]);
 #else
-                NAME(BUNDLE, _decode)(readings[row], decoded[row]);
+                NAME(BUNDLE, _decode)(readings[row], &answers[row]);
 #endif
             }
-            sum += (double)decoded[frame % ROWS][2];
+            sum += (double)answers[frame % ROWS].COORDINATES[2];
         }
         const double each = (seconds() - start) / frames;
         best = each < best ? each : best;

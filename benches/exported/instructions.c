@@ -31,7 +31,7 @@ static void print(uint32_t number)
     host(4, digit);
 }
 
-static int32_t decoded[DECODED];
+static NAME(BUNDLE, _answer) answer;
 
 static uint32_t ticks(int decodes)
 {
@@ -40,9 +40,9 @@ static uint32_t ticks(int decodes)
         const uint32_t start = SYSTICK_VALUE;
         if (decodes) {
 #ifdef TAKES_ROW
-            NAME(BUNDLE, _decode)(1 + round % ROWS, readings[round % ROWS], decoded);
+            NAME(BUNDLE, _decode)(1 + round % ROWS, readings[round % ROWS], &answer);
 #else
-            NAME(BUNDLE, _decode)(readings[round % ROWS], decoded);
+            NAME(BUNDLE, _decode)(readings[round % ROWS], &answer);
 #endif
         }
         sum += (start - SYSTICK_VALUE) & SYSTICK_MOST;
@@ -57,7 +57,7 @@ void start(void)
     SYSTICK_CONTROL = 5;
     const uint32_t loop = ticks(0);
     print((ticks(1) - loop) * NANOSECONDS_A_TICK / ROUNDS);
-    print((uint32_t)decoded[2]);
+    print((uint32_t)answer.coordinates_nm[2]);
     host(0x18, (const void *)0x20026);
     for (;;) {
     }

@@ -42,9 +42,10 @@ def time_c(home, name, precision, folder, readings, scale):
     header = next(folder.glob("*_decode.h"))
     prefix = header.name.removesuffix("_decode.h")
     text = header.read_text()
-    kinds = re.search(r"const (\w+) resistances_\w+\[[^;]*?(\w+) coordinates", text, re.S)
+    kind = re.search(r"const (\w+) resistances_\w+\[", text)[1]
+    coordinates = re.search(r"\w+ (coordinates_\w+)\[", text)[1]
     (home / "readings.txt").write_text(" ".join(f"{value * scale:.17g}" for value in readings.flat))
-    flags = [f'-DHEADER="{header.name}"', f"-DBUNDLE={prefix}", f"-DREADING={kinds[1]}", f"-DCOORDINATE={kinds[2]}"]
+    flags = [f'-DHEADER="{header.name}"', f"-DBUNDLE={prefix}", f"-DREADING={kind}", f"-DCOORDINATES={coordinates}"]
     if "int row" in text:
         flags.append("-DTAKES_ROW")
     program = home / f"{name}_{precision}"
@@ -72,7 +73,7 @@ def arm_size(folder, cpu):
     """Returns flash of the decoder with the arithmetic that the processor lacks, static memory, and stack of the decoder."""
     source, image = next(folder.glob("*_decode.c")), folder / f"{cpu}.elf"
     prefix = source.name.removesuffix("_decode.c")
-    call = f"{prefix}_decode({'1, ' if 'int row' in source.read_text() else ''}(const int32_t *)0x20000000, (int32_t *)0x20001000)"
+    call = f"{prefix}_decode({'1, ' if 'int row' in source.read_text() else ''}(const int32_t *)0x20000000, ({prefix}_answer *)0x20001000)"
     main = folder / "main.c"
     main.write_text(f'#include "{source.stem}.h"\nint main(void)\n{{\n    return {call};\n}}\n')
     flags = [f"-mcpu=cortex-{cpu}", "-mthumb", "-std=c99", "-Os", "-ffunction-sections", "-fstack-usage"]
@@ -82,7 +83,6 @@ def arm_size(folder, cpu):
     text, data, bss, *_ = run("arm-none-eabi-size", image).splitlines()[1].split()
     usage = dict(line.split(":")[-1].split("\t")[:2] for line in (folder / f"{cpu}.su").read_text().splitlines())
     own = int(usage.pop(f"{prefix}_decode"))
-    usage.pop(f"{prefix}_is_out_of_range", None)
     return int(text) + int(data), int(data) + int(bss), own + max(map(int, usage.values()), default=0)
 
 
@@ -90,7 +90,7 @@ def arm_instructions(folder, cpu, optimisation, readings, scale):
     """Returns the instructions for a row-wire, and the last z_1 in nm, on an emulated processor that takes 1 ns for each."""
     source, image = next(folder.glob("*_decode.c")), folder / f"{cpu}{optimisation}.elf"
     rows = ", ".join("{" + ", ".join(str(round(value * scale)) for value in row) + "}" for row in readings)
-    sizes = f"#define ROWS {len(readings)}\n#define DECODED 30\n"
+    sizes = f"#define ROWS {len(readings)}\n"
     (folder / "readings.h").write_text(f"{sizes}static const int32_t readings[ROWS][{len(readings[0])}] = {{{rows}}};\n")
     flags = [f"-mcpu=cortex-{cpu}", "-mthumb", "-std=c99", optimisation, f"-I{folder}", f'-DHEADER="{source.stem}.h"']
     flags.append(f"-DBUNDLE={source.name.removesuffix('_decode.c')}")

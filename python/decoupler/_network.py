@@ -19,21 +19,21 @@ class Exported(NamedTuple):
     Attributes
     ----------
     path : str
-        The folder, or the file.
+        The folder.
     files : list of (str, int)
         Names of the files, with their sizes in bytes.
-    deviation : float
-        Largest deviation of the files, read back and evaluated, from the decoder, relative to the
-        range of the targets.
+    deviation : float or None
+        Largest deviation of the files from the decoder where they were evaluated, as C is and single
+        precision, relative to the range of the targets.
     limit : float
-        Largest deviation allowed.
+        Largest deviation to be expected of other programs.
     remarks : list of str
         Remarks on the accuracy.
     """
 
     path: str
     files: list[tuple[str, int]]
-    deviation: float
+    deviation: float | None
     limit: float
     remarks: list[str]
 
@@ -177,10 +177,10 @@ class Network:
         Parameters
         ----------
         path : path-like
-            New folder; a file for format "json".
-        format : {"onnx", "c99", "matlab", "numpy", "json"}, default="onnx"
+            New folder.
+        format : {"onnx", "c99", "matlab", "numpy"}, default="onnx"
             Kind of files: a graph for ONNX runtimes, a C header and source, a MATLAB function,
-            arrays with a short Python module, or the network file.
+            or arrays with a short Python module.
         precision : {"f64", "f32", "fixed16"}, default="f64"
             Numbers with which the files compute; "fixed16" is for "c99" only.
 

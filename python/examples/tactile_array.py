@@ -79,7 +79,7 @@ print("best number of hidden nodes", search.best_params_["hidden_nodes"])
 
 # %% [markdown]
 # ## Export
-# The files are read back and compared with the network before they are put in place.
+# The files state how far answers of other programs may deviate from those of the network.
 
 # %%
 with tempfile.TemporaryDirectory() as folder:

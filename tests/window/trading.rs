@@ -351,7 +351,11 @@ fn save(driver: &mut Driver, path: &Path) -> serde_json::Value {
     driver.type_into("File", &path.display().to_string());
     driver.click_button("Save");
     driver.wait("the answer", |driver| driver.notice().is_some());
-    assert!(driver.says("written and read back"), "{:#?}", driver.texts());
+    assert!(
+        driver.says("answers of other programs agree within"),
+        "{:#?}",
+        driver.texts()
+    );
     driver.settle();
     driver.click("Dismiss");
     serde_json::from_str(&fs::read_to_string(path.join("metadata.json")).unwrap()).unwrap()

@@ -50,7 +50,7 @@ const STEPS: [Step; 5] = [
     },
     Step {
         title: "Take the network with you",
-        text: "Export saves it as ONNX, C99, MATLAB, NumPy or JSON. Each file is read back and compared with the \
+        text: "Export saves it as ONNX, C99, MATLAB or NumPy, with golden readings and answers for a test of your \
                network before you get it.",
         landmark: Landmark::Export,
         action: None,

@@ -2,7 +2,10 @@
 //!
 //! Exports of single decoders, offered next to their errors.
 
-use std::{path::Path, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
@@ -98,6 +101,17 @@ pub fn network_exports<'a>(
         })
         .collect();
     exports.push(Export {
+        group: ExportGroup::Network,
+        name: format!("{prefix}Network file"),
+        form: "JSON".to_owned(),
+        description: NETWORK_FILE.description,
+        ask: ask(Box::new(move |source: NetworkSource| {
+            source.task(NETWORK_FILE, "network", |file, _| {
+                Contents::new(move |path| file.save(path))
+            })
+        })),
+    });
+    exports.push(Export {
         group: ExportGroup::Report,
         name: format!("{prefix}Report"),
         form: "HTML".to_owned(),
@@ -123,11 +137,8 @@ fn bundle_export<'a>(
 ) -> Export<'a> {
     Export {
         group: ExportGroup::Network,
-        name: format!("{prefix}{}", bundle_name(format)),
-        form: match format {
-            BundleFormat::Json => "JSON".to_owned(),
-            _ => precision.to_string(),
-        },
+        name: format!("{prefix}{}", format.title()),
+        form: precision.to_string(),
         description: words.description,
         ask,
     }
@@ -136,20 +147,25 @@ fn bundle_export<'a>(
 /// The contents that `export` writes and verifies.
 fn bundle_contents(export: impl Fn(&Path) -> Result<BundleReport, BundleError> + Send + Sync + 'static) -> Contents {
     Contents::with_message(move |path| {
-        export(path)
+        export(&free_folder(path))
             .map(|report| said_of(&report))
             .map_err(|error| error.to_string())
     })
 }
 
-pub(super) fn bundle_name(format: BundleFormat) -> &'static str {
-    match format {
-        BundleFormat::Onnx => "ONNX",
-        BundleFormat::C99 => "C99",
-        BundleFormat::Matlab => "MATLAB/Octave",
-        BundleFormat::NumPy => "NumPy",
-        BundleFormat::Json => "Network file",
-    }
+/// The folder, or if there is one with files, the first of its name with -2, -3, … that is free: no folder is overwritten, and
+/// a second export does not fail.
+fn free_folder(path: &Path) -> PathBuf {
+    let is_taken = |path: &Path| match path.read_dir() {
+        Ok(mut entries) => entries.next().is_some(),
+        Err(_) => path.exists(),
+    };
+    let name = path
+        .file_name()
+        .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    let numbered = (2..).map(|number| path.with_file_name(format!("{name}-{number}")));
+    let mut all = std::iter::once(path.to_owned()).chain(numbered);
+    all.find(|path| !is_taken(path)).unwrap_or_else(|| path.to_owned())
 }
 
 /// Words for a network or another decoder in a format.
@@ -158,20 +174,16 @@ pub(super) fn bundle_words(format: BundleFormat, decoder: BundleDecoder) -> File
     let (kind, description) = match (format, is_network) {
         (BundleFormat::Onnx, true) => (
             "network as ONNX",
-            "A folder with the network as an ONNX graph (opset 13) and golden vectors: readings in, targets out.",
+            "A folder with the network as an ONNX graph (opset 13) and golden readings: readings in, targets out.",
         ),
         (BundleFormat::Onnx, false) => (
             "decoder as ONNX",
-            "A folder with the decoder as an ONNX graph (opset 13) and golden vectors: readings in, targets out.",
+            "A folder with the decoder as an ONNX graph (opset 13) and golden readings: readings in, targets out.",
         ),
-        (BundleFormat::C99, true) => (
-            "network as C99",
+        (BundleFormat::C99, _) => (
+            if is_network { "network as C99" } else { "decoder as C99" },
             "A folder with one header and one source in C99 and a self-test: readings in, targets out. fixed16 uses integer \
              arithmetic only, for microcontrollers.",
-        ),
-        (BundleFormat::C99, false) => (
-            "decoder as C99",
-            "A folder with one header and one source in C99 and a self-test: readings in, targets out.",
         ),
         (BundleFormat::Matlab, _) => (
             if is_network {
@@ -179,7 +191,7 @@ pub(super) fn bundle_words(format: BundleFormat, decoder: BundleDecoder) -> File
             } else {
                 "decoder for MATLAB and Octave"
             },
-            "A folder with one function file for MATLAB and GNU Octave and golden vectors: readings in, targets out.",
+            "A folder with one function file for MATLAB and GNU Octave and golden readings: readings in, targets out.",
         ),
         (BundleFormat::NumPy, _) => (
             if is_network {
@@ -187,27 +199,25 @@ pub(super) fn bundle_words(format: BundleFormat, decoder: BundleDecoder) -> File
             } else {
                 "decoder for NumPy"
             },
-            "A folder with the weights as .npz, a short decode.py and golden vectors: readings in, targets out.",
+            "A folder with the weights as .npz, a short decode.py and golden readings: readings in, targets out.",
         ),
-        (BundleFormat::Json, true) => (
-            "network",
-            "Layers, scaling, array, geometry, training record and errors, as JSON; the terminal commands decode and \
-             export read it.",
-        ),
-        (BundleFormat::Json, false) => ("decoder", "The parameters of the decoder as JSON, with their meanings."),
     };
     FileWords {
         kind,
         description,
-        extensions: if format == BundleFormat::Json { &["json"] } else { &[] },
+        extensions: &[],
     }
 }
 
+const NETWORK_FILE: FileWords = FileWords {
+    kind: "network",
+    description: "Layers, scaling, array, geometry, training record and errors, as JSON; the terminal commands decode and \
+                  export read it.",
+    extensions: &["json"],
+};
+
 fn bundle_task(source: &NetworkSource, format: BundleFormat, precision: BundlePrecision) -> FileTask {
     let words = bundle_words(format, NETWORK);
-    if format == BundleFormat::Json {
-        return source.task(words, "network", |file, _| Contents::new(move |path| file.save(path)));
-    }
     source.task(words, &format!("{format}-{precision}"), move |file, _| {
         bundle_contents(move |path| export_bundle(&*file, format, precision, path))
     })
@@ -215,13 +225,13 @@ fn bundle_task(source: &NetworkSource, format: BundleFormat, precision: BundlePr
 
 /// Returns a sentence about a bundle that was written.
 pub(super) fn said_of(report: &BundleReport) -> String {
-    let deviation = match report.output_range_mm {
-        Some(range_mm) => format!("{} mm", format_number(report.deviation() * range_mm)),
-        None => format!("{:.1e} of the range of a target", report.deviation()),
+    let limit = match report.output_range_mm {
+        Some(range_mm) => format!("{} mm", format_number(report.limit * range_mm)),
+        None => format!("{:.1e} of the range of a target", report.limit),
     };
     let mut text = format!(
-        "{} written and read back: largest deviation {deviation}. Saved {}",
-        bundle_name(report.format),
+        "{} written; answers of other programs agree within {limit}. Saved {}",
+        report.format.title(),
         report.path.display()
     );
     for remark in &report.remarks {
@@ -289,12 +299,9 @@ impl DecoderSource {
     fn task(&self, kind: DecoderKind, (format, precision): (BundleFormat, BundlePrecision)) -> FileTask {
         let decoder = BundleDecoder::Kind(kind);
         let words = bundle_words(format, decoder);
-        let what = match format {
-            BundleFormat::Json => kind.to_string(),
-            _ => format!("{kind}-{format}-{precision}"),
-        };
+        let what = format!("{kind}-{format}-{precision}");
         let write = move |path: &Path, exported: Result<ExportedDecoder<'_>, BundleError>| {
-            let report = exported.and_then(|exported| export_bundle(exported, format, precision, path));
+            let report = exported.and_then(|exported| export_bundle(exported, format, precision, &free_folder(path)));
             report.map(|report| said_of(&report)).map_err(|error| error.to_string())
         };
         match self {
@@ -353,10 +360,7 @@ pub fn decoder_forms_ui(ui: &mut Ui, kind: DecoderKind, source: &DecoderSource) 
     }
     let mut asked = None;
     for form in bundles().filter(|(format, precision)| format.check_for(decoder, *precision).is_ok()) {
-        let name = match form {
-            (BundleFormat::Json, _) => "JSON".to_owned(),
-            (format, precision) => format!("{}, {precision}", bundle_name(format)),
-        };
+        let name = format!("{}, {}", form.0.title(), form.1);
         let button = ui.button(name).on_hover_text(bundle_words(form.0, decoder).description);
         if button.clicked() {
             asked = Some(source.task(kind, form));

@@ -1,7 +1,7 @@
 use std::collections::HashMap;
 
 /// Number of usual intervals after which a series starts again.
-const GAP: f64 = 50.0;
+pub const GAP: f64 = 50.0;
 /// Steps back in time are restarts of a clock up to one in this many rows; more of them are rows that are out of order.
 const ROWS_PER_RESTART: usize = 50;
 

@@ -19,7 +19,7 @@ mod seed;
 mod simulation;
 mod span;
 
-pub use continuation::{Continuation, Place, RowOrder, Series};
+pub use continuation::{Continuation, GAP, Place, RowOrder, Series};
 pub use division::{DividedSamples, Division, Split, SplitBy};
 pub use error::DatasetError;
 pub use folds::Folds;

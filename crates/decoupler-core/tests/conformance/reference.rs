@@ -47,11 +47,8 @@ pub(crate) fn answer(program: &Program, row: usize, readings: &[f64], states: &m
             Operation::Divide(one, other) => by_pairs(one, other, |one, other| one / other),
             Operation::Map(function, operand) => {
                 let function: fn(f64) -> f64 = match function {
-                    Function::Log => f64::ln,
                     Function::Log1p => f64::ln_1p,
-                    Function::Reciprocal => f64::recip,
                     Function::Tanh => f64::tanh,
-                    Function::Exp => f64::exp,
                     Function::Gaussian => |x| (-x).exp(),
                 };
                 of(operand).into_iter().map(|value| round(function(value))).collect()

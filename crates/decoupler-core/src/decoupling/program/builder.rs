@@ -1,4 +1,4 @@
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1};
 
 use super::{Domain, Function, Node, NodeId, Operation, Program};
 use crate::{
@@ -13,6 +13,8 @@ pub struct Changes {
     node: NodeId,
     /// Derivative of the quantity by the change of each channel.
     slopes: Vec<f64>,
+    /// The quantity where the change is 0, relative to the centre.
+    offsets: Vec<f64>,
     precision: Precision,
 }
 
@@ -177,12 +179,14 @@ impl Builder {
         self.push(Operation::CountOutside { of, low, high }, 1, Precision::Double)
     }
 
-    /// Adds the changes of the readings from R₀, the readings whose `quantity` is `centre`. They are valid readings only.
+    /// Adds the changes of the readings from R₀, the readings whose `quantity` is `centre`, rounded to single precision. They
+    /// are valid readings only.
     ///
     /// R − R₀ is computed in double precision and the change in `precision`, which loses no digits in single precision where
-    /// readings differ little:
+    /// readings differ little. As R₀ is the same number in both precisions, programs that take their readings in single
+    /// precision can compute the difference in it.
     ///
-    /// | quantity q | change | q − q₀ |
+    /// | quantity q | change | q − q(R₀) |
     /// |---|---|---|
     /// | resistance, raw | R − R₀ | the change |
     /// | conductance | (R − R₀)/R | −1/R₀ times the change |
@@ -192,7 +196,20 @@ impl Builder {
             Quantity::Raw => Domain::Finite,
             Quantity::Resistance | Quantity::Conductance | Quantity::LogResistance => Domain::Positive,
         };
-        let centre = Vec::from_iter(centre.iter().map(|&value| quantity.resistance_ohm(value)));
+        let (exact, centre): (Vec<f64>, Vec<f64>) = centre
+            .iter()
+            .map(|&value| {
+                let exact = quantity.resistance_ohm(value);
+                let rounded = f64::from(exact as f32);
+                (exact, if quantity.accepts(rounded) { rounded } else { exact })
+            })
+            .unzip();
+        let off = exact.iter().zip(&centre).map(|(exact, rounded)| match quantity {
+            Quantity::Resistance | Quantity::Raw => rounded - exact,
+            Quantity::Conductance => (exact - rounded) / rounded / exact,
+            Quantity::LogResistance => ((rounded - exact) / exact).ln_1p(),
+        });
+        let offsets = off.collect();
         let readings = self.valid(self.readings(), domain);
         let reference = self.constants(&centre, Precision::Double);
         let difference = self.subtract(readings, reference, Precision::Double);
@@ -211,6 +228,7 @@ impl Builder {
         Changes {
             node,
             slopes,
+            offsets,
             precision,
         }
     }
@@ -233,11 +251,12 @@ impl Builder {
         padding: f64,
     ) -> NodeId {
         assert_eq!(weights.dim(), (changes.slopes.len(), biases.len()));
+        let biases = (&ArrayView1::from(biases) + &ArrayView1::from(&changes.offsets).dot(&weights)).to_vec();
         for (mut weights, slope) in weights.rows_mut().into_iter().zip(&changes.slopes) {
             weights *= *slope;
         }
         let weights = self.table(weights, 0.0, changes.precision);
-        let biases = self.table(row(biases), padding, changes.precision);
+        let biases = self.table(row(&biases), padding, changes.precision);
         self.affine_by(changes.node, weights, biases)
     }
 

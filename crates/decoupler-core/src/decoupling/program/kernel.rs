@@ -78,10 +78,7 @@ pub(super) fn map(precision: Precision, function: Function, values: &[f64], resu
 #[inline(always)]
 fn map_in<T: Real>(function: Function, values: &[f64], results: &mut [f64]) {
     match function {
-        Function::Log => each::<T>(values, results, f64::ln),
         Function::Log1p => each::<T>(values, results, f64::ln_1p),
-        Function::Reciprocal => each::<T>(values, results, |x| 1.0 / x),
-        Function::Exp => each::<T>(values, results, exp),
         Function::Gaussian => each::<T>(values, results, |x| exp(-x)),
         Function::Tanh => {
             for (result, &value) in results.iter_mut().zip(values) {

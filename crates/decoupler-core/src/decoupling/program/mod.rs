@@ -45,6 +45,11 @@ pub struct Node {
 pub struct NodeId(usize);
 
 impl NodeId {
+    /// The node with this index.
+    pub fn at(index: usize) -> Self {
+        Self(index)
+    }
+
     /// Index in [`Program::nodes`].
     pub fn index(self) -> usize {
         self.0
@@ -157,21 +162,27 @@ impl Domain {
 /// A function of one value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Function {
-    /// ln x.
-    Log,
     /// ln(1 + x).
     Log1p,
-    /// 1/x.
-    Reciprocal,
     /// Hyperbolic tangent.
     Tanh,
-    /// eˣ.
-    Exp,
     /// e⁻ˣ, a Gaussian of a squared distance.
     Gaussian,
 }
 
 impl Program {
+    /// The program of these nodes.
+    ///
+    /// # Panics
+    /// If the first are not the readings, or an operand does not come before its node.
+    pub fn new(nodes: Vec<Node>, output: NodeId) -> Self {
+        assert_eq!(nodes[0].operation, Operation::Readings);
+        for (index, node) in nodes.iter().enumerate() {
+            assert!(node.operation.operands().iter().all(|operand| operand.0 < index));
+        }
+        Self { nodes, output }
+    }
+
     /// All nodes in the order of evaluation.
     pub fn nodes(&self) -> &[Node] {
         &self.nodes
@@ -207,7 +218,7 @@ impl Program {
     }
 
     /// Number of times that a node is taken, as an operand or as the targets.
-    fn uses(&self, id: NodeId) -> usize {
+    pub fn uses(&self, id: NodeId) -> usize {
         let operands = self.nodes.iter().flat_map(|node| node.operation.operands());
         operands.chain([self.output]).filter(|&operand| operand == id).count()
     }
@@ -291,7 +302,8 @@ fn padded(tables: &[&Array2<f64>], padding: f64) -> Vec<Array2<f64>> {
 
 impl Operation {
     /// The same operation on other nodes.
-    fn with_operands(&self, moved: impl Fn(&NodeId) -> NodeId) -> Self {
+    #[must_use]
+    pub fn with_operands(&self, moved: impl Fn(&NodeId) -> NodeId) -> Self {
         let mut operation = self.clone();
         for operand in operation.operands_mut() {
             *operand = moved(operand);

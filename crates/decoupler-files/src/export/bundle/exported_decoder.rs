@@ -1,7 +1,9 @@
+use std::sync::Arc;
+
 use decoupler_core::{
-    dataset::{Dataset, Memory, PerRow, Seed, Simulation, Stream},
-    decoupling::{Decoder, DecoderKind, NotDescribed, Precision, Program, decode_set},
-    evaluation::{DecoderSet, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
+    dataset::{Dataset, GAP, PerRow, Seed, Simulation, Stream},
+    decoupling::{DecoderKind, Function, NodeId, NotDescribed, Operation, Precision, Program, decode_set},
+    evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
     network::{MinMax, Networks},
     problem::{Channel, Problem},
 };
@@ -10,9 +12,11 @@ use serde_json::{Map, Value, json};
 
 use super::{
     BundleDecoder, BundleError, BundlePrecision, ChoiceError,
-    layers::Layer,
+    contents::Contents,
+    exported_program::{ExportedProgram, Limits},
+    golden::{Golden, GoldenRow},
     meaning::Meaning,
-    portable::{ChannelRanges, Portable},
+    names::names,
 };
 use crate::{
     export::{NetworkFile, document::PROGRAM},
@@ -25,21 +29,26 @@ pub struct ExportedDecoder<'a> {
     file: Option<&'a NetworkFile>,
     origin: Origin,
     fitted: FittedDecoder,
+    /// Test samples, if they are known.
+    test: Option<Arc<Dataset>>,
 }
 
-/// Readings of one row with the index of the row-wire, 0 if it is not an argument.
-pub(super) type Drawn = Vec<(usize, Vec<f64>)>;
-
 /// Facts about a decoder, for users and programs that have only the bundle: names of fields and JSON values.
-pub(super) type Metadata = Map<String, Value>;
+type Metadata = Map<String, Value>;
 
 impl<'a> From<&'a NetworkFile> for ExportedDecoder<'a> {
     /// Exports the network of a file.
     fn from(file: &'a NetworkFile) -> Self {
+        // Without the recording, readings are drawn from the range in training.
+        let test = match file.settings.simulation() {
+            Some(_) => None,
+            None => file.test_set().ok(),
+        };
         Self {
             fitted: FittedDecoder::of_networks(&file.network, file.scores.network.clone()),
             origin: Origin::of_file(file),
             file: Some(file),
+            test,
         }
     }
 }
@@ -53,13 +62,16 @@ impl<'a> ExportedDecoder<'a> {
     /// does.
     pub fn of_run(file: &'a NetworkFile, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
         sets.check_saved(file.recorded.as_ref())?;
-        if decoder.is_network() {
-            return Ok(file.into());
-        }
+        let test = Some(Arc::clone(&sets.sets.test));
+        let fitted = match decoder.is_network() {
+            true => FittedDecoder::of_networks(&file.network, file.scores.network.clone()),
+            false => FittedDecoder::fit(file.settings, sets.sets, Some(file.network.clone()), decoder)?,
+        };
         Ok(Self {
             origin: Origin::of_file(file),
-            fitted: FittedDecoder::fit(file.settings, sets.sets, Some(file.network.clone()), decoder)?,
+            fitted,
             file: Some(file),
+            test,
         })
     }
 
@@ -70,6 +82,7 @@ impl<'a> ExportedDecoder<'a> {
     pub fn of_setup(setup: &Setup, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
         Ok(Self {
             origin: Origin::of_sets(setup, &sets)?,
+            test: Some(Arc::clone(&sets.sets.test)),
             fitted: FittedDecoder::fit(*setup.settings(), sets.sets, None, decoder)?,
             file: None,
         })
@@ -86,6 +99,7 @@ impl<'a> ExportedDecoder<'a> {
         let none = TestErrors::Targets(Vec::new());
         Self {
             file: None,
+            test: None,
             origin: Origin {
                 program: PROGRAM.to_owned(),
                 settings,
@@ -103,216 +117,323 @@ impl<'a> ExportedDecoder<'a> {
         self.fitted.kind
     }
 
-    /// Network file of the run, if a network was trained.
-    pub(super) fn file(&self) -> Option<&'a NetworkFile> {
-        self.file
+    /// Number of row-wires that are distinguished; 1 if the row is not an argument.
+    fn rows(&self) -> usize {
+        self.fitted.reading_ranges.len().max(self.fitted.program.rows())
     }
 
-    pub(super) fn program(&self) -> &Program {
-        &self.fitted.program
-    }
-
-    /// Memory whose features the decoder takes, if it has one.
-    pub(super) fn memory(&self) -> Option<&Memory> {
-        self.origin.problem.memory.as_ref()
-    }
-
-    pub(super) fn meaning(&self) -> Meaning {
+    fn meaning(&self) -> Meaning {
         match &self.origin.problem.sensor {
             Some(simulation) => Meaning::Array(simulation.sensor.scale),
             None => Meaning::Own {
-                inputs: self.origin.problem.features(),
-                has_memory: self.memory().is_some(),
+                inputs: self.origin.problem.inputs.clone(),
                 targets: self.origin.problem.targets.clone(),
-                row_wires: match (&self.origin.row_wires, self.fitted.reading_ranges.len()) {
+                row_wires: match (&self.origin.row_wires, self.rows()) {
                     (Some(row_wires), 2..) => row_wires.clone(),
                     _ => Vec::new(),
                 },
-                half_widths: self.half_widths(),
             },
         }
     }
 
-    /// Half-width of the 90 % prediction interval of each target of the network, as far as they were calibrated.
-    fn half_widths(&self) -> Vec<Option<f64>> {
+    /// 90 % prediction intervals of the network, if every target has one.
+    fn half_widths(&self) -> Vec<HalfWidth> {
         let file = self.file.filter(|_| self.fitted.kind.is_network());
         let intervals = file.and_then(|file| file.intervals.as_ref());
-        let targets = intervals.iter().flat_map(|intervals| &intervals.targets);
-        targets.map(|target| Some(target.as_ref()?.constant)).collect()
+        let all = intervals.and_then(|intervals| intervals.targets.iter().cloned().collect());
+        all.unwrap_or_default()
     }
 
-    /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
-    pub(super) fn reading_ranges(&self) -> &[Option<MinMax>] {
-        &self.fitted.reading_ranges
+    /// Limits of the readings, or of the features of a history, beyond which they count as outside: for all row-wires or for
+    /// each; `None` if the range in training is not known.
+    pub(super) fn limits(&self) -> Option<Limits> {
+        let quantity = ExportedProgram::quantity_of(&self.fitted.program);
+        let of_row = |range: &Option<MinMax>| {
+            let range = range.as_ref()?;
+            Some(
+                (0..range.channels())
+                    .map(|channel| range.limits(quantity, channel))
+                    .collect(),
+            )
+        };
+        self.fitted.reading_ranges.iter().map(of_row).collect()
     }
 
-    /// Ranges of the targets in training: one for all row-wires, or one for each if the row is an argument.
-    pub(super) fn target_extremes(&self) -> &[Vec<(f64, f64)>] {
-        &self.fitted.target_extremes
-    }
-
-    /// Answer of this program to the readings of a row-wire.
+    /// Collects what a bundle contains.
     ///
     /// # Errors
-    /// A reading cannot be decoded.
-    pub(super) fn decode(&mut self, row: usize, readings: &[f64]) -> Result<Vec<f64>, BundleError> {
-        let mut answer = vec![0.0; self.fitted.decoder.outputs()];
-        let decoded = self.fitted.decoder.decode_row(row, readings, &mut answer);
-        decoded.map_err(|error| Box::new(RunError::from(error)))?;
-        Ok(answer)
+    /// No readings could be drawn, or one cannot be decoded.
+    pub(super) fn contents(&self, name: &str, precision: BundlePrecision) -> Result<Contents, BundleError> {
+        let problem = &self.origin.problem;
+        let channels = problem.inputs.len();
+        let meaning = self.meaning();
+        let mut program = self.fitted.program.clone();
+        if let Some(memory) = problem.memory.as_ref().filter(|memory| !memory.is_empty()) {
+            let with_history = program.with_history(memory, channels);
+            program = with_history.map_err(|error| Box::new(RunError::from(error)))?;
+        }
+        let exported = ExportedProgram::of(&program, &self.half_widths(), self.limits().as_ref());
+        let (rows, printed) = self.readings(channels)?;
+        let golden = Golden::of(rows, printed, &program, exported.outputs())?;
+        let targets = &self.fitted.target_extremes;
+        let scales = match meaning.is_array() {
+            true => vec![scale(targets, 0..exported.outputs()); exported.outputs()],
+            false => (0..exported.outputs())
+                .map(|output| scale(targets, output..output + 1))
+                .collect(),
+        };
+        let mut contents = Contents {
+            name: name.to_owned(),
+            noun: self.fitted.kind.noun(),
+            precision,
+            names: names(&exported, &meaning),
+            rows: self.rows(),
+            meaning,
+            exported,
+            scales,
+            golden,
+            metadata: Metadata::new(),
+            notes: Vec::new(),
+        };
+        if self.test.is_none() && problem.sensor.is_none() {
+            let note = "the golden readings are drawn from the range in training, because the recording was not found";
+            contents.notes.push(note.to_owned());
+        }
+        contents.metadata = self.metadata(&contents);
+        Ok(contents)
     }
 
-    /// Draws readings for the verification. Returns the number of golden vectors, which come first, and all readings.
-    /// Readings of a simulated sensor are drawn from its scene; readings of a recording are uniform in their range in
-    /// training.
+    /// Readings of the caller, and the number of those for the bundle, which come first: of test samples, or drawn from the
+    /// scene of a simulated sensor or from the range in training.
     ///
     /// # Errors
     /// The scene could not be drawn, or the range is not known.
-    pub(super) fn draw(&self, portable: &Portable) -> Result<(usize, Drawn), BundleError> {
-        /// Snapshots drawn, and snapshots among them that are golden vectors.
-        const SNAPSHOTS: [usize; 2] = [20, 1];
-        /// Readings drawn for each network, and golden vectors among them.
-        const EVEN: [usize; 2] = [100, 4];
-        match self.origin.problem.sensor {
-            Some(simulation) => {
+    fn readings(&self, channels: usize) -> Result<(Vec<GoldenRow>, usize), BundleError> {
+        /// Rows by which the accuracy is found, and those of them in the bundle.
+        const ROWS: [usize; 2] = [200, 30];
+        let takes_row = self.rows() > 1;
+        let of_set = |set: &Dataset, sample: usize| GoldenRow {
+            is_new_series: false,
+            time_s: None,
+            row: if takes_row { set.row_index(sample) } else { 0 },
+            readings: set.sample_readings(sample)[..channels].to_vec(),
+            targets: Vec::new(),
+        };
+        let has_history = self
+            .origin
+            .problem
+            .memory
+            .as_ref()
+            .is_some_and(|memory| !memory.is_empty());
+        let mut rows = match (&self.origin.problem.sensor, &self.test) {
+            (Some(simulation), _) => {
                 let rows = simulation.model_size().map_or(1, |size| size.rows);
+                let test_samples = ROWS[0].next_multiple_of(rows.max(1));
                 let few = Simulation {
-                    test_samples: SNAPSHOTS[0] * rows,
-                    ..simulation
+                    test_samples,
+                    ..*simulation
                 };
                 let set = few.draw_test(self.origin.settings.seed).map_err(Box::new)?;
-                let network = |sample| if portable.takes_row() { set.row_index(sample) } else { 0 };
-                let samples = 0..set.samples();
-                let drawn = samples.map(|sample| (network(sample), set.sample_readings(sample).to_vec()));
-                Ok((SNAPSHOTS[1] * rows, drawn.collect()))
+                (0..set.samples().min(2 * ROWS[0]))
+                    .map(|sample| of_set(&set, sample))
+                    .collect()
             }
-            None => {
-                let mut rng = Seed::default().rng(Stream::Test);
-                let mut drawn = Drawn::new();
-                for _ in 0..EVEN[0] {
-                    for (index, range) in portable.ranges.iter().enumerate() {
-                        let range = range.as_ref().ok_or(BundleError::NoRange)?;
-                        let mut between = |&(low, high): &(f64, f64)| low + rng.random::<f64>() * (high - low);
-                        drawn.push((index, range.extremes.iter().map(&mut between).collect()));
-                    }
-                }
-                Ok((EVEN[1] * portable.rows(), drawn))
+            (None, Some(test)) if has_history => (0..test.samples().min(ROWS[0]))
+                .map(|sample| of_set(test, sample))
+                .collect(),
+            (None, Some(test)) => {
+                let count = test.samples().min(ROWS[0]);
+                (0..count)
+                    .map(|place| of_set(test, place * test.samples() / count))
+                    .collect()
             }
+            (None, None) => self.drawn(channels, ROWS[0])?,
+        };
+        match &self.origin.problem.memory {
+            Some(memory) if has_history => set_times(&mut rows, memory.interval_s.unwrap_or(1.0)),
+            _ => rows.splice(..0, self.corners()).for_each(drop),
         }
+        Ok((rows, ROWS[1] + self.rows()))
+    }
+
+    /// The smallest, middle and largest readings of each range in training.
+    fn corners(&self) -> Vec<GoldenRow> {
+        let ranges = self.fitted.reading_ranges.iter().enumerate();
+        let known = ranges.filter_map(|(row, range)| Some((row, range.as_ref()?)));
+        let of_range = |(row, range): (usize, &MinMax)| {
+            let at = |place: f64| {
+                let between = |channel| {
+                    let (low, high) = range.extremes(channel);
+                    if place == 1.0 { high } else { low + place * (high - low) }
+                };
+                (0..range.channels()).map(between).collect()
+            };
+            [0.0, 0.5, 1.0].map(|place| GoldenRow {
+                is_new_series: false,
+                time_s: None,
+                row,
+                readings: at(place),
+                targets: Vec::new(),
+            })
+        };
+        known.flat_map(of_range).collect()
+    }
+
+    /// Readings that are uniform in their range in training.
+    fn drawn(&self, channels: usize, count: usize) -> Result<Vec<GoldenRow>, BundleError> {
+        let mut rng = Seed::default().rng(Stream::Test);
+        let ranges = &self.fitted.reading_ranges;
+        let row = |place: usize| {
+            let row = place % ranges.len();
+            let range = ranges[row].as_ref().ok_or(BundleError::NoRange)?;
+            let mut between = |channel| {
+                let (low, high) = range.extremes(channel);
+                low + rng.random::<f64>() * (high - low)
+            };
+            Ok(GoldenRow {
+                is_new_series: false,
+                time_s: None,
+                row,
+                readings: (0..channels).map(&mut between).collect(),
+                targets: Vec::new(),
+            })
+        };
+        (0..count).map(row).collect()
     }
 
     /// Collects the metadata of a bundle.
-    pub(super) fn metadata(&self, portable: &Portable, precision: BundlePrecision) -> Metadata {
+    fn metadata(&self, contents: &Contents) -> Metadata {
         let common = json!({
-            "program": crate::export::document::PROGRAM,
+            "program": PROGRAM,
             "decoder": self.fitted.kind.to_string(),
-            "takes_row": portable.takes_row(),
-            "quantity": portable.quantity,
-            "layers": layers(portable),
-            "precision": precision.to_string(),
+            "takes_row": contents.takes_row(),
+            "steps": steps(contents),
+            "precision": contents.precision.to_string(),
         });
-        let network = self
-            .fitted
-            .kind
-            .is_network()
-            .then(|| json!({ "hidden_nodes": portable.widest() }));
         let errors = &self.fitted.errors;
         let own = match &self.origin.problem.sensor {
-            Some(simulation) => of_array(&self.origin, simulation, portable, errors),
-            None => of_recording(&self.origin, portable, errors),
+            Some(simulation) => self.of_array(simulation, contents, errors),
+            None => self.of_recording(contents, errors),
         };
-        let half_widths = self.half_widths();
-        let intervals = (!half_widths.is_empty()).then(|| json!({ "half_widths_90": half_widths }));
         let mut fields = Metadata::new();
-        for part in [Some(common), network, Some(own), intervals] {
-            if let Some(Value::Object(part)) = part {
+        for part in [common, own] {
+            if let Value::Object(part) = part {
                 fields.extend(part);
             }
         }
         fields
     }
-}
 
-/// Describes the steps of the decoder with their sizes.
-fn layers(portable: &Portable) -> Vec<String> {
-    let mut inputs = portable.channels;
-    let layers = portable.layers().iter().map(|layer| {
-        let outputs = layer.outputs(inputs);
-        let text = match layer {
-            Layer::Affine(_) => format!("affine, {inputs} to {outputs}"),
-            Layer::Tanh => "hyperbolic tangent".to_owned(),
-            Layer::Gaussians { .. } => format!("{outputs} Gaussians of {inputs} values"),
+    fn of_array(&self, simulation: &Simulation, contents: &Contents, errors: &TestErrors) -> Value {
+        let Simulation { sensor, scene, .. } = simulation;
+        let names = |channels: Vec<Channel>| channels.into_iter().map(|channel| channel.name).collect::<Vec<_>>();
+        json!({
+            "trained_by": self.origin.program,
+            "array": sensor.scale.to_string(),
+            "geometry": sensor.geometry,
+            "scene": scene,
+            "rows": scene.rows.to_string(),
+            "row_numbers": contents.takes_row().then_some([1, contents.rows]),
+            "inputs": { "names": names(contents.meaning.inputs(contents.channels())), "unit": "ohm" },
+            "outputs": { "names": names(contents.meaning.targets()), "unit": "mm" },
+            "training_samples": simulation.samples,
+            "seed": self.origin.settings.seed,
+            "errors": errors.nodes(),
+            "readings_in_training_ohm": self.ranges(),
+            "output_range_mm": contents.scales[0],
+        })
+    }
+
+    fn of_recording(&self, contents: &Contents, errors: &TestErrors) -> Value {
+        let origin = &self.origin;
+        let columns = |channels: &[Channel]| {
+            let (names, units): (Vec<_>, Vec<_>) =
+                channels.iter().map(|channel| (&channel.name, &channel.unit)).unzip();
+            json!({ "names": names, "units": units })
         };
-        inputs = outputs;
-        text
+        let named = |errors: &TestErrors| {
+            let of = |(channel, errors): (&Channel, &TargetErrors)| json!({ "name": channel.name, "errors": errors });
+            let targets = origin.problem.targets.iter();
+            targets.zip(errors.targets()).map(of).collect::<Vec<_>>()
+        };
+        let row_wires = origin.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
+        json!({
+            "trained_by": origin.program,
+            "files": origin.files,
+            "row_numbers": contents.takes_row().then(|| row_wires.collect::<Vec<_>>()),
+            "inputs": columns(&origin.problem.inputs),
+            "memory": origin.problem.memory,
+            "outputs": columns(&origin.problem.targets),
+            "method": origin.settings.training.method.short_name(),
+            "seed": origin.settings.seed,
+            "errors": named(errors),
+            "errors_of_ridge": named(&origin.errors_of_linear),
+            "readings_in_training": self.ranges(),
+            "output_ranges": contents.scales,
+        })
+    }
+
+    /// Smallest and largest readings in training, row by row; with a history, of all features.
+    fn ranges(&self) -> Vec<Option<Value>> {
+        let range = |range: &MinMax| {
+            let extremes = (0..range.channels()).map(|channel| range.extremes(channel));
+            let (minimum, maximum): (Vec<f64>, Vec<f64>) = extremes.unzip();
+            json!({ "minimum": minimum, "maximum": maximum })
+        };
+        self.fitted
+            .reading_ranges
+            .iter()
+            .map(|of_row| of_row.as_ref().map(range))
+            .collect()
+    }
+}
+
+/// Times at the usual interval with a pause and a step back, and a series that begins after half of the rows.
+fn set_times(rows: &mut [GoldenRow], interval_s: f64) {
+    let count = rows.len();
+    let mut time_s = 0.0;
+    for (place, row) in rows.iter_mut().enumerate() {
+        // Within the rows of the bundle, too.
+        match place {
+            10 => time_s += 2.0 * GAP * interval_s,
+            20 => time_s -= 5.0 * interval_s,
+            _ => time_s += interval_s * [1.0, 0.5, 1.7][place % 3],
+        }
+        row.is_new_series = place == 0 || place == 15 || place == count / 2;
+        row.time_s = Some(time_s);
+    }
+}
+
+/// Widest range in training among these outputs of all rows.
+fn scale(targets: &[Vec<(f64, f64)>], outputs: std::ops::Range<usize>) -> f64 {
+    let extremes = targets.iter().flat_map(|row| row[outputs.clone()].iter());
+    let (width, largest) = extremes.fold((0.0_f64, 0.0_f64), |(width, largest), &(low, high)| {
+        (width.max(high - low), largest.max(low.abs()).max(high.abs()))
     });
-    layers.collect()
+    // Outputs that did not vary are constants, and deviations are relative to these.
+    [width, largest].into_iter().find(|&scale| scale > 0.0).unwrap_or(1.0)
 }
 
-fn of_array(origin: &Origin, simulation: &Simulation, portable: &Portable, errors: &TestErrors) -> Value {
-    let Simulation { sensor, scene, .. } = simulation;
-    let names = |channels: Vec<Channel>| channels.into_iter().map(|channel| channel.name).collect::<Vec<_>>();
-    json!({
-        "trained_by": origin.program,
-        "array": sensor.scale.to_string(),
-        "geometry": sensor.geometry,
-        "scene": scene,
-        "rows": scene.rows.to_string(),
-        "row_numbers": portable.takes_row().then_some([1, portable.rows()]),
-        "inputs": { "names": names(portable.meaning.inputs()), "unit": "ohm" },
-        "outputs": { "names": names(portable.meaning.targets()), "unit": "mm" },
-        "training_samples": simulation.samples,
-        "seed": origin.settings.seed,
-        "errors": errors.nodes(),
-        "readings_in_training_ohm": ranges(portable),
-        "output_range_mm": portable.output_range_mm(),
-    })
-}
-
-fn of_recording(origin: &Origin, portable: &Portable, errors: &TestErrors) -> Value {
-    let columns = |channels: &[Channel]| {
-        let (names, units): (Vec<_>, Vec<_>) = channels.iter().map(|channel| (&channel.name, &channel.unit)).unzip();
-        json!({ "names": names, "units": units })
+/// Describes the steps of the program with their sizes.
+fn steps(contents: &Contents) -> Vec<String> {
+    let step = |(id, operation): (NodeId, &Operation)| {
+        let size = contents.size(id);
+        Some(match operation {
+            Operation::Affine { of, .. } => format!("affine, {} to {size}", contents.size(*of)),
+            Operation::Map(Function::Tanh, _) => format!("hyperbolic tangent of {size}"),
+            Operation::Map(Function::Gaussian, _) => format!("{size} Gaussians"),
+            Operation::Map(..) => format!("logarithm of {size}"),
+            Operation::Divide(..) => format!("relative changes of {size}"),
+            Operation::History { of, .. } => format!("history, {} to {size}", contents.size(*of)),
+            _ => return None,
+        })
     };
-    let named = |errors: &TestErrors| {
-        let of = |(channel, errors): (&Channel, &TargetErrors)| json!({ "name": channel.name, "errors": errors });
-        let targets = origin.problem.targets.iter();
-        targets.zip(errors.targets()).map(of).collect::<Vec<_>>()
-    };
-    let row_wires = origin.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
-    json!({
-        "trained_by": origin.program,
-        "files": origin.files,
-        "row_numbers": portable.takes_row().then(|| row_wires.collect::<Vec<_>>()),
-        "inputs": columns(&origin.problem.features()),
-        "memory": origin.problem.memory,
-        "outputs": columns(&origin.problem.targets),
-        "method": origin.settings.training.method.short_name(),
-        "seed": origin.settings.seed,
-        "errors": named(errors),
-        "errors_of_ridge": named(&origin.errors_of_linear),
-        "readings_in_training": ranges(portable),
-        "output_ranges": portable.scales,
-    })
-}
-
-/// Smallest and largest readings in training, row by row.
-fn ranges(portable: &Portable) -> Vec<Option<Value>> {
-    let range = |range: &ChannelRanges| {
-        let (minimum, maximum): (Vec<f64>, Vec<f64>) = range.extremes.iter().copied().unzip();
-        json!({ "minimum": minimum, "maximum": maximum })
-    };
-    portable
-        .ranges
-        .iter()
-        .map(|of_row| of_row.as_ref().map(range))
-        .collect()
+    contents.computed().filter_map(step).collect()
 }
 
 /// A decoder fitted to training samples, with the facts about them that a bundle contains.
 pub(super) struct FittedDecoder {
     pub(super) kind: BundleDecoder,
-    pub(super) decoder: Box<dyn Decoder>,
     pub(super) program: Program,
     /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
     pub(super) reading_ranges: Vec<Option<MinMax>>,
@@ -330,11 +451,9 @@ impl FittedDecoder {
             let outputs = network.outputs();
             (0..outputs.channels()).map(|output| outputs.extremes(output)).collect()
         });
-        let decoder = networks.decoder();
         Self {
             kind: BundleDecoder::Kind(DecoderKind::Network),
-            program: decoder.program().clone(),
-            decoder: Box::new(decoder),
+            program: networks.program(Precision::Double),
             reading_ranges: all.map(|network| network.inputs().range().cloned()).collect(),
             target_extremes: extremes.collect(),
             errors,
@@ -352,7 +471,7 @@ impl FittedDecoder {
         networks: Option<Networks>,
         kind: BundleDecoder,
     ) -> Result<Self, BundleError> {
-        if kind.needs_network() && networks.is_none() {
+        if kind.is_network() && networks.is_none() {
             return Err(BundleError::NoNetwork(kind));
         }
         let (training, test, problem) = (sets.split.training, sets.test, sets.problem);
@@ -377,7 +496,6 @@ impl FittedDecoder {
         let answers = decode_set(&mut *decoder, &test).map_err(|error| Box::new(RunError::from(error)))?;
         Ok(Self {
             kind,
-            decoder,
             program,
             reading_ranges,
             target_extremes,
@@ -409,7 +527,7 @@ impl Origin {
             settings: file.settings,
             problem: file.problem.clone(),
             row_wires: file.row_wires.clone(),
-            files: names(file.recorded.as_ref().map(|recorded| &recorded.plan)),
+            files: file_names(file.recorded.as_ref().map(|recorded| &recorded.plan)),
             errors_of_linear: file.scores.baselines.linear.clone(),
         }
     }
@@ -427,14 +545,14 @@ impl Origin {
             program: PROGRAM.to_owned(),
             problem: Problem::clone(&samples.problem),
             row_wires: samples.test.row_wires_read().map(<[usize]>::to_vec),
-            files: names(setup.plan()),
+            files: file_names(setup.plan()),
             errors_of_linear: TestErrors::measure(&samples.problem, &samples.test, &answers),
             settings,
         })
     }
 }
 
-fn names(plan: Option<&Plan>) -> Vec<String> {
+fn file_names(plan: Option<&Plan>) -> Vec<String> {
     let paths = plan.into_iter().flat_map(Plan::files);
     let names = paths.filter_map(|path| path.file_name());
     names.map(|name| name.to_string_lossy().into_owned()).collect()

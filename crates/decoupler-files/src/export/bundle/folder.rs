@@ -3,15 +3,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{
-    choice::BundlePrecision,
-    exported_decoder::Metadata,
-    fixed_point::FixedNetworks,
-    portable::Portable,
-    report::BundleError,
-    vectors::{Deviation, Vector, Vectors},
-    weights::Weights,
-};
+use super::report::BundleError;
 use crate::export::{WriteError, unfinished::UnfinishedFolder};
 
 /// A folder that is filled under a temporary name next to its target and then renamed: it exists completely or not at
@@ -82,18 +74,6 @@ impl AtomicFolder {
         Ok(sizes().map_err(|error| WriteError::io(&self.target, error))?)
     }
 
-    /// Moves one of its files to the target, and removes the folder.
-    ///
-    /// # Errors
-    /// Something has been created there in the meantime, or the operating system refuses.
-    pub(super) fn commit_only(self, name: &str) -> Result<(), BundleError> {
-        if fs::symlink_metadata(&self.target).is_ok() {
-            return Err(BundleError::Exists(self.target));
-        }
-        let renamed = fs::rename(self.path().join(name), &self.target);
-        Ok(renamed.map_err(|error| WriteError::io(&self.target, error))?)
-    }
-
     /// Renames it to its target.
     ///
     /// # Errors
@@ -133,51 +113,6 @@ pub(super) fn identifier(path: &Path) -> String {
     }
     joined.truncate(LONGEST);
     joined
-}
-
-/// An unfinished bundle of floating-point numbers, which its format fills.
-pub(super) struct Draft<'a> {
-    /// Prefix of the names of functions and files.
-    pub(super) name: &'a str,
-    pub(super) folder: &'a AtomicFolder,
-    pub(super) portable: &'a Portable,
-    pub(super) weights: &'a Weights,
-    pub(super) vectors: &'a Vectors,
-    pub(super) limits: Deviation,
-    pub(super) metadata: &'a Metadata,
-    /// Remarks for the user, with cause and cure.
-    pub(super) remarks: &'a mut Vec<String>,
-}
-
-/// Facts for the usage section of the README.
-pub(super) struct Call<'a> {
-    /// Prefix of the names of functions and files.
-    pub(super) name: &'a str,
-    pub(super) portable: &'a Portable,
-    /// For a bundle in fixed point.
-    pub(super) fixed: Option<&'a FixedNetworks>,
-    pub(super) precision: BundlePrecision,
-}
-
-impl Draft<'_> {
-    /// Writes a file and reads it back.
-    ///
-    /// # Errors
-    /// The operating system refuses.
-    pub(super) fn write(&self, file: &str, contents: impl AsRef<[u8]>) -> Result<Vec<u8>, BundleError> {
-        self.folder.write(file, contents)?;
-        fs::read(self.folder.path().join(file)).map_err(|error| BundleError::read_back(file, error.to_string()))
-    }
-
-    /// Deviation of a bundle with these numbers.
-    pub(super) fn deviation_of(&self, weights: &Weights) -> Deviation {
-        deviation(weights, self.vectors)
-    }
-}
-
-/// Deviation of a bundle with these numbers.
-pub(super) fn deviation(weights: &Weights, vectors: &Vectors) -> Deviation {
-    vectors.deviation(|vector: &Vector| weights.decode(vector.row, &vector.taken))
 }
 
 #[cfg(test)]

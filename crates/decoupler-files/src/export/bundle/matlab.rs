@@ -1,144 +1,238 @@
-//! Bundles as one function file for MATLAB and GNU Octave, and reading back its numbers.
+//! Bundles as one function file for MATLAB and GNU Octave.
 
 use std::fmt::Write;
 
-use super::{
-    folder::{Call, Draft},
-    layers::Layer,
-    meaning::Meaning,
-    portable::Portable,
-    report::{BundleCheck, BundleError},
-    weights::{Arithmetic, Weights, names},
+use decoupler_core::{
+    decoupling::{Domain, Function, NodeId, Operation},
+    text::counted,
 };
-use decoupler_core::{network::Quantity, text::counted};
+use ndarray::Array2;
 
-/// Writes the function `name`. The matrices of the rows are stacked vertically.
-pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> String {
-    let (channels, rows) = (portable.channels, portable.rows());
-    let (input, output) = (portable.meaning.readings(), portable.meaning.outputs());
-    let ranges = portable.known_ranges();
-    let (argument, help, check) = if portable.takes_row() {
-        (
-            ", row",
-            format!("%   ROW is the row of each sample, from 1 to {rows}; a scalar applies to all samples.\n"),
-            format!(
-                "if isscalar(row)\n    row = repmat(row, samples, 1);\nend\nif numel(row) ~= samples || \
-                 ~all(ismember(row, 1:{rows}))\n    error('row: give the row of each sample, from 1 to {rows}');\n\
-                 end\n"
-            ),
-        )
-    } else {
-        ("", String::new(), "row = ones(samples, 1);\n".to_owned())
-    };
-    let also = match ranges {
-        Some(_) => {
-            "the number of readings of each\n%   sample that lie beyond the range seen in training by more than a tenth of it"
-        }
-        None => "zeros, because the range of the readings in training is not known",
-    };
-    let (is_reading, readings) = match portable.quantity {
-        Quantity::Raw => (format!("isfinite({input}(:))"), "finite numbers"),
-        _ => (
-            format!("isfinite({input}(:)) & {input}(:) > 0"),
-            "finite numbers above 0",
-        ),
-    };
-    let centre = portable.meaning.centre();
-    let change = match portable.quantity {
-        Quantity::Resistance | Quantity::Raw => format!("r - {centre}(k, :)"),
-        Quantity::Conductance => format!("({centre}(k, :) - r) ./ r"),
-        Quantity::LogResistance => format!("log1p((r - {centre}(k, :)) ./ {centre}(k, :))"),
-    };
-    let outputs = portable.outputs;
-    let (upper, upper_argument) = (name.to_uppercase(), argument.to_uppercase());
-    let (upper_input, upper_output) = (input.to_uppercase(), output.to_uppercase());
-    let purpose = match &portable.meaning {
-        Meaning::Array(_) => format!(
-            "%{upper} Decodes readings of a tactile array into the coordinates of its nodes.\n\
-             %   {upper_output} = {upper}({upper_input}{upper_argument}) has a line of {of_outputs} in mm (x_1, y_1, z_1, to {last})\n\
-             %   for each line of {of_channels} in ohm (r_1 to r_{channels}).\n",
-            of_outputs = counted(outputs, "coordinate"),
-            of_channels = counted(channels, "resistance"),
-            last = portable.meaning.targets().last().map_or("", |target| &target.name),
-        ),
-        own @ Meaning::Own { .. } => format!(
-            "%{upper} Decodes readings into targets.\n\
-             %   {upper_output} = {upper}({upper_input}{upper_argument}) has a line of {of_outputs} for each line of {of_channels}.\n\
-             %   {legend}\n",
-            of_outputs = counted(outputs, "target"),
-            of_channels = counted(channels, "reading"),
-            legend = own.legend().join("\n%   "),
-        ),
-    };
-    let mut text = format!(
-        "function [{output}, readings_outside] = {name}({input}{argument})\n\
-         {purpose}\
-         {help}\
-         %   [{upper_output}, READINGS_OUTSIDE] = ... also has {also}.\n\
-         \n\
-         samples = size({input}, 1);\n\
-         if size({input}, 2) ~= {channels} || ~all({is_reading})\n    \
-         error('{input}: give {channels} columns of {readings}');\n\
-         end\n\
-         {check}",
-    );
-    for table in weights.tables(portable) {
-        let columns = table.shape.last().copied().unwrap_or(1);
-        push_matrix(&mut text, &table.name, columns, table.values.into_iter());
-    }
-    let mut outside = String::new();
-    if let Some(ranges) = &ranges {
-        let limits = || ranges.iter().flat_map(|range| &range.limits);
-        let [lowest, highest] = portable.meaning.limits();
-        push_matrix(&mut text, lowest, channels, limits().map(|limits| limits.0));
-        push_matrix(&mut text, highest, channels, limits().map(|limits| limits.1));
-        outside = format!("    readings_outside(mine) = sum(r < {lowest}(k, :) | r > {highest}(k, :), 2);\n");
-    }
-    text + &format!(
-        "{output} = zeros(samples, {outputs});\n\
-         readings_outside = zeros(samples, 1);\n\
-         for k = 1:{rows}\n    \
-         mine = find(row(:) == k);\n    \
-         r = {input}(mine, :);\n    \
-         v = {change};\n\
-         {steps}    \
-         {output}(mine, :) = v;\n\
-         {outside}\
-         end\n\
-         end\n",
-        steps = steps(portable),
-    )
+use super::{
+    contents::{Contents, PrintedHistory},
+    folder::AtomicFolder,
+    report::BundleError,
+};
+
+/// Writes the function.
+///
+/// # Errors
+/// The operating system refuses.
+pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<(), BundleError> {
+    folder.write(&format!("{}_decode.m", contents.name), function(contents))
 }
 
-/// Statements from the changes `v` of the readings to the outputs, for row `k`.
-fn steps(portable: &Portable) -> String {
-    let mut text = String::new();
-    let mut inputs = portable.channels;
-    for (layer, names) in portable.layers().iter().zip(names(portable.layers())) {
-        let block = |place: usize| format!("{}((k - 1) * {inputs} + (1:{inputs}), :)", names.tables[place]);
-        let constants = |place: usize| format!("{}(k, :)", names.tables[place]);
-        text += &match layer {
-            Layer::Affine(_) => format!("    v = v * {} + {};\n", block(0), constants(1)),
-            Layer::Tanh => "    v = tanh(v);\n".to_owned(),
-            Layer::Gaussians { centres } => format!(
-                "    centres = {};\n    \
-                 gaussians = zeros(numel(mine), {count});\n    \
-                 for g = 1:{count}\n        \
-                 gaussians(:, g) = exp(-sum((v - centres(:, g)') .^ 2, 2));\n    \
-                 end\n    \
-                 v = gaussians;\n",
-                block(0),
-                count = centres.ncols(),
-            ),
-        };
-        inputs = layer.outputs(inputs);
+/// Text of the function file.
+fn function(contents: &Contents) -> String {
+    let name = format!("{}_decode", contents.name);
+    let (input, channels) = (contents.meaning.readings(), contents.channels());
+    let history = contents.history();
+    let parts = contents.parts();
+    let returned = match history {
+        Some(_) => format!("{}, state", parts.join(", ")),
+        None => parts.join(", "),
+    };
+    let arguments = arguments(contents);
+    let legend = contents
+        .meaning
+        .legend(channels)
+        .into_iter()
+        .chain(contents.note_lines());
+    let legend: String = legend.map(|line| format!("%   {line}\n")).collect();
+    let upper = name.to_uppercase();
+    let mut text = format!(
+        "function [{returned}] = {name}({arguments})\n%{upper} {}.\n%   [{}] = {upper}({}) has a line of {} for each line of\n\
+         %   {}{}.\n{legend}",
+        contents.meaning.purpose_without_stop(),
+        returned.to_uppercase(),
+        arguments.to_uppercase(),
+        contents.meaning.outputs_in_words(contents.outputs()),
+        counted(channels, "reading"),
+        contents.parts_in_words(),
+    );
+    if contents.takes_row() {
+        let rows = contents.rows;
+        let _ = writeln!(
+            text,
+            "%   ROW is the row of each sample, from 1 to {rows}; a scalar applies to all samples."
+        );
+    }
+    if let Some(about) = contents.state_in_words() {
+        let lines = super::meaning::wrapped(&format!(
+            "TIME_S is the time of each sample in seconds, in order. STATE is [] at the start, and continues from an earlier \
+             call. {about}"
+        ));
+        text += &lines.iter().map(|line| format!("%   {line}\n")).collect::<String>();
+    }
+    let _ = write!(
+        text,
+        "\nsamples = size({input}, 1);\nif size({input}, 2) ~= {channels}\n    error('{input}: give {channels} columns');\nend\n"
+    );
+    text += &match contents.takes_row() {
+        true => format!(
+            "if isscalar(row)\n    row = repmat(row, samples, 1);\nend\nif numel(row) ~= samples || \
+             ~all(ismember(row, 1:{rows}))\n    error('row: give the row of each sample, from 1 to {rows}');\nend\n",
+            rows = contents.rows
+        ),
+        false => "row = ones(samples, 1);\n".to_owned(),
+    };
+    for (id, tables) in contents.constants() {
+        for (index, table) in tables.iter().enumerate() {
+            push_matrix(&mut text, &format!("{}_{{{}}}", contents.name_of(id), index + 1), table);
+        }
+    }
+    let part_sizes = parts.iter().map(|part| match *part {
+        "readings_outside" => (*part, 1),
+        part => (part, contents.outputs()),
+    });
+    for (part, size) in part_sizes {
+        let _ = writeln!(text, "{part} = zeros(samples, {size});");
+    }
+    let body: String = contents
+        .computed()
+        .map(|(id, operation)| statement(contents, id, operation))
+        .collect();
+    let taken: String = parts
+        .iter()
+        .map(|part| format!("    {part}(mine, :) = {part}_;\n"))
+        .collect();
+    match &history {
+        None => {
+            let _ = write!(
+                text,
+                "for k = 1:{}\n    mine = find(row(:) == k);\n    {input}_ = {input}(mine, :);\n{body}{taken}end\nend\n",
+                contents.rows
+            );
+        }
+        Some(history) => {
+            let constants = &history.constants;
+            let rows = 2 + constants.longest_lag() + constants.averages.len();
+            let _ = write!(
+                text,
+                "if isscalar(time_s)\n    time_s = repmat(time_s, samples, 1);\nend\n\
+                 if nargin < 3 || isempty(state)\n    state = zeros({rows}, {channels});\nend\n\
+                 for mine = 1:samples\n    k = row(mine);\n    {input}_ = {input}(mine, :);\n{body}{taken}end\nend\n\n{}",
+                remembering(history)
+            );
+        }
     }
     text
 }
 
-fn push_matrix(text: &mut String, name: &str, columns: usize, values: impl Iterator<Item = f64>) {
+fn arguments(contents: &Contents) -> String {
+    let mut arguments = contents.meaning.readings().to_owned();
+    if contents.history().is_some() {
+        arguments += ", time_s, state";
+    }
+    if contents.takes_row() {
+        arguments += ", row";
+    }
+    arguments
+}
+
+fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
+    // Names end in _, which keeps them apart from arguments and functions.
+    let of = |id: NodeId| {
+        let name = contents.name_of(id);
+        match (&contents.exported.program.node(id).operation, contents.is_of_row(id)) {
+            (Operation::Select { .. }, true) => format!("{name}_{{k}}"),
+            (Operation::Select { .. }, false) => format!("{name}_{{1}}"),
+            _ => format!("{name}_"),
+        }
+    };
+    let name = format!("{}_", contents.name_of(id));
+    let expression = match operation {
+        Operation::Valid { of: x, domain } => {
+            let (x, plain) = (of(*x), contents.name_of(*x));
+            let (is_valid, above) = match domain {
+                Domain::Positive => (format!("isfinite({x}(:)) & {x}(:) > 0"), " above 0"),
+                Domain::Finite => (format!("isfinite({x}(:))"), ""),
+            };
+            return format!(
+                "    if ~all({is_valid})\n        error('{plain}: give finite numbers{above}');\n    end\n"
+            );
+        }
+        Operation::Subtract(one, other) => format!("{} - {}", of(*one), of(*other)),
+        Operation::Divide(one, other) => format!("{} ./ {}", of(*one), of(*other)),
+        Operation::Map(function, x) => match function {
+            Function::Log1p => format!("log1p({})", of(*x)),
+            Function::Tanh => format!("tanh({})", of(*x)),
+            Function::Gaussian => format!("exp(-{})", of(*x)),
+        },
+        Operation::Affine { of: x, weights, biases } => format!("{} * {} + {}", of(*x), of(*weights), of(*biases)),
+        Operation::SquaredDistances { of: x, points } => {
+            return format!(
+                "    {name} = zeros(size({x}, 1), {count});\n    for g = 1:{count}\n        \
+                 {name}(:, g) = sum(({x} - {points}(:, g)') .^ 2, 2);\n    end\n",
+                x = of(*x),
+                points = of(*points),
+                count = contents.size(id),
+            );
+        }
+        Operation::Clip { of: x, low, high } => format!("min(max({}, {}), {})", of(*x), of(*low), of(*high)),
+        Operation::Concatenate(parts) => {
+            let parts = Vec::from_iter(parts.iter().map(|part| of(*part)));
+            format!("[{}]", parts.join(", "))
+        }
+        Operation::History { of: x, .. } => {
+            return format!("    [{name}, state] = remember(state, {}, time_s(mine));\n", of(*x));
+        }
+        Operation::CountOutside { of: x, low, high } => {
+            format!("sum({x} < {} | {x} > {}, 2)", of(*low), of(*high), x = of(*x))
+        }
+        Operation::Readings | Operation::Select { .. } | Operation::Blend { .. } => {
+            unreachable!("given, or not exported")
+        }
+    };
+    format!("    {name} = {expression};\n")
+}
+
+/// The function that takes a reading into a state: whether it has started, the latest time, the latest readings (the newest
+/// first), and the averages.
+fn remembering(history: &PrintedHistory) -> String {
+    let constants = &history.constants;
+    let list = |values: Vec<String>| format!("[{}]", values.join("; "));
+    let (per_second, per_reading) = history.rates();
+    let texts = |values: Vec<f64>| values.iter().map(|value| format!("{value:e}")).collect();
+    let kept = constants.longest_lag();
+    let pause = match history.pause_s {
+        f64::INFINITY => "Inf".to_owned(),
+        pause_s => format!("{pause_s:e}"),
+    };
+    format!(
+        "function [features, state] = remember(state, now, time_s)\n\
+         has_started = state(1, 1) > 0;\nelapsed_s = time_s - state(2, 1);\n\
+         if ~has_started || elapsed_s < 0 || elapsed_s > {pause}\n    \
+         state([1, 3:end], :) = repmat(now, size(state, 1) - 1, 1);\n    state(1, :) = 1;\n    elapsed_s = NaN;\nend\n\
+         if isfinite(time_s) || ~has_started\n    state(2, :) = time_s;\nend\n\
+         if ~isfinite(elapsed_s)\n    elapsed_s = {usual:e};\nend\n\
+         past = state({lags}, :);\n\
+         weights = -expm1(-(elapsed_s * {per_second} + {per_reading}));\n\
+         for k = 1:numel(weights)\n    average = {averages} + k;\n    \
+         state(average, :) = state(average, :) + weights(k) * (now - state(average, :));\n    \
+         past = [past; state(average, :)];\nend\n\
+         {shift}{difference}features = [now, reshape(past', 1, [])];\nend\n",
+        usual = constants.interval_s,
+        lags = list(constants.lags.iter().map(|lag| (lag + 2).to_string()).collect()),
+        per_second = list(texts(per_second)),
+        per_reading = list(texts(per_reading)),
+        averages = 2 + kept,
+        shift = match kept {
+            0 => String::new(),
+            kept => format!("state(3:{}, :) = [now; state(3:{}, :)];\n", kept + 2, kept + 1),
+        },
+        difference = if constants.differences {
+            "past = repmat(now, size(past, 1), 1) - past;\n"
+        } else {
+            ""
+        },
+    )
+}
+
+fn push_matrix(text: &mut String, name: &str, matrix: &Array2<f64>) {
+    let columns = matrix.ncols();
     let _ = write!(text, "{name} = [");
-    for (index, value) in values.enumerate() {
+    for (index, value) in matrix.iter().enumerate() {
         let separator = match index {
             0 => "",
             _ if index.is_multiple_of(columns) => ";\n",
@@ -150,59 +244,18 @@ fn push_matrix(text: &mut String, name: &str, columns: usize, values: impl Itera
     text.push_str("];\n");
 }
 
-/// Reads the matrices back.
-///
-/// # Errors
-/// The name of the first that is missing, or has another number of values than `portable` needs.
-pub(super) fn read_weights(text: &str, portable: &Portable) -> Result<Weights, String> {
-    Weights::of_tables(portable, Arithmetic::DOUBLE, |table| {
-        let missing = || format!("the matrix {} is missing or damaged", table.name);
-        let rest = text
-            .split(&format!("\n{} = [", table.name))
-            .nth(1)
-            .ok_or_else(missing)?;
-        let inside = rest.split("];").next().ok_or_else(missing)?;
-        let inside = inside.replace("...", " ").replace(';', " ");
-        let values = inside
-            .split_whitespace()
-            .map(|number| number.parse::<f64>().map_err(|_| missing()));
-        values.collect()
-    })
-}
-
-/// Writes the function and reads its matrices back.
-///
-/// # Errors
-/// It cannot be written or read back.
-pub(super) fn export(draft: &mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleError> {
-    let (function, file) = (format!("{}_decode", draft.name), format!("{}_decode.m", draft.name));
-    let damaged = |reason| BundleError::read_back(&file, reason);
-    let bytes = draft.write(&file, write(&function, draft.portable, draft.weights))?;
-    let text = String::from_utf8(bytes).map_err(|error| damaged(error.to_string()))?;
-    let read = read_weights(&text, draft.portable).map_err(damaged)?;
-    let deviation = draft.deviation_of(&read);
-    Ok(vec![BundleCheck::of(
-        "MATLAB matrices, read back and evaluated",
-        deviation,
-    )])
-}
-
-/// Returns the usage section of the README.
-pub(super) fn call(call: &Call<'_>) -> String {
-    let portable = call.portable;
-    let (takes_row, channels, outputs) = (portable.takes_row(), portable.channels, portable.outputs);
-    let meaning = &portable.meaning;
-    let (input, output) = (meaning.readings(), meaning.outputs());
-    let name = call.name;
-    let row = if takes_row { ", row" } else { "" };
+/// Lines of a program that decodes.
+pub(super) fn usage(contents: &Contents) -> String {
+    let state = if contents.history().is_some() { ", state" } else { "" };
     format!(
-        "    [{output}, readings_outside] = {name}_decode({input}{row})\n\n\
-         in MATLAB (from R2016b) or GNU Octave. {input} is samples x {channels}, {output} samples x \
-         {outputs}{row_text}.",
-        row_text = if takes_row {
-            ";\nrow is the row of each sample, from 1"
-        } else {
+        "    [{}{state}] = {}_decode({})\n\nin MATLAB (from R2016b) or GNU Octave.{}\n",
+        contents.parts().join(", "),
+        contents.name,
+        arguments(contents),
+        if state.is_empty() {
             ""
+        } else {
+            " state is [] at the start."
         },
     )
 }

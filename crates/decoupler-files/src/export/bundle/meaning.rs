@@ -1,6 +1,8 @@
-use decoupler_core::{problem::Channel, sensor::ArrayScale, text::is_unprintable};
-
-use crate::export::format_number;
+use decoupler_core::{
+    problem::Channel,
+    sensor::ArrayScale,
+    text::{counted, is_unprintable},
+};
 
 /// Meaning of the readings and outputs of an exported network, and the words for them in its files.
 #[derive(Clone, Debug, PartialEq)]
@@ -11,22 +13,15 @@ pub(super) enum Meaning {
     Own {
         inputs: Vec<Channel>,
         targets: Vec<Channel>,
-        /// The inputs are features of a memory, not readings.
-        has_memory: bool,
         /// Row-wires that have a network each, from 0, in their order; empty if one network serves all.
         row_wires: Vec<usize>,
-        /// Half-width of the 90 % prediction interval of each target that has one; empty if none has.
-        half_widths: Vec<Option<f64>>,
     },
 }
 
 impl Meaning {
     /// Identifier of the readings in code and graphs.
     pub(super) fn readings(&self) -> &'static str {
-        match self {
-            Self::Own { has_memory: true, .. } => "features",
-            _ => self.either("resistances_ohm", "readings"),
-        }
+        self.either("resistances_ohm", "readings")
     }
 
     /// Identifier of the outputs.
@@ -44,19 +39,6 @@ impl Meaning {
         self.either("one row-wire", "one sample")
     }
 
-    /// Identifier of the centres of the channels.
-    pub(super) fn centre(&self) -> &'static str {
-        self.either("centre_ohm", "centre")
-    }
-
-    /// Identifiers of the limits beyond which a reading is outside.
-    pub(super) fn limits(&self) -> [&'static str; 2] {
-        [
-            self.either("lowest_ohm", "lowest"),
-            self.either("highest_ohm", "highest"),
-        ]
-    }
-
     /// Name of the range to which deviations are relative.
     pub(super) fn scale(&self) -> &'static str {
         self.either(
@@ -70,7 +52,30 @@ impl Meaning {
         self.either("train with noise (--noise)", "train with fewer hidden nodes or epochs")
     }
 
-    fn either(&self, array: &'static str, own: &'static str) -> &'static str {
+    /// `true` for an array.
+    pub(super) fn is_array(&self) -> bool {
+        matches!(self, Self::Array(_))
+    }
+
+    /// A sentence on what the decoder does.
+    pub(super) fn purpose(&self) -> &'static str {
+        self.either(
+            "Decodes the readings of one row-wire of a tactile array in ohm into the coordinates of its nodes in mm.",
+            "Decodes readings into targets.",
+        )
+    }
+
+    /// [`Self::purpose`] without its full stop.
+    pub(super) fn purpose_without_stop(&self) -> &'static str {
+        self.purpose().trim_end_matches('.')
+    }
+
+    /// The outputs with their number.
+    pub(super) fn outputs_in_words(&self, count: usize) -> String {
+        counted(count, self.output())
+    }
+
+    pub(super) fn either(&self, array: &'static str, own: &'static str) -> &'static str {
         match self {
             Self::Array(_) => array,
             Self::Own { .. } => own,
@@ -78,9 +83,9 @@ impl Meaning {
     }
 
     /// Names and units of the readings: r_1, r_2, … in ohm, or those of the columns.
-    pub(super) fn inputs(&self) -> Vec<Channel> {
+    pub(super) fn inputs(&self, count: usize) -> Vec<Channel> {
         match self {
-            Self::Array(scale) => (1..=scale.columns())
+            Self::Array(_) => (1..=count)
                 .map(|channel| Channel::new(format!("r_{channel}"), Some("ohm")))
                 .collect(),
             Self::Own { inputs, .. } => inputs.clone(),
@@ -113,35 +118,28 @@ impl Meaning {
         }
     }
 
-    /// Half-widths of the 90 % prediction intervals, if every target has one.
-    pub(super) fn half_widths(&self) -> Option<Vec<f64>> {
-        match self {
-            Self::Own { half_widths, .. } if !half_widths.is_empty() => half_widths.iter().copied().collect(),
-            _ => None,
-        }
-    }
-
-    /// Sentences with the names and units of own data, in lines of at most 100 characters that fit into a comment of
-    /// any language; none for an array.
-    pub(super) fn legend(&self) -> Vec<String> {
+    /// Sentences with the names and units of the channels, in lines of at most 100 characters that fit into a comment of any
+    /// language.
+    pub(super) fn legend(&self, channels: usize) -> Vec<String> {
         let Self::Own {
             inputs,
             targets,
-            has_memory,
             row_wires,
-            half_widths,
         } = self
         else {
-            return Vec::new();
+            let last = self
+                .targets()
+                .last()
+                .map_or(String::new(), |target| target.name.clone());
+            return wrapped(&format!(
+                "Readings are r_1 to r_{channels}; coordinates are x_1, y_1, z_1, x_2, ... {last}."
+            ));
         };
         let list = |what: &str, channels: &[Channel]| {
             let titles: Vec<String> = channels.iter().map(|channel| comment(&channel.title())).collect();
             format!("{what}, in this order: {}.", titles.join(", "))
         };
-        let mut sentences = vec![
-            list(if *has_memory { "Features" } else { "Readings" }, inputs),
-            list("Targets", targets),
-        ];
+        let mut sentences = vec![list("Readings", inputs), list("Targets", targets)];
         // The usual numbering is not mentioned.
         if row_wires.iter().enumerate().any(|(index, &row_wire)| index != row_wire) {
             let rows = row_wires.iter().enumerate();
@@ -149,19 +147,6 @@ impl Meaning {
                 .map(|(index, row_wire)| format!("{} is row-wire {}", index + 1, row_wire + 1))
                 .collect();
             sentences.push(format!("Rows: {}.", rows.join(", ")));
-        }
-        let half_widths = targets.iter().zip(half_widths);
-        let half_widths: Vec<String> = half_widths
-            .filter_map(|(target, half_width)| {
-                let half_width = format_number((*half_width)?);
-                Some(format!("{} +/- {half_width}", comment(&target.title())))
-            })
-            .collect();
-        if !half_widths.is_empty() {
-            sentences.push(format!(
-                "90 % prediction intervals, valid for all answers together: {}.",
-                half_widths.join(", ")
-            ));
         }
         sentences.iter().flat_map(|sentence| wrapped(sentence)).collect()
     }
@@ -204,11 +189,9 @@ mod tests {
         let meaning = Meaning::Own {
             inputs: odd.iter().map(channel).collect(),
             targets: vec![channel(&"x")],
-            has_memory: false,
             row_wires: vec![0, 4],
-            half_widths: vec![Some(1.5)],
         };
-        let text = meaning.legend().join("\n");
+        let text = meaning.legend(8).join("\n");
         for forbidden in ["*/", "/*", "??", "\u{202e}", "\u{7}"] {
             assert!(!text.contains(forbidden), "{forbidden}: {text}");
         }
@@ -216,7 +199,6 @@ mod tests {
             text.contains("µT") && text.contains("Rows: 1 is row-wire 1, 2 is row-wire 5."),
             "{text}"
         );
-        assert!(text.ends_with("+/- 1.50."), "{text}");
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
     }
 
@@ -224,8 +206,7 @@ mod tests {
     fn an_array_has_the_names_of_the_paper() {
         let meaning = Meaning::Array("3x2_2x6".parse().unwrap());
         let titles = |channels: Vec<Channel>| channels.iter().map(Channel::title).collect::<Vec<_>>();
-        assert_eq!(titles(meaning.inputs())[5], "r_6 (ohm)");
+        assert_eq!(titles(meaning.inputs(6))[5], "r_6 (ohm)");
         assert_eq!(titles(meaning.targets())[4], "y_2 (mm)");
-        assert_eq!(meaning.legend(), [""; 0]);
     }
 }

@@ -1,39 +1,32 @@
 //! Bundles: decoders exported for other programs (feature `bundle`).
 //!
-//! A decoder describes its computation as a chain of a few kinds of layers, which is folded once into layers without
-//! any scaling (`portable`: readings to outputs, in the units of the user). Each format writes these layers and is
-//! independent of the decoder: an ONNX graph, C99 in floating point or (networks only) in fixed point, a MATLAB
-//! function, NumPy arrays. The files are read back, evaluated, and compared with the decoder computed with twice the
-//! digits (`exact`). Only a bundle that agrees is moved into place.
+//! What a decoder computes is a program of the core, extended by prediction intervals and the count of readings outside of the
+//! range in training (`exported_program`). A format is a printer of its nodes: an ONNX graph, C99 in floating point or in
+//! fixed point (`fixed16`), a MATLAB function, NumPy. Folder, README, metadata and golden pairs are the same for all.
 
 mod c99;
 mod choice;
-mod exact;
+mod contents;
 mod exported_decoder;
+mod exported_program;
 mod exporting;
-mod fixed_point;
+mod fixed16;
 mod folder;
-mod layers;
+mod golden;
 mod matlab;
 mod meaning;
-mod memory;
+mod names;
 mod numpy;
 mod onnx;
-mod portable;
 mod report;
-mod vectors;
-mod weights;
 
 #[cfg(test)]
 mod tests;
 
 pub use self::{
-    choice::{BundleFormat, BundlePrecision, ChoiceError},
+    choice::{BundleDecoder, BundleFormat, BundlePrecision, ChoiceError},
     exported_decoder::ExportedDecoder,
     exporting::export_bundle,
-    fixed_point::FixedPointError,
-    portable::FoldError,
-    report::{BundleCheck, BundleReport, VectorCounts},
+    fixed16::FixedPointError,
+    report::{BundleCheck, BundleError, BundleReport},
 };
-pub use choice::{BundleDecoder, ReadingRounding};
-pub use report::BundleError;

@@ -1,19 +1,16 @@
-use std::{fmt::Write, path::PathBuf};
+use std::path::PathBuf;
 
-use decoupler_core::{dataset::Memory, evaluation::RunError, problem::Channel, text::counted};
+use decoupler_core::{decoupling::DecodeError, evaluation::RunError, problem::Channel, text::counted};
 use thiserror::Error;
 
 use super::{
     BundleDecoder,
-    choice::{BundleFormat, BundlePrecision, ChoiceError, ReadingRounding},
-    fixed_point::{FixedNetworks, FixedPointError},
-    folder::Call,
-    meaning::Meaning,
-    portable::{FoldError, Portable},
-    vectors::Deviation,
+    choice::{BundleFormat, BundlePrecision, ChoiceError},
+    contents::Contents,
+    fixed16::FixedPointError,
 };
 use crate::{
-    export::{DocumentError, WriteError, format_number},
+    export::{WriteError, document::PROGRAM, format_number},
     import::SetupError,
 };
 
@@ -25,77 +22,38 @@ pub struct BundleReport {
     pub format: BundleFormat,
     /// Numbers with which it computes.
     pub precision: BundlePrecision,
-    /// The folder, or the file.
+    /// The folder.
     pub path: PathBuf,
     /// Names of its files, with their sizes in bytes.
     pub files: Vec<(String, u64)>,
-    /// Readings with which the bundle was verified, and how many of them it contains.
-    pub vectors: VectorCounts,
-    /// Evaluations of the bundle after reading it back.
+    /// Number of readings by which the accuracy was found, and how many of them the bundle contains.
+    pub verified: usize,
+    /// See [`Self::verified`].
+    pub golden: usize,
+    /// Evaluations of the bundle.
     pub checks: Vec<BundleCheck>,
-    /// Largest deviation allowed, relative to [`Self::output_range_mm`], or to the range of each target of own data.
+    /// Largest deviation to be expected of another program, relative to [`Self::output_range_mm`], or to the range of each
+    /// target of own data. It includes [`Self::rounding`].
     pub limit: f64,
-    /// Changes of the outputs caused by rounding the readings to single precision; `None` for other precisions.
-    pub rounding: Option<ReadingRounding>,
+    /// Change of the targets by rounding the readings to single precision, at most, relative as [`Self::limit`]; `None` for
+    /// other precisions.
+    pub rounding: Option<f64>,
     /// Widest range of a coordinate in training, in mm; `None` for own data.
     pub output_range_mm: Option<f64>,
-    /// Deviation of `decode` of this program from the same exact answers, relative as [`Self::limit`].
-    pub program_deviation: f64,
     /// Proven bounds on the errors in fixed point: of any coordinate of an array, or of each target; empty otherwise.
     pub bounds: Vec<(Channel, f64)>,
     /// Remarks for the user, with cause and cure.
     pub remarks: Vec<String>,
 }
 
-/// Numbers of readings of a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct VectorCounts {
-    /// Number with which the bundle was verified.
-    pub verified: usize,
-    /// Number in the bundle, as golden vectors.
-    pub golden: usize,
-}
-
-/// An evaluation of a bundle after reading it back.
+/// An evaluation of a bundle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BundleCheck {
     /// Name of the program that evaluated it.
     pub evaluator: &'static str,
-    /// Largest deviation from the network, which takes the readings in double precision, where the bundle takes them as its
+    /// Largest deviation from the decoder, which takes the readings in double precision, where the bundle takes them as its
     /// callers must round them; relative as [`BundleReport::limit`].
     pub deviation: f64,
-    /// The part of it that is not caused by rounding the readings.
-    pub of_arithmetic: f64,
-}
-
-impl BundleCheck {
-    pub(super) fn of(evaluator: &'static str, deviation: Deviation) -> Self {
-        Self {
-            evaluator,
-            deviation: deviation.total,
-            of_arithmetic: deviation.of_arithmetic,
-        }
-    }
-
-    /// Checks the deviations.
-    ///
-    /// # Errors
-    /// A deviation exceeds its limit or is NaN.
-    pub(super) fn admit(&self, limits: Deviation) -> Result<(), BundleError> {
-        for (deviation, limit) in [
-            (self.of_arithmetic, limits.of_arithmetic),
-            (self.deviation, limits.total),
-        ] {
-            if deviation.is_nan() || deviation > limit {
-                return Err(BundleError::Deviation {
-                    evaluator: self.evaluator.to_owned(),
-                    deviation,
-                    limit,
-                });
-            }
-        }
-        Ok(())
-    }
 }
 
 impl BundleReport {
@@ -116,99 +74,75 @@ impl BundleReport {
 
     /// Returns the sentence on [`Self::rounding`], if there is one.
     pub fn describe_rounding(&self) -> Option<String> {
-        self.rounding.map(|rounding| {
-            format!(
-                "Rounding the readings to single precision alone: {:.1e}, at most {:.1e}",
-                rounding.largest,
-                rounding.worst()
-            )
-        })
+        let rounding = self.rounding?;
+        Some(format!(
+            "Rounding the readings to single precision changes a target by at most {rounding:.1e}"
+        ))
     }
 
-    /// Returns the largest deviation of all checks.
-    pub fn deviation(&self) -> f64 {
-        self.checks.iter().map(|check| check.deviation).fold(0.0, f64::max)
+    /// Returns the largest deviation of all checks; `None` if nothing evaluated the bundle.
+    pub fn deviation(&self) -> Option<f64> {
+        self.checks.iter().map(|check| check.deviation).reduce(f64::max)
     }
 }
 
 /// Returns the README of a bundle: its usage and its accuracy.
-pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: &BundleReport) -> String {
-    let meaning = &portable.meaning;
-    let subject = match meaning {
-        Meaning::Array(scale) => format!("a tactile array {scale}"),
-        Meaning::Own { .. } => "own data".to_owned(),
-    };
+pub(super) fn readme(contents: &Contents, decoder: BundleDecoder, usage: &str, report: &BundleReport) -> String {
+    let meaning = &contents.meaning;
     let mut text = format!(
-        "{decoder} of {subject}, exported by {program} as {format}, {precision}.\n\n",
-        decoder = portable.name,
-        program = crate::export::document::PROGRAM,
-        format = report.format,
-        precision = report.precision,
+        "{}, exported by {PROGRAM} as {}, {}.\n\n{}\nIt takes {} and returns {}{}.\n\n{}\n",
+        decoder.name(),
+        report.format,
+        report.precision,
+        meaning.purpose(),
+        counted(contents.channels(), "reading"),
+        meaning.outputs_in_words(contents.outputs()),
+        contents.parts_in_words(),
+        meaning.legend(contents.channels()).join("\n"),
     );
-    text += &match meaning {
-        Meaning::Array(_) => format!(
-            "It converts the {channels} of one row-wire (r_1 to r_{channels}, in ohm) into the {outputs} of\n\
-             its nodes (x_1, y_1, z_1, x_2, ... {last}, in mm).",
-            channels = counted(portable.channels, "reading"),
-            outputs = counted(portable.outputs, "coordinate"),
-            last = meaning.targets().last().map_or("", |target| &target.name),
-        ),
-        Meaning::Own { .. } => format!(
-            "It converts {channels} into {outputs}.\n\n{legend}",
-            channels = counted(portable.channels, "reading"),
-            outputs = counted(portable.outputs, "target"),
-            legend = meaning.legend().join("\n"),
-        ),
-    };
-    if portable.takes_row() {
-        let _ = write!(
-            text,
-            " There is one {} for each row, from 1 to {}.",
-            portable.decoder,
-            portable.rows()
+    if contents.takes_row() {
+        text += &format!(
+            "There is one {} for each row, from 1 to {}.\n",
+            contents.noun, contents.rows
         );
     }
-    text += "\n\nUsage\n\n";
-    let call = Call {
-        name,
-        portable,
-        fixed,
-        precision: report.precision,
-    };
-    text += &(report.format.writer().call)(&call);
-    text += "\n\nAccuracy\n\n";
+    text += &format!(
+        "\nUsage\n\n{usage}\nA line of readings has {}, a line of the answer {}.\n",
+        counted(contents.channels(), "number"),
+        counted(contents.outputs(), "number"),
+    );
+    if let Some(state) = contents.state_in_words() {
+        text += &format!("\n{}\n", super::meaning::wrapped(&state).join("\n"));
+    }
+    text += "\nAccuracy\n\n";
+    let range = report
+        .output_range_mm
+        .map_or_else(String::new, |range| format!(" ({} mm)", format_number(range)));
+    text += &format!(
+        "Answers agree with those of the {} within {:.1e} of {}{range}.\n",
+        contents.noun,
+        report.limit,
+        meaning.scale()
+    );
     for check in &report.checks {
-        let _ = writeln!(
-            text,
-            "{}: largest deviation {:.1e} of {}{}.",
-            check.evaluator,
-            check.deviation,
-            meaning.scale(),
-            report
-                .output_range_mm
-                .map_or_else(String::new, |range| format!(" ({} mm)", format_number(range)))
-        );
+        text += &format!("{}: largest deviation {:.1e}.\n", check.evaluator, check.deviation);
     }
-    if let Some(rounding) = report.describe_rounding() {
-        let _ = writeln!(text, "{rounding}.");
-    }
-    if let Some(bounds) = report.describe_bounds() {
-        let _ = writeln!(text, "{bounds}.");
+    for sentence in [report.describe_rounding(), report.describe_bounds()]
+        .into_iter()
+        .flatten()
+    {
+        text += &format!("{sentence}.\n");
     }
     for remark in &report.remarks {
-        let _ = writeln!(text, "Note: {remark}.");
+        text += &format!("Note: {remark}.\n");
     }
-    let subject = match meaning {
-        Meaning::Array(_) => "the array, its geometry",
-        Meaning::Own { .. } => "names and units",
-    };
     text + &format!(
-        "\ngolden.csv has readings in double precision with the {output}s that the {decoder} gives to them, for a test of your\n\
+        "\ngolden.csv has readings in double precision with the {output}s that the {noun} gives to them, for a test of your\n\
          own: convert the readings as you would your own.\n\
-         metadata.json has {subject}, the errors of the {decoder} on test samples, if there were any, the range of the\n\
+         metadata.json has names and units, the errors of the {noun} on test samples, if there were any, the range of the\n\
          readings in training, the seed and the version of the program.\n",
         output = meaning.output(),
-        decoder = portable.decoder,
+        noun = contents.noun,
     )
 }
 
@@ -222,23 +156,20 @@ pub enum BundleError {
     /// The decoder needs a network, and none was trained.
     #[error("{0} needs a trained network: train one first")]
     NoNetwork(BundleDecoder),
-    /// The network was trained on samples in memory and has no network file.
-    #[error("json is the network file, and a network trained on samples in memory has none: give another format")]
-    NoFile,
-    /// A memory is exported in double precision only.
-    #[error("a network with a memory ({1}) cannot be exported in {0}: give --precision f64, or train without a memory")]
-    Memory(&'static str, Memory),
     /// The lag is too long for a graph.
     #[error(
         "a lag of {0} samples is too long for an ONNX graph, which copies its state for each sample: export as c99, numpy or matlab"
     )]
     LongLag(usize),
-    /// The scaling cannot be folded into the weights.
-    #[error(transparent)]
-    Fold(#[from] FoldError),
-    /// The readings with which the bundle is verified could not be drawn.
+    /// A constant of the program is beyond the range of the numbers.
+    #[error("a constant of the decoder is beyond the range of {0}: {1}")]
+    NotFinite(&'static str, &'static str),
+    /// The readings by which the accuracy is found could not be drawn or decoded.
     #[error("no readings to verify the bundle: {0}")]
     Readings(#[from] Box<RunError>),
+    /// A reading could not be decoded.
+    #[error("no readings to verify the bundle: {0}")]
+    Decoding(#[from] DecodeError),
     /// The network file does not have the range of the readings.
     #[error(
         "the network file does not have the range of the readings in training, without which no bundle can be verified: train again"
@@ -253,9 +184,6 @@ pub enum BundleError {
     /// The bundle cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The network file cannot be written or read back.
-    #[error(transparent)]
-    NetworkFile(#[from] DocumentError),
     /// A reading that becomes 0 or infinite in the numbers of the bundle.
     #[error(
         "a reading of {reading:.1e} ({channel}) is beyond the range of the numbers in which the bundle takes it: give --precision f64"
@@ -279,14 +207,6 @@ pub enum BundleError {
     /// The numbers do not fit 16 bits.
     #[error(transparent)]
     FixedPoint(#[from] FixedPointError),
-    /// A file of the bundle could not be read back.
-    #[error("'{file}' of the bundle could not be read back: {reason}; nothing is left of the bundle")]
-    ReadBack {
-        /// Name of the file.
-        file: String,
-        /// The cause.
-        reason: String,
-    },
     /// The C compiler refused the source, or its program failed.
     #[error("{step} failed: {reason}; nothing is left of the bundle")]
     SelfTest {
@@ -295,26 +215,4 @@ pub enum BundleError {
         /// First lines of the message.
         reason: String,
     },
-    /// The bundle gives other answers than the decoder.
-    #[error(
-        "{evaluator} gives answers that deviate by {deviation:.1e} of the range of the outputs, more than {limit:.1e}; nothing is left of the bundle"
-    )]
-    Deviation {
-        /// Name of the program that evaluated the bundle.
-        evaluator: String,
-        /// Largest deviation relative to the widest range of an output.
-        deviation: f64,
-        /// Largest deviation allowed.
-        limit: f64,
-    },
-}
-
-impl BundleError {
-    /// The error for a file of a bundle that could not be read back.
-    pub(super) fn read_back(file: &str, reason: String) -> Self {
-        Self::ReadBack {
-            file: file.to_owned(),
-            reason,
-        }
-    }
 }

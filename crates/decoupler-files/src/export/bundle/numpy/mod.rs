@@ -1,216 +1,231 @@
-//! Bundles for NumPy: weights as `network.npz` (of other decoders `decoder.npz`), and a `decode.py` that uses them.
+//! Bundles for NumPy: constants as `network.npz` (of other decoders `decoder.npz`), and a `decode.py` that uses them.
 
 mod npz;
 
-use decoupler_core::network::Quantity;
+use decoupler_core::decoupling::{Domain, Function, NodeId, Operation, Precision};
 
-use self::npz::NamedArray;
 use super::{
-    folder::{Call, Draft},
-    layers::Layer,
-    meaning::Meaning,
-    portable::Portable,
-    report::{BundleCheck, BundleError},
-    weights::{Arithmetic, Digits, Table, Weights, names},
+    contents::{Contents, PrintedHistory},
+    folder::AtomicFolder,
+    report::BundleError,
 };
+use npz::NamedArray;
 
-/// Writes the weights and the limits of the readings. Every array has the maps of the rows along its first axis.
-pub(super) fn write_weights(portable: &Portable, weights: &Weights) -> Vec<u8> {
-    let of_table = |table: Table| NamedArray {
-        name: table.name,
-        digits: table.digits,
-        shape: [&[weights.maps.len()], &table.shape[..]].concat(),
-        values: table.values,
-    };
-    let mut arrays: Vec<_> = weights.tables(portable).into_iter().map(of_table).collect();
-    if let Some(ranges) = portable.known_ranges() {
-        let limit = |name: &str, pick: fn(&(f64, f64)) -> f64| NamedArray {
-            name: name.to_owned(),
-            // Rounded like the readings: no reading within the limits counts as outside.
-            digits: weights.arithmetic.rest,
-            shape: vec![ranges.len(), portable.channels],
-            values: ranges.iter().flat_map(|range| range.limits.iter().map(pick)).collect(),
-        };
-        let [lowest, highest] = portable.meaning.limits();
-        arrays.push(limit(lowest, |limits| limits.0));
-        arrays.push(limit(highest, |limits| limits.1));
-    }
-    npz::write(&arrays)
-}
-
-/// Reads back the weights, which are in this arithmetic.
+/// Writes constants and program.
 ///
 /// # Errors
-/// A description of the damage.
-pub(super) fn read_weights(bytes: &[u8], portable: &Portable, arithmetic: Arithmetic) -> Result<Weights, String> {
-    let arrays = npz::read(bytes)?;
-    Weights::of_tables(portable, arithmetic, |table| {
-        let found = arrays.iter().find(|array| array.name == table.name);
-        let array = found.ok_or_else(|| format!("there is no array '{}'", table.name))?;
-        if array.digits == table.digits && array.shape[1..] == table.shape {
-            Ok(array.values.clone())
-        } else {
-            Err(format!("'{}' has another shape or precision", table.name))
-        }
-    })
+/// The operating system refuses.
+pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<(), BundleError> {
+    let arrays = contents.constants().map(|(id, tables)| NamedArray {
+        name: contents.name_of(id).to_owned(),
+        precision: contents.precision_of(id),
+        shape: contents.full_shape(id, tables.len()),
+        values: tables.iter().flat_map(|table| table.iter().copied()).collect(),
+    });
+    folder.write(&format!("{}.npz", contents.noun), npz::write(&Vec::from_iter(arrays)))?;
+    folder.write("decode.py", program(contents))
 }
 
-/// Writes the program.
-pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> String {
-    let rows = portable.rows();
-    let (argument, row) = if portable.takes_row() {
-        let check = format!(
+/// Text of the program.
+fn program(contents: &Contents) -> String {
+    let (input, channels) = (contents.meaning.readings(), contents.channels());
+    let legend = contents
+        .meaning
+        .legend(channels)
+        .into_iter()
+        .chain(contents.note_lines());
+    let legend: String = legend.map(|line| format!("# {line}\n")).collect();
+    let dtype = dtype(contents.outer_precision());
+    let (row, row_text) = match contents.takes_row() {
+        true => (", row", "; row: row of each sample, from 1"),
+        false => ("", ""),
+    };
+    let is_sequence = contents.history().is_some();
+    let state = if is_sequence { ", state, time_s" } else { "" };
+    let body: String = contents
+        .computed()
+        .map(|(id, operation)| statement(contents, id, operation))
+        .collect();
+    let mut text = format!(
+        "\"\"\"{}; see README.txt.\"\"\"\n{legend}\nimport pathlib\n\nimport numpy as np\n\n\
+         CONSTANTS = dict(np.load(pathlib.Path(__file__).with_name(\"{}.npz\")))\n\n\n\
+         def compute({input}, index{state}):\n    \"\"\"Answers to samples of the row-wire with this index.\"\"\"\n    \
+         c = CONSTANTS\n{body}    return ({parts},)\n\n\n",
+        contents.meaning.purpose_without_stop(),
+        contents.noun,
+        parts = returned_parts(contents).join(", "),
+    );
+    if let Some(history) = contents.history() {
+        text += &remembering(contents, &history);
+    }
+    let check = format!(
+        "    r = np.atleast_2d(np.asarray({input}, dtype={dtype}))\n    if r.shape[1] != {channels}:\n        \
+         raise ValueError(\"{input}: give {channels} columns\")\n"
+    );
+    let row_check = match contents.takes_row() {
+        true => format!(
             "    row = np.broadcast_to(np.asarray(row), len(r))\n    if not np.isin(row, np.arange(1, {rows} + 1)).all():\n        \
-             raise ValueError(\"row: give rows from 1 to {rows}\")\n"
-        );
-        (", row", check)
-    } else {
-        ("", "    row = np.ones(len(r))\n".to_owned())
-    };
-    let row_text = if portable.takes_row() {
-        "; row: row of each sample, from 1"
-    } else {
-        ""
-    };
-    let meaning = &portable.meaning;
-    let (input, output) = (meaning.readings(), meaning.outputs());
-    let is_reading = match portable.quantity {
-        Quantity::Raw => "np.isfinite(r)",
-        _ => "(r > 0) & np.isfinite(r)",
-    };
-    let dtype = match arithmetic.rest {
-        Digits::Single => "np.float32",
-        Digits::Double => "np.float64",
-    };
-    let (outside, counted) = if portable.known_ranges().is_some() {
-        (
-            format!(
-                "        outside[mine] = ((r[mine] < MAPS[\"{lowest}\"][index]) | (r[mine] > MAPS[\"{highest}\"][index])).sum(axis=1)\n",
-                lowest = meaning.limits()[0],
-                highest = meaning.limits()[1],
-            ),
-            "the number of readings of each sample outside the range of training",
-        )
-    } else {
-        (String::new(), "zeros, because the range of training is not known")
-    };
-    let outputs = portable.outputs;
-    let (purpose, answers) = match meaning {
-        Meaning::Array(_) => (
-            "Decodes readings of a tactile array in ohm into the coordinates of its nodes in mm",
-            format!("the coordinates in mm (samples x {outputs}: x_1, y_1, z_1, x_2, ...)"),
+             raise ValueError(\"row: give rows from 1 to {rows}\")\n",
+            rows = contents.rows,
         ),
-        Meaning::Own { .. } => (
-            "Decodes readings into targets",
-            format!("the targets (samples x {outputs})"),
-        ),
+        false => "    row = np.ones(len(r), int)\n".to_owned(),
     };
-    let legend: String = meaning.legend().iter().map(|line| format!("# {line}\n")).collect();
-    format!(
-        r#""""{purpose}; see README.txt."""
-{legend}import pathlib
-
-import numpy as np
-
-MAPS = dict(np.load(pathlib.Path(__file__).with_name("{noun}.npz")))
-{half_widths}
-def decode_by(index, r):
-    """Decodes readings with the map of this index."""
-    w = {{name: array[index] for name, array in MAPS.items() if name not in {not_of_maps}}}
-    x = r.astype(w["{centre}"].dtype)
-{steps}    return v.astype(r.dtype)
-
-
-
-def decode({input}{argument}):
-    """Returns {answers}, and
-    {counted}.
-
-    {input}: samples x {channels}{row_text}
-    """
-    r = np.atleast_2d(np.asarray({input}, dtype={dtype}))
-    if not ({is_reading}).all():
-        raise ValueError("{input}: give finite numbers{above}")
-{row}    {output}, outside = np.empty((len(r), {outputs}), r.dtype), np.zeros(len(r), int)
-    for index in range({rows}):
-        mine = row == index + 1
-        {output}[mine] = decode_by(index, r[mine])
-{outside}    return {output}, outside
-"#,
-        channels = portable.channels,
-        noun = portable.decoder,
-        half_widths = meaning.half_widths().map_or_else(String::new, |half_widths| {
-            format!("# Half-widths of the 90 % prediction intervals for all answers together, in the units of the targets.\nHALF_WIDTHS_90 = np.array({half_widths:?})\n")
-        }),
-        centre = meaning.centre(),
-        not_of_maps = format_args!("(\"{}\", \"{}\")", meaning.limits()[0], meaning.limits()[1]),
-        steps = steps(portable, arithmetic),
-        above = if portable.quantity == Quantity::Raw {
-            ""
-        } else {
-            " above 0"
-        },
-    )
-}
-
-/// Statements from the readings `x` to the answers `v`.
-fn steps(portable: &Portable, arithmetic: Arithmetic) -> String {
-    let centre = format!("w[\"{}\"]", portable.meaning.centre());
-    let change = match portable.quantity {
-        Quantity::Resistance | Quantity::Raw => format!("x - {centre}"),
-        Quantity::Conductance => format!("({centre} - x) / x"),
-        Quantity::LogResistance => format!("np.log1p((x - {centre}) / {centre})"),
-    };
-    let mut text = format!("    v = {change}\n");
-    for (index, (layer, names)) in portable.layers().iter().zip(names(portable.layers())).enumerate() {
-        if index > 0 && index == arithmetic.wide_layers {
-            text += "    v = v.astype(r.dtype)\n";
-        }
-        let table = |place: usize| format!("w[\"{}\"]", names.tables[place]);
-        text += &match layer {
-            Layer::Affine(_) => format!("    v = v @ {} + {}\n", table(0), table(1)),
-            Layer::Tanh => "    v = np.tanh(v)\n".to_owned(),
-            Layer::Gaussians { .. } => {
-                format!("    v = np.exp(-((v[:, :, None] - {}) ** 2).sum(axis=1))\n", table(0))
-            }
-        };
+    let returned = format!(
+        "Returns {}{}, each with a line for each sample.",
+        contents.meaning.outputs_in_words(contents.outputs()),
+        contents.parts_in_words()
+    );
+    if is_sequence {
+        return text
+            + &format!(
+                "def decode({input}, time_s, state=None{row}):\n    \"\"\"{returned} The last value is the state.\n\n    \
+                 {input}: samples x {channels}, in order of time; time_s: time of each in seconds, NaN where it is not known;\n    \
+                 state: None at the start, or the state to continue from{row_text}\n    \"\"\"\n{check}{row_check}    \
+                 time_s = np.broadcast_to(np.asarray(time_s, dtype=float), len(r))\n    \
+                 state = start() if state is None else np.array(state)\n    \
+                 answers = [compute(r[k : k + 1], row[k] - 1, state, time_s[k]) for k in range(len(r))]\n    \
+                 return (*(np.concatenate(part) for part in zip(*answers)), state)\n",
+                row = if contents.takes_row() { ", row=1" } else { "" },
+            );
     }
-    text
+    text + &format!(
+        "def decode({input}{row}):\n    \"\"\"{returned}\n\n    {input}: samples x {channels}{row_text}\n    \"\"\"\n{check}{row_check}    \
+         answers = [compute(r[row == index + 1], index) for index in range({rows})]\n    \
+         joined = tuple(np.concatenate(part)[np.argsort(np.argsort(row, kind=\"stable\"), kind=\"stable\")] for part in zip(*answers))\n    \
+         return joined if len(joined) > 1 else joined[0]\n",
+        rows = contents.rows,
+    )
 }
 
-/// Writes weights and program, and reads the weights back.
-///
-/// # Errors
-/// They cannot be written or read back.
-pub(super) fn export(draft: &mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleError> {
-    let (portable, arithmetic) = (draft.portable, draft.weights.arithmetic);
-    let file = format!("{}.npz", portable.decoder);
-    let bytes = draft.write(&file, write_weights(portable, draft.weights))?;
-    draft.write("decode.py", write_program(portable, arithmetic))?;
-    let read = read_weights(&bytes, portable, arithmetic);
-    let read = read.map_err(|reason| BundleError::read_back(&file, reason))?;
-    let deviation = draft.deviation_of(&read);
-    Ok(vec![BundleCheck::of(
-        "NumPy weights, read back and evaluated",
-        deviation,
-    )])
+/// The parts of an answer, in the precision of the bundle.
+fn returned_parts(contents: &Contents) -> Vec<String> {
+    let exported = &contents.exported;
+    let numbers = [Some(exported.targets), exported.half_widths].into_iter().flatten();
+    let mut parts: Vec<String> = numbers
+        .map(|id| value(contents, id, contents.outer_precision()))
+        .collect();
+    parts.extend(exported.outside.map(|id| contents.name_of(id).to_owned()));
+    parts
 }
 
-/// Returns the usage section of the README.
-pub(super) fn call(call: &Call<'_>) -> String {
-    let portable = call.portable;
-    let (takes_row, channels, outputs) = (portable.takes_row(), portable.channels, portable.outputs);
-    let meaning = &portable.meaning;
-    let (input, output) = (meaning.readings(), meaning.outputs());
-    let row = if takes_row { ", row" } else { "" };
+fn dtype(precision: Precision) -> &'static str {
+    match precision {
+        Precision::Single => "np.float32",
+        Precision::Double => "np.float64",
+    }
+}
+
+/// A value in this precision.
+fn value(contents: &Contents, id: NodeId, precision: Precision) -> String {
+    let name = contents.name_of(id);
+    let value = match (&contents.exported.program.node(id).operation, contents.is_of_row(id)) {
+        (Operation::Select { .. }, true) => format!("c[\"{name}\"][index]"),
+        (Operation::Select { .. }, false) => format!("c[\"{name}\"]"),
+        _ => name.to_owned(),
+    };
+    match contents.precision_of(id) == precision {
+        true => value,
+        false => format!("{value}.astype({})", dtype(precision)),
+    }
+}
+
+fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
+    let (name, precision) = (contents.name_of(id), contents.precision_of(id));
+    let of = |id: NodeId| value(contents, id, precision);
+    let expression = match operation {
+        Operation::Valid { of, domain } => {
+            let x = contents.name_of(*of);
+            let (is_valid, above) = match domain {
+                Domain::Positive => (format!("({x} > 0) & np.isfinite({x})"), " above 0"),
+                Domain::Finite => (format!("np.isfinite({x})"), ""),
+            };
+            return format!(
+                "    if not ({is_valid}).all():\n        raise ValueError(\"{x}: give finite numbers{above}\")\n"
+            );
+        }
+        Operation::Subtract(one, other) => format!("{} - {}", of(*one), of(*other)),
+        Operation::Divide(one, other) => format!("{} / {}", of(*one), of(*other)),
+        Operation::Map(function, x) => match function {
+            Function::Log1p => format!("np.log1p({})", of(*x)),
+            Function::Tanh => format!("np.tanh({})", of(*x)),
+            Function::Gaussian => format!("np.exp(-{})", of(*x)),
+        },
+        Operation::Affine { of: x, weights, biases } => format!("{} @ {} + {}", of(*x), of(*weights), of(*biases)),
+        Operation::SquaredDistances { of: x, points } => {
+            format!(
+                "np.stack([(({} - point) ** 2).sum(axis=1) for point in {}.T], axis=1)",
+                of(*x),
+                of(*points)
+            )
+        }
+        Operation::Clip { of: x, low, high } => format!("np.clip({}, {}, {})", of(*x), of(*low), of(*high)),
+        Operation::Concatenate(parts) => {
+            let parts = Vec::from_iter(parts.iter().map(|part| of(*part)));
+            format!("np.concatenate([{}], axis=1)", parts.join(", "))
+        }
+        Operation::History { of: x, .. } => format!("remember(state, {}[0], time_s)[None]", of(*x)),
+        Operation::CountOutside { of: x, low, high } => {
+            format!("(({x} < {}) | ({x} > {})).sum(axis=1)", of(*low), of(*high), x = of(*x))
+        }
+        Operation::Readings | Operation::Select { .. } | Operation::Blend { .. } => {
+            unreachable!("given, or not exported")
+        }
+    };
+    format!("    {name} = {expression}\n")
+}
+
+/// The functions that start a state and take a reading into it.
+fn remembering(contents: &Contents, history: &PrintedHistory) -> String {
+    let constants = &history.constants;
+    let (kept, averages) = (constants.longest_lag(), constants.averages.len());
+    let (per_second, per_reading) = history.rates();
+    let lags = Vec::from_iter(constants.lags.iter().map(|lag| lag - 1));
+    let pause = match history.pause_s {
+        f64::INFINITY => "np.inf".to_owned(),
+        pause_s => format!("{pause_s:?}"),
+    };
     format!(
-        "    from decode import decode\n    \
-         {output}, readings_outside = decode({input}{row})\n\n\
-         {input} is samples x {channels}, {output} samples x {outputs}{row_text}.",
-        row_text = if takes_row {
-            ";\nrow is the row of each sample, from 1"
+        "# Usual interval between samples in training, and the pause after which the past is forgotten, in seconds.\n\
+         INTERVAL_S, PAUSE_S = {usual:?}, {pause}\n\
+         KEPT, LAGS = {kept}, np.array({lags:?}, dtype=int)\n\
+         PER_SECOND, PER_READING = np.array({per_second:?}, dtype=float), np.array({per_reading:?}, dtype=float)\n\n\n\
+         def start():\n    \"\"\"The state before the first reading. {about} A copy is a state to continue from.\"\"\"\n    \
+         # Whether it has started, the latest time, the latest readings (the newest first), and the averages.\n    \
+         return np.zeros((2 + {kept} + {averages}, {channels}))\n\n\n\
+         def remember(state, now, time_s):\n    \
+         \"\"\"Takes the next readings into the state; returns them with their past.\"\"\"\n    \
+         has_started, latest_s = state[0, 0] > 0, state[1, 0]\n    \
+         elapsed_s = time_s - latest_s if has_started else np.nan\n    \
+         if not has_started or elapsed_s < 0 or elapsed_s > PAUSE_S:\n        \
+         state[0], state[2:], elapsed_s = 1, now, np.nan\n    \
+         if np.isfinite(time_s) or not has_started:\n        state[1] = time_s\n    \
+         elapsed_s = elapsed_s if np.isfinite(elapsed_s) else INTERVAL_S\n    \
+         kept, averages = state[2 : 2 + KEPT], state[2 + KEPT :]\n    \
+         past_of_lags = kept[LAGS] if len(LAGS) else kept[:0]\n    \
+         averages += -np.expm1(-(elapsed_s * PER_SECOND + PER_READING))[:, None] * (now - averages)\n    \
+         past = np.concatenate([past_of_lags, averages])\n    \
+         kept[1:], kept[:1] = kept[:-1].copy(), now\n    \
+         return np.concatenate([now, {past}])\n\n\n",
+        usual = constants.interval_s,
+        channels = constants.channels,
+        about = contents.state_in_words().unwrap_or_default(),
+        past = if constants.differences {
+            "(now - past).ravel()"
         } else {
-            ""
+            "past.ravel()"
         },
     )
+}
+
+/// Lines of a program that decodes.
+pub(super) fn usage(contents: &Contents) -> String {
+    let (input, parts) = (contents.meaning.readings(), contents.parts().join(", "));
+    let row = if contents.takes_row() { ", row" } else { "" };
+    match contents.history() {
+        Some(_) => format!(
+            "    from decode import decode\n    state = None\n    {parts}, state = decode({input}, time_s, state{row})\n\n\
+             takes as many samples as have come since the last call.\n"
+        ),
+        None => format!("    from decode import decode\n    {parts} = decode({input}{row})\n"),
+    }
 }

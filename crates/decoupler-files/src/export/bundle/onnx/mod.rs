@@ -1,177 +1,409 @@
-//! Bundles as ONNX graphs (opset 13), which are read back and evaluated.
+//! Bundles as ONNX graphs (opset 13).
 //!
 //! | input | shape | type |
 //! |---|---|---|
 //! | `resistances_ohm`, or `readings` of own data | batch × M4 | float or double |
-//! | `row`, for networks of known rows | batch | int64, from 1 |
+//! | `row`, for decoders of known rows | batch | int64, from 1 |
+//! | `time_s` and `state`, with a history: batch is 1 | 1 × 1, rows × M4 | double |
 //!
 //! | output | shape | type |
 //! |---|---|---|
 //! | `coordinates_mm`, or `targets` | batch × 3·M2 | as the input; NaN where a reading or the row is invalid |
+//! | `half_widths`, if there are prediction intervals | as the targets | as the targets |
 //! | `readings_outside`, if the range in training is known | batch | int64 |
+//! | `next_state`, with a history | as the state | double |
 
-mod evaluator;
+mod builder;
+mod history;
 mod schema;
-mod stream;
-mod writer;
 
+use std::collections::HashMap;
+
+use decoupler_core::{
+    decoupling::{Domain, Function, NodeId, Operation, Precision},
+    problem::Channel,
+};
 use prost::Message;
 
-use self::{evaluator::evaluate, schema::Model};
-use super::{
-    choice::BundlePrecision,
-    folder::{Call, Draft},
-    report::{BundleCheck, BundleError},
-    vectors::Vector,
-    weights::Digits,
+use self::{
+    builder::{GraphBuilder, element_type, value},
+    schema::{Graph, INT64, Model, OperatorSet, Property},
 };
-use decoupler_core::network::Quantity;
-use evaluator::{Tensor, Values};
+use super::{contents::Contents, folder::AtomicFolder, meaning::comment, report::BundleError};
 
-pub(super) use self::{
-    stream::{StreamGraph, StreamParts},
-    writer::write,
-};
+const OPSET: i64 = 13;
+/// The first version of the format with opset 13.
+const IR_VERSION: i64 = 7;
+/// Longest lag in a graph, which copies its state for each sample.
+const MAX_LAG: usize = 1000;
 
-/// A graph that was read back.
-pub(super) struct OnnxGraph {
-    graph: schema::Graph,
-    digits: Digits,
-}
-
-/// The outputs of a graph.
-pub(super) struct OnnxAnswers {
-    pub(super) answers: Vec<Vec<f64>>,
-    pub(super) readings_outside: Option<Vec<i64>>,
-}
-
-impl OnnxGraph {
-    /// Reads a file.
-    ///
-    /// # Errors
-    /// A description of the damage.
-    pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
-        let model = Model::decode(bytes).map_err(|error| error.to_string())?;
-        let graph = model.graph.ok_or("there is no graph in it")?;
-        let input = graph
-            .input
-            .first()
-            .and_then(|input| input.kind.as_ref()?.tensor_type.as_ref());
-        let digits = match input.map(|kind| kind.elem_type) {
-            Some(schema::FLOAT) => Digits::Single,
-            Some(schema::DOUBLE) => Digits::Double,
-            _ => return Err("its first input is not of numbers".to_owned()),
-        };
-        Ok(Self { graph, digits })
-    }
-
-    /// Evaluates all vectors in batches; all values of a batch are in memory at once.
-    ///
-    /// # Errors
-    /// A description of the first operation that fails.
-    pub(super) fn decode(&self, vectors: &[Vector]) -> Result<OnnxAnswers, String> {
-        /// Vectors of a batch.
-        const BATCH: usize = 100;
-        let mut all = OnnxAnswers {
-            answers: Vec::new(),
-            readings_outside: Some(Vec::new()),
-        };
-        for batch in vectors.chunks(BATCH) {
-            let of_batch = self.decode_batch(batch)?;
-            all.answers.extend(of_batch.answers);
-            let outside = all.readings_outside.zip(of_batch.readings_outside);
-            all.readings_outside = outside.map(|(all, of_batch)| [all, of_batch].concat());
-        }
-        Ok(all)
-    }
-
-    fn decode_batch(&self, vectors: &[Vector]) -> Result<OnnxAnswers, String> {
-        let channels = vectors.first().map_or(0, |vector| vector.readings.len());
-        let readings = vectors.iter().flat_map(|vector| &vector.readings);
-        let readings = readings.map(|&ohm| self.digits.round(ohm)).collect();
-        let name = |values: &[schema::ValueInfo]| values.first().map(|value| value.name.clone()).unwrap_or_default();
-        let mut inputs = vec![(
-            name(&self.graph.input),
-            Tensor::real(self.digits, [vectors.len(), channels], readings),
-        )];
-        if self.graph.input.len() > 1 {
-            let rows = vectors.iter().map(|vector| vector.row as i64 + 1).collect();
-            inputs.push(("row".to_owned(), Tensor::int([vectors.len()], rows)));
-        }
-        let mut values = evaluate(&self.graph, inputs)?;
-        let found = values.remove(&name(&self.graph.output));
-        let answers = match found.map(|tensor| (tensor.shape, tensor.values)) {
-            Some((shape, Values::Real(_, values))) if shape.len() == 2 => {
-                values.chunks(shape[1].max(1)).map(<[f64]>::to_vec).collect()
-            }
-            _ => return Err("there are no outputs".to_owned()),
-        };
-        let readings_outside = match values.remove("readings_outside").map(|tensor| tensor.values) {
-            Some(Values::Int(outside)) => Some(outside),
-            _ => None,
-        };
-        Ok(OnnxAnswers {
-            answers,
-            readings_outside,
-        })
-    }
-}
-
-/// Writes the graph, reads it back and evaluates it.
+/// Writes the graph.
 ///
 /// # Errors
-/// It cannot be written, read back or evaluated.
-pub(super) fn export(draft: &mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleError> {
-    let file = format!("{}.onnx", draft.portable.decoder);
-    let damaged = |reason| BundleError::read_back(&file, reason);
-    let bytes = draft.write(
-        &file,
-        write(draft.portable, draft.weights, draft.metadata, draft.remarks),
-    )?;
-    let graph = OnnxGraph::read(&bytes).map_err(damaged)?;
-    let answers = graph.decode(draft.vectors.all()).map_err(damaged)?.answers;
-    if answers.len() != draft.vectors.all().len() {
-        return Err(damaged("it has a different number of answers".to_owned()));
+/// A lag is too long, or the operating system refuses.
+pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<(), BundleError> {
+    if let Some(history) = contents.history()
+        && history.constants.longest_lag() > MAX_LAG
+    {
+        return Err(BundleError::LongLag(history.constants.longest_lag()));
     }
-    let mut answers = answers.into_iter();
-    let deviation = draft.vectors.deviation(|_| answers.next().unwrap_or_default());
-    Ok(vec![BundleCheck::of("ONNX graph, read back and evaluated", deviation)])
+    let properties = contents.metadata.iter().map(|(key, value)| Property {
+        key: key.clone(),
+        value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
+    });
+    let notes = contents.notes.iter().map(|note| format!(" Note: {note}."));
+    let about = format!(
+        "{}. Answers are NaN where a reading or the row is invalid.{}{}",
+        contents.meaning.purpose_without_stop(),
+        contents
+            .state_in_words()
+            .map_or_else(String::new, |about| format!(" {about}")),
+        notes.collect::<String>()
+    );
+    let model = Model {
+        ir_version: IR_VERSION,
+        producer_name: "decoupler".to_owned(),
+        producer_version: env!("CARGO_PKG_VERSION").to_owned(),
+        doc_string: about,
+        graph: Some(Printer::graph(contents)),
+        opset_import: vec![OperatorSet {
+            domain: String::new(),
+            version: OPSET,
+        }],
+        metadata_props: properties.collect(),
+    };
+    folder.write(&format!("{}.onnx", contents.noun), model.encode_to_vec())
 }
 
-/// Returns the usage section of the README.
-pub(super) fn call(call: &Call<'_>) -> String {
-    let portable = call.portable;
-    let (takes_row, channels, outputs) = (portable.takes_row(), portable.channels, portable.outputs);
-    let meaning = &portable.meaning;
-    let (input, output) = (meaning.readings(), meaning.outputs());
-    let kind = if call.precision == BundlePrecision::Single {
-        "float32"
-    } else {
-        "float64"
+/// A graph in progress.
+struct Printer<'a> {
+    contents: &'a Contents,
+    builder: GraphBuilder,
+    /// Conditions under which there is an answer, batch × 1 each.
+    valid: Vec<String>,
+    /// Values of nodes in the precision of other nodes.
+    casts: HashMap<(usize, Precision), String>,
+    next_state: Option<String>,
+}
+
+impl Printer<'_> {
+    fn graph(contents: &Contents) -> Graph {
+        let mut printer = Printer {
+            contents,
+            builder: GraphBuilder::default(),
+            valid: Vec::new(),
+            casts: HashMap::new(),
+            next_state: None,
+        };
+        printer.check_row();
+        for (id, tables) in contents.constants() {
+            let shape = contents.full_shape(id, tables.len());
+            let values = tables.iter().flat_map(|table| table.iter().copied());
+            let precision = contents.precision_of(id);
+            if tables.len() > 1 {
+                let all =
+                    printer
+                        .builder
+                        .numbers(&format!("{}_of_rows", contents.name_of(id)), precision, &shape, values);
+                printer
+                    .builder
+                    .named("Gather", &[&all, "row_index"], &[("axis", 0)], contents.name_of(id));
+            } else {
+                printer.builder.numbers(contents.name_of(id), precision, &shape, values);
+            }
+        }
+        for (id, operation) in contents.computed() {
+            printer.add(id, operation);
+        }
+        printer.finish()
+    }
+
+    /// Adds the check of the row and its index.
+    fn check_row(&mut self) {
+        if !self.contents.takes_row() {
+            return;
+        }
+        let builder = &mut self.builder;
+        let (first, last) = (
+            builder.whole(&[], &[1]),
+            builder.whole(&[], &[self.contents.rows as i64]),
+        );
+        let not_below = builder.op("GreaterOrEqual", &["row", &first]);
+        let not_above = builder.op("LessOrEqual", &["row", &last]);
+        let is_row = builder.op("And", &[&not_below, &not_above]);
+        let row = builder.op("Where", &[&is_row, "row", &first]);
+        builder.named("Sub", &[&row, &first], &[], "row_index");
+        let axis = builder.whole(&[1], &[1]);
+        self.valid.push(builder.op("Unsqueeze", &[&is_row, &axis]));
+    }
+
+    /// Name of a value; the outputs have their own, as they are NaN where there is no answer.
+    fn name(&self, id: NodeId) -> String {
+        let name = self.contents.name_of(id);
+        let exported = &self.contents.exported;
+        match id == exported.targets || Some(id) == exported.half_widths {
+            true => format!("{name}_computed"),
+            false => name.to_owned(),
+        }
+    }
+
+    /// The value of a node in this precision.
+    fn value(&mut self, id: NodeId, precision: Precision) -> String {
+        let name = self.name(id);
+        if self.contents.precision_of(id) == precision {
+            return name;
+        }
+        let Self { casts, builder, .. } = self;
+        let cast = casts.entry((id.index(), precision));
+        cast.or_insert_with(|| builder.cast(&name, precision)).clone()
+    }
+
+    fn add(&mut self, id: NodeId, operation: &Operation) {
+        let contents = self.contents;
+        let (name, precision) = (self.name(id), contents.precision_of(id));
+        let operands = Vec::from_iter(
+            operation
+                .operands()
+                .into_iter()
+                .map(|operand| self.value(operand, precision)),
+        );
+        let operands = Vec::from_iter(operands.iter().map(String::as_str));
+        let builder = &mut self.builder;
+        match operation {
+            Operation::Valid { of, domain } => {
+                let x = contents.name_of(*of);
+                let precision = contents.precision_of(*of);
+                let infinity = builder.scalar(precision, f64::INFINITY);
+                let size = builder.op("Abs", &[x]);
+                let mut is_valid = builder.op("Less", &[&size, &infinity]);
+                if *domain == Domain::Positive {
+                    let zero = builder.scalar(precision, 0.0);
+                    let is_positive = builder.op("Greater", &[x, &zero]);
+                    is_valid = builder.op("And", &[&is_valid, &is_positive]);
+                }
+                let is_invalid = builder.op("Not", &[&is_valid]);
+                let invalid = builder.count(&is_invalid, true);
+                let none = builder.whole(&[], &[0]);
+                self.valid.push(builder.op("Equal", &[&invalid, &none]));
+            }
+            Operation::Subtract(..) => drop(builder.named("Sub", &operands, &[], &name)),
+            Operation::Divide(..) => drop(builder.named("Div", &operands, &[], &name)),
+            Operation::Map(function, _) => self.map(*function, operands[0], precision, &name),
+            Operation::Affine { weights, .. } => {
+                let product = if contents.is_of_row(*weights) {
+                    let axis = builder.whole(&[1], &[1]);
+                    let line = builder.op("Unsqueeze", &[operands[0], &axis]);
+                    let product = builder.op("MatMul", &[&line, operands[1]]);
+                    builder.op("Squeeze", &[&product, &axis])
+                } else {
+                    builder.op("MatMul", &operands[..2])
+                };
+                builder.named("Add", &[&product, operands[2]], &[], &name);
+            }
+            Operation::SquaredDistances { .. } => {
+                let axis = builder.whole(&[1], &[2]);
+                let values = builder.op("Unsqueeze", &[operands[0], &axis]);
+                let apart = builder.op("Sub", &[&values, operands[1]]);
+                let squares = builder.op("Mul", &[&apart, &apart]);
+                let axes = builder.whole(&[1], &[1]);
+                builder.named("ReduceSum", &[&squares, &axes], &[("keepdims", 0)], &name);
+            }
+            Operation::Clip { .. } => {
+                let above = builder.op("Max", &[operands[0], operands[1]]);
+                builder.named("Min", &[&above, operands[2]], &[], &name);
+            }
+            Operation::Concatenate(_) => drop(builder.named("Concat", &operands, &[("axis", 1)], &name)),
+            Operation::History { .. } => self.add_history(operands[0], &name),
+            Operation::CountOutside { .. } => {
+                let below = builder.op("Less", &operands[..2]);
+                let above = builder.op("Greater", &[operands[0], operands[2]]);
+                let is_outside = builder.op("Or", &[&below, &above]);
+                let ones = builder.with("Cast", &[&is_outside], &[("to", i64::from(INT64))]);
+                let axes = builder.whole(&[1], &[1]);
+                builder.named("ReduceSum", &[&ones, &axes], &[("keepdims", 0)], "readings_outside");
+            }
+            Operation::Readings | Operation::Select { .. } | Operation::Blend { .. } => {
+                unreachable!("given, or not exported")
+            }
+        }
+    }
+
+    fn map(&mut self, function: Function, x: &str, precision: Precision, name: &str) {
+        let builder = &mut self.builder;
+        match function {
+            Function::Tanh => drop(builder.named("Tanh", &[x], &[], name)),
+            Function::Gaussian => {
+                let negative = builder.op("Neg", &[x]);
+                builder.named("Exp", &[&negative], &[], name);
+            }
+            Function::Log1p => {
+                // With u = 1 + x rounded, ln u · x/(u − 1), and x where u is 1 (W. Kahan): the digits that x loses in u cancel.
+                let one = builder.scalar(precision, 1.0);
+                let u = builder.op("Add", &[x, &one]);
+                let rounded = builder.op("Sub", &[&u, &one]);
+                let zero = builder.scalar(precision, 0.0);
+                let is_lost = builder.op("Equal", &[&rounded, &zero]);
+                let divisor = builder.op("Where", &[&is_lost, &one, &rounded]);
+                let log = builder.op("Log", &[&u]);
+                let scaled = builder.op("Mul", &[&log, x]);
+                let quotient = builder.op("Div", &[&scaled, &divisor]);
+                builder.named("Where", &[&is_lost, x, &quotient], &[], name);
+            }
+        }
+    }
+
+    /// Adds the outputs, NaN where there is no answer.
+    fn finish(mut self) -> Graph {
+        let contents = self.contents;
+        let exported = &contents.exported;
+        let meaning = &contents.meaning;
+        let batch = if contents.history().is_some() { Some(1) } else { None };
+        let is_valid = self
+            .valid
+            .iter()
+            .cloned()
+            .reduce(|all, one| self.builder.op("And", &[&all, &one]));
+        let is_valid = is_valid.expect("every decoder checks its readings");
+        let precision = contents.outer_precision();
+        let kind = element_type(precision);
+        let mut outputs = Vec::new();
+        for (id, output) in [
+            (Some(exported.targets), meaning.outputs()),
+            (exported.half_widths, "half_widths"),
+        ] {
+            let Some(id) = id else { continue };
+            let computed = self.value(id, precision);
+            let nan = self.builder.scalar(precision, f64::NAN);
+            self.builder.named("Where", &[&is_valid, &computed, &nan], &[], output);
+            let about = match output {
+                "half_widths" => {
+                    "Half-widths of the 90 % prediction intervals, valid for all answers together".to_owned()
+                }
+                _ => channel_names(
+                    meaning.either("Coordinates in mm", "Targets"),
+                    &meaning.targets(),
+                    meaning.is_array(),
+                ),
+            };
+            outputs.push(value(output, kind, &[batch, Some(contents.outputs())], about));
+        }
+        if exported.outside.is_some() {
+            let about = contents.outside_in_words().to_owned();
+            outputs.push(value("readings_outside", INT64, &[batch], about));
+        }
+        let about = channel_names(
+            meaning.either("Readings in ohm", "Readings"),
+            &meaning.inputs(contents.channels()),
+            meaning.is_array(),
+        );
+        let mut inputs = vec![value(
+            meaning.readings(),
+            kind,
+            &[batch, Some(contents.channels())],
+            about,
+        )];
+        if contents.takes_row() {
+            let about = format!("Row of each reading, from 1 to {}", contents.rows);
+            inputs.push(value("row", INT64, &[batch], about));
+        }
+        if let Some(next) = self.next_state.take() {
+            let double = element_type(Precision::Double);
+            let shape = self.state_shape();
+            self.builder
+                .named("Where", &[&is_valid, &next, "state"], &[], "next_state");
+            let of_state = "State of a series: zeros at the start, then next_state of the reading before";
+            inputs.push(value(
+                "time_s",
+                double,
+                &[Some(1), Some(1)],
+                "Time in seconds, NaN if it is not known".to_owned(),
+            ));
+            inputs.push(value("state", double, &shape, of_state.to_owned()));
+            outputs.push(value(
+                "next_state",
+                double,
+                &shape,
+                "State after this reading".to_owned(),
+            ));
+        }
+        Graph {
+            name: "decoupler".to_owned(),
+            input: inputs,
+            output: outputs,
+            ..self.builder.graph
+        }
+    }
+}
+
+/// A list of channels, with units for own data.
+fn channel_names(what: &str, channels: &[Channel], is_array: bool) -> String {
+    let name = |channel: &Channel| {
+        if is_array {
+            channel.name.clone()
+        } else {
+            comment(&channel.title())
+        }
     };
-    let row = if takes_row {
+    format!("{what}: {}", Vec::from_iter(channels.iter().map(name)).join(", "))
+}
+
+/// Lines of a program that decodes.
+pub(super) fn usage(contents: &Contents) -> String {
+    let (input, output) = (contents.meaning.readings(), contents.meaning.outputs());
+    let kind = match contents.outer_precision() {
+        Precision::Single => "float32",
+        Precision::Double => "float64",
+    };
+    let row = if contents.takes_row() {
         ", \"row\": np.array([1], np.int64)"
     } else {
         ""
     };
+    let loaded = format!(
+        "    import numpy as np\n    import onnxruntime\n    session = onnxruntime.InferenceSession(\"{}.onnx\")\n",
+        contents.noun
+    );
+    if contents.history().is_some() {
+        let [rows, columns] = history::state_shape(contents).map(|size| size.unwrap_or(1));
+        return format!(
+            "{loaded}    state = np.zeros(({rows}, {columns}))\n    \
+             {output}, state = session.run([\"{output}\", \"next_state\"],\n        \
+             {{\"{input}\": readings.astype(np.{kind}), \"time_s\": np.array([[time_s]]), \"state\": state{row}}})\n\n\
+             takes one sample at a time. Invalid readings give NaN, and the state stays.\n"
+        );
+    }
+    let first = usize::from(contents.takes_row());
     format!(
-        "    import numpy as np\n    import onnxruntime\n    \
-         session = onnxruntime.InferenceSession(\"{noun}.onnx\")\n    \
-         readings = np.loadtxt(\"golden.csv\", delimiter=\",\", skiprows=1, ndmin=2)[:1, {first}:{end}]\n    \
-         inputs = {{\"{input}\": readings.astype(np.{kind}){row}}}\n    \
-         {output} = session.run([\"{output}\"], inputs)[0]\n\n\
-         {input} is batch x {channels}, {output} batch x {outputs}; where a reading is not a finite \
-         number{above}{row_text},\nthe {one}s are NaN. A second output, readings_outside, counts the readings \
-         of each line beyond the range\nseen in training.",
-        above = if portable.quantity == Quantity::Raw {
-            ""
-        } else {
-            " above 0"
-        },
-        one = meaning.output(),
-        noun = portable.decoder,
-        first = usize::from(takes_row),
-        end = channels + usize::from(takes_row),
-        row_text = if takes_row { ", or the row does not exist" } else { "" },
+        "{loaded}    readings = np.loadtxt(\"golden.csv\", delimiter=\",\", skiprows=1, ndmin=2)[:1, {first}:{}]\n    \
+         {output} = session.run([\"{output}\"], {{\"{input}\": readings.astype(np.{kind}){row}}})[0]\n\n\
+         Invalid readings and rows give NaN.\n",
+        first + contents.channels(),
     )
+}
+
+/// Values of a constant of a graph that was written, which has its own name or that of all row-wires.
+#[cfg(test)]
+pub(super) fn initializer(bytes: &[u8], name: &str) -> Vec<f64> {
+    let graph = Model::decode(bytes).unwrap().graph.unwrap();
+    let of_rows = format!("{name}_of_rows");
+    let tensor = graph
+        .initializer
+        .iter()
+        .find(|tensor| tensor.name == name || tensor.name == of_rows);
+    let tensor = tensor.unwrap_or_else(|| panic!("no {name}"));
+    let bytes = &tensor.raw_data;
+    match tensor.data_type == schema::DOUBLE {
+        true => bytes
+            .as_chunks()
+            .0
+            .iter()
+            .map(|bytes| f64::from_le_bytes(*bytes))
+            .collect(),
+        false => bytes
+            .as_chunks()
+            .0
+            .iter()
+            .map(|bytes| f64::from(f32::from_le_bytes(*bytes)))
+            .collect(),
+    }
 }

@@ -1,0 +1,220 @@
+//! What a bundle contains, whatever its format.
+
+use decoupler_core::{
+    dataset::{GAP, MemoryConstants, Span},
+    decoupling::{NodeId, Operation, Precision},
+};
+
+use super::{
+    BundlePrecision,
+    exported_program::{ExportedProgram, table},
+    golden::Golden,
+    meaning::{Meaning, comment, wrapped},
+};
+use crate::export::format_number;
+
+/// Everything that the printers of the formats need.
+pub(super) struct Contents {
+    /// Prefix of the names of functions and files.
+    pub(super) name: String,
+    /// Word for the decoder in sentences, and the name of its files: network or decoder.
+    pub(super) noun: &'static str,
+    pub(super) meaning: Meaning,
+    pub(super) precision: BundlePrecision,
+    pub(super) exported: ExportedProgram,
+    /// A name for each node.
+    pub(super) names: Vec<String>,
+    /// Number of row-wires that are distinguished; 1 if the row is not an argument.
+    pub(super) rows: usize,
+    /// Range to which deviations of each target are relative: the widest of any in training for the coordinates of an array,
+    /// and its own for a target of own data, as units differ.
+    pub(super) scales: Vec<f64>,
+    pub(super) golden: Golden,
+    /// Facts as JSON for users and programs that have only the bundle.
+    pub(super) metadata: serde_json::Map<String, serde_json::Value>,
+    /// Remarks for the user, with cause and cure.
+    pub(super) notes: Vec<String>,
+}
+
+/// The past that a program takes, with its numbers.
+pub(super) struct PrintedHistory {
+    pub(super) constants: MemoryConstants,
+    /// Pause in seconds after which it restarts, if the usual interval is known.
+    pub(super) pause_s: f64,
+}
+
+impl PrintedHistory {
+    /// Rates of the averages: per second, and per reading; one of the two is 0.
+    pub(super) fn rates(&self) -> (Vec<f64>, Vec<f64>) {
+        let rates = self.constants.averages.iter().map(|average| match average {
+            Span::Seconds(seconds) => (1.0 / seconds, 0.0),
+            Span::Samples(samples) => (0.0, 1.0 / samples),
+        });
+        rates.unzip()
+    }
+}
+
+impl Contents {
+    pub(super) fn name_of(&self, id: NodeId) -> &str {
+        &self.names[id.index()]
+    }
+
+    /// Nodes that are computed, in order.
+    pub(super) fn computed(&self) -> impl Iterator<Item = (NodeId, &Operation)> {
+        let nodes = self.exported.program.nodes().iter().enumerate();
+        // The last node joins the outputs, which have names of their own.
+        let last = self.exported.program.nodes().len() - 1;
+        nodes
+            .filter(move |(index, node)| {
+                let is_given = matches!(node.operation, Operation::Readings | Operation::Select { .. });
+                !is_given && *index != last
+            })
+            .map(|(index, node)| (NodeId::at(index), &node.operation))
+    }
+
+    /// Constants with their names, one table for all row-wires or one for each: inputs × outputs or 1 × size.
+    pub(super) fn constants(&self) -> impl Iterator<Item = (NodeId, &[ndarray::Array2<f64>])> {
+        let nodes = self.exported.program.nodes().iter().enumerate();
+        nodes.filter_map(|(index, node)| match &node.operation {
+            Operation::Select { tables, .. } => Some((NodeId::at(index), &tables[..])),
+            _ => None,
+        })
+    }
+
+    /// `true` if the constants differ between row-wires.
+    pub(super) fn is_of_row(&self, id: NodeId) -> bool {
+        matches!(&self.exported.program.node(id).operation, Operation::Select { tables, .. } if tables.len() > 1)
+    }
+
+    /// Shape of the constants of one row-wire.
+    pub(super) fn shape(&self, id: NodeId) -> (usize, usize) {
+        table(self.exported.program.nodes(), id, 0).dim()
+    }
+
+    /// `true` for weights and points, which are matrices; other constants are vectors.
+    pub(super) fn is_matrix(&self, id: NodeId) -> bool {
+        let mut operations = self.exported.program.nodes().iter().map(|node| &node.operation);
+        operations.any(|operation| match operation {
+            Operation::Affine { weights: matrix, .. } | Operation::SquaredDistances { points: matrix, .. } => {
+                *matrix == id
+            }
+            _ => false,
+        })
+    }
+
+    /// Names of the parts of an answer.
+    pub(super) fn parts(&self) -> Vec<&str> {
+        let exported = &self.exported;
+        let all = [Some(exported.targets), exported.half_widths, exported.outside];
+        all.into_iter().flatten().map(|id| self.name_of(id)).collect()
+    }
+
+    /// Shape of a constant in a file: of each row-wire, if they differ, and as a matrix or vector.
+    pub(super) fn full_shape(&self, id: NodeId, tables: usize) -> Vec<usize> {
+        let (rows, columns) = self.shape(id);
+        let mut shape = if self.is_matrix(id) {
+            vec![rows, columns]
+        } else {
+            vec![columns]
+        };
+        if tables > 1 {
+            shape.insert(0, tables);
+        }
+        shape
+    }
+
+    /// The notes as lines for a comment of any language.
+    pub(super) fn note_lines(&self) -> impl Iterator<Item = String> {
+        self.notes
+            .iter()
+            .flat_map(|note| wrapped(&comment(&format!("Note: {note}."))))
+    }
+
+    pub(super) fn size(&self, id: NodeId) -> usize {
+        self.exported.program.node(id).size
+    }
+
+    pub(super) fn precision_of(&self, id: NodeId) -> Precision {
+        self.exported.program.node(id).precision
+    }
+
+    /// Precision of readings and targets.
+    pub(super) fn outer_precision(&self) -> Precision {
+        match self.precision {
+            BundlePrecision::Single => Precision::Single,
+            BundlePrecision::Double | BundlePrecision::Fixed16 => Precision::Double,
+        }
+    }
+
+    pub(super) fn channels(&self) -> usize {
+        self.exported.program.channels()
+    }
+
+    pub(super) fn outputs(&self) -> usize {
+        self.exported.outputs()
+    }
+
+    /// `true` if there is a decoder for each known row, which makes the row an argument.
+    pub(super) fn takes_row(&self) -> bool {
+        self.rows > 1
+    }
+
+    /// The history, if the program has one.
+    pub(super) fn history(&self) -> Option<PrintedHistory> {
+        let mut nodes = self.exported.program.nodes().iter();
+        nodes.find_map(|node| match &node.operation {
+            Operation::History { of, memory } => {
+                let constants = MemoryConstants::of(memory, self.size(*of));
+                Some(PrintedHistory {
+                    constants: constants.expect("checked when the program was built"),
+                    pause_s: memory.interval_s.map_or(f64::INFINITY, |usual_s| GAP * usual_s),
+                })
+            }
+            _ => None,
+        })
+    }
+
+    /// A deviation relative to [`Self::scales`], in mm for an array, and in per cent of the range of a target of own data.
+    pub(super) fn in_words(&self, relative: f64) -> String {
+        match self.meaning.is_array() {
+            true => format!("{} mm", format_number(relative * self.scales[0])),
+            false => format!("{} % of its range in training", format_number(100.0 * relative)),
+        }
+    }
+
+    /// The further parts of an answer, in words.
+    pub(super) fn parts_in_words(&self) -> &'static str {
+        match (self.exported.half_widths.is_some(), self.exported.outside.is_some()) {
+            (true, true) => {
+                ", the half-widths of their 90 % prediction intervals, and the number of readings out of range"
+            }
+            (true, false) => ", and the half-widths of their 90 % prediction intervals",
+            (false, true) => ", and the number of readings out of range",
+            (false, false) => "",
+        }
+    }
+
+    /// What `readings_outside` counts.
+    pub(super) fn outside_in_words(&self) -> &'static str {
+        if self.history().is_some() {
+            "Number of features (readings and values of their past) beyond the range seen in training by more than a tenth of it"
+        } else {
+            "Number of readings beyond the range seen in training by more than a tenth of it"
+        }
+    }
+
+    /// How the caller keeps the state of a history.
+    pub(super) fn state_in_words(&self) -> Option<String> {
+        let history = self.history()?;
+        let pause = match history.pause_s {
+            f64::INFINITY => String::new(),
+            pause_s => format!(", and after a pause of more than {pause_s} s (50 usual intervals)"),
+        };
+        Some(format!(
+            "Keep one state for each series of readings that continue each other: for each sensor, group and row-wire. It \
+             restarts by itself where the time steps back{pause}. Where the time is not known, give NaN: the reading then comes \
+             {} s after the one before, as usual.",
+            history.constants.interval_s
+        ))
+    }
+}

@@ -1,0 +1,361 @@
+//! The program that is printed.
+
+use decoupler_core::{
+    decoupling::{Domain, Node, NodeId, Operation, Precision, Program},
+    evaluation::HalfWidth,
+    network::Quantity,
+};
+use ndarray::Array2;
+
+/// The program of a decoder with everything that a bundle answers: the targets, the half-widths of their intervals, and the
+/// number of readings outside of the range of training. The output of the program are these, one after the other.
+#[derive(Clone, Debug)]
+pub(super) struct ExportedProgram {
+    pub(super) program: Program,
+    pub(super) targets: NodeId,
+    /// Half-widths of the 90 % prediction intervals.
+    pub(super) half_widths: Option<NodeId>,
+    /// Number of readings, or of features of their past, beyond the range of training.
+    pub(super) outside: Option<NodeId>,
+}
+
+/// Limits of each reading or feature, beyond which it counts as outside: for all row-wires or for each.
+pub(super) type Limits = Vec<Vec<(f64, f64)>>;
+
+impl ExportedProgram {
+    /// Extends the program of a decoder; its successive affine maps are joined.
+    pub(super) fn of(program: &Program, half_widths: &[HalfWidth], limits: Option<&Limits>) -> Self {
+        let mut nodes = program.nodes().to_vec();
+        let targets = program.output();
+        join_affine_maps(&mut nodes, targets);
+        let of_widths = (!half_widths.is_empty()).then(|| push_half_widths(&mut nodes, targets, half_widths));
+        let outside = limits.map(|limits| push_outside(&mut nodes, limits));
+        let parts = Vec::from_iter([Some(targets), of_widths, outside].into_iter().flatten());
+        let size = parts.iter().map(|part| nodes[part.index()].size).sum();
+        let output = push(&mut nodes, Operation::Concatenate(parts), size);
+        let (program, moved) = compact(&nodes, output);
+        Self {
+            program,
+            targets: moved[targets.index()],
+            half_widths: of_widths.map(|node| moved[node.index()]),
+            outside: outside.map(|node| moved[node.index()]),
+        }
+    }
+
+    /// The same program in single precision, but for the nodes up to the layer number `wide`, the state of a history and the
+    /// comparison with limits.
+    pub(super) fn in_single(&self, wide: usize) -> Self {
+        let first = match wide {
+            0 => 0,
+            _ => self.layers()[wide - 1] + 1,
+        };
+        let mut nodes = self.program.nodes().to_vec();
+        for index in (0..nodes.len()).rev() {
+            let is_double = match nodes[index].operation {
+                Operation::History { .. } | Operation::CountOutside { .. } => true,
+                // Those of tables follow from the nodes that take them.
+                Operation::Select { .. } => continue,
+                Operation::Readings | Operation::Valid { .. } => false,
+                _ => index < first,
+            };
+            let precision = if is_double {
+                Precision::Double
+            } else {
+                Precision::Single
+            };
+            nodes[index].precision = precision;
+            for operand in nodes[index].operation.operands() {
+                let operand = &mut nodes[operand.index()];
+                if let Operation::Select { .. } = operand.operation {
+                    operand.precision = precision;
+                }
+            }
+        }
+        // A checked value has the precision of the value.
+        for index in 0..nodes.len() {
+            if let Operation::Valid { of, .. } = nodes[index].operation {
+                nodes[index].precision = nodes[of.index()].precision;
+            }
+        }
+        Self {
+            program: Program::new(nodes, self.program.output()),
+            ..self.clone()
+        }
+    }
+
+    /// The program with constants that are larger or smaller by this relative error, in a fixed pattern.
+    pub(super) fn disturbed(&self, error: f64) -> Program {
+        let mut nodes = self.program.nodes().to_vec();
+        // A linear congruential generator (Knuth, The Art of Computer Programming, volume 2, section 3.3.4).
+        let mut state = 1_u64;
+        let values = nodes.iter_mut().flat_map(|node| match &mut node.operation {
+            Operation::Select { tables, .. } => &mut tables[..],
+            _ => &mut [],
+        });
+        for value in values.flatten() {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            *value *= 1.0 + if state >> 63 == 0 { error } else { -error };
+        }
+        Program::new(nodes, self.program.output())
+    }
+
+    /// Indices of the nodes with sums of products.
+    pub(super) fn layers(&self) -> Vec<usize> {
+        let is_layer = |node: &Node| {
+            matches!(
+                node.operation,
+                Operation::Affine { .. } | Operation::SquaredDistances { .. }
+            )
+        };
+        let nodes = self.program.nodes().iter().enumerate();
+        nodes
+            .filter(|(_, node)| is_layer(node))
+            .map(|(index, _)| index)
+            .collect()
+    }
+
+    /// Number of targets.
+    pub(super) fn outputs(&self) -> usize {
+        self.program.node(self.targets).size
+    }
+
+    /// `true` if a reading must be above 0.
+    pub(super) fn are_positive(&self) -> bool {
+        let mut nodes = self.program.nodes().iter();
+        nodes.any(|node| {
+            matches!(
+                node.operation,
+                Operation::Valid {
+                    domain: Domain::Positive,
+                    ..
+                }
+            )
+        })
+    }
+
+    /// Quantity by whose rule limits are set.
+    pub(super) fn quantity_of(program: &Program) -> Quantity {
+        let is_positive = |node: &Node| {
+            matches!(
+                node.operation,
+                Operation::Valid {
+                    domain: Domain::Positive,
+                    ..
+                }
+            )
+        };
+        match program.nodes().iter().any(is_positive) {
+            true => Quantity::Resistance,
+            false => Quantity::Raw,
+        }
+    }
+}
+
+fn push(nodes: &mut Vec<Node>, operation: Operation, size: usize) -> NodeId {
+    nodes.push(Node {
+        operation,
+        size,
+        precision: Precision::Double,
+    });
+    NodeId::at(nodes.len() - 1)
+}
+
+fn push_tables(nodes: &mut Vec<Node>, tables: Vec<Array2<f64>>) -> NodeId {
+    let size = tables[0].len();
+    push(nodes, Operation::Select { tables, padding: 0.0 }, size)
+}
+
+fn row(values: Vec<f64>) -> Array2<f64> {
+    Array2::from_shape_vec((1, values.len()), values).expect("a row of values")
+}
+
+/// The constants of node `id`, of row-wire `row`.
+pub(super) fn table(nodes: &[Node], id: NodeId, row: usize) -> &Array2<f64> {
+    match &nodes[id.index()].operation {
+        Operation::Select { tables, .. } => &tables[row.min(tables.len() - 1)],
+        _ => panic!("the tables of an operation are constants"),
+    }
+}
+
+fn tables_of(nodes: &[Node], id: NodeId) -> usize {
+    match &nodes[id.index()].operation {
+        Operation::Select { tables, .. } => tables.len(),
+        _ => 1,
+    }
+}
+
+/// Joins affine maps of affine maps: the constants that restore the units of targets need no layer of their own.
+fn join_affine_maps(nodes: &mut [Node], output: NodeId) {
+    for index in 0..nodes.len() {
+        let Operation::Affine { of, weights, biases } = nodes[index].operation else {
+            continue;
+        };
+        let Operation::Affine {
+            of: first,
+            weights: first_weights,
+            biases: first_biases,
+        } = nodes[of.index()].operation
+        else {
+            continue;
+        };
+        let operands = nodes.iter().flat_map(|node| node.operation.operands());
+        if of == output || operands.filter(|&operand| operand == of).count() > 1 {
+            continue;
+        }
+        let all = [weights, biases, first_weights, first_biases];
+        let rows = all.map(|id| tables_of(nodes, id)).into_iter().max().unwrap_or(1);
+        let (mut joined_weights, mut joined_biases) = (Vec::new(), Vec::new());
+        for row in 0..rows {
+            let [weights, biases, first_weights, first_biases] = all.map(|id| table(nodes, id, row));
+            joined_weights.push(first_weights.dot(weights));
+            joined_biases.push(first_biases.dot(weights) + biases);
+        }
+        for (id, tables) in [(weights, joined_weights), (biases, joined_biases)] {
+            nodes[id.index()].size = tables[0].len();
+            nodes[id.index()].operation = Operation::Select { tables, padding: 0.0 };
+        }
+        nodes[index].operation = Operation::Affine {
+            of: first,
+            weights,
+            biases,
+        };
+    }
+}
+
+/// Adds half-widths that are constant, or piecewise linear in the target: a constant and, for each segment, a slope times
+/// the target within it.
+fn push_half_widths(nodes: &mut Vec<Node>, targets: NodeId, half_widths: &[HalfWidth]) -> NodeId {
+    let count = half_widths.len();
+    let segments = half_widths.iter().map(|of| of.by_answer.len().saturating_sub(1)).max();
+    let segments = segments.unwrap_or(0).max(1);
+    let mut weights = Array2::zeros((segments * count, count));
+    let mut biases = vec![0.0; count];
+    let (mut low, mut high) = (vec![vec![0.0; count]; segments], vec![vec![0.0; count]; segments]);
+    for (target, of) in half_widths.iter().enumerate() {
+        biases[target] = of.by_answer.first().map_or(of.constant, |point| point[1]);
+        for (segment, pair) in of.by_answer.windows(2).enumerate() {
+            let ([x0, y0], [x1, y1]) = (pair[0], pair[1]);
+            let slope = (y1 - y0) / (x1 - x0);
+            (low[segment][target], high[segment][target]) = (x0, x1);
+            weights[[segment * count + target, target]] = slope;
+            biases[target] -= slope * x0;
+        }
+    }
+    let clipped = low.into_iter().zip(high).map(|(low, high)| {
+        let [low, high] = [low, high].map(|values| push_tables(nodes, vec![row(values)]));
+        push(nodes, Operation::Clip { of: targets, low, high }, count)
+    });
+    let clipped = Vec::from_iter(clipped);
+    let of = push(nodes, Operation::Concatenate(clipped), segments * count);
+    let weights = push_tables(nodes, vec![weights]);
+    let biases = push_tables(nodes, vec![row(biases)]);
+    push(nodes, Operation::Affine { of, weights, biases }, count)
+}
+
+/// Adds the number of readings, or features of a history, outside of `limits`.
+fn push_outside(nodes: &mut Vec<Node>, limits: &Limits) -> NodeId {
+    let first = |is: fn(&Operation) -> bool| nodes.iter().position(|node| is(&node.operation));
+    let of = first(|operation| matches!(operation, Operation::History { .. }))
+        .or_else(|| first(|operation| matches!(operation, Operation::Valid { .. })))
+        .expect("every decoder checks its readings");
+    let side = |pick: fn(&(f64, f64)) -> f64| {
+        let of_rows = limits.iter().map(|of_row| row(of_row.iter().map(pick).collect()));
+        Vec::from_iter(of_rows)
+    };
+    let low = push_tables(nodes, side(|limits| limits.0));
+    let high = push_tables(nodes, side(|limits| limits.1));
+    let of = NodeId::at(of);
+    push(nodes, Operation::CountOutside { of, low, high }, 1)
+}
+
+/// The program of the nodes that the output needs, and the new place of each.
+fn compact(nodes: &[Node], output: NodeId) -> (Program, Vec<NodeId>) {
+    let mut is_needed = vec![false; nodes.len()];
+    (is_needed[0], is_needed[output.index()]) = (true, true);
+    for index in (0..nodes.len()).rev() {
+        if is_needed[index] {
+            for operand in nodes[index].operation.operands() {
+                is_needed[operand.index()] = true;
+            }
+        }
+    }
+    let (mut kept, mut moved) = (Vec::new(), Vec::new());
+    for (node, is_needed) in nodes.iter().zip(is_needed) {
+        moved.push(NodeId::at(kept.len()));
+        if is_needed {
+            kept.push(Node {
+                operation: node.operation.with_operands(|id| moved[id.index()]),
+                ..node.clone()
+            });
+        }
+    }
+    (Program::new(kept, moved[output.index()]), moved)
+}
+
+#[cfg(test)]
+mod tests {
+    use decoupler_core::decoupling::{Builder, Decoder, ProgramDecoder};
+
+    use super::*;
+
+    fn answers(program: &Program, readings: &[f64]) -> Vec<f64> {
+        let mut decoder = ProgramDecoder::new(program.clone());
+        let mut answers = vec![0.0; decoder.outputs()];
+        decoder.decode_row(0, readings, &mut answers).unwrap();
+        answers
+    }
+
+    /// Targets 2a + 3b + 1 and −a; half-widths by hand: constant 0.5, and 1 at −1, 3 at 1, 2 at 2.
+    #[test]
+    fn joined_maps_half_widths_and_counts_answer_as_the_definitions_say() {
+        let mut builder = Builder::new(2);
+        let valid = builder.valid(builder.readings(), Domain::Finite);
+        let double = Precision::Double;
+        let weights = Array2::from_shape_vec((2, 2), vec![1.0, 0.5, 2.0, 0.0]).unwrap();
+        let first = builder.affine(valid, weights, &[0.25, 0.0], double);
+        let weights = Array2::from_shape_vec((2, 2), vec![1.5, 0.0, 1.0, -2.0]).unwrap();
+        let second = builder.affine(first, weights, &[0.625, 0.0], double);
+        let program = builder.finish(second);
+        let half_width = |by_answer: Vec<[f64; 2]>| HalfWidth {
+            constant: 0.5,
+            by_answer,
+            samples: 100,
+            effective_samples: 100.0,
+        };
+        let widths = [
+            half_width(vec![]),
+            half_width(vec![[-1.0, 1.0], [1.0, 3.0], [2.0, 2.0]]),
+        ];
+        let limits = vec![vec![(-2.0, 2.0), (0.0, 1.0)]];
+        let exported = ExportedProgram::of(&program, &widths, Some(&limits));
+        assert_eq!(
+            exported.layers().len(),
+            2,
+            "one for the targets, one for the half-widths"
+        );
+        for (readings, width, outside) in [
+            ([0.0, 0.0], 2.0, 0.0),
+            ([3.0, 0.0], 1.0, 1.0),
+            ([-1.5, 2.0], 2.5, 1.0),
+            ([-9.0, -1.0], 2.0, 2.0),
+        ] {
+            let [a, b] = readings;
+            let expected = [2.0 * a + 3.0 * b + 1.0, -a, 0.5, width, outside];
+            for program in [
+                &exported.program,
+                &exported.in_single(0).program,
+                &exported.in_single(1).program,
+            ] {
+                for (found, expected) in answers(program, &readings).iter().zip(expected) {
+                    assert!((found - expected).abs() < 1e-6, "{readings:?}: {found} {expected}");
+                }
+            }
+            assert_eq!(
+                answers(&program, &readings)[..2],
+                answers(&exported.program, &readings)[..2]
+            );
+        }
+    }
+}

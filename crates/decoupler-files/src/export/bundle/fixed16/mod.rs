@@ -1,0 +1,358 @@
+//! Programs in fixed point: 16-bit weights and activations, 64-bit sums; readings and targets are 32-bit numbers of small
+//! units. For affine maps and hyperbolic tangents of the changes of the readings, such as networks and ridge.
+//!
+//! Every number has a range that holds for all readings, because each step begins with a saturation; sums therefore
+//! cannot overflow. The bound on the error is computed by interval analysis over the range of readings in training and
+//! a tenth of it on either side.
+
+mod scaled;
+mod units;
+
+use decoupler_core::{
+    dataset::PerRow,
+    decoupling::{Domain, Function, NodeId, Operation},
+};
+use ndarray::Array2;
+use thiserror::Error;
+
+pub(super) use self::scaled::{CONDUCTANCE_BITS, INPUT_BITS, LARGEST_INPUT, TangentTable};
+use self::{
+    scaled::{Change, ScaledRow, whole_bias},
+    units::Units,
+};
+use super::{
+    exported_program::{ExportedProgram, Limits, table},
+    meaning::Meaning,
+};
+use crate::export::format_number;
+
+/// Reasons why a decoder cannot be exported in fixed point.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum FixedPointError {
+    /// Steps that have no form in integers.
+    #[error("fixed16 has no {0}: give --precision f64 or f32")]
+    Step(&'static str),
+    /// The file does not contain the range of the readings.
+    #[error(
+        "fixed16 needs the range of the readings in training, which the network file does not have: train again, or give --precision f32"
+    )]
+    NoRange,
+    /// Resistances that exceed 32 bits in every unit.
+    #[error(
+        "fixed16 reads resistances up to 1e9 ohm, and in training they were up to {0:.1e} ohm: give --precision f32"
+    )]
+    Reading(f64),
+    /// Weights or outputs beyond the range of the numbers.
+    #[error("fixed16 cannot hold the weights of {what}: {cure}, which keeps weights small, or give --precision f32")]
+    Range {
+        /// A way to train a network with smaller weights.
+        cure: &'static str,
+        /// Name of the value that is too large.
+        what: &'static str,
+    },
+    /// An error bound that is too large.
+    #[error(
+        "in fixed point the error is only known to be below {bound:.3} times {scale}: {cure} (the decoder amplifies differences of its readings too much), or give --precision f32"
+    )]
+    Coarse {
+        /// The bound, in proportion to the range.
+        bound: f64,
+        /// Name of the range.
+        scale: &'static str,
+        /// A way to train a network that amplifies less.
+        cure: &'static str,
+    },
+}
+
+/// Upper bound of a target in units for all inputs of the last layer.
+const LARGEST_TARGET: f64 = (1_u32 << 30) as f64;
+
+/// A program in fixed point.
+#[derive(Clone, Debug)]
+pub(super) struct FixedProgram {
+    readings: Units,
+    targets: Units,
+    /// The changes of the readings are relative ones, as of conductances.
+    pub(super) is_relative: bool,
+    pub(super) tangent: TangentTable,
+    /// The numbers of all row-wires, or of each.
+    pub(super) rows: Vec<FixedRow>,
+    /// Bound on the error of each target within the limits of the readings, including the rounding of readings to units, in
+    /// the unit of the target.
+    pub(super) bounds: Vec<f64>,
+}
+
+/// The numbers of one row-wire.
+#[derive(Clone, Debug, Default)]
+pub(super) struct FixedRow {
+    /// Reading relative to which the change of each channel is measured, factor of the change, and the shift after it.
+    pub(super) centres: Vec<i32>,
+    pub(super) factors: Vec<i32>,
+    pub(super) shifts: Vec<u8>,
+    /// A hyperbolic tangent follows each layer but the last.
+    pub(super) layers: Vec<FixedLayer>,
+    /// Limits beyond which a reading counts as outside.
+    pub(super) limits: Vec<(i32, i32)>,
+}
+
+/// Weighted sums of integers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct FixedLayer {
+    pub(super) inputs: usize,
+    /// Sums × inputs.
+    pub(super) weights: Vec<i32>,
+    pub(super) biases: Vec<i64>,
+    pub(super) shifts: Vec<u8>,
+}
+
+/// Steps from the changes of the readings to the targets.
+struct Chain {
+    /// The readings are compared with these constants.
+    reference: NodeId,
+    is_relative: bool,
+    /// Weights and biases of each layer.
+    layers: Vec<[NodeId; 2]>,
+}
+
+impl FixedProgram {
+    /// Upper limit of the error bound, relative to the range of a target, above which the user is told.
+    pub(super) const USUAL_BOUND: f64 = 0.01;
+
+    /// Rounds the numbers of a program.
+    ///
+    /// # Errors
+    /// The range of the readings is not known, a step or a number has no form in integers, or the bound on the error is as
+    /// large as the range of the targets.
+    pub(super) fn of(
+        exported: &ExportedProgram,
+        limits: Option<&Limits>,
+        meaning: &Meaning,
+        scales: &[f64],
+    ) -> Result<Self, FixedPointError> {
+        let chain = Chain::of(exported)?;
+        let limits = limits.ok_or(FixedPointError::NoRange)?;
+        let cure = meaning.smaller_weights();
+        let nodes = exported.program.nodes();
+        let rows = exported.program.rows();
+        let tables = |id: NodeId, row: usize| table(nodes, id, row);
+        let readings = Units::of_readings(meaning, limits)?;
+        let [weights, biases] = *chain.layers.last().expect("there is a layer of targets");
+        let reach = |target: usize| {
+            let of_row = |row: usize| {
+                let weights = tables(weights, row)
+                    .column(target)
+                    .iter()
+                    .map(|weight| weight.abs())
+                    .sum::<f64>();
+                // The targets of a single layer are sums of changes, whose size is that of the range.
+                let most = if chain.layers.len() > 1 {
+                    weights
+                } else {
+                    scales[target]
+                };
+                tables(biases, row)[[0, target]].abs() + most
+            };
+            (0..rows).map(of_row).fold(0.0, f64::max)
+        };
+        let targets = Units::of_targets(meaning, scales, reach);
+        let mut fixed = Self {
+            is_relative: chain.is_relative,
+            tangent: TangentTable::new(),
+            rows: Vec::new(),
+            bounds: vec![0.0; exported.outputs()],
+            readings,
+            targets,
+        };
+        for row in 0..rows {
+            let limits = PerRow::each(limits.clone());
+            let numbers = [chain.reference]
+                .into_iter()
+                .chain(chain.layers.iter().flatten().copied());
+            let tables: Vec<&Array2<f64>> = numbers.map(|id| tables(id, row)).collect();
+            let bounds = fixed.push_row(&tables, limits.at(row));
+            let bounds = bounds.map_err(|what| FixedPointError::Range { what, cure })?;
+            for (target, (bound, of_row)) in fixed.bounds.iter_mut().zip(bounds).enumerate() {
+                *bound = bound.max(of_row * fixed.targets.unit(target));
+            }
+        }
+        let bound = fixed.relative_bound(scales);
+        if bound < 1.0 {
+            return Ok(fixed);
+        }
+        let scale = meaning.scale();
+        Err(FixedPointError::Coarse { bound, scale, cure })
+    }
+
+    /// Largest bound relative to the scale of its target.
+    pub(super) fn relative_bound(&self, scales: &[f64]) -> f64 {
+        let relative = self.bounds.iter().zip(scales).map(|(bound, scale)| bound / scale);
+        relative.fold(0.0, f64::max)
+    }
+
+    /// Adds the numbers of a row-wire: its reference, then weights and biases of each layer. Returns bounds on the errors of
+    /// the targets in their units, or the name of what does not fit.
+    fn push_row(&mut self, tables: &[&Array2<f64>], limits: &[(f64, f64)]) -> Result<Vec<f64>, &'static str> {
+        let (reference, layers) = tables.split_first().expect("the reference comes first");
+        let channels = limits.iter().zip(reference.iter()).enumerate();
+        let changes = channels.map(|(channel, (&limits, &reference))| {
+            Change::of(self.is_relative, self.readings.per_one(channel), limits, reference)
+        });
+        let changes: Vec<Change> = changes.collect();
+        let mut row = FixedRow {
+            centres: changes.iter().map(|change| change.centre).collect(),
+            factors: changes.iter().map(|change| change.multiplier().factor).collect(),
+            shifts: changes.iter().map(|change| change.multiplier().shift).collect(),
+            limits: (limits.iter().enumerate())
+                .map(|(channel, &(low, high))| (self.readings.whole(channel, low), self.readings.whole(channel, high)))
+                .collect(),
+            ..FixedRow::default()
+        };
+        // Each input is a number of 15 bits after the point times a slope, plus an offset.
+        let mut slopes: Vec<f64> = changes.iter().map(Change::slope).collect();
+        let mut offsets: Vec<f64> = changes.iter().map(|change| change.offset).collect();
+        let mut errors: Vec<f64> = changes.iter().map(Change::error).collect();
+        let count = layers.len() / 2;
+        for (index, layer) in layers.chunks_exact(2).enumerate() {
+            let (weights, biases) = (layer[0], layer[1]);
+            let is_last = index + 1 == count;
+            let mut fixed = FixedLayer {
+                inputs: weights.nrows(),
+                ..FixedLayer::default()
+            };
+            let mut next_errors = Vec::new();
+            for (sum, weights) in weights.columns().into_iter().enumerate() {
+                // Sums in units of the target, or arguments of the tangent.
+                let per_one = if is_last { self.targets.per_one(sum) } else { 1.0 };
+                let pairs = || weights.iter().zip(&slopes).zip(&offsets);
+                let bias = biases[[0, sum]] + pairs().map(|((weight, _), offset)| weight * offset).sum::<f64>();
+                let scaled: Vec<f64> = pairs().map(|((weight, slope), _)| weight * slope * per_one).collect();
+                let result_bits = if is_last { 0 } else { TangentTable::FRACTION_BITS as i32 };
+                let what = if is_last { "a target" } else { "a hidden node" };
+                let reach = (bias * per_one).abs() + scaled.iter().map(|weight| weight.abs()).sum::<f64>();
+                if is_last && reach > LARGEST_TARGET {
+                    return Err(what);
+                }
+                let row = ScaledRow::of(&scaled, result_bits - INPUT_BITS).ok_or(what)?;
+                let sum_bits = row.bits + INPUT_BITS;
+                let (bias, of_bias) = whole_bias(bias * per_one, sum_bits, &row.weights).ok_or(what)?;
+                let of_inputs = scaled.iter().zip(&errors).map(|(weight, error)| weight.abs() * error);
+                let rounding = 0.5 * 2.0_f64.powi(-result_bits);
+                let error = of_inputs.sum::<f64>() + row.error + of_bias + rounding;
+                next_errors.push(match is_last {
+                    true => error,
+                    false => self
+                        .tangent
+                        .passed_on(error, bias as f64 * 2.0_f64.powi(-sum_bits), &scaled),
+                });
+                fixed.weights.extend(row.weights);
+                fixed.biases.push(bias);
+                fixed.shifts.push((sum_bits - result_bits) as u8);
+            }
+            row.layers.push(fixed);
+            errors = next_errors;
+            (slopes, offsets) = (vec![1.0; errors.len()], vec![0.0; errors.len()]);
+        }
+        self.rows.push(row);
+        Ok(errors)
+    }
+
+    /// Number of units in 1 of each reading.
+    pub(super) fn readings_per_one(&self) -> impl Iterator<Item = f64> {
+        self.readings.all().map(|unit| 1.0 / unit)
+    }
+
+    /// Unit of each target, in that of the decoder.
+    pub(super) fn target_units(&self) -> impl Iterator<Item = f64> {
+        self.targets.all()
+    }
+
+    /// Name of the readings, with their unit where they share one.
+    pub(super) fn readings_name(&self, name: &'static str) -> &'static str {
+        match (name, self.readings.first_decimals()) {
+            ("resistances_ohm", 9) => "resistances_nanoohm",
+            ("resistances_ohm", 6) => "resistances_microohm",
+            ("resistances_ohm", 3) => "resistances_milliohm",
+            _ => name,
+        }
+    }
+
+    /// The sentences on units and bounds.
+    pub(super) fn units_in_words(&self, meaning: &Meaning) -> String {
+        let saturation = "All readings are decoded without overflow: numbers out of range saturate.";
+        let bounds = meaning.named(&self.bounds).into_iter().map(|(target, bound)| {
+            format!(
+                "{} ({})",
+                format_number(bound),
+                super::meaning::comment(&target.title())
+            )
+        });
+        let bounds = Vec::from_iter(bounds).join(", ");
+        let units = match meaning.is_array() {
+            true => format!(
+                "Readings are integers in units of {:e} ohm, coordinates integers in nanometres.",
+                self.readings.unit(0)
+            ),
+            false => "Readings and targets are integers in the units below.".to_owned(),
+        };
+        format!("{units} {saturation} Error bounds for readings that are not out of range: {bounds}.")
+    }
+
+    /// Units of own data as initialisers of arrays; empty for an array, whose names contain the units.
+    pub(super) fn unit_definitions(&self, upper: &str, meaning: &Meaning) -> String {
+        if meaning.is_array() {
+            return String::new();
+        }
+        let define = |what: &str, units: &Units| {
+            let units: Vec<String> = units.all().map(|unit| format!("{unit:e}")).collect();
+            format!("#define {upper}_{what}_UNITS {{ {} }}\n", units.join(", "))
+        };
+        format!(
+            "/* Units of the integers, in proportion to the units of the columns. */\n{}{}\n",
+            define("READING", &self.readings),
+            define("TARGET", &self.targets)
+        )
+    }
+}
+
+impl Chain {
+    /// The steps of a program.
+    ///
+    /// # Errors
+    /// A step has no form in integers.
+    fn of(exported: &ExportedProgram) -> Result<Self, FixedPointError> {
+        let operation = |id: NodeId| &exported.program.node(id).operation;
+        let mut layers = Vec::new();
+        let mut id = exported.targets;
+        loop {
+            id = match operation(id) {
+                Operation::Affine { of, weights, biases } => {
+                    layers.push([*weights, *biases]);
+                    *of
+                }
+                Operation::Map(Function::Tanh, of) if !layers.is_empty() => *of,
+                _ => break,
+            };
+        }
+        layers.reverse();
+        let difference = match operation(id) {
+            Operation::Divide(difference, readings) if is_valid(operation(*readings)) => *difference,
+            _ => id,
+        };
+        match operation(difference) {
+            Operation::Subtract(readings, reference) if is_valid(operation(*readings)) => Ok(Self {
+                reference: *reference,
+                is_relative: difference != id,
+                layers,
+            }),
+            Operation::Map(Function::Gaussian, _) => Err(FixedPointError::Step("Gaussians")),
+            Operation::Map(..) => Err(FixedPointError::Step("logarithms")),
+            _ => Err(FixedPointError::Step("history of readings")),
+        }
+    }
+}
+
+/// `true` for readings that were checked.
+fn is_valid(operation: &Operation) -> bool {
+    matches!(operation, Operation::Valid { of, domain: Domain::Finite | Domain::Positive } if of.index() == 0)
+}
