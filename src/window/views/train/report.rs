@@ -8,7 +8,8 @@ use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
         Combination, ErrorTable, Errors, Initialization, NodeAddress, Outlook, Scores, Spread, StartRecord, TestErrors,
-        auto::Tried, best_start, error_remarks,
+        auto::{Tried, TriedModel},
+        best_start, error_remarks,
     },
     identifiability::Identifiability,
     problem::Problem,
@@ -125,7 +126,7 @@ fn tried_ui(ui: &mut Ui, tried: &Tried, is_chosen: bool) {
         });
     });
     let mut text = tried.features();
-    if let Some((begin, epochs)) = tried.training() {
+    if let TriedModel::Network { begin, epochs, .. } = tried.model {
         text += &format!("; {}", counted(epochs, "epoch"));
         if begin != Initialization::default() {
             text += &format!(" from {begin}");
