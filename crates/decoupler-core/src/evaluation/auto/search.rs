@@ -116,8 +116,8 @@ struct Search<'a> {
     on_progress: &'a mut dyn FnMut(AutoProgress),
 }
 
-/// Chooses settings for `samples` by cross-validation. `base` gives the source (one network for all rows), the seed, and whatever is not searched;
-/// its inputs are raw readings. Networks whose equations do not fit into `memory` are not tried.
+/// Chooses settings for `samples` by cross-validation. `base` gives the source (one network for all rows), the seed, and
+/// whatever is not searched; its inputs are raw readings. Networks whose equations do not fit into `memory` are not tried.
 ///
 /// # Errors
 /// If the samples cannot be divided into folds, or cannot be scaled, or the job is cancelled.
