@@ -179,10 +179,10 @@ fn a_missing_folder_for_temporary_files_is_named() {
         "{message}"
     );
     assert_eq!(names(folder.path()), ["n.json", "readings.csv"]);
-    let json = "export --network n.json --format json --out copy.json";
+    let numpy = "export --network n.json --format numpy --out numpy";
     let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
     command
-        .args(json.split(' '))
+        .args(numpy.split(' '))
         .env("TMPDIR", "/none")
         .current_dir(folder.path());
     assert!(command.output().unwrap().status.success(), "it needs no such folder");

@@ -195,11 +195,11 @@ fn answers_have_calibrated_intervals_and_drift_is_reported() {
         "{message}"
     );
     json(
-        "export --network n.json --format json --json --out bundle",
+        "export --network n.json --format c99 --json --out bundle",
         folder.path(),
     );
-    let exported = fs::read_to_string(folder.path().join("bundle")).unwrap();
-    assert!(exported.contains("\"intervals\""));
+    let exported = fs::read_to_string(folder.path().join("bundle/bundle_decode.h")).unwrap();
+    assert!(exported.contains("half_widths[BUNDLE_OUTPUTS]"), "{exported}");
 }
 
 #[test]

@@ -110,7 +110,7 @@ type Written = (&'static str, &'static str, Before);
 
 /// Commands that write one file. `inspect` and `trade` write none, nor does `decode --follow`, and those of `simulate`
 /// with faults, and of `--save-recipe` elsewhere, are written by the same code.
-const FILES: [Written; 17] = [
+const FILES: [Written; 16] = [
     ("simulate --array 2x2_2x6 --samples 6 --out", "out.csv", Before::AnyFile),
     (
         "simulate --array 2x2_2x6 --samples 6 --decoder newton --out",
@@ -152,11 +152,6 @@ const FILES: [Written; 17] = [
         "fine-tune --network fitted.json @frames --epochs 1 --out",
         "tuned.json",
         Before::AnyFile,
-    ),
-    (
-        "export --network n.json --format json --out",
-        "copy.json",
-        Before::Nothing,
     ),
     ("sweep --merge runs --out", "table.csv", Before::AnyFile),
     ("sweep --merge runs --out", "table.json", Before::AnyFile),

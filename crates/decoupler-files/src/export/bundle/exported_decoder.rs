@@ -321,6 +321,14 @@ impl<'a> ExportedDecoder<'a> {
                 fields.extend(part);
             }
         }
+        if self.fitted.kind.is_network() {
+            let mut operations = contents.computed();
+            let hidden = operations.find(|(_, operation)| matches!(operation, Operation::Map(Function::Tanh, _)));
+            fields.insert(
+                "hidden_nodes".to_owned(),
+                json!(hidden.map(|(id, _)| contents.size(id))),
+            );
+        }
         fields
     }
 
