@@ -243,7 +243,7 @@ fn offsets_too_large_for_single_precision_are_refused_with_cause_and_remedy() {
     }
 }
 
-/// Readings up to 1e100 have no number in single precision, but one in double.
+/// Readings up to 1e100 overflow in single precision, but not in double.
 #[test]
 fn readings_beyond_single_precision_are_exported_in_double() {
     let folder = tempfile::tempdir().unwrap();

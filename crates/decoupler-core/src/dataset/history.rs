@@ -253,22 +253,7 @@ mod tests {
     use ndarray::Array2;
 
     use super::*;
-
-    /// Memory of the readings the given numbers of samples before.
-    fn of_lags(samples: &[usize]) -> Memory {
-        Memory {
-            lags: samples.iter().map(|&lag| Span::Samples(lag as f64)).collect(),
-            ..Memory::default()
-        }
-    }
-
-    /// Memory of averages with these time constants in seconds.
-    fn of_averages_s(time_constants_s: &[f64]) -> Memory {
-        Memory {
-            averages: time_constants_s.iter().map(|&s| Span::Seconds(s)).collect(),
-            ..Memory::default()
-        }
-    }
+    use crate::dataset::memory::tests::{of_averages_s, of_lags};
 
     fn counting(rows: usize) -> Array2<f64> {
         Array2::from_shape_fn((rows, 1), |(row, _)| row as f64)

@@ -334,7 +334,7 @@ impl MemoryState {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use ndarray::{ArcArray2, Array2, ArrayView2, array};
     use rand::RngExt;
 
@@ -342,7 +342,7 @@ mod tests {
     use crate::dataset::{History, Seed, Stream};
 
     /// Memory of the readings the given numbers of samples before.
-    fn of_lags(samples: &[usize]) -> Memory {
+    pub(in crate::dataset) fn of_lags(samples: &[usize]) -> Memory {
         Memory {
             lags: samples.iter().map(|&lag| Span::Samples(lag as f64)).collect(),
             ..Memory::default()
@@ -350,7 +350,7 @@ mod tests {
     }
 
     /// Memory of averages with these time constants in seconds.
-    fn of_averages_s(time_constants_s: &[f64]) -> Memory {
+    pub(in crate::dataset) fn of_averages_s(time_constants_s: &[f64]) -> Memory {
         Memory {
             averages: time_constants_s.iter().map(|&s| Span::Seconds(s)).collect(),
             ..Memory::default()

@@ -108,7 +108,7 @@ fn model_based(problem: &Problem, test: &Dataset, job: &Job<'_>) -> Result<Optio
     let rows = test.row_wires_read().expect("samples of a scene know their row-wire");
     let (readings, unknowns) = (sensor.scale.columns(), scene.unknowns_per_row(sensor.scale));
     let (is_exact, is_determined) = (scene.noise.in_test().is_none(), simulation.is_determined());
-    // Only exact readings that determine the deformation tell row-wires apart before each was tried.
+    // Only exact readings that determine the deformation distinguish row-wires before each was tried.
     let is_each_tried = scene.rows.model() == RowModel::Shared && !(is_exact && is_determined);
     let tried = if is_each_tried { rows.len() } else { 1 };
     let steps = if is_exact && !is_determined { OPEN_STEPS } else { STEPS };

@@ -11,7 +11,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// Scaling of channels to [−1, 1] by their training minimum and maximum; constant channels are removed and restored.
 ///
-/// Equivalent to `removeconstantrows` and `mapminmax` of the field's reference toolbox. The ranges of the readings also tell
+/// Equivalent to `removeconstantrows` and `mapminmax` of the field's reference toolbox. The ranges of the readings also show
 /// where a network extrapolates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

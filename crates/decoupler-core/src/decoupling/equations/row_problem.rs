@@ -123,7 +123,7 @@ impl RowProblem {
         self.readings_ohm.len()
     }
 
-    /// True if so many readings are more than the unknowns. With as many equations as unknowns there are often several
+    /// True if there are more readings than unknowns. With as many equations as unknowns there are often several
     /// solutions that nothing distinguishes; with one unknown, the resistance is monotonic in the compression.
     pub(super) fn is_redundant(&self, readings: usize) -> bool {
         readings > self.unknowns() || readings > 0 && self.unknowns() == 1

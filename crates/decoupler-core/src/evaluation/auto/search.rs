@@ -196,7 +196,7 @@ impl Search<'_> {
         Ok(is_any_better)
     }
 
-    /// Returns one of so many `parts` of the multiplications that are left of this share of the budget.
+    /// Returns one of `parts` equal parts of the multiplications that are left of this share of the budget.
     fn part(&self, share: f64, parts: usize) -> f64 {
         (share * self.budget() - self.work).max(0.0) / parts as f64
     }

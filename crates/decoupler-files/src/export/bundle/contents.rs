@@ -208,7 +208,7 @@ impl Contents {
         let history = self.history()?;
         let pause = match history.pause_s {
             f64::INFINITY => String::new(),
-            pause_s => format!(", and after a pause of more than {pause_s} s (50 usual intervals)"),
+            pause_s => format!(", and after a pause of more than {pause_s} s ({GAP} usual intervals)"),
         };
         Some(format!(
             "Keep one state for each series of readings that continue each other: for each sensor, group and row-wire. It \

@@ -42,7 +42,7 @@ impl ExportedProgram {
         }
     }
 
-    /// The same program in single precision, but for the nodes up to the layer number `wide`, the state of a history and the
+    /// The same program in single precision, except for the nodes up to the layer number `wide`, the state of a history and the
     /// comparison with limits.
     pub(super) fn in_single(&self, wide: usize) -> Self {
         let first = match wide {
@@ -123,34 +123,28 @@ impl ExportedProgram {
 
     /// `true` if a reading must be above 0.
     pub(super) fn are_positive(&self) -> bool {
-        let mut nodes = self.program.nodes().iter();
-        nodes.any(|node| {
-            matches!(
-                node.operation,
-                Operation::Valid {
-                    domain: Domain::Positive,
-                    ..
-                }
-            )
-        })
+        are_positive(&self.program)
     }
 
     /// Quantity by whose rule limits are set.
     pub(super) fn quantity_of(program: &Program) -> Quantity {
-        let is_positive = |node: &Node| {
-            matches!(
-                node.operation,
-                Operation::Valid {
-                    domain: Domain::Positive,
-                    ..
-                }
-            )
-        };
-        match program.nodes().iter().any(is_positive) {
+        match are_positive(program) {
             true => Quantity::Resistance,
             false => Quantity::Raw,
         }
     }
+}
+
+fn are_positive(program: &Program) -> bool {
+    program.nodes().iter().any(|node| {
+        matches!(
+            node.operation,
+            Operation::Valid {
+                domain: Domain::Positive,
+                ..
+            }
+        )
+    })
 }
 
 fn push(nodes: &mut Vec<Node>, operation: Operation, size: usize) -> NodeId {

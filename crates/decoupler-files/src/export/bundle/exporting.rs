@@ -1,6 +1,5 @@
 use std::path::Path;
 
-use decoupler_core::decoupling::Precision;
 use serde_json::json;
 
 use super::{
@@ -10,6 +9,7 @@ use super::{
     exported_decoder::ExportedDecoder,
     fixed16::FixedProgram,
     folder::{AtomicFolder, identifier},
+    golden::Golden,
     matlab, numpy, onnx,
     report::{BundleCheck, BundleError, BundleReport, readme},
 };
@@ -102,11 +102,15 @@ struct Accuracy {
     checks: Vec<BundleCheck>,
 }
 
+/// A reading as a program in single precision takes it.
+fn in_f32(_channel: usize, reading: f64) -> f64 {
+    f64::from(reading as f32)
+}
+
 /// Deviation of the program in single precision with `wide` layers in double precision, from readings as it takes them.
 fn deviation_in_single(contents: &Contents, wide: usize) -> Result<f64, BundleError> {
-    let rounded = |_: usize, reading: f64| f64::from(reading as f32);
-    let of_taken = super::golden::Golden::of(
-        contents.golden.all().iter().map(|row| row.rounded(rounded)).collect(),
+    let of_taken = Golden::of(
+        contents.golden.all().iter().map(|row| row.rounded(in_f32)).collect(),
         0,
         &contents.exported.program,
         contents.outputs(),
@@ -203,10 +207,9 @@ fn in_single(contents: &mut Contents) -> Result<Accuracy, BundleError> {
         });
     }
     contents.exported = contents.exported.in_single(wide);
-    let rounded = |_: usize, reading: f64| f64::from(reading as f32);
     let deviation = contents
         .golden
-        .deviation(&contents.exported.program, &contents.scales, rounded)?;
+        .deviation(&contents.exported.program, &contents.scales, in_f32)?;
     Ok(Accuracy {
         limit: arithmetic + rounding,
         rounding: Some(rounding),
@@ -269,7 +272,6 @@ fn cure(contents: &Contents) -> String {
 }
 
 fn are_constants_finite(contents: &Contents, is_finite: impl Fn(f64) -> bool) -> bool {
-    let is_double = |id| contents.precision_of(id) == Precision::Double;
-    let mut tables = contents.constants().filter(|(id, _)| is_double(*id));
-    tables.all(|(_, tables)| tables.iter().flatten().all(|&value| is_finite(value)))
+    let mut values = contents.constants().flat_map(|(_, tables)| tables.iter().flatten());
+    values.all(|&value| is_finite(value))
 }

@@ -65,7 +65,7 @@ fn numbers(text: &str) -> Vec<f64> {
         .collect()
 }
 
-/// Each table of the program, as it should stand in a file.
+/// Each table of the program, as it should be in a file.
 fn tables(contents: &Contents) -> Vec<(String, Vec<f64>)> {
     let rounded = |precision: Precision, value: f64| match precision {
         Precision::Double => value,

@@ -116,7 +116,7 @@ struct Chain {
 }
 
 impl FixedProgram {
-    /// Upper limit of the error bound, relative to the range of a target, above which the user is told.
+    /// Upper limit of the error bound, relative to the range of a target, above which there is a remark.
     pub(super) const USUAL_BOUND: f64 = 0.01;
 
     /// Rounds the numbers of a program.

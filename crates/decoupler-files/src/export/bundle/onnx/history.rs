@@ -110,7 +110,7 @@ impl Printer<'_> {
         let shape = builder.whole(&[2], &[1, -1]);
         let line = builder.op("Reshape", &[&past, &shape]);
         builder.named("Concat", &[now, &line], &[("axis", 1)], name);
-        // The latest time stands in every column.
+        // The latest time fills every column.
         let size = builder.whole(&[2], &[1, channels as i64]);
         next_rows[1] = builder.op("Expand", &[&next_rows[1].clone(), &size]);
         let names = Vec::from_iter(next_rows.iter().map(String::as_str));
