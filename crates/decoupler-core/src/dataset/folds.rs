@@ -51,6 +51,16 @@ impl Folds {
         Self(blocks)
     }
 
+    /// The folds of some of the samples, by their places among `samples`; `None` if fewer than two folds have any.
+    pub(crate) fn among(&self, samples: &[usize]) -> Option<Self> {
+        let places = |fold: &Vec<usize>| {
+            let is_in = |place: &usize| fold.binary_search(&samples[*place]).is_ok();
+            Vec::from_iter((0..samples.len()).filter(is_in))
+        };
+        let folds = self.0.iter().map(places).filter(|fold| !fold.is_empty());
+        Some(Self(folds.collect())).filter(|folds: &Self| folds.count() >= 2)
+    }
+
     /// Number of folds, k.
     pub fn count(&self) -> usize {
         self.0.len()

@@ -26,4 +26,5 @@ pub use equations::{Estimate, Estimator, LARGEST_ERROR, NewtonStop, Solution};
 pub use kind::{DecoderKind, Fit, FitError, FitProblem, Precision};
 pub use newton::NewtonDecoder;
 pub use program::{Builder, Changes, Domain, Function, Node, NodeId, Operation, Program, ProgramDecoder};
+pub(crate) use radial_basis::KernelShape;
 pub(crate) use ridge::{Regression, ridge};

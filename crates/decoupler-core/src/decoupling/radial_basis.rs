@@ -35,18 +35,26 @@ impl Program {
         rng: &mut impl Rng,
     ) -> Result<Self, NetworkError> {
         let training = with_noise(training, unseen, rng);
-        let inputs = Inputs::fit(choice, training.readings(), NoiseSource::default())?;
-        let outputs = MinMax::fit(training.targets())?;
-        let x = inputs.of(training.readings());
-        let y = outputs.scale(training.targets());
-        let scales = match choice.scaling {
-            ScalingChoice::MinMax => x.std_axis(Axis(0), 0.0).mapv(|deviation| 1.0 / deviation),
-            // Components below the noise have less than unit variance on purpose.
-            ScalingChoice::Whitening => Array1::ones(x.ncols()),
-        };
+        let scaled = Scaled::of(&training, choice)?;
         let folds = |samples: &[usize]| folds(&training.select(samples));
-        let kernel = KernelRidge::fit(&(x * &scales), &y, folds);
-        Ok(Self::of_kernel(&inputs, &scales, &kernel, &outputs))
+        let kernel = KernelRidge::fit(&scaled.x, &scaled.y, folds);
+        Ok(Self::of_kernel(&scaled.inputs, &scaled.scales, &kernel, &scaled.outputs))
+    }
+
+    /// As [`Self::radial_basis`], with a kernel whose shape is given: up to four times `subset` samples are all centres, of
+    /// more there are `subset`.
+    ///
+    /// # Errors
+    /// If values cannot be scaled.
+    pub(crate) fn kernel(training: &Dataset, shape: &KernelShape, subset: usize) -> Result<Self, NetworkError> {
+        let scaled = Scaled::of(training, shape.inputs)?;
+        let penalty = |&target: &usize| shape.penalties[target];
+        let shape = KernelShape {
+            penalties: scaled.outputs.varying().iter().map(penalty).collect(),
+            ..*shape
+        };
+        let kernel = KernelRidge::of_shape(&scaled.x, &scaled.y, &shape, subset);
+        Ok(Self::of_kernel(&scaled.inputs, &scaled.scales, &kernel, &scaled.outputs))
     }
 
     /// The network of a fitted kernel; the inputs are multiplied by `scales`.
@@ -55,6 +63,7 @@ impl Program {
         let KernelRidge {
             centres,
             sharpness,
+            linear,
             coefficients,
         } = kernel;
         // Distances in units of the width: exp(−sharpness · |x − c|²).
@@ -66,11 +75,107 @@ impl Program {
         let changes = builder.changes(inputs.quantity(), &channel_centres, double);
         let scaled = builder.affine_of(&changes, to_inputs, &zeros);
         let distances = builder.squared_distances(scaled, &centres.t() * root, double);
-        let gaussians = builder.map(Function::Gaussian, distances, double);
+        let mut basis = builder.map(Function::Gaussian, distances, double);
         let (weights, constants) = coefficients.view().split_at(Axis(0), centres.nrows());
-        let changes = builder.affine(gaussians, weights.to_owned(), &constants.row(0).to_vec(), double);
+        let mut weights = weights.to_owned();
+        if *linear > 0.0 && *sharpness > 0.0 {
+            let slopes = centres.t().dot(&weights) * (linear / root);
+            weights.append(Axis(0), slopes.view()).expect("the same outputs");
+            basis = builder.concatenate(&[basis, scaled]);
+        }
+        let changes = builder.affine(basis, weights, &constants.row(0).to_vec(), double);
         let targets = builder.restored(changes, outputs);
         builder.finish(targets)
+    }
+}
+
+/// Samples in the units of a kernel.
+struct Scaled {
+    inputs: Inputs,
+    /// Factors of the inputs.
+    scales: Array1<f64>,
+    outputs: MinMax,
+    x: Array2<f64>,
+    y: Array2<f64>,
+}
+
+impl Scaled {
+    fn of(training: &Dataset, choice: InputChoice) -> Result<Self, NetworkError> {
+        let inputs = Inputs::fit(choice, training.readings(), NoiseSource::default())?;
+        let outputs = MinMax::fit(training.targets())?;
+        let x = inputs.of(training.readings());
+        let scales = match choice.scaling {
+            ScalingChoice::MinMax => x.std_axis(Axis(0), 0.0).mapv(|deviation| 1.0 / deviation),
+            // Components below the noise have less than unit variance on purpose.
+            ScalingChoice::Whitening => Array1::ones(x.ncols()),
+        };
+        Ok(Self {
+            x: x * &scales,
+            y: outputs.scale(training.targets()),
+            inputs,
+            scales,
+            outputs,
+        })
+    }
+}
+
+/// Kernel whose width and penalties were chosen by cross-validation.
+#[derive(Clone, Debug)]
+pub(crate) struct KernelShape {
+    /// Quantity and scaling of the inputs.
+    inputs: InputChoice,
+    /// 1 / (2 · width²).
+    sharpness: f64,
+    /// Factor of the linear kernel x · x′ that is added to the Gaussian; 0 for none.
+    linear: f64,
+    /// Penalty of each target.
+    penalties: Vec<f64>,
+}
+
+/// Number of samples from which the shape of a kernel is chosen on given folds.
+const SHAPED: usize = 500;
+
+impl KernelShape {
+    /// Chooses width and penalties by the held-out errors in `folds` of `training`; with `is_linear`, a linear kernel is added
+    /// that has ten times the variance of the Gaussian, for relations with a linear part.
+    ///
+    /// # Errors
+    /// If values cannot be scaled.
+    pub(crate) fn choose(
+        training: &Dataset,
+        inputs: InputChoice,
+        is_linear: bool,
+        folds: &Folds,
+    ) -> Result<Self, NetworkError> {
+        let scaled = Scaled::of(training, inputs)?;
+        let searched = thinned(training.samples(), SHAPED);
+        let [x, y] = [&scaled.x, &scaled.y].map(|of| of.select(Axis(0), &searched));
+        let linear = if is_linear { 10.0 / x.ncols().max(1) as f64 } else { 0.0 };
+        let (sharpness, chosen) = choose(&x, &y, folds.among(&searched).as_ref(), linear);
+        let mut penalties = vec![f64::INFINITY; training.outputs()];
+        for (&target, penalty) in scaled.outputs.varying().iter().zip(chosen) {
+            penalties[target] = penalty;
+        }
+        Ok(Self {
+            inputs,
+            sharpness,
+            linear,
+            penalties,
+        })
+    }
+
+    /// Approximate number of multiplications of a choice and of a fit to `samples` samples with `subset` centres of many.
+    pub(crate) fn multiplications(samples: usize, folds: usize, subset: usize) -> [f64; 2] {
+        /// Usual number of widths and penalties that are compared.
+        const COMPARED: usize = 50;
+        let cube = |size: usize| (size as f64).powi(3) / 3.0;
+        let searched = SHAPED.min(samples);
+        let fit = if samples <= 4 * subset {
+            cube(samples)
+        } else {
+            (20 * subset).min(samples) as f64 * (subset as f64).powi(2) + cube(subset)
+        };
+        [(COMPARED * folds) as f64 * cube(searched - searched / folds), fit]
     }
 }
 
@@ -95,14 +200,16 @@ pub(super) fn thinned(samples: usize, count: usize) -> Vec<usize> {
 /// With K the Gaussians of all pairs of samples, the coefficients are (K + penalty · 1)⁻¹ (y − ȳ). The width is common to
 /// all outputs, and each has its own penalty, both chosen by cross-validation.
 ///
-/// Up to [`Self::MAX_SAMPLES`] samples are all centres. Of more, [`Self::SUBSET`] are centres, and the coefficients
-/// minimise the penalised error on up to [`Self::MAX_ROWS`] samples (subset of regressors, ibid., section 8.3.1).
+/// Up to four times [`Self::SUBSET`] samples are all centres. Of more, [`Self::SUBSET`] are centres, and the coefficients
+/// minimise the penalised error on up to twenty times as many samples (subset of regressors, ibid., section 8.3.1).
 #[derive(Clone, Debug)]
 struct KernelRidge {
     /// Centres × inputs.
     centres: Array2<f64>,
     /// 1 / (2 · width²).
     sharpness: f64,
+    /// Factor of the linear kernel that is added to the Gaussian.
+    linear: f64,
     /// Centres + 1 × outputs, the constant last.
     coefficients: Array2<f64>,
 }
@@ -120,47 +227,60 @@ fn penalties() -> impl Iterator<Item = f64> {
 }
 
 impl KernelRidge {
-    /// Maximum number of samples that are all centres.
-    const MAX_SAMPLES: usize = 4000;
-    /// Number of centres in larger sets.
+    /// Number of centres in sets of more than four times as many samples.
     const SUBSET: usize = 1000;
-    /// Maximum number of samples to which the coefficients of a larger set are fitted.
-    const MAX_ROWS: usize = 20_000;
 
     /// Fits outputs `y` (samples × outputs) on inputs `x` (samples × inputs), which should have comparable scales; `folds`
     /// divides some of the samples. There is at least one sample.
     fn fit(x: &Array2<f64>, y: &Array2<f64>, folds: impl Fn(&[usize]) -> Option<Folds>) -> Self {
-        let samples = x.nrows();
-        let searched = thinned(samples, MAX_SEARCHED);
+        let searched = thinned(x.nrows(), MAX_SEARCHED);
         let (of_x, of_y) = (x.select(Axis(0), &searched), y.select(Axis(0), &searched));
-        let (sharpness, penalties) = choose(&of_x, &of_y, folds(&searched).as_ref());
+        let (sharpness, penalties) = choose(&of_x, &of_y, folds(&searched).as_ref(), 0.0);
+        let shape = KernelShape {
+            inputs: InputChoice::default(),
+            sharpness,
+            linear: 0.0,
+            penalties,
+        };
+        Self::of_shape(x, y, &shape, Self::SUBSET)
+    }
+
+    /// Fits the coefficients of a kernel with this shape: of more than `4 · subset` samples, `subset` are centres, and the
+    /// coefficients minimise the error on `20 · subset`.
+    fn of_shape(x: &Array2<f64>, y: &Array2<f64>, shape: &KernelShape, subset: usize) -> Self {
+        let samples = x.nrows();
+        let KernelShape {
+            sharpness,
+            linear,
+            penalties,
+            ..
+        } = shape;
         let means = y.mean_axis(Axis(0)).expect("there are samples");
-        let (centres, gains) = if samples <= Self::MAX_SAMPLES {
+        let kernel_of = |x: &Array2<f64>, centres: &Array2<f64>| kernel(x, centres, *sharpness, *linear);
+        let (centres, gains) = if samples <= 4 * subset {
             let off = Mat::from_fn(samples, y.ncols(), |s, t| y[[s, t]] - means[t]);
-            let mut kernel = gaussians(x, x, sharpness);
-            let gains = solve(&penalties, &off, |penalty| {
-                (0..samples).for_each(|sample| kernel[(sample, sample)] = 1.0 + penalty);
-                kernel.clone()
+            let kernel = kernel_of(x, x);
+            let gains = solve(penalties, &off, |penalty| {
+                let mut matrix = kernel.clone();
+                (0..samples).for_each(|sample| matrix[(sample, sample)] += penalty);
+                matrix
             });
             (x.clone(), gains)
         } else {
-            let centres = x.select(Axis(0), &thinned(samples, Self::SUBSET));
-            let rows = thinned(samples, Self::MAX_ROWS);
-            let (mut gram, mut right) = (
-                Mat::zeros(Self::SUBSET, Self::SUBSET),
-                Mat::zeros(Self::SUBSET, y.ncols()),
-            );
-            for chunk in rows.chunks(Self::SUBSET) {
-                let basis = gaussians(&x.select(Axis(0), chunk), &centres, sharpness);
+            let centres = x.select(Axis(0), &thinned(samples, subset));
+            let rows = thinned(samples, 20 * subset);
+            let (mut gram, mut right) = (Mat::zeros(subset, subset), Mat::zeros(subset, y.ncols()));
+            for chunk in rows.chunks(subset) {
+                let basis = kernel_of(&x.select(Axis(0), chunk), &centres);
                 gram += basis.transpose() * &basis;
                 right += basis.transpose() * Mat::from_fn(chunk.len(), y.ncols(), |s, t| y[[chunk[s], t]] - means[t]);
             }
             // Gram matrix and kernel both lose half of the digits.
-            let rounding = f64::EPSILON * (rows.len() * Self::SUBSET) as f64;
-            let kernel = gaussians(&centres, &centres, sharpness);
-            let gains = solve(&penalties, &right, |penalty| {
+            let rounding = f64::EPSILON * (rows.len() * subset) as f64 * (1.0 + linear * x.ncols() as f64);
+            let kernel = kernel_of(&centres, &centres);
+            let gains = solve(penalties, &right, |penalty| {
                 let mut matrix = &gram + faer::Scale(penalty) * &kernel;
-                (0..Self::SUBSET).for_each(|centre| matrix[(centre, centre)] += rounding);
+                (0..subset).for_each(|centre| matrix[(centre, centre)] += rounding);
                 matrix
             });
             (centres, gains)
@@ -175,13 +295,14 @@ impl KernelRidge {
                 }
             }),
             centres,
-            sharpness,
+            sharpness: *sharpness,
+            linear: *linear,
         }
     }
 }
 
 /// Chooses the sharpness, and the penalty of each output, by the error on held-out folds.
-fn choose(x: &Array2<f64>, y: &Array2<f64>, folds: Option<&Folds>) -> (f64, Vec<f64>) {
+fn choose(x: &Array2<f64>, y: &Array2<f64>, folds: Option<&Folds>, linear: f64) -> (f64, Vec<f64>) {
     let variance = x.var_axis(Axis(0), 0.0).sum();
     // Without variance, all Gaussians are 1.
     let Some(folds) = folds.filter(|_| variance > 0.0) else {
@@ -189,7 +310,7 @@ fn choose(x: &Array2<f64>, y: &Array2<f64>, folds: Option<&Folds>) -> (f64, Vec<
     };
     let judge = |exponent: f64| {
         let sharpness = exponent.exp2() / variance;
-        let kernel = gaussians(x, x, sharpness);
+        let kernel = kernel(x, x, sharpness, linear);
         let choice = Choice::new(penalties(), y.ncols(), Choice::PATIENCE, |penalty| {
             let of_fold = |fold| held_out(&kernel, y, &folds.without(&[fold]), folds.test(fold), penalty);
             (0..folds.count()).map(of_fold).collect()
@@ -259,10 +380,14 @@ fn solve(penalties: &[f64], right: &Mat<f64>, mut matrix: impl FnMut(f64) -> Mat
     gains
 }
 
-/// Gaussians between the rows of `x` and `centres`.
-fn gaussians(x: &Array2<f64>, centres: &Array2<f64>, sharpness: f64) -> Mat<f64> {
+/// Gaussians between the rows of `x` and `centres`, plus their scalar products times `linear`.
+fn kernel(x: &Array2<f64>, centres: &Array2<f64>, sharpness: f64, linear: f64) -> Mat<f64> {
     Mat::from_fn(x.nrows(), centres.nrows(), |i, j| {
-        (-sharpness * distance2(x.row(i), centres.row(j))).exp()
+        let gaussian = (-sharpness * distance2(x.row(i), centres.row(j))).exp();
+        match linear {
+            0.0 => gaussian,
+            _ => gaussian + linear * x.row(i).dot(&centres.row(j)),
+        }
     })
 }
 
@@ -311,6 +436,7 @@ mod tests {
             centres,
             sharpness,
             coefficients,
+            ..
         } = kernel;
         let (channel_centres, to_inputs) = inputs.affine();
         let ranges = outputs.middles_and_half_widths();
@@ -431,7 +557,7 @@ mod tests {
 
     #[test]
     fn larger_sets_have_fewer_centres_and_are_as_accurate() {
-        let fit = fitted(&wandering(KernelRidge::MAX_SAMPLES + 1, 0.1, 7));
+        let fit = fitted(&wandering(4 * KernelRidge::SUBSET + 1, 0.1, 7));
         assert_eq!(fit.centres.nrows(), KernelRidge::SUBSET);
         let error = rmse(&fit, &wandering(300, 0.0, 8))[0];
         assert!(error < 0.05, "{error}");

@@ -40,6 +40,8 @@ pub(crate) struct Ridge {
     pub map: Array2<f64>,
     /// Sums of squared held-out errors: fold × output.
     pub squares: Vec<Vec<f64>>,
+    /// Maps fitted without each fold, with the same penalties.
+    pub held_out: Vec<Array2<f64>>,
 }
 
 /// Minimum number of samples in a block of a QR decomposition.
@@ -73,9 +75,11 @@ impl Regression<'_> {
             held_out.iter().map(squares).collect()
         });
         let fit = self.spectrum(factors.iter(), self.samples)?;
-        let penalties = choice.levels.iter().map(|level| level * self.samples as f64);
+        let penalties = |samples: f64| Vec::from_iter(choice.levels.iter().map(|level| level * samples));
+        let without = |(fit, _, _, training): &(Spectrum, Mat<f64>, Mat<f64>, f64)| fit.map(&penalties(*training));
         Ok(Ridge {
-            map: fit.map(&penalties.collect::<Vec<_>>()),
+            map: fit.map(&penalties(self.samples as f64)),
+            held_out: held_out.iter().map(without).collect(),
             squares: choice.squares,
         })
     }
@@ -396,15 +400,17 @@ pub(crate) fn ridge(
         },
         noise: Array2::zeros((0, inputs.ncols())),
     };
-    let Ridge { mut map, squares } = regression.ridge(Some(folds))?;
-    for (t, mut column) in map.columns_mut().into_iter().enumerate() {
-        column[inputs.ncols()] += offsets[t];
-        for (i, (centre, scale)) in standard.centre.iter().zip(&standard.scale).enumerate() {
-            column[i] *= scale;
-            column[inputs.ncols()] -= centre * column[i];
+    let mut ridge = regression.ridge(Some(folds))?;
+    for map in std::iter::once(&mut ridge.map).chain(&mut ridge.held_out) {
+        for (t, mut column) in map.columns_mut().into_iter().enumerate() {
+            column[inputs.ncols()] += offsets[t];
+            for (i, (centre, scale)) in standard.centre.iter().zip(&standard.scale).enumerate() {
+                column[i] *= scale;
+                column[inputs.ncols()] -= centre * column[i];
+            }
         }
     }
-    Ok(Ridge { map, squares })
+    Ok(ridge)
 }
 
 /// Folds by which a decoder chooses penalties and widths: blocks in the order of the samples between groups, or whole groups

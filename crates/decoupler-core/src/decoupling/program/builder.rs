@@ -21,7 +21,7 @@ pub struct Changes {
 /// Builds a program node by node.
 #[derive(Clone, Debug)]
 pub struct Builder {
-    nodes: Vec<Node>,
+    pub(super) nodes: Vec<Node>,
 }
 
 impl Builder {
@@ -44,10 +44,6 @@ impl Builder {
             nodes: self.nodes,
             output,
         }
-    }
-
-    pub(super) fn into_nodes(self) -> Vec<Node> {
-        self.nodes
     }
 
     /// Number of values of a node.

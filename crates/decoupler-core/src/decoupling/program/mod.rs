@@ -6,6 +6,7 @@
 //! their own.
 
 mod builder;
+mod combined;
 mod evaluate;
 mod kernel;
 mod networks;
@@ -278,17 +279,8 @@ impl Program {
         let mut builder = Builder::new(channels);
         let current = builder.valid(builder.readings(), Domain::Finite);
         let features = builder.history(current, memory);
-        let shift = features.0;
-        let moved = |id: &NodeId| NodeId(id.0 + shift);
-        let mut nodes = builder.into_nodes();
-        nodes.extend(self.nodes[1..].iter().map(|node| Node {
-            operation: node.operation.with_operands(moved),
-            ..node.clone()
-        }));
-        Ok(Self {
-            nodes,
-            output: moved(&self.output),
-        })
+        let output = builder.include(&self, features);
+        Ok(builder.finish(output))
     }
 }
 
