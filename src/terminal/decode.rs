@@ -107,7 +107,7 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
     let mut drift = DriftWarnings::new(file, false);
     let mut values = Vec::new();
     let mut outside = OutsideTraining::new(&file.problem);
-    let mut decoder = file.network.decoder();
+    let mut decoder = file.decoder();
     read(file, input, &mut |readings| {
         if !std::mem::replace(&mut has_heading, true) {
             let kept = readings.kept.iter().map(|column| column.title.clone());

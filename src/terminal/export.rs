@@ -40,7 +40,7 @@ pub(super) struct Export {
     /// Network saved by train --out or by the window
     #[arg(long, value_name = "FILE")]
     network: PathBuf,
-    #[arg(long, value_name = "DECODER", default_value_t, help = BundleDecoder::help())]
+    #[arg(long, value_name = "DECODER", default_value_t = BundleDecoder::Chosen, help = BundleDecoder::help())]
     decoder: BundleDecoder,
     #[arg(long, value_name = "FORMAT", help = BundleFormat::help())]
     format: BundleFormat,
@@ -66,7 +66,7 @@ impl Export {
             .check_for(self.decoder, self.precision)
             .map_err(BundleError::from)?;
         let file = NetworkFile::load(&self.network)?;
-        let decoder = if self.decoder.is_network() {
+        let decoder = if self.decoder == BundleDecoder::Chosen {
             ExportedDecoder::from(&file)
         } else {
             ExportedDecoder::of_run(&file, sets(&file.setup(), self.json)?, self.decoder)?

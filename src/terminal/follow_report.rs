@@ -183,7 +183,7 @@ impl<'a> Answers<'a> {
         let rows = rows_read(file)?;
         Ok(Self {
             file,
-            decoder: file.network.decoder(),
+            decoder: file.decoder(),
             rows,
             answer: vec![0.0; rows * file.problem.targets.len()],
             values: Vec::new(),

@@ -263,6 +263,7 @@ impl Train {
         })?;
         if training != saved.settings().training {
             sets.forget_choice();
+            run.set_blend(None);
         }
         self.continue_run(&mut run, saved.settings().training, training)?;
         Ok((run, sets))

@@ -311,7 +311,11 @@ impl<'a> Trained<'a> {
             .chain(of_import.into_iter().flatten())
             .chain(self.extrapolation().and_then(|found| found.warning))
             .chain(describe_samples(self.sets))
-            .chain(search(self.file).and_then(AutoRecord::remark))
+            .chain(
+                search(self.file)
+                    .into_iter()
+                    .flat_map(|record| record.remarks(&problem.targets)),
+            )
             .chain(self.optimism.iter().cloned())
             .chain(self.run.defect())
             .chain(describe_determinacy(&self.file.problem.targets, determined))

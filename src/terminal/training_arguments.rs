@@ -130,6 +130,7 @@ impl TrainingArguments {
             starts: self.starts,
             scaling: self.scene.scaling,
             memory: None,
+            tries_memory: false,
         }
     }
 

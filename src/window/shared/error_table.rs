@@ -11,9 +11,6 @@ use decoupler_core::{
 };
 use decoupler_files::export::{format_number, format_r2};
 
-/// Name of the network's row.
-const NETWORK: &str = "network";
-
 /// Measures of intervals, which have a table of their own.
 const OF_INTERVALS: [ErrorMeasure; 2] = [ErrorMeasure::HalfWidth, ErrorMeasure::CoveragePercent];
 
@@ -54,9 +51,10 @@ pub fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
         .iter()
         .position(|measure| matches!(measure, ErrorMeasure::ZMm | ErrorMeasure::Rmse));
     let mut rows = Vec::new();
+    let used = table.used();
     for block in &table.blocks {
         let judged = |row: &ErrorRow| judged.and_then(|place| row.errors.get(place).copied().flatten());
-        let of_network = block.rows.iter().find(|row| row.name == NETWORK).and_then(judged);
+        let of_network = block.rows.iter().find(|row| row.name == used).and_then(judged);
         let figure = |row: &ErrorRow, place: usize| match table.measures[place] {
             ErrorMeasure::R2 => format_r2(row.errors[place]),
             _ => format_number(row.errors[place]),
@@ -70,11 +68,11 @@ pub fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
                 .named(name)
                 .meaning(row_meaning(row.name))
                 .colour(match row.name {
-                    NETWORK => palette.accent,
+                    name if name == used => palette.accent,
                     "published" | "model-based" => palette.dim,
                     _ => palette.text,
                 })
-                .strong(row.name == NETWORK)
+                .strong(row.name == used)
                 .mark(if beats(row.name, judged(row), of_network) {
                     BETTER
                 } else {
@@ -95,7 +93,7 @@ fn intervals_ui(ui: &mut Ui, table: &ErrorTable) {
         return;
     };
     let row = |block: &ErrorBlock| {
-        let network = block.rows.iter().find(|row| row.name == NETWORK)?;
+        let network = block.rows.iter().find(|row| row.name == table.used())?;
         let figures = [half_width, coverage].map(|place| network.errors.get(place).copied().flatten());
         let title = block.target.as_ref()?.title();
         let cells = [title.clone()].into_iter().chain(figures.map(format_number));
@@ -120,7 +118,10 @@ fn row_meaning(name: &str) -> &'static str {
         "training mean" => DecoderKind::Mean.meaning(),
         "linear map" => glossary::LINEAR_MAP.hint,
         "ridge" => DecoderKind::Ridge.meaning(),
-        NETWORK => {
+        "chosen" => {
+            "The combination with the lowest error in cross-validation on the training samples: what decoding, Live and exports use"
+        }
+        "network" => {
             "The network with the lowest validation error so far; with the lowest training error if nothing is held out"
         }
         "model-based" => glossary::MODEL_BASED.hint,
@@ -130,7 +131,7 @@ fn row_meaning(name: &str) -> &'static str {
 }
 
 /// Meaning of the mark at a baseline.
-const BETTER: &str = "Better than the network.";
+const BETTER: &str = "Better than what is used.";
 
 /// Returns true for a baseline with a smaller error than the network.
 fn beats(name: &str, error: Option<f64>, of_network: Option<f64>) -> bool {

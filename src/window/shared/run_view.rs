@@ -106,6 +106,7 @@ impl RunView {
     pub fn scores(&self, result: &RunResult) -> Scores {
         Scores {
             network: result.errors.clone(),
+            network_alone: result.network_alone.clone(),
             baselines: self.baselines.clone(),
             coverage: result.coverage.clone(),
         }

@@ -211,6 +211,8 @@ pub struct RunResult {
     pub frame: Option<(usize, Frame)>,
     /// Errors of the decoded values.
     pub errors: TestErrors,
+    /// Errors of the network alone, if a combination is used.
+    pub network_alone: Option<TestErrors>,
     /// Coverage of the intervals on the test set, if they were calibrated.
     pub coverage: Vec<Option<Coverage>>,
     /// Epoch of the network.

@@ -316,7 +316,8 @@ impl<'a> TrainingLoop<'a> {
             }) => continue_run(run, training)
                 .map(|()| {
                     if let (Some(recorded), Some(calibration)) = (recorded, calibration) {
-                        recorded.chosen_intervals = None;
+                        recorded.forget_choice();
+                        run.set_blend(None);
                         calibration.forget_choice();
                     }
                     *run.settings()
@@ -405,8 +406,10 @@ impl<'a> TrainingLoop<'a> {
         let number = run.leader_number();
         let trainer = &run.trainers()[number];
         let networks = run.network();
-        let answers = networks.decouple(run.test());
+        let scores = run.scores();
+        let answers = run.decouple_test();
         let errors = run.errors_of(&answers);
+        let network_alone = scores.and_then(|scores| scores.network_alone);
         let test = self.test.as_ref();
         let frame = test.and_then(TestSet::array).map(|test| {
             let snapshot = test.nearest_snapshot(self.snapshot.load(Ordering::Relaxed));
@@ -443,6 +446,7 @@ impl<'a> TrainingLoop<'a> {
                 charts,
                 frame,
                 errors,
+                network_alone,
                 coverage: run.coverage().to_vec(),
                 best_epoch: trainer.best_epoch(),
                 defect: run.defect(),
@@ -492,6 +496,7 @@ impl<'a> TrainingLoop<'a> {
         if let Some(baselines) = run.baselines() {
             let scores = Scores {
                 network: errors.clone(),
+                network_alone: run.blend().is_some().then(|| errors.clone()),
                 baselines: baselines.clone(),
                 coverage: Vec::new(),
             };

@@ -38,7 +38,12 @@ impl Program {
         let scaled = Scaled::of(&training, choice)?;
         let folds = |samples: &[usize]| folds(&training.select(samples));
         let kernel = KernelRidge::fit(&scaled.x, &scaled.y, folds);
-        Ok(Self::of_kernel(&scaled.inputs, &scaled.scales, &kernel, &scaled.outputs))
+        Ok(Self::of_kernel(
+            &scaled.inputs,
+            &scaled.scales,
+            &kernel,
+            &scaled.outputs,
+        ))
     }
 
     /// As [`Self::radial_basis`], with a kernel whose shape is given: up to four times `subset` samples are all centres, of
@@ -54,7 +59,12 @@ impl Program {
             ..*shape
         };
         let kernel = KernelRidge::of_shape(&scaled.x, &scaled.y, &shape, subset);
-        Ok(Self::of_kernel(&scaled.inputs, &scaled.scales, &kernel, &scaled.outputs))
+        Ok(Self::of_kernel(
+            &scaled.inputs,
+            &scaled.scales,
+            &kernel,
+            &scaled.outputs,
+        ))
     }
 
     /// The network of a fitted kernel; the inputs are multiplied by `scales`.

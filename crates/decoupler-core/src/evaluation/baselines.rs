@@ -31,8 +31,11 @@ pub struct Baselines {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scores {
-    /// Errors of the network.
+    /// Errors of the network, or of the combination that a choice of settings found.
     pub network: TestErrors,
+    /// Errors of the network alone, if [`Self::network`] are those of a combination.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub network_alone: Option<TestErrors>,
     /// Errors of the baselines.
     pub baselines: Baselines,
     /// Coverage of the network's intervals for each target on the test set; empty if it has no intervals.

@@ -154,6 +154,7 @@ impl CrossValidated {
         let errors = |answers| TestErrors::measure(problem, set, answers);
         Scores {
             network: errors(&self.network),
+            network_alone: None,
             baselines: Baselines {
                 mean: errors(&self.mean),
                 linear: errors(&self.linear),

@@ -91,6 +91,7 @@ impl Run {
             scalings: tasks.map(|task| task.scaling.clone()),
             starts,
             baselines: None,
+            blend: None,
             intervals: None,
         })
     }

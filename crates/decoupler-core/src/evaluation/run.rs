@@ -10,11 +10,11 @@ use thiserror::Error;
 
 use super::{
     Baselines, Combination, Coverage, Intervals, RunSettings, Scores, StartRecord, StartTrainer, TestErrors,
-    starts::lowest,
+    auto::Blend, starts::lowest,
 };
 use crate::{
     dataset::{Dataset, DatasetError, PerRow, SimulationError, SplitBy},
-    decoupling::{DecodeError, FitError},
+    decoupling::{DecodeError, FitError, Precision, Program, ProgramDecoder},
     identifiability::IdentifiabilityError,
     job::{Cancelled, Job},
     machine::MemoryBudget,
@@ -46,6 +46,8 @@ pub struct Run {
     pub(super) wall_time: Option<Duration>,
     /// Errors of the baselines; `None` if only the networks are needed.
     pub(super) baselines: Option<Baselines>,
+    /// What a choice of settings answers with once the network is trained; `None` for the network alone.
+    pub(super) blend: Option<Blend>,
     /// Intervals of the present network, with their coverage on the test set.
     pub(super) intervals: Option<(Intervals, Vec<Option<Coverage>>)>,
 }
@@ -236,9 +238,30 @@ impl Run {
         Networks::each(rows.map(network).collect())
     }
 
-    /// Returns the answers of [`Self::network`] to the test set: samples × outputs, in the units of the targets.
+    /// Sets what the run answers with once it has ended by itself, instead of its network alone.
+    pub fn set_blend(&mut self, blend: Option<Blend>) {
+        self.blend = blend;
+    }
+
+    /// What the run answers with instead of its network alone: `None` unless the training has ended by itself.
+    pub fn blend(&self) -> Option<&Blend> {
+        let has_ended = self.stop_reason().is_some_and(|reason| reason != StopReason::Stopped);
+        self.blend.as_ref().filter(|_| has_ended)
+    }
+
+    /// Returns the program of the answers: of the combination, if settings were chosen and the training has ended, otherwise of
+    /// [`Self::network`]. For a recording, readings are limited to their range in training, extended by a tenth.
+    pub fn program(&self) -> Program {
+        match self.blend() {
+            Some(blend) => blend.program(&self.network(), Precision::Double),
+            None if self.problem.has_nodes() => self.network().program(Precision::Double),
+            None => self.network().clipped_program(Precision::Double),
+        }
+    }
+
+    /// Returns the answers of [`Self::program`] to the test set: samples × outputs, in the units of the targets.
     pub fn decouple_test(&self) -> Array2<f64> {
-        self.network().decouple(&self.test)
+        ProgramDecoder::new(self.program()).answers_to(&self.test)
     }
 
     /// Returns the errors of answers to the test set (samples × targets, in the units of the targets).
@@ -246,7 +269,7 @@ impl Run {
         TestErrors::measure(&self.problem, &self.test, answers)
     }
 
-    /// Returns the errors of [`Self::network`] on the test set.
+    /// Returns the errors of [`Self::decouple_test`].
     pub fn errors(&self) -> TestErrors {
         self.errors_of(&self.decouple_test())
     }
@@ -275,8 +298,14 @@ impl Run {
 
     /// Returns the errors of [`Self::network`] and of the baselines on the test set; `None` for the run of a fold.
     pub fn scores(&self) -> Option<Scores> {
+        let alone = || {
+            self.errors_of(
+                &ProgramDecoder::new(self.network().clipped_program(Precision::Double)).answers_to(&self.test),
+            )
+        };
         Some(Scores {
             network: self.errors(),
+            network_alone: self.blend().filter(|blend| !blend.others.is_empty()).map(|_| alone()),
             baselines: self.baselines.clone()?,
             coverage: self.coverage().to_vec(),
         })

@@ -70,6 +70,8 @@ pub enum ErrorMeasure {
 
 /// Name of the row of the network.
 const NETWORK: &str = "network";
+/// Name of the row of the combination that a choice of settings found.
+const CHOSEN: &str = "chosen";
 /// Name of the row of the decoder that knows the sensor model.
 const MODEL_BASED: &str = "model-based";
 
@@ -216,8 +218,11 @@ impl ErrorTable {
         let mut rows = vec![
             ("training mean", &baselines.mean),
             (baselines.linear_name(), &baselines.linear),
-            (NETWORK, &scores.network),
         ];
+        match &scores.network_alone {
+            Some(alone) => rows.extend([(NETWORK, alone), (CHOSEN, &scores.network)]),
+            None => rows.push((NETWORK, &scores.network)),
+        }
         // Exact readings that determine the deformation leave only rounding errors.
         let model_based = baselines.model_based.as_ref();
         let model_based = model_based.filter(|errors| !errors.nodes().is_some_and(Errors::is_rounding));
@@ -234,15 +239,29 @@ impl ErrorTable {
         table
     }
 
+    /// Name of the row of what is used: `chosen` if there is one, otherwise `network`.
+    pub fn used(&self) -> &'static str {
+        let mut rows = self.blocks.iter().flat_map(|block| &block.rows);
+        if rows.any(|row| row.name == CHOSEN) {
+            CHOSEN
+        } else {
+            NETWORK
+        }
+    }
+
     /// Adds rows for the errors of the network while each target rises and while it falls; `loops` are in the order of
     /// the targets, `None` for those that do not rise and fall.
     #[must_use]
     pub fn with_loops(mut self, loops: &[Option<HysteresisLoop>]) -> Self {
+        let used = self.used();
         for (block, found) in self.blocks.iter_mut().zip(loops) {
             let Some(HysteresisLoop { loading, unloading, .. }) = found else {
                 continue;
             };
-            let rows = [("network, loading", loading), ("network, unloading", unloading)];
+            let rows = match used {
+                CHOSEN => [("chosen, loading", loading), ("chosen, unloading", unloading)],
+                _ => [("network, loading", loading), ("network, unloading", unloading)],
+            };
             let row = |(name, errors)| ErrorRow::new(name, self.measures, Figures::Target(errors));
             block.rows.extend(rows.map(row));
         }
@@ -251,11 +270,12 @@ impl ErrorTable {
 
     /// Adds the measures of the intervals of the network, target by target.
     fn add_coverage(&mut self, coverage: &[Option<Coverage>]) {
+        let used = self.used();
         self.measures = &ErrorMeasure::OF_TARGETS_WITH_INTERVALS;
         let added = &self.measures[ErrorMeasure::OF_TARGETS.len()..];
         for (index, block) in self.blocks.iter_mut().enumerate() {
             for row in &mut block.rows {
-                let coverage = coverage.get(index).copied().flatten().filter(|_| row.name == NETWORK);
+                let coverage = coverage.get(index).copied().flatten().filter(|_| row.name == used);
                 let of = |measure: &ErrorMeasure| measure.of(Figures::Intervals(coverage.as_ref()?));
                 row.errors.extend(added.iter().map(of));
             }

@@ -1,18 +1,16 @@
 //! Distributions and special functions.
 
-/// Returns the 97.5 % quantile of Student's t with this many degrees of freedom, at least 2 and not necessarily an
-/// integer (Hill 1970, algorithm 396, doi:10.1145/355598.355600), within 3e-4 of the exact value.
-pub(crate) fn student_quantile(freedom: f64) -> f64 {
-    /// Probability of both tails.
-    const TAILS: f64 = 0.05;
-    const NORMAL_QUANTILE: f64 = -1.959_963_984_540_054;
+/// Returns the value that Student's t exceeds in size with the probability `tails`, with this many degrees of freedom, at
+/// least 2 and not necessarily an integer (Hill 1970, algorithm 396, doi:10.1145/355598.355600), for 5 % within 3e-4 of the
+/// exact value.
+pub(crate) fn student_quantile(tails: f64, freedom: f64) -> f64 {
     let a = 1.0 / (freedom - 0.5);
     let b = 48.0 / (a * a);
     let mut c = ((20_700.0 * a / b - 98.0) * a - 16.0) * a + 96.36;
     let d = ((94.5 / (b + c) - 3.0) / b + 1.0) * (0.5 * a * std::f64::consts::PI).sqrt() * freedom;
-    let mut y = (d * TAILS).powf(2.0 / freedom);
+    let mut y = (d * tails).powf(2.0 / freedom);
     if y > 0.05 + a {
-        let x = NORMAL_QUANTILE;
+        let x = -two_sided_normal_quantile(tails);
         y = x * x;
         if freedom < 5.0 {
             c += 0.3 * (freedom - 4.5) * (x + 0.6);
@@ -136,7 +134,7 @@ mod tests {
             (100.0, 1.983_971_518_523_551_8),
             (1e9, 1.959_963_986_912_6),
         ] {
-            let found = student_quantile(freedom);
+            let found = student_quantile(0.05, freedom);
             assert!((found / expected - 1.0).abs() < 5e-4, "{freedom}: {found}");
         }
     }

@@ -82,6 +82,7 @@ impl CheckpointFile {
         sets.check_saved(self.recorded.as_ref())?;
         if let (Some(recordings), Some(saved)) = (&mut sets.recordings, self.recorded) {
             recordings.recorded.search = saved.search;
+            recordings.recorded.blend = saved.blend;
             recordings.recorded.chosen_intervals = saved.chosen_intervals;
         }
         let run = sets.run(&setup, Begin::Resume(self.starts), job)?;

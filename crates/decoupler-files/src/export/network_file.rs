@@ -2,7 +2,8 @@ use std::{fmt::Display, io::Write as _, path::Path, sync::Arc, time::Duration};
 
 use decoupler_core::{
     dataset::{Dataset, MemoryStream, Simulation},
-    evaluation::{ErrorTable, Intervals, Run, RunSettings, Scores, StartRecord, TestErrors},
+    decoupling::{Precision, Program, ProgramDecoder},
+    evaluation::{ErrorTable, Intervals, Run, RunSettings, Scores, StartRecord, TestErrors, auto::Blend},
     job::Job,
     live::{DriftReference, NoDriftMonitor},
     network::{DecouplingNetwork, Networks},
@@ -124,10 +125,15 @@ impl NetworkFile {
     /// [`DocumentError::NoPlan`] if the samples are recorded and no plan is given.
     pub fn from_run(run: &Run, recorded: Option<&Recorded>) -> Result<Self, DocumentError> {
         let scores = run.scores().ok_or(DocumentError::NoPlan(KIND))?;
+        let mut recorded = KIND.recorded_of(run, recorded)?;
+        if let (Some(recorded), None) = (&mut recorded, run.blend()) {
+            // The training was stopped, or has not ended.
+            recorded.forget_choice();
+        }
         Ok(Self {
             program: PROGRAM.to_owned(),
             settings: *run.settings(),
-            recorded: KIND.recorded_of(run, recorded)?,
+            recorded,
             problem: Problem::clone(run.problem()),
             row_wires: run.test().row_wires_read().map(<[usize]>::to_vec),
             network: run.network(),
@@ -145,13 +151,44 @@ impl NetworkFile {
     /// As [`Self::from_run`].
     pub fn from_past(run: &Run, recorded: Option<&Recorded>, past: &PastNetwork) -> Result<Self, DocumentError> {
         let mut file = Self::from_run(run, recorded)?;
-        file.scores.network = run.errors_of(&past.networks.decouple(run.test()));
         file.network = past.networks.clone();
-        // The intervals belong to the latest network.
+        // Intervals and combination belong to the latest network.
         file.intervals = None;
+        file.scores.network_alone = None;
+        if let Some(recorded) = &mut file.recorded {
+            recorded.forget_choice();
+        }
+        file.scores.network = run.errors_of(&file.decoder().answers_to(run.test()));
         file.scores.coverage.clear();
         file.training = TrainingRecord::until(run, past);
         Ok(file)
+    }
+
+    /// Combination that the file answers with, if settings were chosen; otherwise the network alone.
+    pub fn blend(&self) -> Option<&Blend> {
+        self.recorded.as_ref()?.blend.as_ref()
+    }
+
+    /// The program of the answers: of the combination if settings were chosen, otherwise of the network. For a recording,
+    /// readings are limited to their range in training, extended by a tenth.
+    pub fn decoder_program(&self) -> Program {
+        match self.blend() {
+            Some(blend) => blend.program(&self.network, Precision::Double),
+            None => self.network_program(),
+        }
+    }
+
+    /// As [`Self::decoder_program`], of the network alone.
+    pub fn network_program(&self) -> Program {
+        match self.problem.has_nodes() {
+            true => self.network.program(Precision::Double),
+            false => self.network.clipped_program(Precision::Double),
+        }
+    }
+
+    /// Decoder of [`Self::decoder_program`].
+    pub fn decoder(&self) -> ProgramDecoder {
+        ProgramDecoder::new(self.decoder_program())
     }
 
     /// Returns a parser for lines with the inputs of a network that was trained on a recording.
@@ -384,11 +421,13 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         row_wires,
         network,
         training,
-        scores: Scores {
-            network: errors,
-            baselines,
-            coverage: _,
-        },
+        scores:
+            Scores {
+                network: errors,
+                network_alone: alone,
+                baselines,
+                coverage: _,
+            },
         intervals,
         drift,
     } = file;
@@ -417,7 +456,13 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         (drift.as_ref().ok())
             .filter(|drift| !drift.is_valid() || drift.channels() != problem.inputs.len())
             .map(|_| "drift: it does not match the inputs".to_owned()),
+        file.blend()
+            .and_then(|blend| blend.defect(problem.feature_count(), problem.targets.len()))
+            .map(|defect| format!("recorded.blend: {defect}")),
         unmeasured("scores.network", errors, problem),
+        alone
+            .as_ref()
+            .and_then(|errors| unmeasured("scores.network_alone", errors, problem)),
         unmeasured("scores.baselines.mean", &baselines.mean, problem),
         unmeasured("scores.baselines.linear", &baselines.linear, problem),
         (baselines.model_based.as_ref()).and_then(|errors| unmeasured("scores.baselines.model_based", errors, problem)),

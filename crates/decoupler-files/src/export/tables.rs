@@ -392,10 +392,16 @@ pub fn describe_worse_than_ridge(problem: &Problem, scores: &Scores) -> Option<S
         targets.truncate(NAMED);
     }
     let targets = targets.join(", ");
-    Some(format!(
-        "the network is {comparison} ridge regression for {targets}{more}: use ridge, or compare other settings by \
-         cross-validation"
-    ))
+    Some(match scores.network_alone {
+        None => format!(
+            "the network is {comparison} ridge regression for {targets}{more}: use ridge, or compare other settings by \
+             cross-validation"
+        ),
+        Some(_) => format!(
+            "on these test samples, the chosen combination is {comparison} ridge regression for {targets}{more}, though not \
+             in cross-validation on the training samples"
+        ),
+    })
 }
 
 #[cfg(test)]

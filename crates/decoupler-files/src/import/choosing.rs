@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::{Memory, Seed, Stream},
     evaluation::{
         Intervals,
-        auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, choose_settings},
+        auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, choose_settings, dead_channels},
     },
     job::Job,
     scene::RowModel,
@@ -38,7 +38,7 @@ pub enum ChoosingProgress {
 }
 
 /// Minimum number of training samples to choose settings for.
-const MIN_SAMPLES: usize = 40;
+const MIN_SAMPLES: usize = 10;
 
 impl Setup {
     /// Returns `true` if settings can be chosen: for a recording with one network for all rows.
@@ -62,10 +62,16 @@ impl Setup {
         job: &Job<'_>,
         on_progress: &mut dyn FnMut(ChoosingProgress),
     ) -> Result<ChosenSetup, SetupError> {
-        let plan = self.plan().expect("settings are chosen for a recording");
+        let mut plan = self.plan().expect("settings are chosen for a recording").clone();
         let mut on_reading = |progress| on_progress(ChoosingProgress::Reading(progress));
         let read = plan.recordings(folder, &mut watch(job, &mut on_reading));
-        let (recording, test_recording) = unless_cancelled(job, read)?;
+        let (mut recording, mut test_recording) = unless_cancelled(job, read)?;
+        let left_out = leave_out_dead(&mut plan, &recording, self.settings().seed)?;
+        if !left_out.is_empty() {
+            // Rows in which only these channels have no value are samples now.
+            let read = plan.recordings(folder, &mut watch(job, &mut on_reading));
+            (recording, test_recording) = unless_cancelled(job, read)?;
+        }
         let raw = recording.with_memory(None).map_err(ImportError::from)?;
         let mut rng = self.settings().seed.rng(Stream::Split);
         let divided = match test_recording {
@@ -87,7 +93,7 @@ impl Setup {
                 ..fixed.clone()
             };
             let mut on_trying = |progress| on_progress(ChoosingProgress::Trying(progress));
-            Some(choose_settings(
+            let chosen = choose_settings(
                 self.settings(),
                 &fixed,
                 &samples,
@@ -95,9 +101,12 @@ impl Setup {
                 memory_budget(),
                 job,
                 &mut on_trying,
-            )?)
+            );
+            Some(chosen.map(|mut choice| {
+                choice.record.left_out = left_out;
+                choice
+            })?)
         };
-        let mut plan = plan.clone();
         let mut settings = *self.settings();
         if let Some(choice) = &choice {
             settings = choice.settings;
@@ -109,10 +118,9 @@ impl Setup {
         let mut sets = unless_cancelled(job, read)?;
         if let (Some(recordings), Some(choice)) = (&mut sets.recordings, &choice) {
             recordings.recorded.search = Some(choice.record.clone());
-            // The answers are those of committees with the chosen settings, each trained without the fold that it answers to.
-            // Epochs and settings were chosen for these same answers, which makes their errors slightly too small; that they
-            // come from fewer training samples, and for large recordings from every nth of them or smaller committees, makes
-            // them too large, which has the greater effect.
+            recordings.recorded.blend = Some(choice.blend.clone());
+            // The held-out answers of the combination. Its weights, and the epochs, were chosen for these same answers, which
+            // makes their errors slightly too small; that they come from fewer training samples makes them too large.
             let (training, by) = (&sets.sets.split.training, plan.division.by);
             recordings.recorded.chosen_intervals = Some(Intervals::calibrate(training, choice.answers.view(), by));
         }
@@ -122,6 +130,34 @@ impl Setup {
             choice,
         })
     }
+}
+
+/// Removes channels that are nearly dead in the training samples from the plan, and returns their names. A pipe cannot be read
+/// again without them, so that all of its channels stay.
+fn leave_out_dead(plan: &mut Plan, recording: &Recording, seed: Seed) -> Result<Vec<String>, ImportError> {
+    let raw = recording.with_memory(None)?;
+    let (division, mut rng) = (plan.division, seed.rng(Stream::Split));
+    let divided = match plan.test {
+        None => division.divide(&raw.set, &mut rng)?,
+        Some(_) => division.divide_for_training(&raw.set, &mut rng)?,
+    };
+    if plan.irregular().is_some() || divided.training.len() < MIN_SAMPLES {
+        return Ok(Vec::new());
+    }
+    let dead = dead_channels(&raw.set.select(&divided.training));
+    let (mut left_out, mut kept) = (Vec::new(), Vec::new());
+    for (channel, input) in raw.inputs.iter().enumerate() {
+        let names = if dead.contains(&channel) {
+            &mut left_out
+        } else {
+            &mut kept
+        };
+        names.push(input.name.clone());
+    }
+    if !left_out.is_empty() {
+        plan.import.inputs = kept;
+    }
+    Ok(left_out)
 }
 
 /// Divides the recordings with the features of `memory`.

@@ -9,7 +9,10 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Memory},
-    evaluation::{Intervals, auto::AutoRecord},
+    evaluation::{
+        Intervals,
+        auto::{AutoRecord, Blend},
+    },
 };
 use serde::{Deserialize, Serialize};
 
@@ -198,7 +201,10 @@ pub struct Recorded {
     /// What was tried to choose the settings and the memory, if they were chosen automatically.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub search: Option<AutoRecord>,
-    /// Intervals of the network with the chosen settings, from the held-out answers of the choice.
+    /// What was found best instead of the network alone, if settings were chosen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blend: Option<Blend>,
+    /// Intervals of the answers with the chosen settings, from the held-out answers of the choice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chosen_intervals: Option<Intervals>,
 }
@@ -234,6 +240,7 @@ impl Recorded {
             files,
             samples_crc32: samples_crc32([&sets.recording.set, &sets.test]),
             search: None,
+            blend: None,
             chosen_intervals: None,
             plan,
         })
@@ -260,6 +267,11 @@ impl Recorded {
         self.with_paths(|path| if path == from { to.to_owned() } else { path.to_owned() })
     }
 
+    /// Forgets what was chosen for a network with other settings.
+    pub fn forget_choice(&mut self) {
+        (self.blend, self.chosen_intervals) = (None, None);
+    }
+
     /// Returns the paths of recordings that no longer exist.
     pub fn missing(&self) -> Vec<&Path> {
         let files = self.files.iter().map(|file| file.path.as_path());
@@ -276,6 +288,7 @@ impl Recorded {
             plan: self.plan.with_paths(|path| of(path)),
             samples_crc32: self.samples_crc32.clone(),
             search: self.search.clone(),
+            blend: self.blend.clone(),
             chosen_intervals: self.chosen_intervals.clone(),
         }
     }

@@ -262,7 +262,9 @@ impl SetupSets {
     /// # Errors
     /// As [`Run::with_baselines`].
     pub fn run(&self, setup: &Setup, begin: Begin, job: &Job<'_>) -> Result<Run, RunError> {
-        Run::with_baselines(setup.settings, self.sets.clone(), begin, job)
+        let mut run = Run::with_baselines(setup.settings, self.sets.clone(), begin, job)?;
+        run.set_blend(self.recorded().and_then(|recorded| recorded.blend.clone()));
+        Ok(run)
     }
 
     /// Describes the training readings of a recording, by which a later drift is detected.
@@ -289,10 +291,10 @@ impl SetupSets {
         self.recorded()?.chosen_intervals.clone().map(Intervals::checked)
     }
 
-    /// Forgets the intervals of the choice, because the training continues with other settings.
+    /// Forgets the intervals and the combination of the choice, because the training continues with other settings.
     pub fn forget_choice(&mut self) {
         if let Some(recordings) = &mut self.recordings {
-            recordings.recorded.chosen_intervals = None;
+            recordings.recorded.forget_choice();
         }
     }
 

@@ -87,7 +87,7 @@ impl Compared {
             None => TestSet::Array(TestView::draw(&file.settings).map_err(|error| error.to_string())?),
             Some(recorded) => TestSet::Recording(recorded_test(file, recorded, job)?),
         };
-        let answers = Arc::new(file.network.decouple(test.set()));
+        let answers = Arc::new(file.decoder().answers_to(test.set()));
         let drawn = drawn(&test, &answers, 0);
         Ok(Self { test, answers, drawn })
     }

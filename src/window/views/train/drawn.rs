@@ -200,6 +200,7 @@ mod tests {
         let decoupled_mm = run.decouple_test();
         RunResult {
             errors: run.errors_of(&decoupled_mm),
+            network_alone: None,
             answers: Arc::new(decoupled_mm),
             charts: None,
             remarks: Vec::new(),

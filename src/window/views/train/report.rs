@@ -103,9 +103,9 @@ fn search_ui(ui: &mut Ui, run: &RunView) {
         let mut candidates: Vec<(usize, &Tried)> = search.tried.iter().enumerate().collect();
         candidates.sort_by(|(_, one), (_, other)| one.error.total_cmp(&other.error));
         for (place, tried) in candidates {
-            ui.scope(|ui| tried_ui(ui, tried, place == search.chosen));
+            ui.scope(|ui| tried_ui(ui, tried, place == search.chosen || tried.share > 0.0));
         }
-        if let Some(remark) = search.remark() {
+        for remark in search.remarks(&run.problem.targets) {
             note_ui(ui, &remark);
         }
     });
@@ -126,10 +126,16 @@ fn tried_ui(ui: &mut Ui, tried: &Tried, is_chosen: bool) {
         });
     });
     let mut text = tried.features();
+    if tried.share > 0.0 {
+        text = format!("{:.0} % of the answer; {text}", 100.0 * tried.share);
+    }
     if let TriedModel::Network { begin, epochs, .. } = tried.model {
         text += &format!("; {}", counted(epochs, "epoch"));
         if begin != Initialization::default() {
             text += &format!(" from {begin}");
+        }
+        if tried.is_cut_off {
+            text += ", cut off by the budget";
         }
     }
     dim_ui(ui, &text);
@@ -159,6 +165,7 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
         let published = shared.draft.published().filter(|_| is_of_draft);
         let scores = Scores {
             network: baselines.mean.clone(),
+            network_alone: None,
             baselines,
             coverage: Vec::new(),
         };

@@ -168,8 +168,13 @@ fn result_at(
 ) -> Option<RunResult> {
     let past = past.at(epoch, present)?;
     let (networks, best_epoch) = (past.networks, past.best_epoch);
-    let answers = networks.decouple(test.set());
+    let program = match problem.has_nodes() {
+        true => networks.program(Precision::Double),
+        false => networks.clipped_program(Precision::Double),
+    };
+    let answers = ProgramDecoder::new(program).answers_to(test.set());
     Some(RunResult {
+        network_alone: None,
         errors: TestErrors::measure(problem, test.set(), &answers),
         answers: Arc::new(answers),
         frame: None,

@@ -3,7 +3,11 @@
 use ndarray::{Array2, ArrayView1, Axis, Slice};
 
 use super::{Builder, Domain, Node, NodeId, Operation, Program};
-use crate::{decoupling::Precision, network::{DecouplingNetwork, Quantity}, dataset::PerRow};
+use crate::{
+    dataset::PerRow,
+    decoupling::Precision,
+    network::{DecouplingNetwork, Quantity},
+};
 
 impl Program {
     /// The sum of the answers of programs that take the same readings, each target multiplied by its weight: an affine map of
@@ -90,22 +94,21 @@ impl Program {
             }
             Operation::Valid { of, .. } | Operation::Map(_, of) => Some(size(of)),
             Operation::Subtract(one, other) | Operation::Divide(one, other) => same(&[*one, *other]),
-            Operation::Affine { of, weights, biases } => (is_constant(weights)
-                && is_constant(biases)
-                && size(weights) == size(of) * size(biases))
-            .then(|| size(biases)),
-            Operation::SquaredDistances { of, points } => (is_constant(points)
-                && size(of) > 0
-                && size(points).is_multiple_of(size(of)))
-            .then(|| size(points) / size(of)),
+            Operation::Affine { of, weights, biases } => {
+                (is_constant(weights) && is_constant(biases) && size(weights) == size(of) * size(biases))
+                    .then(|| size(biases))
+            }
+            Operation::SquaredDistances { of, points } => {
+                (is_constant(points) && size(of) > 0 && size(points).is_multiple_of(size(of)))
+                    .then(|| size(points) / size(of))
+            }
             Operation::Clip { of, low, high } => same(&[*of, *low, *high]),
             Operation::CountOutside { of, low, high } => same(&[*of, *low, *high]).map(|_| 1),
             Operation::Concatenate(parts) => Some(parts.iter().map(size).sum()),
-            Operation::Blend { logits, of } => (size(logits) > 0 && size(of).is_multiple_of(size(logits)))
-                .then(|| size(of) / size(logits)),
-            Operation::History { of, memory } => {
-                memory.check(size(of)).ok().map(|()| memory.features(size(of)))
+            Operation::Blend { logits, of } => {
+                (size(logits) > 0 && size(of).is_multiple_of(size(logits))).then(|| size(of) / size(logits))
             }
+            Operation::History { of, memory } => memory.check(size(of)).ok().map(|()| memory.features(size(of))),
         }
     }
 }
@@ -127,32 +130,27 @@ impl Builder {
 }
 
 impl PerRow<DecouplingNetwork> {
-    /// As [`Self::program`], with readings limited to their range in training, extended by a tenth: a network extrapolates
-    /// without bound. Networks whose range is not known are not limited.
+    /// As [`Self::program`], with limited readings: see [`Self::clipped`].
     ///
     /// # Panics
     /// As [`Self::program`].
     pub fn clipped_program(&self, precision: Precision) -> Program {
-        Program::each(&self.map(|network| {
-            let program = network.program(precision);
-            network.limits().map_or(program.clone(), |limits| program.clipped(network.domain(), &limits))
-        }))
-    }
-}
-
-impl DecouplingNetwork {
-    /// Limits of the readings: their range in training, extended by a tenth; `None` if it is not known.
-    pub(crate) fn limits(&self) -> Option<Vec<(f64, f64)>> {
-        let (range, quantity) = (self.inputs().range()?, self.inputs().quantity());
-        let limits = (0..range.channels()).map(|channel| range.limits(quantity, channel));
-        Some(limits.collect())
+        self.clipped(|network| network.program(precision))
     }
 
-    /// Numbers that the network accepts as readings.
-    pub(crate) fn domain(&self) -> Domain {
-        match self.inputs().quantity() {
-            Quantity::Raw => Domain::Finite,
-            Quantity::Resistance | Quantity::Conductance | Quantity::LogResistance => Domain::Positive,
-        }
+    /// Joins one program for each network, with the readings limited to their range in training, extended by a tenth: outside,
+    /// networks and maps extrapolate without bound. Those of networks whose range is not known are not limited.
+    pub(crate) fn clipped(&self, program: impl Fn(&DecouplingNetwork) -> Program) -> Program {
+        let limited = |network: &DecouplingNetwork| {
+            let (inputs, program) = (network.inputs(), program(network));
+            let Some(range) = inputs.range() else { return program };
+            let domain = match inputs.quantity() {
+                Quantity::Raw => Domain::Finite,
+                Quantity::Resistance | Quantity::Conductance | Quantity::LogResistance => Domain::Positive,
+            };
+            let limits = (0..range.channels()).map(|channel| range.limits(inputs.quantity(), channel));
+            program.clipped(domain, &Vec::from_iter(limits))
+        };
+        Program::each(&self.map(limited))
     }
 }

@@ -6,7 +6,7 @@ use super::{
     kernel::{self, LANES, Placement, Table},
 };
 use crate::{
-    dataset::{MemoryStream, PerRow, Series},
+    dataset::{Dataset, MemoryStream, PerRow, Series},
     decoupling::{DecodeError, Decoder, NotDescribed, Precision},
 };
 
@@ -136,6 +136,16 @@ impl ProgramDecoder {
                 stream.restart();
             }
         }
+    }
+
+    /// Answers to all samples of a set, each with the index of its row-wire: samples × outputs. NaN where a reading cannot be
+    /// decoded.
+    ///
+    /// # Panics
+    /// As [`Self::answers`].
+    pub fn answers_to(&mut self, set: &Dataset) -> Array2<f64> {
+        let row_indices = Vec::from_iter((0..set.samples()).map(|sample| set.row_index(sample)));
+        self.answers(&row_indices, set.readings())
     }
 
     /// Answers to `readings` (samples × channels), each with the index of its row-wire: samples × outputs. NaN where a

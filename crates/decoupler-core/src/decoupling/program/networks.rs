@@ -37,8 +37,7 @@ impl PerRow<DecouplingNetwork> {
     /// # Panics
     /// If the set has a different number of channels, or a row-wire without a network.
     pub fn decouple(&self, set: &Dataset) -> Array2<f64> {
-        let row_indices = Vec::from_iter((0..set.samples()).map(|sample| set.row_index(sample)));
-        self.decoder().answers(&row_indices, set.readings())
+        self.decoder().answers_to(set)
     }
 }
 

@@ -6,40 +6,32 @@ use super::{
         Begin, Run, RunError, RunSets, RunSettings,
         cross_validation::{nth_seed, scatter},
     },
-    FoldErrors,
-    fold_errors::variances,
+    features::Features,
+    judge::Judge,
 };
 use crate::{
-    dataset::{Dataset, Folds, Split},
+    dataset::{Dataset, Split},
+    decoupling::{Program, ProgramDecoder},
     job::Job,
     machine::MemoryBudget,
     network::Shape,
+    scene::NoiseSource,
     training::{StoppingRules, TrainingError},
 };
 
 /// Committees trained on all folds but one, for each fold, which advance together epoch by epoch: the epoch at which to
 /// stop is that with the lowest error over all folds.
 pub(super) struct FoldedTraining<'a> {
-    folds: &'a Folds,
-    variances: Vec<f64>,
+    judge: &'a Judge,
     parts: Vec<Part>,
     /// Epoch of the latest weights.
     pub(super) epoch: usize,
     /// Number of multiplications of one epoch of all trainings, from the shapes alone.
     pub(super) epoch_multiplications: f64,
-    /// Best epoch so far; `None` if no epoch had finite answers.
-    pub(super) best: Option<BestEpoch>,
+    /// Epoch with the lowest error so far, the error, and the held-out answers; `None` if no epoch had finite answers.
+    pub(super) best: Option<(usize, f64, Array2<f64>)>,
     /// Last epoch that lowered the error noticeably, and the error then.
     gain: (usize, f64),
-}
-
-/// Errors and answers at the epoch with the lowest error so far.
-#[derive(Clone, Debug)]
-pub(super) struct BestEpoch {
-    pub(super) epoch: usize,
-    pub(super) errors: FoldErrors,
-    /// Held-out answers to all samples: samples × targets.
-    pub(super) answers: Array2<f64>,
 }
 
 /// Trainings without one fold.
@@ -47,8 +39,11 @@ struct Part {
     /// The training and the scaled inputs of the held-out samples; `None` if every target is constant without the fold: the
     /// constant is then the answer.
     run: Option<(Run, Array2<f64>)>,
-    targets: Array2<f64>,
+    /// Answers to which those of the networks are added: of ridge regression, if they learn what it leaves.
+    base: Array2<f64>,
     answers: Array2<f64>,
+    /// Rows of the answers among all held-out answers.
+    rows: Vec<usize>,
 }
 
 /// Returns the number of multiplications of an epoch of all starts on this many samples, and of their answers to `answered`
@@ -61,22 +56,43 @@ pub(super) fn training_multiplications(settings: &RunSettings, shape: Shape, sam
     settings.starts as f64 * (training + answers as f64)
 }
 
+/// Returns ridge regression fitted to a set, and the set with what it leaves of the targets.
+pub(super) fn residual(set: &Dataset, settings: &RunSettings) -> Result<(Program, Dataset), RunError> {
+    let ridge = Program::ridge(set, settings.inputs.quantity, NoiseSource::default())?;
+    let answers = ProgramDecoder::new(ridge.clone()).answers_to(set);
+    let left = &set.targets() - &answers;
+    let residual = Dataset::new(set.readings().to_owned(), left, None, set.groups().to_vec());
+    Ok((ridge, residual?))
+}
+
 impl<'a> FoldedTraining<'a> {
-    /// Prepares trainings with `settings` on every `stride`th sample of `set` outside each fold.
+    /// Prepares trainings with `settings` on every `stride`th sample outside each fold; of what ridge regression leaves, with
+    /// `is_on_residual`.
     pub(super) fn new(
         settings: &RunSettings,
-        set: &Dataset,
-        folds: &'a Folds,
-        stride: usize,
+        features: &Features,
+        judge: &'a Judge,
+        (stride, is_on_residual): (usize, bool),
         memory: MemoryBudget,
     ) -> Result<Self, RunError> {
         let mut endless = *settings;
         endless.training.stopping.epochs = StoppingRules::MAX_EPOCHS;
-        let parts = (0..folds.count()).into_par_iter().map(|fold| {
-            let thinned: Vec<usize> = folds.without(&[fold]).into_iter().step_by(stride).collect();
-            let seed = nth_seed(settings.seed, fold);
-            let settings = RunSettings { seed, ..endless };
-            Part::new(settings, set.select(&thinned), &set.select(folds.test(fold)), memory)
+        let divisions = Vec::from_iter(judge.divisions().enumerate());
+        let parts = divisions.into_par_iter().map(|(part, (outside, inside, rows))| {
+            let settings = RunSettings {
+                seed: nth_seed(settings.seed, part),
+                ..endless
+            };
+            let readings = features.held_out(&outside, inside, settings.inputs.quantity);
+            let thinned = Vec::from_iter(outside.into_iter().step_by(stride));
+            let mut training = features.set.select(&thinned);
+            let mut base = Array2::zeros((inside.len(), training.outputs()));
+            if is_on_residual {
+                let ridge;
+                (ridge, training) = residual(&training, &settings)?;
+                base = ProgramDecoder::new(ridge).answers(&vec![0; inside.len()], readings.view());
+            }
+            Part::new(settings, training, (readings, base, rows), memory)
         });
         let parts: Vec<Part> = parts.collect::<Result<_, _>>()?;
         if parts.iter().all(|part| part.run.is_none()) {
@@ -85,11 +101,10 @@ impl<'a> FoldedTraining<'a> {
         let of_part = |part: &Part| {
             let Some((run, _)) = &part.run else { return 0.0 };
             let first = &run.leader().rows()[0];
-            training_multiplications(settings, first.present().shape(), first.samples(), part.targets.nrows())
+            training_multiplications(settings, first.present().shape(), first.samples(), part.rows.len())
         };
         Ok(Self {
-            folds,
-            variances: variances(set.targets()),
+            judge,
             epoch_multiplications: parts.iter().map(of_part).sum(),
             parts,
             epoch: 0,
@@ -102,23 +117,16 @@ impl<'a> FoldedTraining<'a> {
     pub(super) fn step(&mut self) {
         self.parts.par_iter_mut().for_each(Part::step);
         self.epoch += 1;
-        let squares = Vec::from_iter(self.parts.iter().map(Part::squared_errors));
-        let errors = FoldErrors::new(&squares, &self.variances, self.folds);
-        if errors.upper() < Self::NOTICEABLE * self.gain.1 {
-            self.gain = (self.epoch, errors.upper());
+        let mut answers = Array2::zeros(self.judge.truth.dim());
+        for part in &self.parts {
+            scatter(&mut answers, &part.rows, &part.answers);
         }
-        let is_best = |best: &BestEpoch| errors.upper() < best.errors.upper();
-        if errors.relative().is_finite() && self.best.as_ref().is_none_or(is_best) {
-            let samples = self.parts.iter().map(|part| part.targets.nrows()).sum();
-            let mut answers = Array2::zeros((samples, self.variances.len()));
-            for (fold, part) in self.parts.iter().enumerate() {
-                scatter(&mut answers, self.folds.test(fold), &part.answers);
-            }
-            self.best = Some(BestEpoch {
-                epoch: self.epoch,
-                errors,
-                answers,
-            });
+        let (error, _) = self.judge.error(&answers);
+        if error < Self::NOTICEABLE * self.gain.1 {
+            self.gain = (self.epoch, error);
+        }
+        if error.is_finite() && self.best.as_ref().is_none_or(|(_, best, _)| error < *best) {
+            self.best = Some((self.epoch, error, answers));
         }
     }
 
@@ -135,12 +143,18 @@ impl<'a> FoldedTraining<'a> {
 }
 
 impl Part {
-    fn new(settings: RunSettings, training: Dataset, test: &Dataset, memory: MemoryBudget) -> Result<Self, RunError> {
-        let constant = |(_, target)| training.targets()[[0, target]];
+    fn new(
+        settings: RunSettings,
+        training: Dataset,
+        (readings, base, rows): (Array2<f64>, Array2<f64>, Vec<usize>),
+        memory: MemoryBudget,
+    ) -> Result<Self, RunError> {
+        let constant = |(row, target)| base[[row, target]] + training.targets()[[0, target]];
         let mut part = Self {
             run: None,
-            targets: test.targets().to_owned(),
-            answers: Array2::from_shape_fn(test.targets().dim(), constant),
+            answers: Array2::from_shape_fn(base.dim(), constant),
+            base,
+            rows,
         };
         if training.has_varying_target() {
             let validation = None;
@@ -149,7 +163,7 @@ impl Part {
                 ..RunSets::without_test(Split { training, validation })
             };
             let run = Run::new(settings, sets, Begin::Initialize, &Job::UNINTERRUPTED)?;
-            let inputs = run.scalings.at(0).0.of(test.readings());
+            let inputs = run.scalings.at(0).0.of(readings.view());
             part.run = Some((run, inputs));
         }
         Ok(part)
@@ -162,13 +176,6 @@ impl Part {
         let scaled = present.map(|network| network.forward(inputs.view()));
         let sum = scaled.reduce(|sum, scaled| sum + scaled).expect("a run has a start");
         let mean = sum / run.trainers().len() as f64;
-        self.answers = run.scalings.at(0).1.restore(mean.view());
-    }
-
-    /// Returns the sum of the squared errors of each target.
-    fn squared_errors(&self) -> Vec<f64> {
-        let squares = (&self.answers - &self.targets).powi(2);
-        let sums = squares.columns().into_iter().map(|of_target| of_target.iter().sum());
-        sums.collect()
+        self.answers = run.scalings.at(0).1.restore(mean.view()) + &self.base;
     }
 }

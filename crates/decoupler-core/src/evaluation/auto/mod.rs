@@ -1,39 +1,48 @@
-//! Settings chosen from the data: features, hidden nodes, method, epochs and committee by cross-validation that respects
-//! time and groups, within a budget of work.
+//! Settings chosen from the data: memory, quantity, hidden nodes, method and epochs by cross-validation that respects time and
+//! groups, within a budget of work.
 //!
-//! The search goes from cheap to dear. Ridge regression screens the features (quantity, memory); small networks try the
-//! best of them; then hidden nodes, then scaling, method and regularisation are varied; last, the best few are
-//! cross-validated again as the committees that would be trained. Every network is judged by the lowest point of its error
-//! over epochs, which is also when its training will stop. That error is the mean over folds plus its standard error, so
-//! that a choice is steady from fold to fold. Among networks with the features of the best, the smallest wins that is not
-//! worse by more than the standard error of the difference (Breiman et al. 1984).
+//! Candidates are the training mean, ridge regression, kernel ridge regression and networks, also networks on what ridge
+//! regression leaves. All are judged by their held-out answers in the same folds, a network at the lowest point of its error over
+//! epochs, which is also when its training will stop. The answer is the convex combination of the best of each family, for
+//! each target by non-negative least squares on the held-out answers (stacking: Breiman 1996, doi:10.1007/BF00117832); in the
+//! folds it is never worse than one of them. The network is trained in any case.
+//!
+//! A memory is tried only on readings with times, or on request, and is taken only if it is clearly better in paired
+//! comparisons: on samples in an order that the targets follow, such as a scan, it learns that order. Channels that are
+//! [nearly dead](dead_channels) are to be left out before, and targets that nothing determines take no part in the choice.
 //!
 //! The budget counts estimated multiplications, never seconds of a clock, so that the same samples and seed give the same
 //! choice on every machine. Test samples take no part.
 
-mod fold_errors;
+mod blend;
+mod channels;
+mod features;
 mod folded_training;
+mod judge;
 mod search;
 mod spans;
 #[cfg(test)]
 mod tests;
+mod weights;
 
 use std::fmt;
 
-use ndarray::{Array2, Axis};
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 use super::{Initialization, RunSettings};
 use crate::{
     dataset::{Dataset, History, Memory, Span, SplitBy},
     network::{InputChoice, Quantity, ScalingChoice},
-    text::format_percent,
+    problem::Channel,
+    text::{format_below_one, format_percent},
     training::Method,
 };
-use fold_errors::FoldErrors;
+pub use blend::Blend;
+pub use channels::dead_channels;
 pub use search::choose_settings;
 
-/// Time on one core that a search may take if nothing else is given, in seconds.
+/// Time on one core that a choice and the training may take if nothing else is given, in seconds.
 pub const DEFAULT_BUDGET_S: f64 = 60.0;
 
 /// Multiplications that count as one second of one core: about those of a training of small networks on an ordinary
@@ -52,18 +61,6 @@ pub struct AutoSamples<'a> {
     pub by: SplitBy,
 }
 
-impl AutoSamples<'_> {
-    /// Returns the samples with the features of `memory` as readings; `None` if it is not possible for them.
-    fn with_memory(&self, memory: &Memory) -> Option<Dataset> {
-        if memory.is_empty() {
-            return Some(self.set.clone());
-        }
-        let (history, samples) = self.past?;
-        let features = history.features(memory).ok()?;
-        Some(self.set.with_readings(features.select(Axis(0), samples)))
-    }
-}
-
 /// Settings given by the user, which are not searched.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AutoFixed {
@@ -79,6 +76,8 @@ pub struct AutoFixed {
     pub scaling: Option<ScalingChoice>,
     /// Features; the readings alone if empty.
     pub memory: Option<Memory>,
+    /// `true` if memories are to be tried even without times.
+    pub tries_memory: bool,
 }
 
 /// Progress of a search.
@@ -93,13 +92,15 @@ pub struct AutoProgress {
 /// Result of a search.
 #[derive(Clone, Debug)]
 pub struct AutoChoice {
-    /// Settings of the run: inputs, hidden nodes, method, epochs and committee.
+    /// Settings of the network: inputs, hidden nodes, method, epochs and starts.
     pub settings: RunSettings,
     /// Memory from which the features are made.
     pub memory: Memory,
+    /// The best combination with the network.
+    pub blend: Blend,
     /// Everything that was tried.
     pub record: AutoRecord,
-    /// Held-out answers of the choice to all samples (samples × targets), each by a committee trained without its fold.
+    /// Held-out answers of the combination to all samples (samples × targets).
     pub answers: Array2<f64>,
 }
 
@@ -115,8 +116,24 @@ pub struct AutoRecord {
     pub by: SplitBy,
     /// Candidates in the order in which they were tried.
     pub tried: Vec<Tried>,
-    /// Index of the choice in `tried`.
+    /// Index of the network to be trained in `tried`.
     pub chosen: usize,
+    /// Error of the combination, as [`Tried::error`]; `None` in files of version 0.1.0, whose choice is the network alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub combined: Option<f64>,
+    /// Estimated time of the training on one core in seconds, which counts against the budget.
+    #[serde(default)]
+    pub training_s: f64,
+    /// Names of the channels that are left out.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
+    /// Indices of the targets that nothing determines, which took no part in the choice.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub undetermined: Vec<usize>,
+    /// Targets that a memory predicts and the readings of the moment do not: the index of each, and R² without and with
+    /// memory.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub leaks: Vec<(usize, [f64; 2])>,
 }
 
 /// A candidate and its cross-validated error.
@@ -130,34 +147,50 @@ pub struct Tried {
     pub inputs: InputChoice,
     /// Model on the features.
     pub model: TriedModel,
-    /// Root mean square error of held-out answers, relative to the standard deviation of each target and averaged over
-    /// targets: 1 for always answering the mean.
+    /// Root mean square error of held-out answers, relative to the standard deviation of each target and averaged over the
+    /// targets that count: 1 for always answering the mean.
     pub error: f64,
     /// Standard error of `error`, from the differences between folds.
     pub standard_error: f64,
     /// Estimated time on one core in seconds, which counts against the budget.
     pub seconds: f64,
+    /// Mean weight in the combination over the targets that count.
+    #[serde(default)]
+    pub share: f64,
+    /// `true` if the budget ended its training before the error had passed its lowest point.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_cut_off: bool,
 }
 
 /// Model that was tried.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TriedModel {
+    /// The mean of the training samples.
+    Mean,
     /// Ridge regression.
     Ridge,
-    /// Committee of networks.
+    /// Kernel ridge regression with Gaussians.
+    Kernel {
+        /// `true` if a linear kernel is added.
+        is_linear: bool,
+    },
+    /// Mean of several networks.
     Network {
         /// Number of hidden nodes of each.
         hidden: usize,
         /// Training method.
         method: Method,
-        /// Number of networks in the committee.
+        /// Number of networks.
         starts: usize,
         /// Epochs after which the error was lowest.
         epochs: usize,
         /// Weights with which the trainings begin.
         #[serde(default, skip_serializing_if = "Initialization::is_random")]
         begin: Initialization,
+        /// `true` if they learn what ridge regression leaves.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        is_on_residual: bool,
     },
 }
 
@@ -169,28 +202,36 @@ impl Tried {
 }
 
 impl fmt::Display for TriedModel {
-    /// Writes `ridge`, or `5 × 8 hidden nodes, br`.
+    /// Writes `ridge`, or `2 × 8 hidden nodes, br`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self::Network {
-            hidden, method, starts, ..
+            hidden,
+            method,
+            starts,
+            is_on_residual,
+            ..
         } = self
         else {
-            return f.write_str("ridge");
+            return f.write_str(match self {
+                Self::Mean => "mean",
+                Self::Kernel { is_linear: true } => "kernel ridge, Gaussian + linear",
+                Self::Kernel { is_linear: false } => "kernel ridge, Gaussian",
+                _ => "ridge",
+            });
         };
-        let correlated = match method {
-            Method::BayesianRegularization(settings) if settings.correlation_epoch > 0.0 => ", errors correlated",
-            _ => "",
-        };
-        write!(
-            f,
-            "{starts} × {hidden} hidden nodes, {}{correlated}",
-            method.short_name()
-        )
+        write!(f, "{starts} × {hidden} hidden nodes, {}", method.short_name())?;
+        // Candidates that differ in nothing else.
+        if let Method::ScaledConjugateGradient(settings) = method
+            && settings.decay > 0.0
+        {
+            write!(f, ", decay {:.2}", settings.decay)?;
+        }
+        f.write_str(if *is_on_residual { ", added to ridge" } else { "" })
     }
 }
 
 impl AutoRecord {
-    /// Returns the candidate that was chosen.
+    /// Returns the network that was chosen to be trained.
     pub fn choice(&self) -> Option<&Tried> {
         self.tried.get(self.chosen)
     }
@@ -200,20 +241,53 @@ impl AutoRecord {
         self.tried.iter().map(|tried| tried.seconds).sum()
     }
 
-    /// Remarks that no network was better than ridge regression; `None` if the choice was.
-    pub fn remark(&self) -> Option<String> {
-        let ridges = self.tried.iter().filter(|tried| tried.model == TriedModel::Ridge);
-        let best = ridges.min_by(|one, other| one.error.total_cmp(&other.error));
-        let (choice, ridge) = (self.choice()?, best?);
-        (choice.error >= ridge.error).then(|| {
+    /// Remarks on what was found: channels that are left out, targets that are not determined or may leak, and the network if
+    /// it is no better than ridge regression.
+    pub fn remarks(&self, targets: &[Channel]) -> Vec<String> {
+        let mut remarks = Vec::new();
+        let name = |index: &usize| targets.get(*index).map_or("a target", |target| &target.name).to_owned();
+        if !self.left_out.is_empty() {
+            remarks.push(format!(
+                "left out as nearly dead (few different values, or nearly always the same): {}; give the settings of the \
+                 training to keep them",
+                self.left_out.join(", ")
+            ));
+        }
+        if !self.undetermined.is_empty() {
+            let names = Vec::from_iter(self.undetermined.iter().map(name));
+            remarks.push(format!(
+                "nothing that was tried explains {} in cross-validation: the choice of settings leaves it out",
+                names.join(", ")
+            ));
+        }
+        remarks.extend(self.leaks.iter().map(|(target, [now, past])| {
             format!(
-                "in cross-validation, no network that was tried is better than ridge regression: error {} of the spread of \
-                 the targets, ridge ({}) {}",
-                format_percent(100.0 * choice.error),
+                "possible leak: a memory predicts {} (R² {}), but the readings of the moment do not (R² {}). Either the order \
+                 of recording gives it away, which does not help in use, or the sensor responds to changes only; give a memory \
+                 if it is the latter",
+                name(target),
+                format_below_one(*past, 2),
+                format_below_one(*now, 2)
+            )
+        }));
+        let ridges = self.tried.iter().filter(|tried| tried.model == TriedModel::Ridge);
+        let best = |one: &&Tried, other: &&Tried| one.error.total_cmp(&other.error);
+        let networks = self
+            .tried
+            .iter()
+            .filter(|tried| matches!(tried.model, TriedModel::Network { .. }));
+        if let (Some(network), Some(ridge)) = (networks.min_by(best), ridges.min_by(best))
+            && network.error >= ridge.error
+        {
+            remarks.push(format!(
+                "in cross-validation, the best network that was tried has an error of {} of the spread of the targets, and \
+                 ridge regression on {} one of {}",
+                format_percent(100.0 * network.error),
                 ridge.features(),
                 format_percent(100.0 * ridge.error)
-            )
-        })
+            ));
+        }
+        remarks
     }
 }
 

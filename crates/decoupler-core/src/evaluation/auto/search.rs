@@ -1,27 +1,28 @@
+use ndarray::{Array2, Axis, concatenate};
+
 use super::{
-    super::{Combination, Initialization, RunError, RunSettings, errors::extremes},
-    AutoChoice, AutoFixed, AutoProgress, AutoRecord, AutoSamples, MULTIPLICATIONS_PER_SECOND, Tried, TriedModel,
+    super::{Begin, Combination, Initialization, Run, RunError, RunSets, RunSettings, errors::extremes},
+    AutoChoice, AutoFixed, AutoProgress, AutoRecord, AutoSamples, Blend, MULTIPLICATIONS_PER_SECOND, Tried, TriedModel,
     describe_features,
-    fold_errors::{FoldErrors, variances},
-    folded_training::{BestEpoch, FoldedTraining, training_multiplications},
+    features::Features,
+    folded_training::{FoldedTraining, residual, training_multiplications},
+    judge::Judge,
     spans::memories,
+    weights::convex_weights,
 };
 use crate::{
-    dataset::{Dataset, Folds, Memory, Seed, SplitBy, Stream},
-    decoupling::{Regression, ridge},
+    dataset::{Memory, Split, SplitBy},
+    decoupling::{KernelShape, Precision, Program, Regression},
     job::Job,
     machine::MemoryBudget,
     network::{InputChoice, InputScaling, Inputs, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
+    scene::NoiseSource,
     text::format_percent,
     training::{Damping, Method, RegularizationSettings, ScaledConjugateGradientSettings, TrainingError},
 };
 
-/// Number of blocks or sets of groups in the cross-validation.
-const FOLDS: usize = 4;
-/// Networks of a committee.
+/// Largest number of networks whose mean is taken.
 const COMMITTEE: usize = 5;
-/// Networks of a committee while settings are compared.
-const SCREENED: usize = 2;
 /// Minimum number of epochs of a candidate.
 const MIN_EPOCHS: usize = 10;
 /// Number of epochs for which samples are thinned out.
@@ -32,18 +33,18 @@ const EPOCHS: (usize, usize) = (400, 15);
 const SHORT_EPOCHS: (usize, usize) = (3000, 300);
 /// Numbers of hidden nodes to try, in ascending order.
 const HIDDEN: [usize; 6] = [2, 4, 8, 16, 32, 64];
-/// Hidden nodes with which features are compared.
-const FIRST_HIDDEN: usize = 4;
-/// Hidden nodes with which features are compared where samples are fewer than weights.
-const FIRST_HIDDEN_WIDE: usize = 16;
+/// Hidden nodes with which the search begins, and those where samples are fewer than weights.
+const FIRST_HIDDEN: [usize; 2] = [4, 16];
 /// Weight decays to try, for each sample; the first one first.
 const DECAYS: [f64; 3] = [3e-4, 3e-5, 3e-3];
-/// Feature sets that networks try, next to the plain readings.
-const FEATURE_SETS: usize = 2;
-/// Candidates that are compared again as committees.
-const FINALISTS: usize = 2;
-/// Epoch after which the correlation of errors is measured, if it is: not for trainings that end before.
-const CORRELATION_EPOCH: f64 = 20.0;
+/// Largest ratio of the error of a member of the combination to that of the best.
+const WORST_MEMBER: f64 = 1.5;
+/// Smallest weight of a member, below which it is not worth its place.
+const SMALLEST_WEIGHT: f64 = 0.05;
+/// Share of the variance that the best candidate leaves of a target that is not determined, and those that the readings of
+/// the moment and a memory leave of one that may leak.
+const UNDETERMINED: f64 = 0.95;
+const LEAK: [f64; 2] = [0.9, 0.5];
 
 /// Initial damping, and its factor after each epoch. Gauss-Newton steps without damping fit noise within an epoch or two
 /// where weights are many; with damping that falls gradually, the number of epochs regularises.
@@ -57,42 +58,27 @@ const DAMPING: Damping = Damping {
 /// Ratio of the damping of Bayesian regularisation, which is relative to the noise, to that of Levenberg-Marquardt.
 const PER_NOISE: f64 = 100.0;
 
-/// A network with its features.
-#[derive(Clone, Debug, PartialEq)]
-struct Candidate {
-    memory: Memory,
-    settings: RunSettings,
-}
-
-impl Candidate {
-    fn has_features_of(&self, other: &Self) -> bool {
-        self.memory == other.memory && self.settings.inputs == other.settings.inputs
-    }
-
-    fn with(&self, change: impl FnOnce(&mut RunSettings)) -> Self {
-        let mut changed = self.clone();
-        change(&mut changed.settings);
-        changed
-    }
-
-    fn model(&self, epochs: usize) -> TriedModel {
-        TriedModel::Network {
-            hidden: self.settings.hidden,
-            method: self.settings.training.method,
-            starts: self.settings.starts,
-            epochs,
-            begin: self.settings.initialization,
-        }
-    }
+/// How a candidate is fitted to all samples.
+#[derive(Clone)]
+enum Fit {
+    /// It is fitted.
+    Done(Program),
+    /// A kernel of this shape, with this many centres.
+    Kernel(KernelShape, usize),
+    /// A network of these settings; on what ridge regression leaves unless it is the last member.
+    Network(RunSettings),
 }
 
 /// A candidate that was cross-validated.
 #[derive(Clone)]
-struct Measured {
-    candidate: Candidate,
+struct Member {
+    fit: Fit,
+    /// Held-out answers.
+    answers: Array2<f64>,
+    /// Relative error.
+    error: f64,
     /// Index of its record.
     place: usize,
-    best: BestEpoch,
 }
 
 /// A search in progress.
@@ -100,18 +86,17 @@ struct Search<'a> {
     base: RunSettings,
     fixed: &'a AutoFixed,
     samples: &'a AutoSamples<'a>,
-    folds: Folds,
+    judge: Judge,
     budget_s: f64,
     memory: MemoryBudget,
     /// `true` if even a small network has more weights than there are samples. Levenberg-Marquardt then fits noise within
     /// an epoch or two, and its epochs are expensive.
     is_wide: bool,
-    /// Hidden nodes with which features are compared.
-    first_hidden: usize,
     /// Multiplications used so far.
     work: f64,
-    tried: Vec<Tried>,
-    networks: Vec<Measured>,
+    record: AutoRecord,
+    /// Networks that were tried.
+    networks: Vec<Member>,
     job: &'a Job<'a>,
     on_progress: &'a mut dyn FnMut(AutoProgress),
 }
@@ -130,21 +115,31 @@ pub fn choose_settings(
     job: &Job<'_>,
     on_progress: &mut dyn FnMut(AutoProgress),
 ) -> Result<AutoChoice, RunError> {
-    if variances(samples.set.targets()).iter().all(|variance| *variance == 0.0) {
+    let judge = Judge::new(samples, base.seed)?;
+    if judge.variances.iter().all(|variance| *variance == 0.0) {
         return Err(TrainingError::NothingVaries.into());
     }
-    let is_wide = shape(samples.set, FIRST_HIDDEN).weights() > samples.set.samples();
     let search = Search {
         base: *base,
         fixed,
         samples,
-        folds: folds(samples, base.seed)?,
         budget_s,
         memory,
-        is_wide,
-        first_hidden: if is_wide { FIRST_HIDDEN_WIDE } else { FIRST_HIDDEN },
+        is_wide: false,
         work: 0.0,
-        tried: Vec::new(),
+        record: AutoRecord {
+            budget_s,
+            folds: judge.repeats[0].count(),
+            by: samples.by,
+            tried: Vec::new(),
+            chosen: 0,
+            combined: None,
+            training_s: 0.0,
+            left_out: Vec::new(),
+            undetermined: Vec::new(),
+            leaks: Vec::new(),
+        },
+        judge,
         networks: Vec::new(),
         job,
         on_progress,
@@ -153,42 +148,278 @@ pub fn choose_settings(
 }
 
 impl Search<'_> {
-    /// Tries features, then hidden nodes, then scalings and methods, then committees.
+    /// Compares what is cheap, which decides on the features, and then networks.
     fn run(mut self) -> Result<AutoChoice, RunError> {
-        let candidates = self.screen_features()?;
-        self.try_all(candidates, 0.35, 0)?;
-        if self.fixed.hidden.is_none() {
-            self.vary_hidden(0.7)?;
+        let (features, mut members, inputs) = self.compare_fits()?;
+        self.is_wide = self.shape(&features, FIRST_HIDDEN[0]).weights() > self.samples.set.samples();
+        self.try_networks(&features, inputs)?;
+        let best = self.best().ok_or(TrainingError::NothingVaries)?;
+        let network = self.finalist(&features, best)?;
+        self.record.chosen = network.place;
+        if let Fit::Network(settings) = network.fit {
+            let alone = RunSettings {
+                starts: 1,
+                initialization: Initialization::Random,
+                ..settings
+            };
+            let limit = 0.5 * self.left(&features, &alone);
+            members.extend(self.try_network(&features, (alone, true), (limit, MIN_EPOCHS))?);
         }
-        self.refine(0.85)?;
-        self.try_committees()?;
-        self.decide()
+        members.push(network);
+        self.combine(&features, &members)
     }
 
-    /// Cross-validates candidates, within this share of the budget for all work until then and for `reserve` later ones.
-    fn try_all(&mut self, candidates: Vec<Candidate>, share: f64, reserve: usize) -> Result<(), RunError> {
-        let mut left = candidates.len() + reserve;
-        for candidate in candidates {
-            self.try_network(candidate, self.part(share, left), MIN_EPOCHS)?;
+    /// Tries the mean, ridge and kernel ridge regression on the readings and on their memories, and decides which targets count
+    /// and which features are used. Returns the features, the candidates on them, and quantity and scaling.
+    fn compare_fits(&mut self) -> Result<(Features, Vec<Member>, InputChoice), RunError> {
+        let none = Memory::default();
+        let plain = Features::of(self.samples, &none).ok_or(TrainingError::NothingVaries)?;
+        let mut ridges = Vec::new();
+        for quantity in [Quantity::Raw, Quantity::LogResistance, Quantity::Conductance] {
+            if self.suits(quantity) {
+                ridges.extend(self.try_ridge(&plain, quantity)?.map(|ridge| (ridge, quantity)));
+            }
+        }
+        let best = |one: &&(Member, Quantity), other: &&(Member, Quantity)| one.0.error.total_cmp(&other.0.error);
+        let (ridge, quantity) = ridges
+            .iter()
+            .min_by(best)
+            .cloned()
+            .ok_or(TrainingError::NothingVaries)?;
+        let scaling = self.fixed.scaling.unwrap_or_default();
+        let mut inputs = InputChoice { quantity, scaling };
+        let mut members = vec![self.mean(&plain)?, ridge];
+        members.extend(self.try_kernels(&plain, inputs)?);
+        let tried = match &self.fixed.memory {
+            Some(memory) => Vec::from_iter(Some(memory.clone()).filter(|memory| !memory.is_empty())),
+            None if self.tries_memory() => memories(self.samples),
+            None => Vec::new(),
+        };
+        let mut past = Vec::new();
+        for memory in tried {
+            if let Some(features) = Features::of(self.samples, &memory) {
+                past.extend(self.try_ridge(&features, Quantity::Raw)?.map(|ridge| (features, ridge)));
+            }
+        }
+        let varying = self.judge.variances.clone();
+        for target in (0..varying.len()).filter(|target| varying[*target] > 0.0) {
+            let now = self.least(target, members.iter());
+            let then = self.least(target, past.iter().map(|(_, ridge)| ridge));
+            if now > LEAK[0] && then < LEAK[1] {
+                self.record.leaks.push((target, [1.0 - now, 1.0 - then]));
+                // A memory must not win by what may be a leak.
+                self.judge.variances[target] = 0.0;
+            }
+        }
+        let is_taken = |(_, with): &&(Features, Member)| {
+            self.fixed.memory.is_some()
+                || self
+                    .judge
+                    .is_clearly_better(&with.answers, &members[1].answers, past.len())
+        };
+        let error = |(_, with): &(Features, Member)| self.judge.error(&with.answers).0;
+        let taken = past
+            .iter()
+            .filter(is_taken)
+            .min_by(|one, other| error(one).total_cmp(&error(other)));
+        self.judge.variances = varying;
+        let mut compared = members.clone();
+        let mut features = plain;
+        if let Some((with, ridge)) = taken.cloned() {
+            (features, inputs.quantity) = (with, Quantity::Raw);
+            members = vec![self.mean(&features)?, ridge];
+            members.extend(self.try_kernels(&features, inputs)?);
+        }
+        self.leave_out_open(&features, &members);
+        compared.extend(ridges.into_iter().map(|(ridge, _)| ridge));
+        compared.extend(past.into_iter().map(|(_, ridge)| ridge));
+        for member in members.iter_mut().chain(&mut compared) {
+            let tried = &mut self.record.tried[member.place];
+            (tried.error, tried.standard_error) = self.judge.error(&member.answers);
+            member.error = tried.error;
+        }
+        Ok((features, members, inputs))
+    }
+
+    /// Smallest share of the variance of a target that any of these leaves.
+    fn least<'m>(&self, target: usize, members: impl Iterator<Item = &'m Member>) -> f64 {
+        let left = members.map(|member| self.judge.unexplained(target, &member.answers));
+        left.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Lets only those targets count that a member explains, unless none does.
+    fn leave_out_open(&mut self, features: &Features, members: &[Member]) {
+        let is_leak = |target: &usize| self.record.leaks.iter().any(|(leak, _)| leak == target);
+        let varying = Vec::from_iter((0..self.judge.variances.len()).filter(|t| self.judge.variances[*t] > 0.0));
+        let is_open = |target: &usize| {
+            features.memory.is_empty() && is_leak(target) || self.least(*target, members.iter()) > UNDETERMINED
+        };
+        let open = Vec::from_iter(varying.iter().copied().filter(is_open));
+        if open.len() < varying.len() {
+            open.iter().for_each(|target| self.judge.variances[*target] = 0.0);
+            self.record.undetermined = open;
+        }
+    }
+
+    /// Memories are tried only where time is known, and never where neighbours are in different folds.
+    fn tries_memory(&self) -> bool {
+        let is_timed = self
+            .samples
+            .past
+            .is_some_and(|(history, _)| history.times_s().is_some());
+        self.samples.by != SplitBy::Random && (is_timed || self.fixed.tries_memory)
+    }
+
+    fn mean(&mut self, features: &Features) -> Result<Member, RunError> {
+        let targets = self.samples.set.targets();
+        let answers = self.judge.collect(|outside, inside| {
+            let mean = targets
+                .select(Axis(0), outside)
+                .mean_axis(Axis(0))
+                .ok_or(TrainingError::NothingVaries)?;
+            let shape = (inside.len(), mean.len());
+            Ok::<_, RunError>(mean.broadcast(shape).expect("rows of the mean").to_owned())
+        })?;
+        let fit = Fit::Done(Program::mean(&features.set));
+        Ok(self.keep(features, InputChoice::MEASURED, TriedModel::Mean, (fit, answers), 0.0))
+    }
+
+    fn try_ridge(&mut self, features: &Features, quantity: Quantity) -> Result<Option<Member>, RunError> {
+        let inputs = InputChoice {
+            quantity,
+            scaling: ScalingChoice::MinMax,
+        };
+        let sizes = (self.judge.samples(), features.set.channels(), self.judge.parts());
+        let work = Regression::multiplications(sizes.0, sizes.1, sizes.2);
+        if !self.record.tried.is_empty() && self.work + work > 0.2 * self.budget() {
+            return Ok(None);
+        }
+        self.announce(features, inputs, &TriedModel::Ridge)?;
+        let Ok((answers, program)) = features.ridge(&self.judge, quantity) else {
+            return Ok(None);
+        };
+        let fit = (Fit::Done(program), answers);
+        Ok(Some(self.keep(features, inputs, TriedModel::Ridge, fit, work)))
+    }
+
+    /// Tries kernel ridge regression with and without a linear kernel, with as many centres as a quarter of the budget allows.
+    fn try_kernels(&mut self, features: &Features, inputs: InputChoice) -> Result<Vec<Member>, RunError> {
+        const CENTRES: [usize; 5] = [1000, 700, 450, 300, 150];
+        let (samples, parts) = (self.judge.samples(), self.judge.parts());
+        let (folds, repeats) = (self.record.folds, self.judge.repeats.len());
+        let work = |subset: usize| {
+            let [choice, fit] = KernelShape::multiplications(samples, folds, subset);
+            let centres = if samples <= 4 * subset { samples } else { subset };
+            let answers = samples * centres * (features.set.channels() + 10);
+            choice + (parts + 1) as f64 * fit + (repeats * answers) as f64
+        };
+        let is_affordable = |subset: &usize| 2.0 * work(*subset) < 0.25 * self.budget();
+        let Some(subset) = CENTRES.into_iter().find(is_affordable) else {
+            return Ok(Vec::new());
+        };
+        let mut members = Vec::new();
+        for is_linear in [false, true] {
+            let model = TriedModel::Kernel { is_linear };
+            self.announce(features, inputs, &model)?;
+            let work = work(subset);
+            if let Ok((answers, shape)) = features.kernel(&self.judge, (inputs, is_linear, subset)) {
+                members.push(self.keep(features, inputs, model, (Fit::Kernel(shape, subset), answers), work));
+            }
+        }
+        Ok(members)
+    }
+
+    /// Tries networks: numbers of hidden nodes, then scaling, method and regularisation of the best.
+    fn try_networks(&mut self, features: &Features, inputs: InputChoice) -> Result<(), RunError> {
+        let first = FIRST_HIDDEN[usize::from(self.is_wide)];
+        let mut settings = RunSettings {
+            inputs,
+            hidden: self.fixed.hidden.unwrap_or(first),
+            starts: 1,
+            initialization: Initialization::Random,
+            ..self.base
+        };
+        settings.training.method = self.fixed.method.unwrap_or(match self.is_wide {
+            true => self.decaying(DECAYS[0]),
+            false => Method::LevenbergMarquardt(DAMPING),
+        });
+        let mut begun = vec![settings];
+        if !self.is_wide {
+            // A regression on nearly as many inputs as samples is worse to begin with than random weights.
+            begun.push(with(settings, |settings| {
+                settings.initialization = Initialization::Ridge
+            }));
+        }
+        self.try_all(features, begun, 0.45)?;
+        let best = self.settings().ok_or(TrainingError::NothingVaries)?;
+        if self.fixed.hidden.is_none() {
+            let hidden = |hidden| with(best, |settings| settings.hidden = hidden);
+            let more = HIDDEN.into_iter().filter(|&hidden| hidden > first).map(hidden);
+            if !self.try_while_better(features, more)? {
+                let fewer = HIDDEN.into_iter().rev().filter(|&hidden| hidden < first).map(hidden);
+                self.try_while_better(features, fewer)?;
+            }
+        }
+        let best = self.settings().unwrap_or(best);
+        let mut variants = Vec::new();
+        if self.fixed.scaling.is_none() {
+            variants.push(with(best, |settings| {
+                settings.inputs.scaling = ScalingChoice::Whitening
+            }));
+        }
+        if self.fixed.method.is_none() {
+            let methods = match self.is_wide {
+                true => DECAYS[1..].iter().map(|&decay| self.decaying(decay)).collect(),
+                false => vec![regularized()],
+            };
+            variants.extend(
+                methods
+                    .into_iter()
+                    .map(|method| with(best, |settings| settings.training.method = method)),
+            );
+        }
+        self.try_all(features, variants, 0.7)
+    }
+
+    /// Settings of the best network so far.
+    fn settings(&self) -> Option<RunSettings> {
+        match self.best()?.fit {
+            Fit::Network(settings) => Some(settings),
+            _ => None,
+        }
+    }
+
+    fn best(&self) -> Option<Member> {
+        let best = self
+            .networks
+            .iter()
+            .min_by(|one, other| one.error.total_cmp(&other.error));
+        best.cloned()
+    }
+
+    /// Cross-validates networks within this share of the budget for all work until then.
+    fn try_all(&mut self, features: &Features, all: Vec<RunSettings>, share: f64) -> Result<(), RunError> {
+        let mut left = all.len();
+        for settings in all {
+            let limit = (share * self.budget() - self.work).max(0.0) / left as f64;
+            let tried = self.try_network(features, (settings, false), (limit, MIN_EPOCHS))?;
+            self.networks.extend(tried);
             left -= 1;
         }
         Ok(())
     }
 
-    /// Cross-validates candidates up to the first that is no better than all before it with the same features; returns `true`
-    /// if there is a better one.
-    fn try_while_better(&mut self, candidates: impl Iterator<Item = Candidate>, share: f64) -> Result<bool, RunError> {
+    /// Cross-validates networks up to the first that is no better than all before it; returns `true` if there is a better one.
+    fn try_while_better(
+        &mut self,
+        features: &Features,
+        candidates: impl Iterator<Item = RunSettings>,
+    ) -> Result<bool, RunError> {
         let mut is_any_better = false;
-        for candidate in candidates {
-            let alike = self
-                .networks
-                .iter()
-                .filter(|network| network.candidate.has_features_of(&candidate));
-            let before = alike
-                .map(|network| network.best.errors.relative())
-                .fold(f64::INFINITY, f64::min);
-            let error = self.try_network(candidate, self.part(share, 2), MIN_EPOCHS)?;
-            if error.is_none_or(|error| error >= before) {
+        for settings in candidates {
+            let before = self.best().map_or(f64::INFINITY, |best| best.error);
+            self.try_all(features, vec![settings], 0.6)?;
+            if self.best().is_none_or(|best| best.error >= before) {
                 break;
             }
             is_any_better = true;
@@ -196,43 +427,58 @@ impl Search<'_> {
         Ok(is_any_better)
     }
 
-    /// Returns one of `parts` equal parts of the multiplications that are left of this share of the budget.
-    fn part(&self, share: f64, parts: usize) -> f64 {
-        (share * self.budget() - self.work).max(0.0) / parts as f64
+    /// Multiplications that are left for the cross-validation of a network if its training is to fit into the budget.
+    fn left(&self, features: &Features, settings: &RunSettings) -> f64 {
+        let epochs = settings.training.stopping.epochs;
+        (self.budget() - self.work - self.epoch_of_all(features, settings) * epochs as f64).max(0.0)
     }
 
-    /// Cross-validates a network within `limit` multiplications. Returns its error; `None` if the `needed` epochs are too
-    /// expensive.
-    fn try_network(&mut self, mut candidate: Candidate, limit: f64, needed: usize) -> Result<Option<f64>, RunError> {
-        if let Some(network) = self.networks.iter().find(|network| network.candidate == candidate) {
-            return Ok(Some(network.best.errors.relative()));
-        }
+    /// Multiplications of an epoch on all samples.
+    fn epoch_of_all(&self, features: &Features, settings: &RunSettings) -> f64 {
+        let shape = self.shape_of(features, settings);
+        training_multiplications(settings, shape, self.judge.samples(), 0)
+    }
+
+    /// Cross-validates a network within `limit` multiplications, on what ridge regression leaves if the flag is set. Returns
+    /// `None` if the `needed` epochs are too expensive.
+    fn try_network(
+        &mut self,
+        features: &Features,
+        (settings, is_on_residual): (RunSettings, bool),
+        (limit, needed): (f64, usize),
+    ) -> Result<Option<Member>, RunError> {
         let is_first = self.networks.is_empty();
-        let Some(set) = self.samples.with_memory(&candidate.memory) else {
+        let stride = self.stride(features, &settings, limit, needed);
+        let Some(stride) = stride.or(is_first.then_some(self.largest_stride())) else {
             return Ok(None);
         };
-        let stride = |settings: &RunSettings| self.stride(settings, &set, limit, needed);
-        // Fewer samples would call for fewer hidden nodes; one start instead of two only makes the comparison less certain.
-        let may_shrink = candidate.settings.starts == SCREENED && self.fixed.starts.is_none();
-        if may_shrink && stride(&candidate.settings) != Some(1) {
-            candidate.settings.starts = 1;
-        }
-        let stride = stride(&candidate.settings).or(is_first.then_some(self.largest_stride()));
-        let Some(stride) = stride else { return Ok(None) };
-        self.announce(&candidate.memory, candidate.settings.inputs, &candidate.model(0))?;
-        let mut training = match FoldedTraining::new(&candidate.settings, &set, &self.folds, stride, self.memory) {
+        let model = |epochs: usize| TriedModel::Network {
+            hidden: settings.hidden,
+            method: settings.training.method,
+            starts: settings.starts,
+            epochs,
+            begin: settings.initialization,
+            is_on_residual,
+        };
+        self.announce(features, settings.inputs, &model(0))?;
+        let part = (stride, is_on_residual);
+        let mut training = match FoldedTraining::new(&settings, features, &self.judge, part, self.memory) {
             Ok(training) => training,
             Err(_) if !is_first => return Ok(None),
             Err(error) => return Err(error),
         };
-        let (max_epochs, patience) = match candidate.settings.training.method {
+        let (max_epochs, patience) = match settings.training.method {
             Method::ScaledConjugateGradient(_) => SHORT_EPOCHS,
             _ => EPOCHS,
         };
         let max_epochs = self.fixed.epochs.unwrap_or(max_epochs);
-        let mut used = 0.0;
+        let final_epoch = self.epoch_of_all(features, &settings);
+        let (mut used, mut is_cut_off) = (0.0, false);
         while training.epoch < max_epochs && !training.has_passed_its_best(patience) {
-            if used + training.epoch_multiplications > limit && training.epoch >= MIN_EPOCHS {
+            // The training on all samples must fit into what is left, too.
+            let left = self.budget() - self.work - used - final_epoch * training.epoch as f64;
+            is_cut_off = used + training.epoch_multiplications > limit || left < 0.0;
+            if is_cut_off && training.epoch >= MIN_EPOCHS {
                 break;
             }
             self.job.check()?;
@@ -240,34 +486,33 @@ impl Search<'_> {
             used += training.epoch_multiplications;
         }
         self.work += used;
-        let Some(best) = training.best else { return Ok(None) };
-        let model = candidate.model(self.fixed.epochs.unwrap_or(best.epoch));
-        self.record(&candidate.memory, candidate.settings.inputs, model, &best.errors, used);
-        let error = best.errors.relative();
-        self.networks.push(Measured {
-            place: self.tried.len() - 1,
-            candidate,
-            best,
-        });
-        Ok(Some(error))
+        let Some((epoch, _, answers)) = training.best else {
+            return Ok(None);
+        };
+        let epochs = self.fixed.epochs.unwrap_or(epoch);
+        let mut settings = settings;
+        settings.training.stopping.epochs = epochs;
+        let fit = Fit::Network(settings);
+        let member = self.keep(features, settings.inputs, model(epochs), (fit, answers), used);
+        self.record.tried[member.place].is_cut_off = is_cut_off;
+        Ok(Some(member))
     }
 
     /// Returns the smallest number such that, with every so manieth sample, trainings of [`TYPICAL_EPOCHS`] stay within
     /// `limit` multiplications; `None` if too few samples would be left, even for the `needed` epochs.
-    fn stride(&self, settings: &RunSettings, set: &Dataset, limit: f64, needed: usize) -> Option<usize> {
-        let mut shape = shape(set, settings.hidden);
-        if settings.inputs.scaling == ScalingChoice::Whitening {
-            let inputs = Inputs::fit(settings.inputs, set.readings(), crate::scene::NoiseSource::default()).ok()?;
-            if let InputScaling::Whitening(whitening) = inputs.scaling() {
-                shape.inputs = whitening.components();
-            }
-        }
-        let samples = set.samples() * (self.folds.count() - 1) / self.folds.count();
+    fn stride(&self, features: &Features, settings: &RunSettings, limit: f64, needed: usize) -> Option<usize> {
+        let shape = self.shape_of(features, settings);
+        let folds = self.record.folds;
+        let samples = self.judge.samples() * (folds - 1) / folds;
         let epoch = |stride: usize| {
-            self.folds.count() as f64 * training_multiplications(settings, shape, samples.div_ceil(stride), 0)
+            self.judge.parts() as f64 * training_multiplications(settings, shape, samples.div_ceil(stride), 0)
         };
         let largest = self.largest_stride();
-        let fits = |epochs: usize| (1..=largest).find(|&stride| epoch(stride) * epochs as f64 <= limit);
+        let of_all = self.epoch_of_all(features, settings);
+        let fits = |epochs: usize| {
+            let is_trainable = of_all * epochs as f64 <= 0.5 * self.budget();
+            (1..=largest).find(|&stride| is_trainable && epoch(stride) * epochs as f64 <= limit)
+        };
         fits(TYPICAL_EPOCHS.max(needed)).or_else(|| fits(needed))
     }
 
@@ -275,7 +520,26 @@ impl Search<'_> {
     fn largest_stride(&self) -> usize {
         /// Minimum number of samples after thinning.
         const ENOUGH: usize = 3000;
-        (self.samples.set.samples() / ENOUGH).clamp(1, 20)
+        (self.judge.samples() / ENOUGH).clamp(1, 20)
+    }
+
+    fn shape(&self, features: &Features, hidden: usize) -> Shape {
+        Shape {
+            inputs: features.set.channels(),
+            hidden,
+            outputs: features.set.outputs(),
+        }
+    }
+
+    fn shape_of(&self, features: &Features, settings: &RunSettings) -> Shape {
+        let mut shape = self.shape(features, settings.hidden);
+        if settings.inputs.scaling == ScalingChoice::Whitening {
+            let inputs = Inputs::fit(settings.inputs, features.set.readings(), NoiseSource::default());
+            if let Ok(InputScaling::Whitening(whitening)) = inputs.as_ref().map(Inputs::scaling) {
+                shape.inputs = whitening.components();
+            }
+        }
+        shape
     }
 
     /// Budget in multiplications.
@@ -283,123 +547,51 @@ impl Search<'_> {
         self.budget_s * MULTIPLICATIONS_PER_SECOND
     }
 
-    fn announce(&mut self, memory: &Memory, inputs: InputChoice, model: &TriedModel) -> Result<(), RunError> {
+    fn announce(&mut self, features: &Features, inputs: InputChoice, model: &TriedModel) -> Result<(), RunError> {
         self.job.check()?;
-        let number = self.tried.len() + 1;
-        let features = describe_features(memory, inputs);
-        let mut text = format!("Trying candidate {number}: {features}, {model}");
-        if let Some(best) = self.ranked().first() {
-            let error = format_percent(100.0 * best.best.errors.relative());
-            text += &format!(", best error so far {error}");
+        let number = self.record.tried.len() + 1;
+        let mut text = format!(
+            "Trying candidate {number}: {}, {model}",
+            describe_features(&features.memory, inputs)
+        );
+        let errors = self.record.tried.iter().map(|tried| tried.error);
+        if let Some(best) = errors.min_by(f64::total_cmp) {
+            text += &format!(", best error so far {}", format_percent(100.0 * best));
         }
         let share = (self.work / self.budget()).min(1.0);
         (self.on_progress)(AutoProgress { text, share });
         Ok(())
     }
 
-    fn record(&mut self, memory: &Memory, inputs: InputChoice, model: TriedModel, errors: &FoldErrors, work: f64) {
-        self.tried.push(Tried {
-            memory: memory.clone(),
+    /// Records a candidate with its held-out answers.
+    fn keep(
+        &mut self,
+        features: &Features,
+        inputs: InputChoice,
+        model: TriedModel,
+        (fit, answers): (Fit, Array2<f64>),
+        work: f64,
+    ) -> Member {
+        if !matches!(fit, Fit::Network(..)) {
+            self.work += work;
+        }
+        let (error, standard_error) = self.judge.error(&answers);
+        self.record.tried.push(Tried {
+            memory: features.memory.clone(),
             inputs,
             model,
-            error: errors.relative(),
-            standard_error: errors.standard_error(),
+            error,
+            standard_error,
             seconds: work / MULTIPLICATIONS_PER_SECOND,
+            share: 0.0,
+            is_cut_off: false,
         });
-    }
-
-    /// Networks, best first.
-    fn ranked(&self) -> Vec<&Measured> {
-        let mut networks = Vec::from_iter(&self.networks);
-        networks.sort_by(|one, other| one.best.errors.upper().total_cmp(&other.best.errors.upper()));
-        networks
-    }
-
-    /// Returns the best candidate so far among those that suit.
-    fn best(&self, suits: impl Fn(&Candidate) -> bool) -> Option<Candidate> {
-        let mut candidates = self.ranked().into_iter().map(|network| &network.candidate);
-        candidates.find(|candidate| suits(candidate)).cloned()
-    }
-
-    /// Compares features by ridge regression; returns networks on the plain readings and on the best others.
-    fn screen_features(&mut self) -> Result<Vec<Candidate>, RunError> {
-        let plain = InputChoice {
-            quantity: Quantity::Raw,
-            scaling: self.fixed.scaling.unwrap_or_default(),
-        };
-        let first = self.fixed.memory.clone().unwrap_or_default();
-        let mut features = vec![(first.clone(), plain)];
-        if self.fixed.memory.is_none() && self.samples.by != SplitBy::Random {
-            features.extend(memories(self.samples).into_iter().map(|memory| (memory, plain)));
+        Member {
+            fit,
+            answers,
+            error,
+            place: self.record.tried.len() - 1,
         }
-        for quantity in [Quantity::LogResistance, Quantity::Conductance] {
-            if self.suits(quantity) {
-                features.push((first.clone(), InputChoice { quantity, ..plain }));
-            }
-        }
-        let mut plain_error: Option<f64> = None;
-        let mut measured: Vec<(f64, (Memory, InputChoice))> = Vec::new();
-        for (number, (memory, inputs)) in features.into_iter().enumerate() {
-            let width = memory.features(self.samples.set.channels());
-            let work = Regression::multiplications(self.samples.set.samples(), width, self.folds.count());
-            if number > 0 && self.work + work > 0.2 * self.budget() {
-                continue;
-            }
-            self.announce(&memory, inputs, &TriedModel::Ridge)?;
-            let Some(set) = self.samples.with_memory(&memory) else {
-                continue;
-            };
-            let values = set.readings().mapv(|reading| inputs.quantity.of(reading));
-            self.work += work;
-            let fit = ridge(values.view(), set.targets(), &self.folds);
-            let error = fit.map_or(f64::INFINITY, |fit| {
-                let errors = FoldErrors::new(&fit.squares, &variances(set.targets()), &self.folds);
-                self.record(&memory, inputs, TriedModel::Ridge, &errors, work);
-                errors.relative()
-            });
-            // The plain readings are always tried, and many inputs are not multiplied unless that helps.
-            let plain = plain_error.get_or_insert(error);
-            if number > 0 && self.is_wide && error >= *plain {
-                continue;
-            }
-            let rank = if number == 0 { -1.0 } else { error };
-            measured.push((rank, (memory, inputs)));
-        }
-        measured.sort_by(|(one, _), (other, _)| one.total_cmp(other));
-        measured.truncate(1 + FEATURE_SETS);
-        let networks = measured
-            .into_iter()
-            .flat_map(|(_, (memory, inputs))| self.first_candidates(memory, inputs));
-        Ok(networks.collect())
-    }
-
-    /// Networks with which features are compared.
-    fn first_candidates(&self, mut memory: Memory, inputs: InputChoice) -> Vec<Candidate> {
-        // To ridge regression, averages and their differences from the readings are the same; not to a network.
-        memory.differences |= self.fixed.memory.is_none() && !memory.is_empty() && inputs.quantity == Quantity::Raw;
-        // A regression on many averages that overlap may be worse to begin with than random weights, and one on
-        // nearly as many inputs as samples is.
-        let begins: &[Initialization] = match (self.is_wide, memory.is_empty()) {
-            (true, _) => &[Initialization::Random],
-            (false, true) => &[Initialization::Ridge],
-            (false, false) => &[Initialization::Ridge, Initialization::Random],
-        };
-        let mut settings = RunSettings {
-            inputs,
-            hidden: self.fixed.hidden.unwrap_or(self.first_hidden),
-            starts: self.fixed.starts.unwrap_or(SCREENED).min(SCREENED),
-            ..self.base
-        };
-        settings.training.method = self.fixed.method.unwrap_or(if self.is_wide {
-            self.decaying(DECAYS[0])
-        } else {
-            Method::LevenbergMarquardt(DAMPING)
-        });
-        let candidate = Candidate { memory, settings };
-        let begins = begins
-            .iter()
-            .map(|&begin| candidate.with(|settings| settings.initialization = begin));
-        begins.collect()
     }
 
     /// Returns `true` if the quantity is defined for all readings and clearly not linear in them.
@@ -411,7 +603,9 @@ impl Search<'_> {
             let (low, high) = extremes(column);
             high > RATIO * low
         };
-        readings.iter().all(|&reading| quantity.accepts(reading)) && readings.columns().into_iter().any(is_curved)
+        quantity == Quantity::Raw
+            || readings.iter().all(|&reading| quantity.accepts(reading))
+                && readings.columns().into_iter().any(is_curved)
     }
 
     /// The scaled conjugate gradient with this weight decay for each sample.
@@ -422,113 +616,142 @@ impl Search<'_> {
         })
     }
 
-    /// Tries other numbers of hidden nodes on the best features and on the plain readings, which need more of them: more
-    /// while it helps, and fewer if it does not. Then tries the second best features with the number found.
-    fn vary_hidden(&mut self, share: f64) -> Result<(), RunError> {
-        let best = self.best(|_| true).ok_or(TrainingError::NothingVaries)?;
-        let is_other = |candidate: &Candidate| !candidate.has_features_of(&best);
-        let plain = self.best(|candidate| is_other(candidate) && candidate.memory.is_empty());
-        let first = self.first_hidden;
-        for base in std::iter::once(best.clone()).chain(plain) {
-            let with = |hidden| base.with(|settings| settings.hidden = hidden);
-            let more = HIDDEN.into_iter().filter(|&hidden| hidden > first).map(with);
-            if !self.try_while_better(more, share)? {
-                let fewer = HIDDEN.into_iter().rev().filter(|&hidden| hidden < first).map(with);
-                self.try_while_better(fewer, share)?;
-            }
-        }
-        let hidden = self.best(|_| true).map_or(first, |best| best.settings.hidden);
-        let second = self.best(|candidate| is_other(candidate) && !candidate.memory.is_empty());
-        let second = second.map(|second| second.with(|settings| settings.hidden = hidden));
-        self.try_all(Vec::from_iter(second), share, 0)
-    }
-
-    /// Varies scaling, regularisation and method of the best network.
-    fn refine(&mut self, share: f64) -> Result<(), RunError> {
-        let best = self.best(|_| true).ok_or(TrainingError::NothingVaries)?;
-        let mut variants = Vec::new();
-        if self.fixed.scaling.is_none() {
-            variants.push(best.with(|settings| settings.inputs.scaling = ScalingChoice::Whitening));
-        }
-        if self.fixed.method.is_none() {
-            let methods = if self.is_wide {
-                DECAYS[1..].iter().map(|&decay| self.decaying(decay)).collect()
-            } else {
-                vec![regularized(0.0)]
-            };
-            let with = |method| best.with(|settings| settings.training.method = method);
-            variants.extend(methods.into_iter().map(with));
-        }
-        self.try_all(variants, share, 1)?;
-        let is_regularized = |network: &&Measured| {
-            network.candidate.settings.training.method == regularized(0.0)
-                && network.best.epoch > CORRELATION_EPOCH as usize
-        };
-        let correlated = self.networks.last().filter(is_regularized).map(|network| {
-            let method = regularized(CORRELATION_EPOCH);
-            network.candidate.with(|settings| settings.training.method = method)
-        });
-        self.try_all(Vec::from_iter(correlated), share, 0)
-    }
-
-    /// Number of networks of a committee with this many hidden nodes each.
-    fn committee(&self, hidden: usize) -> usize {
-        let wanted = self.fixed.starts.unwrap_or(COMMITTEE);
-        wanted.min(LARGEST_HIDDEN / hidden).max(1)
-    }
-
-    /// Cross-validates the best candidates again as committees.
-    fn try_committees(&mut self) -> Result<(), RunError> {
+    /// Cross-validates the best network again as the mean of as many networks as the budget allows.
+    fn finalist(&mut self, features: &Features, best: Member) -> Result<Member, RunError> {
         /// Epochs beyond the best.
         const BEYOND: usize = 5;
-        let finalists = self.ranked().into_iter().take(FINALISTS).map(|network| {
-            let starts = self.committee(network.candidate.settings.hidden);
-            let committee = network.candidate.with(|settings| settings.starts = starts);
-            (committee, network.best.epoch)
-        });
-        let finalists = Vec::from_iter(finalists);
-        let mut left = finalists.len();
-        for (committee, epochs) in finalists {
-            self.try_network(committee, self.part(1.0, left), epochs + BEYOND)?;
-            left -= 1;
-        }
-        Ok(())
+        let Fit::Network(settings) = best.fit else {
+            return Ok(best);
+        };
+        let epochs = settings.training.stopping.epochs + BEYOND;
+        // Each is trained once without every fold, and once on all samples.
+        let of_one = self.epoch_of_all(features, &settings) * (epochs * self.judge.parts()) as f64;
+        let most = COMMITTEE.min(LARGEST_HIDDEN / settings.hidden).max(1) as f64;
+        let starts = 0.9 * (self.budget() - self.work) / of_one.max(1.0);
+        let starts = self.fixed.starts.unwrap_or(starts.clamp(1.0, most) as usize);
+        let committee = with(settings, |settings| settings.starts = starts);
+        let limit = of_one * starts as f64;
+        let tried = if starts > 1 {
+            self.try_network(features, (committee, false), (limit, epochs))?
+        } else {
+            None
+        };
+        Ok(match tried {
+            Some(tried) if tried.error < best.error || self.fixed.starts.is_some() => tried,
+            _ => best,
+        })
     }
 
-    /// Returns the smallest network that is about as good as the best.
-    ///
-    /// A committee is compared with a smaller one where it was too expensive: it would hardly be worse.
-    fn decide(self) -> Result<AutoChoice, RunError> {
-        let ranked = self.ranked();
-        let best = *ranked.first().ok_or(TrainingError::NothingVaries)?;
-        // A few folds do not show that features are dispensable: only networks with the same are compared.
-        let smallest = ranked
-            .into_iter()
-            .filter(|network| network.candidate.has_features_of(&best.candidate))
-            .filter(|network| network.best.errors.is_as_good_as(&best.best.errors))
-            .min_by_key(|network| network.candidate.settings.hidden);
-        let chosen = smallest.unwrap_or(best).clone();
-        let Measured { candidate, place, best } = chosen;
-        let mut settings = candidate.settings;
-        (settings.starts, settings.combine) = (self.committee(settings.hidden), Combination::Mean);
-        settings.training.stopping.epochs = self.fixed.epochs.unwrap_or(best.epoch);
+    /// Combines the members, the last of which is the network.
+    fn combine(mut self, features: &Features, members: &[Member]) -> Result<AutoChoice, RunError> {
+        let (samples, targets) = (self.judge.samples(), self.samples.set.outputs());
+        let mut answers = Array2::zeros(self.judge.truth.dim());
+        let mut weights = Array2::<f64>::zeros((members.len(), targets));
+        for target in 0..targets {
+            let of_target = self.weights(members, target);
+            for (member, weight) in of_target.iter().enumerate() {
+                weights[[member, target]] = *weight;
+                answers
+                    .column_mut(target)
+                    .scaled_add(*weight, &members[member].answers.column(target));
+            }
+        }
+        let counted = Vec::from_iter((0..targets).filter(|target| self.judge.variances[*target] > 0.0));
+        for (member, weights) in members.iter().zip(weights.rows()) {
+            let sum: f64 = counted.iter().map(|target| weights[*target]).sum();
+            self.record.tried[member.place].share = sum / counted.len().max(1) as f64;
+        }
+        self.record.combined = Some(self.judge.error(&answers).0);
+        let network = members.len() - 1;
+        let Fit::Network(mut settings) = members[network].fit else {
+            return Err(TrainingError::NothingVaries.into());
+        };
+        settings.combine = Combination::Mean;
+        let mut others = Vec::new();
+        for (member, weights) in members[..network].iter().zip(weights.rows()) {
+            if weights.iter().any(|weight| *weight > 0.0) {
+                others.push((self.fitted(features, &member.fit)?, weights.to_vec()));
+            }
+        }
+        let epochs = settings.training.stopping.epochs as f64;
+        self.record.training_s = self.epoch_of_all(features, &settings) * epochs / MULTIPLICATIONS_PER_SECOND;
+        let repeats = answers.axis_chunks_iter(Axis(0), samples);
+        let mean = repeats.fold(Array2::zeros((samples, targets)), |sum, part| sum + part);
         Ok(AutoChoice {
             settings,
-            memory: candidate.memory,
-            record: AutoRecord {
-                budget_s: self.budget_s,
-                folds: self.folds.count(),
-                by: self.samples.by,
-                tried: self.tried,
-                chosen: place,
+            memory: features.memory.clone(),
+            blend: Blend {
+                network: weights.row(network).to_vec(),
+                others,
             },
-            answers: best.answers,
+            record: self.record,
+            answers: mean / self.judge.repeats.len() as f64,
+        })
+    }
+
+    /// Weights of the members for a target: those within 1.5 times the smallest error on it, without weights that are not worth
+    /// their place, and never worse than the best alone.
+    fn weights(&self, members: &[Member], target: usize) -> Vec<f64> {
+        let truth = self.judge.truth.column(target);
+        let square = |answers: ndarray::ArrayView1<'_, f64>| (&answers - &truth).mapv(|error| error * error).sum();
+        let squares = Vec::from_iter(members.iter().map(|member| square(member.answers.column(target))));
+        let best = squares.iter().copied().fold(f64::INFINITY, f64::min);
+        let mut among = Vec::from_iter((0..members.len()).filter(|&m| squares[m] <= best * WORST_MEMBER.powi(2)));
+        loop {
+            let columns = Vec::from_iter(
+                among
+                    .iter()
+                    .map(|&m| members[m].answers.column(target).insert_axis(Axis(1))),
+            );
+            let columns = concatenate(Axis(1), &columns).expect("one answer for each sample");
+            let found = convex_weights(&columns, truth);
+            let kept = Vec::from_iter((0..among.len()).filter(|&place| found[place] >= SMALLEST_WEIGHT));
+            let mut weights = vec![0.0; members.len()];
+            if kept.len() == among.len() || kept.is_empty() {
+                if square(columns.dot(&ndarray::ArrayView1::from(&found)).view()) > best || kept.is_empty() {
+                    weights[squares.iter().position(|square| *square == best).unwrap_or(0)] = 1.0;
+                } else {
+                    among
+                        .iter()
+                        .zip(found)
+                        .for_each(|(&member, weight)| weights[member] = weight);
+                }
+                return weights;
+            }
+            among = kept.into_iter().map(|place| among[place]).collect();
+        }
+    }
+
+    /// Fits a candidate to all samples.
+    fn fitted(&mut self, features: &Features, fit: &Fit) -> Result<Program, RunError> {
+        self.job.check()?;
+        Ok(match fit {
+            Fit::Done(program) => program.clone(),
+            Fit::Kernel(shape, subset) => Program::kernel(&features.set, shape, *subset)?,
+            Fit::Network(settings) => {
+                let (ridge, training) = residual(&features.set, settings)?;
+                let validation = None;
+                let sets = RunSets {
+                    memory: self.memory,
+                    ..RunSets::without_test(Split { training, validation })
+                };
+                let mut run = Run::new(*settings, sets, Begin::Initialize, self.job)?;
+                run.finish(self.job)?;
+                let ones = vec![1.0; features.set.outputs()];
+                let network = run.network().program(Precision::Double);
+                Program::combination(&[(ridge, ones.clone()), (network, ones)])
+            }
         })
     }
 }
 
+fn with(mut settings: RunSettings, change: impl FnOnce(&mut RunSettings)) -> RunSettings {
+    change(&mut settings);
+    settings
+}
+
 /// Bayesian regularisation for recordings.
-fn regularized(correlation_epoch: f64) -> Method {
+fn regularized() -> Method {
     let usual = RegularizationSettings::recorded();
     Method::BayesianRegularization(RegularizationSettings {
         damping: Damping {
@@ -536,28 +759,6 @@ fn regularized(correlation_epoch: f64) -> Method {
             mu_decrease: DAMPING.mu_decrease,
             ..usual.damping
         },
-        correlation_epoch,
         ..usual
-    })
-}
-
-/// Shape of a network with this many hidden nodes for the samples of `set`.
-fn shape(set: &Dataset, hidden: usize) -> Shape {
-    Shape {
-        inputs: set.channels(),
-        hidden,
-        outputs: set.outputs(),
-    }
-}
-
-/// Divides the samples by their rule; a part without enough groups is divided in time.
-pub(super) fn folds(samples: &AutoSamples<'_>, seed: Seed) -> Result<Folds, RunError> {
-    let mut rng = seed.rng(Stream::Folds);
-    let (set, groups) = (samples.set, samples.set.snapshots().len());
-    Ok(match samples.by {
-        SplitBy::Random => Folds::by(set, FOLDS, SplitBy::Random, &mut rng)?,
-        SplitBy::Group if groups >= 2 => Folds::by(set, FOLDS.min(groups), SplitBy::Group, &mut rng)?,
-        SplitBy::Time if groups >= 2 * FOLDS => Folds::by(set, FOLDS, SplitBy::Time, &mut rng)?,
-        SplitBy::Time | SplitBy::Group => Folds::by(&set.ungrouped(), FOLDS, SplitBy::Time, &mut rng)?,
     })
 }

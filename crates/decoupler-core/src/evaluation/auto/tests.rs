@@ -4,10 +4,10 @@ use rand::RngExt as _;
 use super::*;
 use crate::{
     dataset::{Seed, SplitBy, Stream},
-    evaluation::{Begin, Combination, Measured, Run, RunError, RunSets},
+    evaluation::{Begin, Measured, Run, RunError, RunSets},
     job::Job,
     machine::MemoryBudget,
-    scene::RowModel,
+    scene::{RowModel, standard_normal},
     training::Method,
 };
 
@@ -31,11 +31,19 @@ fn creeping(samples: usize) -> (Array2<f64>, Array2<f64>) {
     (readings, targets)
 }
 
-fn choose(by: SplitBy, groups: Vec<usize>, fixed: &AutoFixed, job: &Job<'_>) -> Result<AutoChoice, RunError> {
-    let (readings, targets) = creeping(groups.len());
-    let set = Dataset::new(readings.clone(), targets, None, groups).unwrap();
+/// Chooses for readings (samples × channels) and targets, at an interval of 0.1 s if they are timed.
+fn choose_for(
+    (readings, targets): (Array2<f64>, Array2<f64>),
+    (by, groups, is_timed): (SplitBy, Vec<usize>, bool),
+    fixed: &AutoFixed,
+    (budget_s, job): (f64, &Job<'_>),
+) -> Result<AutoChoice, RunError> {
+    let set = Dataset::new(readings.clone(), targets, None, groups.clone()).unwrap();
     let samples: Vec<usize> = (0..set.samples()).collect();
-    let history = History::new(readings, None, None, None, samples.clone());
+    let times_s = is_timed.then(|| samples.iter().map(|sample| 0.1 * *sample as f64).collect());
+    let series = Vec::from_iter(groups.iter().map(|group| *group as u64));
+    let series = (by == SplitBy::Group).then_some(&series[..]);
+    let history = History::new(readings, series, None, times_s, samples.clone());
     let samples = AutoSamples {
         set: &set,
         past: Some((&history, &samples)),
@@ -46,7 +54,7 @@ fn choose(by: SplitBy, groups: Vec<usize>, fixed: &AutoFixed, job: &Job<'_>) -> 
         &base,
         fixed,
         &samples,
-        BUDGET_S,
+        budget_s,
         MemoryBudget::UNLIMITED,
         job,
         &mut |_| (),
@@ -54,24 +62,229 @@ fn choose(by: SplitBy, groups: Vec<usize>, fixed: &AutoFixed, job: &Job<'_>) -> 
 }
 
 fn in_time() -> Result<AutoChoice, RunError> {
-    choose(
-        SplitBy::Time,
-        (0..400).collect(),
-        &AutoFixed::default(),
-        &Job::UNINTERRUPTED,
+    let (fixed, all) = (AutoFixed::default(), (0..400).collect());
+    choose_for(
+        creeping(400),
+        (SplitBy::Time, all, true),
+        &fixed,
+        (BUDGET_S, &Job::UNINTERRUPTED),
     )
 }
 
+fn normal(rows: usize, columns: usize, seed: u64) -> Array2<f64> {
+    let mut rng = Seed(seed).rng(Stream::TestNoise);
+    Array2::from_shape_simple_fn((rows, columns), || standard_normal(&mut rng))
+}
+
+/// Share of the variance of a target that the answers of a choice leave.
+fn unexplained(choice: &AutoChoice, targets: &Array2<f64>, target: usize) -> f64 {
+    let (answers, truth) = (choice.answers.column(target), targets.column(target));
+    let mean = truth.mean().unwrap();
+    let spread = truth.mapv(|value| (value - mean).powi(2)).sum();
+    (&answers - &truth).mapv(|error| error * error).sum() / spread
+}
+
 #[test]
-fn a_sensor_that_creeps_gets_a_memory() {
+fn a_sensor_that_creeps_gets_a_memory_where_time_is_known() {
     let choice = in_time().unwrap();
     assert!(!choice.memory.is_empty(), "{:?}", choice.record);
-    let error = choice.record.choice().unwrap().error;
     let without = choice.record.tried.iter().filter(|tried| tried.memory.is_empty());
     let without = without.map(|tried| tried.error).fold(f64::INFINITY, f64::min);
+    let error = choice.record.combined.unwrap();
     assert!(error < 0.5 * without, "{error} {without}");
-    assert_eq!(choice.settings.combine, Combination::Mean);
-    assert!(choice.settings.starts > 1);
+    let untimed = |fixed: &AutoFixed| {
+        let all = (0..400).collect();
+        choose_for(
+            creeping(400),
+            (SplitBy::Time, all, false),
+            fixed,
+            (BUDGET_S, &Job::UNINTERRUPTED),
+        )
+        .unwrap()
+    };
+    assert!(untimed(&AutoFixed::default()).memory.is_empty());
+    let asked = AutoFixed {
+        tries_memory: true,
+        ..AutoFixed::default()
+    };
+    assert!(!untimed(&asked).memory.is_empty());
+}
+
+/// A scan in rows over the plane; the readings know nothing of it, but wander.
+#[test]
+fn a_scan_and_sorted_samples_get_no_memory_even_with_times() {
+    let count = 800;
+    let noise = normal(count, 4, 1);
+    let mut readings = noise.clone();
+    for sample in 1..count {
+        for channel in 0..4 {
+            readings[[sample, channel]] = 0.9 * readings[[sample - 1, channel]] + noise[[sample, channel]];
+        }
+    }
+    let scan = Array2::from_shape_fn((count, 2), |(sample, axis)| match axis {
+        0 => (sample % 40) as f64,
+        _ => (sample / 40) as f64,
+    });
+    let sorted = Array2::from_shape_fn((count, 1), |(sample, _)| (sample % 100) as f64);
+    for targets in [scan, sorted] {
+        for readings in [&readings, &noise] {
+            let rule = (SplitBy::Time, (0..count).collect(), true);
+            let job = (BUDGET_S, &Job::UNINTERRUPTED);
+            let choice = choose_for((readings.clone(), targets.clone()), rule, &AutoFixed::default(), job).unwrap();
+            assert!(choice.memory.is_empty(), "{:?}", choice.record);
+        }
+    }
+}
+
+/// In every file the same ramp, and a burst of the readings at its beginning: only averages know the time since then.
+#[test]
+fn what_only_a_memory_predicts_is_reported_and_not_used() {
+    let count = 1000;
+    let mut readings = normal(count, 2, 2) * 0.05;
+    for sample in (0..count).filter(|sample| sample % 100 < 5) {
+        readings[[sample, 0]] += 3.0;
+    }
+    let targets = Array2::from_shape_fn((count, 1), |(sample, _)| (sample % 100) as f64);
+    let files = (0..count).map(|sample| sample / 100).collect();
+    let rule = (SplitBy::Group, files, true);
+    let choice = choose_for(
+        (readings, targets),
+        rule,
+        &AutoFixed::default(),
+        (BUDGET_S, &Job::UNINTERRUPTED),
+    )
+    .unwrap();
+    assert_eq!(choice.record.leaks.len(), 1, "{:?}", choice.record);
+    assert!(choice.memory.is_empty());
+    let remarks = choice.record.remarks(&[Channel::new("y", None)]);
+    assert!(
+        remarks
+            .iter()
+            .any(|remark| remark.starts_with("possible leak: a memory predicts y")),
+        "{remarks:?}"
+    );
+}
+
+#[test]
+fn the_answer_is_never_worse_than_a_candidate_and_noise_does_not_spoil_other_targets() {
+    let count = 300;
+    let readings = normal(count, 3, 3);
+    let noise = normal(count, 3, 4);
+    let targets = Array2::from_shape_fn((count, 3), |(sample, target)| {
+        let [a, b] = [readings[[sample, 0]], readings[[sample, 1]]];
+        let truth = [(2.0 * a).sin() + b, a - b, 0.0][target];
+        truth + [0.2, 0.5, 1.0][target] * noise[[sample, target]]
+    });
+    let rule = (SplitBy::Random, (0..count).collect(), false);
+    let job = (BUDGET_S, &Job::UNINTERRUPTED);
+    let choice = choose_for((readings, targets.clone()), rule, &AutoFixed::default(), job).unwrap();
+    assert_eq!(choice.record.undetermined, [2]);
+    // Those on the same features, all of which could be members.
+    let combined = choice.record.combined.unwrap();
+    for tried in &choice.record.tried {
+        let is_network = matches!(tried.model, TriedModel::Network { .. });
+        assert!(
+            combined <= tried.error * (1.0 + 1e-12) || is_network,
+            "{combined} {tried:?}"
+        );
+    }
+    let square = (
+        0.2_f64.powi(2) / targets.column(0).var(0.0),
+        0.25 / targets.column(1).var(0.0),
+    );
+    assert!(
+        unexplained(&choice, &targets, 0) < 2.0 * square.0,
+        "{:?}",
+        choice.record
+    );
+    assert!(unexplained(&choice, &targets, 1) < 1.2 * square.1);
+    // The mean of the other folds is within a few percent of that of all.
+    assert!(unexplained(&choice, &targets, 2) < 1.05);
+}
+
+#[test]
+fn the_program_of_the_combination_adds_its_members() {
+    let choice = in_time().unwrap();
+    let (readings, targets) = creeping(400);
+    let times_s = (0..400).map(|sample| 0.1 * f64::from(sample)).collect();
+    let history = History::new(readings, None, None, Some(times_s), (0..400).collect());
+    let features = history.features(&choice.memory).unwrap();
+    let set = Dataset::new(features, targets, None, (0..400).collect()).unwrap();
+    let split = crate::dataset::Split {
+        training: set.clone(),
+        validation: None,
+    };
+    let mut run = Run::new(
+        choice.settings,
+        RunSets::new(split, set.clone()),
+        Begin::Initialize,
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
+    run.set_blend(Some(choice.blend.clone()));
+    let before = run.network().decouple(&set);
+    assert!(
+        (run.decouple_test() - before).iter().all(|off| off.abs() < 1e-9),
+        "the network until it is trained"
+    );
+    run.finish(&Job::UNINTERRUPTED).unwrap();
+    let network = run.network().decouple(&set).column(0).to_vec();
+    let expected = Vec::from_iter(network.iter().enumerate().map(|(sample, network)| {
+        let others = choice.blend.others.iter().map(|(program, weights)| {
+            let answer = crate::decoupling::ProgramDecoder::new(program.clone()).answers_to(&set)[[sample, 0]];
+            weights[0] * answer
+        });
+        choice.blend.network[0] * network + others.sum::<f64>()
+    }));
+    for (ours, expected) in run.decouple_test().iter().zip(expected) {
+        assert!((ours - expected).abs() < 1e-9, "{ours} {expected}");
+    }
+    assert_eq!(choice.blend.defect(set.channels(), 1), None);
+    assert!(choice.blend.defect(set.channels() + 1, 1).is_some() || choice.blend.others.is_empty());
+}
+
+#[test]
+fn readings_far_outside_are_answered_as_at_the_limits() {
+    let choice = in_time().unwrap();
+    let mut run = trained(&choice);
+    run.finish(&Job::UNINTERRUPTED).unwrap();
+    let mut decoder = crate::decoupling::ProgramDecoder::new(run.program());
+    let channels = run.test().channels();
+    let answer = |value: f64, decoder: &mut crate::decoupling::ProgramDecoder| {
+        decoder.answers(&[0], Array2::from_elem((1, channels), value).view())[[0, 0]]
+    };
+    let far = answer(1e6, &mut decoder);
+    assert_eq!(far, answer(1e9, &mut decoder));
+    assert!(far.abs() < 100.0, "{far}");
+}
+
+#[test]
+fn dead_channels_are_left_out_and_sparse_ones_stay() {
+    let count = 600;
+    let mut readings = normal(count, 4, 5);
+    for sample in 0..count {
+        // At the end of its range, with a few steps below; and a switch that knows the target.
+        readings[[sample, 2]] = if sample % 50 < 2 { 1022.0 } else { 1023.0 };
+        readings[[sample, 3]] = f64::from(u8::from(readings[[sample, 0]] > 0.5));
+    }
+    let targets = readings.select(ndarray::Axis(1), &[0]);
+    let set = Dataset::new(readings, targets, None, (0..count).collect()).unwrap();
+    assert_eq!(dead_channels(&set), [2]);
+    // 16 × 16 taxels, each pressed in one of twenty samples.
+    let taxels = Array2::from_shape_fn((2000, 256), |(sample, taxel)| {
+        let pressed = (sample * 7919) % 256;
+        let [off_x, off_y] = [pressed % 16, pressed / 16].map(|place| place as f64);
+        let distance = (off_x - (taxel % 16) as f64).hypot(off_y - (taxel / 16) as f64);
+        (2.2 - distance).max(0.0)
+    });
+    let zeros = taxels.iter().filter(|value| **value == 0.0).count() as f64 / taxels.len() as f64;
+    assert!((0.93..0.97).contains(&zeros), "{zeros}");
+    let targets = Array2::from_shape_fn((2000, 2), |(sample, axis)| match axis {
+        0 => ((sample * 7919) % 256 % 16) as f64,
+        _ => ((sample * 7919) % 256 / 16) as f64,
+    });
+    let set = Dataset::new(taxels, targets, None, (0..2000).collect()).unwrap();
+    assert_eq!(dead_channels(&set), Vec::<usize>::new());
 }
 
 #[test]
@@ -80,18 +293,16 @@ fn the_same_seed_gives_the_same_choice_and_the_budget_is_kept() {
     assert_eq!(one.record, other.record);
     assert_eq!((one.settings, &one.answers), (other.settings, &other.answers));
     // A candidate runs at least a few epochs.
-    assert!(one.record.seconds() < 1.5 * BUDGET_S, "{}", one.record.seconds());
+    let used = one.record.seconds() + one.record.training_s;
+    assert!(used < 1.5 * BUDGET_S, "{used}");
 }
 
 #[test]
 fn held_out_answers_have_the_error_of_the_choice() {
     let choice = in_time().unwrap();
     let (_, targets) = creeping(400);
-    let mean = targets.mean().unwrap();
-    let spread = targets.mapv(|target| (target - mean).powi(2)).sum();
-    let square = (&choice.answers - &targets).mapv(|error| error * error).sum();
-    let error = choice.record.choice().unwrap().error;
-    assert!(((square / spread).sqrt() / error - 1.0).abs() < 1e-9);
+    let error = choice.record.combined.unwrap();
+    assert!((unexplained(&choice, &targets, 0).sqrt() / error - 1.0).abs() < 1e-9);
 }
 
 #[test]
@@ -104,7 +315,8 @@ fn given_settings_are_kept_and_groups_are_not_divided() {
         ..AutoFixed::default()
     };
     let groups: Vec<usize> = (0..300).map(|sample| sample / 50).collect();
-    let choice = choose(SplitBy::Group, groups.clone(), &fixed, &Job::UNINTERRUPTED).unwrap();
+    let rule = (SplitBy::Group, groups.clone(), true);
+    let choice = choose_for(creeping(300), rule, &fixed, (BUDGET_S, &Job::UNINTERRUPTED)).unwrap();
     let settings = choice.settings;
     assert_eq!(
         (settings.hidden, settings.starts, settings.training.stopping.epochs),
@@ -118,57 +330,56 @@ fn given_settings_are_kept_and_groups_are_not_divided() {
         past: None,
         by: SplitBy::Group,
     };
-    let folds = search::folds(&samples, settings.seed).unwrap();
-    assert_eq!(folds.count(), choice.record.folds);
-    for fold in 0..folds.count() {
-        let of_fold = folds.test(fold);
-        let others = folds.without(&[fold]);
+    let judge = judge::Judge::new(&samples, settings.seed).unwrap();
+    assert_eq!(judge.parts(), choice.record.folds);
+    for (outside, inside, _) in judge.divisions() {
         assert!(
-            of_fold
+            inside
                 .iter()
-                .all(|&one| others.iter().all(|&other| groups[one] != groups[other]))
+                .all(|one| outside.iter().all(|other| groups[*one] != groups[*other]))
         );
     }
 }
 
 #[test]
 fn a_cancelled_search_has_no_result() {
-    let cancelled = choose(
-        SplitBy::Time,
-        (0..200).collect(),
+    let rule = (SplitBy::Time, (0..200).collect(), true);
+    let cancelled = choose_for(
+        creeping(200),
+        rule,
         &AutoFixed::default(),
-        &Job::new(&|| true),
+        (BUDGET_S, &Job::new(&|| true)),
     );
     assert!(matches!(cancelled, Err(RunError::Cancelled(_))));
 }
 
-/// Training stops at the chosen epoch and begins with the ridge regression that the search began with.
-#[test]
-fn the_choice_trains_to_about_its_error() {
-    let choice = in_time().unwrap();
+/// The run of a choice for 400 samples, tested on the next 200.
+fn trained(choice: &AutoChoice) -> Run {
     let (readings, targets) = creeping(600);
-    let history = History::new(readings.clone(), None, None, None, (0..600).collect());
+    let times_s = (0..600).map(|sample| 0.1 * f64::from(sample)).collect();
+    let history = History::new(readings, None, None, Some(times_s), (0..600).collect());
     let features = history.features(&choice.memory).unwrap();
-    let all = Dataset::new(features, targets.clone(), None, (0..600).collect()).unwrap();
+    let all = Dataset::new(features, targets, None, (0..600).collect()).unwrap();
     let part = |samples: std::ops::Range<usize>| all.select(&samples.collect::<Vec<_>>());
     let split = crate::dataset::Split {
         training: part(0..400),
         validation: None,
     };
-    let mut run = Run::with_baselines(
-        choice.settings,
-        RunSets::new(split, part(400..600)),
-        Begin::Initialize,
-        &Job::UNINTERRUPTED,
-    )
-    .unwrap();
-    while run.step().is_none() {}
-    let mut square = 0.0;
-    for (answer, target) in run.decouple_test().iter().zip(targets.iter().skip(400)) {
-        square += (answer - target).powi(2);
-    }
-    let spread = targets.iter().skip(400).map(|target| target * target).sum::<f64>();
-    let (error, expected) = ((square / spread).sqrt(), choice.record.choice().unwrap().error);
+    let sets = RunSets::new(split, part(400..600));
+    let mut run = Run::with_baselines(choice.settings, sets, Begin::Initialize, &Job::UNINTERRUPTED).unwrap();
+    run.set_blend(Some(choice.blend.clone()));
+    run
+}
+
+#[test]
+fn the_choice_trains_to_about_its_error() {
+    let choice = in_time().unwrap();
+    let mut run = trained(&choice);
+    run.finish(&Job::UNINTERRUPTED).unwrap();
+    let truth = run.test().targets().to_owned();
+    let square = (run.decouple_test() - &truth).mapv(|error| error * error).sum();
+    let spread = truth.mapv(|target| target * target).sum();
+    let (error, expected) = ((square / spread).sqrt(), choice.record.combined.unwrap());
     assert!(error < 4.0 * expected, "{error} {expected}");
 }
 
@@ -210,6 +421,6 @@ fn many_inputs_for_few_samples_get_weight_decay() {
         .iter()
         .filter(|tried| tried.model == TriedModel::Ridge);
     let ridge = ridge.map(|tried| tried.error).fold(f64::INFINITY, f64::min);
-    let error = choice.record.choice().unwrap().error;
+    let error = choice.record.combined.unwrap();
     assert!(error < 0.8 * ridge, "{error} {ridge}");
 }

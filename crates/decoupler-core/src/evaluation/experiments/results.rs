@@ -226,6 +226,7 @@ mod tests {
             repeat: 0,
             scores: Scores {
                 network: errors(z_percent),
+                network_alone: None,
                 baselines: Baselines {
                     mean: errors(5.5),
                     linear: errors(1.6),

@@ -119,6 +119,7 @@ impl Trial {
             repeat,
             scores: Scores {
                 network: run.errors(),
+                network_alone: None,
                 baselines,
                 coverage: Vec::new(),
             },

@@ -187,7 +187,7 @@ fn differ(branches: [Vec<f64>; 2]) -> bool {
     let pairs = branches.iter().zip(means);
     let squares = pairs.flat_map(|(values, mean)| values.iter().map(move |value| (value - mean).powi(2)));
     let standard_error = (squares.sum::<f64>() / freedom * (1.0 / loading + 1.0 / unloading)).sqrt();
-    (means[0] - means[1]).abs() > student_quantile(freedom) * standard_error
+    (means[0] - means[1]).abs() > student_quantile(0.05, freedom) * standard_error
 }
 
 /// Adds the excursions of one stretch between the first and the last turning point that are certain.

@@ -100,7 +100,7 @@ impl SumVariance {
 
     /// Distance from the sum to the ends of its 95 % confidence interval.
     pub(super) fn reach(self) -> f64 {
-        student_quantile(self.units as f64 - 1.0) * self.variance.sqrt()
+        student_quantile(0.05, self.units as f64 - 1.0) * self.variance.sqrt()
     }
 }
 

@@ -8,6 +8,8 @@ use decoupler_core::{
 };
 use thiserror::Error;
 
+use crate::export::NetworkFile;
+
 /// Format in which a decoder is exported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BundleFormat {
@@ -188,6 +190,8 @@ pub enum BundleDecoder {
     Kind(DecoderKind),
     /// The linear map of the error table.
     Linear,
+    /// What a choice of settings found best.
+    Chosen,
 }
 
 impl BundleDecoder {
@@ -218,6 +222,9 @@ impl BundleDecoder {
             let meaning = match decoder {
                 Self::Kind(kind) => kind.meaning(),
                 Self::Linear => "The linear map of the error table",
+                Self::Chosen => {
+                    "What the file answers with: the combination that a choice of settings found, or the network"
+                }
             };
             format!("{decoder}: {meaning}")
         };
@@ -225,9 +232,17 @@ impl BundleDecoder {
         format!("Decoder to export. {}", lines.join("; "))
     }
 
-    /// `true` for the trained network.
+    /// `true` for the trained network, and for the combination with it: those that a network file contains.
     pub fn is_network(self) -> bool {
-        self == Self::default()
+        matches!(self, Self::Chosen | Self::Kind(DecoderKind::Network))
+    }
+
+    /// What the network file answers with.
+    pub fn of(file: &NetworkFile) -> Self {
+        match file.blend() {
+            Some(blend) if !blend.others.is_empty() => Self::Chosen,
+            _ => Self::default(),
+        }
     }
 
     /// Name in sentences.
@@ -235,12 +250,13 @@ impl BundleDecoder {
         match self {
             Self::Kind(kind) => kind.name(Precision::Double),
             Self::Linear => "Linear map",
+            Self::Chosen => "Chosen combination",
         }
     }
 
     /// Word for it in sentences, and the name of its files: network or decoder.
     pub(super) fn noun(self) -> &'static str {
-        if self.is_network() { "network" } else { "decoder" }
+        if self == Self::default() { "network" } else { "decoder" }
     }
 }
 
@@ -255,12 +271,14 @@ impl Named for BundleDecoder {
         Self::Kind(DecoderKind::Newton),
         Self::Kind(DecoderKind::Polish),
         Self::Linear,
+        Self::Chosen,
     ];
 
     fn name(self) -> &'static str {
         match self {
             Self::Kind(kind) => Named::name(kind),
             Self::Linear => "linear",
+            Self::Chosen => "chosen",
         }
     }
 }

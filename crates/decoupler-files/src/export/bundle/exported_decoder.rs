@@ -45,7 +45,7 @@ impl<'a> From<&'a NetworkFile> for ExportedDecoder<'a> {
             None => file.test_set().ok(),
         };
         Self {
-            fitted: FittedDecoder::of_networks(&file.network, file.scores.network.clone()),
+            fitted: FittedDecoder::of_file(file, BundleDecoder::of(file)),
             origin: Origin::of_file(file),
             file: Some(file),
             test,
@@ -64,7 +64,7 @@ impl<'a> ExportedDecoder<'a> {
         sets.check_saved(file.recorded.as_ref())?;
         let test = Some(Arc::clone(&sets.sets.test));
         let fitted = match decoder.is_network() {
-            true => FittedDecoder::of_networks(&file.network, file.scores.network.clone()),
+            true => FittedDecoder::of_file(file, decoder),
             false => FittedDecoder::fit(file.settings, sets.sets, Some(file.network.clone()), decoder)?,
         };
         Ok(Self {
@@ -138,8 +138,10 @@ impl<'a> ExportedDecoder<'a> {
 
     /// 90 % prediction intervals of the network, if every target has one.
     fn half_widths(&self) -> Vec<HalfWidth> {
-        let file = self.file.filter(|_| self.fitted.kind.is_network());
-        let intervals = file.and_then(|file| file.intervals.as_ref());
+        // The intervals are those of what the file answers with.
+        let has_them =
+            |file: &&NetworkFile| self.fitted.kind.is_network() && self.fitted.kind == BundleDecoder::of(file);
+        let intervals = self.file.filter(has_them).and_then(|file| file.intervals.as_ref());
         let all = intervals.and_then(|intervals| intervals.targets.iter().cloned().collect());
         all.unwrap_or_default()
     }
@@ -167,7 +169,13 @@ impl<'a> ExportedDecoder<'a> {
         let problem = &self.origin.problem;
         let channels = problem.inputs.len();
         let meaning = self.meaning();
-        let mut program = self.fitted.program.clone();
+        let mut program = match self.file {
+            // Integers saturate, and need no limits.
+            Some(file) if precision == BundlePrecision::Fixed16 && self.fitted.kind == BundleDecoder::default() => {
+                file.network.program(Precision::Double)
+            }
+            _ => self.fitted.program.clone(),
+        };
         if let Some(memory) = problem.memory.as_ref().filter(|memory| !memory.is_empty()) {
             let with_history = program.with_history(memory, channels);
             program = with_history.map_err(|error| Box::new(RunError::from(error)))?;
@@ -321,7 +329,7 @@ impl<'a> ExportedDecoder<'a> {
                 fields.extend(part);
             }
         }
-        if self.fitted.kind.is_network() {
+        if self.fitted.kind == BundleDecoder::default() {
             let mut operations = contents.computed();
             let hidden = operations.find(|(_, operation)| matches!(operation, Operation::Map(Function::Tanh, _)));
             fields.insert(
@@ -452,6 +460,26 @@ pub(super) struct FittedDecoder {
 }
 
 impl FittedDecoder {
+    /// Wraps what a network file answers with, or its network alone.
+    pub(super) fn of_file(file: &NetworkFile, kind: BundleDecoder) -> Self {
+        let (program, errors) = match kind {
+            BundleDecoder::Chosen => (file.decoder_program(), file.scores.network.clone()),
+            _ => (
+                file.network_program(),
+                file.scores
+                    .network_alone
+                    .as_ref()
+                    .unwrap_or(&file.scores.network)
+                    .clone(),
+            ),
+        };
+        Self {
+            kind,
+            program,
+            ..Self::of_networks(&file.network, errors)
+        }
+    }
+
     /// Wraps trained networks, which contain the range of their readings, and their errors on the test samples.
     pub(super) fn of_networks(networks: &Networks, errors: TestErrors) -> Self {
         let all = networks.values().iter();
@@ -497,6 +525,7 @@ impl FittedDecoder {
         let decoder = match kind {
             BundleDecoder::Linear => Some(set.linear().map_err(Box::new)?),
             BundleDecoder::Kind(kind) => set.decoder(kind, Precision::Double).map_err(Box::new)?,
+            BundleDecoder::Chosen => set.decoder(DecoderKind::Network, Precision::Double).map_err(Box::new)?,
         };
         let not_described = |reason| ChoiceError::NotDescribed { decoder: kind, reason };
         let mut decoder = decoder.ok_or_else(|| not_described(NotDescribed::Equations))?;

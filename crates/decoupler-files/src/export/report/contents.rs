@@ -60,7 +60,7 @@ impl RunReport<'_> {
     pub fn html(&self, folder: &Path) -> String {
         let Self { file, decoders, .. } = *self;
         let setup = self.setup(folder);
-        let answers = file.network.decouple(self.test);
+        let answers = file.decoder().answers_to(self.test);
         let loops = setup.plan().map_or_else(Vec::new, |plan| {
             HysteresisLoop::of_test(self.test, answers.view(), plan.test_order())
         });

@@ -61,7 +61,7 @@ impl TargetSession {
         let surface = TargetSurface::new(&problem.positions, &problem.targets);
         let surface = surface.ok().filter(|_| !problem.positions.is_empty());
         Ok(Some(Self {
-            decoder: network.network.decoder(),
+            decoder: network.decoder(),
             source,
             tally: Tally::new(Instant::now()),
             sample: vec![0.0; 1 + problem.feature_count()],
@@ -413,7 +413,7 @@ mod tests {
         assert!(session.take_next(Instant::now(), &|_| ()).is_none());
         let shown = session.show();
         let mut expected = [0.0];
-        let mut decoder = network.network.decoder();
+        let mut decoder = network.decoder();
         decoder.decode_row(0, &[3.0, 2.0], &mut expected).unwrap();
         let targets = shown.targets.unwrap();
         assert_eq!(targets.values(), expected);

@@ -319,6 +319,7 @@ impl From<Plan> for Reopened {
             files: plan.files().map(unknown).collect(),
             samples_crc32: String::new(),
             search: None,
+            blend: None,
             chosen_intervals: None,
             plan,
         })

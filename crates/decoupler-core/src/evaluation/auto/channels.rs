@@ -1,0 +1,58 @@
+use std::collections::HashMap;
+
+use ndarray::ArrayView1;
+
+use crate::dataset::Dataset;
+
+/// Number of different values below which a channel is nearly dead.
+const FEW_VALUES: usize = 12;
+/// Shares of the samples at one value above which a channel with few values is left out, and one without any relation.
+const AT_ONE_VALUE: (f64, f64) = (0.9, 0.99);
+
+/// Returns the channels of `set` that should be left out: those with few different values that are nearly always at one of
+/// them or have no relation to a target, and those that are hardly ever away from one value, without any relation. A channel
+/// at the end of its range may wake in a later session, where a decoder that takes it in would answer anything. Sparse
+/// channels, such as taxels that are rarely pressed, stay: with few values, if they are most of the channels and related.
+pub fn dead_channels(set: &Dataset) -> Vec<usize> {
+    let readings = set.readings();
+    let stuck = Vec::from_iter(readings.columns().into_iter().map(|readings| {
+        let mut counts: HashMap<u64, usize> = HashMap::new();
+        for value in readings {
+            *counts.entry(value.to_bits()).or_default() += 1;
+        }
+        let most = counts.iter().max_by_key(|(bits, count)| (**count, **bits));
+        let (&bits, &count) = most.expect("a set has samples");
+        let has_few = counts.len() < FEW_VALUES.min(set.samples() / 2);
+        (has_few, count as f64 / readings.len() as f64, f64::from_bits(bits))
+    }));
+    let is_silent = |(has_few, share, _): &(bool, f64, f64)| *has_few && *share >= AT_ONE_VALUE.0;
+    let is_sparse = 2 * stuck.iter().filter(|channel| is_silent(channel)).count() > stuck.len();
+    let is_dead = |channel: &usize| {
+        let (has_few, share, usual) = stuck[*channel];
+        let is_suspect = has_few || share >= AT_ONE_VALUE.1;
+        let is_out = is_silent(&stuck[*channel]) && !is_sparse;
+        is_out || is_suspect && !is_related(set, readings.column(*channel), usual)
+    };
+    let dead = Vec::from_iter((0..set.channels()).filter(is_dead));
+    if dead.len() < set.channels() { dead } else { Vec::new() }
+}
+
+/// Returns `true` if the mean of a target while the channel is away from its usual value differs from that of all samples by
+/// more than three standard errors, where each stretch away counts as one sample.
+fn is_related(set: &Dataset, readings: ArrayView1<'_, f64>, usual: f64) -> bool {
+    const DEVIATIONS: f64 = 3.0;
+    let away = readings.map(|value| *value != usual);
+    let count = away.iter().filter(|away| **away).count().max(1) as f64;
+    let begins = (0..away.len()).filter(|&sample| away[sample] && (sample == 0 || !away[sample - 1]));
+    let stretches = begins.count() as f64;
+    set.targets().columns().into_iter().any(|target| {
+        let mean = target.mean().unwrap_or(0.0);
+        let deviation = target.std(0.0);
+        let of_away = target
+            .iter()
+            .zip(&away)
+            .filter(|(_, away)| **away)
+            .map(|(value, _)| value - mean);
+        (of_away.sum::<f64>() / count).abs() > DEVIATIONS * deviation / stretches.max(1.0).sqrt()
+    })
+}

@@ -1,0 +1,90 @@
+use ndarray::{Array2, Axis, Zip};
+
+use super::{AutoSamples, judge::Judge};
+use crate::{
+    dataset::{Dataset, Memory},
+    decoupling::{KernelShape, Program, ProgramDecoder, ridge},
+    network::{InputChoice, MinMax, NetworkError, Quantity},
+};
+
+/// Samples with the features of a memory as readings.
+#[derive(Clone)]
+pub(super) struct Features {
+    pub(super) memory: Memory,
+    pub(super) set: Dataset,
+}
+
+impl Features {
+    /// Returns the features of `memory`; `None` if they are not possible for the samples.
+    pub(super) fn of(samples: &AutoSamples<'_>, memory: &Memory) -> Option<Self> {
+        let set = if memory.is_empty() {
+            samples.set.clone()
+        } else {
+            let (history, of_samples) = samples.past?;
+            let features = history.features(memory).ok()?;
+            samples.set.with_readings(features.select(Axis(0), of_samples))
+        };
+        let memory = memory.clone();
+        Some(Self { memory, set })
+    }
+
+    /// Readings of the samples `inside`, limited as they will be in use: to the range of those outside, extended by a tenth.
+    pub(super) fn held_out(&self, outside: &[usize], inside: &[usize], quantity: Quantity) -> Array2<f64> {
+        let all = self.set.readings();
+        let mut readings = all.select(Axis(0), inside);
+        if let Some(range) = MinMax::of(all.select(Axis(0), outside).view()) {
+            for (channel, mut column) in readings.columns_mut().into_iter().enumerate() {
+                let (low, high) = range.limits(quantity, channel);
+                column.mapv_inplace(|reading| reading.clamp(low, high));
+            }
+        }
+        readings
+    }
+
+    /// Returns the held-out answers of ridge regression and the regression fitted to all samples.
+    pub(super) fn ridge(&self, judge: &Judge, quantity: Quantity) -> Result<(Array2<f64>, Program), NetworkError> {
+        let values = self.set.readings().mapv(|reading| quantity.of(reading));
+        let fits = judge
+            .repeats
+            .iter()
+            .map(|folds| ridge(values.view(), self.set.targets(), folds));
+        let fits = fits.collect::<Result<Vec<_>, _>>()?;
+        let mut maps = fits.iter().flat_map(|fit| &fit.held_out);
+        let answers = judge.collect(|outside, inside| {
+            let map = maps.next().ok_or(NetworkError::Empty)?;
+            let values = self
+                .held_out(outside, inside, quantity)
+                .mapv(|reading| quantity.of(reading));
+            Ok::<_, NetworkError>(linear(map, &values))
+        })?;
+        let mean = fits
+            .iter()
+            .fold(Array2::zeros(fits[0].map.dim()), |sum, fit| sum + &fit.map)
+            / fits.len() as f64;
+        let centre = values.mean_axis(Axis(0)).ok_or(NetworkError::Empty)?.to_vec();
+        Ok((answers, Program::of_map(&mean, quantity, &centre)))
+    }
+
+    /// Returns the held-out answers of kernel ridge regression and the shape of its kernel.
+    pub(super) fn kernel(
+        &self,
+        judge: &Judge,
+        (inputs, is_linear, subset): (InputChoice, bool, usize),
+    ) -> Result<(Array2<f64>, KernelShape), NetworkError> {
+        let shape = KernelShape::choose(&self.set, inputs, is_linear, &judge.repeats[0])?;
+        let answers = judge.collect(|outside, inside| {
+            let program = Program::kernel(&self.set.select(outside), &shape, subset)?;
+            let readings = self.held_out(outside, inside, inputs.quantity);
+            Ok::<_, NetworkError>(ProgramDecoder::new(program).answers(&vec![0; inside.len()], readings.view()))
+        })?;
+        Ok((answers, shape))
+    }
+}
+
+/// Answers of an affine map, whose constants are the last row.
+fn linear(map: &Array2<f64>, values: &Array2<f64>) -> Array2<f64> {
+    let (weights, constants) = map.view().split_at(Axis(0), values.ncols());
+    let mut answers = values.dot(&weights);
+    Zip::from(answers.rows_mut()).for_each(|mut row| row += &constants.row(0));
+    answers
+}
