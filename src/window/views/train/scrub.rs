@@ -3,7 +3,12 @@
 
 use std::{sync::Arc, time::Duration};
 
-use decoupler_core::{evaluation::TestErrors, network::Networks, problem::Problem};
+use decoupler_core::{
+    decoupling::{Precision, ProgramDecoder},
+    evaluation::TestErrors,
+    network::Networks,
+    problem::Problem,
+};
 use eframe::egui::{Align, Layout, RichText, Slider, Ui, Vec2, WidgetInfo, accesskit::Role};
 
 use crate::window::{
