@@ -118,7 +118,7 @@ impl Saved<'_> {
         let answers = file.network.decouple(&sets.sets.test);
         file.scores.network = TestErrors::of_targets(&sets.sets.test, answers.view());
         if let Some(intervals) = self.intervals {
-            file.scores.coverage = intervals.coverage(&sets.sets.test, answers.view(), SplitBy::Time);
+            file.scores.coverage = intervals.coverage(&sets.sets.test, answers.view());
             file.intervals = Some(intervals.clone());
         }
         file.training = self.origin.training();

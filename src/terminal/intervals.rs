@@ -60,7 +60,7 @@ pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) {
         }
     };
     match calibrated {
-        Ok(intervals) => run.set_intervals(intervals, by),
+        Ok(intervals) => run.set_intervals(intervals),
         // The training is complete without them.
         Err(reason) => note(&format!("No prediction intervals: {reason}")),
     }

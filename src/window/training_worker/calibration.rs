@@ -27,11 +27,6 @@ impl Calibration {
         })
     }
 
-    /// Rule by which samples are held out.
-    pub fn by(&self) -> SplitBy {
-        self.by
-    }
-
     /// Forgets the choice of settings, because the training continues with others.
     pub fn forget_choice(&mut self) {
         self.chosen = None;

@@ -385,12 +385,12 @@ impl<'a> TrainingLoop<'a> {
         let calibrated = self.run.as_ref().and_then(|TrainedRun { run, calibration, .. }| {
             let calibration = calibration.as_ref()?;
             let calibrated = calibration.calibrate(run, &Job::new(&|| is_cancelled(self)));
-            Some((calibrated, calibration.by()))
+            Some(calibrated)
         });
         self.no_intervals = None;
-        if let (Some(trained), Some((calibrated, by))) = (&mut self.run, calibrated) {
+        if let (Some(trained), Some(calibrated)) = (&mut self.run, calibrated) {
             match calibrated {
-                Ok(intervals) => trained.run.set_intervals(intervals, by),
+                Ok(intervals) => trained.run.set_intervals(intervals),
                 Err(reason) => self.no_intervals = Some(reason),
             }
         }

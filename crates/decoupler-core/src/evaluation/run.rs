@@ -13,7 +13,7 @@ use super::{
     auto::Blend, starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, DatasetError, PerRow, SimulationError, SplitBy},
+    dataset::{Dataset, DatasetError, PerRow, SimulationError},
     decoupling::{DecodeError, FitError, Precision, Program, ProgramDecoder},
     identifiability::IdentifiabilityError,
     job::{Cancelled, Job},
@@ -279,10 +279,9 @@ impl Run {
         self.baselines.as_ref()
     }
 
-    /// Sets the intervals of [`Self::network`], and measures their coverage on the test set, which was held out by the
-    /// rule `by`. Another epoch removes them.
-    pub fn set_intervals(&mut self, intervals: Intervals, by: SplitBy) {
-        let coverage = intervals.coverage(&self.test, self.decouple_test().view(), by);
+    /// Sets the intervals of [`Self::decouple_test`], and measures their coverage on the test set. Another epoch removes them.
+    pub fn set_intervals(&mut self, intervals: Intervals) {
+        let coverage = intervals.coverage(&self.test, self.decouple_test().view());
         self.intervals = Some((intervals, coverage));
     }
 

@@ -262,13 +262,19 @@ pub fn describe_half_widths(targets: &[Channel], intervals: &Intervals) -> Optio
 
 /// Warns of the targets whose intervals contain significantly fewer test samples than stated, with cause and remedy.
 pub fn describe_coverage(targets: &[Channel], coverage: &[Option<Coverage>]) -> Vec<String> {
-    let low = targets
-        .iter()
-        .zip(coverage)
-        .filter_map(|(target, coverage)| Some((target, coverage.as_ref().filter(|of| of.is_too_low())?)));
+    let low = targets.iter().zip(coverage).filter_map(|(target, coverage)| {
+        Some((
+            target,
+            coverage.as_ref().filter(|of| of.is_too_low() || of.is_too_high())?,
+        ))
+    });
     let describe = |(target, coverage): (&Channel, &Coverage)| {
         let percent = |share: f64| format!("{:.0}", 100.0 * share);
-        let cause = if coverage.bias.abs() > 0.5 * coverage.half_width {
+        let cause = if coverage.is_too_high() {
+            "they are too wide for these samples: part of the training recording was answered much worse than this test part; \
+             look for a stretch of it that differs"
+                .to_owned()
+        } else if coverage.bias.abs() > 0.5 * coverage.half_width {
             format!(
                 "the test part is offset from the training part (mean error {}, half-width {}): re-zero the sensor, or \
                  record training data closer to the time of use",

@@ -1,6 +1,6 @@
 use std::collections::HashMap;
 
-use ndarray::ArrayView1;
+use ndarray::{ArrayView1, Axis};
 
 use crate::dataset::Dataset;
 
@@ -38,21 +38,16 @@ pub fn dead_channels(set: &Dataset) -> Vec<usize> {
 }
 
 /// Returns `true` if the mean of a target while the channel is away from its usual value differs from that of all samples by
-/// more than three standard errors, where each stretch away counts as one sample.
+/// more than three standard errors, or its variance is smaller by more than that, where each stretch away counts as one sample.
 fn is_related(set: &Dataset, readings: ArrayView1<'_, f64>, usual: f64) -> bool {
     const DEVIATIONS: f64 = 3.0;
-    let away = readings.map(|value| *value != usual);
-    let count = away.iter().filter(|away| **away).count().max(1) as f64;
-    let begins = (0..away.len()).filter(|&sample| away[sample] && (sample == 0 || !away[sample - 1]));
-    let stretches = begins.count() as f64;
+    let away = Vec::from_iter((0..readings.len()).filter(|&sample| readings[sample] != usual));
+    let stretches = away.chunk_by(|one, next| one + 1 == *next).count().max(1) as f64;
     set.targets().columns().into_iter().any(|target| {
-        let mean = target.mean().unwrap_or(0.0);
-        let deviation = target.std(0.0);
-        let of_away = target
-            .iter()
-            .zip(&away)
-            .filter(|(_, away)| **away)
-            .map(|(value, _)| value - mean);
-        (of_away.sum::<f64>() / count).abs() > DEVIATIONS * deviation / stretches.max(1.0).sqrt()
+        let (mean, variance) = (target.mean().unwrap_or(0.0), target.var(0.0));
+        let of_away = target.select(Axis(0), &away);
+        let off = of_away.mean().unwrap_or(mean) - mean;
+        off.abs() > DEVIATIONS * (variance / stretches).sqrt()
+            || of_away.var(0.0) < variance * (1.0 - DEVIATIONS * (2.0 / stretches).sqrt())
     })
 }

@@ -44,7 +44,7 @@ const SMALLEST_WEIGHT: f64 = 0.05;
 /// Share of the variance that the best candidate leaves of a target that is not determined, and those that the readings of
 /// the moment and a memory leave of one that may leak.
 const UNDETERMINED: f64 = 0.95;
-const LEAK: [f64; 2] = [0.9, 0.5];
+const LEAK: [f64; 2] = [0.75, 0.4];
 
 /// Initial damping, and its factor after each epoch. Gauss-Newton steps without damping fit noise within an epoch or two
 /// where weights are many; with damping that falls gradually, the number of epochs regularises.

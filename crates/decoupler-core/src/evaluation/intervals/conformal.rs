@@ -19,17 +19,17 @@ pub(super) fn conformal_quantile(scores: &[f64], evidence: &Evidence) -> Option<
     (effective >= Intervals::FEWEST_SAMPLES).then(|| (quantile(scores, P + (P - 0.5) / effective), effective))
 }
 
-/// Returns the lowest and the highest share of `test` effective samples within intervals that were calibrated on
-/// `calibration` effective samples, with 99 % confidence.
+/// Returns the lowest and the highest share of `test` effective samples within intervals of this `nominal` coverage that were
+/// calibrated on `calibration` effective samples, with 99 % confidence.
 ///
 /// The coverage of conformal intervals has a beta distribution, so the number of samples within them is beta-binomial
 /// (Vovk 2012, arXiv:1209.2673). Its skewness matters for few samples.
-pub(super) fn expected_shares(test: f64, calibration: f64) -> [f64; 2] {
+pub(super) fn expected_shares(nominal: f64, test: f64, calibration: f64) -> [f64; 2] {
     const TAIL: f64 = 0.005;
     /// More samples do not change the shares noticeably.
     const MAX_SAMPLES: f64 = 10_000.0;
     let samples = test.floor().clamp(1.0, MAX_SAMPLES);
-    let inside = Intervals::NOMINAL * (calibration + 1.0);
+    let inside = nominal * (calibration + 1.0);
     let outside = calibration + 1.0 - inside;
     let ln_beta = |a: f64, b: f64| libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b);
     let mut ln_probability = ln_beta(inside, outside + samples) - ln_beta(inside, outside);

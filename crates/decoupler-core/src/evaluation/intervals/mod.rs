@@ -44,6 +44,9 @@ pub struct Coverage {
     pub expected: [f64; 2],
     /// Mean error (answer − target), in the unit of the target.
     pub bias: f64,
+    /// `true` if so many errors are within a quarter of the half-width that the intervals are much too wide.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_too_wide: bool,
 }
 
 impl Intervals {
@@ -129,19 +132,18 @@ impl Intervals {
         Some(self.targets.get(target)?.as_ref()?.at(answer))
     }
 
-    /// Measures the coverage of `answers` (samples × targets) to the test samples `test`, which were held out by the
-    /// rule `by`; `None` for targets without an interval.
+    /// Measures the coverage of `answers` (samples × targets) to the test samples `test`; `None` for targets without an
+    /// interval.
     ///
     /// # Panics
     /// If the shapes differ.
-    pub fn coverage(&self, test: &Dataset, answers: ArrayView2<'_, f64>, by: SplitBy) -> Vec<Option<Coverage>> {
+    pub fn coverage(&self, test: &Dataset, answers: ArrayView2<'_, f64>) -> Vec<Option<Coverage>> {
         assert_eq!(test.targets().dim(), answers.dim());
-        let evidence = Evidence::of(test, by);
         let of = |(target, half_width): (usize, &Option<HalfWidth>)| {
             let half_width = half_width.as_ref()?;
             let (truth, answers) = (test.targets().column(target).to_vec(), answers.column(target));
             let pairs = truth.into_iter().zip(answers.iter().copied());
-            Some(half_width.coverage(pairs.collect(), &evidence))
+            Some(half_width.coverage(&Vec::from_iter(pairs)))
         };
         self.targets.iter().enumerate().map(of).collect()
     }
@@ -203,6 +205,11 @@ impl Coverage {
     /// Returns `true` if the coverage is significantly too low.
     pub fn is_too_low(&self) -> bool {
         self.share < self.expected[0]
+    }
+
+    /// Returns `true` if the coverage is significantly too high, or the intervals are much too wide.
+    pub fn is_too_high(&self) -> bool {
+        self.share > self.expected[1] || self.is_too_wide
     }
 }
 

@@ -72,8 +72,8 @@ fn coverage(truth: Truth, repeats: u64) -> (f64, f64) {
         let lines = fit(&set);
         let new = truth.draw(2000, &mut rng);
         let short = truth.draw(truth.samples / 4, &mut rng);
-        let many = intervals.coverage(&new, answers(&lines, &new).view(), SplitBy::Time);
-        let few = intervals.coverage(&short, answers(&lines, &short).view(), SplitBy::Time);
+        let many = intervals.coverage(&new, answers(&lines, &new).view());
+        let few = intervals.coverage(&short, answers(&lines, &short).view());
         for (many, few) in many.iter().flatten().zip(few.iter().flatten()) {
             total += many.share;
             alarms += f64::from(u8::from(few.is_too_low()));
@@ -122,7 +122,7 @@ fn expected_shares_are_quantiles_of_the_beta_binomial_distribution() {
         (400.0, 60.0, [0.77, 0.9775]),
         (2000.0, 3000.0, [0.877, 0.9215]),
     ] {
-        let found = expected_shares(test, calibration);
+        let found = expected_shares(Intervals::NOMINAL, test, calibration);
         assert!(
             found
                 .iter()
@@ -173,6 +173,32 @@ fn independent_samples_have_the_quantile_of_conformal_prediction() {
         assert_eq!(half_width.effective_samples, samples as f64);
         assert!((half_width.constant - rank).abs() < 1e-9, "{samples}: {half_width:?}");
     }
+}
+
+/// Intervals that are six times too wide, and those of a test part that is offset by a multiple of the noise, are noticed.
+#[test]
+fn wrong_coverage_is_noticed_in_both_directions() {
+    let truth = Truth {
+        memory: 0.9,
+        growth: 0.0,
+        samples: 1000,
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let (set, test) = (truth.draw(1000, &mut rng), truth.draw(300, &mut rng));
+    let of = |set: &Dataset, factor: f64, offset: f64| {
+        Array2::from_shape_fn((set.samples(), 2), |(sample, target)| {
+            let truth = set.targets()[[sample, target]];
+            truth + factor * (2.0 * set.readings()[[sample, 0]] - truth) + offset
+        })
+    };
+    let intervals = Intervals::calibrate(&set, of(&set, 1.0, 0.0).view(), SplitBy::Time);
+    let found = |factor: f64, offset: f64| {
+        let coverage = intervals.coverage(&test, of(&test, factor, offset).view())[0].unwrap();
+        (coverage.is_too_low(), coverage.is_too_high())
+    };
+    assert_eq!(found(1.0, 0.0), (false, false));
+    assert_eq!(found(1.0, 0.2), (true, false));
+    assert_eq!(found(1.0 / 6.0, 0.0), (false, true));
 }
 
 /// The mean over 200 sets and two targets has a standard error of about 0.3 %, 0.6 % with autocorrelation.
