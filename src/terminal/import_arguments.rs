@@ -1,4 +1,7 @@
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use clap::Args;
 
@@ -8,7 +11,7 @@ use super::{
     interruption::check_same,
 };
 use decoupler_core::{
-    dataset::{Division, Memory, Span, SplitBy},
+    dataset::{DatasetError, Division, Memory, Span, SplitBy},
     text::Named,
 };
 use decoupler_files::{
@@ -18,6 +21,38 @@ use decoupler_files::{
         Separator, TestFiles,
     },
 };
+
+/// A value of `--memory`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum MemoryArgument {
+    /// No memory.
+    None,
+    /// Memories are tried.
+    Auto,
+    /// A time constant.
+    Span(Span),
+}
+
+impl MemoryArgument {
+    fn span(&self) -> Option<Span> {
+        match self {
+            Self::Span(span) => Some(*span),
+            Self::None | Self::Auto => None,
+        }
+    }
+}
+
+impl FromStr for MemoryArgument {
+    type Err = DatasetError;
+
+    fn from_str(text: &str) -> Result<Self, DatasetError> {
+        match text {
+            "none" => Ok(Self::None),
+            "auto" => Ok(Self::Auto),
+            _ => text.parse().map(Self::Span),
+        }
+    }
+}
 
 // Layout of text files, if it should not be detected.
 #[derive(Args)]
@@ -77,9 +112,10 @@ pub(super) struct ImportArguments {
     #[arg(long, value_name = "SPANS", value_delimiter = ',', requires = "data")]
     lags: Vec<Span>,
     /// Inputs from the past: exponential averages of the readings with these time constants, such as 0.1s,1s,10s, which need
-    /// --time, or 20,100 samples
-    #[arg(long, value_name = "SPANS", value_delimiter = ',', requires = "data")]
-    memory: Vec<Span>,
+    /// --time, or 20,100 samples. For a choice of settings, none tries no memory, and auto tries some even without --time;
+    /// otherwise it tries some with --time
+    #[arg(long, value_name = "SPANS|none|auto", value_delimiter = ',', requires = "data")]
+    memory: Vec<MemoryArgument>,
     /// The past as its difference from the present reading; without --lags and --memory, from the sample before
     #[arg(long, requires = "data")]
     differences: bool,
@@ -464,11 +500,26 @@ impl ImportArguments {
         })
     }
 
+    /// Memory that a choice of settings keeps, and whether it tries some even without times.
+    ///
+    /// # Errors
+    /// If none or auto is given together with others.
+    pub(super) fn fixed_memory(&self) -> Result<(Option<Memory>, bool), Failure> {
+        let has = |word: MemoryArgument| self.memory.contains(&word);
+        let (is_none, is_auto) = (has(MemoryArgument::None), has(MemoryArgument::Auto));
+        let is_mixed = self.memory.len() > 1 || !self.lags.is_empty() || self.differences;
+        if (is_none || is_auto) && is_mixed {
+            let message = "--memory: none and auto stand alone; give them without spans, --lags and --differences";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
+        Ok((is_none.then(Memory::default), is_auto))
+    }
+
     /// Inputs from the past, if requested.
     fn of_memory(&self) -> Option<Memory> {
         let memory = Memory {
             lags: self.lags.clone(),
-            averages: self.memory.clone(),
+            averages: self.memory.iter().filter_map(MemoryArgument::span).collect(),
             differences: self.differences,
             interval_s: None,
         };

@@ -18,7 +18,10 @@ use super::{
 };
 use decoupler_core::{
     decoupling::DecoderKind,
-    evaluation::{Begin, DecoderReport, DecoderSet, Run, RunError, auto::DEFAULT_BUDGET_S},
+    evaluation::{
+        Begin, DecoderReport, DecoderSet, Run, RunError,
+        auto::{AutoFixed, DEFAULT_BUDGET_S},
+    },
     job::Job,
     text::counted,
     training::TrainingSettings,
@@ -37,7 +40,8 @@ use decoupler_files::{
 /// with the best linear map, with other decoders, with the decoder that knows the sensor model (model-based), and
 /// with the published figures, if any. With --data it trains on the samples of a recording, and compares the network with
 /// the mean, with ridge regression and with other decoders, target by target; unless settings of the training are given,
-/// they are first chosen by cross-validation on the training samples (--hidden auto). Ctrl-C stops after the epoch, keeps the
+/// they are first chosen by cross-validation on the training samples (--hidden auto), and the answer is the combination of ridge
+/// regression, kernel ridge regression and networks that is best there. Ctrl-C stops after the epoch, keeps the
 /// best network so far, and ends with status 130; a second Ctrl-C ends at once. SIGTERM (status 143) and SIGHUP (129) do the
 /// same.
 #[derive(Args)]
@@ -58,8 +62,8 @@ pub(super) struct Train {
     /// File for a report with errors, figures, settings and the command that repeats the run, as one HTML page
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
-    /// Time on one core that a choice of settings (--hidden auto) may take, estimated from its work, so that it gives the
-    /// same choice on every machine [default: 60]
+    /// Time on one core that a choice of settings (--hidden auto) and the training may take, estimated from their work, so
+    /// that the choice is the same on every machine [default: 60]
     #[arg(long, value_name = "SECONDS", value_parser = budget)]
     budget: Option<f64>,
     /// When to calibrate the 90 % prediction intervals of a recording's targets. After a choice of settings (--hidden
@@ -170,14 +174,24 @@ impl Train {
             let message = "--budget: it is for a choice of settings; give --data and --hidden auto, or leave it out";
             return Err(Failure::Arguments(message.to_owned()));
         }
+        if !chooses && self.import.fixed_memory()?.1 {
+            let message = "--memory auto: it is for a choice of settings; give spans, or --hidden auto";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
         Ok(chooses)
     }
 
     /// Chooses the settings of `setup`, with a progress bar of the budget.
     fn choose(&self, setup: &Setup) -> Result<ChosenSetup, Failure> {
         let bar = progress_bar(self.json, 100, "{bar:20} {msg}");
+        let (memory, tries_memory) = self.import.fixed_memory()?;
+        let fixed = AutoFixed {
+            memory,
+            tries_memory,
+            ..self.training.fixed(setup.settings())
+        };
         let chosen = setup.choose(
-            &self.training.fixed(setup.settings()),
+            &fixed,
             self.budget.unwrap_or(DEFAULT_BUDGET_S),
             working_folder(),
             &Job::UNINTERRUPTED,

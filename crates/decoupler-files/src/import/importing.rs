@@ -27,7 +27,7 @@ use super::{
     selection::{Rows, not_a_number},
     sentinel::{Sentinel, is_rounding, rounding_warning},
     sheet::Spreadsheet,
-    suggestion::Meanings,
+    suggestion::{Meanings, is_group_name},
     table::{column_called, stem},
 };
 use crate::machine::ReadingBudget;
@@ -81,6 +81,16 @@ impl Recipe {
         let names = Names::of(&tables, &stems);
         let meanings = Meanings::of(self, &names)?;
         let mut warnings = notes(&files);
+        let used = |id: &ColumnId| meanings.inputs.contains(id) || meanings.targets.contains(id);
+        let groups = names
+            .all()
+            .find(|(name, id)| id.file == 0 && is_group_name(name) && !used(id));
+        if let Some((name, _)) = groups.filter(|_| meanings.group.is_none() && self.append.is_empty()) {
+            warnings.push(format!(
+                "the column {name} looks like a group of samples that belong together: choose it as the group (--group \
+                 {name}), so that training and test samples never share one"
+            ));
+        }
         let mut joins = Vec::new();
         for (number, joined) in self.join.iter().enumerate() {
             joins.push(self.partners(number + 1, joined, &files, &names, &meanings, &mut warnings)?);

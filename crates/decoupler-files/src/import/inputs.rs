@@ -439,6 +439,11 @@ impl Names {
         found.map_or("", |(name, _)| name)
     }
 
+    /// Names of all columns.
+    pub(super) fn all(&self) -> impl Iterator<Item = (&str, ColumnId)> {
+        self.names.iter().map(|(name, id)| (name.as_str(), *id))
+    }
+
     /// Finds a column by its full name, with or without the unit given in the header.
     pub(super) fn find(&self, given: &str) -> Result<ColumnId, ImportError> {
         let name = &clean_name(given.trim());

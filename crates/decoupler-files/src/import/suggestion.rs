@@ -74,7 +74,11 @@ const INPUT_UNITS: [&str; 22] = [
 ];
 
 /// Names of group columns.
-const GROUP_NAMES: [&str; 11] = [
+const GROUP_NAMES: [&str; 15] = [
+    "file",
+    "experiment",
+    "participant",
+    "grasp",
     "group",
     "session",
     "trial",
@@ -293,6 +297,16 @@ fn score_of_file(path: &Path) -> i32 {
     targets.map(|(_, weight)| *weight).max().unwrap_or(0) - 4 * i32::from(inputs.count() > 0)
 }
 
+/// Returns `true` if a column of this name looks like a group, such as `trial`, `Session_ID` or `press number`.
+pub(super) fn is_group_name(name: &str) -> bool {
+    let name = name.trim().to_lowercase();
+    let words = Vec::from_iter(name.split(|letter: char| !letter.is_alphanumeric()));
+    GROUP_NAMES.contains(&words[0])
+        && words[1..]
+            .iter()
+            .all(|word| ["", "id", "no", "nr", "number"].contains(word))
+}
+
 /// Guesses the meaning of each column.
 fn guesses(file: &InspectedFile, is_alone: bool) -> Vec<Meaning> {
     let inspection = &file.inspection;
@@ -303,11 +317,7 @@ fn guesses(file: &InspectedFile, is_alone: bool) -> Vec<Meaning> {
             return Meaning::Time;
         }
         let name = column.name.trim().to_lowercase();
-        if !has_group
-            && GROUP_NAMES
-                .iter()
-                .any(|group| name == *group || name == format!("{group}_id"))
-        {
+        if !has_group && is_group_name(&name) {
             has_group = true;
             return Meaning::Group;
         }
