@@ -191,7 +191,7 @@ fn print_folds(
     let mut warnings = recording.warnings.clone();
     warnings.extend(channel_remarks(set, by, &recording.inputs, channels));
     warnings.extend(optimism);
-    warnings.extend(describe_determinacy(channels, &determined));
+    warnings.extend(describe_determinacy(channels, &determined, false));
     let remarks = channels.iter().zip(gains);
     warnings.extend(remarks.filter_map(|(channel, gain)| ridge_remark(gain?, &channel.name)));
     let fallbacks = channels.iter().zip(&better).filter(|(_, better)| **better != NETWORK);

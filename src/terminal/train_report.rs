@@ -318,7 +318,11 @@ impl<'a> Trained<'a> {
             )
             .chain(self.optimism.iter().cloned())
             .chain(self.run.defect())
-            .chain(describe_determinacy(&self.file.problem.targets, determined))
+            .chain(describe_determinacy(
+                &self.file.problem.targets,
+                determined,
+                scores.network_alone.is_some(),
+            ))
             .chain(describe_worse_than_ridge(problem, scores))
             .chain(describe_coverage(&problem.targets, &scores.coverage))
             .collect()

@@ -492,7 +492,11 @@ impl<'a> TrainingLoop<'a> {
         let run = &trained.run;
         let determined = Determination::measure(run.test(), answers.view(), recorded.plan.division.by);
         let mut remarks = trained.of_samples.clone();
-        remarks.extend(describe_determinacy(&run.problem().targets, &determined));
+        remarks.extend(describe_determinacy(
+            &run.problem().targets,
+            &determined,
+            run.blend().is_some(),
+        ));
         if let Some(baselines) = run.baselines() {
             let scores = Scores {
                 network: errors.clone(),

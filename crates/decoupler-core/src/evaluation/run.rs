@@ -120,8 +120,8 @@ impl Run {
     /// ended: some failed or diverged. The text includes the remedy; `None` if there is no defect.
     pub fn defect(&self) -> Option<String> {
         match self.settings.combine {
-            Combination::Best => defect_of(self.leader()),
-            Combination::Mean => self.starts.iter().find_map(defect_of),
+            Combination::Best => defect_of(self.leader(), self.blend().is_some()),
+            Combination::Mean => (self.starts.iter()).find_map(|start| defect_of(start, self.blend().is_some())),
         }
     }
 
@@ -311,11 +311,14 @@ impl Run {
     }
 }
 
-/// Describes the defect of a start whose trainings have all ended, with its remedy.
-fn defect_of(start: &StartTrainer) -> Option<String> {
+/// Describes the defect of a start whose trainings have all ended, with its remedy. Settings that were chosen by
+/// cross-validation may end a training that hardly improves on its start; a divergence is a defect even then.
+fn defect_of(start: &StartTrainer, is_chosen: bool) -> Option<String> {
     start.stop_reason()?;
     let numbered = start.rows().iter().enumerate();
-    let mut defects = numbered.filter_map(|(index, trainer)| Some((index + 1, TrainingDefect::of(trainer)?)));
+    let is_defect = |defect: &TrainingDefect| !is_chosen || defect.diverged_in.is_some();
+    let defect = |(index, trainer)| Some((index + 1, TrainingDefect::of(trainer).filter(is_defect)?));
+    let mut defects = numbered.filter_map(defect);
     let (first, defect) = defects.next()?;
     let (defective, networks) = (1 + defects.count(), start.rows().len());
     Some(match networks {

@@ -227,11 +227,21 @@ fn in_last_number(bytes: &[u8], error: &serde_json::Error) -> bool {
 }
 
 /// Warns of targets that the readings explain little of or that could not be judged; `measured` has an entry for each target.
-pub fn describe_determinacy(targets: &[Channel], measured: &[Result<Determination, Undetermined>]) -> Vec<String> {
+pub fn describe_determinacy(
+    targets: &[Channel],
+    measured: &[Result<Determination, Undetermined>],
+    is_blend: bool,
+) -> Vec<String> {
+    let explains = if is_blend {
+        "the chosen combination explains"
+    } else {
+        "the network explains"
+    };
     let of = |(target, measured): (&Channel, &Result<Determination, Undetermined>)| match measured {
         Err(cause) => Some(format!("{}: {cause}", target.name)),
-        Ok(measured) => (measured.determinacy() != Determinacy::Determined)
-            .then(|| measured.sentence(&target.name, "the network explains")),
+        Ok(measured) => {
+            (measured.determinacy() != Determinacy::Determined).then(|| measured.sentence(&target.name, explains))
+        }
     };
     targets.iter().zip(measured).filter_map(of).collect()
 }

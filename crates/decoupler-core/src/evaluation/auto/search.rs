@@ -471,14 +471,17 @@ impl Search<'_> {
             Method::ScaledConjugateGradient(_) => SHORT_EPOCHS,
             _ => EPOCHS,
         };
-        let max_epochs = self.fixed.epochs.unwrap_or(max_epochs);
+        let max_epochs = match needed {
+            MIN_EPOCHS => self.fixed.epochs.unwrap_or(max_epochs),
+            needed => needed,
+        };
         let final_epoch = self.epoch_of_all(features, &settings);
         let (mut used, mut is_cut_off) = (0.0, false);
         while training.epoch < max_epochs && !training.has_passed_its_best(patience) {
             // The training on all samples must fit into what is left, too.
             let left = self.budget() - self.work - used - final_epoch * training.epoch as f64;
             is_cut_off = used + training.epoch_multiplications > limit || left < 0.0;
-            if is_cut_off && training.epoch >= MIN_EPOCHS {
+            if is_cut_off && training.epoch >= needed {
                 break;
             }
             self.job.check()?;

@@ -4,8 +4,8 @@ use ndarray::ArrayView2;
 
 use crate::{dataset::Dataset, evaluation::errors::extremes, problem::Channel};
 
-/// Test samples outside the range of the training samples, where a network extrapolates: those with a reading or a target
-/// outside it by more than a tenth of its width.
+/// Test samples outside the range of the training samples: those with a reading or a target outside it by more than a tenth of
+/// its width. Such readings are limited to the range, extended by a tenth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extrapolation {
     /// Share of the test samples that are outside.
@@ -58,7 +58,7 @@ impl Extrapolation {
         let share = outside as f64 / samples.max(1) as f64;
         let warning = format!(
             "{:.0} % of the test samples ({outside} of {samples}) are outside the range of the training samples by more than \
-             a tenth of it ({}); the network extrapolates there, so that its error within the range may be smaller",
+             a tenth of it ({}); readings are limited to that range, and the error within it may be smaller",
             100.0 * share,
             Vec::from_iter(listed.into_iter().flatten()).join("; ")
         );

@@ -228,7 +228,7 @@ impl RunReport<'_> {
 
     fn recording_remarks(&self, plan: &Plan, answers: &ndarray::Array2<f64>) -> Vec<String> {
         let measured = Determination::measure(self.test, answers.view(), plan.division.by);
-        let mut remarks = describe_determinacy(&self.file.problem.targets, &measured);
+        let mut remarks = describe_determinacy(&self.file.problem.targets, &measured, self.file.blend().is_some());
         let NetworkFile { problem, scores, .. } = self.file;
         remarks.extend(describe_worse_than_ridge(problem, scores));
         if plan.is_optimistic() {
