@@ -19,10 +19,7 @@ mod scaled_conjugate_gradient;
 mod tests;
 mod trainer;
 
-pub use crate::settings::{
-    AdaptiveDescentSettings, Damping, Method, MomentumSettings, RegularizationSettings, ResilientSettings,
-    ScaledConjugateGradientSettings, SettingError, StoppingRules, TrainingSettings,
-};
+pub use crate::settings::{Damping, Method, RegularizationSettings, SettingError, StoppingRules, TrainingSettings};
 pub use checkpoint::TrainerState;
 pub use ending::{StopReason, TrainingDefect};
 pub use epoch_columns::EpochColumns;
