@@ -8,7 +8,7 @@ use std::{
 use clap::Args;
 use decoupler_core::{
     calibration::PressLimits,
-    dataset::{Dataset, Division, SimulationError, SplitBy, Stream},
+    dataset::{Dataset, DatasetError, Division, SplitBy, Stream},
     evaluation::{Errors, TestErrors, fine_tune, pressed_rows},
     job::Job,
     network::{DecouplingNetwork, Networks},
@@ -262,7 +262,7 @@ pub(super) fn rows_read(file: &NetworkFile) -> Result<usize, Failure> {
     match &file.problem.sensor {
         Some(simulation) => {
             let rows = simulation.scene.rows.read(simulation.sensor.scale.rows());
-            Ok(rows.map_err(SimulationError::from)?.len())
+            Ok(rows.map_err(DatasetError::from)?.len())
         }
         None => Ok(file.network.values().len()),
     }
@@ -460,7 +460,7 @@ impl FineTune {
         };
         let frames = self.frames.read(&simulation.sensor, limits, self.json)?;
         let read = simulation.scene.rows.read(simulation.sensor.scale.rows());
-        let read = read.map_err(decoupler_core::dataset::SimulationError::from)?;
+        let read = read.map_err(decoupler_core::dataset::DatasetError::from)?;
         let frames = frames
             .among_rows(&read)
             .map_err(|error| Failure::Arguments(error.to_string()))?;

@@ -15,12 +15,10 @@ pub use fit::Calibration;
 pub use limits::PressLimits;
 pub use parameter::{CalibratedParameter, SensorParameter};
 
+use glam::DVec3;
 use thiserror::Error;
 
-use crate::{
-    sensor::{DVec3, SensorError},
-    text::counted,
-};
+use crate::{sensor::SensorError, text::counted};
 
 /// Readings of one row-wire under a known deformation.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,7 +7,7 @@ mod activations;
 mod bayesian_regularization;
 mod checkpoint;
 mod ending;
-mod epoch_columns;
+pub mod epoch_columns;
 mod examples;
 mod gradient_descent;
 mod levenberg_marquardt;
@@ -21,8 +21,7 @@ mod trainer;
 
 pub use crate::settings::{Damping, Method, RegularizationSettings, SettingError, StoppingRules, TrainingSettings};
 pub use checkpoint::TrainerState;
-pub use ending::{StopReason, TrainingDefect};
-pub use epoch_columns::EpochColumns;
+pub use ending::StopReason;
 pub use examples::Examples;
 use method::MethodState;
 use trainer::Evaluation;
