@@ -8,8 +8,8 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{
-    EpochRecord, Method, MethodState, Problem, SettingError, Stage, StopReason, StoppingRules, Trainer, TrainingError,
-    TrainingSettings, activations::Activations, trainer::Best,
+    EpochRecord, ExampleSets, Method, MethodState, SettingError, Stage, StopReason, StoppingRules, Trainer,
+    TrainingError, TrainingSettings, activations::Activations, trainer::Best,
 };
 use crate::network::{Mlp, Shape};
 
@@ -108,7 +108,7 @@ impl Trainer {
     ///
     /// # Errors
     /// If the state is damaged or belongs to other samples.
-    pub fn resume(state: TrainerState, problem: Problem) -> Result<Self, TrainingError> {
+    pub fn resume(state: TrainerState, problem: ExampleSets) -> Result<Self, TrainingError> {
         state.check()?;
         let (shape, training) = (state.shape, &problem.training);
         if (shape.inputs, shape.outputs) != (training.inputs(), training.outputs()) {

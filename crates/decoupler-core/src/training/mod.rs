@@ -25,4 +25,4 @@ pub use ending::StopReason;
 pub use examples::Examples;
 use method::MethodState;
 use trainer::Evaluation;
-pub use trainer::{EpochRecord, Problem, Stage, Trainer, TrainingError, check_width};
+pub use trainer::{EpochRecord, ExampleSets, Stage, Trainer, TrainingError, check_width};

@@ -3,7 +3,7 @@
 use decoupler_core::{
     network::{Mlp, Shape},
     settings::Value,
-    training::{Examples, Method, Problem, StopReason, StoppingRules, Trainer, TrainingSettings},
+    training::{ExampleSets, Examples, Method, StopReason, StoppingRules, Trainer, TrainingSettings},
 };
 use ndarray::{Array2, Axis, Slice};
 
@@ -68,7 +68,7 @@ impl Task {
         }
     }
 
-    fn problem(&self) -> Problem {
+    fn problem(&self) -> ExampleSets {
         let cut = self.training_samples();
         let examples = |rows: std::ops::Range<usize>| {
             let (inputs, targets) = (&self.inputs, &self.targets);
@@ -76,7 +76,7 @@ impl Task {
             Examples::new(at(inputs).view(), at(targets).view())
         };
         let samples = self.inputs.nrows();
-        Problem {
+        ExampleSets {
             training: examples(0..cut),
             validation: (cut < samples).then(|| examples(cut..samples)),
             test: None,
