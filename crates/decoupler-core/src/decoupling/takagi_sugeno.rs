@@ -7,7 +7,8 @@ use super::{
     Precision,
     program::{Builder, Program},
     radial_basis::{distance2, thinned, with_noise},
-    ridge::{Regression, Standard, folds},
+    ridge::Regression,
+    standardised::{Standard, folds},
 };
 use crate::{
     dataset::Dataset,
