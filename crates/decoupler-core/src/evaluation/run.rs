@@ -13,8 +13,8 @@ use super::{
     starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, DatasetError, PerRow, SimulationError, SplitBy},
-    decoupling::{DecodeError, FitError},
+    dataset::{Dataset, DatasetError, PerRow, SplitBy},
+    decoupling::DecodeError,
     identifiability::IdentifiabilityError,
     job::{Cancelled, Job},
     machine::MemoryBudget,
@@ -22,10 +22,7 @@ use crate::{
     problem::Problem,
     scene::SceneError,
     sensor::SensorError,
-    training::{
-        Method, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingDefect, TrainingError,
-        check_width,
-    },
+    training::{Method, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingError, check_width},
 };
 
 /// Run: its sets of samples, one training per start, and the errors of the best network.
@@ -287,15 +284,12 @@ impl Run {
 fn defect_of(start: &StartTrainer) -> Option<String> {
     start.stop_reason()?;
     let numbered = start.rows().iter().enumerate();
-    let mut defects = numbered.filter_map(|(index, trainer)| Some((index + 1, TrainingDefect::of(trainer)?)));
+    let mut defects = numbered.filter_map(|(index, trainer)| Some((index + 1, trainer.defect()?)));
     let (first, defect) = defects.next()?;
     let (defective, networks) = (1 + defects.count(), start.rows().len());
     Some(match networks {
-        1 => defect.text,
-        _ => format!(
-            "{defective} of {networks} networks, the first being number {first}: {}",
-            defect.text
-        ),
+        1 => defect,
+        _ => format!("{defective} of {networks} networks, the first being number {first}: {defect}"),
     })
 }
 
@@ -336,16 +330,10 @@ pub enum RunError {
     /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Samples cannot be drawn.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// A decoder cannot be fitted.
-    #[error(transparent)]
-    Fit(#[from] FitError),
-    /// Samples cannot be divided.
+    /// Samples cannot be drawn or divided.
     #[error(transparent)]
     Division(#[from] DatasetError),
-    /// Samples cannot be scaled.
+    /// Samples cannot be scaled, or a decoder cannot be fitted.
     #[error(transparent)]
     Scaling(#[from] NetworkError),
     /// A reading is not a resistance.

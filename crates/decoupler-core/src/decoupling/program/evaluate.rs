@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     dataset::{MemoryStream, PerRow, Series},
-    decoupling::{DecodeError, Decoder, NotDescribed, Precision},
+    decoupling::{DecodeError, Decoder, Precision},
 };
 
 /// Decoder that evaluates a [`Program`], many rows at a time and without allocation.
@@ -190,12 +190,10 @@ impl Decoder for ProgramDecoder {
         })
     }
 
-    fn program(&self) -> Result<Program, NotDescribed> {
+    fn program(&self) -> Option<Program> {
         let is_blend = |node: &Node| matches!(node.operation, Operation::Blend { .. });
-        if self.program.nodes().iter().any(is_blend) {
-            return Err(NotDescribed::Rules);
-        }
-        Ok(self.program.clone())
+        let has_rules = self.program.nodes().iter().any(is_blend);
+        (!has_rules).then(|| self.program.clone())
     }
 }
 

@@ -13,7 +13,7 @@ use crate::{
     machine::MemoryBudget,
     network::{InputChoice, InputScaling, Inputs, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
     text::format_percent,
-    training::{Damping, Method, RegularizationSettings, ScaledConjugateGradientSettings, TrainingError},
+    training::{Damping, Method, RegularizationSettings, TrainingError},
 };
 
 /// Number of blocks or sets of groups in the cross-validation.
@@ -226,7 +226,7 @@ impl Search<'_> {
             Err(error) => return Err(error),
         };
         let (max_epochs, patience) = match candidate.settings.training.method {
-            Method::ScaledConjugateGradient(_) => SHORT_EPOCHS,
+            Method::ScaledConjugateGradient { .. } => SHORT_EPOCHS,
             _ => EPOCHS,
         };
         let max_epochs = self.fixed.epochs.unwrap_or(max_epochs);
@@ -416,10 +416,7 @@ impl Search<'_> {
 
     /// The scaled conjugate gradient with this weight decay for each sample.
     fn decaying(&self, decay: f64) -> Method {
-        Method::ScaledConjugateGradient(ScaledConjugateGradientSettings {
-            decay: decay * self.samples.set.samples() as f64,
-            ..ScaledConjugateGradientSettings::default()
-        })
+        Method::scaled_conjugate_gradient(decay * self.samples.set.samples() as f64)
     }
 
     /// Tries other numbers of hidden nodes on the best features and on the plain readings, which need more of them: more
