@@ -19,7 +19,7 @@ use decoupler::window::{DecouplerWindow, Desktop, Effect, Phase, Shared};
 use decoupler_core::{
     dataset::Simulation,
     evaluation::RunSettings,
-    training::{EpochRecord, Method, ScaledConjugateGradientSettings},
+    training::{EpochRecord, Method},
 };
 use decoupler_files::figure::{EpochOutline, loss_figure};
 use eframe::egui::{Context, Event, Modifiers, PointerButton, RawInput, Rect, accesskit::TreeUpdate, pos2, vec2};
@@ -138,7 +138,7 @@ fn endless(scale: &str) -> RunSettings {
     let mut settings = RunSettings::from(simulation);
     if scale == LARGE {
         // Its epochs last long enough with any method.
-        settings.training.method = Method::ScaledConjugateGradient(ScaledConjugateGradientSettings::default());
+        settings.training.method = Method::scaled_conjugate_gradient(0.0);
     }
     settings.training.stopping.epochs = 1_000_000;
     settings.training.stopping.min_gradient = 0.0;

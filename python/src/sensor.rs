@@ -4,8 +4,8 @@ use decoupler_core::{
     dataset::Dataset,
     evaluation::Errors,
     identifiability::Identifiability,
-    scene::{Movement, RelativeNoise},
-    sensor::{ArrayScale, Geometry, SensorModel},
+    scene::Movement,
+    sensor::{ArrayScale, Geometry, RelativeNoise, SensorModel},
     text::Named,
 };
 use glam::DVec3;

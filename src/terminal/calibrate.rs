@@ -9,7 +9,7 @@ use super::{
     output::{print, print_object},
 };
 use decoupler_core::{
-    calibration::{Calibration, PressLimits, SensorParameter},
+    calibration::{Calibration, SensorParameter},
     evaluation::pressed_rows,
     sensor::{ArrayScale, SensorModel},
     text::counted,
@@ -82,8 +82,7 @@ impl Calibrate {
             Some(path) => SensorFile::load(path)?,
             None => SensorModel::new(self.array),
         };
-        let limits = PressLimits::of_sensor(&nominal);
-        let frames = self.frames.read(&nominal, limits, self.json)?;
+        let frames = self.frames.read(&nominal, None, self.json)?;
         let calibration = Calibration::fit(&nominal, &pressed_rows(&frames, &nominal)?)?;
         if let Some(path) = &self.out {
             SensorFile::save(&calibration.model, path)?;

@@ -7,12 +7,13 @@ use std::{
 
 use clap::Args;
 use decoupler_core::{
-    calibration::PressLimits,
-    dataset::{Dataset, Division, SimulationError, SplitBy, Stream},
+    calibration::check_presses,
+    dataset::{Dataset, DatasetError, Division, SplitBy, Stream},
     evaluation::{Errors, TestErrors, fine_tune, pressed_rows},
     job::Job,
     network::{DecouplingNetwork, Networks},
     problem::{Channel, Problem},
+    scene::Scene,
     sensor::SensorModel,
     text::{counted, inert},
     training::StoppingRules,
@@ -182,9 +183,9 @@ pub(super) struct FrameArguments {
 }
 
 impl FrameArguments {
-    /// Reads the frames of presses within `limits`: a sample is a row-wire, and its targets are the coordinates of its
+    /// Reads the frames of presses within the limits of `scene`, if there is one: a sample is a row-wire, and its targets are the coordinates of its
     /// nodes in the frame of `sensor`.
-    pub(super) fn read(&self, sensor: &SensorModel, limits: PressLimits, is_json: bool) -> Result<Dataset, Failure> {
+    pub(super) fn read(&self, sensor: &SensorModel, scene: Option<&Scene>, is_json: bool) -> Result<Dataset, Failure> {
         let has_depths = !self.depths.is_empty();
         self.import.refuse_division(|argument| {
             format!(
@@ -232,7 +233,7 @@ impl FrameArguments {
         } else {
             set
         };
-        let checked = limits.check(sensor, &pressed_rows(&frames, sensor)?);
+        let checked = check_presses(sensor, scene, &pressed_rows(&frames, sensor)?);
         checked.map_err(|source| match source.sample() {
             Some(sample) => Failure::Press {
                 path: recording.file_of(sample).to_owned(),
@@ -262,7 +263,7 @@ pub(super) fn rows_read(file: &NetworkFile) -> Result<usize, Failure> {
     match &file.problem.sensor {
         Some(simulation) => {
             let rows = simulation.scene.rows.read(simulation.sensor.scale.rows());
-            Ok(rows.map_err(SimulationError::from)?.len())
+            Ok(rows.map_err(DatasetError::from)?.len())
         }
         None => Ok(file.network.values().len()),
     }
@@ -454,13 +455,11 @@ impl FineTune {
         let simulation = file.problem.sensor.ok_or_else(no_array)?;
         let settings = file.settings;
         // Samples outside are not presses, or require answers that the network was not trained for.
-        let limits = PressLimits {
-            largest_depth_mm: simulation.stroke_mm(),
-            largest_shift_mm: simulation.scene.movement.largest_shift_mm(),
-        };
-        let frames = self.frames.read(&simulation.sensor, limits, self.json)?;
+        let frames = self
+            .frames
+            .read(&simulation.sensor, Some(&simulation.scene), self.json)?;
         let read = simulation.scene.rows.read(simulation.sensor.scale.rows());
-        let read = read.map_err(decoupler_core::dataset::SimulationError::from)?;
+        let read = read.map_err(decoupler_core::dataset::DatasetError::from)?;
         let frames = frames
             .among_rows(&read)
             .map_err(|error| Failure::Arguments(error.to_string()))?;

@@ -7,7 +7,7 @@ use std::{
 
 use decoupler_core::{
     calibration::CalibrationError,
-    dataset::{DatasetError, SimulationError, SplitBy},
+    dataset::{DatasetError, SplitBy},
     evaluation::RunError,
     scene::Rows,
     sensor::SensorError,
@@ -34,7 +34,7 @@ pub(super) enum Failure {
     #[error(transparent)]
     Run(#[from] RunError),
     #[error(transparent)]
-    Simulation(#[from] SimulationError),
+    Dataset(#[from] DatasetError),
     #[error(transparent)]
     Document(#[from] DocumentError),
     #[error(transparent)]
@@ -207,7 +207,7 @@ impl Failure {
             )) => 1,
             Self::Import(ImportError::Dataset(_)) => 2,
             Self::Run(error) if is_argument_error(error) => 2,
-            Self::Simulation(SimulationError::Count(_) | SimulationError::Scene(_)) => 2,
+            Self::Dataset(DatasetError::Count(_) | DatasetError::Scene(_)) => 2,
             Self::Interrupted(_)
             | Self::InterruptedComparison { .. }
             | Self::InterruptedTrials { .. }
@@ -236,11 +236,10 @@ fn is_argument_error(error: &RunError) -> bool {
         RunError::Count { .. }
             | RunError::TooManySamples { .. }
             | RunError::Scene(_)
-            | RunError::Simulation(SimulationError::Count(_) | SimulationError::Scene(_))
             | RunError::Training(_)
             | RunError::Memory { .. }
             | RunError::Division(_)
-    )
+    ) && !matches!(error, RunError::Division(DatasetError::Sensor { .. }))
 }
 
 /// Maximum number of trials of a sweep. Every program that works on a sweep reads all of them.

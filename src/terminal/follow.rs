@@ -13,7 +13,7 @@ use std::{
 
 use clap::Args;
 use decoupler_core::{
-    dataset::{Place, Simulation, SimulationError},
+    dataset::{DatasetError, Place, Simulation},
     live::{FaultEvent, LeftOutDecoder, WireCheck},
     scene::Noise,
 };
@@ -236,7 +236,7 @@ impl Parser {
         Ok(match &file.problem.sensor {
             Some(simulation) => {
                 let parser = LineParser::new(simulation.sensor.scale, simulation.scene.rows, is_complete);
-                Self::Array(Box::new(parser.map_err(SimulationError::from)?))
+                Self::Array(Box::new(parser.map_err(DatasetError::from)?))
             }
             None => Self::Columns {
                 lines: Box::new(file.input_lines()),
@@ -368,7 +368,7 @@ impl Faults {
                 is_reported: true,
             });
         }
-        let rows = scene.rows.read(scale.rows()).map_err(SimulationError::from)?;
+        let rows = scene.rows.read(scale.rows()).map_err(DatasetError::from)?;
         Ok(Self {
             watch: Some(Watch {
                 check: WireCheck::new(sensor, &scene, &rows).map_err(Failure::Sensor)?,

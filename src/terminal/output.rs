@@ -8,7 +8,7 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::{Simulation, SimulationError},
+    dataset::{DatasetError, Simulation},
     scene::RowModel,
     text::{is_unprintable, printable},
 };
@@ -172,7 +172,7 @@ fn read_resistances(
     };
     let (scale, rows) = (sensor.scale, scene.rows);
     let reader = ResistanceReader::new(BufReader::new(opened), scale.columns()).map_err(unreadable)?;
-    let read = rows.read(scale.rows()).map_err(SimulationError::from)?;
+    let read = rows.read(scale.rows()).map_err(DatasetError::from)?;
     let mut reader = match rows.model() {
         RowModel::Shared => reader,
         RowModel::Each => reader.with_row_wires(scale.rows()),

@@ -8,7 +8,7 @@ use std::{
 
 use clap::Args;
 use decoupler_core::{
-    dataset::{Dataset, LARGEST_SAMPLES, Seed, Simulation, SimulationError, Stream},
+    dataset::{Dataset, DatasetError, LARGEST_SAMPLES, Seed, Simulation, Stream},
     decoupling::{Decoder, Precision, decode_set},
     evaluation::{DecoderSet, Run, RunError, RunSets, RunSettings, TrainingSize, Workload, error_remarks},
     job::Job,
@@ -164,7 +164,7 @@ impl Simulate {
         }
         settings.seed = Seed(self.seed);
         let (Simulation { sensor, scene, .. }, seed) = (settings.drawn()?, settings.seed);
-        let rows = scene.rows.read(self.array.rows()).map_err(SimulationError::from)?;
+        let rows = scene.rows.read(self.array.rows()).map_err(DatasetError::from)?;
         let faulty = match self.fault {
             Some(fault) => {
                 fault

@@ -6,7 +6,7 @@ use decoupler::window::{Notice, Phase};
 use decoupler_core::{
     evaluation::{Run, RunSettings, Spread, StartRecord},
     job::Job,
-    training::{Method, MomentumSettings, StopReason, StoppingRules},
+    training::{Method, StopReason, StoppingRules},
 };
 use decoupler_files::export::{CheckpointFile, NetworkFile, format_number};
 
@@ -41,7 +41,7 @@ fn save(driver: &mut Driver, button: &str, path: &Path) {
 
 fn momentum(epochs: usize) -> RunSettings {
     let mut settings = small();
-    settings.training.method = Method::Momentum(MomentumSettings::default());
+    settings.training.method = Method::MOMENTUM;
     settings.training.stopping.epochs = epochs;
     settings
 }

@@ -1,10 +1,10 @@
 //! Pressing the actual surface with the pointer, and the answers of all decoders.
 
+use decoupler::window::Touch;
 use decoupler_core::{dataset::Dataset, ndarray::Array2};
 use decoupler_core::{
     evaluation::{Errors, Run, RunSettings},
     glam::DVec3,
-    scene::Touch,
     sensor::SensorModel,
 };
 use decoupler_files::export::format_number;

@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::Simulation,
     evaluation::{Outlook, Preset, RunSettings},
     network::{InputChoice, Quantity, ScalingChoice},
-    scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Rows, Scene, Span},
+    scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Radii, Rows, Scene},
     training::StoppingRules,
 };
 use decoupler_files::export::format_number;
@@ -205,7 +205,7 @@ fn only_the_settings_of_the_current_choices_are_shown() {
     };
     let (smallest, largest) = (8.0, 8.0);
     let cylinder = IndenterShape::Cylinder {
-        radius_mm: Span { smallest, largest },
+        radius_mm: Radii { smallest, largest },
         largest_tilt_degrees: 12.0,
     };
     assert_eq!(indenter.shape, cylinder, "the largest radius follows the smallest");

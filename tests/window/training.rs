@@ -5,7 +5,7 @@ use std::fs;
 use decoupler::window::{Effect, Phase};
 use decoupler_core::{
     evaluation::{Run, RunSettings},
-    training::{Method, MomentumSettings, StopReason},
+    training::{Method, StopReason},
 };
 use decoupler_files::figure::surface::ViewMode;
 use eframe::egui::{Key, Modifiers};
@@ -120,7 +120,7 @@ fn every_picture_of_a_trained_network_can_be_displayed() {
 /// A training that does not end by itself.
 pub(crate) fn endless() -> RunSettings {
     let mut settings = small();
-    settings.training.method = Method::Momentum(MomentumSettings::default());
+    settings.training.method = Method::MOMENTUM;
     settings.training.stopping.epochs = 1_000_000;
     settings
 }

@@ -10,10 +10,10 @@
 //! | [`text`] | numbers, counts and names as text |
 //! | [`job`] | work that can be cancelled |
 //! | [`sensor`] | array scale, geometry, the resistance model and its Jacobian |
-//! | [`calibration`] | geometry and resistivity fitted to the readings of known deformations |
 //! | [`identifiability`] | deformation patterns that the readings determine, and how well |
 //! | [`machine`] | budget of memory, speed of the machine |
 //! | [`scene`] | what happens to the sensor: rows, movement, loading, noise |
+//! | [`calibration`] | geometry and resistivity fitted to the readings of known deformations |
 //! | [`dataset`] | samples with their row-wire and snapshot, simulated or recorded; frames, folds, splits |
 //! | [`network`] | the three-layer network, its initialisation and scaling |
 //! | [`settings`] | the table of settings: name, help, range and access of each |

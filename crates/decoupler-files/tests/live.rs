@@ -365,10 +365,9 @@ fn frames(
     let columns = sensor.scale.columns();
     let source = scene.noise.source(sensor).unwrap();
     let faulty = fault.map(|fault| FaultySensor::new(sensor, scene.noise, fault).unwrap());
-    let sampler = scene.sampler(sensor);
     let mut frame_ohm = vec![0.0; rows.len() * columns];
     for _ in 0..count {
-        let deformation = sampler.draw(&mut rng);
+        let deformation = scene.draw(sensor, &mut rng);
         for (&row, ohm) in rows.iter().zip(frame_ohm.chunks_exact_mut(columns)) {
             sensor.row_resistances_into(row, deformation.row_mm(row), ohm).unwrap();
         }

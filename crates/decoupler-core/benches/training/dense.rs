@@ -3,7 +3,7 @@
 
 use decoupler_core::{
     network::{Mlp, Shape},
-    training::{Examples, Method, Problem, StoppingRules, Trainer, TrainingSettings},
+    training::{ExampleSets, Examples, Method, StoppingRules, Trainer, TrainingSettings},
 };
 use faer::{Mat, Side, prelude::Solve};
 use ndarray::Array2;
@@ -96,7 +96,7 @@ pub(crate) fn print() {
     let inputs = numbers(1000, shape.inputs, 1.0);
     // The targets cannot be reached exactly: otherwise the damping vanishes and rounding decides both paths.
     let targets = teacher.forward(inputs.view()) + numbers(1000, shape.outputs, 0.5);
-    let problem = Problem {
+    let problem = ExampleSets {
         training: Examples::new(inputs.view(), targets.view()),
         validation: None,
         test: None,

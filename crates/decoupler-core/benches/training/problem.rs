@@ -2,7 +2,7 @@
 
 use decoupler_core::{
     network::{Mlp, Shape},
-    training::{Examples, Method, Problem, StoppingRules, Trainer, TrainingSettings},
+    training::{ExampleSets, Examples, Method, StoppingRules, Trainer, TrainingSettings},
 };
 use ndarray::Array2;
 use rayon::ThreadPoolBuilder;
@@ -30,7 +30,7 @@ impl Sizes {
     pub(crate) fn trainer(self, method: Method) -> Trainer {
         let Self { shape, samples } = self;
         let columns = |count, first| Array2::from_shape_fn((samples, count), |(row, column)| wave(row, first + column));
-        let problem = Problem {
+        let problem = ExampleSets {
             training: Examples::new(columns(shape.inputs, 0).view(), columns(shape.outputs, 2000).view()),
             validation: None,
             test: None,

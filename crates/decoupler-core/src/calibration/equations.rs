@@ -197,7 +197,8 @@ pub(super) fn restricted(all: &Linearised, free: &[SensorParameter]) -> Linearis
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sensor::{ArrayScale, DVec3};
+    use crate::sensor::ArrayScale;
+    use glam::DVec3;
 
     fn pressed(scale: ArrayScale, row: usize) -> PressedRow {
         let displacement = |node: usize| DVec3::new(0.03 * node as f64, -0.02, 0.17 * (node % 5) as f64);

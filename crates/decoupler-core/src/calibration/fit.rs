@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use super::{
-    CalibratedParameter, CalibrationError, PressLimits, PressedRow, SensorParameter,
+    CalibratedParameter, CalibrationError, PressedRow, SensorParameter, check_presses,
     equations::{COUNT, Problem, Slopes, restricted},
     warning::warnings,
 };
@@ -45,7 +45,7 @@ impl Calibration {
     /// If the nominal sensor is impossible, a sample does not belong to the array or has a reading that is not a
     /// resistance, or the fit does not converge.
     pub fn fit(nominal: &SensorModel, samples: &[PressedRow]) -> Result<Self, CalibrationError> {
-        PressLimits::of_sensor(nominal).check(nominal, samples)?;
+        check_presses(nominal, None, samples)?;
         // The position of the first row-wire is not fitted, so it alone leaves no ambiguity.
         if let Some(row) = samples.first().map(|sample| sample.row).filter(|&row| row > 0)
             && samples.iter().all(|sample| sample.row == row)

@@ -2,7 +2,7 @@
 //!
 //! [`Calibration::fit`] minimises the squared relative errors of the readings by the Levenberg-Marquardt method with
 //! analytic derivatives. Parameters that the readings cannot determine keep their nominal values and are reported as
-//! such. [`PressLimits::check`] refuses samples that no press can produce, before a calibration or a training uses
+//! such. [`check_presses`] refuses samples that no press can produce, before a calibration or a training uses
 //! them.
 
 mod equations;
@@ -12,15 +12,13 @@ mod parameter;
 mod warning;
 
 pub use fit::Calibration;
-pub use limits::PressLimits;
+pub use limits::check_presses;
 pub use parameter::{CalibratedParameter, SensorParameter};
 
+use glam::DVec3;
 use thiserror::Error;
 
-use crate::{
-    sensor::{DVec3, SensorError},
-    text::counted,
-};
+use crate::{sensor::SensorError, text::counted};
 
 /// Readings of one row-wire under a known deformation.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,7 +1,10 @@
 use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use super::*;
-use crate::sensor::SensorModel;
+use crate::{
+    scene::{Movement, Scene},
+    sensor::SensorModel,
+};
 
 fn nominal() -> SensorModel {
     of_scale("10x6_3x18")
@@ -241,15 +244,15 @@ fn a_wrong_sensor_gives_a_warning() {
 fn presses_outside_the_limits_are_named() {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let good = frames(&nominal(), &[0, 1, 2], 4, 1e-3, &mut rng);
-    let limits = PressLimits {
-        largest_depth_mm: 1.0,
-        largest_shift_mm: 0.2,
+    let scene = Scene {
+        movement: Movement::SIDEWAYS,
+        ..Scene::default()
     };
-    assert_eq!(limits.check(&nominal(), &good), Ok(()));
+    assert_eq!(check_presses(&nominal(), Some(&scene), &good), Ok(()));
     let message = |spoil: &dyn Fn(&mut PressedRow)| {
         let mut samples = good.clone();
         spoil(&mut samples[4]);
-        let error = limits.check(&nominal(), &samples).unwrap_err();
+        let error = check_presses(&nominal(), Some(&scene), &samples).unwrap_err();
         assert_eq!(error.sample(), Some(4), "{error}");
         error.to_string()
     };
@@ -264,7 +267,7 @@ fn presses_outside_the_limits_are_named() {
     for sample in &mut samples {
         sample.resistances_ohm.iter_mut().for_each(|ohm| *ohm *= 1e9);
     }
-    assert_eq!(limits.check(&nominal(), &samples), Ok(()));
+    assert_eq!(check_presses(&nominal(), Some(&scene), &samples), Ok(()));
 }
 
 #[test]

@@ -19,7 +19,7 @@ pub struct Series {
 /// Each [`Series`] has a state of its own. It restarts where the time steps back, or jumps by more than fifty usual
 /// intervals. A row without a time comes one usual interval after the row before.
 #[derive(Clone, Debug)]
-pub struct Continuation<S> {
+pub(super) struct Continuation<S> {
     interval_s: Option<f64>,
     /// Maximum number of states; beyond that the half that was used longest ago is dropped.
     limit: usize,

@@ -1,12 +1,26 @@
 use thiserror::Error;
 
-use super::{LARGEST_LAG, Span};
-use crate::text::format_number;
+use super::{LARGEST_LAG, LARGEST_SAMPLES, Span};
+use crate::{scene::SceneError, sensor::SensorError, text::format_number};
 
-/// Error in a set of samples, its division or frames, or in a memory of the past.
+/// Error in a set of samples, in drawing it, in its division or frames, or in a memory of the past.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum DatasetError {
+    /// The number of samples to draw is out of range.
+    #[error("{0} samples: give from 1 to {LARGEST_SAMPLES}")]
+    Count(usize),
+    /// The array to draw samples of has no such row-wire.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The model has no resistance for a drawn deformation.
+    #[error("snapshot {}: {source}", .snapshot + 1)]
+    Sensor {
+        /// Index of the snapshot, from 0.
+        snapshot: usize,
+        /// Error of the sensor model.
+        source: SensorError,
+    },
     /// There are no samples, channels or targets.
     #[error("the {what} are {samples} × {columns}: give at least one sample and one column")]
     Empty {

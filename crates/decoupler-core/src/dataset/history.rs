@@ -3,12 +3,13 @@ use std::collections::HashMap;
 use ndarray::{ArcArray2, Array2, ArrayView2, Axis};
 
 use super::{
-    DatasetError, Memory, MemoryState, Span,
+    DatasetError, Memory, Span,
     continuation::{Continuation, Place, RowOrder, Series, usual_interval_s},
+    memory::MemoryState,
 };
 
 /// Everything that a sensor has read, including rows that are not samples because a target is missing: the past, from
-/// which the features of a [`Memory`] are computed. [`Continuation`] decides which rows continue each other.
+/// which the features of a [`Memory`] are computed. Rows continue each other as those of a [`MemoryStream`] do.
 #[derive(Clone, Debug, PartialEq)]
 pub struct History {
     /// Rows × channels, shared with the samples.

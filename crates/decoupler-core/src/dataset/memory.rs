@@ -215,7 +215,7 @@ impl MemoryConstants {
 
 /// State of a [`Memory`] in one stream of samples: steps from sample to sample.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MemoryState {
+pub(super) struct MemoryState {
     constants: MemoryConstants,
     /// `false` until the first sample.
     has_started: bool,

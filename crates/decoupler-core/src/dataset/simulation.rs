@@ -1,9 +1,8 @@
 use ndarray::Array2;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use super::{Dataset, LARGEST_SAMPLES};
+use super::{Dataset, DatasetError, LARGEST_SAMPLES};
 use crate::{
     scene::{DeformationSampler, Noise, NoiseSource, RowModel, Scene, SceneError},
     sensor::{ArrayScale, SensorError, SensorModel},
@@ -74,26 +73,6 @@ impl Simulation {
     }
 }
 
-/// Error in drawing simulated samples.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum SimulationError {
-    /// The number of samples is out of range.
-    #[error("{0} samples: give from 1 to {LARGEST_SAMPLES}")]
-    Count(usize),
-    /// The array has no such row-wire.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The model has no resistance for a drawn deformation.
-    #[error("snapshot {}: {source}", .snapshot + 1)]
-    Sensor {
-        /// Index of the snapshot, from 0.
-        snapshot: usize,
-        /// Error of the sensor model.
-        source: SensorError,
-    },
-}
-
 impl Dataset {
     /// Draws at least `samples` samples of the row-wires that the scene reads, as whole snapshots: 101 samples of 10
     /// rows become 110. Snapshots follow one another, each with its rows in ascending order.
@@ -106,9 +85,9 @@ impl Dataset {
         scene: &Scene,
         samples: usize,
         rng: &mut impl Rng,
-    ) -> Result<Self, SimulationError> {
+    ) -> Result<Self, DatasetError> {
         if !(1..=LARGEST_SAMPLES).contains(&samples) {
-            return Err(SimulationError::Count(samples));
+            return Err(DatasetError::Count(samples));
         }
         let read = scene.rows.read(model.scale.rows())?;
         Self::draw(model, &scene.sampler(model), &read, samples.div_ceil(read.len()), rng)
@@ -124,7 +103,7 @@ impl Dataset {
         read: &[usize],
         snapshots: usize,
         rng: &mut impl Rng,
-    ) -> Result<Self, SimulationError> {
+    ) -> Result<Self, DatasetError> {
         let samples = snapshots * read.len();
         let mut resistances_ohm = Array2::zeros((samples, model.scale.columns()));
         let mut coordinates_mm = Array2::zeros((samples, model.scale.coordinates_per_row()));
@@ -137,7 +116,7 @@ impl Dataset {
                     .expect("a row of a standard array is contiguous");
                 model
                     .row_resistances_into(row_wire, deformation.row_mm(row_wire), readings)
-                    .map_err(|source| SimulationError::Sensor { snapshot, source })?;
+                    .map_err(|source| DatasetError::Sensor { snapshot, source })?;
                 let nodes = deformation.row_positions_mm(model, row_wire);
                 for (to, value) in positions.iter_mut().zip(nodes.flat_map(|node| node.to_array())) {
                     *to = value;
@@ -294,7 +273,7 @@ mod tests {
         let model = SensorModel::new(ArrayScale::default());
         for samples in [0, LARGEST_SAMPLES + 1] {
             let result = Dataset::simulate(&model, &Scene::default(), samples, &mut Seed(0).rng(Stream::Test));
-            assert_eq!(result, Err(SimulationError::Count(samples)));
+            assert_eq!(result, Err(DatasetError::Count(samples)));
         }
     }
 }

@@ -6,7 +6,8 @@ use super::{
     Precision,
     equations::Range,
     program::{Builder, Program},
-    ridge::{Regression, Standard, folds},
+    ridge::Regression,
+    standardised::{Standard, folds},
 };
 use crate::{
     dataset::Dataset,

@@ -72,25 +72,11 @@ pub trait Decoder: Send {
         SolvedRows::default()
     }
 
-    /// Returns the program that the decoder evaluates, for other programs that decode without this one.
-    ///
-    /// # Errors
-    /// If the decoder is not a program.
-    fn program(&self) -> Result<Program, NotDescribed> {
-        Err(NotDescribed::Equations)
+    /// Returns the program that the decoder evaluates, for other programs that decode without this one; `None` if it
+    /// solves equations, or is a system of fuzzy rules, which is only for comparison.
+    fn program(&self) -> Option<Program> {
+        None
     }
-}
-
-/// Reason why a decoder is not available as a program.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum NotDescribed {
-    /// The decoder solves the equations of the sensor.
-    #[error("it solves the equations of the sensor, which bundles do not contain: export a network or ridge instead")]
-    Equations,
-    /// The decoder is a system of fuzzy rules.
-    #[error("it is only for comparison: export another decoder instead, such as rbf or ridge")]
-    Rules,
 }
 
 /// Error for a reading that cannot be decoded.

@@ -1,14 +1,13 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::{Decoder, NewtonDecoder, Program, ProgramDecoder};
 use crate::{
     dataset::{Dataset, PerRow, Seed, Stream},
     network::{InputChoice, NetworkError, Networks},
     scene::{NoiseSource, RowModel, Scene},
-    sensor::{SensorError, SensorModel},
+    sensor::SensorModel,
     text::Named,
 };
 
@@ -175,27 +174,12 @@ pub struct FitProblem<'a> {
     pub seed: Seed,
 }
 
-/// Error in fitting a decoder.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum FitError {
-    /// The samples cannot be scaled.
-    #[error(transparent)]
-    Scaling(#[from] NetworkError),
-    /// The sensor has no resistances at rest.
-    #[error(transparent)]
-    Sensor(#[from] SensorError),
-}
-
-/// A fitted decoder, or `None` if the problem lacks the networks or the sensor that it needs.
-pub type Fit = Result<Option<Box<dyn Decoder>>, FitError>;
-
 impl DecoderKind {
-    /// Fits a decoder of this kind.
+    /// Fits a decoder of this kind; `None` if the problem lacks the networks or the sensor that it needs.
     ///
     /// # Errors
     /// If samples cannot be scaled, or the sensor has no resistances at rest.
-    pub fn fit(self, problem: &FitProblem<'_>) -> Fit {
+    pub fn fit(self, problem: &FitProblem<'_>) -> Result<Option<Box<dyn Decoder>>, NetworkError> {
         let FitProblem { inputs, unseen, .. } = *problem;
         let mut rng = problem.seed.rng(Stream::Expectation);
         match self {
@@ -215,7 +199,10 @@ impl DecoderKind {
 
 impl FitProblem<'_> {
     /// Fits one program to the samples of all row-wires, or one for each.
-    fn of_samples(&self, fit: impl FnMut(&Dataset) -> Result<Program, NetworkError>) -> Fit {
+    fn of_samples(
+        &self,
+        fit: impl FnMut(&Dataset) -> Result<Program, NetworkError>,
+    ) -> Result<Option<Box<dyn Decoder>>, NetworkError> {
         let programs = PerRow::fit(self.training, self.row_model, fit)?;
         Ok(Some(Box::new(ProgramDecoder::new(Program::each(&programs)))))
     }
@@ -226,7 +213,10 @@ impl FitProblem<'_> {
     }
 
     /// Creates a decoder for the rows that were read, and changes it; `None` without a sensor.
-    fn on_equations(&self, change: impl FnOnce(NewtonDecoder) -> NewtonDecoder) -> Fit {
+    fn on_equations(
+        &self,
+        change: impl FnOnce(NewtonDecoder) -> NewtonDecoder,
+    ) -> Result<Option<Box<dyn Decoder>>, NetworkError> {
         let Some(((model, scene), rows)) = self.sensor.zip(self.training.row_wires_read()) else {
             return Ok(None);
         };

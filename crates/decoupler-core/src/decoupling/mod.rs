@@ -18,13 +18,15 @@ mod newton;
 mod program;
 mod radial_basis;
 mod ridge;
+mod standardised;
 mod takagi_sugeno;
 
-pub use decoder::{DecodeError, Decoder, NotDescribed, SolvedRows, decode_set, resistance_residual};
+pub use decoder::{DecodeError, Decoder, SolvedRows, decode_set, resistance_residual};
 pub(crate) use equations::GaussianPrior;
 pub use equations::{Estimate, Estimator, LARGEST_ERROR, NewtonStop, Solution};
-pub use kind::{DecoderKind, Fit, FitError, FitProblem, Precision};
+pub use kind::{DecoderKind, FitProblem, Precision};
 pub use newton::NewtonDecoder;
 pub use program::{Builder, Changes, Domain, Function, Node, NodeId, Operation, Program, ProgramDecoder};
 pub(crate) use radial_basis::KernelShape;
-pub(crate) use ridge::{Regression, ridge};
+pub(crate) use ridge::Regression;
+pub(crate) use standardised::ridge;

@@ -9,7 +9,8 @@ use rand::Rng;
 use super::{
     Precision,
     program::{Builder, Function, Program},
-    ridge::{Choice, folds},
+    ridge::Choice,
+    standardised::folds,
 };
 use crate::{
     dataset::{Dataset, Folds},

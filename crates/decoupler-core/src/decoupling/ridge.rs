@@ -1,10 +1,7 @@
 use faer::Mat;
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 
-use crate::{
-    dataset::{Dataset, DatasetError, Folds, Seed, SplitBy, Stream},
-    network::NetworkError,
-};
+use crate::{dataset::Folds, network::NetworkError};
 
 /// Writes the features and the outputs of a sample.
 type WriteSample<'a> = &'a dyn Fn(usize, &mut [f64], &mut [f64]);
@@ -12,7 +9,7 @@ type WriteSample<'a> = &'a dyn Fn(usize, &mut [f64], &mut [f64]);
 /// Ridge regression of outputs on features, with the penalty of each output chosen by cross-validation.
 ///
 /// Minimises `‖y − ȳ − (X − x̄) B‖² + α ‖B‖²` (Hoerl and Kennard 1970, doi:10.1080/00401706.1970.10488634), with α the
-/// number of samples times one of [`levels`]. Features should have comparable sizes; [`Standard`] makes them so.
+/// number of samples times one of [`levels`]. Features should have comparable sizes; [`Standard`](super::standardised::Standard) makes them so.
 ///
 /// Each fold is reduced to R of a QR decomposition of [1, X, Y], block by block of its samples, so that memory does not
 /// grow with their number (Golub and Van Loan, Matrix Computations, section 6.5.2). The R of several folds below each
@@ -293,152 +290,6 @@ impl Choice {
     }
 }
 
-/// Centre and scale of each feature. A feature that is constant, or nearly so, has the scale 0: its deviations are
-/// rounding, and divided by their size they would turn a later change into an enormous one. A feature that varied much less
-/// than others, such as an average over a rare pulse, keeps some of the difference for the same reason.
-pub(crate) struct Standard {
-    /// Means.
-    pub centre: Vec<f64>,
-    /// Reciprocal standard deviations, limited by [`Self::SMALLEST`].
-    pub scale: Vec<f64>,
-}
-
-impl Standard {
-    /// Deviation of a constant feature, relative to its largest absolute value.
-    const CONSTANT: f64 = 1e-12;
-    /// Smallest deviation by which a feature is divided, relative to the largest deviation of a feature.
-    const SMALLEST: f64 = 0.1;
-
-    /// Computes them for `of` the values (samples × features).
-    ///
-    /// # Errors
-    /// If there are no values, or they overflow.
-    pub fn fit(values: ArrayView2<'_, f64>, of: impl Fn(f64) -> f64) -> Result<Self, NetworkError> {
-        let (samples, features) = values.dim();
-        if samples == 0 {
-            return Err(NetworkError::Empty);
-        }
-        let first: Vec<f64> = values.row(0).iter().map(|&value| of(value)).collect();
-        let (mut shift, mut largest) = (vec![0.0; features], vec![0.0_f64; features]);
-        for row in values.rows() {
-            for (feature, &value) in row.iter().enumerate() {
-                let value = of(value);
-                shift[feature] += (value - first[feature]) / samples as f64;
-                largest[feature] = largest[feature].max(value.abs());
-            }
-        }
-        let centre: Vec<f64> = first.iter().zip(&shift).map(|(first, shift)| first + shift).collect();
-        // Relative to the largest value, whose square may overflow.
-        let mut squares = vec![0.0; features];
-        for row in values.rows() {
-            for (feature, &value) in row.iter().enumerate() {
-                let off = (of(value) - centre[feature]) / largest[feature].max(f64::MIN_POSITIVE);
-                squares[feature] += off * off / samples as f64;
-            }
-        }
-        let deviation = |(square, largest): (&f64, &f64)| match square.sqrt() {
-            relative if relative > Self::CONSTANT => relative * largest,
-            _ => 0.0,
-        };
-        let deviations: Vec<f64> = squares.iter().zip(&largest).map(deviation).collect();
-        let smallest = Self::SMALLEST * deviations.iter().copied().fold(0.0, f64::max);
-        let scale = |&deviation: &f64| match deviation {
-            0.0 => 0.0,
-            _ => 1.0 / deviation.max(smallest),
-        };
-        let standard = Self {
-            scale: deviations.iter().map(scale).collect(),
-            centre,
-        };
-        let all = standard
-            .centre
-            .iter()
-            .chain(&deviations)
-            .chain(&squares)
-            .chain(&standard.scale);
-        if all.copied().all(f64::is_finite) {
-            Ok(standard)
-        } else {
-            Err(NetworkError::NotConverged)
-        }
-    }
-
-    /// Writes the standardised features of a sample with these values.
-    pub fn write(&self, values: impl Iterator<Item = f64>, features: &mut [f64]) {
-        for ((feature, value), (centre, scale)) in
-            features.iter_mut().zip(values).zip(self.centre.iter().zip(&self.scale))
-        {
-            *feature = (value - centre) * scale;
-        }
-    }
-}
-
-/// Cross-validated ridge regression of `targets` (samples × targets) on standardised `inputs` (samples × inputs). Its map
-/// takes the inputs as they are.
-///
-/// # Errors
-/// If there are no samples, or the equations have no finite solution.
-pub(crate) fn ridge(
-    inputs: ArrayView2<'_, f64>,
-    targets: ArrayView2<'_, f64>,
-    folds: &Folds,
-) -> Result<Ridge, NetworkError> {
-    let standard = Standard::fit(inputs, |value| value)?;
-    let offsets = Standard::fit(targets, |value| value)?.centre;
-    let regression = Regression {
-        samples: inputs.nrows(),
-        features: inputs.ncols(),
-        outputs: targets.ncols(),
-        write: &|sample, features, outputs| {
-            standard.write(inputs.row(sample).iter().copied(), features);
-            // Squares of a large offset would hide the changes.
-            let off = targets.row(sample).into_iter().zip(&offsets);
-            outputs
-                .iter_mut()
-                .zip(off)
-                .for_each(|(output, (target, offset))| *output = target - offset);
-        },
-        noise: Array2::zeros((0, inputs.ncols())),
-    };
-    let mut ridge = regression.ridge(Some(folds))?;
-    for map in std::iter::once(&mut ridge.map).chain(&mut ridge.held_out) {
-        for (t, mut column) in map.columns_mut().into_iter().enumerate() {
-            column[inputs.ncols()] += offsets[t];
-            for (i, (centre, scale)) in standard.centre.iter().zip(&standard.scale).enumerate() {
-                column[i] *= scale;
-                column[inputs.ncols()] -= centre * column[i];
-            }
-        }
-    }
-    Ok(ridge)
-}
-
-/// Folds by which a decoder chooses penalties and widths: blocks in the order of the samples between groups, or whole groups
-/// if these are scattered. The fewer samples there are, the fewer a fold holds out: a twentieth, a tenth, or a fifth. There are
-/// fewer folds if there are fewer groups. `None` for a single sample.
-pub(super) fn folds(set: &Dataset) -> Option<Folds> {
-    let samples = set.samples();
-    let count = match samples {
-        ..=50 => 20,
-        51..=200 => 10,
-        _ => 5,
-    };
-    let runs = set.groups().chunk_by(|one, next| one == next).count();
-    let by = if runs == set.snapshots().len() {
-        SplitBy::Time
-    } else {
-        SplitBy::Group
-    };
-    let divide = |folds| Folds::by(set, folds, by, &mut Seed(0).rng(Stream::Split));
-    match divide(count) {
-        Ok(folds) => Some(folds),
-        Err(DatasetError::Folds { units, .. }) if units >= 2 => divide(units).ok(),
-        // A single group.
-        Err(_) if samples >= 2 => Some(Folds::consecutive(samples, count.min(samples))),
-        Err(_) => None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use faer::{Side, linalg::solvers::Solve};
@@ -674,62 +525,6 @@ mod tests {
     }
 
     #[test]
-    fn constant_features_have_no_scale_and_extremes_have_one() {
-        let x = normal(50, 1, 12);
-        for (size, offset, varies) in [
-            (1.0, 0.0, true),
-            (0.0, 5.3, false),
-            (0.0, 0.0, false),
-            (1e-16, 5.3, false),
-            (1e-9, 5.3, true),
-            (1e-200, 0.0, true),
-            (1e200, 0.0, true),
-        ] {
-            let values = x.mapv(|value| size * value + offset);
-            let standard = Standard::fit(values.view(), |value| value).unwrap();
-            assert_eq!(standard.scale[0] > 0.0, varies, "{size} {offset}");
-            if varies {
-                let mut scaled = [0.0];
-                let square = |value: &f64| {
-                    standard.write([*value].into_iter(), &mut scaled);
-                    scaled[0] * scaled[0]
-                };
-                let variance = values.iter().map(square).sum::<f64>() / 50.0;
-                assert!((variance - 1.0).abs() < 1e-6, "{size} {offset}: {variance}");
-            }
-        }
-        let none = Array2::zeros((0, 2));
-        assert!(matches!(
-            Standard::fit(none.view(), |value| value),
-            Err(NetworkError::Empty)
-        ));
-    }
-
-    #[test]
-    fn inputs_are_standardised_and_large_offsets_kept() {
-        let inputs = Array2::from_shape_fn((60, 3), |(s, i)| {
-            ((7 * s + 13 * i * s + i) as f64).sin() * 10.0_f64.powi(2 * i as i32)
-        });
-        let targets = Array2::from_shape_fn((60, 2), |(s, t)| match t {
-            0 => 3.0 * inputs[[s, 0]] - 0.2 * inputs[[s, 2]] + 5.0,
-            _ => inputs[[s, 1]] + 1e6,
-        });
-        let map = ridge(inputs.view(), targets.view(), &Folds::consecutive(60, 4))
-            .unwrap()
-            .map;
-        for (found, expected) in [
-            (map[[0, 0]], 3.0),
-            (map[[1, 0]], 0.0),
-            (map[[2, 0]], -0.2),
-            (map[[3, 0]], 5.0),
-            (map[[1, 1]], 1.0),
-            (map[[3, 1]], 1e6),
-        ] {
-            assert!((found - expected).abs() < 1e-6, "{map}");
-        }
-    }
-
-    #[test]
     fn no_or_one_sample_and_no_features_or_outputs() {
         for (samples, features, outputs) in [(1, 3, 2), (2, 3, 2), (5, 0, 2), (5, 3, 0)] {
             let (x, y) = (normal(samples, features, 1), normal(samples, outputs, 2));
@@ -743,32 +538,5 @@ mod tests {
         let (x, y) = (normal(0, 3, 0), normal(0, 2, 0));
         let empty = with(&x, &y, &none(3), |regression| regression.ridge(None).map(|_| ()));
         assert_eq!(empty, Err(NetworkError::Empty));
-    }
-
-    #[test]
-    fn folds_leave_groups_whole() {
-        let set = |groups: Vec<usize>| {
-            let values = Array2::zeros((groups.len(), 1));
-            Dataset::new(values.clone(), values, None, groups).unwrap()
-        };
-        // Groups one after another, scattered, few of them, and a single one.
-        for (groups, count) in [
-            ((0..60).map(|s| s / 4).collect::<Vec<_>>(), 10),
-            ((0..45).collect(), 20),
-            ((0..300).map(|s| s / 4).collect(), 5),
-            ((0..60).map(|s| s % 15).collect(), 10),
-            ((0..60).map(|s| s % 3).collect(), 3),
-        ] {
-            let set = set(groups.clone());
-            let folds = folds(&set).unwrap();
-            assert_eq!(folds.count(), count);
-            for fold in 0..count {
-                let others = folds.without(&[fold]);
-                let is_elsewhere = |sample: &usize| others.iter().any(|&other| groups[other] == groups[*sample]);
-                assert!(!folds.test(fold).iter().any(is_elsewhere), "{groups:?}");
-            }
-        }
-        assert_eq!(folds(&set(vec![7; 60])).unwrap().test(0), Vec::from_iter(0..6));
-        assert!(folds(&set(vec![7])).is_none());
     }
 }

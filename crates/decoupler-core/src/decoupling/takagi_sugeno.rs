@@ -7,7 +7,8 @@ use super::{
     Precision,
     program::{Builder, Program},
     radial_basis::{distance2, thinned, with_noise},
-    ridge::{Regression, Standard, folds},
+    ridge::Regression,
+    standardised::{Standard, folds},
 };
 use crate::{
     dataset::Dataset,
@@ -61,7 +62,8 @@ impl Program {
         let searched = training.select(&thinned(training.samples(), MAX_VALIDATED));
         let components = inputs.of(searched.readings());
         let mut antecedents = |rules, leading| antecedents(&inputs, components.view(), rules, leading, rng);
-        let error = |antecedents: &Array2<f64>| Ok(with_rules(&searched, &inputs, &outputs, antecedents)?.1);
+        let error =
+            |antecedents: &Array2<f64>| with_rules(&searched, &inputs, &outputs, antecedents).map(|fitted| fitted.1);
         let most = MAX_REGRESSORS.min((REGRESSORS_PER_SAMPLE * searched.samples() as f64) as usize);
         let is_affordable = |rules: &usize| rules * (training.channels() + 1) <= most;
         let candidates: Vec<usize> = RULES.into_iter().filter(is_affordable).collect();

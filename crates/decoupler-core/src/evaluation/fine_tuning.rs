@@ -8,7 +8,7 @@ use crate::{
     machine::MemoryBudget,
     network::{DecouplingNetwork, Networks},
     sensor::SensorModel,
-    training::{Examples, Problem, Trainer, TrainingSettings, check_width},
+    training::{ExampleSets, Examples, Trainer, TrainingSettings, check_width},
 };
 
 /// Returns the samples of `set` as readings of known deformations, for
@@ -70,7 +70,7 @@ pub fn fine_tune(
             let inputs = network.inputs().of(set.readings());
             Examples::new(inputs.view(), network.outputs().scale(set.targets()).view())
         };
-        let problem = Problem {
+        let problem = ExampleSets {
             training: examples(&split.training),
             validation: split.validation.as_ref().map(examples),
             test: None,

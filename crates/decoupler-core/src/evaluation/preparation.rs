@@ -13,7 +13,7 @@ use crate::{
     machine::MemoryBudget,
     network::{Inputs, MinMax, Mlp, Shape, nguyen_widrow},
     scene::{NoiseSource, NoisySets, RowModel},
-    training::{Examples, Problem, Trainer, TrainerState, TrainingError, check_width},
+    training::{ExampleSets, Examples, Trainer, TrainerState, TrainingError, check_width},
 };
 
 /// Weights with which the trainings of a run begin.
@@ -148,7 +148,7 @@ fn check_states(states: &[TrainerState], expected: usize) -> Result<(), RunError
 
 /// Training problem of one network, for one row-wire or for all.
 pub(super) struct Task {
-    pub(super) problem: Problem,
+    pub(super) problem: ExampleSets,
     pub(super) shape: Shape,
     pub(super) scaling: (Inputs, MinMax),
     /// Weights that replace random ones.
@@ -183,7 +183,7 @@ impl Task {
                 (set.targets(), |targets| outputs.scale(targets)),
             )
         };
-        let problem = Problem {
+        let problem = ExampleSets {
             training: examples(training),
             validation: validation.map(examples),
             // The error on no samples is undefined.

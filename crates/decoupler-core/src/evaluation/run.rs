@@ -13,8 +13,8 @@ use super::{
     auto::Blend, starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, DatasetError, PerRow, SimulationError},
-    decoupling::{DecodeError, FitError, Precision, Program, ProgramDecoder},
+    dataset::{Dataset, DatasetError, PerRow},
+    decoupling::{DecodeError, Precision, Program, ProgramDecoder},
     identifiability::IdentifiabilityError,
     job::{Cancelled, Job},
     machine::MemoryBudget,
@@ -22,10 +22,7 @@ use crate::{
     problem::Problem,
     scene::SceneError,
     sensor::SensorError,
-    training::{
-        Method, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingDefect, TrainingError,
-        check_width,
-    },
+    training::{Method, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingError, check_width},
 };
 
 /// Run: its sets of samples, one training per start, and the errors of the best network.
@@ -316,17 +313,14 @@ impl Run {
 fn defect_of(start: &StartTrainer, is_chosen: bool) -> Option<String> {
     start.stop_reason()?;
     let numbered = start.rows().iter().enumerate();
-    let is_defect = |defect: &TrainingDefect| !is_chosen || defect.diverged_in.is_some();
-    let defect = |(index, trainer)| Some((index + 1, TrainingDefect::of(trainer).filter(is_defect)?));
-    let mut defects = numbered.filter_map(defect);
+    let is_judged = |trainer: &Trainer| !is_chosen || trainer.stop_reason() == Some(StopReason::Diverged);
+    let numbered = numbered.filter(|(_, trainer)| is_judged(trainer));
+    let mut defects = numbered.filter_map(|(index, trainer)| Some((index + 1, trainer.defect()?)));
     let (first, defect) = defects.next()?;
     let (defective, networks) = (1 + defects.count(), start.rows().len());
     Some(match networks {
-        1 => defect.text,
-        _ => format!(
-            "{defective} of {networks} networks, the first being number {first}: {}",
-            defect.text
-        ),
+        1 => defect,
+        _ => format!("{defective} of {networks} networks, the first being number {first}: {defect}"),
     })
 }
 
@@ -367,16 +361,10 @@ pub enum RunError {
     /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// Samples cannot be drawn.
-    #[error(transparent)]
-    Simulation(#[from] SimulationError),
-    /// A decoder cannot be fitted.
-    #[error(transparent)]
-    Fit(#[from] FitError),
-    /// Samples cannot be divided.
+    /// Samples cannot be drawn or divided.
     #[error(transparent)]
     Division(#[from] DatasetError),
-    /// Samples cannot be scaled.
+    /// Samples cannot be scaled, or a decoder cannot be fitted.
     #[error(transparent)]
     Scaling(#[from] NetworkError),
     /// A reading is not a resistance.

@@ -298,12 +298,11 @@ impl RunSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::training::ScaledConjugateGradientSettings;
 
     #[test]
     fn a_method_chosen_for_a_recording_brings_its_settings_and_rules_unless_the_user_set_others() {
         let measured = || RunSettings::from(Measured { rows: RowModel::Shared });
-        let scg = Method::ScaledConjugateGradient(ScaledConjugateGradientSettings::default());
+        let scg = Method::scaled_conjugate_gradient(0.0);
         let mut settings = measured();
         settings.choose_method(scg);
         let rules = settings.training.stopping;

@@ -2,12 +2,8 @@ use super::{
     Baselines, Begin, DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, TestErrors,
 };
 use crate::{
-    dataset::Simulation,
-    decoupling::DecoderKind,
-    identifiability::Identifiability,
-    job::Job,
-    scene::{RelativeNoise, Rows},
-    training::Method,
+    dataset::Simulation, decoupling::DecoderKind, identifiability::Identifiability, job::Job, scene::Rows,
+    sensor::RelativeNoise, training::Method,
 };
 
 /// One decoder in the trade-off between speed and accuracy.

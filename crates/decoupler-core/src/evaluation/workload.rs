@@ -7,7 +7,7 @@ use crate::{
     machine::{MemoryBudget, Speed, node_pairs_per_row},
     network::{ScalingChoice, Shape},
     scene::{Movement, RowModel, Rows},
-    training::{Method, ScaledConjugateGradientSettings},
+    training::Method,
 };
 
 /// Memory and work of a run, from the sizes of its network and samples alone, so that both are known before it begins.
@@ -121,10 +121,7 @@ impl Workload {
     /// for the number of epochs that it gets by default.
     pub fn faster_methods(&self, settings: &RunSettings, size: TrainingSize) -> Vec<(Method, Duration)> {
         let present = self.time().all_epochs;
-        let candidates = [
-            Method::default(),
-            Method::ScaledConjugateGradient(ScaledConjugateGradientSettings::default()),
-        ];
+        let candidates = [Method::default(), Method::scaled_conjugate_gradient(0.0)];
         let of_each = candidates.into_iter().map(|method| {
             let mut other = *settings;
             other.choose_method(method);

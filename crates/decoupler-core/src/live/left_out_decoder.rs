@@ -1,8 +1,10 @@
 use super::Diagnosis;
+use glam::DVec3;
+
 use crate::{
     decoupling::{DecodeError, Decoder, Estimator},
     scene::{Loading, Scene},
-    sensor::{DVec3, SensorError, SensorModel},
+    sensor::{SensorError, SensorModel},
 };
 
 /// Decodes known rows by Eq. (2), with the wire of a named fault left out, if there is one.

@@ -2,11 +2,13 @@ use std::{f64::consts::TAU, fmt, iter::Sum, mem::discriminant, ops::Range};
 
 use faer::{Mat, Side, linalg::solvers::Solve};
 
+use glam::DVec3;
+
 use crate::{
     decoupling::Estimator,
     numerics::chi_squared_quantile,
     scene::{Loading, Scene},
-    sensor::{ArrayScale, DVec3, SensorError, SensorModel},
+    sensor::{ArrayScale, SensorError, SensorModel},
 };
 
 /// Faulty wire, counted from 0.

@@ -1,7 +1,9 @@
 use ndarray::ArrayView2;
 use thiserror::Error;
 
-/// Error in fitting or reading a scaling or a network.
+use crate::sensor::SensorError;
+
+/// Error in fitting a decoder, or in fitting or reading a scaling or a network.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NetworkError {
@@ -71,6 +73,9 @@ pub enum NetworkError {
         /// Index of the weight, row by row from 0.
         index: usize,
     },
+    /// The sensor, which a decoder solves, has no resistances at rest.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
 }
 
 impl NetworkError {

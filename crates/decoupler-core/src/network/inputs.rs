@@ -7,10 +7,7 @@ use super::{
     ChannelNoise, MinMax, NetworkError, Quantity, Whitening,
     quantity::{root_mean_square, rounding},
 };
-use crate::{
-    scene::{NoiseSource, RelativeNoise},
-    text::Named,
-};
+use crate::{scene::NoiseSource, sensor::RelativeNoise, text::Named};
 
 /// Choice of the input quantity and its scaling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,7 +60,7 @@ pub struct Inputs {
 /// Scaling fitted to a training set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum InputScaling {
+pub(crate) enum InputScaling {
     /// Each channel scaled to [−1, 1].
     MinMax(MinMax),
     /// Principal components scaled to unit variance.
@@ -90,7 +87,7 @@ impl fmt::Display for ScalingChoice {
 
 impl Inputs {
     /// Creates inputs from a quantity, its fitted scaling, and the range of the readings in the training set, if it is known.
-    pub fn new(quantity: Quantity, scaling: InputScaling, range: Option<MinMax>) -> Self {
+    pub(super) fn new(quantity: Quantity, scaling: InputScaling, range: Option<MinMax>) -> Self {
         Self {
             quantity,
             scaling,
@@ -137,7 +134,7 @@ impl Inputs {
     }
 
     /// Returns the fitted scaling.
-    pub fn scaling(&self) -> &InputScaling {
+    pub(crate) fn scaling(&self) -> &InputScaling {
         &self.scaling
     }
 

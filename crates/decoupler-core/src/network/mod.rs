@@ -13,12 +13,13 @@ mod tanh;
 mod whitening;
 
 pub use error::NetworkError;
-pub(crate) use inputs::channel_noise;
-pub use inputs::{InputChoice, InputScaling, Inputs, ScalingChoice};
+pub use inputs::{InputChoice, Inputs, ScalingChoice};
+pub(crate) use inputs::{InputScaling, channel_noise};
 pub use mlp::{Mlp, Shape, nguyen_widrow};
-pub use networks::{DecouplingNetwork, HiddenSuggestions, LARGEST_HIDDEN, Networks};
-pub use quantity::{ChannelNoise, Quantity};
+pub use networks::{DecouplingNetwork, LARGEST_HIDDEN, Networks, suggested_hidden};
+pub(crate) use quantity::ChannelNoise;
+pub use quantity::Quantity;
 pub use scaling::MinMax;
 pub(crate) use tanh::{exp, tanh, tanh_single};
 pub use tanh::{tanh_in_place, tanh_in_place_single};
-pub use whitening::Whitening;
+pub(crate) use whitening::Whitening;

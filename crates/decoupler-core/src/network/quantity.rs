@@ -163,7 +163,7 @@ pub(super) fn root_mean_square(values: impl ExactSizeIterator<Item = f64> + Clon
 
 /// Errors of the values of each channel: standard deviations in the unit of the values.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ChannelNoise {
+pub(crate) struct ChannelNoise {
     /// Independent error of each channel.
     pub own: Vec<f64>,
     /// Error common to all channels, with the same sign in each: a drift.
@@ -200,11 +200,6 @@ impl ChannelNoise {
             common += weight * of_common;
         }
         own + common * common
-    }
-
-    /// Returns `true` if no channel has an error.
-    pub fn is_none(&self) -> bool {
-        self.own.iter().chain(&self.common).all(|&deviation| deviation == 0.0)
     }
 }
 
@@ -288,6 +283,5 @@ mod tests {
             .sum();
         let ratio = noise.variance(weights) / (squares / f64::from(draws));
         assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
-        assert!(!noise.is_none() && ChannelNoise::none(3).is_none());
     }
 }

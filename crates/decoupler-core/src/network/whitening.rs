@@ -12,7 +12,7 @@ use super::{ChannelNoise, NetworkError};
 /// amplify noise to the size of the signal, or by many more orders of magnitude where the component is only rounding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Whitening {
+pub(crate) struct Whitening {
     /// Mean of each channel.
     mean: Vec<f64>,
     /// √(σ² + noise²) of each component.

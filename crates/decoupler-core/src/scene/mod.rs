@@ -4,14 +4,16 @@ mod loading;
 mod noise;
 mod rows;
 
-pub use loading::{Contact, DeformationSampler, Indenter, IndenterShape, Loading, Print, Span, Touch};
+pub(crate) use loading::DeformationSampler;
+pub use loading::{Indenter, IndenterShape, Loading, Radii};
 pub(crate) use noise::standard_normal;
-pub use noise::{Noise, NoiseSource, NoisySets, RelativeNoise};
+pub use noise::{Noise, NoiseSource, NoisySets};
 pub use rows::{RowModel, Rows};
 
 use std::fmt;
 
 use glam::DVec3;
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -74,7 +76,7 @@ pub enum SceneError {
     Spread(f64),
     /// The indenter's radius is out of range.
     #[error("the indenter's radius is from {} to {} mm: give two lengths above 0 in order", short(.0.smallest), short(.0.largest))]
-    Radius(Span),
+    Radius(Radii),
     /// The indenter's tilt is out of range.
     #[error("the indenter's largest tilt is {} degrees: give from 0 to 45", short(*.0))]
     Tilt(f64),
@@ -129,8 +131,13 @@ impl Scene {
     }
 
     /// Prepares to draw deformations of `model`.
-    pub fn sampler(&self, model: &SensorModel) -> DeformationSampler {
+    pub(crate) fn sampler(&self, model: &SensorModel) -> DeformationSampler {
         DeformationSampler::new(self, model)
+    }
+
+    /// Draws a deformation of `model`.
+    pub fn draw(&self, model: &SensorModel, rng: &mut impl Rng) -> Deformation {
+        self.sampler(model).draw(rng)
     }
 
     /// Returns the number of unknowns of each row-wire: the coordinates that vary in the scene.

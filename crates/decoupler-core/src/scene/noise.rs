@@ -5,8 +5,7 @@ use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
 use super::SceneError;
-pub use crate::sensor::RelativeNoise;
-use crate::sensor::{SensorError, SensorModel};
+use crate::sensor::{RelativeNoise, SensorError, SensorModel};
 
 /// Noise of the readings: Gaussian noise and the rounding of the converter.
 ///

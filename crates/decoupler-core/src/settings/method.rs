@@ -19,15 +19,54 @@ pub enum Method {
     /// always factored, since the method needs the trace of their inverse.
     BayesianRegularization(RegularizationSettings),
     /// Møller's scaled conjugate gradient (`trainscg`).
-    ScaledConjugateGradient(ScaledConjugateGradientSettings),
+    ScaledConjugateGradient {
+        /// Length of the finite difference from which the curvature is estimated.
+        sigma: f64,
+        /// Initial scale of the curvature.
+        lambda: f64,
+        /// Factor on the sum of the squared weights, which is added to the sum of the squared errors. Files from before
+        /// this setting existed lack it.
+        #[serde(default)]
+        decay: f64,
+    },
     /// Resilient back-propagation (`trainrp`).
-    Resilient(ResilientSettings),
+    Resilient {
+        /// Step length of every weight in the first epoch (delta0).
+        first_length: f64,
+        /// Factor on a weight's step length while its slope keeps its sign.
+        length_increase: f64,
+        /// Factor on a weight's step length when its slope changes sign.
+        length_decrease: f64,
+        /// Largest step of a weight in one epoch (deltamax).
+        largest_length: f64,
+    },
     /// Gradient descent with momentum and an adaptive learning rate (`traingdx`).
-    AdaptiveDescent(AdaptiveDescentSettings),
+    AdaptiveDescent {
+        /// Initial step length relative to the length of the gradient.
+        learning_rate: f64,
+        /// Share of the previous step in each step, below 1.
+        momentum: f64,
+        /// Factor on the learning rate after a step that lowers the error.
+        rate_increase: f64,
+        /// Factor on the learning rate after a rejected step.
+        rate_decrease: f64,
+        /// A step that raises the error by more than this factor is rejected.
+        largest_error_increase: f64,
+    },
     /// Gradient descent with momentum of steps (`traingdm`).
-    StepMomentum(MomentumSettings),
+    StepMomentum {
+        /// Step length relative to the length of the gradient.
+        learning_rate: f64,
+        /// Share of the previous step in each step, below 1.
+        momentum: f64,
+    },
     /// Gradient descent with momentum of gradients, Eq. (11).
-    Momentum(MomentumSettings),
+    Momentum {
+        /// Step length relative to the length of the gradient (alpha).
+        learning_rate: f64,
+        /// Share of the previous gradient in each step (eta).
+        momentum: f64,
+    },
     /// Conventional back-propagation, Eq. (5)-(10) (`traingd`).
     GradientDescent {
         /// Step length relative to the length of the gradient.
@@ -105,102 +144,6 @@ impl RegularizationSettings {
     }
 }
 
-/// Settings of the scaled conjugate gradient, with the field's usual defaults (`trainscg`). Files from before a
-/// setting existed get its default.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ScaledConjugateGradientSettings {
-    /// Length of the finite difference from which the curvature is estimated.
-    pub sigma: f64,
-    /// Initial scale of the curvature.
-    pub lambda: f64,
-    /// Factor on the sum of the squared weights, which is added to the sum of the squared errors.
-    pub decay: f64,
-}
-
-impl Default for ScaledConjugateGradientSettings {
-    fn default() -> Self {
-        Self {
-            sigma: 5e-5,
-            lambda: 5e-7,
-            decay: 0.0,
-        }
-    }
-}
-
-/// Settings of resilient back-propagation, with the field's usual defaults (`trainrp`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ResilientSettings {
-    /// Step length of every weight in the first epoch (delta0).
-    pub first_length: f64,
-    /// Factor on a weight's step length while its slope keeps its sign.
-    pub length_increase: f64,
-    /// Factor on a weight's step length when its slope changes sign.
-    pub length_decrease: f64,
-    /// Largest step of a weight in one epoch (deltamax).
-    pub largest_length: f64,
-}
-
-impl Default for ResilientSettings {
-    fn default() -> Self {
-        Self {
-            first_length: 0.07,
-            length_increase: 1.2,
-            length_decrease: 0.5,
-            largest_length: 50.0,
-        }
-    }
-}
-
-/// Settings of gradient descent with momentum and an adaptive learning rate, with the field's usual defaults
-/// (`traingdx`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct AdaptiveDescentSettings {
-    /// Initial step length relative to the length of the gradient.
-    pub learning_rate: f64,
-    /// Share of the previous step in each step, below 1.
-    pub momentum: f64,
-    /// Factor on the learning rate after a step that lowers the error.
-    pub rate_increase: f64,
-    /// Factor on the learning rate after a rejected step.
-    pub rate_decrease: f64,
-    /// A step that raises the error by more than this factor is rejected.
-    pub largest_error_increase: f64,
-}
-
-impl Default for AdaptiveDescentSettings {
-    fn default() -> Self {
-        Self {
-            learning_rate: 0.01,
-            momentum: 0.9,
-            rate_increase: 1.05,
-            rate_decrease: 0.7,
-            largest_error_increase: 1.04,
-        }
-    }
-}
-
-/// Settings of gradient descent with momentum of gradients or of steps, with the field's usual defaults.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MomentumSettings {
-    /// Step length relative to the length of the gradient (alpha).
-    pub learning_rate: f64,
-    /// Share of the previous gradient (eta) or step in each step; below 1 for steps.
-    pub momentum: f64,
-}
-
-impl Default for MomentumSettings {
-    fn default() -> Self {
-        Self {
-            learning_rate: 0.01,
-            momentum: 0.9,
-        }
-    }
-}
-
 /// Texts that describe a method.
 struct Description {
     short_name: &'static str,
@@ -218,16 +161,36 @@ impl Default for Method {
 }
 
 impl Method {
+    /// Momentum of gradients with the field's usual defaults.
+    pub const MOMENTUM: Self = Self::Momentum {
+        learning_rate: 0.01,
+        momentum: 0.9,
+    };
+
     /// Returns every method with its defaults, in the order offered to the user.
     pub fn all() -> [Self; 8] {
         [
             Self::default(),
             Self::bayesian_regularization(),
-            Self::ScaledConjugateGradient(ScaledConjugateGradientSettings::default()),
-            Self::Resilient(ResilientSettings::default()),
-            Self::AdaptiveDescent(AdaptiveDescentSettings::default()),
-            Self::StepMomentum(MomentumSettings::default()),
-            Self::Momentum(MomentumSettings::default()),
+            Self::scaled_conjugate_gradient(0.0),
+            Self::Resilient {
+                first_length: 0.07,
+                length_increase: 1.2,
+                length_decrease: 0.5,
+                largest_length: 50.0,
+            },
+            Self::AdaptiveDescent {
+                learning_rate: 0.01,
+                momentum: 0.9,
+                rate_increase: 1.05,
+                rate_decrease: 0.7,
+                largest_error_increase: 1.04,
+            },
+            Self::StepMomentum {
+                learning_rate: 0.01,
+                momentum: 0.9,
+            },
+            Self::MOMENTUM,
             Self::GradientDescent { learning_rate: 0.01 },
         ]
     }
@@ -253,6 +216,15 @@ impl Method {
     /// Returns Bayesian regularisation with the settings for recordings.
     pub fn recorded_regularization() -> Self {
         Self::BayesianRegularization(RegularizationSettings::recorded())
+    }
+
+    /// Returns the scaled conjugate gradient with this weight decay and the field's usual defaults.
+    pub fn scaled_conjugate_gradient(decay: f64) -> Self {
+        Self::ScaledConjugateGradient {
+            sigma: 5e-5,
+            lambda: 5e-7,
+            decay,
+        }
     }
 
     /// Returns the settings of this method.
@@ -283,35 +255,35 @@ impl Method {
                 parameter_name: "mu",
                 remedy: "try another seed, more samples, or Levenberg-Marquardt (lm)",
             },
-            Self::ScaledConjugateGradient(_) => Description {
+            Self::ScaledConjugateGradient { .. } => Description {
                 short_name: "scg",
                 name: "Scaled conjugate gradient",
                 summary: "Conjugate directions, step length from the curvature: little memory, for very large networks.",
                 parameter_name: "lambda",
                 remedy: "try another seed, or Levenberg-Marquardt (lm)",
             },
-            Self::Resilient(_) => Description {
+            Self::Resilient { .. } => Description {
                 short_name: "rp",
                 name: "Resilient back-propagation",
                 summary: "Each weight has its own step length and uses only the sign of its slope.",
                 parameter_name: "mean step length",
                 remedy: "lower the first and the largest step length, or try another seed",
             },
-            Self::AdaptiveDescent(_) => Description {
+            Self::AdaptiveDescent { .. } => Description {
                 short_name: "gdx",
                 name: "Adaptive rate with momentum",
                 summary: "Gradient descent with momentum whose learning rate grows while the error falls.",
                 parameter_name: "learning rate",
                 remedy: "lower the learning rate, run more epochs, or try another seed",
             },
-            Self::StepMomentum(_) => Description {
+            Self::StepMomentum { .. } => Description {
                 short_name: "gdms",
                 name: "Momentum of steps",
                 summary: "Gradient descent that mixes the previous step into each step, as traingdm does.",
                 parameter_name: "learning rate",
                 remedy: "change the learning rate, run more epochs, or try another method",
             },
-            Self::Momentum(_) => Description {
+            Self::Momentum { .. } => Description {
                 short_name: "gdm",
                 name: "Momentum, Eq. (11)",
                 summary: "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does.",

@@ -5,10 +5,7 @@ mod method;
 mod rows;
 mod training;
 
-pub use method::{
-    AdaptiveDescentSettings, Damping, Method, MomentumSettings, RegularizationSettings, ResilientSettings,
-    ScaledConjugateGradientSettings,
-};
+pub use method::{Damping, Method, RegularizationSettings};
 pub use rows::{AsText, Field, Kind, Setting, SettingError, Value};
 use training::METHOD;
 pub(crate) use training::MIN_MU;

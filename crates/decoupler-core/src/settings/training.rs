@@ -2,10 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    AdaptiveDescentSettings, Damping, Field, Kind, Method, MomentumSettings, RegularizationSettings, ResilientSettings,
-    ScaledConjugateGradientSettings, Setting, SettingError,
-};
+use super::{Damping, Field, Kind, Method, RegularizationSettings, Setting, SettingError};
 
 /// Method and stopping rules of a training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -177,63 +174,91 @@ pub(super) static METHOD: &[Setting<Method>] = &[
         "sigma",
         Kind::Number(1e-12, 1.0),
         "Length of the finite difference from which the curvature is estimated.",
-        |method| Some(Field::Number(&mut conjugate(method)?.sigma)),
+        |method| match method {
+            Method::ScaledConjugateGradient { sigma, .. } => Some(Field::Number(sigma)),
+            _ => None,
+        },
     ),
     Setting::new(
         "lambda",
         LENGTH,
         "Initial scale of the curvature: it shortens steps where the error is not convex.",
-        |method| Some(Field::Number(&mut conjugate(method)?.lambda)),
+        |method| match method {
+            Method::ScaledConjugateGradient { lambda, .. } => Some(Field::Number(lambda)),
+            _ => None,
+        },
     ),
     Setting::new(
         "weight decay",
         Kind::Number(0.0, 1e12),
         "Penalty on large weights: this times the sum of the squared weights is added to the sum of the squared errors.",
-        |method| Some(Field::Number(&mut conjugate(method)?.decay)),
+        |method| match method {
+            Method::ScaledConjugateGradient { decay, .. } => Some(Field::Number(decay)),
+            _ => None,
+        },
     ),
     Setting::new(
         "first step length",
         LENGTH,
         "Step length of every weight in the first epoch (delta0).",
-        |method| Some(Field::Number(&mut resilient(method)?.first_length)),
+        |method| match method {
+            Method::Resilient { first_length, .. } => Some(Field::Number(first_length)),
+            _ => None,
+        },
     ),
     Setting::new(
         "length increase",
         GROWTH,
         "Factor on a weight's step length while its slope keeps its sign.",
-        |method| Some(Field::Number(&mut resilient(method)?.length_increase)),
+        |method| match method {
+            Method::Resilient { length_increase, .. } => Some(Field::Number(length_increase)),
+            _ => None,
+        },
     ),
     Setting::new(
         "length decrease",
         REDUCTION,
         "Factor on a weight's step length when its slope changes sign.",
-        |method| Some(Field::Number(&mut resilient(method)?.length_decrease)),
+        |method| match method {
+            Method::Resilient { length_decrease, .. } => Some(Field::Number(length_decrease)),
+            _ => None,
+        },
     ),
     Setting::new(
         "largest step length",
         LENGTH,
         "Largest step of a weight in one epoch (deltamax).",
-        |method| Some(Field::Number(&mut resilient(method)?.largest_length)),
+        |method| match method {
+            Method::Resilient { largest_length, .. } => Some(Field::Number(largest_length)),
+            _ => None,
+        },
     ),
     Setting::new(
         "learning rate",
         LENGTH,
         "Initial step length relative to the length of the gradient; it adapts from there.",
-        |method| Some(Field::Number(&mut adaptive(method)?.learning_rate)),
+        |method| match method {
+            Method::AdaptiveDescent { learning_rate, .. } => Some(Field::Number(learning_rate)),
+            _ => None,
+        },
     ),
     Setting::new(
         "learning rate",
         LENGTH,
         "Step length relative to the length of the gradient (alpha).",
-        |method| Some(Field::Number(&mut momentum(method)?.learning_rate)),
+        |method| match method {
+            Method::Momentum { learning_rate, .. } => Some(Field::Number(learning_rate)),
+            _ => None,
+        },
     ),
     Setting::new(
         "learning rate",
         LENGTH,
         "Step length relative to the length of the gradient.",
         |method| match method {
-            Method::GradientDescent { learning_rate } => Some(Field::Number(learning_rate)),
-            Method::StepMomentum(settings) => Some(Field::Number(&mut settings.learning_rate)),
+            Method::GradientDescent { learning_rate } | Method::StepMomentum { learning_rate, .. } => {
+                Some(Field::Number(learning_rate))
+            }
             _ => None,
         },
     ),
@@ -241,15 +266,19 @@ pub(super) static METHOD: &[Setting<Method>] = &[
         "momentum",
         Kind::Number(0.0, 1.0),
         "Share of the previous gradient in each step (eta), from 0 to 1.",
-        |method| Some(Field::Number(&mut momentum(method)?.momentum)),
+        |method| match method {
+            Method::Momentum { momentum, .. } => Some(Field::Number(momentum)),
+            _ => None,
+        },
     ),
     Setting::new(
         "momentum",
         Kind::Number(0.0, MAX_MOMENTUM),
         "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.",
         |method| match method {
-            Method::AdaptiveDescent(settings) => Some(Field::Number(&mut settings.momentum)),
-            Method::StepMomentum(settings) => Some(Field::Number(&mut settings.momentum)),
+            Method::AdaptiveDescent { momentum, .. } | Method::StepMomentum { momentum, .. } => {
+                Some(Field::Number(momentum))
+            }
             _ => None,
         },
     ),
@@ -257,19 +286,30 @@ pub(super) static METHOD: &[Setting<Method>] = &[
         "rate increase",
         GROWTH,
         "Factor on the learning rate after a step that lowers the error.",
-        |method| Some(Field::Number(&mut adaptive(method)?.rate_increase)),
+        |method| match method {
+            Method::AdaptiveDescent { rate_increase, .. } => Some(Field::Number(rate_increase)),
+            _ => None,
+        },
     ),
     Setting::new(
         "rate decrease",
         REDUCTION,
         "Factor on the learning rate after a rejected step.",
-        |method| Some(Field::Number(&mut adaptive(method)?.rate_decrease)),
+        |method| match method {
+            Method::AdaptiveDescent { rate_decrease, .. } => Some(Field::Number(rate_decrease)),
+            _ => None,
+        },
     ),
     Setting::new(
         "largest error increase",
         Kind::Number(1.0, 1e6),
         "A step that raises the error by more than this factor is rejected.",
-        |method| Some(Field::Number(&mut adaptive(method)?.largest_error_increase)),
+        |method| match method {
+            Method::AdaptiveDescent {
+                largest_error_increase, ..
+            } => Some(Field::Number(largest_error_increase)),
+            _ => None,
+        },
     ),
 ];
 
@@ -284,34 +324,6 @@ fn damping(method: &mut Method) -> Option<&mut Damping> {
 fn regularization(method: &mut Method) -> Option<&mut RegularizationSettings> {
     match method {
         Method::BayesianRegularization(settings) => Some(settings),
-        _ => None,
-    }
-}
-
-fn conjugate(method: &mut Method) -> Option<&mut ScaledConjugateGradientSettings> {
-    match method {
-        Method::ScaledConjugateGradient(settings) => Some(settings),
-        _ => None,
-    }
-}
-
-fn resilient(method: &mut Method) -> Option<&mut ResilientSettings> {
-    match method {
-        Method::Resilient(settings) => Some(settings),
-        _ => None,
-    }
-}
-
-fn adaptive(method: &mut Method) -> Option<&mut AdaptiveDescentSettings> {
-    match method {
-        Method::AdaptiveDescent(settings) => Some(settings),
-        _ => None,
-    }
-}
-
-fn momentum(method: &mut Method) -> Option<&mut MomentumSettings> {
-    match method {
-        Method::Momentum(settings) => Some(settings),
         _ => None,
     }
 }

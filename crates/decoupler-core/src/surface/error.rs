@@ -1,23 +1,3 @@
-use std::fmt;
-
-/// Axis of the invalid coordinates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Axis {
-    /// The x axis, in a lattice with one coordinate per row-wire.
-    X,
-    /// The y axis, in a lattice with one coordinate per node of a row.
-    Y,
-}
-
-impl fmt::Display for Axis {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(match self {
-            Self::X => "x",
-            Self::Y => "y",
-        })
-    }
-}
-
 /// Error in the coordinates of the nodes.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -25,14 +5,14 @@ pub enum SurfaceError {
     /// An axis has no coordinates.
     #[error("a surface needs at least one {axis} coordinate, and none was given")]
     NoNodes {
-        /// The empty axis.
-        axis: Axis,
+        /// The empty axis: x or y.
+        axis: &'static str,
     },
     /// A coordinate is NaN, infinite, or so large that distances would overflow.
     #[error("{axis} coordinate {index} is {value_mm:?} mm; nodes need finite coordinates within ±1e300 mm")]
     NotFinite {
-        /// Axis of the invalid coordinates.
-        axis: Axis,
+        /// Axis of the invalid coordinates: x or y.
+        axis: &'static str,
         /// Index in the given coordinates.
         index: usize,
         /// Value found, in millimetres.
@@ -42,8 +22,8 @@ pub enum SurfaceError {
     /// them.
     #[error("{axis} coordinates {first} and {second} coincide at {value_mm:?} mm; nodes need distinct positions")]
     Duplicate {
-        /// Axis of the invalid coordinates.
-        axis: Axis,
+        /// Axis of the invalid coordinates: x or y.
+        axis: &'static str,
         /// Index of the first in the given coordinates.
         first: usize,
         /// Index of the second.

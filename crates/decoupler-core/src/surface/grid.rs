@@ -2,7 +2,7 @@ use std::ops::RangeInclusive;
 
 use glam::DVec2;
 
-use super::error::{Axis, SurfaceError};
+use super::error::SurfaceError;
 
 /// A rectangular grid through the nodes of a lattice that extends half a pitch beyond them; for scattered nodes, a grid
 /// through the outermost of them.
@@ -149,7 +149,7 @@ const LARGEST_MM: f64 = 1e300;
 pub(super) const CLOSEST_RELATIVE: f64 = 1e-12;
 
 /// Checks that there are coordinates, all of them finite.
-pub(super) fn check_coordinates(axis: Axis, given_mm: &[f64]) -> Result<(), SurfaceError> {
+pub(super) fn check_coordinates(axis: &'static str, given_mm: &[f64]) -> Result<(), SurfaceError> {
     if given_mm.is_empty() {
         return Err(SurfaceError::NoNodes { axis });
     }
@@ -172,7 +172,7 @@ pub(super) struct SortedAxis {
 }
 
 impl SortedAxis {
-    pub(super) fn new(axis: Axis, given_mm: &[f64]) -> Result<Self, SurfaceError> {
+    pub(super) fn new(axis: &'static str, given_mm: &[f64]) -> Result<Self, SurfaceError> {
         check_coordinates(axis, given_mm)?;
         let mut order: Vec<usize> = (0..given_mm.len()).collect();
         order.sort_by(|&a, &b| given_mm[a].total_cmp(&given_mm[b]));

@@ -6,7 +6,7 @@ use std::{
 use glam::DVec2;
 
 use super::{
-    error::{Axis, SurfaceError},
+    error::SurfaceError,
     grid::{Grid, GridAxis, SortedAxis},
     spline::{Point, Weights},
 };
@@ -91,7 +91,7 @@ impl SurfaceMap {
     /// # Errors
     /// [`SurfaceError`] if an axis is empty, a coordinate is not finite, or two coordinates coincide.
     pub fn new(x_mm: &[f64], y_mm: &[f64]) -> Result<Self, SurfaceError> {
-        let lattice = [SortedAxis::new(Axis::X, x_mm)?, SortedAxis::new(Axis::Y, y_mm)?];
+        let lattice = [SortedAxis::new("x", x_mm)?, SortedAxis::new("y", y_mm)?];
         let nodes = x_mm.len() * y_mm.len();
         let is_line = x_mm.len() == 1 || y_mm.len() == 1;
         let mut grid = self::grid(&lattice, if is_line { GRID_POINTS } else { affordable(nodes) });

@@ -13,7 +13,7 @@ mod map;
 mod scattered;
 mod spline;
 
-pub use error::{Axis, SurfaceError};
+pub use error::SurfaceError;
 pub use grid::Grid;
 pub use lattice::Lattice;
 pub use map::{Interpolation, SurfaceMap};

@@ -6,7 +6,7 @@
 use glam::DVec2;
 
 use super::{
-    error::{Axis, SurfaceError},
+    error::SurfaceError,
     grid::{CLOSEST_RELATIVE, Grid, GridAxis, check_coordinates},
     map::{Interpolation, MAX_SPLINE_NODES, SurfaceMap, affordable},
     spline::{Point, Weights},
@@ -34,7 +34,7 @@ impl SurfaceMap {
                 most: MAX_SPLINE_NODES,
             });
         }
-        for (axis, place) in [(Axis::X, 0), (Axis::Y, 1)] {
+        for (axis, place) in [("x", 0), ("y", 1)] {
             check_coordinates(axis, &Vec::from_iter(places_mm.iter().map(|at| at[place])))?;
         }
         let places = Vec::from_iter(places_mm.iter().copied().map(DVec2::from));

@@ -8,7 +8,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{
-    EpochColumns, EpochRecord, Method, MethodState, Problem, SettingError, Stage, StopReason, StoppingRules, Trainer,
+    EpochRecord, ExampleSets, Method, MethodState, SettingError, Stage, StopReason, StoppingRules, Trainer,
     TrainingError, TrainingSettings, activations::Activations, trainer::Best,
 };
 use crate::network::{Mlp, Shape};
@@ -25,7 +25,8 @@ pub struct TrainerState {
     mse: f64,
     best_weights: Vec<f64>,
     best_epoch: usize,
-    history: EpochColumns,
+    #[serde(with = "super::epoch_columns")]
+    history: Vec<EpochRecord>,
     stages: Vec<Stage>,
     validation_failures: usize,
     stop_reason: Option<StopReason>,
@@ -44,7 +45,7 @@ impl TrainerState {
 
     /// Returns the records of all epochs so far.
     pub fn history(&self) -> &[EpochRecord] {
-        &self.history.0
+        &self.history
     }
 
     /// Checks everything that does not depend on the samples.
@@ -94,7 +95,7 @@ impl Trainer {
             mse: Activations::new(self.mlp.shape()).mse(&self.mlp, &self.problem.training),
             best_weights: self.best.mlp.weights().to_vec(),
             best_epoch: self.best.epoch,
-            history: EpochColumns(self.history.clone()),
+            history: self.history.clone(),
             stages: self.stages.clone(),
             validation_failures: self.validation_failures,
             stop_reason: self.stop_reason,
@@ -107,7 +108,7 @@ impl Trainer {
     ///
     /// # Errors
     /// If the state is damaged or belongs to other samples.
-    pub fn resume(state: TrainerState, problem: Problem) -> Result<Self, TrainingError> {
+    pub fn resume(state: TrainerState, problem: ExampleSets) -> Result<Self, TrainingError> {
         state.check()?;
         let (shape, training) = (state.shape, &problem.training);
         if (shape.inputs, shape.outputs) != (training.inputs(), training.outputs()) {
@@ -130,7 +131,7 @@ impl Trainer {
             return Err(TrainingError::Damaged("the state belongs to another method"));
         }
         algorithm.restore(state.method);
-        let best = state.history.0[state.best_epoch];
+        let best = state.history[state.best_epoch];
         let best_mse = best.validation_mse.unwrap_or(best.training_mse);
         Ok(Self {
             settings: state.settings,
@@ -141,7 +142,7 @@ impl Trainer {
                 mse: if best_mse.is_nan() { f64::INFINITY } else { best_mse },
             },
             mlp,
-            history: state.history.0,
+            history: state.history,
             stages: state.stages,
             validation_failures: state.validation_failures,
             stop_reason: state.stop_reason.filter(|reason| *reason != StopReason::Stopped),

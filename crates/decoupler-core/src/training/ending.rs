@@ -7,32 +7,22 @@ use serde::{Deserialize, Serialize};
 use super::{EpochRecord, Method, Trainer};
 use crate::text::counted;
 
-/// Defect of a training that has ended.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrainingDefect {
-    /// Epoch from which on the error stayed above its initial value, if the training diverged.
-    pub diverged_in: Option<usize>,
-    /// `true` if the best network is hardly better than the random start: [`TrainingDefect::MIN_GAIN`].
-    pub is_at_start: bool,
-    /// The problem and its remedy.
-    pub text: String,
-}
+/// Relative decrease of the selection error (validation error, or training error if nothing is held out) from the start at
+/// which the network counts as trained.
+const MIN_GAIN: f64 = 0.01;
 
-impl TrainingDefect {
-    /// Relative decrease of the selection error (validation error, or training error if nothing is held out) from the
-    /// start at which the network counts as trained.
-    pub const MIN_GAIN: f64 = 0.01;
-
-    /// Returns the defect of a training; `None` if it has no defect or has not ended.
-    pub fn of(trainer: &Trainer) -> Option<Self> {
-        let (reason, method) = (trainer.stop_reason()?, trainer.settings().method);
-        let start = trainer.history().first()?;
+impl Trainer {
+    /// Describes the defect of a training that has ended, with its remedy: it diverged, or its best network is hardly better
+    /// than the random start. `None` if it has no defect or has not ended.
+    pub fn defect(&self) -> Option<String> {
+        let (reason, method) = (self.stop_reason()?, self.settings().method);
+        let start = self.history().first()?;
         let start_mse = start.validation_mse.unwrap_or(start.training_mse);
-        let enough = (1.0 - Self::MIN_GAIN) * start_mse;
+        let enough = (1.0 - MIN_GAIN) * start_mse;
         // False if the start has no error, which nothing can improve; true if its error is NaN.
-        let is_at_start = start_mse != 0.0 && (trainer.best_mse() >= enough || enough.is_nan());
-        let diverged_in = diverged_in(trainer.history(), reason);
-        let (epochs, best_epoch) = (counted(trainer.latest().epoch, "epoch"), trainer.best_epoch());
+        let is_at_start = start_mse != 0.0 && (self.best_mse() >= enough || enough.is_nan());
+        let diverged_in = diverged_in(self.history(), reason);
+        let (epochs, best_epoch) = (counted(self.latest().epoch, "epoch"), self.best_epoch());
         let problem = match (diverged_in, is_at_start) {
             (Some(epoch), true) => {
                 format!("training diverged in epoch {epoch}, and the network is no better than its random start")
@@ -53,11 +43,7 @@ impl TrainingDefect {
             StopReason::Stopped if diverged_in.is_none() => "let it run longer".to_owned(),
             _ => method.remedy(),
         };
-        Some(Self {
-            diverged_in,
-            is_at_start,
-            text: format!("{problem}: {remedy}"),
-        })
+        Some(format!("{problem}: {remedy}"))
     }
 }
 

@@ -1,16 +1,27 @@
-//! File format of the history of a training, column by column.
+//! File format of the history of a training, for `#[serde(with)]`: columns of equal length, a third of the size of records,
+//! and the layout that plotting programs read.
 
 use std::num::ParseFloatError;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
 use super::EpochRecord;
 
-/// History of a training, stored as columns of equal length: a third of the size of records, and the layout that
-/// plotting programs read.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Columns", into = "Columns")]
-pub struct EpochColumns(pub Vec<EpochRecord>);
+/// Writes the records of all epochs, column by column.
+///
+/// # Errors
+/// If the serializer fails.
+pub fn serialize<S: Serializer>(records: &[EpochRecord], serializer: S) -> Result<S::Ok, S::Error> {
+    Columns::of(records).serialize(serializer)
+}
+
+/// Reads the records of all epochs.
+///
+/// # Errors
+/// If the deserializer fails, or the columns differ in length or lack an epoch.
+pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<EpochRecord>, D::Error> {
+    Columns::deserialize(deserializer)?.records().map_err(D::Error::custom)
+}
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -25,28 +36,25 @@ struct Columns {
     validation_failures: Vec<usize>,
 }
 
-impl From<EpochColumns> for Columns {
-    fn from(EpochColumns(records): EpochColumns) -> Self {
+impl Columns {
+    fn of(records: &[EpochRecord]) -> Self {
         fn column<T>(records: &[EpochRecord], value: impl Fn(&EpochRecord) -> T) -> Vec<T> {
             records.iter().map(value).collect()
         }
         Self {
-            epoch: column(&records, |record| record.epoch),
-            training_mse: column(&records, |record| Number(record.training_mse)),
-            validation_mse: column(&records, |record| record.validation_mse.map(Number)),
-            test_mse: column(&records, |record| record.test_mse.map(Number)),
-            gradient_norm: column(&records, |record| Number(record.gradient_norm)),
-            parameter: column(&records, |record| Number(record.parameter)),
-            effective_parameters: column(&records, |record| record.effective_parameters.map(Number)),
-            validation_failures: column(&records, |record| record.validation_failures),
+            epoch: column(records, |record| record.epoch),
+            training_mse: column(records, |record| Number(record.training_mse)),
+            validation_mse: column(records, |record| record.validation_mse.map(Number)),
+            test_mse: column(records, |record| record.test_mse.map(Number)),
+            gradient_norm: column(records, |record| Number(record.gradient_norm)),
+            parameter: column(records, |record| Number(record.parameter)),
+            effective_parameters: column(records, |record| record.effective_parameters.map(Number)),
+            validation_failures: column(records, |record| record.validation_failures),
         }
     }
-}
 
-impl TryFrom<Columns> for EpochColumns {
-    type Error = String;
-
-    fn try_from(columns: Columns) -> Result<Self, String> {
+    fn records(self) -> Result<Vec<EpochRecord>, String> {
+        let columns = self;
         let epochs = columns.epoch.len();
         let lengths = [
             ("training_mse", columns.training_mse.len()),
@@ -73,7 +81,7 @@ impl TryFrom<Columns> for EpochColumns {
             effective_parameters: columns.effective_parameters[epoch].map(|number| number.0),
             validation_failures: columns.validation_failures[epoch],
         };
-        Ok(Self((0..epochs).map(record).collect()))
+        Ok((0..epochs).map(record).collect())
     }
 }
 
@@ -127,10 +135,11 @@ mod tests {
             effective_parameters: Some(value),
             validation_failures: epoch,
         };
-        let history = EpochColumns(values.iter().enumerate().map(record).collect());
-        let text = serde_json::to_string(&history).unwrap();
-        let read: EpochColumns = serde_json::from_str(&text).unwrap();
-        for (read, value) in read.0.iter().zip(values) {
+        let history = Vec::from_iter(values.iter().enumerate().map(record));
+        let mut text = Vec::new();
+        serialize(&history, &mut serde_json::Serializer::new(&mut text)).unwrap();
+        let read = deserialize(&mut serde_json::Deserializer::from_slice(&text)).unwrap();
+        for (read, value) in read.iter().zip(values) {
             let numbers = [read.training_mse, read.gradient_norm, read.parameter];
             for number in numbers
                 .into_iter()
@@ -141,6 +150,6 @@ mod tests {
             }
             assert_eq!(read.test_mse, None);
         }
-        assert_eq!(read.0.len(), values.len());
+        assert_eq!(read.len(), values.len());
     }
 }

@@ -60,14 +60,14 @@ impl GradientDescent {
         let mut backpropagation = Backpropagation::new(mlp);
         let zeros = vec![0.0; mlp.weights().len()];
         let mut state = match method {
-            Method::Momentum(_) => MethodState::Momentum(zeros),
-            Method::StepMomentum(_) => MethodState::StepMomentum(zeros),
-            Method::AdaptiveDescent(settings) => MethodState::AdaptiveDescent(AdaptiveState {
-                learning_rate: settings.learning_rate,
+            Method::Momentum { .. } => MethodState::Momentum(zeros),
+            Method::StepMomentum { .. } => MethodState::StepMomentum(zeros),
+            Method::AdaptiveDescent { learning_rate, .. } => MethodState::AdaptiveDescent(AdaptiveState {
+                learning_rate,
                 step: zeros,
             }),
-            Method::Resilient(settings) => MethodState::Resilient {
-                lengths: vec![settings.first_length; zeros.len()],
+            Method::Resilient { first_length, .. } => MethodState::Resilient {
+                lengths: vec![first_length; zeros.len()],
                 previous_gradient: zeros,
             },
             _ => MethodState::GradientDescent,
@@ -95,21 +95,37 @@ impl GradientDescent {
             (Method::GradientDescent { learning_rate }, _) => {
                 weights.for_each(|(weight, slope)| *weight -= learning_rate * slope);
             }
-            (Method::Momentum(settings), MethodState::Momentum(previous)) => {
-                let (rate, momentum) = (settings.learning_rate, settings.momentum);
+            (
+                Method::Momentum {
+                    learning_rate: rate,
+                    momentum,
+                },
+                MethodState::Momentum(previous),
+            ) => {
                 for ((weight, slope), previous) in weights.zip(previous) {
                     *weight -= rate * ((1.0 - momentum) * slope + momentum * *previous);
                     *previous = *slope;
                 }
             }
-            (Method::StepMomentum(settings), MethodState::StepMomentum(previous)) => {
-                add_momentum(weights, previous, settings.learning_rate, settings.momentum);
+            (
+                Method::StepMomentum {
+                    learning_rate,
+                    momentum,
+                },
+                MethodState::StepMomentum(previous),
+            ) => {
+                add_momentum(weights, previous, learning_rate, momentum);
             }
-            (Method::AdaptiveDescent(settings), MethodState::AdaptiveDescent(state)) => {
-                add_momentum(weights, &mut state.step, state.learning_rate, settings.momentum);
+            (Method::AdaptiveDescent { momentum, .. }, MethodState::AdaptiveDescent(state)) => {
+                add_momentum(weights, &mut state.step, state.learning_rate, momentum);
             }
             (
-                Method::Resilient(settings),
+                Method::Resilient {
+                    length_increase,
+                    length_decrease,
+                    largest_length,
+                    ..
+                },
                 MethodState::Resilient {
                     previous_gradient,
                     lengths,
@@ -119,11 +135,11 @@ impl GradientDescent {
                 for ((weight, slope), (length, before)) in weights.zip(lengths) {
                     // Compares signs, since the product of two tiny slopes would be 0.
                     let factor = match (*slope > 0.0, *slope < 0.0, *before > 0.0, *before < 0.0) {
-                        (true, _, true, _) | (_, true, _, true) => settings.length_increase,
-                        (true, _, _, true) | (_, true, true, _) => settings.length_decrease,
+                        (true, _, true, _) | (_, true, _, true) => length_increase,
+                        (true, _, _, true) | (_, true, true, _) => length_decrease,
                         _ => 1.0,
                     };
-                    *length = (*length * factor).min(settings.largest_length);
+                    *length = (*length * factor).min(largest_length);
                     if *slope != 0.0 {
                         *weight -= length.copysign(*slope);
                     }
@@ -153,11 +169,19 @@ impl Algorithm for GradientDescent {
         self.candidate.weights_mut().copy_from_slice(mlp.weights());
         self.move_candidate();
         let then = self.backpropagation.evaluate(&self.candidate, examples);
-        if let (Method::AdaptiveDescent(settings), MethodState::AdaptiveDescent(state)) = (self.method, &mut self.state)
+        if let (
+            Method::AdaptiveDescent {
+                rate_increase,
+                rate_decrease,
+                largest_error_increase,
+                ..
+            },
+            MethodState::AdaptiveDescent(state),
+        ) = (self.method, &mut self.state)
         {
-            let bearable = then.mse <= settings.largest_error_increase * self.now.mse;
+            let bearable = then.mse <= largest_error_increase * self.now.mse;
             if !bearable || then.if_finite().is_err() {
-                state.learning_rate *= settings.rate_decrease;
+                state.learning_rate *= rate_decrease;
                 for (step, slope) in state.step.iter_mut().zip(&self.gradient) {
                     let next = -state.learning_rate * slope;
                     *step = if next.is_finite() { next } else { 0.0 };
@@ -165,7 +189,7 @@ impl Algorithm for GradientDescent {
                 return Ok(self.now);
             }
             if then.mse < self.now.mse {
-                state.learning_rate = (state.learning_rate * settings.rate_increase).min(MAX_RATE);
+                state.learning_rate = (state.learning_rate * rate_increase).min(MAX_RATE);
             }
         }
         std::mem::swap(mlp, &mut self.candidate);
@@ -179,8 +203,12 @@ impl Algorithm for GradientDescent {
         match (&self.state, self.method) {
             (MethodState::AdaptiveDescent(state), _) => state.learning_rate,
             (MethodState::Resilient { lengths, .. }, _) => lengths.iter().sum::<f64>() / lengths.len() as f64,
-            (_, Method::GradientDescent { learning_rate }) => learning_rate,
-            (_, Method::Momentum(settings) | Method::StepMomentum(settings)) => settings.learning_rate,
+            (
+                _,
+                Method::GradientDescent { learning_rate }
+                | Method::Momentum { learning_rate, .. }
+                | Method::StepMomentum { learning_rate, .. },
+            ) => learning_rate,
             _ => f64::NAN,
         }
     }
@@ -197,13 +225,20 @@ impl Algorithm for GradientDescent {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        settings::{AdaptiveDescentSettings, MomentumSettings},
-        training::examples::tests::{random_examples, random_mlp},
-    };
+    use crate::training::examples::tests::{random_examples, random_mlp};
 
     fn start(method: Method, mlp: &Mlp, examples: &Examples) -> (GradientDescent, Evaluation) {
         GradientDescent::new(method, mlp, examples)
+    }
+
+    fn adaptive(learning_rate: f64) -> Method {
+        Method::AdaptiveDescent {
+            learning_rate,
+            momentum: 0.9,
+            rate_increase: 1.05,
+            rate_decrease: 0.7,
+            largest_error_increase: 1.04,
+        }
     }
 
     #[test]
@@ -214,11 +249,11 @@ mod tests {
             backpropagation.evaluate(mlp, &examples);
             backpropagation.gradient
         };
-        let settings = MomentumSettings {
+        let of_gradients = Method::Momentum {
             learning_rate: 0.1,
             momentum: 0.7,
         };
-        let mut method = start(Method::Momentum(settings), &mlp, &examples).0;
+        let mut method = start(of_gradients, &mlp, &examples).0;
         let (start, g0) = (mlp.weights().to_vec(), gradient(&mlp));
         method.step(&mut mlp, &examples).unwrap();
         let (first, g1) = (mlp.weights().to_vec(), gradient(&mlp));
@@ -232,11 +267,7 @@ mod tests {
     #[test]
     fn a_rate_far_too_large_shrinks_until_steps_are_accepted_and_then_adapts() {
         let (mut mlp, examples) = (random_mlp(3, 4, 2, 1), random_examples(50, 3, 2, 2));
-        let settings = AdaptiveDescentSettings {
-            learning_rate: 1e12,
-            ..AdaptiveDescentSettings::default()
-        };
-        let (mut method, start) = start(Method::AdaptiveDescent(settings), &mlp, &examples);
+        let (mut method, start) = start(adaptive(1e12), &mlp, &examples);
         let before = mlp.clone();
         assert_eq!(method.step(&mut mlp, &examples), Ok(start));
         assert_eq!((&mlp, method.parameter()), (&before, 0.7e12));
@@ -251,11 +282,7 @@ mod tests {
     #[test]
     fn after_a_rejected_step_momentum_uses_the_gradient_at_the_reduced_rate() {
         let (mut mlp, examples) = (random_mlp(3, 4, 2, 1), random_examples(50, 3, 2, 2));
-        let settings = AdaptiveDescentSettings {
-            learning_rate: 1e3,
-            ..AdaptiveDescentSettings::default()
-        };
-        let (mut method, start) = start(Method::AdaptiveDescent(settings), &mlp, &examples);
+        let (mut method, start) = start(adaptive(1e3), &mlp, &examples);
         let gradient = method.gradient.clone();
         assert_eq!(method.step(&mut mlp, &examples), Ok(start), "the step is rejected");
         let MethodState::AdaptiveDescent(state) = method.state() else {

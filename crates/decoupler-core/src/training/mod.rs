@@ -7,7 +7,7 @@ mod activations;
 mod bayesian_regularization;
 mod checkpoint;
 mod ending;
-mod epoch_columns;
+pub mod epoch_columns;
 mod examples;
 mod gradient_descent;
 mod levenberg_marquardt;
@@ -19,14 +19,10 @@ mod scaled_conjugate_gradient;
 mod tests;
 mod trainer;
 
-pub use crate::settings::{
-    AdaptiveDescentSettings, Damping, Method, MomentumSettings, RegularizationSettings, ResilientSettings,
-    ScaledConjugateGradientSettings, SettingError, StoppingRules, TrainingSettings,
-};
+pub use crate::settings::{Damping, Method, RegularizationSettings, SettingError, StoppingRules, TrainingSettings};
 pub use checkpoint::TrainerState;
-pub use ending::{StopReason, TrainingDefect};
-pub use epoch_columns::EpochColumns;
+pub use ending::StopReason;
 pub use examples::Examples;
 use method::MethodState;
 use trainer::Evaluation;
-pub use trainer::{EpochRecord, Problem, Stage, Trainer, TrainingError, check_width};
+pub use trainer::{EpochRecord, ExampleSets, Stage, Trainer, TrainingError, check_width};

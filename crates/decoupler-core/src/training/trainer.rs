@@ -18,7 +18,7 @@ use crate::{
 
 /// Scaled training, validation and test sets.
 #[derive(Clone, Debug)]
-pub struct Problem {
+pub struct ExampleSets {
     /// Training set.
     pub training: Examples,
     /// Validation set, if one is held out: it decides which weights are best and when to stop.
@@ -109,7 +109,7 @@ pub fn check_width(
 /// A training in progress. It runs one epoch for each call of [`Self::step`], so pausing only means not calling `step`.
 pub struct Trainer {
     pub(super) settings: TrainingSettings,
-    pub(super) problem: Problem,
+    pub(super) problem: ExampleSets,
     pub(super) algorithm: Box<dyn Algorithm>,
     pub(super) mlp: Mlp,
     pub(super) best: Best,
@@ -138,7 +138,7 @@ impl Trainer {
     ///
     /// # Errors
     /// If a setting is out of range, or there is nothing to train.
-    pub fn new(start: Mlp, problem: Problem, settings: TrainingSettings) -> Result<Self, TrainingError> {
+    pub fn new(start: Mlp, problem: ExampleSets, settings: TrainingSettings) -> Result<Self, TrainingError> {
         settings.check()?;
         if start.shape().outputs == 0 {
             return Err(TrainingError::NothingVaries);

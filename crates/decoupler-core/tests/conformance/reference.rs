@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 
 use decoupler_core::{
-    dataset::MemoryState,
+    dataset::{MemoryStream, Series},
     decoupling::{Function, NodeId, Operation, Precision, Program},
 };
 
 /// States of the history of each node and row-wire.
-pub(crate) type States = HashMap<(usize, usize), MemoryState>;
+pub(crate) type States = HashMap<(usize, usize), MemoryStream>;
 
 /// Values of the output for the readings of a row-wire; `None` if a reading is not in its domain.
 pub(crate) fn answer(program: &Program, row: usize, readings: &[f64], states: &mut States) -> Option<Vec<f64>> {
@@ -100,11 +100,9 @@ pub(crate) fn answer(program: &Program, row: usize, readings: &[f64], states: &m
             }
             Operation::History { of: operand, memory } => {
                 let current = of(operand);
-                let new = || MemoryState::new(memory, current.len()).unwrap();
-                let mut features = vec![0.0; node.size];
-                let state = states.entry((index, row)).or_insert_with(new);
-                state.step(&current, None, &mut features);
-                features
+                let new = || MemoryStream::new(memory, current.len()).unwrap();
+                let stream = states.entry((index, row)).or_insert_with(new);
+                stream.step(Series::default(), &current, None).0.to_vec()
             }
             Operation::CountOutside { of: operand, low, high } => {
                 let limits = of(low).into_iter().zip(of(high));

@@ -1,6 +1,9 @@
 //! Scalings of readings and targets, and their inverses.
 
-use decoupler_core::network::{ChannelNoise, MinMax, Whitening};
+use decoupler_core::{
+    network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice},
+    scene::NoiseSource,
+};
 use ndarray::{Array2, Axis};
 use proptest::prelude::*;
 
@@ -80,8 +83,8 @@ proptest! {
         })
     ) {
         let channels = values.ncols();
-        let whitening = Whitening::fit(values.view(), &vec![0.0; channels], &ChannelNoise::none(channels), channels).unwrap();
-        let whitened = whitening.scale(values.view());
+        let choice = InputChoice { quantity: Quantity::Raw, scaling: ScalingChoice::Whitening };
+        let whitened = Inputs::fit(choice, values.view(), NoiseSource::default()).unwrap().of(values.view());
         prop_assert_eq!(whitened.ncols(), channels);
         let covariance = whitened.t().dot(&whitened) / values.nrows() as f64;
         for ((row, column), &value) in covariance.indexed_iter() {

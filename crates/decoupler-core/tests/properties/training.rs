@@ -2,7 +2,7 @@
 
 use decoupler_core::{
     network::{Mlp, Shape},
-    training::{Examples, Method, Problem, StoppingRules, Trainer, TrainingSettings},
+    training::{ExampleSets, Examples, Method, StoppingRules, Trainer, TrainingSettings},
 };
 use ndarray::{Array2, Axis};
 use proptest::prelude::*;
@@ -44,7 +44,7 @@ fn drawn() -> impl Strategy<Value = Drawn> {
 
 /// Weights after one epoch, and the error there.
 fn after_an_epoch(method: Method, drawn: &Drawn) -> (Vec<f64>, f64) {
-    let problem = Problem {
+    let problem = ExampleSets {
         training: Examples::new(drawn.inputs.view(), drawn.targets.view()),
         validation: None,
         test: None,

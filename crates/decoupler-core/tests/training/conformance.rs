@@ -5,7 +5,7 @@ use decoupler_core::{
     network::{Mlp, Shape},
     settings::Value,
     training::{
-        Examples, Method, Problem, RegularizationSettings, StoppingRules, Trainer, TrainerState, TrainingSettings,
+        ExampleSets, Examples, Method, RegularizationSettings, StoppingRules, Trainer, TrainerState, TrainingSettings,
     },
 };
 use ndarray::Array2;
@@ -99,7 +99,7 @@ fn every_method_learns_two_smooth_functions() {
 }
 
 /// A problem that is large enough to be divided among threads.
-fn large(method: Method, samples: usize) -> (Mlp, Problem, TrainingSettings) {
+fn large(method: Method, samples: usize) -> (Mlp, ExampleSets, TrainingSettings) {
     let shape = Shape {
         inputs: 40,
         hidden: 34,
@@ -107,7 +107,7 @@ fn large(method: Method, samples: usize) -> (Mlp, Problem, TrainingSettings) {
     };
     let columns = |count, first| Array2::from_shape_fn((samples, count), |(row, column)| wave(row, first + column));
     let (inputs, targets) = (columns(shape.inputs, 0), columns(shape.outputs, 100));
-    let problem = Problem {
+    let problem = ExampleSets {
         training: Examples::new(inputs.view(), targets.view()),
         validation: None,
         test: None,

@@ -5,7 +5,7 @@ use decoupler_core::{
     machine::{MemoryBudget, MemorySource},
     network::{Mlp, Shape},
     settings::Value,
-    training::{Examples, Method, Problem, StopReason, StoppingRules, Trainer, TrainingSettings, check_width},
+    training::{ExampleSets, Examples, Method, StopReason, StoppingRules, Trainer, TrainingSettings, check_width},
 };
 use ndarray::Array2;
 
@@ -16,8 +16,8 @@ fn named(name: &str) -> Method {
     method.expect("it is offered")
 }
 
-fn alone(training: Examples) -> Problem {
-    Problem {
+fn alone(training: Examples) -> ExampleSets {
+    ExampleSets {
         training,
         validation: None,
         test: None,

@@ -2,7 +2,7 @@
 
 use decoupler_core::{
     network::{Mlp, Shape},
-    training::{Examples, Method, Problem, StoppingRules, Trainer, TrainingSettings},
+    training::{ExampleSets, Examples, Method, StoppingRules, Trainer, TrainingSettings},
 };
 use ndarray::Array2;
 
@@ -30,8 +30,8 @@ fn examples(count: usize, first: usize) -> Examples {
     Examples::new(inputs.view(), targets.view())
 }
 
-pub(crate) fn problem() -> Problem {
-    Problem {
+pub(crate) fn problem() -> ExampleSets {
+    ExampleSets {
         training: examples(120, 0),
         validation: Some(examples(40, 1000)),
         test: Some(examples(30, 2000)),

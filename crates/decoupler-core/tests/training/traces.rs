@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use decoupler_core::{
     network::{Mlp, Shape},
     settings::Value,
-    training::{Examples, Method, Problem, StoppingRules, Trainer, TrainingSettings},
+    training::{ExampleSets, Examples, Method, StoppingRules, Trainer, TrainingSettings},
 };
 use ndarray::Array2;
 use serde::Deserialize;
@@ -45,7 +45,7 @@ impl Traces {
             hidden: self.hidden,
             outputs: training.outputs(),
         };
-        let problem = Problem {
+        let problem = ExampleSets {
             training,
             validation: None,
             test: None,

@@ -3,7 +3,7 @@
 use decoupler_core::{
     machine::{MemoryBudget, MemorySource},
     network::{Mlp, Shape},
-    training::{Examples, Method, Problem, StoppingRules, Trainer, TrainingError, TrainingSettings, check_width},
+    training::{ExampleSets, Examples, Method, StoppingRules, Trainer, TrainingError, TrainingSettings, check_width},
 };
 use ndarray::Array2;
 
@@ -22,9 +22,9 @@ fn samples(shape: Shape, count: usize) -> (Array2<f64>, Array2<f64>) {
     (inputs, targets)
 }
 
-fn problem(shape: Shape, count: usize) -> Problem {
+fn problem(shape: Shape, count: usize) -> ExampleSets {
     let (inputs, targets) = samples(shape, count);
-    Problem {
+    ExampleSets {
         training: Examples::new(inputs.view(), targets.view()),
         validation: None,
         test: None,

@@ -13,7 +13,7 @@ use decoupler_core::{
             AxisKind, CellResults, CellSummary, Experiment, ExperimentRecording, ExperimentResults, Figure, Trial,
         },
     },
-    network::HiddenSuggestions,
+    network::suggested_hidden,
     problem::Channel,
     text::counted,
 };
@@ -371,8 +371,7 @@ pub fn describe_conditions(experiment: &Experiment) -> String {
     let mut conditions = said.join(", ");
     if let Some(source) = simulation.filter(|_| experiment.axis.kind == AxisKind::Hidden) {
         let scale = source.sensor.scale;
-        let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
-        let (root, logarithm) = (suggested.square_root, suggested.logarithm);
+        let (root, logarithm) = suggested_hidden(scale.columns(), scale.coordinates_per_row());
         let (fewest, most) = (root.start(), root.end());
         conditions += &format!(". Eq. (12) suggests {fewest} to {most} hidden nodes, Eq. (13) {logarithm}");
     }

@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::Dataset,
     evaluation::{Run, StartRecord},
     sensor::ArrayScale,
-    training::{EpochColumns, EpochRecord, Stage, StopReason},
+    training::{EpochRecord, Stage, StopReason},
 };
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
@@ -170,7 +170,8 @@ struct Document {
     best_epoch: usize,
     epochs: usize,
     seconds: f64,
-    history: EpochColumns,
+    #[serde(with = "decoupler_core::training::epoch_columns")]
+    history: Vec<EpochRecord>,
     stages: Vec<Stage>,
     starts: Vec<StartRecord>,
 }
@@ -182,7 +183,7 @@ impl From<TrainingRecord> for Document {
             best_epoch: record.best_epoch,
             epochs: record.epochs(),
             seconds: record.seconds,
-            history: EpochColumns(record.history),
+            history: record.history,
             stages: record.stages,
             starts: record.starts,
         }
@@ -197,7 +198,7 @@ impl TryFrom<Document> for TrainingRecord {
             stop_reason: document.stop_reason,
             best_epoch: document.best_epoch,
             seconds: document.seconds,
-            history: document.history.0,
+            history: document.history,
             stages: document.stages,
             starts: document.starts,
         };

@@ -16,7 +16,7 @@ use decoupler_core::{
             Axis, AxisKind, CellResults, CellSummary, Experiment, ExperimentResults, Figure as Measured, Trial,
         },
     },
-    network::HiddenSuggestions,
+    network::suggested_hidden,
     text::format_percent,
 };
 
@@ -155,18 +155,15 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
     let mut plot = Plot::new(x, PlotAxis::linear(error_axis(results)).including([0.0, 1.0]), series);
     if let Some(problem) = results.problem.as_ref().filter(|_| is_number) {
         // The suggestions of Eq. (12) and (13).
-        let suggested = HiddenSuggestions::new(problem.feature_count(), problem.targets.len());
-        let (fewest, most) = (
-            *suggested.square_root.start() as f64,
-            *suggested.square_root.end() as f64,
-        );
+        let (root, logarithm) = suggested_hidden(problem.feature_count(), problem.targets.len());
+        let (fewest, most) = (*root.start() as f64, *root.end() as f64);
         let (hue, style) = (Hue::Orange, LineStyle::Solid);
         plot.spans.push(Span {
             name: "Eq. (12)".to_owned(),
             hue,
             range: fewest..=most,
         });
-        let at = LineAt::X(suggested.logarithm as f64);
+        let at = LineAt::X(logarithm as f64);
         plot.lines.push(ReferenceLine {
             label: Some("Eq. (13)".to_owned()),
             ..ReferenceLine::new("Eq. (13)", at, hue, style)

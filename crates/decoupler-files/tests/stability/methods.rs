@@ -3,7 +3,7 @@
 use decoupler_core::{
     network::{Mlp, Shape},
     settings::Value,
-    training::{Examples, Method, Problem, StopReason, StoppingRules, Trainer, TrainingDefect, TrainingSettings},
+    training::{ExampleSets, Examples, Method, StopReason, StoppingRules, Trainer, TrainingSettings},
 };
 use ndarray::{Array2, Axis, Slice};
 
@@ -68,7 +68,7 @@ impl Task {
         }
     }
 
-    fn problem(&self) -> Problem {
+    fn problem(&self) -> ExampleSets {
         let cut = self.training_samples();
         let examples = |rows: std::ops::Range<usize>| {
             let (inputs, targets) = (&self.inputs, &self.targets);
@@ -76,7 +76,7 @@ impl Task {
             Examples::new(at(inputs).view(), at(targets).view())
         };
         let samples = self.inputs.nrows();
-        Problem {
+        ExampleSets {
             training: examples(0..cut),
             validation: (cut < samples).then(|| examples(cut..samples)),
             test: None,
@@ -140,7 +140,7 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
         None => history.iter().map(deciding).fold(f64::INFINITY, f64::min),
     };
     let (best, start) = (task.deciding_mse(weights), task.deciding_mse(task.start().weights()));
-    let defect = TrainingDefect::of(&trainer);
+    let defect = trainer.defect();
     if best.is_finite() && !(agree(best, trainer.best_mse(), 1e-6) || (best - trainer.best_mse()).abs() < 1e-22) {
         return wrong(format!(
             "the error is {best:e}, the reported error is {:e}",
@@ -162,7 +162,7 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
         return wrong(format!("the reported reason for stopping does not hold: {reason}"));
     }
     match defect {
-        Some(defect) => flagged(&defect.text),
+        Some(defect) => flagged(&defect),
         None if start > 0.0 && best >= 0.99 * start => wrong(format!(
             "the network has its random initial weights, without a remark: {reason}"
         )),

@@ -7,8 +7,8 @@ use crate::window::test_view::Frame;
 use decoupler_core::{
     dataset::Simulation,
     identifiability::{Identifiability, IdentifiabilityError, RowPair},
-    scene::{RelativeNoise, RowModel, Scene, SceneError},
-    sensor::{SensorError, SensorModel},
+    scene::{RowModel, Scene, SceneError},
+    sensor::{RelativeNoise, SensorError, SensorModel},
     surface::{SurfaceError, SurfaceMap},
 };
 

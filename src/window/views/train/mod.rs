@@ -16,4 +16,5 @@ mod view;
 pub use charts_card::BottomTab;
 pub use decoders::DecoderResult;
 pub use exports::CHECKPOINT;
+pub use press::Touch;
 pub use view::TrainView;

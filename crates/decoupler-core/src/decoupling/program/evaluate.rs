@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, MemoryStream, PerRow, Series},
-    decoupling::{DecodeError, Decoder, NotDescribed, Precision},
+    decoupling::{DecodeError, Decoder, Precision},
 };
 
 /// Decoder that evaluates a [`Program`], many rows at a time and without allocation.
@@ -29,9 +29,9 @@ pub struct ProgramDecoder {
 #[derive(Clone, Debug)]
 struct Prepared {
     work: Work,
-    /// Distance between the values of consecutive rows: the size with padding, whose values are unspecified.
-    stride: usize,
-    /// Chunk × stride.
+    /// Number of values of a row.
+    size: usize,
+    /// Chunk × size, with room for the padding of the last row of a table.
     values: Vec<f64>,
 }
 
@@ -42,13 +42,16 @@ enum Work {
     Plain,
     /// The readings, or those that were checked.
     Readings,
-    Constants(PerRow<Vec<f64>>),
+    /// Constants for all row-wires, repeated for each row of a chunk.
+    Shared(Vec<f64>),
+    /// Constants of each row-wire, one after the other.
+    OfRow(Vec<f64>),
     /// Weights with biases, or points.
     Table(PerRow<Table>),
     Placement(PerRow<Placement>),
     /// A division whose dividend is the difference of these nodes.
     OfDifference(NodeId, NodeId),
-    /// Not at all: the only node that takes it does without.
+    /// Not at all: no node takes its values.
     Skipped,
     /// Scratch for the shares of a blend.
     Blend(Vec<f64>),
@@ -63,39 +66,41 @@ const CHUNK_VALUES: usize = 4096;
 impl ProgramDecoder {
     /// Prepares a program for evaluation.
     pub fn new(program: Program) -> Self {
-        let mut nodes: Vec<Prepared> = Vec::with_capacity(program.nodes().len());
-        for node in program.nodes() {
-            let work = Work::of(node, &program);
-            let stride = match (&work, &node.operation) {
-                (Work::Table(_), _) => node.size.next_multiple_of(LANES),
-                (_, Operation::Map(_, of) | Operation::Valid { of, .. }) => nodes[of.index()].stride,
-                _ => node.size,
+        let mut is_taken = vec![false; program.nodes().len()];
+        is_taken[program.output().index()] = true;
+        let mut works: Vec<Work> = program.nodes().iter().map(|node| Work::of(node, &program)).collect();
+        for (node, work) in program.nodes().iter().zip(&works) {
+            let values = match (&node.operation, work) {
+                (Operation::Affine { of, biases, .. }, Work::Placement(_)) => vec![*of, *biases],
+                (Operation::Affine { of, .. } | Operation::SquaredDistances { of, .. }, _) => vec![*of],
+                (Operation::Divide(_, divisor), Work::OfDifference(one, other)) => vec![*one, *other, *divisor],
+                (operation, _) => operation.operands(),
             };
-            nodes.push(Prepared {
+            values.iter().for_each(|id| is_taken[id.index()] = true);
+        }
+        for (work, _) in works.iter_mut().zip(&is_taken).filter(|(_, is_taken)| !**is_taken) {
+            *work = Work::Skipped;
+        }
+        let sizes = program.nodes().iter().zip(&is_taken);
+        let widest = sizes
+            .map(|(node, &is_taken)| if is_taken { node.size } else { 0 })
+            .max();
+        let chunk = (CHUNK_VALUES / widest.unwrap_or(0).max(1)).clamp(1, CHUNK_ROWS);
+        let prepared = |(work, node): (Work, &Node)| {
+            let length = chunk * node.size;
+            let (work, length) = match work {
+                Work::Readings | Work::Skipped => (work, 0),
+                Work::Shared(values) => (Work::Shared(values.repeat(chunk)), 0),
+                Work::Table(_) => (work, length + LANES),
+                _ => (work, length),
+            };
+            Prepared {
                 work,
-                stride,
-                values: Vec::new(),
-            });
-        }
-        // A relative change takes one pass over the readings, not two.
-        let differences =
-            nodes
-                .iter()
-                .zip(program.nodes())
-                .filter_map(|(prepared, node)| match (&prepared.work, &node.operation) {
-                    (Work::OfDifference(..), Operation::Divide(difference, _)) => Some(difference.index()),
-                    _ => None,
-                });
-        for difference in Vec::from_iter(differences) {
-            nodes[difference].work = Work::Skipped;
-        }
-        let widest = nodes.iter().map(|node| node.stride).max().unwrap_or(0);
-        let chunk = (CHUNK_VALUES / widest.max(1)).clamp(1, CHUNK_ROWS);
-        for node in &mut nodes {
-            if !matches!(node.work, Work::Readings | Work::Constants(_) | Work::Skipped) {
-                node.values = vec![0.0; chunk * node.stride];
+                size: node.size,
+                values: vec![0.0; length],
             }
-        }
+        };
+        let nodes = works.into_iter().zip(program.nodes()).map(prepared).collect();
         Self {
             program,
             nodes,
@@ -195,12 +200,10 @@ impl Decoder for ProgramDecoder {
         })
     }
 
-    fn program(&self) -> Result<Program, NotDescribed> {
+    fn program(&self) -> Option<Program> {
         let is_blend = |node: &Node| matches!(node.operation, Operation::Blend { .. });
-        if self.program.nodes().iter().any(is_blend) {
-            return Err(NotDescribed::Rules);
-        }
-        Ok(self.program.clone())
+        let has_rules = self.program.nodes().iter().any(is_blend);
+        (!has_rules).then(|| self.program.clone())
     }
 }
 
@@ -218,29 +221,30 @@ impl Work {
                     Precision::Double => value,
                     Precision::Single => f64::from(value as f32),
                 };
-                let of_row = |table: &Array2<f64>| table.iter().map(rounded).collect();
-                Self::Constants(PerRow::each(tables.iter().map(of_row).collect()))
+                let values = tables.iter().flatten().map(rounded).collect();
+                if tables.len() == 1 {
+                    Self::Shared(values)
+                } else {
+                    Self::OfRow(values)
+                }
             }
-            Operation::Affine { of, weights, biases } => {
-                let inputs = program.node(*of).size;
+            Operation::Affine { weights, biases, .. } => {
                 let (weights, biases) = (tables(weights), tables(biases));
                 let rows = weights.values().len().max(biases.values().len());
                 let rows = || (0..rows).map(|row| (weights.at(row), biases.at(row)));
-                let placements = rows().map(|(weights, biases)| Placement::new(weights, biases));
+                let placements = rows().map(|(weights, _)| Placement::new(weights));
                 match placements.collect() {
                     Some(placements) if node.precision == Precision::Double => {
                         Self::Placement(PerRow::each(placements))
                     }
                     _ => {
-                        let stacked =
-                            rows().map(|(weights, biases)| Table::new(node.precision, inputs, &[weights, biases]));
+                        let stacked = rows().map(|(weights, biases)| Table::of_affine(node.precision, weights, biases));
                         Self::Table(PerRow::each(stacked.collect()))
                     }
                 }
             }
-            Operation::SquaredDistances { of, points } => {
-                let inputs = program.node(*of).size;
-                Self::Table(tables(points).map(|points| Table::new(node.precision, inputs, &[points])))
+            Operation::SquaredDistances { points, .. } => {
+                Self::Table(tables(points).map(|points| Table::of_points(node.precision, points)))
             }
             Operation::Divide(dividend, _) => match program.node(*dividend) {
                 Node {
@@ -282,8 +286,10 @@ impl WithSimd for Evaluation<'_> {
         let (channels, outputs) = (decoder.channels(), decoder.outputs());
         for first in (0..row_indices.len()).step_by(decoder.chunk) {
             let end = row_indices.len().min(first + decoder.chunk);
+            let indices = &row_indices[first..end];
             let rows = Rows {
-                indices: &row_indices[first..end],
+                indices,
+                is_run: indices.windows(2).all(|pair| pair[1] == pair[0] + 1),
                 readings: &readings[first * channels..end * channels],
             };
             let targets = &mut targets[first * outputs..end * outputs];
@@ -299,28 +305,25 @@ impl WithSimd for Evaluation<'_> {
 struct Rows<'a> {
     /// Index of the row-wire of each.
     indices: &'a [usize],
+    /// Whether these are consecutive row-wires, as in a frame.
+    is_run: bool,
     /// Rows × channels.
     readings: &'a [f64],
 }
 
 impl Rows<'_> {
-    /// Values of all rows with the padding of each; `None` for constants.
+    /// Values of a node that was evaluated, rows × size.
     #[inline(always)]
-    fn block<'a>(&'a self, node: &'a Prepared) -> Option<&'a [f64]> {
-        match node.work {
-            Work::Readings => Some(self.readings),
-            Work::Constants(_) => None,
-            _ => Some(&node.values[..self.indices.len() * node.stride]),
-        }
-    }
-
-    /// Values of a row with padding.
-    #[inline(always)]
-    fn row<'a>(&'a self, node: &'a Prepared, row: usize) -> &'a [f64] {
+    fn values<'a>(&'a self, node: &'a Prepared) -> &'a [f64] {
+        let length = self.indices.len() * node.size;
         match &node.work {
-            Work::Constants(constants) => constants.at(self.indices[row]),
-            Work::Readings => &self.readings[row * node.stride..(row + 1) * node.stride],
-            _ => &node.values[row * node.stride..(row + 1) * node.stride],
+            Work::Readings => self.readings,
+            Work::Shared(constants) => &constants[..length],
+            Work::OfRow(constants) if self.is_run => {
+                let first = self.indices[0] * node.size;
+                &constants[first..first + length]
+            }
+            _ => &node.values[..length],
         }
     }
 }
@@ -332,129 +335,121 @@ impl ProgramDecoder {
             program, nodes, moment, ..
         } = self;
         let output = program.output().index();
-        let outputs = program.outputs();
+        // The last values are written where they are wanted, unless their padding would be too.
+        let is_padded = |node: &Prepared| matches!(node.work, Work::Table(_)) && !node.size.is_multiple_of(LANES);
+        let is_direct = !is_padded(&nodes[output]);
         for (index, node) in program.nodes().iter().enumerate() {
             let (before, rest) = nodes.split_at_mut(index);
-            let Prepared { work, stride, values } = &mut rest[0];
-            let (stride, precision) = (*stride, node.precision);
-            // The last values are written where they are wanted, unless they have padding.
-            let values = if index == output && stride == outputs {
+            let Prepared { work, size, values } = &mut rest[0];
+            let (size, precision) = (*size, node.precision);
+            let values = if index == output && is_direct {
                 &mut *targets
             } else {
                 &mut values[..]
             };
-            let operand = |id: NodeId| &before[id.index()];
-            let row = |id: NodeId, row: usize| rows.row(operand(id), row);
-            macro_rules! of_rows {
-                (|$row:ident, $results:ident| $body:expr) => {
-                    for $row in 0..rows.indices.len() {
-                        let $results = &mut values[$row * stride..($row + 1) * stride];
-                        $body
-                    }
-                };
-            }
+            let all = |id: NodeId| rows.values(&before[id.index()]);
+            let by_row = |id: NodeId| {
+                let (size, values) = (before[id.index()].size, all(id));
+                move |row: usize| &values[row * size..(row + 1) * size]
+            };
+            let of_rows = rows.indices.iter().copied().enumerate();
             match (&node.operation, work) {
-                (Operation::Readings | Operation::Select { .. }, _) | (_, Work::Skipped) => {}
-                (Operation::Valid { of, domain }, work) => {
-                    let block = rows.block(operand(*of)).expect("constants need no check");
-                    // Invalid readings are rare: one vectorised pass finds whether there may be any.
-                    if !block.iter().fold(true, |all, &value| all & domain.contains(value)) {
-                        for row_index in 0..rows.indices.len() {
-                            let values = &row(*of, row_index)[..node.size];
-                            if let Some(channel) = values.iter().position(|&value| !domain.contains(value)) {
-                                let value = values[channel];
-                                return Err(DecodeError {
-                                    row_index,
-                                    channel,
-                                    value,
-                                });
-                            }
+                (_, Work::Skipped | Work::Shared(_)) | (Operation::Readings, _) => {}
+                (_, Work::OfRow(constants)) => {
+                    if !rows.is_run {
+                        for (r, row_index) in of_rows {
+                            let constants = &constants[row_index * size..(row_index + 1) * size];
+                            values[r * size..(r + 1) * size].copy_from_slice(constants);
                         }
                     }
+                }
+                (Operation::Valid { of, domain }, work) => {
+                    let checked = all(*of);
+                    // Invalid readings are rare: one vectorised pass finds whether there may be any.
+                    if !checked.iter().fold(true, |all, &value| all & domain.contains(value))
+                        && let Some(place) = checked.iter().position(|&value| !domain.contains(value))
+                    {
+                        return Err(DecodeError {
+                            row_index: place / size,
+                            channel: place % size,
+                            value: checked[place],
+                        });
+                    }
                     if !matches!(work, Work::Readings) {
-                        values[..block.len()].copy_from_slice(block);
+                        values[..checked.len()].copy_from_slice(checked);
                     }
                 }
-                (Operation::Subtract(one, other), _) => {
-                    of_rows!(|r, results| kernel::subtract(precision, row(*one, r), row(*other, r), results));
-                }
+                (Operation::Subtract(one, other), _) => kernel::subtract(precision, all(*one), all(*other), values),
                 (Operation::Divide(_, divisor), Work::OfDifference(one, other)) => {
-                    of_rows!(|r, results| {
-                        let operands = [row(*one, r), row(*other, r), row(*divisor, r)];
-                        kernel::subtract_and_divide(precision, operands, results);
-                    });
+                    kernel::subtract_and_divide(precision, [all(*one), all(*other), all(*divisor)], values);
                 }
-                (Operation::Divide(one, other), _) => {
-                    of_rows!(|r, results| kernel::divide(precision, row(*one, r), row(*other, r), results));
-                }
-                (Operation::Map(function, of), _) => match rows.block(operand(*of)) {
-                    Some(block) => kernel::map(precision, *function, block, values),
-                    None => of_rows!(|r, results| kernel::map(precision, *function, row(*of, r), results)),
-                },
-                (Operation::Affine { of, .. }, Work::Placement(placements)) => {
-                    of_rows!(|r, results| placements.at(rows.indices[r]).apply(row(*of, r), results));
+                (Operation::Divide(one, other), _) => kernel::divide(precision, all(*one), all(*other), values),
+                (Operation::Map(function, of), _) => kernel::map(precision, *function, all(*of), values),
+                (Operation::Affine { of, biases, .. }, Work::Placement(placements)) => {
+                    let (of, biases) = (by_row(*of), all(*biases));
+                    values[..biases.len()].copy_from_slice(biases);
+                    for (r, row_index) in of_rows {
+                        placements
+                            .at(row_index)
+                            .add(of(r), &mut values[r * size..(r + 1) * size]);
+                    }
                 }
                 (Operation::Affine { of, .. }, Work::Table(tables)) => {
-                    let inputs = program.node(*of).size;
-                    of_rows!(|r, results| tables.at_mut(rows.indices[r]).affine(&row(*of, r)[..inputs], results));
+                    let of = by_row(*of);
+                    for (r, row_index) in of_rows {
+                        tables.at_mut(row_index).affine(of(r), &mut values[r * size..]);
+                    }
                 }
                 (Operation::SquaredDistances { of, .. }, Work::Table(tables)) => {
-                    let inputs = program.node(*of).size;
-                    of_rows!(|r, results| {
-                        let points = tables.at_mut(rows.indices[r]);
-                        points.squared_distances(&row(*of, r)[..inputs], results);
-                    });
-                }
-                (Operation::Clip { of, low, high }, _) => of_rows!(|r, results| {
-                    let limits = row(*low, r).iter().zip(row(*high, r));
-                    for ((result, &value), (&low, &high)) in results.iter_mut().zip(row(*of, r)).zip(limits) {
-                        // Written so that NaN passes through.
-                        let above = if value < low { low } else { value };
-                        let clipped = if above > high { high } else { above };
-                        *result = match precision {
-                            Precision::Double => clipped,
-                            Precision::Single => f64::from(clipped as f32),
-                        };
+                    let of = by_row(*of);
+                    for (r, row_index) in of_rows {
+                        tables
+                            .at_mut(row_index)
+                            .squared_distances(of(r), &mut values[r * size..]);
                     }
-                }),
-                (Operation::Concatenate(parts), _) => of_rows!(|r, results| {
+                }
+                (Operation::Clip { of, low, high }, _) => {
+                    kernel::clip(precision, all(*of), [all(*low), all(*high)], values);
+                }
+                (Operation::Concatenate(parts), _) => {
                     let mut first = 0;
                     for part in parts {
-                        let size = program.node(*part).size;
-                        results[first..first + size].copy_from_slice(&row(*part, r)[..size]);
-                        first += size;
+                        let (part, of) = (before[part.index()].size, by_row(*part));
+                        for (r, _) in of_rows.clone() {
+                            values[r * size + first..r * size + first + part].copy_from_slice(of(r));
+                        }
+                        first += part;
                     }
-                }),
+                }
                 (Operation::Blend { logits, of }, Work::Blend(shares)) => {
-                    let count = shares.len();
-                    of_rows!(|r, results| kernel::blend(&row(*logits, r)[..count], row(*of, r), shares, results));
+                    let (logits, of) = (by_row(*logits), by_row(*of));
+                    for (r, _) in of_rows {
+                        kernel::blend(logits(r), of(r), shares, &mut values[r * size..(r + 1) * size]);
+                    }
                 }
                 (Operation::History { of, .. }, Work::History(stream)) => {
-                    let channels = program.node(*of).size;
-                    let (group, time_s) = *moment;
-                    of_rows!(|r, results| {
-                        let series = Series {
-                            group,
-                            row_wire: rows.indices[r],
-                        };
-                        results.copy_from_slice(stream.step(series, &row(*of, r)[..channels], time_s).0);
-                    });
+                    let ((group, time_s), of) = (*moment, by_row(*of));
+                    for (r, row_wire) in of_rows {
+                        let (past, _) = stream.step(Series { group, row_wire }, of(r), time_s);
+                        values[r * size..(r + 1) * size].copy_from_slice(past);
+                    }
                 }
-                (Operation::CountOutside { of, low, high }, _) => of_rows!(|r, results| {
-                    let limits = row(*low, r).iter().zip(row(*high, r));
-                    let outside = limits
-                        .zip(row(*of, r))
-                        .filter(|((low, high), value)| !(*low..=*high).contains(value));
-                    results[0] = outside.count() as f64;
-                }),
+                (Operation::CountOutside { of, low, high }, _) => {
+                    let [of, low, high] = [of, low, high].map(|id| by_row(*id));
+                    for (r, _) in of_rows {
+                        let limits = low(r).iter().zip(high(r));
+                        let outside = limits
+                            .zip(of(r))
+                            .filter(|((low, high), value)| !(*low..=*high).contains(value));
+                        values[r] = outside.count() as f64;
+                    }
+                }
                 _ => unreachable!("every operation is prepared as such"),
             }
         }
         let last = &nodes[output];
-        if last.stride != outputs || matches!(last.work, Work::Readings | Work::Constants(_)) {
-            for row in 0..rows.indices.len() {
-                targets[row * outputs..(row + 1) * outputs].copy_from_slice(&rows.row(last, row)[..outputs]);
-            }
+        if !is_direct || matches!(last.work, Work::Readings | Work::Shared(_) | Work::OfRow(_)) {
+            targets.copy_from_slice(rows.values(last));
         }
         Ok(())
     }

@@ -125,6 +125,20 @@ pub(super) fn subtract_and_divide(precision: Precision, [one, other, divisor]: [
     }
 }
 
+/// Writes the nearest values within limits; NaN passes through.
+#[inline(always)]
+pub(super) fn clip(precision: Precision, values: &[f64], [low, high]: [&[f64]; 2], results: &mut [f64]) {
+    let limits = low.iter().zip(high);
+    for ((result, &value), (&low, &high)) in results.iter_mut().zip(values).zip(limits) {
+        let above = if value < low { low } else { value };
+        let clipped = if above > high { high } else { above };
+        *result = match precision {
+            Precision::Double => clipped,
+            Precision::Single => f64::from(clipped as f32),
+        };
+    }
+}
+
 #[inline(always)]
 fn pairs<T: Real>(one: &[f64], other: &[f64], results: &mut [f64], function: impl Fn(T, T) -> T) {
     for ((result, &one), &other) in results.iter_mut().zip(one).zip(other) {
@@ -144,68 +158,102 @@ pub(super) enum Table {
 }
 
 impl Table {
-    /// Lays out tables one after the other, for this number of values.
-    pub(super) fn new(precision: Precision, values: usize, tables: &[&Array2<f64>]) -> Self {
+    /// Lays out tables one after the other.
+    fn new(precision: Precision, tables: &[&Array2<f64>], panels: &[usize]) -> Self {
         match precision {
-            Precision::Double => Self::Double(Padded::new(tables)),
-            Precision::Single => Self::Single {
-                table: Padded::new(tables),
-                rounded: vec![0.0; values],
-            },
+            Precision::Double => Self::Double(Padded::new(tables, panels)),
+            Precision::Single => {
+                let table = Padded::new(tables, panels);
+                let rounded = vec![0.0; table.rows];
+                Self::Single { table, rounded }
+            }
         }
     }
 
-    /// Writes [values, 1] · table with padding: an affine map whose biases are the last row.
+    /// An affine map with weights (inputs × outputs) and biases (1 × outputs).
+    pub(super) fn of_affine(precision: Precision, weights: &Array2<f64>, biases: &Array2<f64>) -> Self {
+        Self::new(precision, &[weights, biases], &SUMS)
+    }
+
+    /// Points (inputs × points).
+    pub(super) fn of_points(precision: Precision, points: &Array2<f64>) -> Self {
+        Self::new(precision, &[points], &DISTANCES)
+    }
+
+    /// Writes values · weights + biases with padding.
     #[inline(always)]
     pub(super) fn affine(&mut self, values: &[f64], results: &mut [f64]) {
         match self {
             Self::Double(table) => table.affine(values, results),
             Self::Single { table, rounded } => {
-                round(values, rounded);
-                table.affine(rounded, results);
+                table.affine(round(values, rounded), results);
             }
         }
     }
 
-    /// Writes the squared distances of the values from each column, with padding.
+    /// Writes the squared distances of the values from each point, with padding.
     #[inline(always)]
     pub(super) fn squared_distances(&mut self, values: &[f64], results: &mut [f64]) {
         match self {
             Self::Double(table) => table.squared_distances(values, results),
             Self::Single { table, rounded } => {
-                round(values, rounded);
-                table.squared_distances(rounded, results);
+                table.squared_distances(round(values, rounded), results);
             }
         }
     }
 }
 
 #[inline(always)]
-fn round(values: &[f64], rounded: &mut [f32]) {
+fn round<'a>(values: &[f64], rounded: &'a mut [f32]) -> &'a [f32] {
+    let rounded = &mut rounded[..values.len()];
     for (rounded, &value) in rounded.iter_mut().zip(values) {
         *rounded = value as f32;
     }
+    rounded
 }
 
 /// The number of columns of a table is padded to a multiple of this.
 pub(super) const LANES: usize = 4;
 
-/// A table with its columns padded to whole vector registers.
+/// A table whose columns are padded to whole vector registers and divided into panels that are summed in registers.
 #[derive(Clone, Debug)]
 pub(super) struct Padded<T> {
+    rows: usize,
     width: usize,
+    /// Panel by panel, each rows × its width.
     values: Vec<T>,
 }
 
+/// Widths of the panels of an affine map: the first that fits, or the last.
+const SUMS: [usize; 4] = [16, 12, 8, LANES];
+/// Widths of the panels of points.
+const DISTANCES: [usize; 3] = [32, 16, LANES];
+
 impl<T: Real> Padded<T> {
-    fn new(tables: &[&Array2<f64>]) -> Self {
+    fn new(tables: &[&Array2<f64>], panels: &[usize]) -> Self {
         let width = tables[0].ncols().next_multiple_of(LANES);
-        let mut values = Vec::new();
-        for row in tables.iter().flat_map(|table| table.rows()) {
-            values.extend(row.iter().map(|&value| T::of(value)));
-            values.resize(values.len().next_multiple_of(width.max(1)), T::ZERO);
+        let rows = Vec::from_iter(tables.iter().flat_map(|table| table.rows()));
+        let mut values = Vec::with_capacity(rows.len() * width);
+        let mut first = 0;
+        while first < width {
+            let fitting = panels.iter().find(|&&panel| panel <= width - first);
+            let end = first + fitting.copied().unwrap_or(LANES);
+            for row in &rows {
+                values.extend((first..end).map(|column| row.get(column).map_or(T::ZERO, |&value| T::of(value))));
+            }
+            first = end;
         }
-        Self { width, values }
+        Self {
+            rows: rows.len(),
+            width,
+            values,
+        }
+    }
+
+    /// The rows of the panel with the columns `first..first + B`.
+    #[inline(always)]
+    fn panel<const B: usize>(&self, first: usize) -> &[[T; B]] {
+        self.values[first * self.rows..(first + B) * self.rows].as_chunks().0
     }
 
     #[inline(always)]
@@ -225,26 +273,26 @@ impl<T: Real> Padded<T> {
     /// additions.
     #[inline(always)]
     fn sums<const B: usize>(&self, values: &[T], first: usize, results: &mut [f64]) -> usize {
-        let mut even = *self.columns::<B>(values.len(), first);
-        let mut odd = [T::ZERO; B];
-        let mut pairs = values.chunks_exact(2);
-        let mut row = 0;
-        for pair in &mut pairs {
-            let (of_even, of_odd) = (self.columns::<B>(row, first), self.columns::<B>(row + 1, first));
+        let (biases, weights) = self
+            .panel::<B>(first)
+            .split_last()
+            .expect("the biases are the last row");
+        let (mut even, mut odd) = (*biases, [T::ZERO; B]);
+        let (pairs, last) = values.as_chunks::<2>();
+        let (of_pairs, of_last) = weights.as_chunks::<2>();
+        for (pair, [of_even, of_odd]) in pairs.iter().zip(of_pairs) {
             for lane in 0..B {
                 even[lane] = even[lane] + pair[0] * of_even[lane];
                 odd[lane] = odd[lane] + pair[1] * of_odd[lane];
             }
-            row += 2;
         }
-        if let [value] = *pairs.remainder() {
-            let of_even = self.columns::<B>(row, first);
+        if let ([value], [of_even]) = (last, of_last) {
             for lane in 0..B {
-                even[lane] = even[lane] + value * of_even[lane];
+                even[lane] = even[lane] + *value * of_even[lane];
             }
         }
-        for lane in 0..B {
-            results[first + lane] = (even[lane] + odd[lane]).to_f64();
+        for (lane, result) in results[first..first + B].iter_mut().enumerate() {
+            *result = (even[lane] + odd[lane]).to_f64();
         }
         B
     }
@@ -265,55 +313,49 @@ impl<T: Real> Padded<T> {
     #[inline(always)]
     fn distances<const B: usize>(&self, values: &[T], first: usize, results: &mut [f64]) -> usize {
         let mut squares = [T::ZERO; B];
-        for (row, &value) in values.iter().enumerate() {
-            let points = self.columns::<B>(row, first);
+        for (&value, points) in values.iter().zip(self.panel::<B>(first)) {
             for lane in 0..B {
                 let apart = value - points[lane];
                 squares[lane] = squares[lane] + apart * apart;
             }
         }
-        for lane in 0..B {
-            results[first + lane] = squares[lane].to_f64();
+        for (lane, result) in results[first..first + B].iter_mut().enumerate() {
+            *result = squares[lane].to_f64();
         }
         B
     }
-
-    #[inline(always)]
-    fn columns<const B: usize>(&self, row: usize, first: usize) -> &[T; B] {
-        let begin = row * self.width + first;
-        self.values[begin..begin + B].try_into().expect("B long")
-    }
 }
 
-/// An affine map in which each output depends on at most one value: it restores the units and places of targets.
+/// Weights of which at most one per output is not 0: they restore the units and places of targets.
 #[derive(Clone, Debug)]
-pub(super) struct Placement {
-    biases: Vec<f64>,
-    /// Value, output and weight.
-    terms: Vec<(usize, usize, f64)>,
+pub(super) struct Placement(Vec<Term>);
+
+/// A product that is added to an output.
+#[derive(Clone, Copy, Debug)]
+struct Term {
+    weight: f64,
+    value: usize,
+    output: usize,
 }
 
 impl Placement {
     /// `None` if an output depends on several values.
-    pub(super) fn new(weights: &Array2<f64>, biases: &Array2<f64>) -> Option<Self> {
+    pub(super) fn new(weights: &Array2<f64>) -> Option<Self> {
         let mut terms = Vec::new();
         for (output, column) in weights.columns().into_iter().enumerate() {
             let mut all = column.indexed_iter().filter(|(_, weight)| **weight != 0.0);
-            terms.extend(all.next().map(|(value, &weight)| (value, output, weight)));
+            terms.extend(all.next().map(|(value, &weight)| Term { weight, value, output }));
             if all.next().is_some() {
                 return None;
             }
         }
-        Some(Self {
-            biases: biases.iter().copied().collect(),
-            terms,
-        })
+        Some(Self(terms))
     }
 
+    /// Adds the products to the biases.
     #[inline(always)]
-    pub(super) fn apply(&self, values: &[f64], results: &mut [f64]) {
-        results.copy_from_slice(&self.biases);
-        for &(value, output, weight) in &self.terms {
+    pub(super) fn add(&self, values: &[f64], results: &mut [f64]) {
+        for &Term { weight, value, output } in &self.0 {
             results[output] += weight * values[value];
         }
     }

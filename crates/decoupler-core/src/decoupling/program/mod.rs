@@ -121,7 +121,7 @@ pub enum Operation {
     /// Current values with their past: see [`Memory`] for the features and their order.
     ///
     /// The only operation with a state, one for each group and row-wire.
-    /// [`Continuation`](crate::dataset::Continuation) decides which state a row continues and where it restarts.
+    /// [`MemoryStream`](crate::dataset::MemoryStream) decides which state a row continues and where it restarts.
     History {
         /// Current values.
         of: NodeId,

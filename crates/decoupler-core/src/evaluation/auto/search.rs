@@ -18,7 +18,7 @@ use crate::{
     network::{InputChoice, InputScaling, Inputs, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
     scene::NoiseSource,
     text::format_percent,
-    training::{Damping, Method, RegularizationSettings, ScaledConjugateGradientSettings, TrainingError},
+    training::{Damping, Method, RegularizationSettings, TrainingError},
 };
 
 /// Largest number of networks whose mean is taken.
@@ -468,7 +468,7 @@ impl Search<'_> {
             Err(error) => return Err(error),
         };
         let (max_epochs, patience) = match settings.training.method {
-            Method::ScaledConjugateGradient(_) => SHORT_EPOCHS,
+            Method::ScaledConjugateGradient { .. } => SHORT_EPOCHS,
             _ => EPOCHS,
         };
         let max_epochs = match needed {
@@ -613,10 +613,7 @@ impl Search<'_> {
 
     /// The scaled conjugate gradient with this weight decay for each sample.
     fn decaying(&self, decay: f64) -> Method {
-        Method::ScaledConjugateGradient(ScaledConjugateGradientSettings {
-            decay: decay * self.samples.set.samples() as f64,
-            ..ScaledConjugateGradientSettings::default()
-        })
+        Method::scaled_conjugate_gradient(decay * self.samples.set.samples() as f64)
     }
 
     /// Cross-validates the best network again as the mean of as many networks as the budget allows.

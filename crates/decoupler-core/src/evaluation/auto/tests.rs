@@ -411,10 +411,10 @@ fn many_inputs_for_few_samples_get_weight_decay() {
         &mut |_| (),
     )
     .unwrap();
-    let Method::ScaledConjugateGradient(settings) = choice.settings.training.method else {
+    let Method::ScaledConjugateGradient { decay, .. } = choice.settings.training.method else {
         panic!("{:?}", choice.record);
     };
-    assert!(settings.decay > 0.0);
+    assert!(decay > 0.0);
     let ridge = choice
         .record
         .tried

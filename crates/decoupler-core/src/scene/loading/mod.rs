@@ -4,9 +4,8 @@ mod indenter;
 mod press;
 mod sampler;
 
-pub use indenter::{Indenter, IndenterShape, Print, Span, Touch};
-pub use press::Contact;
-pub use sampler::DeformationSampler;
+pub use indenter::{Indenter, IndenterShape, Radii};
+pub(crate) use sampler::DeformationSampler;
 
 use std::{fmt, str::FromStr};
 

@@ -11,23 +11,6 @@ pub(super) enum Body {
     Edge,
 }
 
-/// Part of the surface that touches an upright indenter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Contact {
-    /// A disc around the centre, under a ball or a punch.
-    Disc {
-        /// Radius.
-        radius_mm: f64,
-    },
-    /// A strip along y, symmetric about the centre, under a cylinder.
-    Strip {
-        /// Half the width.
-        half_width_mm: f64,
-    },
-    /// The half-plane to the left of the line through the centre along y, under a block.
-    HalfPlane,
-}
-
 /// One press of an indenter, prepared for evaluation at many nodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Press {
@@ -96,16 +79,12 @@ impl Press {
         }
     }
 
-    /// The part of the surface that touches the body if it is upright.
-    pub(super) fn contact(&self) -> Contact {
+    /// Half the width of the contact of the upright body; see [`Indenter::contact_half_width_mm`](super::Indenter).
+    pub(super) fn contact_half_width_mm(&self) -> f64 {
         match self.body {
-            Body::Sphere(_) | Body::FlatPunch(_) => Contact::Disc {
-                radius_mm: self.contact.radius_mm,
-            },
-            Body::Cylinder(radius_mm) => Contact::Strip {
-                half_width_mm: self.half_width_mm(self.depth_mm, radius_mm),
-            },
-            Body::Edge => Contact::HalfPlane,
+            Body::Sphere(_) | Body::FlatPunch(_) => self.contact.radius_mm,
+            Body::Cylinder(radius_mm) => self.half_width_mm(self.depth_mm, radius_mm),
+            Body::Edge => f64::INFINITY,
         }
     }
 

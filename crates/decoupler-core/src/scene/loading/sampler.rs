@@ -11,7 +11,7 @@ use crate::{
 
 /// Draws deformations of one array in one scene; common quantities are computed once.
 #[derive(Clone, Debug)]
-pub struct DeformationSampler {
+pub(crate) struct DeformationSampler {
     model: SensorModel,
     scene: Scene,
     /// The field of a smooth loading.

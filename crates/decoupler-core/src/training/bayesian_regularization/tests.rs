@@ -5,7 +5,7 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use super::*;
 use crate::{
     network::{Shape, nguyen_widrow},
-    training::{Method, Problem, StoppingRules, Trainer, TrainingSettings, normal_equations::tests::dense},
+    training::{ExampleSets, Method, StoppingRules, Trainer, TrainingSettings, normal_equations::tests::dense},
 };
 
 /// Returns the effective number of parameters after 60 epochs on a curve with autoregressive noise.
@@ -22,7 +22,7 @@ fn effective_parameters(memory: f64, correlation_epoch: f64) -> f64 {
         hidden: 10,
         outputs: 1,
     };
-    let problem = Problem {
+    let problem = ExampleSets {
         training: Examples::new(inputs.view(), targets.view()),
         validation: None,
         test: None,
@@ -72,7 +72,7 @@ fn without_validation_the_latest_weights_are_the_best() {
                 ..StoppingRules::default()
             },
         };
-        let problem = Problem {
+        let problem = ExampleSets {
             training: Examples::new(inputs.view(), targets.view()),
             validation: None,
             test: None,
@@ -102,15 +102,15 @@ fn good_and_bad_targets(samples: usize, seed: u64) -> (Array2<f64>, Array2<f64>)
     (inputs, targets)
 }
 
-fn problem(inputs: &Array2<f64>, targets: ArrayView2<'_, f64>) -> Problem {
-    Problem {
+fn problem(inputs: &Array2<f64>, targets: ArrayView2<'_, f64>) -> ExampleSets {
+    ExampleSets {
         training: Examples::new(inputs.view(), targets),
         validation: None,
         test: None,
     }
 }
 
-fn trained(problem: Problem, hidden: usize, settings: RegularizationSettings, epochs: usize) -> Trainer {
+fn trained(problem: ExampleSets, hidden: usize, settings: RegularizationSettings, epochs: usize) -> Trainer {
     let shape = Shape {
         inputs: problem.training.inputs(),
         hidden,

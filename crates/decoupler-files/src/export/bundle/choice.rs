@@ -3,7 +3,7 @@
 use std::{fmt, str::FromStr};
 
 use decoupler_core::{
-    decoupling::{DecoderKind, NotDescribed, Precision},
+    decoupling::{DecoderKind, Precision},
     text::{Named, UnknownName},
 };
 use thiserror::Error;
@@ -51,7 +51,7 @@ pub enum ChoiceError {
         /// The decoder.
         decoder: BundleDecoder,
         /// The cause.
-        reason: NotDescribed,
+        reason: &'static str,
     },
     /// A precision that a format does not have.
     #[error("{format} has no precision {precision}: give {}", .format.precision_names())]
@@ -62,6 +62,12 @@ pub enum ChoiceError {
         precision: BundlePrecision,
     },
 }
+
+/// Why a decoder that solves equations is not exported.
+pub(super) const EQUATIONS: &str =
+    "it solves the equations of the sensor, which bundles do not contain: export a network or ridge instead";
+/// Why fuzzy rules are not exported.
+pub(super) const RULES: &str = "it is only for comparison: export another decoder instead, such as rbf or ridge";
 
 impl BundleFormat {
     /// All formats.
@@ -209,8 +215,8 @@ impl BundleDecoder {
     /// They cannot.
     pub fn check(self) -> Result<(), ChoiceError> {
         let reason = match self {
-            Self::Kind(kind) if kind.needs_sensor() => NotDescribed::Equations,
-            Self::Kind(DecoderKind::Fuzzy) => NotDescribed::Rules,
+            Self::Kind(kind) if kind.needs_sensor() => EQUATIONS,
+            Self::Kind(DecoderKind::Fuzzy) => RULES,
             _ => return Ok(()),
         };
         Err(ChoiceError::NotDescribed { decoder: self, reason })

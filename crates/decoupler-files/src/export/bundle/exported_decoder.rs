@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use decoupler_core::{
     dataset::{Dataset, GAP, PerRow, Seed, Simulation, Stream},
-    decoupling::{DecoderKind, Function, NodeId, NotDescribed, Operation, Precision, Program, decode_set},
+    decoupling::{DecoderKind, Function, NodeId, Operation, Precision, Program, decode_set},
     evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
     network::{MinMax, Networks},
     problem::{Channel, Problem},
@@ -12,6 +12,7 @@ use serde_json::{Map, Value, json};
 
 use super::{
     BundleDecoder, BundleError, BundlePrecision, ChoiceError,
+    choice::{EQUATIONS, RULES},
     contents::Contents,
     exported_program::{ExportedProgram, Limits},
     golden::{Golden, GoldenRow},
@@ -528,8 +529,8 @@ impl FittedDecoder {
             BundleDecoder::Chosen => set.decoder(DecoderKind::Network, Precision::Double).map_err(Box::new)?,
         };
         let not_described = |reason| ChoiceError::NotDescribed { decoder: kind, reason };
-        let mut decoder = decoder.ok_or_else(|| not_described(NotDescribed::Equations))?;
-        let program = decoder.program().map_err(not_described)?;
+        let mut decoder = decoder.ok_or_else(|| not_described(EQUATIONS))?;
+        let program = decoder.program().ok_or_else(|| not_described(RULES))?;
         let answers = decode_set(&mut *decoder, &test).map_err(|error| Box::new(RunError::from(error)))?;
         Ok(Self {
             kind,

@@ -1,7 +1,7 @@
 use decoupler_core::{
     dataset::{LARGEST_SAMPLES, Seed, Simulation},
     evaluation::{Outlook, RunSettings, TrainingSize, Workload},
-    network::{HiddenSuggestions, LARGEST_HIDDEN},
+    network::{LARGEST_HIDDEN, suggested_hidden},
     scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Rows, Scene},
     sensor::ArrayScale,
     text::counted,
@@ -417,10 +417,10 @@ pub fn hidden_choice_ui(ui: &mut Ui, hidden: &mut usize, channels: Option<(usize
         hidden_slider_ui(ui, hidden, &[]);
         return;
     };
-    let suggestions = HiddenSuggestions::new(n, m);
-    let (low, high) = (*suggestions.square_root.start(), *suggestions.square_root.end());
-    hidden_slider_ui(ui, hidden, &[suggestions.logarithm, low, high]);
-    let text = format!("Rules of thumb: {}, or {low} to {high}", suggestions.logarithm);
+    let (square_root, logarithm) = suggested_hidden(n, m);
+    let (low, high) = (*square_root.start(), *square_root.end());
+    hidden_slider_ui(ui, hidden, &[logarithm, low, high]);
+    let text = format!("Rules of thumb: {logarithm}, or {low} to {high}");
     dim_ui(ui, &text).on_hover_text(format!(
         "Rules of the paper for n = {n} inputs and m = {m} outputs: log₂ n (Eq. 13), or √(n + m) + a with a from 1 to 10 \
          (Eq. 12). A starting point, not a limit."

@@ -4,7 +4,7 @@ use decoupler_core::{
     evaluation::{Begin, Run, RunError, RunSets, RunSettings},
     job::Job,
     network::Networks,
-    scene::{Contact, Print, Touch},
+    scene::IndenterShape,
 };
 use decoupler_files::{figure::surface::Ray, machine::memory_budget};
 use eframe::egui::{Context, Key, Modifiers, Painter, PointerButton, Pos2, Response, Shape, Stroke, pos2};
@@ -13,6 +13,7 @@ use glam::{DVec2, DVec3};
 use super::{
     ready_settings::ready_settings,
     state::{Grip, Hand, PressState, Subject, Target, Tool},
+    touch::{Print, Touch},
 };
 use crate::window::{
     job::{Background, JobError, Wake},
@@ -255,14 +256,15 @@ fn outline(target: &Target, print: &Print) -> Vec<Vec<Pos2>> {
     let middle = print.place_mm;
     let grid = target.surface.map.grid();
     let along_y = |x_mm: f64| -> Vec<DVec2> { grid.y_mm().iter().map(|&y_mm| DVec2::new(x_mm, y_mm)).collect() };
-    let lines = match print.indenter.contact(print.depth_mm) {
-        Contact::Disc { radius_mm } => {
+    let half_width_mm = print.indenter.contact_half_width_mm(print.depth_mm);
+    let lines = match print.indenter.shape {
+        IndenterShape::Sphere { .. } | IndenterShape::FlatPunch { .. } => {
             let angle = |piece: usize| std::f64::consts::TAU * piece as f64 / PIECES as f64;
-            let circle = (0..=PIECES).map(|piece| middle + radius_mm * DVec2::from_angle(angle(piece)));
+            let circle = (0..=PIECES).map(|piece| middle + half_width_mm * DVec2::from_angle(angle(piece)));
             vec![circle.collect()]
         }
-        Contact::Strip { half_width_mm } => [-1.0, 1.0].map(|side| along_y(middle.x + side * half_width_mm)).into(),
-        Contact::HalfPlane => vec![along_y(middle.x)],
+        IndenterShape::Cylinder { .. } => [-1.0, 1.0].map(|side| along_y(middle.x + side * half_width_mm)).into(),
+        IndenterShape::Edge { .. } => vec![along_y(middle.x)],
     };
     let pieces = lines.into_iter().flat_map(|line: Vec<DVec2>| {
         let seen: Vec<Option<Pos2>> = line.into_iter().map(|place| on_surface(target, place)).collect();

@@ -10,11 +10,12 @@ use decoupler_core::{
     evaluation::RunError,
     job::Job,
     machine::node_pairs_per_row,
-    scene::Touch,
     sensor::{SensorError, SensorModel},
 };
 use glam::DVec3;
 use ndarray::Array2;
+
+use super::touch::Touch;
 
 /// Sensor deformed by a [`Touch`]: positions of its nodes and readings of its wires, without noise.
 #[derive(Clone, Debug, PartialEq)]
@@ -162,12 +163,12 @@ mod tests {
 
     use glam::DVec2;
 
-    use super::*;
+    use super::{super::touch::Print, *};
     use decoupler_core::{
         dataset::Dataset,
         decoupling::{NewtonDecoder, Program, ProgramDecoder},
         evaluation::{Errors, Run, RunSettings},
-        scene::{Indenter, Print, Scene},
+        scene::{Indenter, Scene},
     };
 
     fn sensor() -> SensorModel {

@@ -52,12 +52,14 @@ pub(super) fn ready_settings(source: &Simulation) -> Option<RunSettings> {
 mod tests {
     use glam::DVec2;
 
-    use super::{super::pressed::Pressed, *};
-    use decoupler_core::{
-        evaluation::Run,
-        job::Job,
-        scene::{Print, Touch},
+    use super::{
+        super::{
+            pressed::Pressed,
+            touch::{Print, Touch},
+        },
+        *,
     };
+    use decoupler_core::{evaluation::Run, job::Job};
 
     /// Returns the mean errors of the ready-made network, and of always answering the rest positions, for a ball
     /// pressed on the middle of the array.

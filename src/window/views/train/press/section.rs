@@ -4,7 +4,6 @@ use decoupler_core::{
     decoupling::{DecoderKind, Precision},
     job::Job,
     network::Networks,
-    scene::Touch,
     text::counted,
 };
 use decoupler_files::{
@@ -18,6 +17,7 @@ use super::{
     comparing::Compared,
     pressed::{Pressed, PressedAnswer},
     state::{Finger, PressState, Subject, Tool},
+    touch::Touch,
 };
 use crate::window::{
     glossary,

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use decoupler_core::{
     evaluation::RunSettings,
     network::Networks,
-    scene::{Indenter, IndenterShape, Print, Span, Touch},
+    scene::{Indenter, IndenterShape, Radii},
 };
 use decoupler_files::figure::surface::{Sight, Surface};
 use eframe::egui::{Id, Rect};
@@ -13,6 +13,7 @@ use super::{
     comparing::{Compared, Comparing},
     pointer::ReadyNetwork,
     section::{Question, Shown},
+    touch::{Print, Touch},
 };
 use crate::window::{
     job::{Background, JobError, Wake},
@@ -311,7 +312,7 @@ impl Finger {
 
     /// The finger pressed onto a place; `None` for a tool that moves one node.
     pub(super) fn print(&self, place_mm: DVec2, stroke_mm: f64) -> Option<Print> {
-        let radius_mm = Span {
+        let radius_mm = Radii {
             smallest: self.radius_mm,
             largest: self.radius_mm,
         };
