@@ -19,6 +19,7 @@ pub use mlp::{Mlp, Shape, nguyen_widrow};
 pub use networks::{DecouplingNetwork, LARGEST_HIDDEN, Networks, suggested_hidden};
 pub(crate) use quantity::ChannelNoise;
 pub use quantity::Quantity;
+pub(crate) use scaling::MARGIN;
 pub use scaling::MinMax;
 pub(crate) use tanh::{exp, tanh, tanh_single};
 pub use tanh::{tanh_in_place, tanh_in_place_single};

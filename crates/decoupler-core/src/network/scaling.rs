@@ -5,7 +5,7 @@ use super::{NetworkError, Quantity};
 
 /// Fraction of a channel's range by which a reading may be outside it: new samples of the same scene slightly exceed
 /// the extremes of a few hundred samples, which does not deserve a warning.
-const MARGIN: f64 = 0.1;
+pub(crate) const MARGIN: f64 = 0.1;
 /// Relative rounding error allowed for a channel that is constant in the training set.
 const ROUNDING: f64 = 1e-9;
 
@@ -144,12 +144,17 @@ impl MinMax {
     /// Returns the limits beyond which a reading of a channel counts as outside: the extremes, extended by a tenth of
     /// their distance. For resistances the distance is measured in logarithms, so that 1/R has the same limits.
     pub fn limits(&self, quantity: Quantity, channel: usize) -> (f64, f64) {
+        self.limits_within(quantity, channel, MARGIN)
+    }
+
+    /// As [`Self::limits`], with the extremes extended by this share of their distance.
+    pub(crate) fn limits_within(&self, quantity: Quantity, channel: usize, margin: f64) -> (f64, f64) {
         let (low, high) = self.extremes(channel);
         if quantity == Quantity::Raw {
-            let margin = MARGIN * (high - low) + ROUNDING * low.abs().max(high.abs());
+            let margin = margin * (high - low) + ROUNDING * low.abs().max(high.abs());
             (low - margin, high + margin)
         } else {
-            let factor = (high / low).powf(MARGIN) * (1.0 + ROUNDING);
+            let factor = (high / low).powf(margin) * (1.0 + ROUNDING);
             (low / factor, high * factor)
         }
     }

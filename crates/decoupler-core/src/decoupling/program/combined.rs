@@ -6,7 +6,7 @@ use super::{Builder, Domain, Node, NodeId, Operation, Program};
 use crate::{
     dataset::PerRow,
     decoupling::Precision,
-    network::{DecouplingNetwork, Quantity},
+    network::{DecouplingNetwork, MARGIN, Quantity},
 };
 
 impl Program {
@@ -135,12 +135,12 @@ impl PerRow<DecouplingNetwork> {
     /// # Panics
     /// As [`Self::program`].
     pub fn clipped_program(&self, precision: Precision) -> Program {
-        self.clipped(|network| network.program(precision))
+        self.clipped(MARGIN, |network| network.program(precision))
     }
 
-    /// Joins one program for each network, with the readings limited to their range in training, extended by a tenth: outside,
-    /// networks and maps extrapolate without bound. Those of networks whose range is not known are not limited.
-    pub(crate) fn clipped(&self, program: impl Fn(&DecouplingNetwork) -> Program) -> Program {
+    /// Joins one program for each network, with the readings limited to their range in training, extended by `margin` of
+    /// it: outside, networks and maps extrapolate without bound. Those of networks whose range is not known are not limited.
+    pub(crate) fn clipped(&self, margin: f64, program: impl Fn(&DecouplingNetwork) -> Program) -> Program {
         let limited = |network: &DecouplingNetwork| {
             let (inputs, program) = (network.inputs(), program(network));
             let Some(range) = inputs.range() else { return program };
@@ -148,7 +148,7 @@ impl PerRow<DecouplingNetwork> {
                 Quantity::Raw => Domain::Finite,
                 Quantity::Resistance | Quantity::Conductance | Quantity::LogResistance => Domain::Positive,
             };
-            let limits = (0..range.channels()).map(|channel| range.limits(inputs.quantity(), channel));
+            let limits = (0..range.channels()).map(|channel| range.limits_within(inputs.quantity(), channel, margin));
             program.clipped(domain, &Vec::from_iter(limits))
         };
         Program::each(&self.map(limited))

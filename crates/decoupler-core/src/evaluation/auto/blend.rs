@@ -15,11 +15,13 @@ pub struct Blend {
     /// Other decoders, each with its weight for each target.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub others: Vec<(Program, Vec<f64>)>,
+    /// Share of the range of each reading in training by which it is extended before readings are limited to it.
+    pub margin: f64,
 }
 
 impl Blend {
     /// The combination with this network as a program. Its readings are limited to their range in training, extended by a
-    /// tenth.
+    /// margin.
     ///
     /// # Panics
     /// If the network has other channels or targets.
@@ -27,7 +29,7 @@ impl Blend {
         let network = self.network.iter().any(|weight| *weight > 0.0);
         let network = network.then(|| (networks.program(precision), self.network.clone()));
         let parts = Vec::from_iter(network.into_iter().chain(self.others.iter().cloned()));
-        networks.clipped(|_| Program::combination(&parts))
+        networks.clipped(self.margin, |_| Program::combination(&parts))
     }
 
     /// Describes the first part that does not match this number of readings and targets, for files.
@@ -36,6 +38,9 @@ impl Blend {
         let is_sound = |weights: &Vec<f64>| {
             weights.len() == targets && weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite())
         };
+        if !(0.0..=10.0).contains(&self.margin) {
+            return Some("the margin must be from 0 to 10".to_owned());
+        }
         let has_answer = weights().flatten().any(|weight| *weight > 0.0);
         if !has_answer || !weights().all(is_sound) {
             return Some("there must be one weight of at least 0 for each target".to_owned());

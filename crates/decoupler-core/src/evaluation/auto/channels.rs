@@ -6,13 +6,15 @@ use crate::dataset::Dataset;
 
 /// Number of different values below which a channel is nearly dead.
 const FEW_VALUES: usize = 12;
+/// Share of the samples at one value above which a channel may be at rest.
+const AT_REST: f64 = 0.5;
 /// Shares of the samples at one value above which a channel with few values is left out, and one without any relation.
 const AT_ONE_VALUE: (f64, f64) = (0.9, 0.99);
 
 /// Returns the channels of `set` that should be left out: those with few different values that are nearly always at one of
 /// them or have no relation to a target, and those that are hardly ever away from one value, without any relation. A channel
 /// at the end of its range may wake in a later session, where a decoder that takes it in would answer anything. Sparse
-/// channels, such as taxels that are rarely pressed, stay: with few values, if they are most of the channels and related.
+/// channels, such as taxels that are rarely pressed, stay.
 pub fn dead_channels(set: &Dataset) -> Vec<usize> {
     let readings = set.readings();
     let stuck = Vec::from_iter(readings.columns().into_iter().map(|readings| {
@@ -26,12 +28,14 @@ pub fn dead_channels(set: &Dataset) -> Vec<usize> {
         (has_few, count as f64 / readings.len() as f64, f64::from_bits(bits))
     }));
     let is_silent = |(has_few, share, _): &(bool, f64, f64)| *has_few && *share >= AT_ONE_VALUE.0;
-    let is_sparse = 2 * stuck.iter().filter(|channel| is_silent(channel)).count() > stuck.len();
+    // Most channels of a skin are at rest while it is touched elsewhere.
+    if 2 * stuck.iter().filter(|(_, share, _)| *share > AT_REST).count() > stuck.len() {
+        return Vec::new();
+    }
     let is_dead = |channel: &usize| {
         let (has_few, share, usual) = stuck[*channel];
         let is_suspect = has_few || share >= AT_ONE_VALUE.1;
-        let is_out = is_silent(&stuck[*channel]) && !is_sparse;
-        is_out || is_suspect && !is_related(set, readings.column(*channel), usual)
+        is_silent(&stuck[*channel]) || is_suspect && !is_related(set, readings.column(*channel), usual)
     };
     let dead = Vec::from_iter((0..set.channels()).filter(is_dead));
     if dead.len() < set.channels() { dead } else { Vec::new() }

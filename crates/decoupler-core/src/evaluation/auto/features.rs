@@ -7,6 +7,12 @@ use crate::{
     network::{InputChoice, MinMax, NetworkError, Quantity},
 };
 
+/// Share of its range by which a reading of new samples may be outside of the range of this many: a tenth, and more where the
+/// range of few samples is exceeded by others of the same kind.
+pub(super) fn margin(samples: usize) -> f64 {
+    (10.0 / samples as f64).max(0.1)
+}
+
 /// Samples with the features of a memory as readings.
 #[derive(Clone)]
 pub(super) struct Features {
@@ -28,13 +34,13 @@ impl Features {
         Some(Self { memory, set })
     }
 
-    /// Readings of the samples `inside`, limited as they will be in use: to the range of those outside, extended by a tenth.
+    /// Readings of the samples `inside`, limited as they will be in use: to the range of those outside, extended by a margin.
     pub(super) fn held_out(&self, outside: &[usize], inside: &[usize], quantity: Quantity) -> Array2<f64> {
         let all = self.set.readings();
         let mut readings = all.select(Axis(0), inside);
         if let Some(range) = MinMax::of(all.select(Axis(0), outside).view()) {
             for (channel, mut column) in readings.columns_mut().into_iter().enumerate() {
-                let (low, high) = range.limits(quantity, channel);
+                let (low, high) = range.limits_within(quantity, channel, margin(self.set.samples()));
                 column.mapv_inplace(|reading| reading.clamp(low, high));
             }
         }

@@ -4,7 +4,7 @@ use super::{
     super::{Begin, Combination, Initialization, Run, RunError, RunSets, RunSettings, errors::extremes},
     AutoChoice, AutoFixed, AutoProgress, AutoRecord, AutoSamples, Blend, MULTIPLICATIONS_PER_SECOND, Tried, TriedModel,
     describe_features,
-    features::Features,
+    features::{Features, margin},
     folded_training::{FoldedTraining, residual, training_multiplications},
     judge::Judge,
     spans::memories,
@@ -291,7 +291,7 @@ impl Search<'_> {
         };
         let sizes = (self.judge.samples(), features.set.channels(), self.judge.parts());
         let work = Regression::multiplications(sizes.0, sizes.1, sizes.2);
-        if !self.record.tried.is_empty() && self.work + work > 0.2 * self.budget() {
+        if !self.record.tried.is_empty() && work > 0.05 * self.budget() {
             return Ok(None);
         }
         self.announce(features, inputs, &TriedModel::Ridge)?;
@@ -683,6 +683,7 @@ impl Search<'_> {
             blend: Blend {
                 network: weights.row(network).to_vec(),
                 others,
+                margin: margin(samples),
             },
             record: self.record,
             answers: mean / self.judge.repeats.len() as f64,
@@ -696,7 +697,11 @@ impl Search<'_> {
         let square = |answers: ndarray::ArrayView1<'_, f64>| (&answers - &truth).mapv(|error| error * error).sum();
         let squares = Vec::from_iter(members.iter().map(|member| square(member.answers.column(target))));
         let best = squares.iter().copied().fold(f64::INFINITY, f64::min);
-        let mut among = Vec::from_iter((0..members.len()).filter(|&m| squares[m] <= best * WORST_MEMBER.powi(2)));
+        let is_open = self.judge.variances[target] == 0.0 || best > UNDETERMINED * squares[0];
+        // The mean and ridge regression come first. Nothing else is worth a chance where nothing is determined.
+        let best = if is_open { squares[0].min(squares[1]) } else { best };
+        let is_among = |m: &usize| squares[*m] <= best * WORST_MEMBER.powi(2) && (*m < 2 || !is_open);
+        let mut among = Vec::from_iter((0..members.len()).filter(is_among));
         loop {
             let columns = Vec::from_iter(
                 among
