@@ -215,7 +215,7 @@ impl Search<'_> {
             self.fixed.memory.is_some()
                 || self
                     .judge
-                    .is_clearly_better(&with.answers, &members[1].answers, past.len())
+                    .is_clearly_better(self.samples, [&with.answers, &members[1].answers], past.len())
         };
         let error = |(_, with): &(Features, Member)| self.judge.error(&with.answers).0;
         let taken = past

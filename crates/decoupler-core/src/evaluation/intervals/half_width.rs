@@ -81,6 +81,8 @@ impl HalfWidth {
         /// Share of the errors within a quarter of the half-width that only distributions with few and very large errors
         /// exceed; 32 % for normal ones.
         const WITHIN_QUARTER: f64 = 0.6;
+        /// Share of the effective samples that counts, since their number is an estimate.
+        const SURE: f64 = 0.7;
         let count = pairs.len() as f64;
         let within = |factor: f64| {
             let is_within = |(truth, answer): &&(f64, f64)| (answer - truth).abs() <= factor * self.at(*answer);
@@ -89,7 +91,7 @@ impl HalfWidth {
         let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
         // Samples like those of the calibration are as dependent. Their own dependence would excuse what is to be found: the
         // misses of a test part that differs come together.
-        let effective = (count * self.effective_samples / self.samples as f64).max(1.0);
+        let effective = (SURE * count * self.effective_samples / self.samples as f64).max(1.0);
         let [_, most] = expected_shares(WITHIN_QUARTER, effective, self.effective_samples);
         Coverage {
             share: within(1.0),

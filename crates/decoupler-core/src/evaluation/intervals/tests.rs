@@ -223,6 +223,6 @@ fn new_samples_are_within_their_intervals_at_the_nominal_rate() {
         );
         assert!((0.88..0.92).contains(&share), "{what}: {share}");
         // The shortest tests have about six effective samples.
-        assert!(alarms < 0.03, "{what}: {alarms}");
+        assert!(alarms < 0.04, "{what}: {alarms}");
     }
 }
