@@ -2,7 +2,7 @@
 
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -29,8 +29,17 @@ class NetworkRegressor(Decoder):
 
     Parameters
     ----------
-    hidden_nodes : int, default=12
-        Number of hidden nodes.
+    hidden_nodes : int or "auto", default=12
+        Number of hidden nodes. With "auto", settings are chosen by cross-validation that respects
+        `split`, as by the program, and the answer is the best convex combination of the training
+        mean, ridge, kernel ridge and networks; other settings of the network are then ignored.
+    memory : {"none", "auto"} or sequence of float or str, default=None
+        Time constants of exponential averages of the readings, in samples, which become inputs:
+        the rows of `X` are then consecutive, in `fit` (within groups) and in `predict`. With
+        ``hidden_nodes="auto"``, "auto" tries memories and takes one that is clearly better; None
+        tries none.
+    budget : float, default=60.0
+        Seconds of one core for ``hidden_nodes="auto"``, estimated from the work.
     method : str, default="lm"
         Training method: "lm" (Levenberg-Marquardt), "br" (Bayesian regularisation), "scg"
         (scaled conjugate gradient), and other methods of the program.
@@ -105,8 +114,10 @@ class NetworkRegressor(Decoder):
 
     def __init__(
         self,
-        hidden_nodes: int = 12,
+        hidden_nodes: int | str = 12,
         *,
+        memory: str | Sequence[float | str] | None = None,
+        budget: float = 60.0,
         method: str = "lm",
         method_settings: Mapping[str, float] | None = None,
         epochs: int = 1000,
@@ -126,6 +137,8 @@ class NetworkRegressor(Decoder):
         callback: Callback | None = None,
     ) -> None:
         self.hidden_nodes = hidden_nodes
+        self.memory = memory
+        self.budget = budget
         self.method = method
         self.method_settings = method_settings
         self.epochs = epochs
@@ -205,8 +218,15 @@ class NetworkRegressor(Decoder):
     def _settings(self, y: ArrayLike) -> dict[str, Any]:
         fraction = self.validation_fraction
         settings = self.method_settings or {}
+        is_auto = isinstance(self.hidden_nodes, str)
+        if is_auto and self.hidden_nodes != "auto":
+            raise ValueError(f"hidden_nodes: {self.hidden_nodes!r} is not a number; give one, or 'auto'")
+        words = [self.memory] if isinstance(self.memory, str) else self.memory
+        memory = None if words is None else [str(word) for word in words]
         return {
-            "hidden_nodes": count("hidden_nodes", self.hidden_nodes, 1),
+            "hidden_nodes": None if is_auto else count("hidden_nodes", self.hidden_nodes, 1),
+            "memory": memory,
+            "budget": number("budget", self.budget),
             "method": str(self.method),
             "method_settings": [(str(name), number(name, settings[name])) for name in settings],
             "epochs": count("epochs", self.epochs, 1),

@@ -7,8 +7,8 @@ use std::{
 
 use decoupler_core::{
     dataset::History,
-    decoupling::ProgramDecoder,
-    evaluation::{Intervals, RunSettings},
+    decoupling::{Precision, Program, ProgramDecoder},
+    evaluation::{Intervals, RunSettings, auto::Blend},
     network::Networks,
     problem::{Channel, Problem},
     text::counted,
@@ -45,6 +45,9 @@ pub struct Network {
 #[derive(Serialize, Deserialize)]
 struct Record {
     networks: Networks,
+    /// What it answers with instead of its network alone, if settings were chosen.
+    #[serde(default)]
+    blend: Option<Blend>,
     /// Row-wires with a network each, in ascending order.
     row_wires: Option<Vec<usize>>,
     #[serde(with = "saved_problem")]
@@ -92,10 +95,21 @@ enum State {
     File(String),
 }
 
+impl Record {
+    /// The program of the answers; readings are limited to their range in training.
+    fn program(&self) -> Program {
+        match &self.blend {
+            Some(blend) => blend.program(&self.networks, Precision::Double),
+            None if self.problem.has_nodes() => self.networks.program(Precision::Double),
+            None => self.networks.clipped_program(Precision::Double),
+        }
+    }
+}
+
 impl Network {
     fn new(record: Record, file: Option<NetworkFile>) -> Self {
         Self {
-            decoder: Mutex::new(record.networks.decoder()),
+            decoder: Mutex::new(ProgramDecoder::new(record.program())),
             record,
             file,
         }
@@ -103,7 +117,7 @@ impl Network {
 
     /// Wraps the networks of a fit; `row_wires` are those with a network each.
     pub fn trained(
-        networks: Networks,
+        (networks, blend): (Networks, Option<Blend>),
         row_wires: Option<Vec<usize>>,
         problem: Problem,
         settings: RunSettings,
@@ -112,6 +126,7 @@ impl Network {
     ) -> Self {
         let record = Record {
             networks,
+            blend,
             row_wires,
             problem,
             settings,
@@ -125,6 +140,7 @@ impl Network {
         let has_rows = file.network.only().is_none();
         let record = Record {
             networks: file.network.clone(),
+            blend: file.blend().cloned(),
             row_wires: file.row_wires.clone().filter(|_| has_rows),
             problem: file.problem.clone(),
             settings: file.settings,
@@ -326,8 +342,8 @@ impl Network {
             Some(file) => export_bundle(file, format, precision, &path),
             None => {
                 let row_wires = record.row_wires.clone();
-                let exported =
-                    ExportedDecoder::of_networks(&record.networks, record.settings, record.problem.clone(), row_wires);
+                let fitted = (&record.networks, record.blend.as_ref());
+                let exported = ExportedDecoder::of_networks(fitted, record.settings, record.problem.clone(), row_wires);
                 export_bundle(exported, format, precision, &path)
             }
         })?;
@@ -377,6 +393,7 @@ impl Network {
         let test = test.dataset()?.among_rows(&read).map_err(value_error)?;
         let saved = Saved {
             networks: &record.networks,
+            blend: record.blend.as_ref(),
             settings: record.settings,
             problem: &record.problem,
             origin,

@@ -8,7 +8,8 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Division, Split, SplitBy},
-    evaluation::{Begin, Intervals, Run, RunSettings, TestErrors},
+    decoupling::ProgramDecoder,
+    evaluation::{Begin, Intervals, Run, RunSettings, TestErrors, auto::Blend},
     job::Job,
     network::Networks,
     problem::{Channel, Problem},
@@ -77,6 +78,7 @@ pub fn samples_crc32(set: &Dataset) -> u32 {
 /// A trained network to be saved.
 pub struct Saved<'a> {
     pub networks: &'a Networks,
+    pub blend: Option<&'a Blend>,
     pub settings: RunSettings,
     pub problem: &'a Problem,
     pub origin: &'a Origin,
@@ -103,11 +105,13 @@ impl Saved<'_> {
         let (data, tested) = (path_of("training"), path_of("test"));
         columns.write(&data, training).map_err(text)?;
         columns.write(&tested, test).map_err(text)?;
-        let setup = Setup::recording(self.settings, columns.plan(data, tested, self.division));
+        let mut plan = columns.plan(data, tested, self.division);
+        plan.import.memory.clone_from(&self.problem.memory);
+        let setup = Setup::recording(self.settings, plan);
         let sets = setup
             .sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ())
             .map_err(text)?;
-        if samples_crc32(&sets.sets.split.training) != self.origin.crc32 {
+        if self.problem.memory.is_none() && samples_crc32(&sets.sets.split.training) != self.origin.crc32 {
             return Err("the files with the samples do not read back as the samples of fit".to_owned());
         }
         // Measures the baselines.
@@ -115,8 +119,16 @@ impl Saved<'_> {
         let mut file = NetworkFile::from_run(&run, sets.recorded()).map_err(text)?;
         file.drift = sets.drift_reference();
         file.network = self.networks.clone();
-        let answers = file.network.decouple(&sets.sets.test);
+        if let Some(recorded) = &mut file.recorded {
+            recorded.blend = self.blend.cloned();
+        }
+        let answers = file.decoder().answers_to(&sets.sets.test);
         file.scores.network = TestErrors::of_targets(&sets.sets.test, answers.view());
+        let alone = self.blend.filter(|blend| !blend.others.is_empty());
+        file.scores.network_alone = alone.map(|_| {
+            let answers = ProgramDecoder::new(file.network_program()).answers_to(&sets.sets.test);
+            TestErrors::of_targets(&sets.sets.test, answers.view())
+        });
         if let Some(intervals) = self.intervals {
             file.scores.coverage = intervals.coverage(&sets.sets.test, answers.view());
             file.intervals = Some(intervals.clone());

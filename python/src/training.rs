@@ -3,10 +3,11 @@
 use std::sync::{Mutex, PoisonError};
 
 use decoupler_core::{
-    dataset::{Dataset, Seed, Split, SplitBy},
+    dataset::{Dataset, History, Memory, Seed, Split, SplitBy, Stream},
     evaluation::{
         Begin, Combination, Initialization, Intervals, Measured, NoIntervals, Run, RunError, RunSets, RunSettings,
         TrainingSize, Workload,
+        auto::{AutoChoice, AutoFixed, AutoSamples, choose_settings},
     },
     job::Job,
     network::{Quantity, ScalingChoice},
@@ -23,7 +24,7 @@ use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
 use crate::{
     arrays::{Matrix, Samples},
     network::Network,
-    saving::{Origin, division, samples_crc32},
+    saving::{self, Origin, division, samples_crc32},
     work::{detached, value_error},
 };
 
@@ -31,7 +32,11 @@ use crate::{
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct Settings {
-    hidden_nodes: usize,
+    /// `None` to choose settings by cross-validation.
+    hidden_nodes: Option<usize>,
+    /// Time constants of a memory, `none` or `auto`.
+    memory: Option<Vec<String>>,
+    budget: f64,
     method: String,
     method_settings: Option<Vec<(String, f64)>>,
     epochs: usize,
@@ -74,7 +79,7 @@ impl Settings {
             max_fail: self.max_fail,
         };
         settings.training.check().map_err(value_error)?;
-        settings.hidden = self.hidden_nodes;
+        settings.hidden = self.hidden_nodes.unwrap_or(settings.hidden);
         settings.starts = self.restarts;
         settings.combine = Combination::parse(&self.combine).map_err(value_error)?;
         settings.initialization = Initialization::parse(&self.initialization).map_err(value_error)?;
@@ -83,6 +88,31 @@ impl Settings {
         settings.seed = Seed(self.seed);
         settings.check_counts().map_err(value_error)?;
         Ok(settings)
+    }
+
+    /// Memory that is given, and whether a choice of settings tries some.
+    fn memory(&self) -> PyResult<(Option<Memory>, bool)> {
+        let words = self.memory.iter().flatten().map(String::as_str);
+        match Vec::from_iter(words)[..] {
+            [] => Ok((None, false)),
+            ["none"] => Ok((Some(Memory::default()), false)),
+            ["auto"] if self.hidden_nodes.is_none() => Ok((None, true)),
+            ["auto"] => Err(value_error(
+                "memory: \"auto\" is for hidden_nodes=\"auto\"; give time constants",
+            )),
+            ref spans => {
+                let averages = spans
+                    .iter()
+                    .map(|span| span.parse())
+                    .collect::<Result<_, _>>()
+                    .map_err(value_error)?;
+                let memory = Memory {
+                    averages,
+                    ..Memory::default()
+                };
+                Ok((Some(memory), false))
+            }
+        }
     }
 
     fn method(&self) -> PyResult<Method> {
@@ -215,6 +245,38 @@ pub fn train(
     };
     let usual = run_settings.validation_fraction();
     let division = division(by, settings.validation_fraction.unwrap_or(usual));
+    let (given, tries_memory) = settings.memory()?;
+    let is_auto = settings.hidden_nodes.is_none();
+    if (is_auto || given.is_some()) && (validation.is_some() || samples.row_wires.is_some()) {
+        return Err(PyValueError::new_err(
+            "hidden_nodes=\"auto\" and memory are for one network, without validation samples given apart: leave out rows \
+             and validation",
+        ));
+    }
+    let all = if is_auto || given.is_some() {
+        Some(samples.dataset()?)
+    } else {
+        None
+    };
+    let history = all.as_ref().map(|all| past(all, samples.groups.is_some()));
+    let fixed = AutoFixed {
+        memory: given,
+        tries_memory,
+        ..AutoFixed::default()
+    };
+    let choice = match (&all, &history) {
+        (Some(all), Some(history)) if is_auto => {
+            Some(choose(py, &run_settings, &fixed, (all, history, by), settings.budget)?)
+        }
+        _ => None,
+    };
+    let memory = choice.as_ref().map(|choice| choice.memory.clone()).or(fixed.memory);
+    let memory = memory.filter(|memory| !memory.is_empty());
+    let run_settings = choice.as_ref().map_or(run_settings, |choice| choice.settings);
+    let division = match is_auto {
+        true => saving::division(by, 0.0),
+        false => division,
+    };
     let split = match &validation {
         None => samples.split(division, run_settings.seed)?,
         Some((readings, targets, row_wires)) => {
@@ -233,8 +295,18 @@ pub fn train(
         }
     };
     let row_wires = split.training.row_wires_read().map(<[usize]>::to_vec);
-    let problem = settings.problem(&split.training);
+    let mut problem = settings.problem(&split.training);
     let crc32 = samples_crc32(&split.training);
+    let split = match (&memory, &history, &all) {
+        (Some(memory), Some(history), Some(all)) => {
+            let memory = history.checked(memory).map_err(value_error)?;
+            let features = all.with_readings(history.features(&memory).map_err(value_error)?);
+            problem.memory = Some(memory);
+            let divided = division.divide_for_training(&features, &mut run_settings.seed.rng(Stream::Split));
+            divided.map_err(value_error)?.split(&features)
+        }
+        _ => split,
+    };
     let calibration = calibrates.then(|| split.training.clone());
     let size = TrainingSize::of(&run_settings, &split.training);
     Workload::of(&run_settings, size)
@@ -251,11 +323,13 @@ pub fn train(
     let mut interruption = step_to_the_end(py, &mut run, callback.as_ref());
     run.stop();
     let mut warning = run.defect();
+    let chosen = choice.as_ref().filter(|_| calibrates).zip(all.as_ref());
+    let chosen = chosen.map(|(choice, all)| Intervals::calibrate(all, choice.answers.view(), by));
     let calibrated = calibration
-        .filter(|_| interruption.is_none())
+        .filter(|_| interruption.is_none() && choice.is_none())
         .map(|set| calibrate(py, &run_settings, &set, by));
     let intervals = match calibrated {
-        None => None,
+        None => chosen,
         Some(Ok(Ok(intervals))) => Some(intervals),
         Some(Ok(Err(reason))) => {
             warning.get_or_insert_with(|| format!("no prediction intervals: {reason}"));
@@ -267,7 +341,15 @@ pub fn train(
         }
     };
     let origin = Origin::of(&run, validation.is_none().then_some(division), crc32);
-    let network = Network::trained(run.network(), row_wires, problem, run_settings, intervals, origin);
+    let blend = choice.map(|choice| choice.blend).filter(|_| interruption.is_none());
+    let network = Network::trained(
+        (run.network(), blend),
+        row_wires,
+        problem,
+        run_settings,
+        intervals,
+        origin,
+    );
     let leader = run.leader();
     Ok(Training {
         network: Py::new(py, network)?,
@@ -278,6 +360,58 @@ pub fn train(
         warning,
         interruption: interruption.map(|error| error.into_value(py).into_any()),
     })
+}
+
+/// The samples as a recording, whose groups do not continue each other.
+fn past(all: &Dataset, has_groups: bool) -> History {
+    let groups = Vec::from_iter(all.groups().iter().map(|group| *group as u64));
+    let samples = (0..all.samples()).collect();
+    History::new(
+        all.readings().to_owned(),
+        has_groups.then_some(&groups[..]),
+        None,
+        None,
+        samples,
+    )
+}
+
+/// Chooses settings by cross-validation.
+fn choose(
+    py: Python<'_>,
+    settings: &RunSettings,
+    fixed: &AutoFixed,
+    (all, history, by): (&Dataset, &History, SplitBy),
+    budget_s: f64,
+) -> PyResult<AutoChoice> {
+    let samples = AutoSamples {
+        set: all,
+        past: Some((history, history.samples())),
+        by,
+    };
+    interruptible(py, |job| {
+        choose_settings(settings, fixed, &samples, budget_s, memory_budget(), job, &mut |_| ())
+    })?
+    .map_err(value_error)
+}
+
+/// Runs `work` without the interpreter, until a signal cancels it, which is then raised.
+fn interruptible<T: Send>(py: Python<'_>, work: impl FnOnce(&Job<'_>) -> T + Send) -> PyResult<T> {
+    let interruption = Mutex::new(None);
+    let done = detached(py, || {
+        let is_cancelled = || {
+            let signal = Python::attach(|py| py.check_signals()).err();
+            let mut interruption = interruption.lock().unwrap_or_else(PoisonError::into_inner);
+            if interruption.is_none() {
+                *interruption = signal;
+            }
+            interruption.is_some()
+        };
+        Ok::<_, RunError>(work(&Job::new(&is_cancelled)))
+    })?;
+    match interruption.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        Some(signal) => Err(signal),
+        None => Ok(done),
+    }
 }
 
 /// Trains to the end, to a signal, or until the callback asks for the end. Returns the exception that ended it, if any;
@@ -317,21 +451,7 @@ fn calibrate(
     set: &Dataset,
     by: SplitBy,
 ) -> PyResult<Result<Intervals, NoIntervals>> {
-    let interruption = Mutex::new(None);
-    let calibrated = detached(py, || {
-        let is_cancelled = || {
-            let signal = Python::attach(|py| py.check_signals()).err();
-            let mut interruption = interruption.lock().unwrap_or_else(PoisonError::into_inner);
-            if interruption.is_none() {
-                *interruption = signal;
-            }
-            interruption.is_some()
-        };
-        Ok::<_, RunError>(Intervals::cross_validate(settings, set, by, &Job::new(&is_cancelled)))
-    })?;
-    if let Some(signal) = interruption.into_inner().unwrap_or_else(PoisonError::into_inner) {
-        return Err(signal);
-    }
+    let calibrated = interruptible(py, |job| Intervals::cross_validate(settings, set, by, job))?;
     match calibrated {
         Err(NoIntervals::Run(error)) => Err(value_error(error)),
         calibrated => Ok(calibrated),

@@ -287,7 +287,10 @@ impl KernelRidge {
                 right += basis.transpose() * Mat::from_fn(chunk.len(), y.ncols(), |s, t| y[[chunk[s], t]] - means[t]);
             }
             // Gram matrix and kernel both lose half of the digits.
-            let rounding = f64::EPSILON * (rows.len() * subset) as f64 * (1.0 + linear * x.ncols() as f64);
+            let largest = (0..subset)
+                .map(|centre| gram[(centre, centre)])
+                .fold(rows.len() as f64, f64::max);
+            let rounding = f64::EPSILON * subset as f64 * largest;
             let kernel = kernel_of(&centres, &centres);
             let gains = solve(penalties, &right, |penalty| {
                 let mut matrix = &gram + faer::Scale(penalty) * &kernel;

@@ -1,11 +1,10 @@
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
+use ndarray::{Array2, ArrayView1, ArrayView2};
 
 use super::{
     super::{
         RunError,
         cross_validation::{nth_seed, scatter},
         errors::{mean, varies},
-        recorded::Evidence,
     },
     AutoSamples,
 };
@@ -118,27 +117,20 @@ impl Judge {
         if variance > 0.0 { square / variance } else { 0.0 }
     }
 
-    /// Returns `true` if `ours` are better than `theirs`, and than the mean, by a paired t-test of their squared errors over
-    /// independent stretches or groups, with 1 % for the first of `candidates` that is wrongly found better (Bonferroni).
-    pub(super) fn is_clearly_better(
-        &self,
-        samples: &AutoSamples<'_>,
-        [ours, theirs]: [&Array2<f64>; 2],
-        candidates: usize,
-    ) -> bool {
-        /// Smallest gain in the error that is worth the additional inputs, and largest error of what is of any use.
-        const WORTH: (f64, f64) = (0.97, 0.97);
-        let squares = |answers: &Array2<f64>, row: usize| self.square(answers, row);
-        let gains = (0..self.samples()).map(|row| squares(theirs, row) - squares(ours, row));
-        let gains = Array1::from_iter(gains);
-        let total = gains.sum();
-        let spread = Evidence::of(samples.set, samples.by).variance(&(gains - total / self.samples() as f64));
+    /// Returns `true` if `ours` are better than `theirs`, and than the mean, by a paired t-test of the logarithms of their errors
+    /// in the folds, with 1 % for the first of `candidates` that is wrongly found better (Bonferroni).
+    pub(super) fn is_clearly_better(&self, ours: &Array2<f64>, theirs: &Array2<f64>, candidates: usize) -> bool {
+        /// Fewer folds decide nothing.
+        const FEWEST: usize = 4;
+        /// Largest error of what is worth the additional inputs, relative to the other and to the mean.
+        const WORTH: f64 = 0.97;
+        let pairs = self.of_parts(ours).into_iter().zip(self.of_parts(theirs));
+        let gains = Vec::from_iter(pairs.map(|(ours, theirs)| (theirs / ours).ln()));
+        let mean = gains.iter().sum::<f64>() / gains.len() as f64;
         let error = self.error(ours).0;
-        let tails = 0.02 / candidates as f64;
-        spread.units >= 4
-            && error < WORTH.0 * self.error(theirs).0
-            && error < WORTH.1
-            && total > student_quantile(tails, spread.units as f64 - 1.0) * spread.variance.sqrt()
+        gains.len() >= FEWEST
+            && error < WORTH * self.error(theirs).0.min(1.0)
+            && mean > student_quantile(0.02 / candidates as f64, gains.len() as f64 - 1.0) * standard_error(&gains)
     }
 
     /// Sum of e/σ² of one row of held-out answers over the targets that count.

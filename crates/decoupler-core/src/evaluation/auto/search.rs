@@ -215,7 +215,7 @@ impl Search<'_> {
             self.fixed.memory.is_some()
                 || self
                     .judge
-                    .is_clearly_better(self.samples, [&with.answers, &members[1].answers], past.len())
+                    .is_clearly_better(&with.answers, &members[1].answers, past.len())
         };
         let error = |(_, with): &(Features, Member)| self.judge.error(&with.answers).0;
         let taken = past
@@ -697,7 +697,8 @@ impl Search<'_> {
         let square = |answers: ndarray::ArrayView1<'_, f64>| (&answers - &truth).mapv(|error| error * error).sum();
         let squares = Vec::from_iter(members.iter().map(|member| square(member.answers.column(target))));
         let best = squares.iter().copied().fold(f64::INFINITY, f64::min);
-        let is_open = self.judge.variances[target] == 0.0 || best > UNDETERMINED * squares[0];
+        let least = best / (truth.len() as f64 * truth.var(0.0)).max(f64::MIN_POSITIVE);
+        let is_open = self.judge.variances[target] == 0.0 || least > UNDETERMINED;
         // The mean and ridge regression come first. Nothing else is worth a chance where nothing is determined.
         let best = if is_open { squares[0].min(squares[1]) } else { best };
         let is_among = |m: &usize| squares[*m] <= best * WORST_MEMBER.powi(2) && (*m < 2 || !is_open);

@@ -83,11 +83,11 @@ pub(crate) enum Evidence {
 
 /// Variance of the sum of the influences of all samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct SumVariance {
+pub(super) struct SumVariance {
     /// Estimated variance.
-    pub(crate) variance: f64,
+    pub(super) variance: f64,
     /// Number of independent groups or stretches, one more than the degrees of freedom of the estimate.
-    pub(crate) units: usize,
+    pub(super) units: usize,
 }
 
 impl SumVariance {
@@ -118,7 +118,7 @@ impl Evidence {
     /// Groups are independent. So are samples in order if no autocorrelation is found; otherwise the variance is that
     /// of their projections on the slowest cosines (Lazarus, Lewis, Stock and Watson 2018,
     /// doi:10.1080/07350015.2018.1506926), with one degree of freedom each.
-    pub(crate) fn variance(&self, influences: &Array1<f64>) -> SumVariance {
+    pub(super) fn variance(&self, influences: &Array1<f64>) -> SumVariance {
         match self {
             Self::Groups(groups) => {
                 let sum = |group: &Vec<usize>| group.iter().map(|&sample| influences[sample]).sum();

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use decoupler_core::{
     dataset::{Dataset, GAP, PerRow, Seed, Simulation, Stream},
     decoupling::{DecoderKind, Function, NodeId, Operation, Precision, Program, decode_set},
-    evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
+    evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, TargetErrors, TestErrors, auto::Blend},
     network::{MinMax, Networks},
     problem::{Channel, Problem},
 };
@@ -92,12 +92,21 @@ impl<'a> ExportedDecoder<'a> {
     /// Exports networks that were trained on samples in memory, with the description of their channels and the row-wires
     /// with a network each. Without test samples the bundle contains no errors.
     pub fn of_networks(
-        networks: &Networks,
+        (networks, blend): (&Networks, Option<&Blend>),
         settings: RunSettings,
         problem: Problem,
         row_wires: Option<Vec<usize>>,
     ) -> Self {
         let none = TestErrors::Targets(Vec::new());
+        let mut fitted = FittedDecoder::of_networks(networks, none.clone());
+        match blend {
+            Some(blend) => {
+                fitted.kind = BundleDecoder::Chosen;
+                fitted.program = blend.program(networks, Precision::Double);
+            }
+            None if problem.has_nodes() => {}
+            None => fitted.program = networks.clipped_program(Precision::Double),
+        }
         Self {
             file: None,
             test: None,
@@ -107,9 +116,9 @@ impl<'a> ExportedDecoder<'a> {
                 problem,
                 row_wires,
                 files: Vec::new(),
-                errors_of_linear: none.clone(),
+                errors_of_linear: none,
             },
-            fitted: FittedDecoder::of_networks(networks, none),
+            fitted,
         }
     }
 

@@ -263,7 +263,7 @@ fn networks_of_samples_in_memory_are_exported_without_errors() {
     let mut problem = Problem::unnamed(6, network.at(0).outputs().channels());
     problem.inputs[5] = Channel::new("odd \u{200b}*/ \"name\"", Some("µT"));
     let path = home.path().join("bundle");
-    let exported = ExportedDecoder::of_networks(&network, settings, problem, None);
+    let exported = ExportedDecoder::of_networks((&network, None), settings, problem, None);
     export_bundle(exported, BundleFormat::C99, BundlePrecision::Double, &path).unwrap();
     let metadata = fs::read_to_string(path.join("metadata.json")).unwrap();
     let metadata: serde_json::Value = serde_json::from_str(&metadata).unwrap();
