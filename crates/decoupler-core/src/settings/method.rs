@@ -99,15 +99,13 @@ impl Default for Damping {
     }
 }
 
-/// Settings of Bayesian regularisation.
+/// Settings of Bayesian regularisation. Those of version 0.1.0 had another, which is ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(default)]
 pub struct RegularizationSettings {
     /// Damping mu.
     #[serde(flatten)]
     pub damping: Damping,
-    /// Epoch after which the correlation of neighbouring errors is measured, an integer; 0 for never.
-    pub correlation_epoch: f64,
     /// Number of groups of weights with their own strength of regularisation, an integer from 1 to 4.
     pub groups: f64,
     /// 1 if every target has its own noise level, otherwise 0.
@@ -121,7 +119,6 @@ impl Default for RegularizationSettings {
                 mu: 0.005,
                 ..Damping::default()
             },
-            correlation_epoch: 0.0,
             groups: 1.0,
             own_noise: 0.0,
         }

@@ -149,13 +149,6 @@ pub(super) static METHOD: &[Setting<Method>] = &[
         |method| Some(Field::Number(&mut damping(method)?.mu_max)),
     ),
     Setting::new(
-        "correlation epoch",
-        Kind::Integer(0, 1_000_000),
-        "Epoch after which the correlation of neighbouring errors is measured, as in a recording: from then on fewer \
-         errors count as independent, and weights are smaller. 0: never.",
-        |method| Some(Field::Number(&mut regularization(method)?.correlation_epoch)),
-    ),
-    Setting::new(
         "groups of weights",
         Kind::Integer(1, 4),
         "Groups of weights, each with its own strength of regularisation. 1: all together. 2: hidden layer and output \
@@ -335,20 +328,13 @@ mod tests {
 
     #[test]
     fn integer_settings_reject_fractions() {
-        for (groups, correlation_epoch, is_valid) in [
-            (2.0, 0.0, true),
-            (2.5, 0.0, false),
-            (4.0, 100.0, true),
-            (4.0, 0.5, false),
-            (f64::NAN, 0.0, false),
-        ] {
+        for (groups, is_valid) in [(2.0, true), (2.5, false), (4.0, true), (f64::NAN, false)] {
             let settings = RegularizationSettings {
                 groups,
-                correlation_epoch,
                 ..RegularizationSettings::default()
             };
             let checked = Method::BayesianRegularization(settings).check();
-            assert_eq!(checked.is_ok(), is_valid, "{groups} {correlation_epoch}: {checked:?}");
+            assert_eq!(checked.is_ok(), is_valid, "{groups}: {checked:?}");
         }
         let settings = RegularizationSettings {
             groups: 2.5,

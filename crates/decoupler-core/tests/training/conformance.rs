@@ -26,7 +26,6 @@ fn methods() -> Vec<Method> {
     let further = [
         Method::BayesianRegularization(RegularizationSettings::recorded()),
         with("br", "groups of weights", 2.0),
-        with("br", "correlation epoch", 3.0),
         with("scg", "weight decay", 0.3),
     ];
     Method::all().into_iter().chain(further).collect()

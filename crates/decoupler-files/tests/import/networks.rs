@@ -11,7 +11,6 @@ use decoupler_core::{
     evaluation::{Begin, Measured, Run, RunSettings, TargetErrors, TestErrors},
     job::Job,
     scene::RowModel,
-    settings::Value,
 };
 use decoupler_files::{
     export::{
@@ -49,12 +48,6 @@ fn settings() -> RunSettings {
     let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
     settings.hidden = 5;
     settings.training.stopping.epochs = 30;
-    // This also measures the correlation of neighbouring errors.
-    let mut rows = settings.training.method.settings();
-    let setting = rows.find(|setting| setting.name == "correlation epoch").unwrap();
-    setting
-        .set(&mut settings.training.method, &Value::Number(10.0))
-        .unwrap();
     settings
 }
 

@@ -10,7 +10,7 @@ use crate::{
 /// Share of its range by which a reading of new samples may be outside of the range of this many: a tenth, and more where the
 /// range of few samples is exceeded by others of the same kind.
 pub(super) fn margin(samples: usize) -> f64 {
-    (10.0 / samples as f64).max(0.1)
+    (20.0 / samples as f64).max(0.1)
 }
 
 /// Samples with the features of a memory as readings.

@@ -30,13 +30,14 @@ impl Judge {
     /// Number of blocks, or sets of groups.
     const FOLDS: usize = 5;
     /// Number of samples below which they are divided repeatedly, and number of divisions.
-    const FEW: (usize, usize) = (40, 4);
+    pub(super) const FEW: usize = 40;
+    const DIVISIONS: usize = 4;
 
     /// Divides the samples by their rule.
     pub(super) fn new(samples: &AutoSamples<'_>, seed: Seed) -> Result<Self, RunError> {
         let set = samples.set;
-        let is_few = set.samples() < Self::FEW.0 && samples.by != SplitBy::Time;
-        let count = if is_few { Self::FEW.1 } else { 1 };
+        let is_few = set.samples() < Self::FEW && samples.by != SplitBy::Time;
+        let count = if is_few { Self::DIVISIONS } else { 1 };
         let divide = |repeat| folds(samples, Self::FOLDS, nth_seed(seed, repeat));
         let mut truth = set.targets().to_owned();
         for _ in 1..count {

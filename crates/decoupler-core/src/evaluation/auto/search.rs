@@ -331,7 +331,12 @@ impl Search<'_> {
 
     /// Tries networks: numbers of hidden nodes, then scaling, method and regularisation of the best.
     fn try_networks(&mut self, features: &Features, inputs: InputChoice) -> Result<(), RunError> {
-        let first = FIRST_HIDDEN[usize::from(self.is_wide)];
+        let is_few = self.judge.samples() < Judge::FEW;
+        let first = FIRST_HIDDEN[usize::from(self.is_wide && !is_few)];
+        let mut inputs = inputs;
+        if is_few && self.fixed.scaling.is_none() && features.set.channels() > self.judge.samples() {
+            inputs.scaling = ScalingChoice::Whitening;
+        }
         let mut settings = RunSettings {
             inputs,
             hidden: self.fixed.hidden.unwrap_or(first),
@@ -354,7 +359,11 @@ impl Search<'_> {
         let best = self.settings().ok_or(TrainingError::NothingVaries)?;
         if self.fixed.hidden.is_none() {
             let hidden = |hidden| with(best, |settings| settings.hidden = hidden);
-            let more = HIDDEN.into_iter().filter(|&hidden| hidden > first).map(hidden);
+            let largest = if is_few { 2 * first } else { HIDDEN[HIDDEN.len() - 1] };
+            let more = HIDDEN
+                .into_iter()
+                .filter(|&hidden| hidden > first && hidden <= largest)
+                .map(hidden);
             if !self.try_while_better(features, more)? {
                 let fewer = HIDDEN.into_iter().rev().filter(|&hidden| hidden < first).map(hidden);
                 self.try_while_better(features, fewer)?;

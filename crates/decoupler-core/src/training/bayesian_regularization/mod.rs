@@ -10,7 +10,6 @@ use super::{
     Evaluation, Examples, RegularizationSettings, StopReason,
     method::{Algorithm, MethodState, add_step},
     normal_equations::{Classes, NormalEquations, Plan, class_sizes},
-    trainer::correlation_time,
 };
 use crate::network::Mlp;
 
@@ -40,11 +39,6 @@ use crate::network::Mlp;
 /// weights of the hidden layer, which all targets determine together, are shared among the γₜ in proportion to the squares of
 /// these output weights.
 ///
-/// Errors of neighbouring frames of a recording are correlated: n of them carry only as much information as n/τ
-/// independent errors, where τ is their [`correlation_time`]. It is measured once, at
-/// [`RegularizationSettings::correlation_epoch`]; from then on α/β is that of n/τ errors of the same size, since a
-/// posterior that treats every frame as new evidence fits the noise.
-///
 /// The recorded gradient is that of F / (β n), which vanishes at the minimum of F. The field's toolbox disables
 /// validation stops for this method; here they apply as for every other method.
 pub(super) struct BayesianRegularization {
@@ -69,9 +63,8 @@ pub(super) struct BayesianRegularization {
     scaled: Mlp,
 }
 
-/// State of Bayesian regularisation.
+/// State of Bayesian regularisation. Fields of version 0.1.0 are ignored.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct BayesianState {
     mu: f64,
     /// α, the weight of Σw² of the first group.
@@ -83,12 +76,6 @@ pub struct BayesianState {
     /// The groups after the first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     further: Vec<GroupState>,
-    /// Number of epochs so far.
-    #[serde(default)]
-    epochs: usize,
-    /// τ, once measured.
-    #[serde(default)]
-    correlation_time: Option<f64>,
     /// Noise level and γₜ of each target; empty if all have the same noise level.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     targets: Vec<TargetState>,
@@ -111,9 +98,6 @@ struct GroupState {
     alpha: f64,
     effective_parameters: f64,
 }
-
-/// Maximum lag in samples; the sum of the correlations ends at the first that is not positive.
-const MAX_LAG: usize = 50;
 
 impl BayesianRegularization {
     /// Starts with γ = N, as if the data determined all weights.
@@ -154,8 +138,6 @@ impl BayesianRegularization {
                 beta: 1.0,
                 effective_parameters: weights as f64,
                 further: (1..settings.groups as usize).map(group).collect(),
-                epochs: 0,
-                correlation_time: None,
                 targets: vec![target; if has_own_noise { outputs } else { 0 }],
             },
             precisions: vec![1.0; outputs],
@@ -199,10 +181,6 @@ impl Algorithm for BayesianRegularization {
         self.update_precisions(mlp);
         self.gather(mlp);
         self.measure_effective_parameters();
-        self.state.epochs += 1;
-        if self.state.epochs == self.settings.correlation_epoch as usize {
-            self.state.correlation_time = Some(correlation_time(mlp, examples, MAX_LAG));
-        }
         self.update_weighting();
         Ok(self.regularized())
     }

@@ -8,48 +8,6 @@ use crate::{
     training::{ExampleSets, Method, StoppingRules, Trainer, TrainingSettings, normal_equations::tests::dense},
 };
 
-/// Returns the effective number of parameters after 60 epochs on a curve with autoregressive noise.
-fn effective_parameters(memory: f64, correlation_epoch: f64) -> f64 {
-    let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let inputs = Array2::from_shape_fn((300, 1), |(sample, _)| (sample as f64 / 150.0) - 1.0);
-    let mut noise = 0.0;
-    let targets = inputs.mapv(|x: f64| {
-        noise = memory * noise + (1.0_f64 - memory * memory).sqrt() * rng.random_range(-0.5..0.5);
-        (3.0 * x).sin() + noise
-    });
-    let shape = Shape {
-        inputs: 1,
-        hidden: 10,
-        outputs: 1,
-    };
-    let problem = ExampleSets {
-        training: Examples::new(inputs.view(), targets.view()),
-        validation: None,
-        test: None,
-    };
-    let settings = TrainingSettings {
-        method: Method::BayesianRegularization(RegularizationSettings {
-            correlation_epoch,
-            ..RegularizationSettings::default()
-        }),
-        stopping: StoppingRules {
-            epochs: 60,
-            ..StoppingRules::default()
-        },
-    };
-    let mut trainer = Trainer::new(nguyen_widrow(shape, &mut rng), problem, settings).unwrap();
-    while trainer.step().is_none() {}
-    trainer.latest().effective_parameters.unwrap()
-}
-
-#[test]
-fn correlated_errors_determine_fewer_weights_once_the_correlation_is_measured() {
-    let (never, measured) = (effective_parameters(0.9, 0.0), effective_parameters(0.9, 20.0));
-    assert!(measured < 0.9 * never, "{measured} {never}");
-    let (never, measured) = (effective_parameters(0.0, 0.0), effective_parameters(0.0, 20.0));
-    assert!((measured / never - 1.0).abs() < 0.15, "{measured} {never}");
-}
-
 /// The training error has its minimum where the weights fit the noise; the regularised error continues to fall.
 #[test]
 fn without_validation_the_latest_weights_are_the_best() {

@@ -17,12 +17,9 @@ impl BayesianRegularization {
     fn free(&self, errors: f64, gamma: f64) -> f64 {
         /// Minimum share of the errors left to estimate the noise.
         const MIN_FREE: f64 = 0.1;
-        match self.state.correlation_time {
-            None if self.state.targets.is_empty() => errors - gamma,
-            time => {
-                let independent = errors / time.unwrap_or(1.0);
-                (independent - gamma).max(MIN_FREE * independent)
-            }
+        match self.state.targets.is_empty() {
+            true => errors - gamma,
+            false => (errors - gamma).max(MIN_FREE * errors),
         }
     }
 
