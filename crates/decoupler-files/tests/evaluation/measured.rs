@@ -105,7 +105,7 @@ fn networks_of_known_rows_use_the_row_wire_of_each_sample() {
 #[test]
 fn the_error_table_is_computed_from_the_answers() {
     let run = trained(settings(RowModel::Each), &recording(400, &[1, 3], 2), 300);
-    let answers = run.network().decouple(run.test());
+    let answers = run.decouple_test();
     let expected = TargetErrors::measure(run.test().targets(), answers.view());
     assert_eq!(run.errors().targets(), expected);
 }

@@ -28,17 +28,17 @@ pub(super) struct Judge {
 
 impl Judge {
     /// Number of blocks, or sets of groups.
-    const FOLDS: usize = 5;
+    pub(super) const FOLDS: usize = 5;
     /// Number of samples below which they are divided repeatedly, and number of divisions.
     pub(super) const FEW: usize = 40;
     const DIVISIONS: usize = 4;
 
-    /// Divides the samples by their rule.
-    pub(super) fn new(samples: &AutoSamples<'_>, seed: Seed) -> Result<Self, RunError> {
+    /// Divides the samples by their rule into up to `wanted` folds.
+    pub(super) fn new(samples: &AutoSamples<'_>, wanted: usize, seed: Seed) -> Result<Self, RunError> {
         let set = samples.set;
         let is_few = set.samples() < Self::FEW && samples.by != SplitBy::Time;
         let count = if is_few { Self::DIVISIONS } else { 1 };
-        let divide = |repeat| folds(samples, Self::FOLDS, nth_seed(seed, repeat));
+        let divide = |repeat| folds(samples, wanted, nth_seed(seed, repeat));
         let mut truth = set.targets().to_owned();
         for _ in 1..count {
             truth.append(ndarray::Axis(0), set.targets()).expect("the same targets");

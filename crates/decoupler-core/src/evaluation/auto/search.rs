@@ -115,7 +115,7 @@ pub fn choose_settings(
     job: &Job<'_>,
     on_progress: &mut dyn FnMut(AutoProgress),
 ) -> Result<AutoChoice, RunError> {
-    let judge = Judge::new(samples, base.seed)?;
+    let judge = Judge::new(samples, Judge::FOLDS, base.seed)?;
     if judge.variances.iter().all(|variance| *variance == 0.0) {
         return Err(TrainingError::NothingVaries.into());
     }
@@ -211,11 +211,14 @@ impl Search<'_> {
                 self.judge.variances[target] = 0.0;
             }
         }
-        let is_taken = |(_, with): &&(Features, Member)| {
-            self.fixed.memory.is_some()
-                || self
-                    .judge
-                    .is_clearly_better(&with.answers, &members[1].answers, past.len())
+        // Ridge regression takes little time, and more folds show more clearly whether a memory is better.
+        let mut finer = Judge::new(self.samples, 2 * Judge::FOLDS, self.base.seed)?;
+        finer.variances.clone_from(&self.judge.variances);
+        let of_plain = plain.ridge(&finer, quantity)?.0;
+        let is_taken = |(with, _): &&(Features, Member)| {
+            let of_memory = || Some(with.ridge(&finer, Quantity::Raw).ok()?.0);
+            let is_better = |answers: Array2<f64>| finer.is_clearly_better(&answers, &of_plain, past.len());
+            self.fixed.memory.is_some() || of_memory().is_some_and(is_better)
         };
         let error = |(_, with): &(Features, Member)| self.judge.error(&with.answers).0;
         let taken = past

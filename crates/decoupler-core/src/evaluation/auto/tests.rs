@@ -330,7 +330,7 @@ fn given_settings_are_kept_and_groups_are_not_divided() {
         past: None,
         by: SplitBy::Group,
     };
-    let judge = judge::Judge::new(&samples, settings.seed).unwrap();
+    let judge = judge::Judge::new(&samples, judge::Judge::FOLDS, settings.seed).unwrap();
     assert_eq!(judge.parts(), choice.record.folds);
     for (outside, inside, _) in judge.divisions() {
         assert!(
