@@ -7,8 +7,8 @@ use std::{
 
 use decoupler_core::{
     dataset::History,
-    decoupling::{Precision, Program, ProgramDecoder},
-    evaluation::{Intervals, RunSettings, auto::Blend},
+    decoupling::{Blend, Precision, Program, ProgramDecoder},
+    evaluation::{Intervals, RunSettings},
     network::Networks,
     problem::{Channel, Problem},
     text::counted,

@@ -8,8 +8,8 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Division, Split, SplitBy},
-    decoupling::ProgramDecoder,
-    evaluation::{Begin, Intervals, Run, RunSettings, TestErrors, auto::Blend},
+    decoupling::{Blend, ProgramDecoder},
+    evaluation::{Begin, Intervals, Run, RunSettings, TestErrors},
     job::Job,
     network::Networks,
     problem::{Channel, Problem},

@@ -137,8 +137,8 @@ terms! { NETWORK_TERMS:
     STARTS = "Starts",
         "Number of trainings from different random weights, side by side. Several starts show how much the results vary.";
     AUTO = "Automatic settings",
-        "Hidden nodes, memory, scaling, method, epochs and a committee of networks are chosen by cross-validation on the \
-         training samples, in about a minute. Turned off, the form begins with the settings that were chosen.";
+        "Memory, scaling, hidden nodes, method and epochs are chosen by cross-validation on the training samples, in about a \
+         minute; the answer is the best combination of ridge, kernel ridge and networks. Turned off, the form begins with the settings that were chosen.";
     COMBINE = "Combine starts",
         "Keep the start with the lowest validation error, or average the answers of all starts: their mean is one network \
          with the hidden nodes of all, and varies less than any of them.";

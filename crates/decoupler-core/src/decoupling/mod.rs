@@ -11,6 +11,7 @@
 //! readings, without ground truth.
 
 mod affine_map;
+mod blend;
 mod decoder;
 mod equations;
 mod kind;
@@ -21,6 +22,7 @@ mod ridge;
 mod standardised;
 mod takagi_sugeno;
 
+pub use blend::Blend;
 pub use decoder::{DecodeError, Decoder, SolvedRows, decode_set, resistance_residual};
 pub(crate) use equations::GaussianPrior;
 pub use equations::{Estimate, Estimator, LARGEST_ERROR, NewtonStop, Solution};

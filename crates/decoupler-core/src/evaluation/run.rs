@@ -10,11 +10,11 @@ use thiserror::Error;
 
 use super::{
     Baselines, Combination, Coverage, Intervals, RunSettings, Scores, StartRecord, StartTrainer, TestErrors,
-    auto::Blend, starts::lowest,
+    starts::lowest,
 };
 use crate::{
     dataset::{Dataset, DatasetError, PerRow},
-    decoupling::{DecodeError, Precision, Program, ProgramDecoder},
+    decoupling::{Blend, DecodeError, Precision, Program, ProgramDecoder},
     identifiability::IdentifiabilityError,
     job::{Cancelled, Job},
     machine::MemoryBudget,

@@ -2,8 +2,8 @@ use std::{fmt::Display, io::Write as _, path::Path, sync::Arc, time::Duration};
 
 use decoupler_core::{
     dataset::{Dataset, MemoryStream, Simulation},
-    decoupling::{Precision, Program, ProgramDecoder},
-    evaluation::{ErrorTable, Intervals, Run, RunSettings, Scores, StartRecord, TestErrors, auto::Blend},
+    decoupling::{Blend, Precision, Program, ProgramDecoder},
+    evaluation::{ErrorTable, Intervals, Run, RunSettings, Scores, StartRecord, TestErrors},
     job::Job,
     live::{DriftReference, NoDriftMonitor},
     network::{DecouplingNetwork, Networks},

@@ -9,10 +9,8 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Memory},
-    evaluation::{
-        Intervals,
-        auto::{AutoRecord, Blend},
-    },
+    decoupling::Blend,
+    evaluation::{Intervals, auto::AutoRecord},
 };
 use serde::{Deserialize, Serialize};
 

@@ -14,7 +14,6 @@
 //! The budget counts estimated multiplications, never seconds of a clock, so that the same samples and seed give the same
 //! choice on every machine. Test samples take no part.
 
-mod blend;
 mod channels;
 mod features;
 mod folded_training;
@@ -23,7 +22,6 @@ mod search;
 mod spans;
 #[cfg(test)]
 mod tests;
-mod weights;
 
 use std::fmt;
 
@@ -33,12 +31,12 @@ use serde::{Deserialize, Serialize};
 use super::{Initialization, RunSettings};
 use crate::{
     dataset::{Dataset, History, Memory, Span, SplitBy},
+    decoupling::Blend,
     network::{InputChoice, Quantity, ScalingChoice},
     problem::Channel,
     text::{format_below_one, format_percent},
     training::Method,
 };
-pub use blend::Blend;
 pub use channels::dead_channels;
 pub use search::choose_settings;
 

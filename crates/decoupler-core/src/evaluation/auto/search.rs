@@ -8,7 +8,6 @@ use super::{
     folded_training::{FoldedTraining, residual, training_multiplications},
     judge::Judge,
     spans::memories,
-    weights::convex_weights,
 };
 use crate::{
     dataset::{Memory, Split, SplitBy},
@@ -16,6 +15,7 @@ use crate::{
     job::Job,
     machine::MemoryBudget,
     network::{InputChoice, InputScaling, Inputs, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
+    numerics::convex_weights,
     scene::NoiseSource,
     text::format_percent,
     training::{Damping, Method, RegularizationSettings, TrainingError},

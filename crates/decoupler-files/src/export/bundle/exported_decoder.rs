@@ -2,8 +2,8 @@ use std::sync::Arc;
 
 use decoupler_core::{
     dataset::{Dataset, GAP, PerRow, Seed, Simulation, Stream},
-    decoupling::{DecoderKind, Function, NodeId, Operation, Precision, Program, decode_set},
-    evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, TargetErrors, TestErrors, auto::Blend},
+    decoupling::{Blend, DecoderKind, Function, NodeId, Operation, Precision, Program, decode_set},
+    evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
     network::{MinMax, Networks},
     problem::{Channel, Problem},
 };

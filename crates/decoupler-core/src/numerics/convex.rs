@@ -6,7 +6,7 @@ use ndarray::{Array2, ArrayView1};
 ///
 /// The members are few, so every set of members with weights above 0 is tried: the solution is the best of those whose
 /// equations G w = λ 1, Σ w = 1 have weights above 0, with G the products of the errors of the members.
-pub(super) fn convex_weights(answers: &Array2<f64>, truth: ArrayView1<'_, f64>) -> Vec<f64> {
+pub(crate) fn convex_weights(answers: &Array2<f64>, truth: ArrayView1<'_, f64>) -> Vec<f64> {
     let members = answers.ncols();
     let mut errors = answers.clone();
     errors.columns_mut().into_iter().for_each(|mut column| column -= &truth);

@@ -1,9 +1,7 @@
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    decoupling::{Precision, Program},
-    network::Networks,
-};
+use super::{Precision, Program};
+use crate::network::Networks;
 
 /// What a choice of settings answers with: for each target a convex combination of decoders that were fitted to the training
 /// samples, the network of the run among them. Its weights are those with the smallest held-out error.
