@@ -66,7 +66,7 @@ enum Fit {
     /// A kernel of this shape, with this many centres.
     Kernel(KernelShape, usize),
     /// A network of these settings; on what ridge regression leaves unless it is the last member.
-    Network(RunSettings),
+    Network(Box<RunSettings>),
 }
 
 /// A candidate that was cross-validated.
@@ -156,11 +156,11 @@ impl Search<'_> {
         let best = self.best().ok_or(TrainingError::NothingVaries)?;
         let network = self.finalist(&features, best)?;
         self.record.chosen = network.place;
-        if let Fit::Network(settings) = network.fit {
+        if let Fit::Network(settings) = &network.fit {
             let alone = RunSettings {
                 starts: 1,
                 initialization: Initialization::Random,
-                ..settings
+                ..**settings
             };
             let limit = 0.5 * self.left(&features, &alone);
             members.extend(self.try_network(&features, (alone, true), (limit, MIN_EPOCHS))?);
@@ -355,7 +355,7 @@ impl Search<'_> {
         if !self.is_wide {
             // A regression on nearly as many inputs as samples is worse to begin with than random weights.
             begun.push(with(settings, |settings| {
-                settings.initialization = Initialization::Ridge
+                settings.initialization = Initialization::Ridge;
             }));
         }
         self.try_all(features, begun, 0.45)?;
@@ -376,7 +376,7 @@ impl Search<'_> {
         let mut variants = Vec::new();
         if self.fixed.scaling.is_none() {
             variants.push(with(best, |settings| {
-                settings.inputs.scaling = ScalingChoice::Whitening
+                settings.inputs.scaling = ScalingChoice::Whitening;
             }));
         }
         if self.fixed.method.is_none() {
@@ -396,7 +396,7 @@ impl Search<'_> {
     /// Settings of the best network so far.
     fn settings(&self) -> Option<RunSettings> {
         match self.best()?.fit {
-            Fit::Network(settings) => Some(settings),
+            Fit::Network(settings) => Some(*settings),
             _ => None,
         }
     }
@@ -507,7 +507,7 @@ impl Search<'_> {
         let epochs = self.fixed.epochs.unwrap_or(epoch);
         let mut settings = settings;
         settings.training.stopping.epochs = epochs;
-        let fit = Fit::Network(settings);
+        let fit = Fit::Network(Box::new(settings));
         let member = self.keep(features, settings.inputs, model(epochs), (fit, answers), used);
         self.record.tried[member.place].is_cut_off = is_cut_off;
         Ok(Some(member))
@@ -632,9 +632,10 @@ impl Search<'_> {
     fn finalist(&mut self, features: &Features, best: Member) -> Result<Member, RunError> {
         /// Epochs beyond the best.
         const BEYOND: usize = 5;
-        let Fit::Network(settings) = best.fit else {
+        let Fit::Network(settings) = &best.fit else {
             return Ok(best);
         };
+        let settings = **settings;
         let epochs = settings.training.stopping.epochs + BEYOND;
         // Each is trained once without every fold, and once on all samples.
         let of_one = self.epoch_of_all(features, &settings) * (epochs * self.judge.parts()) as f64;
@@ -675,9 +676,10 @@ impl Search<'_> {
         }
         self.record.combined = Some(self.judge.error(&answers).0);
         let network = members.len() - 1;
-        let Fit::Network(mut settings) = members[network].fit else {
+        let Fit::Network(settings) = &members[network].fit else {
             return Err(TrainingError::NothingVaries.into());
         };
+        let mut settings = **settings;
         settings.combine = Combination::Mean;
         let mut others = Vec::new();
         for (member, weights) in members[..network].iter().zip(weights.rows()) {
@@ -753,7 +755,7 @@ impl Search<'_> {
                     memory: self.memory,
                     ..RunSets::without_test(Split { training, validation })
                 };
-                let mut run = Run::new(*settings, sets, Begin::Initialize, self.job)?;
+                let mut run = Run::new(**settings, sets, Begin::Initialize, self.job)?;
                 run.finish(self.job)?;
                 let ones = vec![1.0; features.set.outputs()];
                 let network = run.network().program(Precision::Double);
