@@ -34,6 +34,12 @@ impl Features {
         Some(Self { memory, set })
     }
 
+    /// This quantity of the features, or raw features if it is not defined for all.
+    pub(super) fn quantity(&self, wanted: Quantity) -> Quantity {
+        let is_defined = self.set.readings().iter().all(|&value| wanted.accepts(value));
+        if is_defined { wanted } else { Quantity::Raw }
+    }
+
     /// Readings of the samples `inside`, limited as they will be in use: to the range of those outside, extended by a margin.
     pub(super) fn held_out(&self, outside: &[usize], inside: &[usize], quantity: Quantity) -> Array2<f64> {
         let all = self.set.readings();

@@ -192,13 +192,15 @@ impl Search<'_> {
         members.extend(self.try_kernels(&plain, inputs)?);
         let tried = match &self.fixed.memory {
             Some(memory) => Vec::from_iter(Some(memory.clone()).filter(|memory| !memory.is_empty())),
-            None if self.tries_memory() => memories(self.samples),
+            // Differences have no logarithms and reciprocals.
+            None if self.tries_memory() => memories(self.samples, quantity == Quantity::Raw),
             None => Vec::new(),
         };
         let mut past = Vec::new();
         for memory in tried {
             if let Some(features) = Features::of(self.samples, &memory) {
-                past.extend(self.try_ridge(&features, Quantity::Raw)?.map(|ridge| (features, ridge)));
+                let quantity = features.quantity(quantity);
+                past.extend(self.try_ridge(&features, quantity)?.map(|ridge| (features, ridge)));
             }
         }
         let varying = self.judge.variances.clone();
@@ -216,7 +218,7 @@ impl Search<'_> {
         finer.variances.clone_from(&self.judge.variances);
         let of_plain = plain.ridge(&finer, quantity)?.0;
         let is_taken = |(with, _): &&(Features, Member)| {
-            let of_memory = || Some(with.ridge(&finer, Quantity::Raw).ok()?.0);
+            let of_memory = || Some(with.ridge(&finer, with.quantity(quantity)).ok()?.0);
             let is_better = |answers: Array2<f64>| finer.is_clearly_better(&answers, &of_plain, past.len());
             self.fixed.memory.is_some() || of_memory().is_some_and(is_better)
         };
@@ -229,7 +231,7 @@ impl Search<'_> {
         let mut compared = members.clone();
         let mut features = plain;
         if let Some((with, ridge)) = taken.cloned() {
-            (features, inputs.quantity) = (with, Quantity::Raw);
+            (inputs.quantity, features) = (with.quantity(quantity), with);
             members = vec![self.mean(&features)?, ridge];
             members.extend(self.try_kernels(&features, inputs)?);
         }

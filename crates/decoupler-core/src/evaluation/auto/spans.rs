@@ -3,7 +3,7 @@ use crate::dataset::{Memory, Span};
 
 /// Returns memories to try: exponential averages with time constants from a few samples to a tenth of the recording, since
 /// some sensors forget within a moment and others creep for hours.
-pub(super) fn memories(samples: &AutoSamples<'_>) -> Vec<Memory> {
+pub(super) fn memories(samples: &AutoSamples<'_>, differences: bool) -> Vec<Memory> {
     /// Shortest time constant in samples.
     const SHORTEST: f64 = 3.0;
     /// Number of time constants, spread evenly in their logarithm.
@@ -23,7 +23,7 @@ pub(super) fn memories(samples: &AutoSamples<'_>) -> Vec<Memory> {
     let sets: [&[i32]; 5] = [&[0, 1], &[1, 2], &[2, 3], &[3, 4], &[0, 2, 4]];
     let memory = |places: &[i32]| Memory {
         averages: places.iter().map(|place| span(*place)).collect(),
-        differences: true,
+        differences,
         interval_s,
         ..Memory::default()
     };
