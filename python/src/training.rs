@@ -5,8 +5,8 @@ use std::sync::{Mutex, PoisonError};
 use decoupler_core::{
     dataset::{Dataset, Seed, Split, SplitBy},
     evaluation::{
-        Begin, Combination, Initialization, Intervals, Measured, NoIntervals, Run, RunError, RunSets, RunSettings,
-        TrainingSize, Workload,
+        Combination, Initialization, Intervals, NoIntervals, Run, RunError, RunSets, RunSettings, TrainingSize,
+        Workload,
     },
     job::Job,
     network::{Quantity, ScalingChoice},
@@ -61,7 +61,7 @@ impl Settings {
         } else {
             RowModel::Shared
         };
-        let mut settings = RunSettings::from(Measured { rows });
+        let mut settings = RunSettings::measured(rows);
         settings.choose_method(self.method()?);
         let method = &mut settings.training.method;
         for (name, value) in self.method_settings.iter().flatten() {
@@ -241,12 +241,7 @@ pub fn train(
         .check_memory(memory_budget())
         .map_err(value_error)?;
     let mut run = detached(py, move || {
-        Run::new(
-            run_settings,
-            RunSets::without_test(split),
-            Begin::Initialize,
-            &Job::UNINTERRUPTED,
-        )
+        Run::new(run_settings, RunSets::without_test(split), None, &Job::UNINTERRUPTED)
     })?;
     let mut interruption = step_to_the_end(py, &mut run, callback.as_ref());
     run.stop();

@@ -11,16 +11,13 @@ use super::{
 use decoupler_core::{
     dataset::SplitBy,
     decoupling::Precision,
-    evaluation::{
-        ErrorTable, RunSets, TradeOffCost, TradeOffLevel, TradeOffPoint, decoded_unit, fastest_under,
-        most_accurate_under,
-    },
+    evaluation::{ErrorTable, RunSets, TradeOffPoint, decoded_unit, fastest_under, most_accurate_under},
     problem::Problem,
     sensor::ArrayScale,
 };
 use decoupler_files::{
     export::{Table, TableColumn, error_table, format_number, trade_off_summary},
-    figure::point_name,
+    figure::{TradeOffCost, TradeOffLevel, point_name},
     import::Recordings,
 };
 

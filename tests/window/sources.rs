@@ -5,7 +5,7 @@ use std::{fmt::Write as _, fs, path::Path, sync::Arc};
 use decoupler::window::{Effect, Phase, SourceKind};
 use decoupler_core::{
     dataset::Division,
-    evaluation::{Begin, ErrorMeasure, Measured, Run, RunSettings},
+    evaluation::{ErrorMeasure, Run, RunSettings},
     job::Job,
     scene::RowModel,
 };
@@ -56,7 +56,7 @@ pub(crate) fn trained_small(source: SourceKind) -> Opened {
 
 /// Settings of a small training on a recording.
 pub(crate) fn small_settings() -> RunSettings {
-    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let mut settings = RunSettings::measured(RowModel::Shared);
     settings.hidden = 6;
     settings.training = small().training;
     settings
@@ -129,7 +129,7 @@ fn setup(folder: &Path, name: &str, text: &str, targets: &[&str]) -> Setup {
 /// Returns a run of the library that has begun.
 pub(crate) fn begun(setup: &Setup) -> Run {
     let sets = setup.sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
-    sets.run(setup, Begin::Initialize, &Job::UNINTERRUPTED).unwrap()
+    sets.run(setup, None, &Job::UNINTERRUPTED).unwrap()
 }
 
 /// The same, trained to the end.

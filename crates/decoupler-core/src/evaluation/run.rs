@@ -13,7 +13,7 @@ use super::{
     starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, DatasetError, PerRow, SimulationError, SplitBy},
+    dataset::{Dataset, DatasetError, PerRow, Seed, SimulationError, SplitBy},
     decoupling::{DecodeError, FitError},
     identifiability::IdentifiabilityError,
     job::{Cancelled, Job},
@@ -189,7 +189,7 @@ impl Run {
         self.starts.par_iter().map(record).collect()
     }
 
-    /// Returns the states of all trainings for [`Begin::Resume`](super::Begin::Resume): start by start, and in each row by row.
+    /// Returns the states of all trainings for [`Self::new`]: start by start, and in each row by row.
     pub fn states(&self) -> Vec<TrainerState> {
         self.starts
             .iter()
@@ -426,6 +426,16 @@ pub enum RunError {
         found: usize,
         /// Number of trainings expected.
         expected: usize,
+    },
+    /// A trial of an experiment failed.
+    #[error("seed {seed}: {source}")]
+    Trial {
+        /// Seed of the trial.
+        seed: Seed,
+        /// Index of the repeat of a cross-validation, from 0.
+        repeat: usize,
+        /// Reason for the failure.
+        source: Box<RunError>,
     },
     /// An axis of an experiment has no values.
     #[error("there are no values for {0}: give at least one")]

@@ -6,14 +6,14 @@ use decoupler_core::{
     job::Job,
     live::{DriftReference, NoDriftMonitor},
     network::{DecouplingNetwork, Networks},
-    problem::{Problem, SavedProblem, TargetPosition},
+    problem::{Problem, TargetPosition},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use serde_json::value::{RawValue, to_raw_value};
 
 use super::{
-    AtomicFile, DocumentError, DocumentKind, TrainingRecord, WriteError,
+    AtomicFile, DocumentError, DocumentKind, SavedProblem, TrainingRecord, WriteError,
     atomic::{LARGEST_BYTES, too_large},
     document::PROGRAM,
     unfinished::folder_of,

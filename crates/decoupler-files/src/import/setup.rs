@@ -2,12 +2,13 @@ use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use decoupler_core::{
     evaluation::{
-        Begin, Intervals, NoIntervals, Run, RunError, RunSets, RunSettings,
-        experiments::{ExperimentRecording, RecordedSamples, TrialSamples},
+        Intervals, NoIntervals, Run, RunError, RunSets, RunSettings,
+        experiments::{ExperimentRecording, TrialSamples},
     },
     job::{Cancelled, Job},
     live::{DriftReference, NoDriftMonitor},
     text::clean_name,
+    training::TrainerState,
 };
 use ndarray::{Axis, Slice};
 use thiserror::Error;
@@ -199,12 +200,12 @@ impl Setup {
         };
         self.check_files()?;
         let (recording, test) = unless_cancelled(job, plan.recordings(folder, &mut watch(job, on_progress)))?;
-        Ok(TrialSamples::Recorded(RecordedSamples {
+        Ok(TrialSamples::Recorded {
             problem: Arc::new(recording.problem()),
             set: Arc::new(recording.set),
             test: test.map(|test| Arc::new(test.set)),
             memory: memory_budget(),
-        }))
+        })
     }
 }
 
@@ -261,8 +262,8 @@ impl SetupSets {
     ///
     /// # Errors
     /// As [`Run::with_baselines`].
-    pub fn run(&self, setup: &Setup, begin: Begin, job: &Job<'_>) -> Result<Run, RunError> {
-        Run::with_baselines(setup.settings, self.sets.clone(), begin, job)
+    pub fn run(&self, setup: &Setup, states: Option<Vec<TrainerState>>, job: &Job<'_>) -> Result<Run, RunError> {
+        Run::with_baselines(setup.settings, self.sets.clone(), states, job)
     }
 
     /// Describes the training readings of a recording, by which a later drift is detected.

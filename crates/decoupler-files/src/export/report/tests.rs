@@ -10,7 +10,7 @@ use crate::{
 use decoupler_core::{
     dataset::SplitBy,
     decoupling::{DecoderKind, Precision},
-    evaluation::{Begin, DecoderSet, Measured, Run, RunSets, RunSettings},
+    evaluation::{DecoderSet, Run, RunSets, RunSettings},
     job::Job,
     machine::MemoryBudget,
     scene::{Indenter, Loading, RowModel},
@@ -164,11 +164,11 @@ fn recorded_run(folder: &Path) -> (Run, NetworkFile) {
         },
         ..Plan::default()
     };
-    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let mut settings = RunSettings::measured(RowModel::Shared);
     (settings.hidden, settings.training.stopping.epochs) = (2, 5);
     let setup = Setup::recording(settings, plan);
     let sets = setup.sets(folder, &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
-    let mut run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED).unwrap();
+    let mut run = sets.run(&setup, None, &Job::UNINTERRUPTED).unwrap();
     while run.step().is_none() {}
     let file = NetworkFile::from_run(&run, sets.recorded()).unwrap();
     (run, file)
@@ -249,7 +249,7 @@ fn the_command_of_a_recording_names_files_columns_and_division() {
         ..Plan::default()
     };
     plan.division.by = SplitBy::Group;
-    let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let settings = RunSettings::measured(RowModel::Shared);
     let command = |plan: &Plan, settings, recipe: Option<&str>| {
         let setup = Setup::recording(settings, plan.clone());
         train_command(&setup, recipe.map(Path::new)).map_err(|gap| gap.to_string())
