@@ -4,10 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use decoupler_core::{
     dataset::{Dataset, Seed, Split, SplitBy},
-    evaluation::{
-        Combination, Initialization, Intervals, NoIntervals, Run, RunError, RunSets, RunSettings, TrainingSize,
-        Workload,
-    },
+    evaluation::{Combination, Initialization, Intervals, Run, RunError, RunSets, RunSettings, TrainingSize, Workload},
     job::Job,
     network::{Quantity, ScalingChoice},
     problem::{Channel, Problem},
@@ -311,7 +308,7 @@ fn calibrate(
     settings: &RunSettings,
     set: &Dataset,
     by: SplitBy,
-) -> PyResult<Result<Intervals, NoIntervals>> {
+) -> PyResult<Result<Intervals, RunError>> {
     let interruption = Mutex::new(None);
     let calibrated = detached(py, || {
         let is_cancelled = || {
@@ -328,7 +325,14 @@ fn calibrate(
         return Err(signal);
     }
     match calibrated {
-        Err(NoIntervals::Run(error)) => Err(value_error(error)),
+        Err(error)
+            if !matches!(
+                error,
+                RunError::NoIntervals | RunError::Division(_) | RunError::Cancelled(_)
+            ) =>
+        {
+            Err(value_error(error))
+        }
         calibrated => Ok(calibrated),
     }
 }

@@ -230,8 +230,8 @@ fn print_folds(
             "{} samples, each tested by a network trained without its fold: {} folds by {}\n",
             report.samples, report.folds, report.split
         )?;
-        let table = ErrorTable::of_scores(&problem, &scores, None);
-        write!(out, "{}", error_table(&table).aligned())?;
+        let tables = ErrorTable::of_scores(&problem, &scores, None);
+        write!(out, "{}", error_table(&tables).aligned())?;
         write_warnings(&report.warnings, out)
     })
 }

@@ -305,7 +305,7 @@ impl MeasuredLevel {
     fn target_table(&self, problem: &Problem) -> Table {
         let points = &self.level.points;
         let errors = points.iter().map(|point| ("", &point.report.errors));
-        let mut table = error_table(&ErrorTable::new(problem, &Vec::from_iter(errors)));
+        let mut table = error_table(&ErrorTable::of_errors(problem, &Vec::from_iter(errors)));
         // The rows of each target are the points in their order.
         for (row, point) in table.rows.iter_mut().zip(points.iter().cycle()) {
             row[1] = point_name(point).into();

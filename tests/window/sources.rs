@@ -149,14 +149,14 @@ pub(crate) fn with_epochs(setup: &Setup, epochs: usize) -> Setup {
 /// Returns the figures of the network in the error table, formatted as in the window: `network, Z %: 2.28`, `x (mm), network, RMSE: 0.01`.
 pub(crate) fn network_figures(run: &Run) -> Vec<String> {
     let (problem, scores) = (run.problem(), run.scores().unwrap());
-    let table = decoupler_core::evaluation::ErrorTable::of_scores(problem, &scores, None);
+    let tables = decoupler_core::evaluation::ErrorTable::of_scores(problem, &scores, None);
     let mut figures = Vec::new();
-    for block in &table.blocks {
-        let caption = block
+    for table in &tables {
+        let caption = table
             .target
             .as_ref()
             .map_or_else(String::new, |target| format!("{}, ", target.title()));
-        let row = block.rows.iter().find(|row| row.name == "network").unwrap();
+        let row = table.rows.iter().find(|row| row.name == "network").unwrap();
         for (measure, error) in table.measures.iter().zip(&row.errors) {
             let heading = match measure {
                 ErrorMeasure::ZPercent => "Z %",

@@ -15,13 +15,13 @@ use super::{
 use crate::{
     dataset::{Dataset, DatasetError, PerRow, Seed, SimulationError, SplitBy},
     decoupling::{DecodeError, FitError},
-    identifiability::IdentifiabilityError,
     job::{Cancelled, Job},
     machine::MemoryBudget,
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, NetworkError, Networks},
     problem::Problem,
     scene::SceneError,
     sensor::SensorError,
+    text::counted,
     training::{
         Method, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingDefect, TrainingError,
         check_width,
@@ -427,6 +427,22 @@ pub enum RunError {
         /// Number of trainings expected.
         expected: usize,
     },
+    /// No target has enough effective samples for an interval.
+    #[error(
+        "there are fewer than 9 independent training samples (their errors are correlated in time or within groups)"
+    )]
+    NoIntervals,
+    /// The number of saved intervals is not the number of targets.
+    #[error("{} for {}", counted(*.found, "interval"), counted(*.expected, "target"))]
+    IntervalCount {
+        /// Number of intervals.
+        found: usize,
+        /// Number of targets.
+        expected: usize,
+    },
+    /// A saved half-width is negative or not finite, or its answers are not ascending.
+    #[error("the interval of target {0} is not valid")]
+    Interval(usize),
     /// A trial of an experiment failed.
     #[error("seed {seed}: {source}")]
     Trial {
@@ -471,9 +487,6 @@ pub enum RunError {
     /// The operating system provides no threads.
     #[error("cannot start worker threads: {0}")]
     Threads(String),
-    /// A scene cannot be analysed.
-    #[error(transparent)]
-    Identifiability(#[from] IdentifiabilityError),
 }
 
 impl RunError {

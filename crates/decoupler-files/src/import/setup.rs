@@ -2,11 +2,11 @@ use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use decoupler_core::{
     evaluation::{
-        Intervals, NoIntervals, Run, RunError, RunSets, RunSettings,
+        Intervals, Run, RunError, RunSets, RunSettings,
         experiments::{ExperimentRecording, TrialSamples},
     },
     job::{Cancelled, Job},
-    live::{DriftReference, NoDriftMonitor},
+    live::{DriftReference, LiveError},
     text::clean_name,
     training::TrainerState,
 };
@@ -270,13 +270,13 @@ impl SetupSets {
     ///
     /// # Errors
     /// If they cannot be monitored, as those of an array, which are checked against its model.
-    pub fn drift_reference(&self) -> Result<DriftReference, NoDriftMonitor> {
+    pub fn drift_reference(&self) -> Result<DriftReference, LiveError> {
         let training = &self.sets.split.training;
         if self.recordings.is_none() {
-            return Err(NoDriftMonitor::NotDescribed);
+            return Err(LiveError::NotDescribed);
         }
         if training.row_wires_read().is_some() {
-            return Err(NoDriftMonitor::RowWires);
+            return Err(LiveError::RowWires);
         }
         // With a memory, the readings are followed by values from the past, which a monitor does not need.
         let channels = self.sets.problem.inputs.len();
@@ -286,7 +286,7 @@ impl SetupSets {
 
     /// Intervals of the network that is trained with chosen settings, from the held-out answers of the choice; `None` if
     /// nothing was chosen.
-    pub fn chosen_intervals(&self) -> Option<Result<Intervals, NoIntervals>> {
+    pub fn chosen_intervals(&self) -> Option<Result<Intervals, RunError>> {
         self.recorded()?.chosen_intervals.clone().map(Intervals::checked)
     }
 

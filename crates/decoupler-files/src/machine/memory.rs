@@ -34,7 +34,7 @@ MemoryBudget::User((gigabytes * 1e9) as u64);
     }
     let limit = limit.and_then(|text| text.trim().parse().ok());
     let least = [meminfo.and_then(total_bytes), limit].into_iter().flatten().min();
-    let of_system = least.map(|bytes| MemoryBudget::System(bytes));
+    let of_system = least.map(MemoryBudget::System);
     of_system.unwrap_or(MemoryBudget::Assumed(MemoryBudget::ASSUMED_BYTES))
 }
 

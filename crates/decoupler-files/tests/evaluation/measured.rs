@@ -55,8 +55,8 @@ fn a_network_learns_a_nonlinear_map_that_a_linear_map_cannot() {
     let run = trained(settings(RowModel::Shared), &recording(600, &[0], 0), 500);
     assert!(matches!(run.settings().source, Source::Measured { .. }));
     let scores = run.scores().unwrap();
-    let table = ErrorTable::of_scores(run.problem(), &scores, None);
-    for block in &table.blocks {
+    let tables = ErrorTable::of_scores(run.problem(), &scores, None);
+    for block in &tables {
         let names = Vec::from_iter(block.rows.iter().map(|row| row.name));
         assert_eq!(names, ["training mean", "ridge", "network"]);
     }

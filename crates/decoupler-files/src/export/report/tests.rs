@@ -108,7 +108,7 @@ fn a_report_contains_the_figures_of_its_run() {
                 .collect()
         })
         .collect();
-    for row in &file.error_table().blocks[0].rows {
+    for row in &file.error_table()[0].rows {
         let mut expected = vec![row.name.to_owned()];
         expected.extend(row.errors.iter().map(|error| format_number(*error)));
         assert!(rows.contains(&expected), "{expected:?} is not among {rows:#?}");
@@ -197,7 +197,7 @@ fn a_report_of_a_recording_has_its_errors_figures_and_command() {
         let cells = row.children().filter_map(|cell| cell.text().map(str::to_owned));
         Vec::from_iter(cells)
     }));
-    for block in &file.error_table().blocks {
+    for block in &file.error_table() {
         for row in &block.rows {
             let mut expected = vec![block.target.as_ref().unwrap().title(), row.name.to_owned()];
             expected.extend(row.errors.iter().map(|error| format_number(*error)));

@@ -9,7 +9,7 @@ use std::{
 
 use decoupler_core::{
     decoupling::{Decoder, ProgramDecoder},
-    live::{DriftMonitor, NoDriftMonitor},
+    live::{DriftMonitor, LiveError},
     problem::Problem,
 };
 use decoupler_files::{
@@ -47,7 +47,7 @@ pub(super) struct TargetSession {
     history: VecDeque<(f64, Arc<[f64]>)>,
     ranges: Vec<(f64, f64)>,
     outside: (Option<usize>, usize),
-    drift: Result<DriftMonitor, NoDriftMonitor>,
+    drift: Result<DriftMonitor, LiveError>,
     has_events: bool,
 }
 
