@@ -57,7 +57,8 @@ struct Record {
 
 /// The problem of a network that was trained in Python, which has no sensor.
 mod saved_problem {
-    use decoupler_core::problem::{Problem, SavedProblem};
+    use decoupler_core::problem::Problem;
+    use decoupler_files::export::SavedProblem;
     use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer, de::Error as _};
 
     pub(super) fn serialize<S: Serializer>(problem: &Problem, serializer: S) -> Result<S::Ok, S::Error> {

@@ -8,7 +8,7 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Division, Split, SplitBy},
-    evaluation::{Begin, Intervals, Run, RunSettings, TestErrors},
+    evaluation::{Intervals, Run, RunSettings, TestErrors},
     job::Job,
     network::Networks,
     problem::{Channel, Problem},
@@ -111,7 +111,7 @@ impl Saved<'_> {
             return Err("the files with the samples do not read back as the samples of fit".to_owned());
         }
         // Measures the baselines.
-        let run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED).map_err(text)?;
+        let run = sets.run(&setup, None, &Job::UNINTERRUPTED).map_err(text)?;
         let mut file = NetworkFile::from_run(&run, sets.recorded()).map_err(text)?;
         file.drift = sets.drift_reference();
         file.network = self.networks.clone();

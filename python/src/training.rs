@@ -4,10 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use decoupler_core::{
     dataset::{Dataset, Seed, Split, SplitBy},
-    evaluation::{
-        Begin, Combination, Initialization, Intervals, Measured, NoIntervals, Run, RunError, RunSets, RunSettings,
-        TrainingSize, Workload,
-    },
+    evaluation::{Combination, Initialization, Intervals, Run, RunError, RunSets, RunSettings, TrainingSize, Workload},
     job::Job,
     network::{Quantity, ScalingChoice},
     problem::{Channel, Problem},
@@ -61,7 +58,7 @@ impl Settings {
         } else {
             RowModel::Shared
         };
-        let mut settings = RunSettings::from(Measured { rows });
+        let mut settings = RunSettings::measured(rows);
         settings.choose_method(self.method()?);
         let method = &mut settings.training.method;
         for (name, value) in self.method_settings.iter().flatten() {
@@ -241,12 +238,7 @@ pub fn train(
         .check_memory(memory_budget())
         .map_err(value_error)?;
     let mut run = detached(py, move || {
-        Run::new(
-            run_settings,
-            RunSets::without_test(split),
-            Begin::Initialize,
-            &Job::UNINTERRUPTED,
-        )
+        Run::new(run_settings, RunSets::without_test(split), None, &Job::UNINTERRUPTED)
     })?;
     let mut interruption = step_to_the_end(py, &mut run, callback.as_ref());
     run.stop();
@@ -316,7 +308,7 @@ fn calibrate(
     settings: &RunSettings,
     set: &Dataset,
     by: SplitBy,
-) -> PyResult<Result<Intervals, NoIntervals>> {
+) -> PyResult<Result<Intervals, RunError>> {
     let interruption = Mutex::new(None);
     let calibrated = detached(py, || {
         let is_cancelled = || {
@@ -333,7 +325,14 @@ fn calibrate(
         return Err(signal);
     }
     match calibrated {
-        Err(NoIntervals::Run(error)) => Err(value_error(error)),
+        Err(error)
+            if !matches!(
+                error,
+                RunError::NoIntervals | RunError::Division(_) | RunError::Cancelled(_)
+            ) =>
+        {
+            Err(value_error(error))
+        }
         calibrated => Ok(calibrated),
     }
 }

@@ -12,7 +12,7 @@ use clap::{
 use decoupler_core::{
     dataset::{Dataset, Folds, Seed, SplitBy, Stream},
     evaluation::{
-        Measured, RunError, RunSettings, Scores, TrainingSize, Workload,
+        RunError, RunSettings, Scores, TrainingSize, Workload,
         recorded::{Determinacy, Determination, Findings, FittedModel, Interval, StudyStep},
     },
     job::Job,
@@ -93,7 +93,7 @@ impl StudyArguments {
         }
         let recording = with_bar(is_json, |watch| plan.recording(working_folder(), watch))?;
         import.save_recipe(&plan)?;
-        let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        let mut settings = RunSettings::measured(RowModel::Shared);
         settings.hidden = self.hidden.unwrap_or(settings.hidden);
         settings.seed = self.seed.map_or(settings.seed, Seed);
         let by = plan.division.by;
@@ -161,8 +161,7 @@ fn time_of_networks(settings: &RunSettings, set: &Dataset, folds: usize) -> Dura
         networks: 1,
     };
     Workload::of(settings, size)
-        .time()
-        .all_epochs
+        .training_time()
         .saturating_mul(folds as u32)
 }
 

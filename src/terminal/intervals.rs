@@ -4,7 +4,7 @@ use std::io::Write;
 
 use clap::ValueEnum;
 use decoupler_core::{
-    evaluation::{Intervals, Run},
+    evaluation::{Intervals, Run, RunError},
     job::Job,
     live::{Drift, DriftEvent, DriftMonitor},
     problem::Channel,
@@ -62,6 +62,7 @@ pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) {
     match calibrated {
         Ok(intervals) => run.set_intervals(intervals, by),
         // The training is complete without them.
+        Err(RunError::Cancelled(_)) => note("No prediction intervals: interrupted"),
         Err(reason) => note(&format!("No prediction intervals: {reason}")),
     }
 }

@@ -18,7 +18,7 @@ use super::{
 };
 use decoupler_core::{
     decoupling::DecoderKind,
-    evaluation::{Begin, DecoderReport, DecoderSet, Run, RunError, auto::DEFAULT_BUDGET_S},
+    evaluation::{DecoderReport, DecoderSet, Run, RunError, auto::DEFAULT_BUDGET_S},
     job::Job,
     text::counted,
     training::TrainingSettings,
@@ -99,7 +99,7 @@ impl Train {
                 };
                 self.import.save_recipe(&setup)?;
                 announce_recording(&setup, &sets);
-                let run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED)?;
+                let run = sets.run(&setup, None, &Job::UNINTERRUPTED)?;
                 (run, sets)
             }
         };

@@ -15,7 +15,7 @@ use super::{
 use decoupler_core::{
     dataset::Simulation,
     evaluation::{
-        Combination, DecoderReport, Errors, Outlook, Run, RunError, StartRecord, TestErrors,
+        Combination, DecoderReport, ErrorTable, Errors, Outlook, Run, RunError, StartRecord, TestErrors,
         auto::AutoRecord,
         best_start, error_remarks,
         recorded::{Determination, Extrapolation, HysteresisLoop, Undetermined},
@@ -374,7 +374,9 @@ impl<'a> Trained<'a> {
             writeln!(out)?;
         }
         let loops = self.loops();
-        write!(out, "{}", error_table(&file.error_table().with_loops(&loops)).aligned())?;
+        let mut tables = file.error_table();
+        ErrorTable::add_loops(&mut tables, &loops);
+        write!(out, "{}", error_table(&tables).aligned())?;
         for (target, found) in file.problem.targets.iter().zip(&loops) {
             if let Some(found) = found {
                 writeln!(out, "{}", found.sentence(&target.name))?;

@@ -227,7 +227,7 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     let outcome = driver.views().experiments.outcome().unwrap();
     let results = by_library(&outcome.results.experiment);
     for (cell, z) in results.cells.iter().zip(["2, 50", "3, 50", "2, 100", "3, 100"]) {
-        let percent = decoupler_files::export::format_percent(cell.summary().percent().median);
+        let percent = decoupler_files::export::format_percent(cell.percent().median);
         let label = format!("{z}: median Z error {percent}");
         assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
     }

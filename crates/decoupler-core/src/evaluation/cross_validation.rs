@@ -4,7 +4,7 @@ use ndarray::{Array2, Axis};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
-use super::{Baselines, Begin, Run, RunError, RunSets, RunSettings, Scores, TestErrors, baselines::fit_baselines};
+use super::{Baselines, Run, RunError, RunSets, RunSettings, Scores, TestErrors, baselines::fit_baselines};
 use crate::{
     dataset::{Dataset, Folds, Seed, SplitBy, Stream},
     decoupling::decode_set,
@@ -121,7 +121,7 @@ impl CrossValidated {
                 ..*settings
             };
             let sets = RunSets::new(split, test).described(problem.clone());
-            let mut run = match Run::new(settings, sets, Begin::Initialize, job) {
+            let mut run = match Run::new(settings, sets, None, job) {
                 // Every target is constant without this fold: the constant is the answer.
                 Err(RunError::Training(TrainingError::NothingVaries)) if set.has_varying_target() => {
                     scatter(&mut network, samples, &answers_of_mean);

@@ -13,15 +13,15 @@ use super::{
     starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, DatasetError, PerRow, SplitBy},
+    dataset::{Dataset, DatasetError, PerRow, Seed, SplitBy},
     decoupling::DecodeError,
-    identifiability::IdentifiabilityError,
     job::{Cancelled, Job},
     machine::MemoryBudget,
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, NetworkError, Networks},
     problem::Problem,
     scene::SceneError,
     sensor::SensorError,
+    text::counted,
     training::{Method, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingError, check_width},
 };
 
@@ -186,7 +186,7 @@ impl Run {
         self.starts.par_iter().map(record).collect()
     }
 
-    /// Returns the states of all trainings for [`Begin::Resume`](super::Begin::Resume): start by start, and in each row by row.
+    /// Returns the states of all trainings for [`Self::new`]: start by start, and in each row by row.
     pub fn states(&self) -> Vec<TrainerState> {
         self.starts
             .iter()
@@ -415,6 +415,32 @@ pub enum RunError {
         /// Number of trainings expected.
         expected: usize,
     },
+    /// No target has enough effective samples for an interval.
+    #[error(
+        "there are fewer than 9 independent training samples (their errors are correlated in time or within groups)"
+    )]
+    NoIntervals,
+    /// The number of saved intervals is not the number of targets.
+    #[error("{} for {}", counted(*.found, "interval"), counted(*.expected, "target"))]
+    IntervalCount {
+        /// Number of intervals.
+        found: usize,
+        /// Number of targets.
+        expected: usize,
+    },
+    /// A saved half-width is negative or not finite, or its answers are not ascending.
+    #[error("the interval of target {0} is not valid")]
+    Interval(usize),
+    /// A trial of an experiment failed.
+    #[error("seed {seed}: {source}")]
+    Trial {
+        /// Seed of the trial.
+        seed: Seed,
+        /// Index of the repeat of a cross-validation, from 0.
+        repeat: usize,
+        /// Reason for the failure.
+        source: Box<RunError>,
+    },
     /// An axis of an experiment has no values.
     #[error("there are no values for {0}: give at least one")]
     NoValues(&'static str),
@@ -449,9 +475,6 @@ pub enum RunError {
     /// The operating system provides no threads.
     #[error("cannot start worker threads: {0}")]
     Threads(String),
-    /// A scene cannot be analysed.
-    #[error(transparent)]
-    Identifiability(#[from] IdentifiabilityError),
 }
 
 impl RunError {

@@ -73,17 +73,6 @@ impl TrainingSize {
     }
 }
 
-/// Time of a run on this machine, from rates measured on one thread. Large runs are faster with more threads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WorkloadTime {
-    /// Time to draw the samples.
-    pub drawing: Duration,
-    /// Time per epoch.
-    pub epoch: Duration,
-    /// Time of all epochs, if none of the other stopping rules ends the training.
-    pub all_epochs: Duration,
-}
-
 impl Workload {
     /// Number of vectors with an entry for each weight in a method and its trainer.
     const VECTORS: usize = 8;
@@ -120,12 +109,12 @@ impl Workload {
     /// Returns the methods that would train on the same recording in less than half of this time, with the time of each
     /// for the number of epochs that it gets by default.
     pub fn faster_methods(&self, settings: &RunSettings, size: TrainingSize) -> Vec<(Method, Duration)> {
-        let present = self.time().all_epochs;
+        let present = self.training_time();
         let candidates = [Method::default(), Method::scaled_conjugate_gradient(0.0)];
         let of_each = candidates.into_iter().map(|method| {
             let mut other = *settings;
             other.choose_method(method);
-            (method, Self::of(&other, size).time().all_epochs)
+            (method, Self::of(&other, size).training_time())
         });
         of_each.filter(|(_, time)| time.saturating_mul(2) < present).collect()
     }
@@ -156,15 +145,20 @@ impl Workload {
         self.epoch_multiplications * self.epochs as f64
     }
 
-    /// Computes the time on this machine. The first call measures its speed, which takes about 20 ms.
-    pub fn time(&self) -> WorkloadTime {
-        let speed = Speed::measured();
-        let duration = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
-        WorkloadTime {
-            drawing: duration(self.node_pairs / speed.node_pairs),
-            epoch: duration(self.epoch_multiplications / speed.multiplications),
-            all_epochs: duration(self.multiplications() / speed.multiplications),
-        }
+    /// Time to draw the samples on one thread of this machine. The first call of this or another time measures its speed,
+    /// which takes about 20 ms; large runs are faster with more threads.
+    pub fn drawing_time(&self) -> Duration {
+        duration(self.node_pairs / Speed::measured().node_pairs)
+    }
+
+    /// Time per epoch on one thread of this machine.
+    pub fn epoch_time(&self) -> Duration {
+        duration(self.epoch_multiplications / Speed::measured().multiplications)
+    }
+
+    /// Time of all epochs on one thread of this machine, if none of the other stopping rules ends the training.
+    pub fn training_time(&self) -> Duration {
+        duration(self.multiplications() / Speed::measured().multiplications)
     }
 
     /// Checks that the work fits into `memory`.
@@ -172,7 +166,7 @@ impl Workload {
     /// # Errors
     /// [`RunError::Memory`] if it does not.
     pub fn check_memory(&self, memory: MemoryBudget) -> Result<(), RunError> {
-        if self.bytes > memory.bytes {
+        if self.bytes > memory.bytes() {
             return Err(RunError::Memory {
                 bytes: self.bytes,
                 memory,
@@ -180,6 +174,10 @@ impl Workload {
         }
         Ok(())
     }
+}
+
+fn duration(seconds: f64) -> Duration {
+    Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
 }
 
 /// Returns the memory of drawn samples and the priors of their rows in bytes, and the number of pairs of their nodes; `None`
@@ -207,7 +205,6 @@ fn float_bytes(rows: usize, columns: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{evaluation::Measured, machine::MemorySource};
 
     fn settings(array: &str, method: &str, hidden: usize) -> RunSettings {
         let mut settings = RunSettings {
@@ -265,10 +262,7 @@ mod tests {
         settings.starts = 100;
         let workload = drawn(&settings);
         assert!(workload.bytes > 500_000_000_000, "{workload:?}");
-        let memory = MemoryBudget {
-            bytes: 500_000_000_000,
-            source: MemorySource::System,
-        };
+        let memory = MemoryBudget::System(500_000_000_000);
         let message = workload.check_memory(memory).unwrap_err().to_string();
         assert!(
             message.contains("GB of memory, and the machine has 500.0 GB"),
@@ -279,7 +273,7 @@ mod tests {
 
     #[test]
     fn wide_inputs_make_a_training_on_a_recording_long_and_conjugate_gradients_faster() {
-        let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        let settings = RunSettings::measured(RowModel::Shared);
         let size = TrainingSize {
             samples: 5000,
             inputs: 192,

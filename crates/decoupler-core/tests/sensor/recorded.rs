@@ -3,7 +3,7 @@
 use decoupler_core::{
     dataset::{Dataset, Division, Folds, Seed, SplitBy, Stream},
     evaluation::{
-        CrossValidated, Measured, RunError, RunSettings,
+        CrossValidated, RunError, RunSettings,
         recorded::{Findings, FittedModel, SplitComparison, StudyStep, nonlinear_gains, ridge_remark},
     },
     job::Job,
@@ -28,7 +28,7 @@ fn set(samples: usize, channels: usize, seed: u64, target: impl Fn(&[f64], &mut 
 }
 
 fn settings() -> RunSettings {
-    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let mut settings = RunSettings::measured(RowModel::Shared);
     (settings.hidden, settings.training.stopping.epochs) = (4, 30);
     settings
 }

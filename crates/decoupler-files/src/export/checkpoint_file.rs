@@ -11,7 +11,7 @@ use super::{
 };
 use crate::import::{Progress, Recorded, Setup, SetupError, SetupSets};
 use decoupler_core::{
-    evaluation::{Begin, Run, RunSettings},
+    evaluation::{Run, RunSettings},
     job::Job,
     training::TrainerState,
 };
@@ -84,7 +84,7 @@ impl CheckpointFile {
             recordings.recorded.search = saved.search;
             recordings.recorded.chosen_intervals = saved.chosen_intervals;
         }
-        let run = sets.run(&setup, Begin::Resume(self.starts), job)?;
+        let run = sets.run(&setup, Some(self.starts), job)?;
         Ok((run.with_wall_time(self.wall_time), sets))
     }
 

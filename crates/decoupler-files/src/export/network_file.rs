@@ -4,16 +4,16 @@ use decoupler_core::{
     dataset::{Dataset, MemoryStream, Simulation},
     evaluation::{ErrorTable, Intervals, Run, RunSettings, Scores, StartRecord, TestErrors},
     job::Job,
-    live::{DriftReference, NoDriftMonitor},
+    live::{DriftReference, LiveError},
     network::{DecouplingNetwork, Networks},
-    problem::{Problem, SavedProblem, TargetPosition},
+    problem::{Problem, TargetPosition},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use serde_json::value::{RawValue, to_raw_value};
 
 use super::{
-    AtomicFile, DocumentError, DocumentKind, TrainingRecord, WriteError,
+    AtomicFile, DocumentError, DocumentKind, SavedProblem, TrainingRecord, WriteError,
     atomic::{LARGEST_BYTES, too_large},
     document::PROGRAM,
     unfinished::folder_of,
@@ -47,7 +47,7 @@ pub struct NetworkFile {
     /// Prediction intervals of the answers, if they were calibrated.
     pub intervals: Option<Intervals>,
     /// Training readings of a recording, by which a later drift is detected, or the reason why they are not monitored.
-    pub drift: Result<DriftReference, NoDriftMonitor>,
+    pub drift: Result<DriftReference, LiveError>,
 }
 
 /// The part of the file that the checksum covers.
@@ -76,7 +76,7 @@ const NODES_OF_RECORDING: &str = "problem: the targets of a recording are not no
 enum SavedDrift {
     Monitored(DriftReference),
     NotMonitored {
-        not_monitored: NoDriftMonitor,
+        not_monitored: LiveError,
     },
     /// Description for the monitor of an older version.
     #[serde(skip_serializing)]
@@ -84,19 +84,19 @@ enum SavedDrift {
 }
 
 impl SavedDrift {
-    fn of(drift: Result<DriftReference, NoDriftMonitor>) -> Option<Self> {
+    fn of(drift: Result<DriftReference, LiveError>) -> Option<Self> {
         match drift {
             Ok(reference) => Some(Self::Monitored(reference)),
-            Err(NoDriftMonitor::NotDescribed) => None,
+            Err(LiveError::NotDescribed) => None,
             Err(not_monitored) => Some(Self::NotMonitored { not_monitored }),
         }
     }
 
-    fn read(saved: Option<Self>) -> Result<DriftReference, NoDriftMonitor> {
+    fn read(saved: Option<Self>) -> Result<DriftReference, LiveError> {
         match saved {
             Some(Self::Monitored(reference)) => Ok(reference),
             Some(Self::NotMonitored { not_monitored }) => Err(not_monitored),
-            Some(Self::Older(_)) | None => Err(NoDriftMonitor::NotDescribed),
+            Some(Self::Older(_)) | None => Err(LiveError::NotDescribed),
         }
     }
 }
@@ -134,7 +134,7 @@ impl NetworkFile {
             training: TrainingRecord::of(run),
             scores,
             intervals: run.intervals().cloned(),
-            drift: Err(NoDriftMonitor::NotDescribed),
+            drift: Err(LiveError::NotDescribed),
         })
     }
 
@@ -194,7 +194,7 @@ impl NetworkFile {
     }
 
     /// Errors of the network and of the baselines, next to the published ones if there are any.
-    pub fn error_table(&self) -> ErrorTable {
+    pub fn error_table(&self) -> Vec<ErrorTable> {
         ErrorTable::of_scores(&self.problem, &self.scores, self.settings.published().as_ref())
     }
 
@@ -576,11 +576,11 @@ mod tests {
         let older =
             r#"{"metric":{"means":[0.0],"inverse_deviations":[1.0],"factor":[1.005]},"block":5,"distances":[1.0]}"#;
         for (saved, expected) in [
-            (older, NoDriftMonitor::NotDescribed),
-            (r#"{"not_monitored":"constant"}"#, NoDriftMonitor::Constant),
+            (older, LiveError::NotDescribed),
+            (r#"{"not_monitored":"constant"}"#, LiveError::Constant),
             (
                 r#"{"not_monitored":{"too_few_readings":{"blocks":4,"block":5}}}"#,
-                NoDriftMonitor::TooFewReadings { blocks: 4, block: 5 },
+                LiveError::TooFewReadings { blocks: 4, block: 5 },
             ),
         ] {
             let found = SavedDrift::read(Some(serde_json::from_str(saved).unwrap()));

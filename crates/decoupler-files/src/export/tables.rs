@@ -3,7 +3,7 @@ use std::io::{self, Write};
 use decoupler_core::{
     dataset::{Dataset, Seed, SplitBy, Stream},
     evaluation::{
-        Coverage, DecoderReport, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, HalfWidth, Intervals, Scores,
+        Coverage, DecoderReport, ErrorMeasure, ErrorRow, ErrorTable, Errors, HalfWidth, Intervals, Scores,
         TargetErrors, TestErrors,
         recorded::{
             Determinacy, Determination, Findings, TargetFindings, Undetermined, channel_remarks, ridge_remark,
@@ -22,24 +22,23 @@ use crate::import::{Recording, SetupSets};
 
 /// Returns the error table: a row for each decoder and baseline; for a recording, a row for each of them and each
 /// target.
-pub fn error_table(table: &ErrorTable) -> Table {
-    let has_targets = table.blocks.iter().any(|block| block.target.is_some());
+pub fn error_table(tables: &[ErrorTable]) -> Table {
+    let has_targets = tables.iter().any(|table| table.target.is_some());
     let target = has_targets.then(|| TableColumn::new("target", "Target", ""));
-    let measures = table.measures.iter().copied().map(error_column);
-    let row = |block: &ErrorBlock, row: &ErrorRow| -> Vec<Cell> {
-        let target = has_targets.then(|| block.target.as_ref().map_or(String::new(), Channel::title).into());
-        let errors = row.errors.iter().zip(table.measures).map(error_cell);
+    let measures = tables.first().map_or(&[][..], |table| table.measures);
+    let row = |table: &ErrorTable, row: &ErrorRow| -> Vec<Cell> {
+        let target = has_targets.then(|| table.target.as_ref().map_or(String::new(), Channel::title).into());
+        let errors = row.errors.iter().zip(measures).map(error_cell);
         target.into_iter().chain([row.name.into()]).chain(errors).collect()
     };
-    let rows = table
-        .blocks
+    let rows = tables
         .iter()
-        .flat_map(|block| block.rows.iter().map(move |line| row(block, line)));
+        .flat_map(|table| table.rows.iter().map(move |line| row(table, line)));
     Table {
         columns: target
             .into_iter()
             .chain([TableColumn::new("decoupler", "Decoder", "")])
-            .chain(measures)
+            .chain(measures.iter().copied().map(error_column))
             .collect(),
         rows: rows.collect(),
     }
@@ -413,8 +412,8 @@ mod tests {
             sensor: Some(Simulation::default()),
             ..Problem::default()
         };
-        let mut errors = ErrorTable::new(&problem, &[]);
-        errors.blocks[0].rows.push(row);
+        let mut errors = ErrorTable::of_errors(&problem, &[]);
+        errors[0].rows.push(row);
         let mut table = Vec::new();
         error_table(&errors).write_csv(&mut table).unwrap();
         assert_eq!(

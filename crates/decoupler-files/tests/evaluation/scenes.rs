@@ -6,7 +6,7 @@ use decoupler_core::{
     dataset::{Seed, Simulation},
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        Begin, DecoderSet, Outlook, Preset, Run, RunError, RunSets, RunSettings, TradeOffPoint, fastest_under,
+        DecoderSet, Outlook, Preset, Run, RunError, RunSets, RunSettings, TradeOffPoint, fastest_under,
         measure_trade_off, most_accurate_under,
     },
     job::Job,
@@ -51,7 +51,7 @@ fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
 /// Resumes a run of these settings from saved states.
 fn resumed(settings: RunSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
     let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
-    Run::new(settings, sets, Begin::Resume(states), &Job::UNINTERRUPTED)
+    Run::new(settings, sets, Some(states), &Job::UNINTERRUPTED)
 }
 
 #[test]

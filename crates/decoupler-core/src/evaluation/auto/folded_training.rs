@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use super::{
     super::{
-        Begin, Run, RunError, RunSets, RunSettings,
+        Run, RunError, RunSets, RunSettings,
         cross_validation::{nth_seed, scatter},
     },
     FoldErrors,
@@ -148,7 +148,7 @@ impl Part {
                 memory,
                 ..RunSets::without_test(Split { training, validation })
             };
-            let run = Run::new(settings, sets, Begin::Initialize, &Job::UNINTERRUPTED)?;
+            let run = Run::new(settings, sets, None, &Job::UNINTERRUPTED)?;
             let inputs = run.scalings.at(0).0.of(test.readings());
             part.run = Some((run, inputs));
         }

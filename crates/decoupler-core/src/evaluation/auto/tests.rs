@@ -4,7 +4,7 @@ use rand::RngExt as _;
 use super::*;
 use crate::{
     dataset::{Seed, SplitBy, Stream},
-    evaluation::{Begin, Combination, Measured, Run, RunError, RunSets},
+    evaluation::{Combination, Run, RunError, RunSets},
     job::Job,
     machine::MemoryBudget,
     scene::RowModel,
@@ -41,7 +41,7 @@ fn choose(by: SplitBy, groups: Vec<usize>, fixed: &AutoFixed, job: &Job<'_>) -> 
         past: Some((&history, &samples)),
         by,
     };
-    let base = RunSettings::from(Measured { rows: RowModel::Shared });
+    let base = RunSettings::measured(RowModel::Shared);
     choose_settings(
         &base,
         fixed,
@@ -158,7 +158,7 @@ fn the_choice_trains_to_about_its_error() {
     let mut run = Run::with_baselines(
         choice.settings,
         RunSets::new(split, part(400..600)),
-        Begin::Initialize,
+        None,
         &Job::UNINTERRUPTED,
     )
     .unwrap();
@@ -189,7 +189,7 @@ fn many_inputs_for_few_samples_get_weight_decay() {
         past: None,
         by: SplitBy::Random,
     };
-    let base = RunSettings::from(Measured { rows: RowModel::Shared });
+    let base = RunSettings::measured(RowModel::Shared);
     let choice = choose_settings(
         &base,
         &AutoFixed::default(),

@@ -1,11 +1,9 @@
 use std::sync::Arc;
 
-use thiserror::Error;
-
 use super::{Cell, Experiment};
 use crate::{
     dataset::{Dataset, Division, Seed},
-    evaluation::{Baselines, Begin, Effort, Run, RunError, RunSets, RunSettings, Scores},
+    evaluation::{Baselines, Effort, Run, RunError, RunSets, RunSettings, Scores},
     job::Job,
     machine::MemoryBudget,
     problem::Problem,
@@ -24,21 +22,9 @@ pub struct Trial {
     pub scores: Scores,
     /// Networks, epochs and time of the trainings.
     pub effort: Effort,
-    /// Final state of every training, for [`Begin::Resume`]; empty for a cross-validation, which has one network per
+    /// Final state of every training, for [`Run::new`]; empty for a cross-validation, which has one network per
     /// fold.
     pub states: Vec<TrainerState>,
-}
-
-/// Trial that failed.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[error("seed {seed}: {reason}")]
-pub struct TrialFailure {
-    /// Seed of the trial.
-    pub seed: Seed,
-    /// Index of the repeat of a cross-validation, from 0.
-    pub repeat: usize,
-    /// Reason for the failure.
-    pub reason: RunError,
 }
 
 /// Samples of the trials of an experiment.
@@ -46,35 +32,50 @@ pub struct TrialFailure {
 pub enum TrialSamples {
     /// Samples drawn by each trial from the model of its settings, within this memory.
     Drawn(MemoryBudget),
-    /// Recorded samples, divided by each trial.
-    Recorded(RecordedSamples),
+    /// Recorded samples, read once for all trials and divided by each.
+    Recorded {
+        /// All samples except those of the test files.
+        set: Arc<Dataset>,
+        /// Samples of the test files, if there are any.
+        test: Option<Arc<Dataset>>,
+        /// Description of the readings and targets.
+        problem: Arc<Problem>,
+        /// Memory that a trial may use.
+        memory: MemoryBudget,
+    },
 }
 
-/// Recorded samples, read once for all trials.
-#[derive(Clone, Debug)]
-pub struct RecordedSamples {
-    /// All samples except those of the test files.
-    pub set: Arc<Dataset>,
-    /// Samples of the test files, if there are any.
-    pub test: Option<Arc<Dataset>>,
-    /// Description of the readings and targets.
-    pub problem: Arc<Problem>,
-    /// Memory that a trial may use.
-    pub memory: MemoryBudget,
-}
-
-impl RecordedSamples {
-    /// Returns the sets of a run with this seed.
+impl TrialSamples {
+    /// Returns the sets of a trial with these settings and this division of recorded samples.
     ///
     /// # Errors
-    /// If the samples cannot be divided in this way.
-    pub fn divided(&self, division: &Division, seed: Seed) -> Result<RunSets, RunError> {
-        let (split, test) = division.sets(&self.set, self.test.as_deref(), seed)?;
-        Ok(RunSets {
-            problem: Arc::clone(&self.problem),
-            memory: self.memory,
-            ..RunSets::new(split, test)
-        })
+    /// If the samples cannot be drawn or divided in this way.
+    ///
+    /// # Panics
+    /// If recorded samples have no division.
+    pub fn sets(
+        &self,
+        settings: &RunSettings,
+        division: Option<&Division>,
+        job: &Job<'_>,
+    ) -> Result<RunSets, RunError> {
+        match self {
+            Self::Drawn(memory) => RunSets::draw(settings, *memory, job),
+            Self::Recorded {
+                set,
+                test,
+                problem,
+                memory,
+            } => {
+                let division = division.expect("recorded samples have a division");
+                let (split, test) = division.sets(set, test.as_deref(), settings.seed)?;
+                Ok(RunSets {
+                    problem: Arc::clone(problem),
+                    memory: *memory,
+                    ..RunSets::new(split, test)
+                })
+            }
+        }
     }
 }
 
@@ -103,15 +104,9 @@ impl Trial {
                 states: Vec::new(),
             });
         }
-        let sets = match samples {
-            TrialSamples::Drawn(memory) => RunSets::draw(&settings, *memory, job)?,
-            TrialSamples::Recorded(recorded) => {
-                let division = cell.division.expect("recorded samples have a division");
-                recorded.divided(&division, seed)?
-            }
-        };
+        let sets = samples.sets(&settings, cell.division.as_ref(), job)?;
         let baselines = Baselines::fitted(&settings, &sets)?;
-        let mut run = Run::new(settings, sets, Begin::Initialize, job)?;
+        let mut run = Run::new(settings, sets, None, job)?;
         let mut effort = Effort::default();
         effort.train(&mut run, job)?;
         Ok(Self {

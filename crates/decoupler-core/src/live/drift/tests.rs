@@ -191,7 +191,7 @@ fn unusable_readings_have_no_monitor_for_a_reason() {
     let mut reason = |change: fn(f64) -> f64, samples, memory| {
         DriftReference::of(readings(samples, memory, &mut rng).mapv(change).view()).err()
     };
-    let constant = Some(NoDriftMonitor::Constant);
+    let constant = Some(LiveError::Constant);
     assert_eq!(reason(|_| 0.0, 400, 0.0), constant);
     assert_eq!(reason(|_| 0.1, 400, 0.0), constant);
     assert_eq!(reason(|reading| 1e14 + 1e-9 * reading, 400, 0.0), constant);
@@ -200,19 +200,19 @@ fn unusable_readings_have_no_monitor_for_a_reason() {
     assert_eq!(reason(|reading| 3e305 * (reading - 300.0), 400, 0.0), None);
     assert_eq!(
         reason(|reading| 1e308 * (reading - 300.0), 400, 0.0),
-        Some(NoDriftMonitor::NotFinite)
+        Some(LiveError::NotFinite)
     );
-    assert_eq!(reason(|_| f64::NAN, 400, 0.0), Some(NoDriftMonitor::NotFinite));
-    let few = Some(NoDriftMonitor::TooFewReadings { blocks: 4, block: 5 });
+    assert_eq!(reason(|_| f64::NAN, 400, 0.0), Some(LiveError::NotFinite));
+    let few = Some(LiveError::TooFewReadings { blocks: 4, block: 5 });
     assert_eq!(reason(|reading| reading, 20, 0.0), few);
     let few = reason(|reading| reading, 400, 0.99);
     assert!(
-        matches!(few, Some(NoDriftMonitor::TooFewReadings { blocks: 0..10, .. })),
+        matches!(few, Some(LiveError::TooFewReadings { blocks: 0..10, .. })),
         "{few:?}"
     );
     assert_eq!(
         DriftReference::of(Array2::zeros((400, 600)).view()),
-        Err(NoDriftMonitor::TooManyInputs { found: 600 })
+        Err(LiveError::TooManyInputs { found: 600 })
     );
 }
 

@@ -8,7 +8,7 @@ use super::{
 use crate::export::NetworkFile;
 use decoupler_core::{
     decoupling::{DecoderKind, Operation, Precision},
-    evaluation::{Measured, Run, RunSettings},
+    evaluation::{Run, RunSettings},
     job::Job,
     network::{InputChoice, Quantity, ScalingChoice},
     problem::{Channel, Problem},
@@ -259,7 +259,7 @@ fn steps_of_affine_maps_are_joined() {
 fn networks_of_samples_in_memory_are_exported_without_errors() {
     let home = tempfile::tempdir().unwrap();
     let network = trained(Rows::All, Quantity::Resistance, ScalingChoice::MinMax, 1e-3).network;
-    let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let settings = RunSettings::measured(RowModel::Shared);
     let mut problem = Problem::unnamed(6, network.at(0).outputs().channels());
     problem.inputs[5] = Channel::new("odd \u{200b}*/ \"name\"", Some("µT"));
     let path = home.path().join("bundle");
