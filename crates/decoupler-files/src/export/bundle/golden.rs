@@ -31,6 +31,17 @@ pub(super) struct GoldenRow {
 }
 
 impl GoldenRow {
+    /// Readings of a row that continue those before, without a time.
+    pub(super) fn new(row: usize, readings: Vec<f64>) -> Self {
+        Self {
+            is_new_series: false,
+            time_s: None,
+            row,
+            readings,
+            targets: Vec::new(),
+        }
+    }
+
     /// The same row with other readings.
     pub(super) fn rounded(&self, taken: impl Fn(usize, f64) -> f64) -> Self {
         let readings = self.readings.iter().enumerate();

@@ -14,24 +14,23 @@ use super::{
     contents::Contents,
     fixed16::FixedProgram,
     folder::AtomicFolder,
-    report::{BundleCheck, BundleError},
+    report::{BundleCheck, BundleError, BundleReport},
 };
-use compile::{Compiled, run_self_test};
+use compile::run_self_test;
 use header::Header;
 use self_test::SelfTest;
 
 /// Writes header, source and self-test, compiles them where there is a compiler, and runs the self-test. `fixed` is the
-/// program in fixed point, if that is wanted.
+/// program in fixed point, if that is wanted. Adds the outcome to `report`, and returns lines of a program that decodes.
 ///
 /// # Errors
 /// They cannot be written, compiled or run, or the self-test finds a larger deviation than `limit`, relative to the scales.
 pub(super) fn print(
     contents: &Contents,
     fixed: Option<&FixedProgram>,
-    limit: f64,
     folder: &AtomicFolder,
-    remarks: &mut Vec<String>,
-) -> Result<Option<BundleCheck>, BundleError> {
+    report: &mut BundleReport,
+) -> Result<String, BundleError> {
     let header = Header::of(contents, fixed);
     let source = match fixed {
         Some(fixed) => fixed::source(&header, fixed),
@@ -40,27 +39,25 @@ pub(super) fn print(
     let self_test = SelfTest {
         header: &header,
         fixed,
-        limit,
+        limit: report.limit,
     };
     let name = &contents.name;
     folder.write(&format!("{name}_decode.h"), header.text())?;
     folder.write(&format!("{name}_decode.c"), source)?;
     folder.write(&format!("{name}_selftest.c"), self_test.text())?;
     match run_self_test(folder.path(), name)? {
-        Compiled::Ran { deviation } => Ok(Some(BundleCheck {
+        Ok(deviation) => report.checks.push(BundleCheck {
             evaluator: "C source, compiled and run",
             deviation,
-        })),
-        Compiled::NoCompiler(reason) => {
-            remarks.push(format!("the C source was not compiled: {reason}"));
-            Ok(None)
-        }
+        }),
+        Err(reason) => report.remarks.push(format!("the C source was not compiled: {reason}")),
     }
+    Ok(usage(&header, fixed))
 }
 
 /// Lines of a program that decodes.
-pub(super) fn usage(contents: &Contents, fixed: Option<&FixedProgram>) -> String {
-    let header = Header::of(contents, fixed);
+fn usage(header: &Header<'_>, fixed: Option<&FixedProgram>) -> String {
+    let contents = header.contents;
     let (name, upper) = (&contents.name, header.upper());
     let row = if contents.takes_row() { "1, " } else { "" };
     let (function, state, time) = match contents.history() {
