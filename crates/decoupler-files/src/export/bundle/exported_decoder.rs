@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::{Dataset, GAP, PerRow, Seed, Simulation, Stream},
     decoupling::{Decoder, Function, NodeId, NotDescribed, Operation, Precision, Program, decode_set},
     evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
-    network::{MinMax, Networks},
+    network::{MinMax, Networks, Quantity},
     problem::{Channel, Problem},
 };
 use rand::RngExt;
@@ -13,7 +13,7 @@ use serde_json::{Map, Value, json};
 use super::{
     BundleDecoder, BundleError, BundlePrecision, ChoiceError,
     contents::Contents,
-    exported_program::{ExportedProgram, Limits},
+    exported_program::{ExportedProgram, Limits, are_positive},
     golden::{Golden, GoldenRow},
     meaning::Meaning,
     names::names,
@@ -204,15 +204,24 @@ impl ExportedDecoder {
     }
 
     fn meaning(&self) -> Meaning {
-        match &self.origin.problem.sensor {
-            Some(simulation) => Meaning::Array(simulation.sensor.scale),
-            None => Meaning::Own {
-                inputs: self.origin.problem.inputs.clone(),
-                targets: self.origin.problem.targets.clone(),
-                row_wires: match (&self.origin.row_wires, self.rows()) {
-                    (Some(row_wires), 2..) => row_wires.clone(),
-                    _ => Vec::new(),
-                },
+        let Problem {
+            inputs,
+            targets,
+            sensor,
+            ..
+        } = self.origin.problem.clone();
+        // Comments of C have no Ω.
+        let in_ohm = |channel: Channel| Channel::new(channel.name, Some("ohm"));
+        Meaning {
+            is_array: sensor.is_some(),
+            inputs: match sensor {
+                Some(_) => inputs.into_iter().map(in_ohm).collect(),
+                None => inputs,
+            },
+            targets,
+            row_wires: match (&self.origin.row_wires, self.rows()) {
+                (Some(row_wires), 2..) => row_wires.clone(),
+                _ => Vec::new(),
             },
         }
     }
@@ -220,7 +229,10 @@ impl ExportedDecoder {
     /// Limits of the readings, or of the features of a history, beyond which they count as outside: for all row-wires or for
     /// each; `None` if the range in training is not known.
     pub(super) fn limits(&self) -> Option<Limits> {
-        let quantity = ExportedProgram::quantity_of(&self.program);
+        let quantity = match are_positive(&self.program) {
+            true => Quantity::Resistance,
+            false => Quantity::Raw,
+        };
         let of_row = |range: &Option<MinMax>| {
             let range = range.as_ref()?;
             Some(
@@ -249,7 +261,7 @@ impl ExportedDecoder {
         let (rows, printed) = self.readings(channels)?;
         let golden = Golden::of(rows, printed, &program, exported.outputs())?;
         let targets = &self.target_extremes;
-        let scales = match meaning.is_array() {
+        let scales = match meaning.is_array {
             true => vec![scale(targets, 0..exported.outputs()); exported.outputs()],
             false => (0..exported.outputs())
                 .map(|output| scale(targets, output..output + 1))
@@ -380,7 +392,7 @@ impl ExportedDecoder {
 
     fn of_array(&self, simulation: &Simulation, contents: &Contents, errors: &TestErrors) -> Value {
         let Simulation { sensor, scene, .. } = simulation;
-        let names = |channels: Vec<Channel>| channels.into_iter().map(|channel| channel.name).collect::<Vec<_>>();
+        let names = |channels: &[Channel]| Vec::from_iter(channels.iter().map(|channel| channel.name.clone()));
         json!({
             "trained_by": self.origin.program,
             "array": sensor.scale.to_string(),
@@ -388,8 +400,8 @@ impl ExportedDecoder {
             "scene": scene,
             "rows": scene.rows.to_string(),
             "row_numbers": contents.takes_row().then_some([1, contents.rows]),
-            "inputs": { "names": names(contents.meaning.inputs(contents.channels())), "unit": "ohm" },
-            "outputs": { "names": names(contents.meaning.targets()), "unit": "mm" },
+            "inputs": { "names": names(&contents.meaning.inputs), "unit": "ohm" },
+            "outputs": { "names": names(&contents.meaning.targets), "unit": "mm" },
             "training_samples": simulation.samples,
             "seed": self.origin.settings.seed,
             "errors": errors.nodes(),

@@ -62,7 +62,7 @@ pub fn export_bundle(
         checks,
         limit,
         rounding,
-        output_range_mm: contents.meaning.is_array().then(|| contents.scales[0]),
+        output_range_mm: contents.meaning.is_array.then(|| contents.scales[0]),
         bounds: bounds.unwrap_or_default(),
         remarks: contents.notes.clone(),
     };
@@ -151,7 +151,7 @@ fn in_single(contents: &mut Contents) -> Result<Accuracy, BundleError> {
         let is_taken = |&reading: &f64| (reading as f32).is_finite() && (!positive || reading as f32 > 0.0);
         if let Some(channel) = row.readings.iter().position(|reading| !is_taken(reading)) {
             return Err(BundleError::ReadingBeyond {
-                channel: contents.meaning.inputs(contents.channels())[channel].name.clone(),
+                channel: contents.meaning.inputs[channel].name.clone(),
                 reading: row.readings[channel],
             });
         }
@@ -235,7 +235,7 @@ fn cure(contents: &Contents) -> String {
         let (low, high) = (readings().fold(f64::MAX, f64::min), readings().fold(f64::MIN, f64::max));
         high - low < NARROW * low.abs().max(high.abs())
     };
-    let smaller = match !contents.meaning.is_array() && (0..contents.channels()).any(is_narrow) {
+    let smaller = match !contents.meaning.is_array && (0..contents.channels()).any(is_narrow) {
         true => {
             "subtract a constant from each input before training, because the readings vary little in proportion to their size"
         }

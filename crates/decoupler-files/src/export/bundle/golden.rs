@@ -162,7 +162,7 @@ impl Golden {
         if takes_row {
             names.push("row".to_owned());
         }
-        let channels = meaning.inputs(contents.channels()).into_iter().chain(meaning.targets());
+        let channels = meaning.inputs.iter().chain(&meaning.targets);
         names.extend(channels.map(|channel| inert(&channel.name)));
         // User-defined names may contain commas and quotation marks.
         let mut writer = csv::Writer::from_writer(Vec::new());

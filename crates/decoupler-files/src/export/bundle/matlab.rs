@@ -34,11 +34,7 @@ fn function(contents: &Contents) -> String {
         None => parts.join(", "),
     };
     let arguments = arguments(contents);
-    let legend = contents
-        .meaning
-        .legend(channels)
-        .into_iter()
-        .chain(contents.note_lines());
+    let legend = contents.meaning.legend().into_iter().chain(contents.note_lines());
     let legend: String = legend.map(|line| format!("%   {line}\n")).collect();
     let upper = name.to_uppercase();
     let mut text = format!(

@@ -30,11 +30,7 @@ pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<String
 /// Text of the program.
 fn program(contents: &Contents) -> String {
     let (input, channels) = (contents.meaning.readings(), contents.channels());
-    let legend = contents
-        .meaning
-        .legend(channels)
-        .into_iter()
-        .chain(contents.note_lines());
+    let legend = contents.meaning.legend().into_iter().chain(contents.note_lines());
     let legend: String = legend.map(|line| format!("# {line}\n")).collect();
     let dtype = dtype(contents.outer_precision());
     let (row, row_text) = match contents.takes_row() {

@@ -89,16 +89,11 @@ impl GraphBuilder {
         self.with("Cast", &[input], &[("to", element_type(precision))])
     }
 
-    /// Adds a sum over the second axis, which is kept with size 1 or dropped.
-    pub(super) fn sum(&mut self, input: &str, is_kept: bool) -> String {
-        let axes = self.whole(&[1], &[1]);
-        self.with("ReduceSum", &[input, &axes], &[("keepdims", i64::from(is_kept))])
-    }
-
-    /// Adds the number of true values of each line, as whole numbers.
-    pub(super) fn count(&mut self, condition: &str, is_kept: bool) -> String {
+    /// Adds the number of true values of each line, as whole numbers (batch × 1).
+    pub(super) fn count(&mut self, condition: &str) -> String {
         let ones = self.with("Cast", &[condition], &[("to", INT64)]);
-        self.sum(&ones, is_kept)
+        let axes = self.whole(&[1], &[1]);
+        self.with("ReduceSum", &[&ones, &axes], &[("keepdims", 1)])
     }
 
     /// A name that no other value has.

@@ -178,7 +178,7 @@ impl Printer<'_> {
                     is_valid = builder.op("And", &[&is_valid, &is_positive]);
                 }
                 let is_invalid = builder.op("Not", &[&is_valid]);
-                let invalid = builder.count(&is_invalid, true);
+                let invalid = builder.count(&is_invalid);
                 let none = builder.whole(&[], &[0]);
                 self.valid.push(builder.op("Equal", &[&invalid, &none]));
             }
@@ -275,8 +275,8 @@ impl Printer<'_> {
                 "half_widths" => "Half-widths of the 90 % prediction intervals, valid for all answers together",
                 _ => &channel_names(
                     meaning.either("Coordinates in mm", "Targets"),
-                    &meaning.targets(),
-                    meaning.is_array(),
+                    &meaning.targets,
+                    meaning.is_array,
                 ),
             };
             outputs.push(value(output, kind, &[batch, Some(contents.outputs())], about));
@@ -287,8 +287,8 @@ impl Printer<'_> {
         }
         let about = channel_names(
             meaning.either("Readings in ohm", "Readings"),
-            &meaning.inputs(contents.channels()),
-            meaning.is_array(),
+            &meaning.inputs,
+            meaning.is_array,
         );
         let mut inputs = vec![value(
             meaning.readings(),
