@@ -235,11 +235,8 @@ impl ExportedDecoder {
         };
         let of_row = |range: &Option<MinMax>| {
             let range = range.as_ref()?;
-            Some(
-                (0..range.channels())
-                    .map(|channel| range.limits(quantity, channel))
-                    .collect(),
-            )
+            let channels = 0..range.channels();
+            Some(channels.map(|channel| range.limits(quantity, channel)).collect())
         };
         self.reading_ranges.iter().map(of_row).collect()
     }
@@ -261,12 +258,12 @@ impl ExportedDecoder {
         let (rows, printed) = self.readings(channels)?;
         let golden = Golden::of(rows, printed, &program, exported.outputs())?;
         let targets = &self.target_extremes;
-        let scales = match meaning.is_array {
-            true => vec![scale(targets, 0..exported.outputs()); exported.outputs()],
-            false => (0..exported.outputs())
-                .map(|output| scale(targets, output..output + 1))
-                .collect(),
-        };
+        let outputs = exported.outputs();
+        let scales = (0..outputs).map(|output| match meaning.is_array {
+            true => scale(targets, 0..outputs),
+            false => scale(targets, output..output + 1),
+        });
+        let scales = scales.collect();
         let mut contents = Contents {
             name: name.to_owned(),
             noun: self.kind.noun(),

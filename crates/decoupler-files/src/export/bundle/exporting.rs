@@ -100,12 +100,8 @@ fn in_f32(_channel: usize, reading: f64) -> f64 {
 
 /// Deviation of the program in single precision with `wide` layers in double precision, from readings as it takes them.
 fn deviation_in_single(contents: &Contents, wide: usize) -> Result<f64, BundleError> {
-    let of_taken = Golden::of(
-        contents.golden.all().iter().map(|row| row.rounded(in_f32)).collect(),
-        0,
-        &contents.exported.program,
-        contents.outputs(),
-    )?;
+    let taken = contents.golden.all().iter().map(|row| row.rounded(in_f32)).collect();
+    let of_taken = Golden::of(taken, 0, &contents.exported.program, contents.outputs())?;
     let single = contents.exported.in_single(wide).program;
     Ok(of_taken.deviation(&single, &contents.scales, |_, reading| reading)?)
 }

@@ -122,17 +122,13 @@ fn decode(header: &Header<'_>, fixed: &FixedProgram, upper: &str) -> String {
     let layers = &fixed.rows[0].layers;
     for (index, FixedLayer { inputs, biases, .. }) in layers.iter().enumerate() {
         let (layer, sums, is_last) = (index + 1, biases.len(), index + 1 == layers.len());
+        let clamped =
+            |largest: &str| format!("(int32_t)clamped(shifted(sum, sum_shifts_{layer}[network][k]), {largest})");
         let (target, value) = match is_last {
-            true => (
-                format!("answer->{}[k]", header.outputs),
-                format!("(int32_t)clamped(shifted(sum, sum_shifts_{layer}[network][k]), INT32_MAX)"),
-            ),
+            true => (format!("answer->{}[k]", header.outputs), clamped("INT32_MAX")),
             false => (
                 format!("values_{}[k]", layer + 1),
-                format!(
-                    "tangent((int32_t)clamped(shifted(sum, sum_shifts_{layer}[network][k]), {}))",
-                    TangentTable::LARGEST
-                ),
+                format!("tangent({})", clamped(&TangentTable::LARGEST.to_string())),
             ),
         };
         if !is_last {
