@@ -11,7 +11,7 @@ use decoupler_core::{
     evaluation::{Intervals, RunSettings},
     network::Networks,
     problem::{Channel, Problem},
-    text::counted,
+    text::{Named, counted},
 };
 use decoupler_files::export::{
     NetworkFile,
@@ -320,8 +320,8 @@ impl Network {
         format: &str,
         precision: &str,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let format: BundleFormat = format.parse().map_err(value_error)?;
-        let precision: BundlePrecision = precision.parse().map_err(value_error)?;
+        let format = BundleFormat::parse(format).map_err(value_error)?;
+        let precision = BundlePrecision::parse(precision).map_err(value_error)?;
         let record = &self.record;
         let report = detached(py, || match &self.file {
             Some(file) => export_bundle(file, format, precision, &path),

@@ -87,6 +87,7 @@ impl StudyArguments {
     pub(super) fn run(&self, import: &ImportArguments, is_json: bool) -> Result<(), Failure> {
         const FOLDS: usize = 5;
         let plan = import.plan(&self.inputs)?;
+        import.refuse_unused_shares()?;
         if plan.test.is_some() {
             let message = "--test-data: a recording is analysed by cross-validation; leave the test files out";
             return Err(Failure::Arguments(message.to_owned()));

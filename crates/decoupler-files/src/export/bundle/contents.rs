@@ -176,7 +176,7 @@ impl Contents {
 
     /// A deviation relative to [`Self::scales`], in mm for an array, and in per cent of the range of a target of own data.
     pub(super) fn in_words(&self, relative: f64) -> String {
-        match self.meaning.is_array() {
+        match self.meaning.is_array {
             true => format!("{} mm", format_number(relative * self.scales[0])),
             false => format!("{} % of its range in training", format_number(100.0 * relative)),
         }

@@ -2,9 +2,9 @@ use std::sync::Arc;
 
 use decoupler_core::{
     dataset::{Dataset, GAP, PerRow, Seed, Simulation, Stream},
-    decoupling::{DecoderKind, Function, NodeId, Operation, Precision, Program, decode_set},
+    decoupling::{Decoder, Function, NodeId, Operation, Precision, Program, decode_set},
     evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
-    network::{MinMax, Networks},
+    network::{MinMax, Networks, Quantity},
     problem::{Channel, Problem},
 };
 use rand::RngExt;
@@ -14,7 +14,7 @@ use super::{
     BundleDecoder, BundleError, BundlePrecision, ChoiceError,
     choice::{EQUATIONS, RULES},
     contents::Contents,
-    exported_program::{ExportedProgram, Limits},
+    exported_program::{ExportedProgram, Limits, are_positive},
     golden::{Golden, GoldenRow},
     meaning::Meaning,
     names::names,
@@ -25,55 +25,73 @@ use crate::{
 };
 
 /// A decoder to be exported, with the meaning of its readings and targets.
-pub struct ExportedDecoder<'a> {
-    /// Network file of the run, if a network was trained.
-    file: Option<&'a NetworkFile>,
-    origin: Origin,
-    fitted: FittedDecoder,
+pub struct ExportedDecoder {
+    kind: BundleDecoder,
+    program: Program,
+    /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
+    reading_ranges: Vec<Option<MinMax>>,
+    /// Ranges of the targets in training: one for all row-wires, or one for each if the row is an argument.
+    target_extremes: Vec<Vec<(f64, f64)>>,
+    /// Errors on the test samples.
+    errors: TestErrors,
+    /// 90 % prediction intervals of the network, if every target has one.
+    half_widths: Vec<HalfWidth>,
     /// Test samples, if they are known.
     test: Option<Arc<Dataset>>,
+    origin: Origin,
+}
+
+/// Facts about the samples to which an exported decoder was fitted, for the metadata of its bundle.
+struct Origin {
+    /// Program and version that trained or fitted it.
+    program: String,
+    settings: RunSettings,
+    /// Names, units and positions of readings and targets.
+    problem: Problem,
+    /// Row-wires of the samples in ascending order, from 0, if they are known.
+    row_wires: Option<Vec<usize>>,
+    /// Names of the recordings without their folders; empty for a simulated array.
+    files: Vec<String>,
+    /// Errors of the linear baseline on the test samples.
+    errors_of_linear: TestErrors,
 }
 
 /// Facts about a decoder, for users and programs that have only the bundle: names of fields and JSON values.
 type Metadata = Map<String, Value>;
 
-impl<'a> From<&'a NetworkFile> for ExportedDecoder<'a> {
+impl From<&NetworkFile> for ExportedDecoder {
     /// Exports the network of a file.
-    fn from(file: &'a NetworkFile) -> Self {
+    fn from(file: &NetworkFile) -> Self {
         // Without the recording, readings are drawn from the range in training.
         let test = match file.settings.simulation() {
             Some(_) => None,
             None => file.test_set().ok(),
         };
+        let intervals = file.intervals.as_ref();
+        let half_widths = intervals.and_then(|intervals| intervals.targets.iter().cloned().collect());
         Self {
-            fitted: FittedDecoder::of_networks(&file.network, file.scores.network.clone()),
-            origin: Origin::of_file(file),
-            file: Some(file),
+            errors: file.scores.network.clone(),
+            half_widths: half_widths.unwrap_or_default(),
             test,
+            ..Self::of_trained(&file.network, Origin::of_file(file))
         }
     }
 }
 
-impl<'a> ExportedDecoder<'a> {
+impl ExportedDecoder {
     /// Fits a decoder to the training samples of the run of `file`; `sets` are its samples, drawn or read again. If the
     /// decoder is the network, uses the network of the file.
     ///
     /// # Errors
     /// The recording has changed, the samples cannot be scaled or decoded, or no other program can compute what the decoder
     /// does.
-    pub fn of_run(file: &'a NetworkFile, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
+    pub fn of_run(file: &NetworkFile, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
         sets.check_saved(file.recorded.as_ref())?;
-        let test = Some(Arc::clone(&sets.sets.test));
-        let fitted = match decoder.is_network() {
-            true => FittedDecoder::of_networks(&file.network, file.scores.network.clone()),
-            false => FittedDecoder::fit(file.settings, sets.sets, Some(file.network.clone()), decoder)?,
-        };
-        Ok(Self {
-            origin: Origin::of_file(file),
-            fitted,
-            file: Some(file),
-            test,
-        })
+        if decoder.is_network() {
+            let test = Some(sets.sets.test);
+            return Ok(Self { test, ..file.into() });
+        }
+        Self::fit(Origin::of_file(file), sets.sets, Some(file.network.clone()), decoder)
     }
 
     /// Fits a decoder that needs no network to the training samples of `setup`, which are `sets`.
@@ -81,12 +99,17 @@ impl<'a> ExportedDecoder<'a> {
     /// # Errors
     /// As [`Self::of_run`], or if the decoder needs a network.
     pub fn of_setup(setup: &Setup, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
-        Ok(Self {
-            origin: Origin::of_sets(setup, &sets)?,
-            test: Some(Arc::clone(&sets.sets.test)),
-            fitted: FittedDecoder::fit(*setup.settings(), sets.sets, None, decoder)?,
-            file: None,
-        })
+        let (settings, sets) = (*setup.settings(), sets.sets);
+        let set = DecoderSet::new(settings, sets.split.training.clone(), None);
+        let origin = Origin {
+            program: PROGRAM.to_owned(),
+            problem: Problem::clone(&sets.problem),
+            row_wires: sets.test.row_wires_read().map(<[usize]>::to_vec),
+            files: file_names(setup.plan()),
+            errors_of_linear: errors(&mut *set.linear().map_err(Box::new)?, &sets.problem, &sets.test)?,
+            settings,
+        };
+        Self::fit(origin, sets, None, decoder)
     }
 
     /// Exports networks that were trained on samples in memory, with the description of their channels and the row-wires
@@ -97,67 +120,126 @@ impl<'a> ExportedDecoder<'a> {
         problem: Problem,
         row_wires: Option<Vec<usize>>,
     ) -> Self {
-        let none = TestErrors::Targets(Vec::new());
+        let origin = Origin {
+            program: PROGRAM.to_owned(),
+            settings,
+            problem,
+            row_wires,
+            files: Vec::new(),
+            errors_of_linear: TestErrors::Targets(Vec::new()),
+        };
+        Self::of_trained(networks, origin)
+    }
+
+    /// Wraps trained networks, which contain the ranges of their readings and targets.
+    fn of_trained(networks: &Networks, origin: Origin) -> Self {
+        let all = networks.values().iter();
+        let extremes = all.clone().map(|network| {
+            let outputs = network.outputs();
+            (0..outputs.channels()).map(|output| outputs.extremes(output)).collect()
+        });
         Self {
-            file: None,
+            kind: BundleDecoder::default(),
+            program: networks.program(Precision::Double),
+            target_extremes: extremes.collect(),
+            reading_ranges: all.map(|network| network.inputs().range().cloned()).collect(),
+            errors: TestErrors::Targets(Vec::new()),
+            half_widths: Vec::new(),
             test: None,
-            origin: Origin {
-                program: PROGRAM.to_owned(),
-                settings,
-                problem,
-                row_wires,
-                files: Vec::new(),
-                errors_of_linear: none.clone(),
-            },
-            fitted: FittedDecoder::of_networks(networks, none),
+            origin,
         }
+    }
+
+    /// Fits a decoder to the training samples of `sets` and measures it on the test samples; `networks` are those trained with
+    /// the same settings, for the decoders that need them.
+    ///
+    /// # Errors
+    /// The samples cannot be scaled or decoded, or no other program can compute what the decoder does.
+    fn fit(
+        origin: Origin,
+        sets: RunSets,
+        networks: Option<Networks>,
+        kind: BundleDecoder,
+    ) -> Result<Self, BundleError> {
+        if kind.is_network() && networks.is_none() {
+            return Err(BundleError::NoNetwork(kind));
+        }
+        let training = sets.split.training;
+        let of_row = |set: &Dataset| {
+            let targets = set.targets();
+            let extremes = targets.columns().into_iter().map(|column| {
+                let both = |(low, high): (f64, f64), &value: &f64| (low.min(value), high.max(value));
+                column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), both)
+            });
+            Ok::<_, BundleError>((MinMax::of(set.readings()), extremes.collect::<Vec<_>>()))
+        };
+        let in_training = PerRow::fit(&training, origin.settings.source.row_model(), of_row)?;
+        let (reading_ranges, target_extremes) = in_training.values().iter().cloned().unzip();
+        let set = DecoderSet::new(origin.settings, training, networks);
+        let decoder = match kind {
+            BundleDecoder::Linear => Some(set.linear().map_err(Box::new)?),
+            BundleDecoder::Kind(kind) => set.decoder(kind, Precision::Double).map_err(Box::new)?,
+        };
+        let not_described = |reason| ChoiceError::NotDescribed { decoder: kind, reason };
+        let mut decoder = decoder.ok_or_else(|| not_described(EQUATIONS))?;
+        Ok(Self {
+            kind,
+            program: decoder.program().ok_or_else(|| not_described(RULES))?,
+            reading_ranges,
+            target_extremes,
+            errors: errors(&mut *decoder, &sets.problem, &sets.test)?,
+            half_widths: Vec::new(),
+            test: Some(sets.test),
+            origin,
+        })
     }
 
     /// Kind of decoder.
     pub fn kind(&self) -> BundleDecoder {
-        self.fitted.kind
+        self.kind
     }
 
     /// Number of row-wires that are distinguished; 1 if the row is not an argument.
     fn rows(&self) -> usize {
-        self.fitted.reading_ranges.len().max(self.fitted.program.rows())
+        self.reading_ranges.len().max(self.program.rows())
     }
 
     fn meaning(&self) -> Meaning {
-        match &self.origin.problem.sensor {
-            Some(simulation) => Meaning::Array(simulation.sensor.scale),
-            None => Meaning::Own {
-                inputs: self.origin.problem.inputs.clone(),
-                targets: self.origin.problem.targets.clone(),
-                row_wires: match (&self.origin.row_wires, self.rows()) {
-                    (Some(row_wires), 2..) => row_wires.clone(),
-                    _ => Vec::new(),
-                },
+        let Problem {
+            inputs,
+            targets,
+            sensor,
+            ..
+        } = self.origin.problem.clone();
+        // Comments of C have no Ω.
+        let in_ohm = |channel: Channel| Channel::new(channel.name, Some("ohm"));
+        Meaning {
+            is_array: sensor.is_some(),
+            inputs: match sensor {
+                Some(_) => inputs.into_iter().map(in_ohm).collect(),
+                None => inputs,
+            },
+            targets,
+            row_wires: match (&self.origin.row_wires, self.rows()) {
+                (Some(row_wires), 2..) => row_wires.clone(),
+                _ => Vec::new(),
             },
         }
-    }
-
-    /// 90 % prediction intervals of the network, if every target has one.
-    fn half_widths(&self) -> Vec<HalfWidth> {
-        let file = self.file.filter(|_| self.fitted.kind.is_network());
-        let intervals = file.and_then(|file| file.intervals.as_ref());
-        let all = intervals.and_then(|intervals| intervals.targets.iter().cloned().collect());
-        all.unwrap_or_default()
     }
 
     /// Limits of the readings, or of the features of a history, beyond which they count as outside: for all row-wires or for
     /// each; `None` if the range in training is not known.
     pub(super) fn limits(&self) -> Option<Limits> {
-        let quantity = ExportedProgram::quantity_of(&self.fitted.program);
+        let quantity = match are_positive(&self.program) {
+            true => Quantity::Resistance,
+            false => Quantity::Raw,
+        };
         let of_row = |range: &Option<MinMax>| {
             let range = range.as_ref()?;
-            Some(
-                (0..range.channels())
-                    .map(|channel| range.limits(quantity, channel))
-                    .collect(),
-            )
+            let channels = 0..range.channels();
+            Some(channels.map(|channel| range.limits(quantity, channel)).collect())
         };
-        self.fitted.reading_ranges.iter().map(of_row).collect()
+        self.reading_ranges.iter().map(of_row).collect()
     }
 
     /// Collects what a bundle contains.
@@ -168,24 +250,24 @@ impl<'a> ExportedDecoder<'a> {
         let problem = &self.origin.problem;
         let channels = problem.inputs.len();
         let meaning = self.meaning();
-        let mut program = self.fitted.program.clone();
+        let mut program = self.program.clone();
         if let Some(memory) = problem.memory.as_ref().filter(|memory| !memory.is_empty()) {
             let with_history = program.with_history(memory, channels);
             program = with_history.map_err(|error| Box::new(RunError::from(error)))?;
         }
-        let exported = ExportedProgram::of(&program, &self.half_widths(), self.limits().as_ref());
+        let exported = ExportedProgram::of(&program, &self.half_widths, self.limits().as_ref());
         let (rows, printed) = self.readings(channels)?;
         let golden = Golden::of(rows, printed, &program, exported.outputs())?;
-        let targets = &self.fitted.target_extremes;
-        let scales = match meaning.is_array() {
-            true => vec![scale(targets, 0..exported.outputs()); exported.outputs()],
-            false => (0..exported.outputs())
-                .map(|output| scale(targets, output..output + 1))
-                .collect(),
-        };
+        let targets = &self.target_extremes;
+        let outputs = exported.outputs();
+        let scales = (0..outputs).map(|output| match meaning.is_array {
+            true => scale(targets, 0..outputs),
+            false => scale(targets, output..output + 1),
+        });
+        let scales = scales.collect();
         let mut contents = Contents {
             name: name.to_owned(),
-            noun: self.fitted.kind.noun(),
+            noun: self.kind.noun(),
             precision,
             names: names(&exported, &meaning),
             rows: self.rows(),
@@ -213,69 +295,50 @@ impl<'a> ExportedDecoder<'a> {
         /// Rows by which the accuracy is found, and those of them in the bundle.
         const ROWS: [usize; 2] = [200, 30];
         let takes_row = self.rows() > 1;
-        let of_set = |set: &Dataset, sample: usize| GoldenRow {
-            is_new_series: false,
-            time_s: None,
-            row: if takes_row { set.row_index(sample) } else { 0 },
-            readings: set.sample_readings(sample)[..channels].to_vec(),
-            targets: Vec::new(),
+        let of_set = |set: &Dataset, sample: usize| {
+            let row = if takes_row { set.row_index(sample) } else { 0 };
+            GoldenRow::new(row, set.sample_readings(sample)[..channels].to_vec())
         };
-        let has_history = self
-            .origin
-            .problem
-            .memory
-            .as_ref()
-            .is_some_and(|memory| !memory.is_empty());
+        let memory = self.origin.problem.memory.as_ref().filter(|memory| !memory.is_empty());
         let mut rows = match (&self.origin.problem.sensor, &self.test) {
             (Some(simulation), _) => {
                 let rows = simulation.model_size().map_or(1, |size| size.rows);
-                let test_samples = ROWS[0].next_multiple_of(rows.max(1));
                 let few = Simulation {
-                    test_samples,
+                    test_samples: ROWS[0].next_multiple_of(rows.max(1)),
                     ..*simulation
                 };
                 let set = few.draw_test(self.origin.settings.seed).map_err(Box::new)?;
-                (0..set.samples().min(2 * ROWS[0]))
-                    .map(|sample| of_set(&set, sample))
-                    .collect()
+                let samples = 0..set.samples().min(2 * ROWS[0]);
+                samples.map(|sample| of_set(&set, sample)).collect()
             }
-            (None, Some(test)) if has_history => (0..test.samples().min(ROWS[0]))
-                .map(|sample| of_set(test, sample))
-                .collect(),
             (None, Some(test)) => {
                 let count = test.samples().min(ROWS[0]);
-                (0..count)
-                    .map(|place| of_set(test, place * test.samples() / count))
-                    .collect()
+                // Readings with a history are successive.
+                let sample = |place| {
+                    if memory.is_some() {
+                        place
+                    } else {
+                        place * test.samples() / count
+                    }
+                };
+                (0..count).map(|place| of_set(test, sample(place))).collect()
             }
             (None, None) => self.drawn(channels, ROWS[0])?,
         };
-        match &self.origin.problem.memory {
-            Some(memory) if has_history => set_times(&mut rows, memory.interval_s.unwrap_or(1.0)),
-            _ => rows.splice(..0, self.corners()).for_each(drop),
+        match memory {
+            Some(memory) => set_times(&mut rows, memory.interval_s.unwrap_or(1.0)),
+            None => rows.splice(..0, self.corners()).for_each(drop),
         }
         Ok((rows, ROWS[1] + self.rows()))
     }
 
     /// The smallest, middle and largest readings of each range in training.
     fn corners(&self) -> Vec<GoldenRow> {
-        let ranges = self.fitted.reading_ranges.iter().enumerate();
+        let ranges = self.reading_ranges.iter().enumerate();
         let known = ranges.filter_map(|(row, range)| Some((row, range.as_ref()?)));
         let of_range = |(row, range): (usize, &MinMax)| {
-            let at = |place: f64| {
-                let between = |channel| {
-                    let (low, high) = range.extremes(channel);
-                    if place == 1.0 { high } else { low + place * (high - low) }
-                };
-                (0..range.channels()).map(between).collect()
-            };
-            [0.0, 0.5, 1.0].map(|place| GoldenRow {
-                is_new_series: false,
-                time_s: None,
-                row,
-                readings: at(place),
-                targets: Vec::new(),
-            })
+            let at = |place: f64| readings_at(range, range.channels(), || place);
+            [0.0, 0.5, 1.0].map(|place| GoldenRow::new(row, at(place)))
         };
         known.flat_map(of_range).collect()
     }
@@ -283,21 +346,13 @@ impl<'a> ExportedDecoder<'a> {
     /// Readings that are uniform in their range in training.
     fn drawn(&self, channels: usize, count: usize) -> Result<Vec<GoldenRow>, BundleError> {
         let mut rng = Seed::default().rng(Stream::Test);
-        let ranges = &self.fitted.reading_ranges;
         let row = |place: usize| {
-            let row = place % ranges.len();
-            let range = ranges[row].as_ref().ok_or(BundleError::NoRange)?;
-            let mut between = |channel| {
-                let (low, high) = range.extremes(channel);
-                low + rng.random::<f64>() * (high - low)
-            };
-            Ok(GoldenRow {
-                is_new_series: false,
-                time_s: None,
+            let row = place % self.reading_ranges.len();
+            let range = self.reading_ranges[row].as_ref().ok_or(BundleError::NoRange)?;
+            Ok(GoldenRow::new(
                 row,
-                readings: (0..channels).map(&mut between).collect(),
-                targets: Vec::new(),
-            })
+                readings_at(range, channels, || rng.random::<f64>()),
+            ))
         };
         (0..count).map(row).collect()
     }
@@ -306,12 +361,12 @@ impl<'a> ExportedDecoder<'a> {
     fn metadata(&self, contents: &Contents) -> Metadata {
         let common = json!({
             "program": PROGRAM,
-            "decoder": self.fitted.kind.to_string(),
+            "decoder": self.kind.to_string(),
             "takes_row": contents.takes_row(),
             "steps": steps(contents),
             "precision": contents.precision.to_string(),
         });
-        let errors = &self.fitted.errors;
+        let errors = &self.errors;
         let own = match &self.origin.problem.sensor {
             Some(simulation) => self.of_array(simulation, contents, errors),
             None => self.of_recording(contents, errors),
@@ -322,7 +377,7 @@ impl<'a> ExportedDecoder<'a> {
                 fields.extend(part);
             }
         }
-        if self.fitted.kind.is_network() {
+        if self.kind.is_network() {
             let mut operations = contents.computed();
             let hidden = operations.find(|(_, operation)| matches!(operation, Operation::Map(Function::Tanh, _)));
             fields.insert(
@@ -335,7 +390,7 @@ impl<'a> ExportedDecoder<'a> {
 
     fn of_array(&self, simulation: &Simulation, contents: &Contents, errors: &TestErrors) -> Value {
         let Simulation { sensor, scene, .. } = simulation;
-        let names = |channels: Vec<Channel>| channels.into_iter().map(|channel| channel.name).collect::<Vec<_>>();
+        let names = |channels: &[Channel]| Vec::from_iter(channels.iter().map(|channel| channel.name.clone()));
         json!({
             "trained_by": self.origin.program,
             "array": sensor.scale.to_string(),
@@ -343,8 +398,8 @@ impl<'a> ExportedDecoder<'a> {
             "scene": scene,
             "rows": scene.rows.to_string(),
             "row_numbers": contents.takes_row().then_some([1, contents.rows]),
-            "inputs": { "names": names(contents.meaning.inputs(contents.channels())), "unit": "ohm" },
-            "outputs": { "names": names(contents.meaning.targets()), "unit": "mm" },
+            "inputs": { "names": names(&contents.meaning.inputs), "unit": "ohm" },
+            "outputs": { "names": names(&contents.meaning.targets), "unit": "mm" },
             "training_samples": simulation.samples,
             "seed": self.origin.settings.seed,
             "errors": errors.nodes(),
@@ -389,12 +444,18 @@ impl<'a> ExportedDecoder<'a> {
             let (minimum, maximum): (Vec<f64>, Vec<f64>) = extremes.unzip();
             json!({ "minimum": minimum, "maximum": maximum })
         };
-        self.fitted
-            .reading_ranges
-            .iter()
-            .map(|of_row| of_row.as_ref().map(range))
-            .collect()
+        let of_rows = self.reading_ranges.iter();
+        of_rows.map(|of_row| of_row.as_ref().map(range)).collect()
     }
+}
+
+/// Readings at a place from 0 to 1 of the range of each channel.
+fn readings_at(range: &MinMax, channels: usize, mut place: impl FnMut() -> f64) -> Vec<f64> {
+    let mut between = |channel| {
+        let ((low, high), place) = (range.extremes(channel), place());
+        if place == 1.0 { high } else { low + place * (high - low) }
+    };
+    (0..channels).map(&mut between).collect()
 }
 
 /// Times at the usual interval with a pause and a step back, and a series that begins after half of the rows.
@@ -440,97 +501,9 @@ fn steps(contents: &Contents) -> Vec<String> {
     contents.computed().filter_map(step).collect()
 }
 
-/// A decoder fitted to training samples, with the facts about them that a bundle contains.
-pub(super) struct FittedDecoder {
-    pub(super) kind: BundleDecoder,
-    pub(super) program: Program,
-    /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
-    pub(super) reading_ranges: Vec<Option<MinMax>>,
-    /// Ranges of the targets in training: one for all row-wires, or one for each if the row is an argument.
-    pub(super) target_extremes: Vec<Vec<(f64, f64)>>,
-    /// Errors on the test samples.
-    pub(super) errors: TestErrors,
-}
-
-impl FittedDecoder {
-    /// Wraps trained networks, which contain the range of their readings, and their errors on the test samples.
-    pub(super) fn of_networks(networks: &Networks, errors: TestErrors) -> Self {
-        let all = networks.values().iter();
-        let extremes = all.clone().map(|network| {
-            let outputs = network.outputs();
-            (0..outputs.channels()).map(|output| outputs.extremes(output)).collect()
-        });
-        Self {
-            kind: BundleDecoder::Kind(DecoderKind::Network),
-            program: networks.program(Precision::Double),
-            reading_ranges: all.map(|network| network.inputs().range().cloned()).collect(),
-            target_extremes: extremes.collect(),
-            errors,
-        }
-    }
-
-    /// Fits a decoder to the training samples of `sets` by these settings and measures it on the test samples; `networks` are
-    /// those trained with these settings, for the decoders that need them.
-    ///
-    /// # Errors
-    /// The samples cannot be scaled or decoded, or no other program can compute what the decoder does.
-    pub(super) fn fit(
-        settings: RunSettings,
-        sets: RunSets,
-        networks: Option<Networks>,
-        kind: BundleDecoder,
-    ) -> Result<Self, BundleError> {
-        if kind.is_network() && networks.is_none() {
-            return Err(BundleError::NoNetwork(kind));
-        }
-        let (training, test, problem) = (sets.split.training, sets.test, sets.problem);
-        let of_row = |set: &Dataset| {
-            let targets = set.targets();
-            let extremes = targets.columns().into_iter().map(|column| {
-                let both = |(low, high): (f64, f64), &value: &f64| (low.min(value), high.max(value));
-                column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), both)
-            });
-            Ok::<_, BundleError>((MinMax::of(set.readings()), extremes.collect::<Vec<_>>()))
-        };
-        let in_training = PerRow::fit(&training, settings.source.row_model(), of_row)?;
-        let (reading_ranges, target_extremes) = in_training.values().iter().cloned().unzip();
-        let set = DecoderSet::new(settings, training, networks);
-        let decoder = match kind {
-            BundleDecoder::Linear => Some(set.linear().map_err(Box::new)?),
-            BundleDecoder::Kind(kind) => set.decoder(kind, Precision::Double).map_err(Box::new)?,
-        };
-        let not_described = |reason| ChoiceError::NotDescribed { decoder: kind, reason };
-        let mut decoder = decoder.ok_or_else(|| not_described(EQUATIONS))?;
-        let program = decoder.program().ok_or_else(|| not_described(RULES))?;
-        let answers = decode_set(&mut *decoder, &test).map_err(|error| Box::new(RunError::from(error)))?;
-        Ok(Self {
-            kind,
-            program,
-            reading_ranges,
-            target_extremes,
-            errors: TestErrors::measure(&problem, &test, &answers),
-        })
-    }
-}
-
-/// Facts about the samples to which an exported decoder was fitted, for the metadata of its bundle.
-pub(super) struct Origin {
-    /// Program and version that trained or fitted it.
-    pub(super) program: String,
-    pub(super) settings: RunSettings,
-    /// Names, units and positions of readings and targets.
-    pub(super) problem: Problem,
-    /// Row-wires of the samples in ascending order, from 0, if they are known.
-    pub(super) row_wires: Option<Vec<usize>>,
-    /// Names of the recordings without their folders; empty for a simulated array.
-    pub(super) files: Vec<String>,
-    /// Errors of the linear baseline on the test samples.
-    pub(super) errors_of_linear: TestErrors,
-}
-
 impl Origin {
-    /// Returns the facts from the file of a trained network.
-    pub(super) fn of_file(file: &NetworkFile) -> Self {
+    /// The facts from the file of a trained network.
+    fn of_file(file: &NetworkFile) -> Self {
         Self {
             program: file.program.clone(),
             settings: file.settings,
@@ -540,25 +513,12 @@ impl Origin {
             errors_of_linear: file.scores.baselines.linear.clone(),
         }
     }
+}
 
-    /// Returns the facts from the samples of `setup`, for a decoder without a network.
-    ///
-    /// # Errors
-    /// The samples cannot be scaled or decoded.
-    pub(super) fn of_sets(setup: &Setup, sets: &SetupSets) -> Result<Self, BundleError> {
-        let (settings, samples) = (*setup.settings(), &sets.sets);
-        let set = DecoderSet::new(settings, samples.split.training.clone(), None);
-        let mut linear = set.linear().map_err(Box::new)?;
-        let answers = decode_set(&mut *linear, &samples.test).map_err(|error| Box::new(RunError::from(error)))?;
-        Ok(Self {
-            program: PROGRAM.to_owned(),
-            problem: Problem::clone(&samples.problem),
-            row_wires: samples.test.row_wires_read().map(<[usize]>::to_vec),
-            files: file_names(setup.plan()),
-            errors_of_linear: TestErrors::measure(&samples.problem, &samples.test, &answers),
-            settings,
-        })
-    }
+/// Errors of a decoder on test samples.
+fn errors(decoder: &mut dyn Decoder, problem: &Problem, test: &Dataset) -> Result<TestErrors, BundleError> {
+    let answers = decode_set(decoder, test).map_err(|error| Box::new(RunError::from(error)))?;
+    Ok(TestErrors::measure(problem, test, &answers))
 }
 
 fn file_names(plan: Option<&Plan>) -> Vec<String> {

@@ -3,7 +3,6 @@
 use decoupler_core::{
     decoupling::{Domain, Node, NodeId, Operation, Precision, Program},
     evaluation::HalfWidth,
-    network::Quantity,
 };
 use ndarray::Array2;
 
@@ -125,26 +124,12 @@ impl ExportedProgram {
     pub(super) fn are_positive(&self) -> bool {
         are_positive(&self.program)
     }
-
-    /// Quantity by whose rule limits are set.
-    pub(super) fn quantity_of(program: &Program) -> Quantity {
-        match are_positive(program) {
-            true => Quantity::Resistance,
-            false => Quantity::Raw,
-        }
-    }
 }
 
-fn are_positive(program: &Program) -> bool {
-    program.nodes().iter().any(|node| {
-        matches!(
-            node.operation,
-            Operation::Valid {
-                domain: Domain::Positive,
-                ..
-            }
-        )
-    })
+/// `true` if a reading of this program must be above 0.
+pub(super) fn are_positive(program: &Program) -> bool {
+    let mut operations = program.nodes().iter().map(|node| &node.operation);
+    operations.any(|operation| matches!(operation, Operation::Valid { domain, .. } if *domain == Domain::Positive))
 }
 
 fn push(nodes: &mut Vec<Node>, operation: Operation, size: usize) -> NodeId {

@@ -1,5 +1,5 @@
 use std::{
-    fs,
+    fs, io,
     path::{Path, PathBuf},
 };
 
@@ -59,19 +59,15 @@ impl AtomicFolder {
     /// # Errors
     /// The operating system refuses.
     pub(super) fn sizes(&self) -> Result<Vec<(String, u64)>, BundleError> {
-        let sizes = || {
-            let mut sizes = Vec::new();
-            for entry in fs::read_dir(self.path())? {
-                let entry = entry?;
-                sizes.push((
-                    entry.file_name().to_string_lossy().into_owned(),
-                    entry.metadata()?.len(),
-                ));
-            }
-            sizes.sort();
-            Ok(sizes)
+        let size = |entry: io::Result<fs::DirEntry>| {
+            let entry = entry?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            Ok((name, entry.metadata()?.len()))
         };
-        Ok(sizes().map_err(|error| WriteError::io(&self.target, error))?)
+        let sizes = fs::read_dir(self.path()).and_then(|entries| entries.map(size).collect::<io::Result<Vec<_>>>());
+        let mut sizes = sizes.map_err(|error| WriteError::io(&self.target, error))?;
+        sizes.sort();
+        Ok(sizes)
     }
 
     /// Renames it to its target.

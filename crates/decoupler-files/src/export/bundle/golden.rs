@@ -31,6 +31,17 @@ pub(super) struct GoldenRow {
 }
 
 impl GoldenRow {
+    /// Readings of a row that continue those before, without a time.
+    pub(super) fn new(row: usize, readings: Vec<f64>) -> Self {
+        Self {
+            is_new_series: false,
+            time_s: None,
+            row,
+            readings,
+            targets: Vec::new(),
+        }
+    }
+
     /// The same row with other readings.
     pub(super) fn rounded(&self, taken: impl Fn(usize, f64) -> f64) -> Self {
         let readings = self.readings.iter().enumerate();
@@ -151,7 +162,7 @@ impl Golden {
         if takes_row {
             names.push("row".to_owned());
         }
-        let channels = meaning.inputs(contents.channels()).into_iter().chain(meaning.targets());
+        let channels = meaning.inputs.iter().chain(&meaning.targets);
         names.extend(channels.map(|channel| inert(&channel.name)));
         // User-defined names may contain commas and quotation marks.
         let mut writer = csv::Writer::from_writer(Vec::new());

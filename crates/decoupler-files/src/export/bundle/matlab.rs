@@ -18,8 +18,9 @@ use super::{
 ///
 /// # Errors
 /// The operating system refuses.
-pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<(), BundleError> {
-    folder.write(&format!("{}_decode.m", contents.name), function(contents))
+pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<String, BundleError> {
+    folder.write(&format!("{}_decode.m", contents.name), function(contents))?;
+    Ok(usage(contents))
 }
 
 /// Text of the function file.
@@ -33,11 +34,7 @@ fn function(contents: &Contents) -> String {
         None => parts.join(", "),
     };
     let arguments = arguments(contents);
-    let legend = contents
-        .meaning
-        .legend(channels)
-        .into_iter()
-        .chain(contents.note_lines());
+    let legend = contents.meaning.legend().into_iter().chain(contents.note_lines());
     let legend: String = legend.map(|line| format!("%   {line}\n")).collect();
     let upper = name.to_uppercase();
     let mut text = format!(
@@ -245,7 +242,7 @@ fn push_matrix(text: &mut String, name: &str, matrix: &Array2<f64>) {
 }
 
 /// Lines of a program that decodes.
-pub(super) fn usage(contents: &Contents) -> String {
+fn usage(contents: &Contents) -> String {
     let state = if contents.history().is_some() { ", state" } else { "" };
     format!(
         "    [{}{state}] = {}_decode({})\n\nin MATLAB (from R2016b) or GNU Octave.{}\n",

@@ -98,7 +98,7 @@ pub(super) fn readme(contents: &Contents, decoder: BundleDecoder, usage: &str, r
         counted(contents.channels(), "reading"),
         meaning.outputs_in_words(contents.outputs()),
         contents.parts_in_words(),
-        meaning.legend(contents.channels()).join("\n"),
+        meaning.legend().join("\n"),
     );
     if contents.takes_row() {
         text += &format!(

@@ -13,6 +13,7 @@ use decoupler_core::{
     network::{InputChoice, Quantity, ScalingChoice},
     problem::{Channel, Problem},
     scene::{Noise, RowModel, Rows},
+    text::Named,
 };
 
 /// A network of a small array after little training.
@@ -49,7 +50,7 @@ fn networks() -> Vec<(String, NetworkFile)> {
 }
 
 /// The decoder fitted to the training samples of `file`.
-fn decoder(file: &NetworkFile, kind: BundleDecoder) -> ExportedDecoder<'_> {
+fn decoder(file: &NetworkFile, kind: BundleDecoder) -> ExportedDecoder {
     let sets = file
         .setup()
         .sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ())
@@ -86,7 +87,7 @@ fn printed_constants_are_those_of_the_program() {
     let home = tempfile::tempdir().unwrap();
     for (name, file) in [networks().remove(0), networks().remove(3)] {
         let exported = ExportedDecoder::from(&file);
-        for format in BundleFormat::ALL {
+        for &format in BundleFormat::ALL {
             for &precision in format.precisions() {
                 let path = home.path().join(format!("{name} {format} {precision}"));
                 let report = export_bundle(&file, format, precision, &path).unwrap();
@@ -186,7 +187,7 @@ fn every_decoder_and_format_is_written_and_the_compiled_source_agrees_with_the_d
     for rows in [Rows::All, Rows::Known, Rows::One(1)] {
         let file = trained(rows, Quantity::Conductance, ScalingChoice::Whitening, 1e-3);
         for kind in BundleDecoder::all() {
-            for format in BundleFormat::ALL {
+            for &format in BundleFormat::ALL {
                 for &precision in format.precisions() {
                     if format.check_for(kind, precision).is_err() {
                         assert_eq!(kind, BundleDecoder::Kind(DecoderKind::RadialBasis));
@@ -319,7 +320,7 @@ fn refused_exports_leave_no_files() {
         assert!(message.contains(expected), "{message}");
     }
     // Without the range, the other bundles have no count of readings outside.
-    for format in BundleFormat::ALL {
+    for &format in BundleFormat::ALL {
         export_bundle(
             &without_range,
             format,

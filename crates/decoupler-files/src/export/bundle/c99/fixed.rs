@@ -12,51 +12,40 @@ pub(super) fn source(header: &Header<'_>, fixed: &FixedProgram) -> String {
     let (contents, upper) = (header.contents, header.upper());
     let (rows, channels) = (fixed.rows.len(), contents.channels());
     let mut text = format!("#include \"{}_decode.h\"\n\n", contents.name);
-    let mut of_rows = |kind: &str, name: &str, size: usize, of: &dyn Fn(&FixedRow) -> Vec<String>| {
-        let declaration = format!("static const {kind} {name}[{rows}][{size}]");
-        push_array(&mut text, &declaration, &[rows, size], fixed.rows.iter().flat_map(of));
-    };
-    of_rows("int32_t", "centres", channels, &|row| texts(&row.centres));
-    of_rows("int32_t", "factors", channels, &|row| texts(&row.factors));
-    of_rows("uint8_t", "factor_shifts", channels, &|row| texts(&row.shifts));
     let layers = fixed.rows[0].layers.len();
-    for layer in 0..layers {
-        let FixedLayer { inputs, biases, .. } = &fixed.rows[0].layers[layer];
-        let (inputs, sums) = (*inputs, biases.len());
-        let declaration = format!("static const int16_t weights_{}[{rows}][{sums}][{inputs}]", layer + 1);
-        let weights = fixed.rows.iter().flat_map(|row| &row.layers[layer].weights);
-        push_array(&mut text, &declaration, &[rows, sums, inputs], weights);
-        let mut of_rows = |kind: &str, name: &str, of: &dyn Fn(&FixedLayer) -> Vec<String>| {
-            let declaration = format!("static const {kind} {name}_{}[{rows}][{sums}]", layer + 1);
-            let values = fixed.rows.iter().flat_map(|row| of(&row.layers[layer]));
-            push_array(&mut text, &declaration, &[rows, sums], values);
-        };
+    let mut push = |kind: &str, name: &str, shape: &[usize], of: &dyn Fn(&FixedRow) -> Vec<String>| {
+        let shape = [&[rows], shape].concat();
+        push_array(&mut text, kind, name, &shape, fixed.rows.iter().flat_map(of));
+    };
+    push("int32_t", "centres", &[channels], &|row| texts(&row.centres));
+    push("int32_t", "factors", &[channels], &|row| texts(&row.factors));
+    push("uint8_t", "factor_shifts", &[channels], &|row| texts(&row.shifts));
+    for (index, FixedLayer { inputs, biases, .. }) in fixed.rows[0].layers.iter().enumerate() {
+        let name = |of: &str| format!("{of}_{}", index + 1);
         let long = |value: &i64| format!("INT64_C({value})");
-        of_rows("int64_t", "biases", &|layer| layer.biases.iter().map(long).collect());
-        of_rows("uint8_t", "sum_shifts", &|layer| texts(&layer.shifts));
-    }
-    if layers > 1 {
-        let values = &fixed.tangent.values;
-        let _ = writeln!(
-            text,
-            "/* tanh, in 2^-15: largest error with interpolation {:.1e}. */",
-            fixed.tangent.error
-        );
-        push_array(
-            &mut text,
-            &format!("static const int16_t tangents[{}]", values.len()),
-            &[values.len()],
-            values,
-        );
+        let sums = biases.len();
+        push("int16_t", &name("weights"), &[sums, *inputs], &|row| {
+            texts(&row.layers[index].weights)
+        });
+        push("int64_t", &name("biases"), &[sums], &|row| {
+            row.layers[index].biases.iter().map(long).collect()
+        });
+        push("uint8_t", &name("sum_shifts"), &[sums], &|row| {
+            texts(&row.layers[index].shifts)
+        });
     }
     if contents.exported.outside.is_some() {
-        let mut limits = |name: &str, pick: fn(&(i32, i32)) -> i32| {
-            let declaration = format!("static const int32_t {name}[{rows}][{channels}]");
-            let values = fixed.rows.iter().flat_map(|row| row.limits.iter().map(pick));
-            push_array(&mut text, &declaration, &[rows, channels], values);
-        };
-        limits("lowest", |limits| limits.0);
-        limits("highest", |limits| limits.1);
+        let limits = |row: &FixedRow, pick: fn(&(i32, i32)) -> i32| texts(&Vec::from_iter(row.limits.iter().map(pick)));
+        push("int32_t", "lowest", &[channels], &|row| limits(row, |limits| limits.0));
+        push("int32_t", "highest", &[channels], &|row| limits(row, |limits| limits.1));
+    }
+    if layers > 1 {
+        let TangentTable { values, error } = &fixed.tangent;
+        let _ = writeln!(
+            text,
+            "/* tanh, in 2^-15: largest error with interpolation {error:.1e}. */"
+        );
+        push_array(&mut text, "int16_t", "tangents", &[values.len()], values);
     }
     text += &arithmetic(fixed, layers);
     text + &decode(header, fixed, &upper)
@@ -133,17 +122,13 @@ fn decode(header: &Header<'_>, fixed: &FixedProgram, upper: &str) -> String {
     let layers = &fixed.rows[0].layers;
     for (index, FixedLayer { inputs, biases, .. }) in layers.iter().enumerate() {
         let (layer, sums, is_last) = (index + 1, biases.len(), index + 1 == layers.len());
+        let clamped =
+            |largest: &str| format!("(int32_t)clamped(shifted(sum, sum_shifts_{layer}[network][k]), {largest})");
         let (target, value) = match is_last {
-            true => (
-                format!("answer->{}[k]", header.outputs),
-                format!("(int32_t)clamped(shifted(sum, sum_shifts_{layer}[network][k]), INT32_MAX)"),
-            ),
+            true => (format!("answer->{}[k]", header.outputs), clamped("INT32_MAX")),
             false => (
                 format!("values_{}[k]", layer + 1),
-                format!(
-                    "tangent((int32_t)clamped(shifted(sum, sum_shifts_{layer}[network][k]), {}))",
-                    TangentTable::LARGEST
-                ),
+                format!("tangent({})", clamped(&TangentTable::LARGEST.to_string())),
             ),
         };
         if !is_last {

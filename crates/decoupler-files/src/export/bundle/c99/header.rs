@@ -25,7 +25,7 @@ impl<'a> Header<'a> {
                 reading: "int32_t",
                 target: "int32_t",
                 readings: fixed.readings_name(readings),
-                outputs: if contents.meaning.is_array() {
+                outputs: if contents.meaning.is_array {
                     "coordinates_nm"
                 } else {
                     outputs
@@ -50,22 +50,48 @@ impl<'a> Header<'a> {
     /// Declares the function that decodes.
     pub(super) fn signature(&self) -> String {
         let (name, upper) = (&self.contents.name, self.upper());
-        let row = if self.contents.takes_row() { "int row, " } else { "" };
-        let (function, state, time) = match self.contents.history() {
-            Some(_) => ("step", format!("{name}_state *state, "), "double time_s, "),
-            None => ("decode", String::new(), ""),
-        };
+        let state = format!("{name}_state *state");
+        let readings = format!("const {} {}[{upper}_CHANNELS]", self.reading, self.readings);
         format!(
-            "int {name}_{function}({state}{row}{time}const {} {}[{upper}_CHANNELS],\n    {name}_answer *answer)",
-            self.reading, self.readings
+            "int {}({},\n    {name}_answer *answer)",
+            self.function(),
+            self.arguments(&state, "int row", "double time_s", &readings)
         )
+    }
+
+    /// Calls the function with these arguments, of which it may not take all.
+    pub(super) fn call(&self, state: &str, row: &str, time: &str, readings: &str) -> String {
+        format!(
+            "{}({}, &answer)",
+            self.function(),
+            self.arguments(state, row, time, readings)
+        )
+    }
+
+    fn function(&self) -> String {
+        let is_sequence = self.contents.history().is_some();
+        format!("{}_{}", self.contents.name, if is_sequence { "step" } else { "decode" })
+    }
+
+    fn arguments(&self, state: &str, row: &str, time: &str, readings: &str) -> String {
+        let (is_sequence, takes_row) = (self.contents.history().is_some(), self.contents.takes_row());
+        let all = [
+            (is_sequence, state),
+            (takes_row, row),
+            (is_sequence, time),
+            (true, readings),
+        ];
+        let taken = all
+            .into_iter()
+            .filter_map(|(is_taken, argument)| is_taken.then_some(argument));
+        Vec::from_iter(taken).join(", ")
     }
 
     /// Text of the header file.
     pub(super) fn text(&self) -> String {
         let (contents, upper) = (self.contents, self.upper());
         let name = &contents.name;
-        let mut lines = contents.meaning.legend(contents.channels());
+        let mut lines = contents.meaning.legend();
         lines.extend(
             self.fixed
                 .iter()

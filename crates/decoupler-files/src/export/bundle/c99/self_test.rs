@@ -28,70 +28,48 @@ impl SelfTest<'_> {
         );
         let _ = write!(text, "#define COUNT {}\n\n", golden.len());
         let (channels, outputs) = (contents.channels(), contents.outputs());
+        let count = golden.len();
         if contents.takes_row() {
-            let rows = golden.iter().map(|row| row.row + 1);
-            push_array(&mut text, "static const int rows[COUNT]", &[golden.len()], rows);
+            push_array(&mut text, "int", "rows", &[count], golden.iter().map(|row| row.row + 1));
         }
         if contents.history().is_some() {
             let restarts = golden.iter().map(|row| u8::from(row.is_new_series));
-            push_array(
-                &mut text,
-                "static const int is_new_series[COUNT]",
-                &[golden.len()],
-                restarts,
-            );
+            push_array(&mut text, "int", "is_new_series", &[count], restarts);
         }
         let mut push = |name: &str, shape: &[usize], values: &mut dyn Iterator<Item = f64>| {
             let values = values.map(|value| number(Precision::Double, value));
-            push_array(&mut text, &format!("static const double {name}"), shape, values);
+            push_array(&mut text, "double", name, shape, values);
         };
         if contents.history().is_some() {
-            let mut times = golden.iter().map(|row| row.time_s.unwrap_or(0.0));
-            push("times_s[COUNT]", &[golden.len()], &mut times);
+            push(
+                "times_s",
+                &[count],
+                &mut golden.iter().map(|row| row.time_s.unwrap_or(0.0)),
+            );
         }
         let of = |pick: fn(&GoldenRow) -> &[f64]| golden.iter().flat_map(pick).copied();
-        push(
-            &format!("readings[COUNT][{channels}]"),
-            &[golden.len(), channels],
-            &mut of(|row| &row.readings),
-        );
-        push(
-            &format!("expected[COUNT][{outputs}]"),
-            &[golden.len(), outputs],
-            &mut of(|row| &row.targets),
-        );
-        push(
-            &format!("scales[{outputs}]"),
-            &[outputs],
-            &mut contents.scales.iter().copied(),
-        );
+        push("readings", &[count, channels], &mut of(|row| &row.readings));
+        push("expected", &[count, outputs], &mut of(|row| &row.targets));
+        push("scales", &[outputs], &mut contents.scales.iter().copied());
         if let Some(fixed) = self.fixed {
-            push(
-                &format!("per_one[{channels}]"),
-                &[channels],
-                &mut fixed.readings_per_one(),
-            );
-            push(&format!("units[{outputs}]"), &[outputs], &mut fixed.target_units());
+            push("per_one", &[channels], &mut fixed.readings_per_one());
+            push("units", &[outputs], &mut fixed.target_units());
         }
-        let _ = write!(text, "{}", self.main(&upper));
-        text
+        text + &self.main(&upper)
     }
 
     fn main(&self, upper: &str) -> String {
         let (header, contents) = (self.header, self.header.contents);
         let (name, outputs) = (&contents.name, header.outputs);
-        let row = |index: &str| match contents.takes_row() {
-            true => format!("rows[{index}], "),
-            false => String::new(),
-        };
         let is_sequence = contents.history().is_some();
-        let function = if is_sequence { "step" } else { "decode" };
         // One state for each row-wire.
         let rows = contents.rows;
-        let state = |index: &str| match (is_sequence, contents.takes_row()) {
-            (true, true) => format!("&states[rows[{index}] - 1], "),
-            (true, false) => "&states[0], ".to_owned(),
-            (false, _) => String::new(),
+        let call = |index: &str, row: &str| {
+            let state = match contents.takes_row() {
+                true => &format!("&states[rows[{index}] - 1]"),
+                false => "&states[0]",
+            };
+            header.call(state, row, &format!("times_s[{index}]"), "taken")
         };
         let (declared, started) = match is_sequence {
             true => (
@@ -101,10 +79,6 @@ impl SelfTest<'_> {
                 ),
             ),
             false => (String::new(), String::new()),
-        };
-        let time = |index: &str| match contents.history() {
-            Some(_) => format!("times_s[{index}], "),
-            None => String::new(),
         };
         let taken = match (self.fixed, header.reading) {
             (Some(_), _) => "(int32_t)lround(readings[v][i] * per_one[i])",
@@ -118,22 +92,18 @@ impl SelfTest<'_> {
         };
         let bad_row = match contents.takes_row() {
             true => format!(
-                "    if ({name}_{function}({state}0, {time}taken, &answer) != {upper}_NO_SUCH_ROW ||\n        \
-                 {name}_{function}({state}{upper}_ROWS + 1, {time}taken, &answer) != {upper}_NO_SUCH_ROW) {{\n        \
+                "    if ({} != {upper}_NO_SUCH_ROW ||\n        {} != {upper}_NO_SUCH_ROW) {{\n        \
                  puts(\"a row that does not exist is not refused\");\n        return 1;\n    }}\n",
-                time = time("0"),
-                state = state("0"),
+                call("0", "0"),
+                call("0", &format!("{upper}_ROWS + 1")),
             ),
             false => String::new(),
         };
         let bad_reading = match contents.exported.are_positive() {
             true => format!(
-                "    taken[{upper}_CHANNELS - 1] = 0;\n    \
-                 if ({name}_{function}({}{}{}taken, &answer) != {upper}_BAD_READING) {{\n        \
+                "    taken[{upper}_CHANNELS - 1] = 0;\n    if ({} != {upper}_BAD_READING) {{\n        \
                  puts(\"a reading of 0 is not refused\");\n        return 1;\n    }}\n",
-                state("0"),
-                row("0"),
-                time("0"),
+                call("0", "rows[0]"),
             ),
             false => String::new(),
         };
@@ -143,7 +113,7 @@ impl SelfTest<'_> {
              double deviation, largest = 0;\n{declared}    \
              for (int v = 0; v < COUNT; ++v) {{\n        /* The readings as the decoder takes them. */\n        \
              for (int i = 0; i < {upper}_CHANNELS; ++i) {{\n            taken[i] = {taken};\n        }}\n{started}        \
-             if ({name}_{function}({state}{row}{time}taken, &answer) != {upper}_OK) {{\n            \
+             if ({decoding} != {upper}_OK) {{\n            \
              puts(\"golden readings are refused\");\n            return 1;\n        }}\n        \
              for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n            \
              deviation = fabs({decoded} - expected[v][k]) / scales[k];\n            \
@@ -152,9 +122,7 @@ impl SelfTest<'_> {
              printf(\"largest deviation: %.3e of the range of the outputs, limit {limit:.1e}\\n\", largest);\n    \
              return largest <= {limit:e} ? 0 : 1;\n}}\n",
             reading = header.reading,
-            state = state("v"),
-            row = row("v"),
-            time = time("v"),
+            decoding = call("v", "rows[v]"),
         )
     }
 }

@@ -15,18 +15,9 @@ pub(super) fn source(header: &Header<'_>) -> String {
         contents.name
     );
     for (id, tables) in contents.constants() {
-        let shape = contents.full_shape(id, tables.len());
-        let (precision, brackets) = (contents.precision_of(id), brackets(&shape));
-        let declaration = format!(
-            "static const {} {}{brackets}",
-            type_name(precision),
-            contents.name_of(id)
-        );
-        let values = tables
-            .iter()
-            .flat_map(|table| table.iter())
-            .map(|&value| number(precision, value));
-        push_array(&mut text, &declaration, &shape, values);
+        let (shape, precision) = (contents.full_shape(id, tables.len()), contents.precision_of(id));
+        let values = tables.iter().flatten().map(|&value| number(precision, value));
+        push_array(&mut text, type_name(precision), contents.name_of(id), &shape, values);
     }
     if let Some(history) = contents.history() {
         text += &remembering(header, &history);
@@ -38,10 +29,6 @@ pub(super) fn source(header: &Header<'_>) -> String {
         .map(|(id, operation)| statements(contents, &upper, id, operation));
     text += &body.collect::<String>();
     text + &answer(header)
-}
-
-pub(super) fn brackets(shape: &[usize]) -> String {
-    shape.iter().map(|size| format!("[{size}]")).collect()
 }
 
 /// Statements that refuse other rows and set `network`.
@@ -194,14 +181,8 @@ fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
     let (kept, averages) = (constants.longest_lag(), constants.averages.len());
     let mut text = String::new();
     let mut array = |kind: &str, name: &str, values: Vec<String>| {
-        let count = values.len();
-        if count > 0 {
-            push_array(
-                &mut text,
-                &format!("static const {kind} {name}[{count}]"),
-                &[count],
-                values,
-            );
+        if !values.is_empty() {
+            push_array(&mut text, kind, name, &[values.len()], values);
         }
     };
     array("int", "lags", constants.lags.iter().map(usize::to_string).collect());

@@ -288,7 +288,7 @@ impl FixedProgram {
             )
         });
         let bounds = Vec::from_iter(bounds).join(", ");
-        let units = match meaning.is_array() {
+        let units = match meaning.is_array {
             true => format!(
                 "Readings are integers in units of {:e} ohm, coordinates integers in nanometres.",
                 self.readings.unit(0)
@@ -300,7 +300,7 @@ impl FixedProgram {
 
     /// Units of own data as initialisers of arrays; empty for an array, whose names contain the units.
     pub(super) fn unit_definitions(&self, upper: &str, meaning: &Meaning) -> String {
-        if meaning.is_array() {
+        if meaning.is_array {
             return String::new();
         }
         let define = |what: &str, units: &Units| {

@@ -25,7 +25,7 @@ impl Units {
             limits.fold(0.0_f64, |largest, (low, high)| largest.max(low.abs()).max(high.abs()))
         };
         let channels = 0..limits[0].len();
-        let decimals = if meaning.is_array() {
+        let decimals = if meaning.is_array {
             let largest_ohm = channels.clone().map(largest).fold(0.0, f64::max);
             let fits = |&decimals: &i32| largest_ohm * ten_to(decimals) <= LARGEST_READING;
             let decimals = [9, 6, 3, 0].into_iter().find(fits);
@@ -40,7 +40,7 @@ impl Units {
 
     /// Units of the targets: nanometres for an array; `reach` is the largest magnitude of a target over all activations.
     pub(super) fn of_targets(meaning: &Meaning, scales: &[f64], reach: impl Fn(usize) -> f64) -> Self {
-        let decimals = |(target, &scale): (usize, &f64)| match meaning.is_array() {
+        let decimals = |(target, &scale): (usize, &f64)| match meaning.is_array {
             true => 6,
             false => max_decimals(scale, TARGET_UNITS).min(max_decimals(reach(target), LARGEST_TARGET)),
         };

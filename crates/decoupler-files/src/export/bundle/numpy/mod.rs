@@ -15,7 +15,7 @@ use npz::NamedArray;
 ///
 /// # Errors
 /// The operating system refuses.
-pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<(), BundleError> {
+pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<String, BundleError> {
     let arrays = contents.constants().map(|(id, tables)| NamedArray {
         name: contents.name_of(id).to_owned(),
         precision: contents.precision_of(id),
@@ -23,17 +23,14 @@ pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<(), Bu
         values: tables.iter().flat_map(|table| table.iter().copied()).collect(),
     });
     folder.write(&format!("{}.npz", contents.noun), npz::write(&Vec::from_iter(arrays)))?;
-    folder.write("decode.py", program(contents))
+    folder.write("decode.py", program(contents))?;
+    Ok(usage(contents))
 }
 
 /// Text of the program.
 fn program(contents: &Contents) -> String {
     let (input, channels) = (contents.meaning.readings(), contents.channels());
-    let legend = contents
-        .meaning
-        .legend(channels)
-        .into_iter()
-        .chain(contents.note_lines());
+    let legend = contents.meaning.legend().into_iter().chain(contents.note_lines());
     let legend: String = legend.map(|line| format!("# {line}\n")).collect();
     let dtype = dtype(contents.outer_precision());
     let (row, row_text) = match contents.takes_row() {
@@ -218,7 +215,7 @@ fn remembering(contents: &Contents, history: &PrintedHistory) -> String {
 }
 
 /// Lines of a program that decodes.
-pub(super) fn usage(contents: &Contents) -> String {
+fn usage(contents: &Contents) -> String {
     let (input, parts) = (contents.meaning.readings(), contents.parts().join(", "));
     let row = if contents.takes_row() { ", row" } else { "" };
     match contents.history() {

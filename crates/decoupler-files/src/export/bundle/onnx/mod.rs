@@ -15,7 +15,7 @@
 
 mod builder;
 mod history;
-mod schema;
+mod message;
 
 use std::collections::HashMap;
 
@@ -23,11 +23,10 @@ use decoupler_core::{
     decoupling::{Domain, Function, NodeId, Operation, Precision},
     problem::Channel,
 };
-use prost::Message;
 
 use self::{
     builder::{GraphBuilder, element_type, value},
-    schema::{Graph, INT64, Model, OperatorSet, Property},
+    message::{INT64, Message},
 };
 use super::{contents::Contents, folder::AtomicFolder, meaning::comment, report::BundleError};
 
@@ -41,16 +40,12 @@ const MAX_LAG: usize = 1000;
 ///
 /// # Errors
 /// A lag is too long, or the operating system refuses.
-pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<(), BundleError> {
+pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<String, BundleError> {
     if let Some(history) = contents.history()
         && history.constants.longest_lag() > MAX_LAG
     {
         return Err(BundleError::LongLag(history.constants.longest_lag()));
     }
-    let properties = contents.metadata.iter().map(|(key, value)| Property {
-        key: key.clone(),
-        value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
-    });
     let notes = contents.notes.iter().map(|note| format!(" Note: {note}."));
     let about = format!(
         "{}. Answers are NaN where a reading or the row is invalid.{}{}",
@@ -60,19 +55,20 @@ pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<(), Bu
             .map_or_else(String::new, |about| format!(" {about}")),
         notes.collect::<String>()
     );
-    let model = Model {
-        ir_version: IR_VERSION,
-        producer_name: "decoupler".to_owned(),
-        producer_version: env!("CARGO_PKG_VERSION").to_owned(),
-        doc_string: about,
-        graph: Some(Printer::graph(contents)),
-        opset_import: vec![OperatorSet {
-            domain: String::new(),
-            version: OPSET,
-        }],
-        metadata_props: properties.collect(),
-    };
-    folder.write(&format!("{}.onnx", contents.noun), model.encode_to_vec())
+    let properties = contents.metadata.iter().map(|(key, value)| {
+        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        Message::default().bytes(1, key).bytes(2, value)
+    });
+    let model = Message::default()
+        .int(1, IR_VERSION)
+        .bytes(2, "decoupler")
+        .bytes(3, env!("CARGO_PKG_VERSION"))
+        .bytes(6, about)
+        .bytes(7, Printer::graph(contents))
+        .bytes(8, Message::default().int(2, OPSET))
+        .all(14, properties);
+    folder.write(&format!("{}.onnx", contents.noun), model)?;
+    Ok(usage(contents))
 }
 
 /// A graph in progress.
@@ -87,7 +83,7 @@ struct Printer<'a> {
 }
 
 impl Printer<'_> {
-    fn graph(contents: &Contents) -> Graph {
+    fn graph(contents: &Contents) -> Message {
         let mut printer = Printer {
             contents,
             builder: GraphBuilder::default(),
@@ -182,7 +178,7 @@ impl Printer<'_> {
                     is_valid = builder.op("And", &[&is_valid, &is_positive]);
                 }
                 let is_invalid = builder.op("Not", &[&is_valid]);
-                let invalid = builder.count(&is_invalid, true);
+                let invalid = builder.count(&is_invalid);
                 let none = builder.whole(&[], &[0]);
                 self.valid.push(builder.op("Equal", &[&invalid, &none]));
             }
@@ -218,7 +214,7 @@ impl Printer<'_> {
                 let below = builder.op("Less", &operands[..2]);
                 let above = builder.op("Greater", &[operands[0], operands[2]]);
                 let is_outside = builder.op("Or", &[&below, &above]);
-                let ones = builder.with("Cast", &[&is_outside], &[("to", i64::from(INT64))]);
+                let ones = builder.with("Cast", &[&is_outside], &[("to", INT64)]);
                 let axes = builder.whole(&[1], &[1]);
                 builder.named("ReduceSum", &[&ones, &axes], &[("keepdims", 0)], "readings_outside");
             }
@@ -253,7 +249,7 @@ impl Printer<'_> {
     }
 
     /// Adds the outputs, NaN where there is no answer.
-    fn finish(mut self) -> Graph {
+    fn finish(mut self) -> Message {
         let contents = self.contents;
         let exported = &contents.exported;
         let meaning = &contents.meaning;
@@ -276,35 +272,33 @@ impl Printer<'_> {
             let nan = self.builder.scalar(precision, f64::NAN);
             self.builder.named("Where", &[&is_valid, &computed, &nan], &[], output);
             let about = match output {
-                "half_widths" => {
-                    "Half-widths of the 90 % prediction intervals, valid for all answers together".to_owned()
-                }
-                _ => channel_names(
+                "half_widths" => "Half-widths of the 90 % prediction intervals, valid for all answers together",
+                _ => &channel_names(
                     meaning.either("Coordinates in mm", "Targets"),
-                    &meaning.targets(),
-                    meaning.is_array(),
+                    &meaning.targets,
+                    meaning.is_array,
                 ),
             };
             outputs.push(value(output, kind, &[batch, Some(contents.outputs())], about));
         }
         if exported.outside.is_some() {
-            let about = contents.outside_in_words().to_owned();
+            let about = contents.outside_in_words();
             outputs.push(value("readings_outside", INT64, &[batch], about));
         }
         let about = channel_names(
             meaning.either("Readings in ohm", "Readings"),
-            &meaning.inputs(contents.channels()),
-            meaning.is_array(),
+            &meaning.inputs,
+            meaning.is_array,
         );
         let mut inputs = vec![value(
             meaning.readings(),
             kind,
             &[batch, Some(contents.channels())],
-            about,
+            &about,
         )];
         if contents.takes_row() {
             let about = format!("Row of each reading, from 1 to {}", contents.rows);
-            inputs.push(value("row", INT64, &[batch], about));
+            inputs.push(value("row", INT64, &[batch], &about));
         }
         if let Some(next) = self.next_state.take() {
             let double = element_type(Precision::Double);
@@ -316,22 +310,17 @@ impl Printer<'_> {
                 "time_s",
                 double,
                 &[Some(1), Some(1)],
-                "Time in seconds, NaN if it is not known".to_owned(),
+                "Time in seconds, NaN if it is not known",
             ));
-            inputs.push(value("state", double, &shape, of_state.to_owned()));
-            outputs.push(value(
-                "next_state",
-                double,
-                &shape,
-                "State after this reading".to_owned(),
-            ));
+            inputs.push(value("state", double, &shape, of_state));
+            outputs.push(value("next_state", double, &shape, "State after this reading"));
         }
-        Graph {
-            name: "decoupler".to_owned(),
-            input: inputs,
-            output: outputs,
-            ..self.builder.graph
-        }
+        Message::default()
+            .all(1, self.builder.nodes)
+            .bytes(2, "decoupler")
+            .all(5, self.builder.initializers)
+            .all(11, inputs)
+            .all(12, outputs)
     }
 }
 
@@ -348,7 +337,7 @@ fn channel_names(what: &str, channels: &[Channel], is_array: bool) -> String {
 }
 
 /// Lines of a program that decodes.
-pub(super) fn usage(contents: &Contents) -> String {
+fn usage(contents: &Contents) -> String {
     let (input, output) = (contents.meaning.readings(), contents.meaning.outputs());
     let kind = match contents.outer_precision() {
         Precision::Single => "float32",
@@ -384,15 +373,31 @@ pub(super) fn usage(contents: &Contents) -> String {
 /// Values of a constant of a graph that was written, which has its own name or that of all row-wires.
 #[cfg(test)]
 pub(super) fn initializer(bytes: &[u8], name: &str) -> Vec<f64> {
-    let graph = Model::decode(bytes).unwrap().graph.unwrap();
+    use message::tests::{Field, fields};
     let of_rows = format!("{name}_of_rows");
-    let tensor = graph
-        .initializer
-        .iter()
-        .find(|tensor| tensor.name == name || tensor.name == of_rows);
-    let tensor = tensor.unwrap_or_else(|| panic!("no {name}"));
-    let bytes = &tensor.raw_data;
-    match tensor.data_type == schema::DOUBLE {
+    let graph = fields(bytes).into_iter().find(|(field, _)| *field == 7);
+    let Some((_, Field::Bytes(graph))) = graph else {
+        panic!("no graph");
+    };
+    let mut initializers = fields(graph).into_iter().filter(|(field, _)| *field == 5);
+    let found = initializers.find_map(|(_, tensor)| {
+        let Field::Bytes(tensor) = tensor else { return None };
+        let get = |number| {
+            fields(tensor)
+                .into_iter()
+                .find(|(field, _)| *field == number)
+                .map(|(_, value)| value)
+        };
+        let is_named = [name, &of_rows]
+            .map(|name| Some(Field::Bytes(name.as_bytes())))
+            .contains(&get(8));
+        match (is_named, get(2), get(9)) {
+            (true, Some(Field::Int(kind)), Some(Field::Bytes(raw))) => Some((kind as i64, raw)),
+            _ => None,
+        }
+    });
+    let (kind, bytes) = found.unwrap_or_else(|| panic!("no {name}"));
+    match kind == message::DOUBLE {
         true => bytes
             .as_chunks()
             .0
