@@ -418,10 +418,10 @@ impl Rows<'_> {
 
     /// Computes values in the precision `T`; returns `false` if the operation is one of double precision alone.
     #[inline(always)]
-    fn compute<T: Width>(&self, operation: &Operation, work: &Work, before: &[Prepared], results: &mut [T]) -> bool {
+    fn compute<T: Width>(&self, node: &Node, work: &Work, before: &[Prepared], results: &mut [T]) -> bool {
         let all = |id: &NodeId| self.values::<T>(&before[id.index()]);
         let of_rows = self.indices.iter().copied().enumerate();
-        match (operation, work) {
+        match (&node.operation, work) {
             (Operation::Divide(_, divisor), Work::OfDifference(one, other)) => {
                 let operands = [one, other, divisor].map(|id| self.values::<f64>(&before[id.index()]));
                 kernel::subtract_and_divide(operands, results);
@@ -436,10 +436,10 @@ impl Rows<'_> {
             (Operation::Clip { of, low, high }, _) => kernel::clip(all(of), [all(low), all(high)], results),
             (Operation::Affine { of, .. } | Operation::SquaredDistances { of, .. }, work) => {
                 let Some(tables) = T::tables(work) else { return false };
-                let (size, of) = (results.len() / self.indices.len(), self.by_row(&before[of.index()]));
-                let is_affine = matches!(operation, Operation::Affine { .. });
+                let of = self.by_row(&before[of.index()]);
+                let is_affine = matches!(node.operation, Operation::Affine { .. });
                 for (row, row_index) in of_rows {
-                    let (table, results) = (tables.at(row_index), &mut results[row * size..]);
+                    let (table, results) = (tables.at(row_index), &mut results[row * node.size..]);
                     if is_affine {
                         table.affine(of(row), results);
                     } else {
@@ -470,7 +470,7 @@ impl ProgramDecoder {
             let Prepared { work, size, values } = &mut rest[0];
             let size = *size;
             if work.is_single(node) {
-                let is_computed = rows.compute::<f32>(&node.operation, work, before, &mut values.singles);
+                let is_computed = rows.compute::<f32>(node, work, before, &mut values.singles);
                 assert!(is_computed, "the operation is one of single precision");
                 convert(&values.singles, &mut values.doubles, f64::from);
                 continue;
@@ -559,8 +559,8 @@ impl ProgramDecoder {
                         results[row] = outside.count() as f64;
                     }
                 }
-                (operation, work) => {
-                    let is_computed = rows.compute::<f64>(operation, work, before, results);
+                (_, work) => {
+                    let is_computed = rows.compute::<f64>(node, work, before, results);
                     assert!(is_computed, "every operation is prepared as such");
                 }
             }
