@@ -8,7 +8,7 @@ use decoupler_core::{
     problem::{Channel, Problem},
 };
 use rand::RngExt;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::{
     BundleDecoder, BundleError, BundlePrecision, ChoiceError,
@@ -55,9 +55,6 @@ struct Origin {
     /// Errors of the linear baseline on the test samples.
     errors_of_linear: TestErrors,
 }
-
-/// Facts about a decoder, for users and programs that have only the bundle: names of fields and JSON values.
-type Metadata = Map<String, Value>;
 
 impl From<&NetworkFile> for ExportedDecoder {
     /// Exports the network of a file.
@@ -275,7 +272,7 @@ impl ExportedDecoder {
             exported,
             scales,
             golden,
-            metadata: Metadata::new(),
+            metadata: Value::Null,
             notes: Vec::new(),
         };
         if self.test.is_none() && problem.sensor.is_none() {
@@ -314,12 +311,9 @@ impl ExportedDecoder {
             (None, Some(test)) => {
                 let count = test.samples().min(ROWS[0]);
                 // Readings with a history are successive.
-                let sample = |place| {
-                    if memory.is_some() {
-                        place
-                    } else {
-                        place * test.samples() / count
-                    }
+                let sample = |place| match memory {
+                    Some(_) => place,
+                    None => place * test.samples() / count,
                 };
                 (0..count).map(|place| of_set(test, sample(place))).collect()
             }
@@ -358,41 +352,35 @@ impl ExportedDecoder {
     }
 
     /// Collects the metadata of a bundle.
-    fn metadata(&self, contents: &Contents) -> Metadata {
-        let common = json!({
-            "program": PROGRAM,
-            "decoder": self.kind.to_string(),
-            "takes_row": contents.takes_row(),
-            "steps": steps(contents),
-            "precision": contents.precision.to_string(),
-        });
-        let errors = &self.errors;
-        let own = match &self.origin.problem.sensor {
-            Some(simulation) => self.of_array(simulation, contents, errors),
-            None => self.of_recording(contents, errors),
+    fn metadata(&self, contents: &Contents) -> Value {
+        let mut fields = match &self.origin.problem.sensor {
+            Some(simulation) => self.of_array(simulation, contents),
+            None => self.of_recording(contents),
         };
-        let mut fields = Metadata::new();
-        for part in [common, own] {
-            if let Value::Object(part) = part {
-                fields.extend(part);
-            }
-        }
+        fields["program"] = json!(PROGRAM);
+        fields["trained_by"] = json!(self.origin.program);
+        fields["decoder"] = json!(self.kind.to_string());
+        fields["takes_row"] = json!(contents.takes_row());
+        fields["steps"] = json!(steps(contents));
+        fields["precision"] = json!(contents.precision.to_string());
+        fields["seed"] = json!(self.origin.settings.seed);
         if self.kind.is_network() {
             let mut operations = contents.computed();
             let hidden = operations.find(|(_, operation)| matches!(operation, Operation::Map(Function::Tanh, _)));
-            fields.insert(
-                "hidden_nodes".to_owned(),
-                json!(hidden.map(|(id, _)| contents.size(id))),
-            );
+            fields["hidden_nodes"] = json!(hidden.map(|(id, _)| contents.size(id)));
         }
         fields
     }
 
-    fn of_array(&self, simulation: &Simulation, contents: &Contents, errors: &TestErrors) -> Value {
-        let Simulation { sensor, scene, .. } = simulation;
+    fn of_array(
+        &self,
+        Simulation {
+            sensor, scene, samples, ..
+        }: &Simulation,
+        contents: &Contents,
+    ) -> Value {
         let names = |channels: &[Channel]| Vec::from_iter(channels.iter().map(|channel| channel.name.clone()));
         json!({
-            "trained_by": self.origin.program,
             "array": sensor.scale.to_string(),
             "geometry": sensor.geometry,
             "scene": scene,
@@ -400,15 +388,14 @@ impl ExportedDecoder {
             "row_numbers": contents.takes_row().then_some([1, contents.rows]),
             "inputs": { "names": names(&contents.meaning.inputs), "unit": "ohm" },
             "outputs": { "names": names(&contents.meaning.targets), "unit": "mm" },
-            "training_samples": simulation.samples,
-            "seed": self.origin.settings.seed,
-            "errors": errors.nodes(),
+            "training_samples": samples,
+            "errors": self.errors.nodes(),
             "readings_in_training_ohm": self.ranges(),
             "output_range_mm": contents.scales[0],
         })
     }
 
-    fn of_recording(&self, contents: &Contents, errors: &TestErrors) -> Value {
+    fn of_recording(&self, contents: &Contents) -> Value {
         let origin = &self.origin;
         let columns = |channels: &[Channel]| {
             let (names, units): (Vec<_>, Vec<_>) =
@@ -422,15 +409,13 @@ impl ExportedDecoder {
         };
         let row_wires = origin.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
         json!({
-            "trained_by": origin.program,
             "files": origin.files,
             "row_numbers": contents.takes_row().then(|| row_wires.collect::<Vec<_>>()),
             "inputs": columns(&origin.problem.inputs),
             "memory": origin.problem.memory,
             "outputs": columns(&origin.problem.targets),
             "method": origin.settings.training.method.short_name(),
-            "seed": origin.settings.seed,
-            "errors": named(errors),
+            "errors": named(&self.errors),
             "errors_of_ridge": named(&origin.errors_of_linear),
             "readings_in_training": self.ranges(),
             "output_ranges": contents.scales,

@@ -3,13 +3,13 @@
 use std::fmt::Write;
 
 use decoupler_core::{
-    decoupling::{Domain, Function, NodeId, Operation},
+    decoupling::{Domain, NodeId, Operation},
     text::counted,
 };
 use ndarray::Array2;
 
 use super::{
-    contents::{Contents, PrintedHistory},
+    contents::{Contents, PrintedHistory, infix},
     folder::AtomicFolder,
     report::BundleError,
 };
@@ -34,8 +34,7 @@ fn function(contents: &Contents) -> String {
         None => parts.join(", "),
     };
     let arguments = arguments(contents);
-    let legend = contents.meaning.legend().into_iter().chain(contents.note_lines());
-    let legend: String = legend.map(|line| format!("%   {line}\n")).collect();
+    let legend = format!("%   {}\n", contents.legend().join("\n%   "));
     let upper = name.to_uppercase();
     let mut text = format!(
         "function [{returned}] = {name}({arguments})\n%{upper} {}.\n%   [{}] = {upper}({}) has a line of {} for each line of\n\
@@ -59,7 +58,7 @@ fn function(contents: &Contents) -> String {
             "TIME_S is the time of each sample in seconds, in order. STATE is [] at the start, and continues from an earlier \
              call. {about}"
         ));
-        text += &lines.iter().map(|line| format!("%   {line}\n")).collect::<String>();
+        let _ = writeln!(text, "%   {}", lines.join("\n%   "));
     }
     let _ = write!(
         text,
@@ -73,16 +72,13 @@ fn function(contents: &Contents) -> String {
         ),
         false => "row = ones(samples, 1);\n".to_owned(),
     };
-    for (id, tables) in contents.constants() {
-        for (index, table) in tables.iter().enumerate() {
-            push_matrix(&mut text, &format!("{}_{{{}}}", contents.name_of(id), index + 1), table);
+    for constant in contents.constants() {
+        for (index, table) in constant.tables.iter().enumerate() {
+            push_matrix(&mut text, &format!("{}_{{{}}}", constant.name, index + 1), table);
         }
     }
-    let part_sizes = parts.iter().map(|part| match *part {
-        "readings_outside" => (*part, 1),
-        part => (part, contents.outputs()),
-    });
-    for (part, size) in part_sizes {
+    let sizes = contents.exported.parts().map(|id| contents.size(id));
+    for (part, size) in parts.iter().zip(sizes) {
         let _ = writeln!(text, "{part} = zeros(samples, {size});");
     }
     let body: String = contents
@@ -149,13 +145,6 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
                 "    if ~all({is_valid})\n        error('{plain}: give finite numbers{above}');\n    end\n"
             );
         }
-        Operation::Subtract(one, other) => format!("{} - {}", of(*one), of(*other)),
-        Operation::Divide(one, other) => format!("{} ./ {}", of(*one), of(*other)),
-        Operation::Map(function, x) => match function {
-            Function::Log1p => format!("log1p({})", of(*x)),
-            Function::Tanh => format!("tanh({})", of(*x)),
-            Function::Gaussian => format!("exp(-{})", of(*x)),
-        },
         Operation::Affine { of: x, weights, biases } => format!("{} * {} + {}", of(*x), of(*weights), of(*biases)),
         Operation::SquaredDistances { of: x, points } => {
             return format!(
@@ -177,9 +166,7 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
         Operation::CountOutside { of: x, low, high } => {
             format!("sum({x} < {} | {x} > {}, 2)", of(*low), of(*high), x = of(*x))
         }
-        Operation::Readings | Operation::Select { .. } | Operation::Blend { .. } => {
-            unreachable!("given, or not exported")
-        }
+        _ => infix(operation, ["./", "", ""], of),
     };
     format!("    {name} = {expression};\n")
 }

@@ -6,38 +6,24 @@ use crate::export::bundle::{contents::Contents, fixed16::FixedProgram, meaning::
 /// Types and names of the interface.
 pub(super) struct Header<'a> {
     pub(super) contents: &'a Contents,
-    fixed: Option<&'a FixedProgram>,
-    /// Types of a reading and of a target.
-    pub(super) reading: &'static str,
-    pub(super) target: &'static str,
+    pub(super) fixed: Option<&'a FixedProgram>,
+    /// Type of a reading and of a target.
+    pub(super) number: &'static str,
     pub(super) readings: &'static str,
     pub(super) outputs: &'static str,
 }
 
 impl<'a> Header<'a> {
     pub(super) fn of(contents: &'a Contents, fixed: Option<&'a FixedProgram>) -> Self {
-        let number = type_name(contents.outer_precision());
         let (readings, outputs) = (contents.meaning.readings(), contents.meaning.outputs());
-        match fixed {
-            Some(fixed) => Self {
-                contents,
-                fixed: Some(fixed),
-                reading: "int32_t",
-                target: "int32_t",
-                readings: fixed.readings_name(readings),
-                outputs: if contents.meaning.is_array {
-                    "coordinates_nm"
-                } else {
-                    outputs
-                },
-            },
-            None => Self {
-                contents,
-                fixed: None,
-                reading: number,
-                target: number,
-                readings,
-                outputs,
+        Self {
+            contents,
+            fixed,
+            number: fixed.map_or(type_name(contents.outer_precision()), |_| "int32_t"),
+            readings: fixed.map_or(readings, |fixed| fixed.readings_name(readings)),
+            outputs: match fixed {
+                Some(_) if contents.meaning.is_array => "coordinates_nm",
+                _ => outputs,
             },
         }
     }
@@ -51,7 +37,7 @@ impl<'a> Header<'a> {
     pub(super) fn signature(&self) -> String {
         let (name, upper) = (&self.contents.name, self.upper());
         let state = format!("{name}_state *state");
-        let readings = format!("const {} {}[{upper}_CHANNELS]", self.reading, self.readings);
+        let readings = format!("const {} {}[{upper}_CHANNELS]", self.number, self.readings);
         format!(
             "int {}({},\n    {name}_answer *answer)",
             self.function(),
@@ -91,13 +77,9 @@ impl<'a> Header<'a> {
     pub(super) fn text(&self) -> String {
         let (contents, upper) = (self.contents, self.upper());
         let name = &contents.name;
-        let mut lines = contents.meaning.legend();
-        lines.extend(
-            self.fixed
-                .iter()
-                .flat_map(|fixed| wrapped(&fixed.units_in_words(&contents.meaning))),
-        );
-        lines.extend(contents.note_lines());
+        let mut lines = contents.legend();
+        let of_units = self.fixed.map(|fixed| fixed.units_in_words(&contents.meaning));
+        lines.extend(of_units.iter().flat_map(|about| wrapped(about)));
         let mut text = format!(
             "/* {}\n   {} */\n#ifndef {upper}_DECODE_H\n#define {upper}_DECODE_H\n\n",
             contents.meaning.purpose(),
@@ -123,14 +105,14 @@ impl<'a> Header<'a> {
             text,
             "/* What the function returns. */\nenum {{\n    {upper}_OK = 0,\n    {upper}_NO_SUCH_ROW = -1,\n    \
              {upper}_BAD_READING = -2\n}};\n\ntypedef struct {{\n    {} {}[{upper}_OUTPUTS];\n",
-            self.target, self.outputs
+            self.number, self.outputs
         );
         if contents.exported.half_widths.is_some() {
             let _ = write!(
                 text,
                 "    /* Half-widths of the 90 % prediction intervals, valid for all answers together. */\n    \
                  {} half_widths[{upper}_OUTPUTS];\n",
-                self.target
+                self.number
             );
         }
         if contents.exported.outside.is_some() {

@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use decoupler_core::decoupling::{Domain, Function, NodeId, Operation, Precision};
+use decoupler_core::decoupling::{Domain, NodeId, Operation, Precision};
 
 use super::{header::Header, number, push_array, type_name};
-use crate::export::bundle::contents::{Contents, PrintedHistory};
+use crate::export::bundle::contents::{Contents, PrintedHistory, infix};
 
 /// Writes the source.
 pub(super) fn source(header: &Header<'_>) -> String {
@@ -14,16 +14,17 @@ pub(super) fn source(header: &Header<'_>) -> String {
         "#include \"{}_decode.h\"\n\n#include <float.h>\n#include <math.h>\n\n",
         contents.name
     );
-    for (id, tables) in contents.constants() {
-        let (shape, precision) = (contents.full_shape(id, tables.len()), contents.precision_of(id));
-        let values = tables.iter().flatten().map(|&value| number(precision, value));
-        push_array(&mut text, type_name(precision), contents.name_of(id), &shape, values);
+    for constant in contents.constants() {
+        let precision = constant.precision;
+        let values = constant.values().map(|value| number(precision, value));
+        push_array(&mut text, type_name(precision), constant.name, &constant.shape, values);
     }
     if let Some(history) = contents.history() {
         text += &remembering(header, &history);
     }
     let _ = write!(text, "{}\n{{\n", header.signature());
-    text += &row_check(contents, &upper);
+    let is_of_row = contents.constants().any(|constant| constant.tables.len() > 1);
+    text += &row_check(contents, &upper, is_of_row);
     let body = contents
         .computed()
         .map(|(id, operation)| statements(contents, &upper, id, operation));
@@ -31,13 +32,12 @@ pub(super) fn source(header: &Header<'_>) -> String {
     text + &answer(header)
 }
 
-/// Statements that refuse other rows and set `network`.
-pub(super) fn row_check(contents: &Contents, upper: &str) -> String {
+/// Statements that refuse other rows, and set `network` where constants are those of a row.
+pub(super) fn row_check(contents: &Contents, upper: &str, is_of_row: bool) -> String {
     if !contents.takes_row() {
         return String::new();
     }
-    let is_used = contents.constants().any(|(id, _)| contents.is_of_row(id));
-    let network = if is_used {
+    let network = if is_of_row {
         "    const int network = row - 1;\n"
     } else {
         ""
@@ -66,10 +66,7 @@ fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operatio
     match operation {
         Operation::Valid { of, domain } => {
             let reading = value(contents, *of, "i", contents.precision_of(*of));
-            let most = match contents.precision_of(*of) {
-                Precision::Single => "FLT_MAX",
-                Precision::Double => "DBL_MAX",
-            };
+            let most = largest(contents.precision_of(*of));
             let lowest = match domain {
                 Domain::Positive => format!("{reading} > 0"),
                 Domain::Finite => format!("{reading} >= -{most}"),
@@ -80,16 +77,6 @@ fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operatio
                     "if (!({lowest} && {reading} <= {most})) {{\n            return {upper}_BAD_READING;\n        }}"
                 ),
             )
-        }
-        Operation::Subtract(one, other) => assigned(format!("{} - {}", of(*one, "i"), of(*other, "i"))),
-        Operation::Divide(one, other) => assigned(format!("{} / {}", of(*one, "i"), of(*other, "i"))),
-        Operation::Map(function, values) => {
-            let x = of(*values, "i");
-            assigned(match function {
-                Function::Log1p => format!("log1p{suffix}({x})"),
-                Function::Tanh => format!("tanh{suffix}({x})"),
-                Function::Gaussian => format!("exp{suffix}(-{x})"),
-            })
         }
         Operation::Affine {
             of: values,
@@ -119,31 +106,34 @@ fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operatio
             let mut text = declared.clone();
             let mut first = 0;
             for part in parts {
-                let target = if first == 0 {
-                    "i".to_owned()
+                let shift = if first == 0 {
+                    String::new()
                 } else {
-                    format!("{first} + i")
+                    format!("{first} + ")
                 };
-                text += &each(contents.size(*part), &format!("{name}[{target}] = {};", of(*part, "i")));
+                text += &each(contents.size(*part), &format!("{name}[{shift}i] = {};", of(*part, "i")));
                 first += contents.size(*part);
             }
             text
         }
         Operation::History { .. } => {
-            declared
-                + &format!(
-                    "    remember(state, time_s, {}, {name});\n",
-                    contents.meaning.readings()
-                )
+            let readings = contents.meaning.readings();
+            format!("{declared}    remember(state, time_s, {readings}, {name});\n")
         }
         Operation::CountOutside { of: values, low, high } => {
             let x = of(*values, "i");
             let count = format!("{name} += !({x} >= {} && {x} <= {});", of(*low, "i"), of(*high, "i"));
             format!("    int {name} = 0;\n") + &each(contents.size(*values), &count)
         }
-        Operation::Readings | Operation::Select { .. } | Operation::Blend { .. } => {
-            unreachable!("given, or not exported")
-        }
+        _ => assigned(infix(operation, ["/", "", suffix], |id| of(id, "i"))),
+    }
+}
+
+/// Name of the largest number.
+fn largest(precision: Precision) -> &'static str {
+    match precision {
+        Precision::Single => "FLT_MAX",
+        Precision::Double => "DBL_MAX",
     }
 }
 
@@ -151,10 +141,7 @@ fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operatio
 fn answer(header: &Header<'_>) -> String {
     let (contents, upper) = (header.contents, header.upper());
     let targets = contents.name_of(contents.exported.targets);
-    let most = match contents.outer_precision() {
-        Precision::Single => "FLT_MAX",
-        Precision::Double => "DBL_MAX",
-    };
+    let most = largest(contents.outer_precision());
     let mut text = format!(
         "    for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n        \
          if (!({targets}[k] >= -{most} && {targets}[k] <= {most})) {{\n            return {upper}_BAD_READING;\n        }}\n    }}\n"
@@ -195,37 +182,31 @@ fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
         true => format!("now - {value}"),
         false => value.to_owned(),
     };
-    let start_of = |field: &str, count: usize| match count {
+    let channel_loop = format!("for (int i = 0; i < {channels}; ++i) {{");
+    let loops = |count: usize, indent: &str, first: &str, body: &str| match count {
         0 => String::new(),
-        count => format!(
-            "        for (int k = 0; k < {count}; ++k) {{\n            for (int i = 0; i < {channels}; ++i) {{\n                \
-             state->{field}[k][i] = readings[i];\n            }}\n        }}\n"
+        _ => format!(
+            "{indent}for (int k = 0; k < {count}; ++k) {{\n{first}{indent}    {channel_loop}\n{body}{indent}    }}\n{indent}}}\n"
         ),
     };
-    let of_lags = match constants.lags.len() {
-        0 => String::new(),
-        count => format!(
-            "    for (int k = 0; k < {count}; ++k) {{\n        const int at = (state->latest - lags[k] + 1 + {kept}) % {kept};\n        \
-             for (int i = 0; i < {channels}; ++i) {{\n            const double now = readings[i];\n            \
-             *feature++ = {};\n        }}\n    }}\n",
-            past("state->kept[at][i]")
-        ),
+    let start_of = |field: &str, count: usize| {
+        let body = format!("                state->{field}[k][i] = readings[i];\n");
+        loops(count, "        ", "", &body)
     };
-    let of_averages = match averages {
-        0 => String::new(),
-        count => format!(
-            "    for (int k = 0; k < {count}; ++k) {{\n        \
-             const double weight = -expm1(-(elapsed_s * per_second[k] + per_reading[k]));\n        \
-             for (int i = 0; i < {channels}; ++i) {{\n            const double now = readings[i];\n            \
-             state->averages[k][i] += weight * (now - state->averages[k][i]);\n            \
-             *feature++ = {};\n        }}\n    }}\n",
-            past("state->averages[k][i]")
-        ),
-    };
+    let now = "            const double now = readings[i];\n            ";
+    let first = format!("        const int at = (state->latest - lags[k] + 1 + {kept}) % {kept};\n");
+    let body = format!("{now}*feature++ = {};\n", past("state->kept[at][i]"));
+    let of_lags = loops(constants.lags.len(), "    ", &first, &body);
+    let first = "        const double weight = -expm1(-(elapsed_s * per_second[k] + per_reading[k]));\n";
+    let body = format!(
+        "{now}state->averages[k][i] += weight * (now - state->averages[k][i]);\n            *feature++ = {};\n",
+        past("state->averages[k][i]")
+    );
+    let of_averages = loops(averages, "    ", first, &body);
     let shifting = match kept {
         0 => String::new(),
         kept => format!(
-            "    state->latest = (state->latest + 1) % {kept};\n    for (int i = 0; i < {channels}; ++i) {{\n        \
+            "    state->latest = (state->latest + 1) % {kept};\n    {channel_loop}\n        \
              state->kept[state->latest][i] = readings[i];\n    }}\n"
         ),
     };
@@ -234,7 +215,7 @@ fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
         f64::INFINITY => String::new(),
         pause_s => format!(" || elapsed_s > {}", double(pause_s)),
     };
-    let reading = header.reading;
+    let reading = header.number;
     text + &format!(
         "void {name}_start({name}_state *state)\n{{\n    state->has_started = 0;\n    state->has_time = 0;\n    \
          state->time_s = 0;\n    state->latest = 0;\n}}\n\n\
@@ -245,7 +226,7 @@ fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
          if (elapsed_s < 0{pause}) {{\n            state->has_started = 0;\n            elapsed_s = {usual};\n        }}\n    }}\n    \
          if (has_time) {{\n        state->has_time = 1;\n        state->time_s = time_s;\n    }}\n    \
          if (!state->has_started) {{\n        state->has_started = 1;\n{kept_start}{averages_start}    }}\n{elapsed}    \
-         for (int i = 0; i < {channels}; ++i) {{\n        *feature++ = readings[i];\n    }}\n\
+         {channel_loop}\n        *feature++ = readings[i];\n    }}\n\
          {of_lags}{of_averages}{shifting}}}\n\n",
         usual = double(constants.interval_s),
         kept_start = start_of("kept", kept),

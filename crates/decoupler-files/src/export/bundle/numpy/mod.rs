@@ -2,27 +2,20 @@
 
 mod npz;
 
-use decoupler_core::decoupling::{Domain, Function, NodeId, Operation, Precision};
+use decoupler_core::decoupling::{Domain, NodeId, Operation, Precision};
 
 use super::{
-    contents::{Contents, PrintedHistory},
+    contents::{Contents, PrintedHistory, infix},
     folder::AtomicFolder,
     report::BundleError,
 };
-use npz::NamedArray;
 
 /// Writes constants and program.
 ///
 /// # Errors
 /// The operating system refuses.
 pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<String, BundleError> {
-    let arrays = contents.constants().map(|(id, tables)| NamedArray {
-        name: contents.name_of(id).to_owned(),
-        precision: contents.precision_of(id),
-        shape: contents.full_shape(id, tables.len()),
-        values: tables.iter().flat_map(|table| table.iter().copied()).collect(),
-    });
-    folder.write(&format!("{}.npz", contents.noun), npz::write(&Vec::from_iter(arrays)))?;
+    folder.write(&format!("{}.npz", contents.noun), npz::write(contents.constants()))?;
     folder.write("decode.py", program(contents))?;
     Ok(usage(contents))
 }
@@ -30,8 +23,7 @@ pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<String
 /// Text of the program.
 fn program(contents: &Contents) -> String {
     let (input, channels) = (contents.meaning.readings(), contents.channels());
-    let legend = contents.meaning.legend().into_iter().chain(contents.note_lines());
-    let legend: String = legend.map(|line| format!("# {line}\n")).collect();
+    let legend = format!("# {}\n", contents.legend().join("\n# "));
     let dtype = dtype(contents.outer_precision());
     let (row, row_text) = match contents.takes_row() {
         true => (", row", "; row: row of each sample, from 1"),
@@ -140,13 +132,6 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
                 "    if not ({is_valid}).all():\n        raise ValueError(\"{x}: give finite numbers{above}\")\n"
             );
         }
-        Operation::Subtract(one, other) => format!("{} - {}", of(*one), of(*other)),
-        Operation::Divide(one, other) => format!("{} / {}", of(*one), of(*other)),
-        Operation::Map(function, x) => match function {
-            Function::Log1p => format!("np.log1p({})", of(*x)),
-            Function::Tanh => format!("np.tanh({})", of(*x)),
-            Function::Gaussian => format!("np.exp(-{})", of(*x)),
-        },
         Operation::Affine { of: x, weights, biases } => format!("{} @ {} + {}", of(*x), of(*weights), of(*biases)),
         Operation::SquaredDistances { of: x, points } => {
             format!(
@@ -164,9 +149,7 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
         Operation::CountOutside { of: x, low, high } => {
             format!("(({x} < {}) | ({x} > {})).sum(axis=1)", of(*low), of(*high), x = of(*x))
         }
-        Operation::Readings | Operation::Select { .. } | Operation::Blend { .. } => {
-            unreachable!("given, or not exported")
-        }
+        _ => infix(operation, ["/", "np.", ""], of),
     };
     format!("    {name} = {expression}\n")
 }

@@ -19,10 +19,6 @@ pub(super) fn state_shape(contents: &Contents) -> [Option<usize>; 2] {
 }
 
 impl Printer<'_> {
-    pub(super) fn state_shape(&self) -> [Option<usize>; 2] {
-        state_shape(self.contents)
-    }
-
     /// Adds the features of the readings `now` (1 × channels, double), and the next state.
     pub(super) fn add_history(&mut self, now: &str, name: &str) {
         let history = self.contents.history().expect("there is a history");
@@ -33,17 +29,11 @@ impl Printer<'_> {
         // Rows from `first` to `end` of a value.
         macro_rules! rows {
             ($of:expr, $first:expr, $end:expr) => {{
-                let (first, end) = (
-                    builder.whole(&[1], &[$first as i64]),
-                    builder.whole(&[1], &[$end as i64]),
-                );
+                let [first, end] = [$first, $end].map(|row| builder.whole(&[1], &[row as i64]));
                 builder.op("Slice", &[$of, &first, &end, &axis])
             }};
         }
-        let (zero, usual) = (
-            builder.scalar(DOUBLE, 0.0),
-            builder.scalar(DOUBLE, constants.interval_s),
-        );
+        let [zero, usual] = [0.0, constants.interval_s].map(|value| builder.scalar(DOUBLE, value));
         let started = rows!("state", 0, 1);
         let has_started = builder.op("Greater", &[&started, &zero]);
         let latest = rows!("state", 1, 2);
