@@ -57,11 +57,20 @@ impl Constant<'_> {
 /// The past that a program takes, with its numbers.
 pub(super) struct PrintedHistory {
     pub(super) constants: MemoryConstants,
+    /// Number of the latest readings that it keeps.
+    pub(super) kept: usize,
+    pub(super) averages: usize,
     /// Pause in seconds after which it restarts, if the usual interval is known.
     pub(super) pause_s: f64,
 }
 
 impl PrintedHistory {
+    /// Rows of the state in languages with matrices: whether it has started, the latest time, the latest readings (the newest
+    /// first), and the averages.
+    pub(super) fn state_rows(&self) -> usize {
+        2 + self.kept + self.averages
+    }
+
     /// Rates of the averages: per second, and per reading; one of the two is 0.
     pub(super) fn rates(&self) -> (Vec<f64>, Vec<f64>) {
         let rates = self.constants.averages.iter().map(|average| match average {
@@ -105,6 +114,13 @@ impl Contents {
                 !is_given && *index != last
             })
             .map(|(index, node)| (NodeId::at(index), &node.operation))
+    }
+
+    /// A statement for each node that is computed.
+    pub(super) fn body(&self, statement: impl Fn(NodeId, &Operation) -> String) -> String {
+        self.computed()
+            .map(|(id, operation)| statement(id, operation))
+            .collect()
     }
 
     /// Constants with their names.
@@ -183,8 +199,11 @@ impl Contents {
         nodes.find_map(|node| match &node.operation {
             Operation::History { of, memory } => {
                 let constants = MemoryConstants::of(memory, self.size(*of));
+                let constants = constants.expect("checked when the program was built");
                 Some(PrintedHistory {
-                    constants: constants.expect("checked when the program was built"),
+                    kept: constants.longest_lag(),
+                    averages: constants.averages.len(),
+                    constants,
                     pause_s: memory.interval_s.map_or(f64::INFINITY, |usual_s| GAP * usual_s),
                 })
             }

@@ -31,7 +31,7 @@ pub struct ExportedDecoder {
     /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
     reading_ranges: Vec<Option<MinMax>>,
     /// Ranges of the targets in training: one for all row-wires, or one for each if the row is an argument.
-    target_extremes: Vec<Vec<(f64, f64)>>,
+    target_ranges: Vec<MinMax>,
     /// Errors on the test samples.
     errors: TestErrors,
     /// 90 % prediction intervals of the network, if every target has one.
@@ -131,14 +131,10 @@ impl ExportedDecoder {
     /// Wraps trained networks, which contain the ranges of their readings and targets.
     fn of_trained(networks: &Networks, origin: Origin) -> Self {
         let all = networks.values().iter();
-        let extremes = all.clone().map(|network| {
-            let outputs = network.outputs();
-            (0..outputs.channels()).map(|output| outputs.extremes(output)).collect()
-        });
         Self {
             kind: BundleDecoder::default(),
             program: networks.program(Precision::Double),
-            target_extremes: extremes.collect(),
+            target_ranges: all.clone().map(|network| network.outputs().clone()).collect(),
             reading_ranges: all.map(|network| network.inputs().range().cloned()).collect(),
             errors: TestErrors::Targets(Vec::new()),
             half_widths: Vec::new(),
@@ -162,16 +158,9 @@ impl ExportedDecoder {
             return Err(BundleError::NoNetwork(kind));
         }
         let training = sets.split.training;
-        let of_row = |set: &Dataset| {
-            let targets = set.targets();
-            let extremes = targets.columns().into_iter().map(|column| {
-                let both = |(low, high): (f64, f64), &value: &f64| (low.min(value), high.max(value));
-                column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), both)
-            });
-            Ok::<_, BundleError>((MinMax::of(set.readings()), extremes.collect::<Vec<_>>()))
-        };
+        let of_row = |set: &Dataset| Ok::<_, BundleError>((MinMax::of(set.readings()), MinMax::of(set.targets())));
         let in_training = PerRow::fit(&training, origin.settings.source.row_model(), of_row)?;
-        let (reading_ranges, target_extremes) = in_training.values().iter().cloned().unzip();
+        let (reading_ranges, target_ranges): (_, Vec<_>) = in_training.values().iter().cloned().unzip();
         let set = DecoderSet::new(origin.settings, training, networks);
         let decoder = match kind {
             BundleDecoder::Linear => Some(set.linear().map_err(Box::new)?),
@@ -183,7 +172,7 @@ impl ExportedDecoder {
             kind,
             program: decoder.program().ok_or_else(|| not_described(RULES))?,
             reading_ranges,
-            target_extremes,
+            target_ranges: target_ranges.into_iter().flatten().collect(),
             errors: errors(&mut *decoder, &sets.problem, &sets.test)?,
             half_widths: Vec::new(),
             test: Some(sets.test),
@@ -255,7 +244,7 @@ impl ExportedDecoder {
         let exported = ExportedProgram::of(&program, &self.half_widths, self.limits().as_ref());
         let (rows, printed) = self.readings(channels)?;
         let golden = Golden::of(rows, printed, &program, exported.outputs())?;
-        let targets = &self.target_extremes;
+        let targets = &self.target_ranges;
         let outputs = exported.outputs();
         let scales = (0..outputs).map(|output| match meaning.is_array {
             true => scale(targets, 0..outputs),
@@ -331,8 +320,7 @@ impl ExportedDecoder {
         let ranges = self.reading_ranges.iter().enumerate();
         let known = ranges.filter_map(|(row, range)| Some((row, range.as_ref()?)));
         let of_range = |(row, range): (usize, &MinMax)| {
-            let at = |place: f64| readings_at(range, range.channels(), || place);
-            [0.0, 0.5, 1.0].map(|place| GoldenRow::new(row, at(place)))
+            [0.0, 0.5, 1.0].map(|place| GoldenRow::new(row, readings_at(range, range.channels(), || place)))
         };
         known.flat_map(of_range).collect()
     }
@@ -343,10 +331,8 @@ impl ExportedDecoder {
         let row = |place: usize| {
             let row = place % self.reading_ranges.len();
             let range = self.reading_ranges[row].as_ref().ok_or(BundleError::NoRange)?;
-            Ok(GoldenRow::new(
-                row,
-                readings_at(range, channels, || rng.random::<f64>()),
-            ))
+            let readings = readings_at(range, channels, || rng.random::<f64>());
+            Ok(GoldenRow::new(row, readings))
         };
         (0..count).map(row).collect()
     }
@@ -460,9 +446,11 @@ fn set_times(rows: &mut [GoldenRow], interval_s: f64) {
 }
 
 /// Widest range in training among these outputs of all rows.
-fn scale(targets: &[Vec<(f64, f64)>], outputs: std::ops::Range<usize>) -> f64 {
-    let extremes = targets.iter().flat_map(|row| row[outputs.clone()].iter());
-    let (width, largest) = extremes.fold((0.0_f64, 0.0_f64), |(width, largest), &(low, high)| {
+fn scale(targets: &[MinMax], outputs: std::ops::Range<usize>) -> f64 {
+    let extremes = targets
+        .iter()
+        .flat_map(|of_row| outputs.clone().map(|output| of_row.extremes(output)));
+    let (width, largest) = extremes.fold((0.0_f64, 0.0_f64), |(width, largest), (low, high)| {
         (width.max(high - low), largest.max(low.abs()).max(high.abs()))
     });
     // Outputs that did not vary are constants, and deviations are relative to these.

@@ -90,16 +90,15 @@ impl ExportedProgram {
 
     /// Indices of the nodes with sums of products.
     pub(super) fn layers(&self) -> Vec<usize> {
-        let is_layer = |node: &Node| {
-            matches!(
-                node.operation,
-                Operation::Affine { .. } | Operation::SquaredDistances { .. }
-            )
+        let index_of_layer = |(index, node): (usize, &Node)| match node.operation {
+            Operation::Affine { .. } | Operation::SquaredDistances { .. } => Some(index),
+            _ => None,
         };
-        let nodes = self.program.nodes().iter().enumerate();
-        nodes
-            .filter(|(_, node)| is_layer(node))
-            .map(|(index, _)| index)
+        self.program
+            .nodes()
+            .iter()
+            .enumerate()
+            .filter_map(index_of_layer)
             .collect()
     }
 

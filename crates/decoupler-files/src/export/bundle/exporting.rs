@@ -34,19 +34,15 @@ pub fn export_bundle(
 ) -> Result<BundleReport, BundleError> {
     let decoder: ExportedDecoder = decoder.into();
     format.check_for(decoder.kind(), precision)?;
-    let folder = AtomicFolder::create(path)?;
+    let mut folder = AtomicFolder::create(path)?;
     let mut contents = decoder.contents(&identifier(path), precision)?;
-    let Accuracy {
-        limit,
-        rounding,
-        checks,
-        fixed,
-    } = match precision {
+    let accuracy = match precision {
         BundlePrecision::Double => in_double(&mut contents)?,
         BundlePrecision::Single => in_single(&mut contents)?,
         BundlePrecision::Fixed16 => in_fixed16(&mut contents, &decoder)?,
     };
-    let bounds = fixed.as_ref().map(|fixed| contents.meaning.named(&fixed.bounds));
+    let (limit, rounding, fixed) = (accuracy.limit, accuracy.rounding, accuracy.fixed.as_ref());
+    let bounds = fixed.map(|fixed| contents.meaning.named(&fixed.bounds));
     let mut report = BundleReport {
         format,
         precision,
@@ -54,7 +50,7 @@ pub fn export_bundle(
         files: Vec::new(),
         verified: contents.golden.count(),
         golden: contents.golden.rows().len(),
-        checks,
+        checks: accuracy.checks,
         limit,
         rounding,
         output_range_mm: contents.meaning.is_array.then(|| contents.scales[0]),
@@ -64,16 +60,15 @@ pub fn export_bundle(
     contents.metadata["verification"] =
         json!({ "limit": limit, "change_by_rounding_readings": rounding, "remarks": report.remarks });
     let usage = match format {
-        BundleFormat::Onnx => onnx::print(&contents, &folder)?,
-        BundleFormat::NumPy => numpy::print(&contents, &folder)?,
-        BundleFormat::Matlab => matlab::print(&contents, &folder)?,
-        BundleFormat::C99 => c99::print(&contents, fixed.as_ref(), &folder, &mut report)?,
+        BundleFormat::Onnx => onnx::print(&contents, &mut folder)?,
+        BundleFormat::NumPy => numpy::print(&contents, &mut folder)?,
+        BundleFormat::Matlab => matlab::print(&contents, &mut folder)?,
+        BundleFormat::C99 => c99::print(&contents, fixed, &mut folder, &mut report)?,
     };
     folder.write("golden.csv", contents.golden.csv(&contents))?;
     folder.write("metadata.json", format!("{:#}\n", contents.metadata))?;
     folder.write("README.txt", readme(&contents, decoder.kind(), &usage, &report))?;
-    report.files = folder.sizes()?;
-    folder.commit()?;
+    report.files = folder.commit()?;
     Ok(report)
 }
 

@@ -61,16 +61,9 @@ impl<'a> Header<'a> {
 
     fn arguments(&self, state: &str, row: &str, time: &str, readings: &str) -> String {
         let (is_sequence, takes_row) = (self.contents.history().is_some(), self.contents.takes_row());
-        let all = [
-            (is_sequence, state),
-            (takes_row, row),
-            (is_sequence, time),
-            (true, readings),
-        ];
-        let taken = all
-            .into_iter()
-            .filter_map(|(is_taken, argument)| is_taken.then_some(argument));
-        Vec::from_iter(taken).join(", ")
+        let [state, time] = [state, time].map(|argument| is_sequence.then_some(argument));
+        let taken = [state, takes_row.then_some(row), time, Some(readings)];
+        Vec::from_iter(taken.into_iter().flatten()).join(", ")
     }
 
     /// Text of the header file.
@@ -85,21 +78,23 @@ impl<'a> Header<'a> {
             contents.meaning.purpose(),
             lines.join("\n   ")
         );
-        if self.fixed.is_some() {
-            text += "#include <stdint.h>\n\n";
-        }
+        text += if self.fixed.is_some() {
+            "#include <stdint.h>\n\n"
+        } else {
+            ""
+        };
         if contents.takes_row() {
             let _ = writeln!(text, "#define {upper}_ROWS {}", contents.rows);
         }
-        let _ = write!(
+        let (channels, outputs) = (contents.channels(), contents.outputs());
+        let _ = writeln!(
             text,
-            "#define {upper}_CHANNELS {}\n#define {upper}_OUTPUTS {}\n\n",
-            contents.channels(),
-            contents.outputs()
+            "#define {upper}_CHANNELS {channels}\n#define {upper}_OUTPUTS {outputs}\n"
         );
-        text += &self
+        let of_units = self
             .fixed
-            .map_or_else(String::new, |fixed| fixed.unit_definitions(&upper, &contents.meaning));
+            .map(|fixed| fixed.unit_definitions(&upper, &contents.meaning));
+        text += &of_units.unwrap_or_default();
         text += "#ifdef __cplusplus\nextern \"C\" {\n#endif\n\n";
         let _ = write!(
             text,
@@ -121,11 +116,8 @@ impl<'a> Header<'a> {
                 contents.outside_in_words(),
                 contents.noun
             ));
-            let _ = write!(
-                text,
-                "    /* {} */\n    int readings_outside;\n",
-                what.join("\n       ")
-            );
+            let what = what.join("\n       ");
+            let _ = writeln!(text, "    /* {what} */\n    int readings_outside;");
         }
         let _ = write!(text, "}} {name}_answer;\n\n");
         text += &self.state();
@@ -150,8 +142,7 @@ impl<'a> Header<'a> {
         let (Some(history), Some(about)) = (self.contents.history(), self.contents.state_in_words()) else {
             return String::new();
         };
-        let (name, upper, constants) = (&self.contents.name, self.upper(), &history.constants);
-        let (kept, averages) = (constants.longest_lag(), constants.averages.len());
+        let (name, upper) = (&self.contents.name, self.upper());
         let array = |field: &str, count: usize| match count {
             0 => String::new(),
             count => format!("    double {field}[{count}][{upper}_CHANNELS];\n"),
@@ -161,8 +152,8 @@ impl<'a> Header<'a> {
              double time_s;\n    int latest;\n{}{}}} {name}_state;\n\n\
              /* Forgets the past: the next reading is the first. */\nvoid {name}_start({name}_state *state);\n\n",
             wrapped(&about).join("\n   "),
-            array("kept", kept),
-            array("averages", averages),
+            array("kept", history.kept),
+            array("averages", history.averages),
         )
     }
 }

@@ -28,7 +28,7 @@ use self_test::self_test;
 pub(super) fn print(
     contents: &Contents,
     fixed: Option<&FixedProgram>,
-    folder: &AtomicFolder,
+    folder: &mut AtomicFolder,
     report: &mut BundleReport,
 ) -> Result<String, BundleError> {
     let header = Header::of(contents, fixed);

@@ -25,10 +25,7 @@ pub(super) fn source(header: &Header<'_>) -> String {
     let _ = write!(text, "{}\n{{\n", header.signature());
     let is_of_row = contents.constants().any(|constant| constant.tables.len() > 1);
     text += &row_check(contents, &upper, is_of_row);
-    let body = contents
-        .computed()
-        .map(|(id, operation)| statements(contents, &upper, id, operation));
-    text += &body.collect::<String>();
+    text += &contents.body(|id, operation| statements(contents, &upper, id, operation));
     text + &answer(header)
 }
 
@@ -37,10 +34,9 @@ pub(super) fn row_check(contents: &Contents, upper: &str, is_of_row: bool) -> St
     if !contents.takes_row() {
         return String::new();
     }
-    let network = if is_of_row {
-        "    const int network = row - 1;\n"
-    } else {
-        ""
+    let network = match is_of_row {
+        true => "    const int network = row - 1;\n",
+        false => "",
     };
     format!("    if (row < 1 || row > {upper}_ROWS) {{\n        return {upper}_NO_SUCH_ROW;\n    }}\n{network}")
 }
@@ -62,6 +58,10 @@ fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operatio
     let declared = format!("    {kind} {name}[{size}];\n");
     let each = |size: usize, body: &str| format!("    for (int i = 0; i < {size}; ++i) {{\n        {body}\n    }}\n");
     let assigned = |expression: String| declared.clone() + &each(size, &format!("{name}[i] = {expression};"));
+    let sums = |inputs: usize, body: &str| {
+        let inner = format!("for (int k = 0; k < {size}; ++k) {{\n            {body}\n        }}");
+        each(inputs, &inner)
+    };
     let suffix = if precision == Precision::Single { "f" } else { "" };
     match operation {
         Operation::Valid { of, domain } => {
@@ -71,32 +71,25 @@ fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operatio
                 Domain::Positive => format!("{reading} > 0"),
                 Domain::Finite => format!("{reading} >= -{most}"),
             };
-            each(
-                size,
-                &format!(
-                    "if (!({lowest} && {reading} <= {most})) {{\n            return {upper}_BAD_READING;\n        }}"
-                ),
-            )
+            let is_valid = format!("{lowest} && {reading} <= {most}");
+            let refusal = format!("if (!({is_valid})) {{\n            return {upper}_BAD_READING;\n        }}");
+            each(size, &refusal)
         }
         Operation::Affine {
             of: values,
             weights,
             biases,
         } => {
-            let inputs = contents.size(*values);
-            let sums = format!("{name}[k] += {} * {};", of(*values, "i"), of(*weights, "i][k"));
-            let inner = format!("for (int k = 0; k < {size}; ++k) {{\n            {sums}\n        }}");
-            assigned(of(*biases, "i")) + &each(inputs, &inner)
+            let body = format!("{name}[k] += {} * {};", of(*values, "i"), of(*weights, "i][k"));
+            assigned(of(*biases, "i")) + &sums(contents.size(*values), &body)
         }
         Operation::SquaredDistances { of: values, points } => {
-            let inputs = contents.size(*values);
-            let sums = format!(
+            let body = format!(
                 "const {kind} apart = {} - {};\n            {name}[k] += apart * apart;",
                 of(*values, "i"),
                 of(*points, "i][k")
             );
-            let inner = format!("for (int k = 0; k < {size}; ++k) {{\n            {sums}\n        }}");
-            assigned("0".to_owned()) + &each(inputs, &inner)
+            assigned("0".to_owned()) + &sums(contents.size(*values), &body)
         }
         Operation::Clip { of: values, low, high } => {
             let (x, low, high) = (of(*values, "i"), of(*low, "i"), of(*high, "i"));
@@ -147,10 +140,8 @@ fn answer(header: &Header<'_>) -> String {
          if (!({targets}[k] >= -{most} && {targets}[k] <= {most})) {{\n            return {upper}_BAD_READING;\n        }}\n    }}\n"
     );
     let copied = |id: NodeId| {
-        let (name, computed) = (
-            contents.name_of(id),
-            value(contents, id, "k", contents.outer_precision()),
-        );
+        let name = contents.name_of(id);
+        let computed = value(contents, id, "k", contents.outer_precision());
         format!("    for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n        answer->{name}[k] = {computed};\n    }}\n")
     };
     text += &copied(contents.exported.targets);
@@ -165,7 +156,7 @@ fn answer(header: &Header<'_>) -> String {
 fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
     let (contents, constants) = (header.contents, &history.constants);
     let (name, channels) = (&contents.name, constants.channels);
-    let (kept, averages) = (constants.longest_lag(), constants.averages.len());
+    let (kept, averages) = (history.kept, history.averages);
     let mut text = String::new();
     let mut array = |kind: &str, name: &str, values: Vec<String>| {
         if !values.is_empty() {

@@ -22,7 +22,7 @@ use self::{
 };
 use super::{
     exported_program::{ExportedProgram, Limits, table},
-    meaning::Meaning,
+    meaning::{Meaning, comment},
 };
 use crate::export::format_number;
 
@@ -135,16 +135,11 @@ impl FixedProgram {
         let [weights, biases] = *chain.layers.last().expect("there is a layer of targets");
         let reach = |target: usize| {
             let of_row = |row: usize| {
-                let weights = tables(weights, row)
-                    .column(target)
-                    .iter()
-                    .map(|weight| weight.abs())
-                    .sum::<f64>();
-                // The targets of a single layer are sums of changes, whose size is that of the range.
-                let most = if chain.layers.len() > 1 {
-                    weights
-                } else {
-                    scales[target]
+                let weights = tables(weights, row).column(target);
+                let most = match chain.layers.len() {
+                    // The targets of a single layer are sums of changes, whose size is that of the range.
+                    1 => scales[target],
+                    _ => weights.iter().map(|weight| weight.abs()).sum::<f64>(),
                 };
                 tables(biases, row)[[0, target]].abs() + most
             };
@@ -163,10 +158,8 @@ impl FixedProgram {
         };
         for row in 0..rows {
             let limits = PerRow::each(limits.clone());
-            let numbers = [chain.reference]
-                .into_iter()
-                .chain(chain.layers.iter().flatten().copied());
-            let tables: Vec<&Array2<f64>> = numbers.map(|id| tables(id, row)).collect();
+            let numbers = [&chain.reference].into_iter().chain(chain.layers.iter().flatten());
+            let tables: Vec<&Array2<f64>> = numbers.map(|id| tables(*id, row)).collect();
             let bounds = fixed.push_row(&tables, limits.at(row));
             let bounds = bounds.map_err(|what| FixedPointError::Range { what, cure })?;
             for (target, (bound, of_row)) in fixed.bounds.iter_mut().zip(bounds).enumerate() {
@@ -197,25 +190,12 @@ impl FixedProgram {
         });
         let changes: Vec<Change> = changes.collect();
         let shape = [changes.len()];
-        let multipliers = || changes.iter().map(Change::multiplier);
-        self.put(
-            "centres",
-            "int32_t",
-            &shape,
-            changes.iter().map(|change| i64::from(change.centre)),
-        );
-        self.put(
-            "factors",
-            "int32_t",
-            &shape,
-            multipliers().map(|by| i64::from(by.factor)),
-        );
-        self.put(
-            "factor_shifts",
-            "uint8_t",
-            &shape,
-            multipliers().map(|by| i64::from(by.shift)),
-        );
+        let centres = changes.iter().map(|change| i64::from(change.centre));
+        self.put("centres", "int32_t", &shape, centres);
+        let factors = changes.iter().map(|change| i64::from(change.multiplier().factor));
+        self.put("factors", "int32_t", &shape, factors);
+        let shifts = changes.iter().map(|change| i64::from(change.multiplier().shift));
+        self.put("factor_shifts", "uint8_t", &shape, shifts);
         // Each input is a number of 15 bits after the point times a slope, plus an offset.
         let mut slopes: Vec<f64> = changes.iter().map(Change::slope).collect();
         let mut offsets: Vec<f64> = changes.iter().map(|change| change.offset).collect();
@@ -244,11 +224,10 @@ impl FixedProgram {
                 let of_inputs = scaled.iter().zip(&errors).map(|(weight, error)| weight.abs() * error);
                 let rounding = 0.5 * 2.0_f64.powi(-result_bits);
                 let error = of_inputs.sum::<f64>() + row.error + of_bias + rounding;
+                let rounded = bias as f64 * 2.0_f64.powi(-sum_bits);
                 next_errors.push(match is_last {
                     true => error,
-                    false => self
-                        .tangent
-                        .passed_on(error, bias as f64 * 2.0_f64.powi(-sum_bits), &scaled),
+                    false => self.tangent.passed_on(error, rounded, &scaled),
                 });
                 whole_weights.extend(row.weights.into_iter().map(i64::from));
                 whole_biases.push(bias);
@@ -299,13 +278,8 @@ impl FixedProgram {
     /// The sentences on units and bounds.
     pub(super) fn units_in_words(&self, meaning: &Meaning) -> String {
         let saturation = "All readings are decoded without overflow: numbers out of range saturate.";
-        let bounds = meaning.named(&self.bounds).into_iter().map(|(target, bound)| {
-            format!(
-                "{} ({})",
-                format_number(bound),
-                super::meaning::comment(&target.title())
-            )
-        });
+        let named = meaning.named(&self.bounds).into_iter();
+        let bounds = named.map(|(target, bound)| format!("{} ({})", format_number(bound), comment(&target.title())));
         let bounds = Vec::from_iter(bounds).join(", ");
         let units = match meaning.is_array {
             true => format!(

@@ -40,19 +40,17 @@ const MAX_LAG: usize = 1000;
 ///
 /// # Errors
 /// A lag is too long, or the operating system refuses.
-pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<String, BundleError> {
-    if let Some(history) = contents.history()
-        && history.constants.longest_lag() > MAX_LAG
-    {
-        return Err(BundleError::LongLag(history.constants.longest_lag()));
+pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<String, BundleError> {
+    let lag = contents.history().map_or(0, |history| history.kept);
+    if lag > MAX_LAG {
+        return Err(BundleError::LongLag(lag));
     }
     let notes = contents.notes.iter().map(|note| format!(" Note: {note}."));
+    let state = contents.state_in_words().map(|about| format!(" {about}"));
     let about = format!(
         "{}. Answers are NaN where a reading or the row is invalid.{}{}",
         contents.meaning.purpose_without_stop(),
-        contents
-            .state_in_words()
-            .map_or_else(String::new, |about| format!(" {about}")),
+        state.unwrap_or_default(),
         notes.collect::<String>()
     );
     let properties = contents.metadata.as_object().into_iter().flatten().map(|(key, value)| {
@@ -143,7 +141,8 @@ impl Printer<'_> {
         }
         let Self { casts, builder, .. } = self;
         let cast = casts.entry((id.index(), precision));
-        cast.or_insert_with(|| builder.cast(&name, precision)).clone()
+        let to = [("to", element_type(precision))];
+        cast.or_insert_with(|| builder.with("Cast", &[&name], &to)).clone()
     }
 
     fn add(&mut self, id: NodeId, operation: &Operation) {
@@ -272,9 +271,9 @@ impl Printer<'_> {
             let about = format!("Row of each reading, from 1 to {}", contents.rows);
             inputs.push(value("row", INT64, &[batch], &about));
         }
-        if let Some(next) = self.next_state.take() {
+        if let (Some(next), Some(history)) = (self.next_state.take(), contents.history()) {
             let double = element_type(Precision::Double);
-            let shape = history::state_shape(contents);
+            let shape = [Some(history.state_rows()), Some(contents.channels())];
             let builder = &mut self.builder;
             builder.named("Where", &[&is_valid, &next, "state"], &[], "next_state");
             let of_state = "State of a series: zeros at the start, then next_state of the reading before";
@@ -316,8 +315,8 @@ fn usage(contents: &Contents) -> String {
         "    import numpy as np\n    import onnxruntime\n    session = onnxruntime.InferenceSession(\"{}.onnx\")\n",
         contents.noun
     );
-    if contents.history().is_some() {
-        let [rows, columns] = history::state_shape(contents).map(|size| size.unwrap_or(1));
+    if let Some(history) = contents.history() {
+        let (rows, columns) = (history.state_rows(), contents.channels());
         return format!(
             "{loaded}    state = np.zeros(({rows}, {columns}))\n    \
              {output}, state = session.run([\"{output}\", \"next_state\"],\n        \
