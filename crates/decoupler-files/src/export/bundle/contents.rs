@@ -157,11 +157,12 @@ impl Contents {
         self.exported.parts().map(|id| self.name_of(id)).collect()
     }
 
-    /// The names of the channels and the notes as lines for a comment of any language.
-    pub(super) fn legend(&self) -> Vec<String> {
+    /// The names of the channels, `more` and the notes as lines for a comment of any language.
+    pub(super) fn legend(&self, more: &str) -> Vec<String> {
         let notes = self.notes.iter().map(|note| comment(&format!("Note: {note}.")));
         let notes = notes.flat_map(|note| wrapped(&note));
-        self.meaning.legend().into_iter().chain(notes).collect()
+        let lines = self.meaning.legend().into_iter().chain(wrapped(more));
+        lines.chain(notes).collect()
     }
 
     pub(super) fn size(&self, id: NodeId) -> usize {

@@ -32,7 +32,7 @@ fn function(contents: &Contents) -> String {
     let state = history.iter().map(|_| "state");
     let returned = Vec::from_iter(parts.iter().copied().chain(state)).join(", ");
     let arguments = arguments(contents);
-    let legend = format!("%   {}\n", contents.legend().join("\n%   "));
+    let legend = format!("%   {}\n", contents.legend("").join("\n%   "));
     let upper = name.to_uppercase();
     let mut text = format!(
         "function [{returned}] = {name}({arguments})\n%{upper} {}.\n%   [{}] = {upper}({}) has a line of {} for each line of\n\

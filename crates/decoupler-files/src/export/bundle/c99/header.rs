@@ -70,9 +70,8 @@ impl<'a> Header<'a> {
     pub(super) fn text(&self) -> String {
         let (contents, upper) = (self.contents, self.upper());
         let name = &contents.name;
-        let mut lines = contents.legend();
         let of_units = self.fixed.map(|fixed| fixed.units_in_words(&contents.meaning));
-        lines.extend(of_units.iter().flat_map(|about| wrapped(about)));
+        let lines = contents.legend(&of_units.unwrap_or_default());
         let mut text = format!(
             "/* {}\n   {} */\n#ifndef {upper}_DECODE_H\n#define {upper}_DECODE_H\n\n",
             contents.meaning.purpose(),

@@ -23,7 +23,7 @@ pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<St
 /// Text of the program.
 fn program(contents: &Contents) -> String {
     let (input, channels) = (contents.meaning.readings(), contents.channels());
-    let legend = format!("# {}\n", contents.legend().join("\n# "));
+    let legend = format!("# {}\n", contents.legend("").join("\n# "));
     let dtype = dtype(contents.outer_precision());
     let (row, row_text) = match contents.takes_row() {
         true => (", row", "; row: row of each sample, from 1"),
