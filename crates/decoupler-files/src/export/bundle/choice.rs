@@ -4,7 +4,7 @@ use std::fmt;
 
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
-    text::{Named, UnknownName},
+    text::Named,
 };
 use thiserror::Error;
 
@@ -33,13 +33,10 @@ pub enum BundlePrecision {
     Fixed16,
 }
 
-/// Errors of unknown names and of unsupported combinations.
+/// Errors of unsupported combinations.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ChoiceError {
-    /// A name that no format, precision or decoder has.
-    #[error(transparent)]
-    Unknown(#[from] UnknownName),
     /// Radial basis in fixed point.
     #[error("fixed16 has no Gaussians: export rbf in f64 or f32, or another decoder")]
     Gaussians,

@@ -8,7 +8,7 @@ use decoupler_core::{
     problem::{Channel, Problem},
 };
 use rand::RngExt;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::{
     BundleDecoder, BundleError, BundlePrecision, ChoiceError,
@@ -31,7 +31,7 @@ pub struct ExportedDecoder {
     /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
     reading_ranges: Vec<Option<MinMax>>,
     /// Ranges of the targets in training: one for all row-wires, or one for each if the row is an argument.
-    target_extremes: Vec<Vec<(f64, f64)>>,
+    target_ranges: Vec<MinMax>,
     /// Errors on the test samples.
     errors: TestErrors,
     /// 90 % prediction intervals of the network, if every target has one.
@@ -55,9 +55,6 @@ struct Origin {
     /// Errors of the linear baseline on the test samples.
     errors_of_linear: TestErrors,
 }
-
-/// Facts about a decoder, for users and programs that have only the bundle: names of fields and JSON values.
-type Metadata = Map<String, Value>;
 
 impl From<&NetworkFile> for ExportedDecoder {
     /// Exports the network of a file.
@@ -134,14 +131,10 @@ impl ExportedDecoder {
     /// Wraps trained networks, which contain the ranges of their readings and targets.
     fn of_trained(networks: &Networks, origin: Origin) -> Self {
         let all = networks.values().iter();
-        let extremes = all.clone().map(|network| {
-            let outputs = network.outputs();
-            (0..outputs.channels()).map(|output| outputs.extremes(output)).collect()
-        });
         Self {
             kind: BundleDecoder::default(),
             program: networks.program(Precision::Double),
-            target_extremes: extremes.collect(),
+            target_ranges: all.clone().map(|network| network.outputs().clone()).collect(),
             reading_ranges: all.map(|network| network.inputs().range().cloned()).collect(),
             errors: TestErrors::Targets(Vec::new()),
             half_widths: Vec::new(),
@@ -165,16 +158,9 @@ impl ExportedDecoder {
             return Err(BundleError::NoNetwork(kind));
         }
         let training = sets.split.training;
-        let of_row = |set: &Dataset| {
-            let targets = set.targets();
-            let extremes = targets.columns().into_iter().map(|column| {
-                let both = |(low, high): (f64, f64), &value: &f64| (low.min(value), high.max(value));
-                column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), both)
-            });
-            Ok::<_, BundleError>((MinMax::of(set.readings()), extremes.collect::<Vec<_>>()))
-        };
+        let of_row = |set: &Dataset| Ok::<_, BundleError>((MinMax::of(set.readings()), MinMax::of(set.targets())));
         let in_training = PerRow::fit(&training, origin.settings.source.row_model(), of_row)?;
-        let (reading_ranges, target_extremes) = in_training.values().iter().cloned().unzip();
+        let (reading_ranges, target_ranges): (_, Vec<_>) = in_training.values().iter().cloned().unzip();
         let set = DecoderSet::new(origin.settings, training, networks);
         let decoder = match kind {
             BundleDecoder::Linear => Some(set.linear().map_err(Box::new)?),
@@ -186,7 +172,7 @@ impl ExportedDecoder {
             kind,
             program: decoder.program().ok_or_else(|| not_described(RULES))?,
             reading_ranges,
-            target_extremes,
+            target_ranges: target_ranges.into_iter().flatten().collect(),
             errors: errors(&mut *decoder, &sets.problem, &sets.test)?,
             half_widths: Vec::new(),
             test: Some(sets.test),
@@ -258,7 +244,7 @@ impl ExportedDecoder {
         let exported = ExportedProgram::of(&program, &self.half_widths, self.limits().as_ref());
         let (rows, printed) = self.readings(channels)?;
         let golden = Golden::of(rows, printed, &program, exported.outputs())?;
-        let targets = &self.target_extremes;
+        let targets = &self.target_ranges;
         let outputs = exported.outputs();
         let scales = (0..outputs).map(|output| match meaning.is_array {
             true => scale(targets, 0..outputs),
@@ -275,7 +261,7 @@ impl ExportedDecoder {
             exported,
             scales,
             golden,
-            metadata: Metadata::new(),
+            metadata: Value::Null,
             notes: Vec::new(),
         };
         if self.test.is_none() && problem.sensor.is_none() {
@@ -314,12 +300,9 @@ impl ExportedDecoder {
             (None, Some(test)) => {
                 let count = test.samples().min(ROWS[0]);
                 // Readings with a history are successive.
-                let sample = |place| {
-                    if memory.is_some() {
-                        place
-                    } else {
-                        place * test.samples() / count
-                    }
+                let sample = |place| match memory {
+                    Some(_) => place,
+                    None => place * test.samples() / count,
                 };
                 (0..count).map(|place| of_set(test, sample(place))).collect()
             }
@@ -337,8 +320,7 @@ impl ExportedDecoder {
         let ranges = self.reading_ranges.iter().enumerate();
         let known = ranges.filter_map(|(row, range)| Some((row, range.as_ref()?)));
         let of_range = |(row, range): (usize, &MinMax)| {
-            let at = |place: f64| readings_at(range, range.channels(), || place);
-            [0.0, 0.5, 1.0].map(|place| GoldenRow::new(row, at(place)))
+            [0.0, 0.5, 1.0].map(|place| GoldenRow::new(row, readings_at(range, range.channels(), || place)))
         };
         known.flat_map(of_range).collect()
     }
@@ -349,50 +331,42 @@ impl ExportedDecoder {
         let row = |place: usize| {
             let row = place % self.reading_ranges.len();
             let range = self.reading_ranges[row].as_ref().ok_or(BundleError::NoRange)?;
-            Ok(GoldenRow::new(
-                row,
-                readings_at(range, channels, || rng.random::<f64>()),
-            ))
+            let readings = readings_at(range, channels, || rng.random::<f64>());
+            Ok(GoldenRow::new(row, readings))
         };
         (0..count).map(row).collect()
     }
 
     /// Collects the metadata of a bundle.
-    fn metadata(&self, contents: &Contents) -> Metadata {
-        let common = json!({
-            "program": PROGRAM,
-            "decoder": self.kind.to_string(),
-            "takes_row": contents.takes_row(),
-            "steps": steps(contents),
-            "precision": contents.precision.to_string(),
-        });
-        let errors = &self.errors;
-        let own = match &self.origin.problem.sensor {
-            Some(simulation) => self.of_array(simulation, contents, errors),
-            None => self.of_recording(contents, errors),
+    fn metadata(&self, contents: &Contents) -> Value {
+        let mut fields = match &self.origin.problem.sensor {
+            Some(simulation) => self.of_array(simulation, contents),
+            None => self.of_recording(contents),
         };
-        let mut fields = Metadata::new();
-        for part in [common, own] {
-            if let Value::Object(part) = part {
-                fields.extend(part);
-            }
-        }
+        fields["program"] = json!(PROGRAM);
+        fields["trained_by"] = json!(self.origin.program);
+        fields["decoder"] = json!(self.kind.to_string());
+        fields["takes_row"] = json!(contents.takes_row());
+        fields["steps"] = json!(steps(contents));
+        fields["precision"] = json!(contents.precision.to_string());
+        fields["seed"] = json!(self.origin.settings.seed);
         if self.kind.is_network() {
             let mut operations = contents.computed();
             let hidden = operations.find(|(_, operation)| matches!(operation, Operation::Map(Function::Tanh, _)));
-            fields.insert(
-                "hidden_nodes".to_owned(),
-                json!(hidden.map(|(id, _)| contents.size(id))),
-            );
+            fields["hidden_nodes"] = json!(hidden.map(|(id, _)| contents.size(id)));
         }
         fields
     }
 
-    fn of_array(&self, simulation: &Simulation, contents: &Contents, errors: &TestErrors) -> Value {
-        let Simulation { sensor, scene, .. } = simulation;
+    fn of_array(
+        &self,
+        Simulation {
+            sensor, scene, samples, ..
+        }: &Simulation,
+        contents: &Contents,
+    ) -> Value {
         let names = |channels: &[Channel]| Vec::from_iter(channels.iter().map(|channel| channel.name.clone()));
         json!({
-            "trained_by": self.origin.program,
             "array": sensor.scale.to_string(),
             "geometry": sensor.geometry,
             "scene": scene,
@@ -400,15 +374,14 @@ impl ExportedDecoder {
             "row_numbers": contents.takes_row().then_some([1, contents.rows]),
             "inputs": { "names": names(&contents.meaning.inputs), "unit": "ohm" },
             "outputs": { "names": names(&contents.meaning.targets), "unit": "mm" },
-            "training_samples": simulation.samples,
-            "seed": self.origin.settings.seed,
-            "errors": errors.nodes(),
+            "training_samples": samples,
+            "errors": self.errors.nodes(),
             "readings_in_training_ohm": self.ranges(),
             "output_range_mm": contents.scales[0],
         })
     }
 
-    fn of_recording(&self, contents: &Contents, errors: &TestErrors) -> Value {
+    fn of_recording(&self, contents: &Contents) -> Value {
         let origin = &self.origin;
         let columns = |channels: &[Channel]| {
             let (names, units): (Vec<_>, Vec<_>) =
@@ -422,15 +395,13 @@ impl ExportedDecoder {
         };
         let row_wires = origin.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
         json!({
-            "trained_by": origin.program,
             "files": origin.files,
             "row_numbers": contents.takes_row().then(|| row_wires.collect::<Vec<_>>()),
             "inputs": columns(&origin.problem.inputs),
             "memory": origin.problem.memory,
             "outputs": columns(&origin.problem.targets),
             "method": origin.settings.training.method.short_name(),
-            "seed": origin.settings.seed,
-            "errors": named(errors),
+            "errors": named(&self.errors),
             "errors_of_ridge": named(&origin.errors_of_linear),
             "readings_in_training": self.ranges(),
             "output_ranges": contents.scales,
@@ -475,9 +446,11 @@ fn set_times(rows: &mut [GoldenRow], interval_s: f64) {
 }
 
 /// Widest range in training among these outputs of all rows.
-fn scale(targets: &[Vec<(f64, f64)>], outputs: std::ops::Range<usize>) -> f64 {
-    let extremes = targets.iter().flat_map(|row| row[outputs.clone()].iter());
-    let (width, largest) = extremes.fold((0.0_f64, 0.0_f64), |(width, largest), &(low, high)| {
+fn scale(targets: &[MinMax], outputs: std::ops::Range<usize>) -> f64 {
+    let extremes = targets
+        .iter()
+        .flat_map(|of_row| outputs.clone().map(|output| of_row.extremes(output)));
+    let (width, largest) = extremes.fold((0.0_f64, 0.0_f64), |(width, largest), (low, high)| {
         (width.max(high - low), largest.max(low.abs()).max(high.abs()))
     });
     // Outputs that did not vary are constants, and deviations are relative to these.

@@ -7,6 +7,7 @@ use super::{
     choice::{BundleFormat, BundlePrecision},
     contents::Contents,
     exported_decoder::ExportedDecoder,
+    exported_program::are_positive,
     fixed16::FixedProgram,
     folder::{AtomicFolder, identifier},
     golden::Golden,
@@ -33,25 +34,15 @@ pub fn export_bundle(
 ) -> Result<BundleReport, BundleError> {
     let decoder: ExportedDecoder = decoder.into();
     format.check_for(decoder.kind(), precision)?;
-    let folder = AtomicFolder::create(path)?;
+    let mut folder = AtomicFolder::create(path)?;
     let mut contents = decoder.contents(&identifier(path), precision)?;
-    let mut fixed = None;
-    let mut accuracy = Accuracy::default();
-    match precision {
-        BundlePrecision::Double => accuracy.limit = limit_in_double(&mut contents)?,
-        BundlePrecision::Single => accuracy = in_single(&mut contents)?,
-        BundlePrecision::Fixed16 => {
-            let program = in_fixed16(&mut contents, &decoder)?;
-            accuracy.limit = program.relative_bound(&contents.scales);
-            fixed = Some(program);
-        }
-    }
-    let Accuracy {
-        limit,
-        rounding,
-        checks,
-    } = accuracy;
-    let bounds = fixed.as_ref().map(|fixed| contents.meaning.named(&fixed.bounds));
+    let accuracy = match precision {
+        BundlePrecision::Double => in_double(&mut contents)?,
+        BundlePrecision::Single => in_single(&mut contents)?,
+        BundlePrecision::Fixed16 => in_fixed16(&mut contents, &decoder)?,
+    };
+    let (limit, rounding, fixed) = (accuracy.limit, accuracy.rounding, accuracy.fixed.as_ref());
+    let bounds = fixed.map(|fixed| contents.meaning.named(&fixed.bounds));
     let mut report = BundleReport {
         format,
         precision,
@@ -59,29 +50,25 @@ pub fn export_bundle(
         files: Vec::new(),
         verified: contents.golden.count(),
         golden: contents.golden.rows().len(),
-        checks,
+        checks: accuracy.checks,
         limit,
         rounding,
         output_range_mm: contents.meaning.is_array.then(|| contents.scales[0]),
         bounds: bounds.unwrap_or_default(),
         remarks: contents.notes.clone(),
     };
-    let verification = json!({ "limit": limit, "change_by_rounding_readings": rounding, "remarks": report.remarks });
-    contents.metadata.insert("verification".to_owned(), verification);
+    contents.metadata["verification"] =
+        json!({ "limit": limit, "change_by_rounding_readings": rounding, "remarks": report.remarks });
     let usage = match format {
-        BundleFormat::Onnx => onnx::print(&contents, &folder)?,
-        BundleFormat::NumPy => numpy::print(&contents, &folder)?,
-        BundleFormat::Matlab => matlab::print(&contents, &folder)?,
-        BundleFormat::C99 => c99::print(&contents, fixed.as_ref(), &folder, &mut report)?,
+        BundleFormat::Onnx => onnx::print(&contents, &mut folder)?,
+        BundleFormat::NumPy => numpy::print(&contents, &mut folder)?,
+        BundleFormat::Matlab => matlab::print(&contents, &mut folder)?,
+        BundleFormat::C99 => c99::print(&contents, fixed, &mut folder, &mut report)?,
     };
     folder.write("golden.csv", contents.golden.csv(&contents))?;
-    folder.write(
-        "metadata.json",
-        format!("{:#}\n", serde_json::Value::Object(contents.metadata.clone())),
-    )?;
+    folder.write("metadata.json", format!("{:#}\n", contents.metadata))?;
     folder.write("README.txt", readme(&contents, decoder.kind(), &usage, &report))?;
-    report.files = folder.sizes()?;
-    folder.commit()?;
+    report.files = folder.commit()?;
     Ok(report)
 }
 
@@ -91,6 +78,7 @@ struct Accuracy {
     limit: f64,
     rounding: Option<f64>,
     checks: Vec<BundleCheck>,
+    fixed: Option<FixedProgram>,
 }
 
 /// A reading as a program in single precision takes it.
@@ -107,7 +95,7 @@ fn deviation_in_single(contents: &Contents, wide: usize) -> Result<f64, BundleEr
 }
 
 /// Double precision: the effect of rounding errors is measured by larger errors of the constants, in proportion.
-fn limit_in_double(contents: &mut Contents) -> Result<f64, BundleError> {
+fn in_double(contents: &mut Contents) -> Result<Accuracy, BundleError> {
     /// Relative errors of constants, far above those of double precision and small enough for proportion.
     const ERROR: f64 = 1.0 / (1_u64 << 44) as f64;
     /// Factor for other orders of the sums, other functions, and errors that do not cancel.
@@ -132,7 +120,10 @@ fn limit_in_double(contents: &mut Contents) -> Result<f64, BundleError> {
             contents.meaning.smaller_weights()
         ));
     }
-    Ok(limit)
+    Ok(Accuracy {
+        limit,
+        ..Accuracy::default()
+    })
 }
 
 /// Single precision for all layers if it is accurate enough, otherwise double precision for as few of the first layers as
@@ -142,7 +133,7 @@ fn in_single(contents: &mut Contents) -> Result<Accuracy, BundleError> {
     const PART: f64 = 0.2;
     /// Factor for other orders of the sums and other functions.
     const SAFETY: f64 = 8.0;
-    let positive = contents.exported.are_positive();
+    let positive = are_positive(&contents.exported.program);
     for row in contents.golden.all() {
         let is_taken = |&reading: &f64| (reading as f32).is_finite() && (!positive || reading as f32 > 0.0);
         if let Some(channel) = row.readings.iter().position(|reading| !is_taken(reading)) {
@@ -198,11 +189,12 @@ fn in_single(contents: &mut Contents) -> Result<Accuracy, BundleError> {
             evaluator: "this program in single precision",
             deviation,
         }],
+        fixed: None,
     })
 }
 
 /// The program in fixed point, with its golden readings.
-fn in_fixed16(contents: &mut Contents, decoder: &ExportedDecoder) -> Result<FixedProgram, BundleError> {
+fn in_fixed16(contents: &mut Contents, decoder: &ExportedDecoder) -> Result<Accuracy, BundleError> {
     let limits = decoder.limits();
     let fixed = FixedProgram::of(&contents.exported, limits.as_ref(), &contents.meaning, &contents.scales)?;
     // The bound holds for these.
@@ -219,7 +211,11 @@ fn in_fixed16(contents: &mut Contents, decoder: &ExportedDecoder) -> Result<Fixe
             contents.meaning.smaller_weights()
         ));
     }
-    Ok(fixed)
+    Ok(Accuracy {
+        limit,
+        fixed: Some(fixed),
+        ..Accuracy::default()
+    })
 }
 
 /// Advice for a bundle in single precision that changes too much by rounding readings to it.
@@ -241,6 +237,8 @@ fn cure(contents: &Contents) -> String {
 }
 
 fn are_constants_finite(contents: &Contents, is_finite: impl Fn(f64) -> bool) -> bool {
-    let mut values = contents.constants().flat_map(|(_, tables)| tables.iter().flatten());
-    values.all(|&value| is_finite(value))
+    let mut values = contents
+        .constants()
+        .flat_map(|constant| Vec::from_iter(constant.values()));
+    values.all(is_finite)
 }

@@ -98,17 +98,10 @@ impl Meaning {
         };
         let mut sentences = vec![list("Readings", inputs), list("Targets", targets)];
         // The usual numbering is not mentioned.
-        if self
-            .row_wires
-            .iter()
-            .enumerate()
-            .any(|(index, &row_wire)| index != row_wire)
-        {
-            let rows = self.row_wires.iter().enumerate();
-            let rows: Vec<String> = rows
-                .map(|(index, row_wire)| format!("{} is row-wire {}", index + 1, row_wire + 1))
-                .collect();
-            sentences.push(format!("Rows: {}.", rows.join(", ")));
+        let rows = || self.row_wires.iter().enumerate();
+        if rows().any(|(index, &row_wire)| index != row_wire) {
+            let is_row_wire = |(index, row_wire)| format!("{} is row-wire {}", index + 1, row_wire + 1);
+            sentences.push(format!("Rows: {}.", Vec::from_iter(rows().map(is_row_wire)).join(", ")));
         }
         sentences.iter().flat_map(|sentence| wrapped(sentence)).collect()
     }

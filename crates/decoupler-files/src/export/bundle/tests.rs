@@ -72,10 +72,9 @@ fn tables(contents: &Contents) -> Vec<(String, Vec<f64>)> {
         Precision::Double => value,
         Precision::Single => f64::from(value as f32),
     };
-    let all = contents.constants().map(|(id, tables)| {
-        let values = tables.iter().flat_map(|table| table.iter());
-        let values = values.map(|&value| rounded(contents.precision_of(id), value));
-        (contents.name_of(id).to_owned(), values.collect())
+    let all = contents.constants().map(|constant| {
+        let values = constant.values().map(|value| rounded(constant.precision, value));
+        (constant.name.to_owned(), values.collect())
     });
     all.collect()
 }

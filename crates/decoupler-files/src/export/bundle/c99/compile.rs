@@ -35,7 +35,7 @@ pub(in crate::export::bundle) fn run_self_test(
     folder: &Path,
     name: &str,
 ) -> Result<Result<f64, &'static str>, BundleError> {
-    let sources = ["decode", "selftest"].map(|part| format!("{name}_{part}.c"));
+    let sources = ["decode", "selftest"].map(|part| folder.join(format!("{name}_{part}.c")));
     let failed = |step: &'static str, reason: String| BundleError::SelfTest { step, reason };
     let temporary = std::env::temp_dir();
     let home = UnfinishedFolder::begin(&temporary).map_err(|error| {
@@ -58,7 +58,6 @@ pub(in crate::export::bundle) fn run_self_test(
     if let Some(reason) = reason {
         return Ok(Err(reason));
     }
-    let sources = sources.each_ref().map(|source| folder.join(source));
     let output = compile(&[&sources[0], &sources[1]], &program, home.path());
     let output = output.map_err(|error| failed("compiling the C source", error.to_string()))?;
     if !output.status.success() {

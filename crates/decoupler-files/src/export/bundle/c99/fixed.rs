@@ -3,43 +3,24 @@
 use std::fmt::Write;
 
 use super::{header::Header, push_array, source::row_check};
-use crate::export::bundle::fixed16::{
-    CONDUCTANCE_BITS, FixedLayer, FixedProgram, FixedRow, LARGEST_INPUT, TangentTable,
+use crate::export::bundle::{
+    exported_program::are_positive,
+    fixed16::{CONDUCTANCE_BITS, FixedProgram, LARGEST_INPUT, TangentTable},
 };
 
 /// Writes the source, which has no floating-point numbers.
 pub(super) fn source(header: &Header<'_>, fixed: &FixedProgram) -> String {
-    let (contents, upper) = (header.contents, header.upper());
-    let (rows, channels) = (fixed.rows.len(), contents.channels());
-    let mut text = format!("#include \"{}_decode.h\"\n\n", contents.name);
-    let layers = fixed.rows[0].layers.len();
-    let mut push = |kind: &str, name: &str, shape: &[usize], of: &dyn Fn(&FixedRow) -> Vec<String>| {
-        let shape = [&[rows], shape].concat();
-        push_array(&mut text, kind, name, &shape, fixed.rows.iter().flat_map(of));
-    };
-    push("int32_t", "centres", &[channels], &|row| texts(&row.centres));
-    push("int32_t", "factors", &[channels], &|row| texts(&row.factors));
-    push("uint8_t", "factor_shifts", &[channels], &|row| texts(&row.shifts));
-    for (index, FixedLayer { inputs, biases, .. }) in fixed.rows[0].layers.iter().enumerate() {
-        let name = |of: &str| format!("{of}_{}", index + 1);
-        let long = |value: &i64| format!("INT64_C({value})");
-        let sums = biases.len();
-        push("int16_t", &name("weights"), &[sums, *inputs], &|row| {
-            texts(&row.layers[index].weights)
+    let mut text = format!("#include \"{}_decode.h\"\n\n", header.contents.name);
+    for table in &fixed.tables {
+        let shape = [&[fixed.rows], &table.shape[..]].concat();
+        let values = table.values.iter().map(|value| match table.kind {
+            "int64_t" => format!("INT64_C({value})"),
+            _ => value.to_string(),
         });
-        push("int64_t", &name("biases"), &[sums], &|row| {
-            row.layers[index].biases.iter().map(long).collect()
-        });
-        push("uint8_t", &name("sum_shifts"), &[sums], &|row| {
-            texts(&row.layers[index].shifts)
-        });
+        push_array(&mut text, table.kind, &table.name, &shape, values);
     }
-    if contents.exported.outside.is_some() {
-        let limits = |row: &FixedRow, pick: fn(&(i32, i32)) -> i32| texts(&Vec::from_iter(row.limits.iter().map(pick)));
-        push("int32_t", "lowest", &[channels], &|row| limits(row, |limits| limits.0));
-        push("int32_t", "highest", &[channels], &|row| limits(row, |limits| limits.1));
-    }
-    if layers > 1 {
+    let has_tangent = fixed.layers.len() > 1;
+    if has_tangent {
         let TangentTable { values, error } = &fixed.tangent;
         let _ = writeln!(
             text,
@@ -47,16 +28,12 @@ pub(super) fn source(header: &Header<'_>, fixed: &FixedProgram) -> String {
         );
         push_array(&mut text, "int16_t", "tangents", &[values.len()], values);
     }
-    text += &arithmetic(fixed, layers);
-    text + &decode(header, fixed, &upper)
-}
-
-fn texts<T: ToString>(values: &[T]) -> Vec<String> {
-    values.iter().map(T::to_string).collect()
+    text += &arithmetic(fixed, has_tangent);
+    text + &decode(header, fixed)
 }
 
 /// Functions on integers.
-fn arithmetic(fixed: &FixedProgram, layers: usize) -> String {
+fn arithmetic(fixed: &FixedProgram, has_tangent: bool) -> String {
     let tangent = format!(
         "/* tanh of an argument in 2^-{fraction}, in 2^-15. */\n\
          static int32_t tangent(int32_t argument)\n{{\n    \
@@ -91,22 +68,19 @@ fn arithmetic(fixed: &FixedProgram, layers: usize) -> String {
          static int64_t clamped(int64_t value, int64_t largest)\n{{\n    \
          return value > largest ? largest : value < -largest ? -largest : value;\n}}\n\n\
          {}/* {about}. */\nstatic int64_t changed(int32_t reading, int32_t centre)\n{{\n    return {change};\n}}\n\n",
-        if layers > 1 { &tangent } else { "" }
+        if has_tangent { &tangent } else { "" }
     )
 }
 
-fn decode(header: &Header<'_>, fixed: &FixedProgram, upper: &str) -> String {
-    let contents = header.contents;
-    let readings = header.readings;
-    let refusal = match contents.exported.are_positive() {
+fn decode(header: &Header<'_>, fixed: &FixedProgram) -> String {
+    let (contents, readings, upper) = (header.contents, header.readings, header.upper());
+    let refusal = match are_positive(&contents.exported.program) {
         true => format!("        if ({readings}[i] <= 0) {{\n            return {upper}_BAD_READING;\n        }}\n"),
         false => String::new(),
     };
-    let network = match contents.takes_row() && fixed.rows.len() > 1 {
-        true => String::new(),
-        false => "    const int network = 0;\n".to_owned(),
-    };
     // A row that only the limits depend on is still checked.
+    let is_of_row = fixed.rows > 1;
+    let network = if is_of_row { "" } else { "    const int network = 0;\n" };
     let mut text = format!(
         "{signature}\n{{\n{check}{network}    int32_t values_1[{upper}_CHANNELS];\n    \
          for (int i = 0; i < {upper}_CHANNELS; ++i) {{\n{refusal}        \
@@ -114,14 +88,10 @@ fn decode(header: &Header<'_>, fixed: &FixedProgram, upper: &str) -> String {
          shifted(changed({readings}[i], centres[network][i]) * factors[network][i], factor_shifts[network][i]),\n            \
          {LARGEST_INPUT});\n    }}\n",
         signature = header.signature(),
-        check = match fixed.rows.len() {
-            1 => row_check(contents, upper).replace("    const int network = row - 1;\n", ""),
-            _ => row_check(contents, upper),
-        },
+        check = row_check(contents, &upper, is_of_row),
     );
-    let layers = &fixed.rows[0].layers;
-    for (index, FixedLayer { inputs, biases, .. }) in layers.iter().enumerate() {
-        let (layer, sums, is_last) = (index + 1, biases.len(), index + 1 == layers.len());
+    for (index, [inputs, sums]) in fixed.layers.iter().enumerate() {
+        let (layer, is_last) = (index + 1, index + 1 == fixed.layers.len());
         let clamped =
             |largest: &str| format!("(int32_t)clamped(shifted(sum, sum_shifts_{layer}[network][k]), {largest})");
         let (target, value) = match is_last {
@@ -142,12 +112,9 @@ fn decode(header: &Header<'_>, fixed: &FixedProgram, upper: &str) -> String {
              {target} = {value};\n    }}\n"
         );
     }
-    if contents.exported.outside.is_some() {
-        let _ = write!(
-            text,
-            "    answer->readings_outside = 0;\n    for (int i = 0; i < {upper}_CHANNELS; ++i) {{\n        \
-             answer->readings_outside += {readings}[i] < lowest[network][i] || {readings}[i] > highest[network][i];\n    }}\n"
-        );
-    }
-    text + &format!("    return {upper}_OK;\n}}\n")
+    text + &format!(
+        "    answer->readings_outside = 0;\n    for (int i = 0; i < {upper}_CHANNELS; ++i) {{\n        \
+         answer->readings_outside += {readings}[i] < lowest[network][i] || {readings}[i] > highest[network][i];\n    }}\n    \
+         return {upper}_OK;\n}}\n"
+    )
 }

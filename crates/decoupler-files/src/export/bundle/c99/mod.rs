@@ -18,7 +18,7 @@ use super::{
 };
 use compile::run_self_test;
 use header::Header;
-use self_test::SelfTest;
+use self_test::self_test;
 
 /// Writes header, source and self-test, compiles them where there is a compiler, and runs the self-test. `fixed` is the
 /// program in fixed point, if that is wanted. Adds the outcome to `report`, and returns lines of a program that decodes.
@@ -28,7 +28,7 @@ use self_test::SelfTest;
 pub(super) fn print(
     contents: &Contents,
     fixed: Option<&FixedProgram>,
-    folder: &AtomicFolder,
+    folder: &mut AtomicFolder,
     report: &mut BundleReport,
 ) -> Result<String, BundleError> {
     let header = Header::of(contents, fixed);
@@ -36,15 +36,10 @@ pub(super) fn print(
         Some(fixed) => fixed::source(&header, fixed),
         None => source::source(&header),
     };
-    let self_test = SelfTest {
-        header: &header,
-        fixed,
-        limit: report.limit,
-    };
     let name = &contents.name;
     folder.write(&format!("{name}_decode.h"), header.text())?;
     folder.write(&format!("{name}_decode.c"), source)?;
-    folder.write(&format!("{name}_selftest.c"), self_test.text())?;
+    folder.write(&format!("{name}_selftest.c"), self_test(&header, report.limit))?;
     match run_self_test(folder.path(), name)? {
         Ok(deviation) => report.checks.push(BundleCheck {
             evaluator: "C source, compiled and run",
@@ -52,18 +47,18 @@ pub(super) fn print(
         }),
         Err(reason) => report.remarks.push(format!("the C source was not compiled: {reason}")),
     }
-    Ok(usage(&header, fixed))
+    Ok(usage(&header))
 }
 
 /// Lines of a program that decodes.
-fn usage(header: &Header<'_>, fixed: Option<&FixedProgram>) -> String {
-    let contents = header.contents;
+fn usage(header: &Header<'_>) -> String {
+    let (contents, is_fixed) = (header.contents, header.fixed.is_some());
     let (name, upper) = (&contents.name, header.upper());
     let declared = match contents.history() {
         Some(_) => format!("    {name}_state state;\n    {name}_start(&state);\n"),
         None => String::new(),
     };
-    let units = match fixed.is_some() && !contents.meaning.is_array {
+    let units = match is_fixed && !contents.meaning.is_array {
         true => format!(
             "Readings and targets are integers in the units {upper}_READING_UNITS and {upper}_TARGET_UNITS in the header:\n\
              round(reading / unit) goes in, and unit * number comes out.\n"
@@ -76,10 +71,10 @@ fn usage(header: &Header<'_>, fixed: Option<&FixedProgram>) -> String {
          The status is {upper}_OK, or the reason why there is no answer. Compile {name}_decode.c with your program{}.\n\
          {units}The self-test compares the golden answers:\n\n    \
          cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n",
-        header.reading,
+        header.number,
         header.readings,
         header.call("&state", "1", "time_s", header.readings),
-        if fixed.is_some() { "" } else { ", and link with -lm" },
+        if is_fixed { "" } else { ", and link with -lm" },
     )
 }
 

@@ -3,8 +3,8 @@ use crate::export::bundle::{exported_program::Limits, meaning::Meaning};
 
 /// Units of integers: each is 10^−`decimals` of the decoder's unit of the reading or target.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Units {
-    decimals: Vec<i32>,
+pub(in crate::export::bundle) struct Units {
+    pub(super) decimals: Vec<i32>,
 }
 
 /// Upper bound of readings within their limits, which leaves a factor of 2 for readings outside.
@@ -54,24 +54,19 @@ impl Units {
         ten_to(self.decimals[index])
     }
 
-    /// Decimals of the first, and of all where they share one.
-    pub(super) fn first_decimals(&self) -> i32 {
-        self.decimals[0]
-    }
-
     /// A unit in those of the decoder: 1e-6.
     pub(super) fn unit(&self, index: usize) -> f64 {
         ten_to(-self.decimals[index])
     }
 
     /// Every unit in those of the decoder.
-    pub(super) fn all(&self) -> impl Iterator<Item = f64> {
+    pub(in crate::export::bundle) fn all(&self) -> impl Iterator<Item = f64> {
         (0..self.decimals.len()).map(|index| self.unit(index))
     }
 
     /// Returns the value in units, limited to the largest number.
-    pub(super) fn whole(&self, index: usize, value: f64) -> i32 {
-        (value * self.per_one(index)).round() as i32
+    pub(super) fn whole(&self, index: usize, value: f64) -> i64 {
+        i64::from((value * self.per_one(index)).round() as i32)
     }
 }
 

@@ -84,11 +84,6 @@ impl GraphBuilder {
         self.named(operation, inputs, attributes, &name)
     }
 
-    /// Adds a conversion to numbers of this precision.
-    pub(super) fn cast(&mut self, input: &str, precision: Precision) -> String {
-        self.with("Cast", &[input], &[("to", element_type(precision))])
-    }
-
     /// Adds the number of true values of each line, as whole numbers (batch × 1).
     pub(super) fn count(&mut self, condition: &str) -> String {
         let ones = self.with("Cast", &[condition], &[("to", INT64)]);
