@@ -28,5 +28,5 @@ pub use history::{History, MemoryStream};
 pub use memory::{LARGEST_LAG, Memory, MemoryConstants};
 pub use samples::{Dataset, LARGEST_SAMPLES};
 pub use seed::{Seed, Stream};
-pub use simulation::{ModelSize, Simulation};
+pub use simulation::Simulation;
 pub use span::Span;

@@ -26,6 +26,6 @@ pub(crate) use equations::GaussianPrior;
 pub use equations::{Estimate, Estimator, LARGEST_ERROR, NewtonStop, Solution};
 pub use kind::{DecoderKind, FitProblem, Precision};
 pub use newton::NewtonDecoder;
-pub use program::{Builder, Changes, Domain, Function, Node, NodeId, Operation, Program, ProgramDecoder};
+pub use program::{Builder, Domain, Function, Node, NodeId, Operation, Program, ProgramDecoder};
 pub(crate) use ridge::Regression;
 pub(crate) use standardised::ridge;

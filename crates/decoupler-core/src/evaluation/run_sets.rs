@@ -35,7 +35,7 @@ impl RunSets {
         settings.check_counts()?;
         settings.training.check().map_err(TrainingError::from)?;
         Workload::of(settings, TrainingSize::drawn(settings)?).check_memory(memory)?;
-        let rows = source.model_size()?.rows;
+        let rows = source.rows()?;
         let held_out = source.validation_samples.div_ceil(rows);
         let total = (source.samples.div_ceil(rows) + held_out) * rows;
         if total > LARGEST_SAMPLES {

@@ -298,7 +298,7 @@ pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
         count => format!("{count} targets have positions"),
     };
     Some(match TargetPosition::lattice(positions) {
-        Some(lattice) => format!("{count}: a grid of {} × {}", lattice.x_mm.len(), lattice.y_mm.len()),
+        Some(([x_mm, y_mm], _)) => format!("{count}: a grid of {} × {}", x_mm.len(), y_mm.len()),
         None => format!("{count}, scattered over the skin"),
     })
 }

@@ -181,7 +181,7 @@ impl Experiment {
         };
         simulation.scene.check()?;
         if let Some(CrossValidation { folds, by, .. }) = self.cross_validation {
-            let rows = simulation.model_size()?.rows;
+            let rows = simulation.rows()?;
             let snapshots = simulation.samples.div_ceil(rows);
             let (units, unit) = match by {
                 SplitBy::Random => (snapshots * rows, "sample"),
