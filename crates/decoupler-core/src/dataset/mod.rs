@@ -20,7 +20,8 @@ mod simulation;
 mod span;
 
 pub use continuation::{GAP, Place, RowOrder, Series};
-pub use division::{DividedSamples, Division, Split, SplitBy};
+pub(crate) use division::DividedSamples;
+pub use division::{Division, Split, SplitBy};
 pub use error::DatasetError;
 pub use folds::Folds;
 pub use frames::{Frames, PerRow};

@@ -52,16 +52,7 @@ impl RunSets {
         let drawn = source.draw_training(total, seed)?;
         job.check()?;
         // Whole snapshots, so that no validation sample was read at the same moment as a training sample.
-        let held_out = SplitBy::Group.hold_out(&drawn, held_out, &mut seed.rng(Stream::Split));
-        let split = if held_out.validation.is_empty() {
-            // Large sets need not be copied.
-            Split {
-                training: drawn,
-                validation: None,
-            }
-        } else {
-            held_out.split(&drawn)
-        };
+        let split = SplitBy::Group.hold_out(&drawn, held_out, &mut seed.rng(Stream::Split));
         Ok(Self {
             memory,
             ..Self::new(split, test).described(source.problem())

@@ -16,4 +16,4 @@ mod spline;
 pub use error::SurfaceError;
 pub use grid::Grid;
 pub(crate) use lattice::lattice;
-pub use map::{Interpolation, SurfaceMap};
+pub use map::SurfaceMap;
