@@ -1,7 +1,7 @@
 //! Samples in NumPy arrays.
 
 use decoupler_core::{
-    dataset::{Dataset, Division, Seed, Split, Stream},
+    dataset::{Dataset, Division, Seed, Split},
     decoupling::{DecodeError, Decoder},
 };
 use ndarray::{Array2, ArrayView2, Axis, Slice};
@@ -156,16 +156,13 @@ impl Samples<'_> {
             None,
             self.groups(),
         );
-        let parts = groups.map_err(value_error).and_then(|set| {
-            division
-                .divide_for_training(&set, &mut seed.rng(Stream::Split))
-                .map_err(value_error)
-        })?;
+        let training = groups.and_then(|set| division.training(&set, true, seed));
+        let training = training.map_err(value_error)?;
+        let is_held_out = |sample: &usize| training.binary_search(sample).is_err();
+        let held_out = Vec::from_iter((0..samples).filter(is_held_out));
         Ok(Split {
-            training: self.select(&parts.training)?,
-            validation: (!parts.validation.is_empty())
-                .then(|| self.select(&parts.validation))
-                .transpose()?,
+            training: self.select(&training)?,
+            validation: (!held_out.is_empty()).then(|| self.select(&held_out)).transpose()?,
         })
     }
 }

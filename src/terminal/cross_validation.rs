@@ -108,8 +108,8 @@ impl Train {
         let settings = *run.settings();
         let honest = || -> Result<Run, RunError> {
             let division = Division { by, ..plan.division };
-            let parts = division.divide(set, &mut settings.seed.rng(Stream::Split))?;
-            let sets = RunSets::new(parts.split(set), set.select(&parts.test));
+            let (split, test) = division.sets(set, None, settings.seed)?;
+            let sets = RunSets::new(split, test);
             Run::with_baselines(settings, sets, None, &Job::UNINTERRUPTED)
         };
         let mut honest = match honest() {

@@ -12,8 +12,8 @@ use decoupler_core::{
     evaluation::{
         CrossValidation, ErrorMeasure, MAX_STARTS, RunError,
         experiments::{
-            Axis, AxisKind, CellResults, Experiment, ExperimentResults, Figure, PaperTable, TrialSamples,
-            run_experiments, worker_threads,
+            self, Axis, AxisKind, Experiment, ExperimentResults, Figure, PaperTable, TrialSamples, run_experiments,
+            worker_threads,
         },
     },
     network::LARGEST_HIDDEN,
@@ -299,9 +299,9 @@ struct CellReport {
 
 impl CellReport {
     /// `None` for a recording, which does not occur in the paper's tables.
-    fn of(cell: &CellResults) -> Option<Self> {
+    fn of(cell: &experiments::Cell) -> Option<Self> {
         let figure = |measure| cell.error(measure);
-        let settings = cell.cell.settings;
+        let settings = cell.settings;
         let simulation = settings.simulation()?;
         Some(Self {
             array: simulation.sensor.scale,

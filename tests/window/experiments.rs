@@ -134,9 +134,7 @@ fn a_cell_of_a_cross_validation_is_trained_where_it_is_opened() {
     driver.click(OPEN);
     wait_for_the_network(&mut driver);
     let state = driver.state();
-    let wanted = driver.views().experiments.outcome().unwrap().results.cells[0]
-        .cell
-        .settings;
+    let wanted = driver.views().experiments.outcome().unwrap().results.cells[0].settings;
     assert_eq!(state.draft, wanted);
     assert_eq!(state.result().unwrap().epochs_run, 3);
 }

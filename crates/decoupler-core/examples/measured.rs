@@ -41,8 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let test = set.select(&Vec::from_iter(500..600));
     let training = set.select(&Vec::from_iter(0..500));
-    let parts = SplitBy::Group.hold_out(&training, 5, &mut Seed(0).rng(Stream::Split));
-    let split = parts.split(&training);
+    let split = SplitBy::Group.hold_out(&training, 5, &mut Seed(0).rng(Stream::Split));
     let mut run = Run::with_baselines(settings, RunSets::new(split, test), None, &Job::UNINTERRUPTED)?;
     while run.step().is_none() {}
     println!("one network, last 100 moments: R² {:?}", run.errors().targets()[0].r2);

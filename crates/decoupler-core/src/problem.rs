@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     dataset::{Dataset, Memory, Simulation},
-    surface::Lattice,
+    surface::lattice,
     text::{cleaned, cleaned_if_any, escaped_if_any},
 };
 
@@ -171,9 +171,11 @@ impl Channel {
 }
 
 impl TargetPosition {
-    /// Returns the lattice whose nodes are these positions; `None` if there are none or they do not form a lattice.
-    pub fn lattice(positions: &[Self]) -> Option<Lattice> {
-        Lattice::of(&Self::places_mm(positions))
+    /// Returns the lattice whose nodes are these positions: its lines along x and along y in millimetres, ascending, and the
+    /// index of the position at each node, in the order of the values of a [`SurfaceMap`](crate::surface::SurfaceMap).
+    /// `None` if there are none or they do not form a lattice.
+    pub fn lattice(positions: &[Self]) -> Option<([Vec<f64>; 2], Vec<usize>)> {
+        lattice(&Self::places_mm(positions))
     }
 
     /// Returns the positions (x, y) in millimetres.

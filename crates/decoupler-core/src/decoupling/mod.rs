@@ -23,9 +23,10 @@ mod takagi_sugeno;
 
 pub use decoder::{DecodeError, Decoder, SolvedRows, decode_set, resistance_residual};
 pub(crate) use equations::GaussianPrior;
-pub use equations::{Estimate, Estimator, LARGEST_ERROR, NewtonStop, Solution};
-pub use kind::{DecoderKind, FitProblem, Precision};
+pub use equations::{Estimate, Estimator, LARGEST_ERROR, Solution};
+pub(crate) use kind::FitProblem;
+pub use kind::{DecoderKind, Precision};
 pub use newton::NewtonDecoder;
-pub use program::{Builder, Changes, Domain, Function, Node, NodeId, Operation, Program, ProgramDecoder};
+pub use program::{Builder, Domain, Function, Node, NodeId, Operation, Program, ProgramDecoder};
 pub(crate) use ridge::Regression;
 pub(crate) use standardised::ridge;

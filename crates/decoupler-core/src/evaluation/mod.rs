@@ -27,10 +27,10 @@ mod trade;
 mod workload;
 
 pub use baselines::{Baselines, PublishedErrors, Scores, published_errors};
-pub use cross_validation::{CrossValidated, CrossValidation, Effort};
+pub use cross_validation::{CrossValidated, CrossValidation};
 pub use decoder_set::{DecoderReport, DecoderSet};
 pub use errors::{Errors, NodeAddress, Spread, TargetErrors, TestErrors, node_rms_mm};
-pub use fine_tuning::{fine_tune, pressed_rows};
+pub use fine_tuning::fine_tune;
 pub use intervals::{Coverage, HalfWidth, Intervals};
 pub use presets::Preset;
 pub use remark::error_remarks;

@@ -4,8 +4,8 @@ use rand::Rng;
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Initialization, Run, RunError, RunSets, RunSettings, StartTrainer, linear_start::LinearStart,
-    run_sets::check_sets,
+    Baselines, Initialization, Run, RunError, RunSets, RunSettings, StartTrainer, TrainingSize,
+    linear_start::LinearStart, run_sets::check_sets,
 };
 use crate::{
     dataset::{Dataset, PerRow, Simulation, Split},
@@ -133,7 +133,7 @@ impl RunSettings {
     /// Checks these settings and the number of saved trainings, before samples are drawn for them.
     pub fn check_states(&self, states: &[TrainerState]) -> Result<(), RunError> {
         self.check_counts()?;
-        check_states(states, self.starts * self.drawn()?.model_size()?.networks)
+        check_states(states, self.starts * TrainingSize::drawn(self)?.networks)
     }
 }
 

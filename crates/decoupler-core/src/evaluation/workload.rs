@@ -6,7 +6,7 @@ use crate::{
     decoupling::{DecoderKind, GaussianPrior},
     machine::{MemoryBudget, Speed, node_pairs_per_row},
     network::{ScalingChoice, Shape},
-    scene::{Movement, RowModel, Rows},
+    scene::{Movement, Rows},
     training::Method,
 };
 
@@ -43,10 +43,7 @@ impl TrainingSize {
             samples: training.samples(),
             inputs: training.readings().ncols(),
             targets: training.targets().ncols(),
-            networks: match settings.source.row_model() {
-                RowModel::Shared => 1,
-                RowModel::Each => training.row_count(),
-            },
+            networks: settings.source.row_model().decoders(training.row_count()),
         }
     }
 
@@ -57,7 +54,7 @@ impl TrainingSize {
     pub fn drawn(settings: &RunSettings) -> Result<Self, RunError> {
         let simulation = settings.drawn()?;
         let Simulation { sensor, scene, .. } = simulation;
-        let (scale, size) = (sensor.scale, simulation.model_size()?);
+        let (scale, rows) = (sensor.scale, simulation.rows()?);
         let varying_axes = match (scene.movement, scene.rows) {
             (Movement::Xyz { .. }, _) => 3,
             // A network that does not know the row also learns the x coordinate.
@@ -65,10 +62,10 @@ impl TrainingSize {
             (Movement::Z, _) => 1,
         };
         Ok(Self {
-            samples: simulation.samples.div_ceil(size.rows) * size.rows,
+            samples: simulation.samples.div_ceil(rows) * rows,
             inputs: scale.columns(),
             targets: varying_axes * scale.nodes_per_row(),
-            networks: size.networks,
+            networks: scene.rows.model().decoders(rows),
         })
     }
 }
@@ -183,15 +180,15 @@ fn duration(seconds: f64) -> Duration {
 /// Returns the memory of drawn samples and the priors of their rows in bytes, and the number of pairs of their nodes; `None`
 /// without the rows of the scene, where nothing can be drawn.
 fn drawing(simulation: &Simulation, size: TrainingSize) -> Option<(u64, f64)> {
-    let (model, scale) = (simulation.model_size().ok()?, simulation.sensor.scale);
-    let whole = |samples: usize| samples.div_ceil(model.rows) * model.rows;
+    let (rows, scale) = (simulation.rows().ok()?, simulation.sensor.scale);
+    let whole = |samples: usize| samples.div_ceil(rows) * rows;
     let held_out = whole(simulation.validation_samples) + whole(simulation.test_samples);
     let drawn = size.samples.saturating_add(held_out);
     // Readings and targets are drawn, split, scaled, and copied to blocks for the training.
     let per_sample = 3 * scale.columns() + 3 * scale.coordinates_per_row() + size.inputs + 1 + size.targets;
     let needs_prior = !(simulation.scene.noise.in_test().is_none() && simulation.is_determined());
-    let unknowns = model.unknowns / model.rows;
-    let prior = || GaussianPrior::bytes(simulation.scene.loading, model.rows, unknowns);
+    let unknowns = simulation.scene.unknowns_per_row(scale);
+    let prior = || GaussianPrior::bytes(simulation.scene.loading, rows, unknowns);
     let prior = if needs_prior { prior() } else { 0 };
     let node_pairs = drawn as f64 * node_pairs_per_row(&simulation.sensor);
     Some((float_bytes(drawn, per_sample).saturating_add(prior), node_pairs))
@@ -273,7 +270,7 @@ mod tests {
 
     #[test]
     fn wide_inputs_make_a_training_on_a_recording_long_and_conjugate_gradients_faster() {
-        let settings = RunSettings::measured(RowModel::Shared);
+        let settings = RunSettings::measured(crate::scene::RowModel::Shared);
         let size = TrainingSize {
             samples: 5000,
             inputs: 192,

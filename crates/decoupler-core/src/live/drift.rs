@@ -329,6 +329,8 @@ pub struct Drift {
     pub first: u64,
     /// Position of the last of these readings so far.
     pub last: u64,
+    /// `true` once the readings look like the training readings again.
+    pub has_ended: bool,
     statistic: Statistic,
     is_larger: bool,
 }
@@ -353,15 +355,6 @@ impl Drift {
             }
         }
     }
-}
-
-/// Change of the state of a [`DriftMonitor`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DriftEvent {
-    /// The readings no longer look like the training readings.
-    Began(Drift),
-    /// They look like the training readings again.
-    Ended(Drift),
 }
 
 /// Monitor that reports when readings no longer look like the training readings, so that the intervals of the network no
@@ -407,11 +400,11 @@ impl DriftMonitor {
     }
 
     /// Takes the next readings, with their position such as the number of their line; further values, such as those of a
-    /// memory, are ignored, and so are readings that are not finite.
+    /// memory, are ignored, and so are readings that are not finite. Returns a drift when it begins, and again when it ends.
     ///
     /// # Panics
     /// If there are fewer readings than channels.
-    pub fn take(&mut self, position: u64, readings: &[f64]) -> Option<DriftEvent> {
+    pub fn take(&mut self, position: u64, readings: &[f64]) -> Option<Drift> {
         let readings = &readings[..self.reference.channels()];
         if !readings.iter().all(|reading| reading.is_finite()) {
             return None;
@@ -433,7 +426,7 @@ impl DriftMonitor {
     }
 
     /// Judges the block that ends at `position`.
-    fn judge(&mut self, position: u64, statistics: &[f64]) -> Option<DriftEvent> {
+    fn judge(&mut self, position: u64, statistics: &[f64]) -> Option<Drift> {
         let mut sign = None;
         for (index, (value, [low, high])) in statistics.iter().zip(&self.reference.ranges).enumerate() {
             let (runs, is_drifted) = (&mut self.runs[index], &mut self.is_drifted[index]);
@@ -450,11 +443,12 @@ impl DriftMonitor {
                 let drift = Drift {
                     first: *self.begins.front()?,
                     last: position,
+                    has_ended: false,
                     statistic: Statistic::at(statistic, self.reference.channels()),
                     is_larger,
                 };
                 self.drift = Some(drift);
-                Some(DriftEvent::Began(drift))
+                self.drift
             }
             (Some(_), Some(drift)) => {
                 drift.last = position;
@@ -468,7 +462,11 @@ impl DriftMonitor {
                 }
                 self.blocks_without = 0;
                 self.is_drifted.fill([false; 2]);
-                self.drift.take().map(DriftEvent::Ended)
+                let ended = self.drift.take();
+                ended.map(|drift| Drift {
+                    has_ended: true,
+                    ..drift
+                })
             }
             (None, None) => None,
         }

@@ -10,7 +10,7 @@ mod left_out_decoder;
 mod re_zero;
 mod wire_check;
 
-pub use drift::{Drift, DriftEvent, DriftMonitor, DriftReference};
+pub use drift::{Drift, DriftMonitor, DriftReference};
 pub use error::LiveError;
 pub use left_out_decoder::LeftOutDecoder;
 pub use re_zero::{ReZero, ZeroGains};

@@ -9,7 +9,7 @@ use decoupler_core::{
     dataset::{Simulation, SplitBy},
     evaluation::{
         Combination, CrossValidation, ErrorMeasure, TargetErrors,
-        experiments::{AxisKind, CellResults, Experiment, ExperimentRecording, ExperimentResults, Figure, Trial},
+        experiments::{self, AxisKind, Experiment, ExperimentRecording, ExperimentResults, Figure, Trial},
     },
     network::suggested_hidden,
     problem::Channel,
@@ -64,7 +64,7 @@ type CellFigure = (ExperimentColumn, Option<f64>, String);
 impl ExperimentTable {
     /// The results so far.
     pub fn new(results: &ExperimentResults) -> Self {
-        let has_published = results.cells.iter().any(|cell| cell.cell.published.is_some());
+        let has_published = results.cells.iter().any(|cell| cell.published.is_some());
         let axes = results.experiment.axes().map(|axis| ExperimentColumn {
             heading: axis.kind.name(),
             kind: ExperimentColumnKind::Axis,
@@ -72,8 +72,8 @@ impl ExperimentTable {
         let first = results.cells.first().map(|cell| figures(cell, has_published));
         let first = first.unwrap_or_default();
         let columns = axes.chain(first.into_iter().map(|(column, ..)| column)).collect();
-        let row = |cell: &CellResults| {
-            let places = [cell.cell.column, cell.cell.row].map(|place| Some(place as f64));
+        let row = |cell: &experiments::Cell| {
+            let places = [cell.column, cell.row].map(|place| Some(place as f64));
             let labels = places.into_iter().zip(results.cell_labels(cell));
             let figures = figures(cell, has_published).into_iter();
             labels.chain(figures.map(|(_, value, text)| (value, text))).unzip()
@@ -121,7 +121,7 @@ const TARGETS_NOTE: &str = "Median, minimum and maximum over seeds. error: mean 
      ridge regression; epochs: mean of the starts; training: one network, all its starts.";
 
 /// Columns with the figures of a cell.
-fn figures(cell: &CellResults, has_published: bool) -> Vec<CellFigure> {
+fn figures(cell: &experiments::Cell, has_published: bool) -> Vec<CellFigure> {
     use ExperimentColumnKind::{Linear, Other, Published, Ranking, Time};
     let number = |heading, kind, value: Option<f64>| {
         let column = ExperimentColumn { heading, kind };
@@ -132,7 +132,7 @@ fn figures(cell: &CellResults, has_published: bool) -> Vec<CellFigure> {
         has_published.then(|| number(heading, Published, value))
     };
     let percent = cell.percent();
-    let is_array = cell.cell.settings.simulation().is_some();
+    let is_array = cell.settings.simulation().is_some();
     let [publ, median, mean, linear] = if is_array {
         ["Z % publ.", "Z % median", "mean Z %", "linear Z %"]
     } else {
@@ -173,7 +173,7 @@ pub fn cells_table(results: &ExperimentResults) -> Table {
     let rows = results.cells.iter().map(|cell| {
         let mut fields = settings_fields(cell);
         fields.extend([
-            field("starts", cell.cell.settings.starts.into()),
+            field("starts", cell.settings.starts.into()),
             field("trials", cell.trials.len().into()),
         ]);
         let figure = |name: &str, figure: &Figure, has_published: bool| {
@@ -182,7 +182,7 @@ pub fn cells_table(results: &ExperimentResults) -> Table {
             let figures = published.into_iter().chain(of_trials);
             Vec::from_iter(figures.map(|(which, value)| field(&format!("{name}_{which}"), value.into())))
         };
-        let is_array = cell.cell.settings.simulation().is_some();
+        let is_array = cell.settings.simulation().is_some();
         for (measure, of_trials) in cell.errors() {
             if measure != ErrorMeasure::ZMm {
                 fields.extend(figure(measure.field(), &of_trials, is_array));
@@ -241,8 +241,8 @@ pub fn trials_table(results: &ExperimentResults) -> Table {
                 &format!("linear_{name}"),
                 trial.scores.baselines.linear.percent().into(),
             ),
-            field("epochs_run", trial.effort.epochs.into()),
-            field("seconds", trial.effort.seconds.into()),
+            field("epochs_run", trial.epochs.into()),
+            field("seconds", trial.seconds.into()),
         ]);
         fields
     }))
@@ -255,8 +255,8 @@ fn field(name: &str, value: Cell) -> Field {
 }
 
 /// Settings of a cell.
-fn settings_fields(cell: &CellResults) -> Vec<Field> {
-    let settings = &cell.cell.settings;
+fn settings_fields(cell: &experiments::Cell) -> Vec<Field> {
+    let settings = &cell.settings;
     let method = field("method", settings.training.method.short_name().into());
     let epochs = field("epochs", settings.training.stopping.epochs.into());
     match settings.simulation() {
@@ -268,7 +268,7 @@ fn settings_fields(cell: &CellResults) -> Vec<Field> {
             epochs,
         ],
         None => {
-            let split = cell.cell.division.map(|division| division.by.to_string());
+            let split = cell.division.map(|division| division.by.to_string());
             vec![
                 field("split", split.unwrap_or_default().into()),
                 field("scaling", settings.inputs.scaling.to_string().into()),
@@ -431,7 +431,7 @@ pub fn describe_failures(results: &ExperimentResults) -> Vec<String> {
 
 /// Describes every cell that has networks worse than always answering the training mean, one sentence per cell.
 pub fn describe_worse_than_mean(results: &ExperimentResults) -> Vec<String> {
-    let of_cell = |cell: &CellResults| {
+    let of_cell = |cell: &experiments::Cell| {
         let is_worse = |trial: &&Trial| is_worse_than_mean(trial);
         let (worse, trials) = (cell.trials.iter().filter(is_worse).count(), cell.trials.len());
         (worse > 0).then(|| {

@@ -484,11 +484,11 @@ fn starts_defect(file: &NetworkFile) -> Option<String> {
 fn number_defect(network: &Networks, settings: &RunSettings, row_wires: Option<&[usize]>) -> Option<String> {
     let found = network.values().len();
     match settings.simulation() {
-        Some(source) => match source.model_size() {
-            Ok(size) if size.networks == found => None,
-            Ok(size) => Some(format!(
-                "network: {found} of them, but rows {} of {} need {}",
-                source.scene.rows, source.sensor.scale, size.networks
+        Some(source) => match source.rows().map(|rows| source.scene.rows.model().decoders(rows)) {
+            Ok(needed) if needed == found => None,
+            Ok(needed) => Some(format!(
+                "network: {found} of them, but rows {} of {} need {needed}",
+                source.scene.rows, source.sensor.scale
             )),
             Err(defect) => Some(format!("settings.source.scene.rows: {defect}")),
         },

@@ -1,7 +1,7 @@
 use std::io::{self, Write};
 
 use decoupler_core::{
-    dataset::{Dataset, Seed, SplitBy, Stream},
+    dataset::{Dataset, Seed, SplitBy},
     evaluation::{
         Coverage, DecoderReport, ErrorMeasure, ErrorRow, ErrorTable, Errors, HalfWidth, Intervals, Scores,
         TargetErrors, TestErrors,
@@ -298,7 +298,7 @@ pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
         count => format!("{count} targets have positions"),
     };
     Some(match TargetPosition::lattice(positions) {
-        Some(lattice) => format!("{count}: a grid of {} × {}", lattice.x_mm.len(), lattice.y_mm.len()),
+        Some(([x_mm, y_mm], _)) => format!("{count}: a grid of {} × {}", x_mm.len(), y_mm.len()),
         None => format!("{count}, scattered over the skin"),
     })
 }
@@ -327,8 +327,9 @@ pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
     } = &recordings.training;
     let division = recordings.recorded.plan.division;
     let mut warnings = target_remarks(training, division.by, inputs, targets);
-    let parts = division.divide(set, &mut Seed(0).rng(Stream::Split));
-    let tests_first = parts.is_ok_and(|parts| parts.test.first() == Some(&0));
+    // In time, the first samples are those for testing unless they are for training.
+    let trained = division.training(set, false, Seed(0));
+    let tests_first = trained.is_ok_and(|samples| samples.first() != Some(&0));
     if division.by == SplitBy::Time && recordings.test.is_none() && tests_first {
         let text = "all changes of the targets are in the last part of the recording, so that the first part was held out \
                     for testing in its place";

@@ -12,7 +12,7 @@ use crate::figure::Figure;
 use decoupler_core::{
     evaluation::{
         ErrorMeasure, TestErrors,
-        experiments::{Axis, AxisKind, CellResults, Experiment, ExperimentResults, Figure as Measured, Trial},
+        experiments::{Axis, AxisKind, Cell, Experiment, ExperimentResults, Figure as Measured, Trial},
     },
     network::suggested_hidden,
     text::format_percent,
@@ -57,7 +57,7 @@ fn heat_map(results: &ExperimentResults, rows: &Axis) -> HeatMap {
     let mut values = Array2::from_elem(shape, f64::NAN);
     let mut notes = Array2::from_elem(shape, String::new());
     for cell in &results.cells {
-        let at = [cell.cell.row, cell.cell.column];
+        let at = [cell.row, cell.column];
         let Measured { median, min, max, .. } = cell.percent();
         values[at] = median.unwrap_or(f64::NAN);
         let name = results.cell_labels(cell).join(", ");
@@ -79,9 +79,9 @@ fn heat_map(results: &ExperimentResults, rows: &Axis) -> HeatMap {
 }
 
 /// Position of a cell on the axis: the value itself, or its index in the list.
-fn position(axis: &Axis, index: usize, cell: &CellResults) -> f64 {
+fn position(axis: &Axis, index: usize, cell: &Cell) -> f64 {
     match axis.kind {
-        AxisKind::Hidden => cell.cell.settings.hidden as f64,
+        AxisKind::Hidden => cell.settings.hidden as f64,
         _ => index as f64,
     }
 }
@@ -89,14 +89,14 @@ fn position(axis: &Axis, index: usize, cell: &CellResults) -> f64 {
 fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
     let axis = &results.experiment.axis;
     let is_number = axis.kind == AxisKind::Hidden;
-    let mut cells: Vec<(f64, &CellResults)> = results
+    let mut cells: Vec<(f64, &Cell)> = results
         .cells
         .iter()
         .enumerate()
         .map(|(index, cell)| (position(axis, index, cell), cell))
         .collect();
     cells.sort_by(|one, other| one.0.total_cmp(&other.0));
-    let points = |value: fn(&CellResults) -> Option<f64>| {
+    let points = |value: fn(&Cell) -> Option<f64>| {
         let points = cells.iter().filter_map(move |(x, cell)| Some([*x, value(cell)?]));
         points.collect::<Vec<_>>()
     };
@@ -124,7 +124,7 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
                 Some(_) => "ridge",
             },
             reference,
-            points(CellResults::linear_percent),
+            points(Cell::linear_percent),
         ),
         Series::new("published", published, points(|cell| cell.percent().published)),
         Series {
@@ -175,7 +175,7 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
 }
 
 /// R² of the networks along the axis; `None` for the nodes of an array.
-fn r2_plot(x: PlotAxis, cells: &[(f64, &CellResults)], look: Look) -> Option<Plot> {
+fn r2_plot(x: PlotAxis, cells: &[(f64, &Cell)], look: Look) -> Option<Plot> {
     let points = cells.iter().map(|(x, cell)| {
         let r2 = cell.error(ErrorMeasure::R2)?;
         Some(r2.median.map(|median| PlotPoint {
@@ -191,7 +191,7 @@ fn r2_plot(x: PlotAxis, cells: &[(f64, &CellResults)], look: Look) -> Option<Plo
     Some(Plot::new(x, PlotAxis::linear("R²").including([1.0]), vec![series]))
 }
 
-type PublishedError = fn(&CellResults) -> Option<f64>;
+type PublishedError = fn(&Cell) -> Option<f64>;
 type TrialError = fn(&TestErrors) -> Option<f64>;
 
 /// The errors of every trial, one plot each for Z, X and Y.
@@ -249,7 +249,7 @@ fn repeats(results: &ExperimentResults) -> PlotFigure {
     let published = Key::new("published", Look::line(Hue::Ink, LineStyle::Dashed));
     let is_published = plots.iter().any(|plot| !plot.lines.is_empty());
     let keys = keys.chain(is_published.then_some(published)).collect();
-    let is_zero = |cell: &CellResults| {
+    let is_zero = |cell: &Cell| {
         cell.error(ErrorMeasure::YPercent)
             .is_some_and(|y| y.median == Some(0.0))
     };
@@ -268,10 +268,10 @@ fn repeats(results: &ExperimentResults) -> PlotFigure {
 }
 
 /// Error of each trial of a cell against the number of the trial, counted from 1 through all seeds (Fig. 5).
-fn trial_points(experiment: &Experiment, cell: &CellResults, error: TrialError) -> Vec<[f64; 2]> {
+fn trial_points(experiment: &Experiment, cell: &Cell, error: TrialError) -> Vec<[f64; 2]> {
     let repeats = experiment.cross_validation.map_or(1, |validation| validation.repeats);
     let number = |trial: &Trial| {
-        let seeds_before = trial.seed.0.wrapping_sub(cell.cell.settings.seed.0) as f64;
+        let seeds_before = trial.seed.0.wrapping_sub(cell.settings.seed.0) as f64;
         seeds_before * repeats as f64 + trial.repeat as f64 + 1.0
     };
     let points = cell.trials.iter();

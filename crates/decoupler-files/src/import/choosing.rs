@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use decoupler_core::{
-    dataset::{Memory, Seed, Stream},
+    dataset::{Memory, Seed},
     evaluation::{
         Intervals,
         auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, choose_settings},
@@ -67,12 +67,9 @@ impl Setup {
         let read = plan.recordings(folder, &mut watch(job, &mut on_reading));
         let (recording, test_recording) = unless_cancelled(job, read)?;
         let raw = recording.with_memory(None).map_err(ImportError::from)?;
-        let mut rng = self.settings().seed.rng(Stream::Split);
-        let divided = match test_recording {
-            None => plan.division.divide(&raw.set, &mut rng),
-            Some(_) => plan.division.divide_for_training(&raw.set, &mut rng),
-        };
-        let training = divided.map_err(ImportError::from)?.training;
+        let seed = self.settings().seed;
+        let training = plan.division.training(&raw.set, test_recording.is_some(), seed);
+        let training = training.map_err(ImportError::from)?;
         let choice = if training.len() < MIN_SAMPLES {
             None
         } else {

@@ -14,7 +14,7 @@ use std::{
 use decoupler_core::{
     dataset::{Seed, Simulation, SplitBy},
     evaluation::{
-        CrossValidation, Effort, ErrorMeasure, Run, RunError, RunSets, RunSettings, TestErrors,
+        CrossValidation, ErrorMeasure, Run, RunError, RunSets, RunSettings, TestErrors,
         experiments::{Axis, AxisKind, Experiment, ExperimentResults, Trial, TrialSamples, run_experiments},
     },
     job::Job,
@@ -98,11 +98,8 @@ fn timeless(results: &[ExperimentResults]) -> Vec<Vec<Trial>> {
     let cells = results.iter().flat_map(|results| &results.cells);
     let trials = cells.map(|cell| {
         let timeless = |trial: &Trial| Trial {
-            effort: Effort {
-                seconds: 0.0,
-                min_epoch_seconds: 0.0,
-                ..trial.effort
-            },
+            seconds: 0.0,
+            min_epoch_seconds: 0.0,
             states: Vec::new(),
             ..trial.clone()
         };
@@ -136,7 +133,7 @@ fn a_trial_equals_the_run_with_its_settings() {
         for (trial, seed) in cell.trials.iter().zip(0..3) {
             let settings = RunSettings {
                 seed: Seed(seed),
-                ..cell.cell.settings
+                ..cell.settings
             };
             let mut alone = Run::prepare(settings).unwrap();
             while alone.step().is_none() {}
@@ -172,7 +169,7 @@ fn cross_validation_decouples_every_sample_with_a_network_that_was_not_trained_o
                 // A sample left out would be decoupled as (0, 0, 0), 4 mm below any node.
                 assert!(worst_mm(&trial.scores.baselines.mean) < 1.0, "{unit}: {trial:?}");
                 assert!(worst_mm(&trial.scores.network) < 4.0, "{unit}: {trial:?}");
-                assert_eq!((trial.effort.networks, trial.states.is_empty()), (4, true));
+                assert_eq!((trial.networks, trial.states.is_empty()), (4, true));
             }
             let [first, second] = [0, 1].map(|repeat| &cell.trials[repeat]);
             assert_eq!(first.seed, second.seed);

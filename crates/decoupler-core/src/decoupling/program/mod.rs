@@ -13,7 +13,7 @@ mod networks;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-pub use builder::{Builder, Changes};
+pub use builder::Builder;
 pub use evaluate::ProgramDecoder;
 
 use super::Precision;

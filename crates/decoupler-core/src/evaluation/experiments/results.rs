@@ -15,34 +15,15 @@ pub struct ExperimentResults {
     pub experiment: Experiment,
     /// Description of the readings and targets; `None` until a recording is read.
     pub problem: Option<Arc<Problem>>,
-    /// Results of the cells, row by row in the order of [`Experiment::cells`].
-    pub cells: Vec<CellResults>,
-}
-
-/// Results of a cell so far.
-#[derive(Clone, Debug)]
-pub struct CellResults {
-    /// Cell to which the results belong.
-    pub cell: Cell,
-    /// Number of trials planned.
-    pub expected: usize,
-    /// Finished trials, sorted by seed and repeat regardless of the order in which they finished.
-    pub trials: Vec<Trial>,
-    /// Failures of trials ([`RunError::Trial`]), sorted likewise.
-    pub failures: Vec<RunError>,
+    /// Cells with their trials, row by row in the order of [`Experiment::cells`].
+    pub cells: Vec<Cell>,
 }
 
 impl ExperimentResults {
     /// Creates empty results.
     pub fn new(experiment: Experiment) -> Self {
-        let cells = experiment.cells().into_iter().map(|cell| CellResults {
-            cell,
-            expected: experiment.trials_of(&cell.settings).count(),
-            trials: Vec::new(),
-            failures: Vec::new(),
-        });
         Self {
-            cells: cells.collect(),
+            cells: experiment.cells(),
             problem: experiment
                 .base
                 .simulation()
@@ -56,7 +37,7 @@ impl ExperimentResults {
     /// # Panics
     /// If there is no such cell.
     pub fn record(&mut self, cell: usize, outcome: Result<Trial, RunError>) {
-        let CellResults { trials, failures, .. } = &mut self.cells[cell];
+        let Cell { trials, failures, .. } = &mut self.cells[cell];
         match outcome {
             Ok(trial) => trials.push(trial),
             Err(failure) => failures.push(failure),
@@ -69,18 +50,18 @@ impl ExperimentResults {
     }
 
     /// Returns the value of a cell on each axis, as text.
-    pub fn cell_labels(&self, cell: &CellResults) -> Vec<String> {
-        let axes = self.experiment.axes().zip([cell.cell.column, cell.cell.row]);
+    pub fn cell_labels(&self, cell: &Cell) -> Vec<String> {
+        let axes = self.experiment.axes().zip([cell.column, cell.row]);
         axes.map(|(axis, place)| axis.label(place)).collect()
     }
 
     /// Returns `true` if every trial has finished or failed.
     pub fn is_complete(&self) -> bool {
-        self.cells.iter().all(CellResults::is_complete)
+        self.cells.iter().all(Cell::is_complete)
     }
 }
 
-impl CellResults {
+impl Cell {
     /// Returns `true` if every trial has finished or failed.
     pub fn is_complete(&self) -> bool {
         self.trials.len() + self.failures.len() == self.expected
@@ -112,11 +93,11 @@ pub struct Figure {
 }
 
 /// Figures for tables and files: medians unless stated otherwise, `None` if there is no such figure (yet).
-impl CellResults {
+impl Cell {
     /// Measures of the errors of the network, the first of which ranks the cells: of the nodes of an array, or over all
     /// targets of a recording.
     fn measures(&self) -> &'static [ErrorMeasure] {
-        match self.cell.settings.simulation() {
+        match self.settings.simulation() {
             Some(_) => &[
                 ErrorMeasure::ZPercent,
                 ErrorMeasure::XPercent,
@@ -140,7 +121,7 @@ impl CellResults {
     fn figure(&self, measure: ErrorMeasure) -> Figure {
         let measured = |trial: &Trial| trial.scores.network.figure(measure);
         let spread = self.spread(measured);
-        let published = self.cell.published.as_ref();
+        let published = self.published.as_ref();
         Figure {
             published: published.and_then(|published| measure.of(Figures::Published(published))),
             median: spread.map(|spread| spread.median),
@@ -175,18 +156,18 @@ impl CellResults {
 
     /// Mean number of epochs per start.
     pub fn epochs_run(&self) -> Option<f64> {
-        let starts = self.cell.settings.starts;
-        self.median(|trial| Some(trial.effort.epochs as f64 / (trial.effort.networks * starts).max(1) as f64))
+        let starts = self.settings.starts;
+        self.median(|trial| Some(trial.epochs as f64 / (trial.networks * starts).max(1) as f64))
     }
 
     /// Training time of a network in seconds, over all its starts.
     pub fn training_seconds(&self) -> Option<f64> {
-        self.median(|trial| Some(trial.effort.seconds / trial.effort.networks.max(1) as f64))
+        self.median(|trial| Some(trial.seconds / trial.networks.max(1) as f64))
     }
 
     /// Time of the fastest epoch in milliseconds, which is least affected by other load on the machine.
     pub fn epoch_ms(&self) -> Option<f64> {
-        let fastest = self.spread(|trial| Some(trial.effort.min_epoch_seconds))?;
+        let fastest = self.spread(|trial| Some(trial.min_epoch_seconds))?;
         Some(1e3 * fastest.smallest)
     }
 }
@@ -196,7 +177,7 @@ mod tests {
     use super::*;
     use crate::{
         dataset::Seed,
-        evaluation::{Baselines, Effort, Errors, NodeAddress, Scores, TestErrors, experiments::PaperTable},
+        evaluation::{Baselines, Errors, NodeAddress, Scores, TestErrors, experiments::PaperTable},
     };
 
     fn errors(z_percent: f64) -> TestErrors {
@@ -225,12 +206,10 @@ mod tests {
                 },
                 coverage: Vec::new(),
             },
-            effort: Effort {
-                networks: 1,
-                epochs: 10,
-                seconds: 10.0,
-                min_epoch_seconds: 1.0,
-            },
+            networks: 1,
+            epochs: 10,
+            seconds: 10.0,
+            min_epoch_seconds: 1.0,
             states: Vec::new(),
         }
     }

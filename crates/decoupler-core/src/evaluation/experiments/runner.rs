@@ -145,7 +145,7 @@ fn planned<'a>(experiments: &'a [Experiment], samples: &TrialSamples) -> Vec<Pla
             let trials = experiment.trials_of(&cell.settings).enumerate();
             planned.extend(trials.map(|(round, seed_and_repeat)| Planned {
                 experiment,
-                cell,
+                cell: cell.clone(),
                 place: (number, cell_number),
                 seed_and_repeat,
                 work,

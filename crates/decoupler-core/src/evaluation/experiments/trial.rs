@@ -3,7 +3,7 @@ use std::sync::Arc;
 use super::{Cell, Experiment};
 use crate::{
     dataset::{Dataset, Division, Seed},
-    evaluation::{Baselines, Effort, Run, RunError, RunSets, RunSettings, Scores},
+    evaluation::{Baselines, Run, RunError, RunSets, RunSettings, Scores, cross_validation::Effort},
     job::Job,
     machine::MemoryBudget,
     problem::Problem,
@@ -20,8 +20,14 @@ pub struct Trial {
     /// Errors of the network, the training mean and the linear baseline on the test set; in a cross-validation, on all
     /// samples, each decoupled by the models for which it was held out.
     pub scores: Scores,
-    /// Networks, epochs and time of the trainings.
-    pub effort: Effort,
+    /// Number of networks trained, each with all starts: 1, or one per fold.
+    pub networks: usize,
+    /// Number of epochs, over all starts and folds.
+    pub epochs: usize,
+    /// Total time of the epochs.
+    pub seconds: f64,
+    /// Time of the fastest epoch, which is least affected by other load on the machine.
+    pub min_epoch_seconds: f64,
     /// Final state of every training, for [`Run::new`]; empty for a cross-validation, which has one network per
     /// fold.
     pub states: Vec<TrainerState>,
@@ -90,35 +96,36 @@ impl Trial {
     ) -> Result<Self, RunError> {
         job.check()?;
         let settings = RunSettings { seed, ..cell.settings };
-        if let Some(validation) = experiment.cross_validation {
+        let (scores, effort, states) = if let Some(validation) = experiment.cross_validation {
             let simulation = settings.drawn()?;
             let set = simulation.draw_training(simulation.samples, seed)?;
             let tested = simulation.draw_tested_folds(&set, seed)?;
             let sets = (&set, tested.as_ref().unwrap_or(&set));
             let validated = validation.run(&settings, sets, repeat, job)?;
-            return Ok(Self {
-                seed,
-                repeat,
-                scores: validated.scores_of(&simulation.problem(), &set),
-                effort: validated.effort,
-                states: Vec::new(),
-            });
-        }
-        let sets = samples.sets(&settings, cell.division.as_ref(), job)?;
-        let baselines = Baselines::fitted(&settings, &sets)?;
-        let mut run = Run::new(settings, sets, None, job)?;
-        let mut effort = Effort::default();
-        effort.train(&mut run, job)?;
-        Ok(Self {
-            seed,
-            repeat,
-            scores: Scores {
+            let scores = validated.scores_of(&simulation.problem(), &set);
+            (scores, validated.effort, Vec::new())
+        } else {
+            let sets = samples.sets(&settings, cell.division.as_ref(), job)?;
+            let baselines = Baselines::fitted(&settings, &sets)?;
+            let mut run = Run::new(settings, sets, None, job)?;
+            let mut effort = Effort::default();
+            effort.train(&mut run, job)?;
+            let scores = Scores {
                 network: run.errors(),
                 baselines,
                 coverage: Vec::new(),
-            },
-            effort,
-            states: run.states(),
+            };
+            (scores, effort, run.states())
+        };
+        Ok(Self {
+            seed,
+            repeat,
+            scores,
+            networks: effort.networks,
+            epochs: effort.epochs,
+            seconds: effort.seconds,
+            min_epoch_seconds: effort.min_epoch_seconds,
+            states,
         })
     }
 }

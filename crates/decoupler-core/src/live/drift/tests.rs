@@ -20,7 +20,7 @@ fn readings(samples: usize, memory: f64, rng: &mut ChaCha8Rng) -> Array2<f64> {
 }
 
 /// Events of the monitor, with rows as positions.
-fn events(reference: &DriftReference, readings: &Array2<f64>) -> Vec<DriftEvent> {
+fn events(reference: &DriftReference, readings: &Array2<f64>) -> Vec<Drift> {
     let mut monitor = DriftMonitor::new(reference.clone());
     let rows = readings.rows().into_iter().zip(0..);
     rows.filter_map(|(row, position)| monitor.take(position, &row.to_vec()))
@@ -29,10 +29,7 @@ fn events(reference: &DriftReference, readings: &Array2<f64>) -> Vec<DriftEvent>
 
 /// First drift, if there is one.
 fn first_drift(reference: &DriftReference, readings: &Array2<f64>) -> Option<Drift> {
-    events(reference, readings).into_iter().find_map(|event| match event {
-        DriftEvent::Began(drift) => Some(drift),
-        DriftEvent::Ended(_) => None,
-    })
+    events(reference, readings).into_iter().find(|drift| !drift.has_ended)
 }
 
 type Fault = fn(&mut Array2<f64>, &Array1<f64>);
@@ -139,9 +136,10 @@ fn a_drift_ends_when_the_readings_are_back_to_normal() {
         later.row_mut(row).assign(&training.row(0));
     }
     let events = events(&reference, &later);
-    let [DriftEvent::Began(began), DriftEvent::Ended(ended)] = events[..] else {
+    let [began, ended] = events[..] else {
         panic!("{events:?}");
     };
+    assert!(!began.has_ended && ended.has_ended);
     assert_eq!(
         (began.first, began.last),
         (frozen.start as u64, ((10 + blocks) * block - 1) as u64)

@@ -288,7 +288,7 @@ impl ExportedDecoder {
         let memory = self.origin.problem.memory.as_ref().filter(|memory| !memory.is_empty());
         let mut rows = match (&self.origin.problem.sensor, &self.test) {
             (Some(simulation), _) => {
-                let rows = simulation.model_size().map_or(1, |size| size.rows);
+                let rows = simulation.rows().unwrap_or(1);
                 let few = Simulation {
                     test_samples: ROWS[0].next_multiple_of(rows.max(1)),
                     ..*simulation
