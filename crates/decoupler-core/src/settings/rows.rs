@@ -36,6 +36,8 @@ pub enum Kind {
     Text,
 }
 
+type ReadText<'a> = Box<dyn FnOnce(&str) -> Result<(), String> + 'a>;
+
 /// Access to the value of a setting.
 pub enum Field<'a> {
     /// Number; an integer if the [kind](Setting::kind) is [`Kind::Integer`].
@@ -45,7 +47,7 @@ pub enum Field<'a> {
     /// Integer of 64 bits, such as a seed.
     Integer(&'a mut u64),
     /// Name or text, and how it is read; an error is a sentence that says what is possible instead.
-    Text(String, Box<dyn FnOnce(&str) -> Result<(), String> + 'a>),
+    Text(String, ReadText<'a>),
 }
 
 impl<'a> Field<'a> {
