@@ -131,10 +131,10 @@ impl SurfaceMap {
     /// - bilinear between neighbours, continued with the same slope beyond the outermost nodes: for more than a thousand
     ///   nodes, and for nodes so unevenly spaced that a spline would overshoot a thousandfold or be lost in rounding errors.
     pub fn interpolation(&self) -> &'static str {
-        let axes = self.lattice.iter().flatten();
+        let is_line = self.lattice.iter().flatten().any(|axis| axis.nodes_mm.len() == 1);
         match &self.weights {
             None => "bilinear",
-            Some(_) if axes.into_iter().any(|axis| axis.nodes_mm.len() == 1) => "natural cubic spline",
+            Some(_) if is_line => "natural cubic spline",
             Some(_) => "thin-plate spline (the biharmonic spline with a plane)",
         }
     }
