@@ -1,7 +1,7 @@
 //! Samples in NumPy arrays.
 
 use decoupler_core::{
-    dataset::{Dataset, Division, Seed, Split, Stream},
+    dataset::{Dataset, Division, Seed, Split},
     decoupling::{DecodeError, Decoder},
 };
 use ndarray::{Array2, ArrayView2, Axis, Slice};
@@ -156,16 +156,10 @@ impl Samples<'_> {
             None,
             self.groups(),
         );
-        let parts = groups.map_err(value_error).and_then(|set| {
-            division
-                .divide_for_training(&set, &mut seed.rng(Stream::Split))
-                .map_err(value_error)
-        })?;
+        let (training, held_out) = parts(&groups.map_err(value_error)?, division, seed)?;
         Ok(Split {
-            training: self.select(&parts.training)?,
-            validation: (!parts.validation.is_empty())
-                .then(|| self.select(&parts.validation))
-                .transpose()?,
+            training: self.select(&training)?,
+            validation: (!held_out.is_empty()).then(|| self.select(&held_out)).transpose()?,
         })
     }
 }
@@ -226,4 +220,12 @@ pub fn row_indices(known: &[usize], row_wires: Option<Vec<usize>>, samples: usiz
         })
     };
     row_wires.iter().enumerate().map(index).collect()
+}
+
+/// Training and held-out samples of `set`, as ascending indices.
+pub fn parts(set: &Dataset, division: Division, seed: Seed) -> PyResult<(Vec<usize>, Vec<usize>)> {
+    let training = division.training(set, true, seed).map_err(value_error)?;
+    let is_held_out = |sample: &usize| training.binary_search(sample).is_err();
+    let held_out = (0..set.samples()).filter(is_held_out).collect();
+    Ok((training, held_out))
 }

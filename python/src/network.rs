@@ -7,11 +7,11 @@ use std::{
 
 use decoupler_core::{
     dataset::History,
-    decoupling::{Blend, Precision, Program, ProgramDecoder},
+    decoupling::{Combined, Program, ProgramDecoder},
     evaluation::{Intervals, RunSettings},
     network::Networks,
     problem::{Channel, Problem},
-    text::counted,
+    text::{Named, counted},
 };
 use decoupler_files::export::{
     NetworkFile,
@@ -47,7 +47,7 @@ struct Record {
     networks: Networks,
     /// What it answers with instead of its network alone, if settings were chosen.
     #[serde(default)]
-    blend: Option<Blend>,
+    combined: Option<Combined>,
     /// Row-wires with a network each, in ascending order.
     row_wires: Option<Vec<usize>>,
     #[serde(with = "saved_problem")]
@@ -60,7 +60,8 @@ struct Record {
 
 /// The problem of a network that was trained in Python, which has no sensor.
 mod saved_problem {
-    use decoupler_core::problem::{Problem, SavedProblem};
+    use decoupler_core::problem::Problem;
+    use decoupler_files::export::SavedProblem;
     use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer, de::Error as _};
 
     pub(super) fn serialize<S: Serializer>(problem: &Problem, serializer: S) -> Result<S::Ok, S::Error> {
@@ -98,11 +99,7 @@ enum State {
 impl Record {
     /// The program of the answers; readings are limited to their range in training.
     fn program(&self) -> Program {
-        match &self.blend {
-            Some(blend) => blend.program(&self.networks, Precision::Double),
-            None if self.problem.has_nodes() => self.networks.program(Precision::Double),
-            None => self.networks.clipped_program(Precision::Double),
-        }
+        self.networks.decoder_program(&self.problem, self.combined.as_ref())
     }
 }
 
@@ -117,7 +114,7 @@ impl Network {
 
     /// Wraps the networks of a fit; `row_wires` are those with a network each.
     pub fn trained(
-        (networks, blend): (Networks, Option<Blend>),
+        (networks, combined): (Networks, Option<Combined>),
         row_wires: Option<Vec<usize>>,
         problem: Problem,
         settings: RunSettings,
@@ -126,7 +123,7 @@ impl Network {
     ) -> Self {
         let record = Record {
             networks,
-            blend,
+            combined,
             row_wires,
             problem,
             settings,
@@ -140,7 +137,7 @@ impl Network {
         let has_rows = file.network.only().is_none();
         let record = Record {
             networks: file.network.clone(),
-            blend: file.blend().cloned(),
+            combined: file.combined().cloned(),
             row_wires: file.row_wires.clone().filter(|_| has_rows),
             problem: file.problem.clone(),
             settings: file.settings,
@@ -335,15 +332,16 @@ impl Network {
         format: &str,
         precision: &str,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let format: BundleFormat = format.parse().map_err(value_error)?;
-        let precision: BundlePrecision = precision.parse().map_err(value_error)?;
+        let format = BundleFormat::parse(format).map_err(value_error)?;
+        let precision = BundlePrecision::parse(precision).map_err(value_error)?;
         let record = &self.record;
         let report = detached(py, || match &self.file {
             Some(file) => export_bundle(file, format, precision, &path),
             None => {
                 let row_wires = record.row_wires.clone();
-                let fitted = (&record.networks, record.blend.as_ref());
-                let exported = ExportedDecoder::of_networks(fitted, record.settings, record.problem.clone(), row_wires);
+                let (networks, combined, problem) =
+                    (&record.networks, record.combined.as_ref(), record.problem.clone());
+                let exported = ExportedDecoder::of_networks(networks, combined, record.settings, problem, row_wires);
                 export_bundle(exported, format, precision, &path)
             }
         })?;
@@ -393,7 +391,7 @@ impl Network {
         let test = test.dataset()?.among_rows(&read).map_err(value_error)?;
         let saved = Saved {
             networks: &record.networks,
-            blend: record.blend.as_ref(),
+            combined: record.combined.as_ref(),
             settings: record.settings,
             problem: &record.problem,
             origin,

@@ -8,8 +8,8 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Division, Split, SplitBy},
-    decoupling::{Blend, ProgramDecoder},
-    evaluation::{Begin, Intervals, Run, RunSettings, TestErrors},
+    decoupling::{Combined, ProgramDecoder},
+    evaluation::{Intervals, Run, RunSettings, TestErrors},
     job::Job,
     network::Networks,
     problem::{Channel, Problem},
@@ -78,7 +78,7 @@ pub fn samples_crc32(set: &Dataset) -> u32 {
 /// A trained network to be saved.
 pub struct Saved<'a> {
     pub networks: &'a Networks,
-    pub blend: Option<&'a Blend>,
+    pub combined: Option<&'a Combined>,
     pub settings: RunSettings,
     pub problem: &'a Problem,
     pub origin: &'a Origin,
@@ -115,18 +115,19 @@ impl Saved<'_> {
             return Err("the files with the samples do not read back as the samples of fit".to_owned());
         }
         // Measures the baselines.
-        let run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED).map_err(text)?;
+        let run = sets.run(&setup, None, &Job::UNINTERRUPTED).map_err(text)?;
         let mut file = NetworkFile::from_run(&run, sets.recorded()).map_err(text)?;
         file.drift = sets.drift_reference();
         file.network = self.networks.clone();
         if let Some(recorded) = &mut file.recorded {
-            recorded.blend = self.blend.cloned();
+            recorded.combined = self.combined.cloned();
         }
         let answers = file.decoder().answers_to(&sets.sets.test);
         file.scores.network = TestErrors::of_targets(&sets.sets.test, answers.view());
-        let alone = self.blend.filter(|blend| !blend.others.is_empty());
+        let alone = self.combined.filter(|combined| !combined.others.is_empty());
         file.scores.network_alone = alone.map(|_| {
-            let answers = ProgramDecoder::new(file.network_program()).answers_to(&sets.sets.test);
+            let answers =
+                ProgramDecoder::new(file.network.decoder_program(&file.problem, None)).answers_to(&sets.sets.test);
             TestErrors::of_targets(&sets.sets.test, answers.view())
         });
         if let Some(intervals) = self.intervals {

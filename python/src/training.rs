@@ -3,10 +3,9 @@
 use std::sync::{Mutex, PoisonError};
 
 use decoupler_core::{
-    dataset::{Dataset, History, Memory, Seed, Split, SplitBy, Stream},
+    dataset::{Dataset, History, Memory, Seed, Split, SplitBy},
     evaluation::{
-        Begin, Combination, Initialization, Intervals, Measured, NoIntervals, Run, RunError, RunSets, RunSettings,
-        TrainingSize, Workload,
+        Combination, Initialization, Intervals, Run, RunError, RunSets, RunSettings, TrainingSize, Workload,
         auto::{AutoChoice, AutoFixed, AutoSamples, choose_settings},
     },
     job::Job,
@@ -22,7 +21,7 @@ use numpy::{IntoPyArray, PyArray1};
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
 
 use crate::{
-    arrays::{Matrix, Samples},
+    arrays::{Matrix, Samples, parts},
     network::Network,
     saving::{self, Origin, division, samples_crc32},
     work::{detached, value_error},
@@ -66,7 +65,7 @@ impl Settings {
         } else {
             RowModel::Shared
         };
-        let mut settings = RunSettings::from(Measured { rows });
+        let mut settings = RunSettings::measured(rows);
         settings.choose_method(self.method()?);
         let method = &mut settings.training.method;
         for (name, value) in self.method_settings.iter().flatten() {
@@ -302,8 +301,11 @@ pub fn train(
             let memory = history.checked(memory).map_err(value_error)?;
             let features = all.with_readings(history.features(&memory).map_err(value_error)?);
             problem.memory = Some(memory);
-            let divided = division.divide_for_training(&features, &mut run_settings.seed.rng(Stream::Split));
-            divided.map_err(value_error)?.split(&features)
+            let (training, held_out) = parts(&features, division, run_settings.seed)?;
+            Split {
+                training: features.select(&training),
+                validation: (!held_out.is_empty()).then(|| features.select(&held_out)),
+            }
         }
         _ => split,
     };
@@ -313,12 +315,7 @@ pub fn train(
         .check_memory(memory_budget())
         .map_err(value_error)?;
     let mut run = detached(py, move || {
-        Run::new(
-            run_settings,
-            RunSets::without_test(split),
-            Begin::Initialize,
-            &Job::UNINTERRUPTED,
-        )
+        Run::new(run_settings, RunSets::without_test(split), None, &Job::UNINTERRUPTED)
     })?;
     let mut interruption = step_to_the_end(py, &mut run, callback.as_ref());
     run.stop();
@@ -341,9 +338,9 @@ pub fn train(
         }
     };
     let origin = Origin::of(&run, validation.is_none().then_some(division), crc32);
-    let blend = choice.map(|choice| choice.blend).filter(|_| interruption.is_none());
+    let combined = choice.map(|choice| choice.combined).filter(|_| interruption.is_none());
     let network = Network::trained(
-        (run.network(), blend),
+        (run.network(), combined),
         row_wires,
         problem,
         run_settings,
@@ -450,10 +447,17 @@ fn calibrate(
     settings: &RunSettings,
     set: &Dataset,
     by: SplitBy,
-) -> PyResult<Result<Intervals, NoIntervals>> {
+) -> PyResult<Result<Intervals, RunError>> {
     let calibrated = interruptible(py, |job| Intervals::cross_validate(settings, set, by, job))?;
     match calibrated {
-        Err(NoIntervals::Run(error)) => Err(value_error(error)),
+        Err(error)
+            if !matches!(
+                error,
+                RunError::NoIntervals | RunError::Division(_) | RunError::Cancelled(_)
+            ) =>
+        {
+            Err(value_error(error))
+        }
         calibrated => Ok(calibrated),
     }
 }

@@ -10,7 +10,6 @@ use super::{
 };
 use decoupler_core::{
     calibration::{Calibration, SensorParameter},
-    evaluation::pressed_rows,
     sensor::{ArrayScale, SensorModel},
     text::counted,
 };
@@ -83,7 +82,7 @@ impl Calibrate {
             None => SensorModel::new(self.array),
         };
         let frames = self.frames.read(&nominal, None, self.json)?;
-        let calibration = Calibration::fit(&nominal, &pressed_rows(&frames, &nominal)?)?;
+        let calibration = Calibration::fit(&nominal, &frames)?;
         if let Some(path) = &self.out {
             SensorFile::save(&calibration.model, path)?;
         }

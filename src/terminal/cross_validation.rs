@@ -16,8 +16,7 @@ use super::{
 use decoupler_core::{
     dataset::{Division, Folds, SplitBy, Stream},
     evaluation::{
-        Begin, CrossValidated, ErrorTable, Run, RunError, RunSets, RunSettings, Scores, TestErrors, TrainingSize,
-        Workload,
+        CrossValidated, ErrorTable, Run, RunError, RunSets, RunSettings, Scores, TestErrors, TrainingSize, Workload,
         recorded::{Determination, SplitComparison, channel_remarks, nonlinear_gains, ridge_remark},
     },
     job::Job,
@@ -109,9 +108,9 @@ impl Train {
         let settings = *run.settings();
         let honest = || -> Result<Run, RunError> {
             let division = Division { by, ..plan.division };
-            let parts = division.divide(set, &mut settings.seed.rng(Stream::Split))?;
-            let sets = RunSets::new(parts.split(set), set.select(&parts.test));
-            Run::with_baselines(settings, sets, Begin::Initialize, &Job::UNINTERRUPTED)
+            let (split, test) = division.sets(set, None, settings.seed)?;
+            let sets = RunSets::new(split, test);
+            Run::with_baselines(settings, sets, None, &Job::UNINTERRUPTED)
         };
         let mut honest = match honest() {
             Ok(honest) => honest,
@@ -231,8 +230,8 @@ fn print_folds(
             "{} samples, each tested by a network trained without its fold: {} folds by {}\n",
             report.samples, report.folds, report.split
         )?;
-        let table = ErrorTable::of_scores(&problem, &scores, None);
-        write!(out, "{}", error_table(&table).aligned())?;
+        let tables = ErrorTable::of_scores(&problem, &scores, None);
+        write!(out, "{}", error_table(&tables).aligned())?;
         write_warnings(&report.warnings, out)
     })
 }

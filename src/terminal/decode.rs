@@ -8,8 +8,8 @@ use std::{
 use clap::Args;
 use decoupler_core::{
     calibration::check_presses,
-    dataset::{Dataset, DatasetError, Division, SplitBy, Stream},
-    evaluation::{Errors, TestErrors, fine_tune, pressed_rows},
+    dataset::{Dataset, DatasetError, Division, SplitBy},
+    evaluation::{Errors, TestErrors, fine_tune},
     job::Job,
     network::{DecouplingNetwork, Networks},
     problem::{Channel, Problem},
@@ -233,7 +233,7 @@ impl FrameArguments {
         } else {
             set
         };
-        let checked = check_presses(sensor, scene, &pressed_rows(&frames, sensor)?);
+        let checked = check_presses(sensor, scene, &frames);
         checked.map_err(|source| match source.sample() {
             Some(sample) => Failure::Press {
                 path: recording.file_of(sample).to_owned(),
@@ -468,9 +468,8 @@ impl FineTune {
             test_fraction: 0.2,
             validation_fraction: 0.2,
         };
-        let parts = division.divide(&frames, &mut settings.seed.rng(Stream::Split));
-        let parts = parts.map_err(decoupler_core::evaluation::RunError::from)?;
-        let (split, test) = (parts.split(&frames), frames.select(&parts.test));
+        let divided = division.sets(&frames, None, settings.seed);
+        let (split, test) = divided.map_err(decoupler_core::evaluation::RunError::from)?;
         let mut training = settings.training;
         training.stopping.epochs = self.epochs.unwrap_or(training.stopping.epochs);
         let bar = progress_bar(self.json, 1, "fine-tuning {spinner}");

@@ -4,6 +4,7 @@ use std::{
 };
 
 use clap::Args;
+use decoupler_core::text::Named;
 use decoupler_files::export::{
     NetworkFile,
     bundle::{BundleDecoder, BundleError, BundleFormat, BundlePrecision, BundleReport, ExportedDecoder, export_bundle},
@@ -40,13 +41,13 @@ pub(super) struct Export {
     /// Network saved by train --out or by the window
     #[arg(long, value_name = "FILE")]
     network: PathBuf,
-    #[arg(long, value_name = "DECODER", default_value_t = BundleDecoder::Chosen, help = BundleDecoder::help())]
+    #[arg(long, value_name = "DECODER", default_value_t = BundleDecoder::Chosen, value_parser = BundleDecoder::parse, help = BundleDecoder::help())]
     decoder: BundleDecoder,
-    #[arg(long, value_name = "FORMAT", help = BundleFormat::help())]
+    #[arg(long, value_name = "FORMAT", value_parser = BundleFormat::parse, help = BundleFormat::help())]
     format: BundleFormat,
     /// Arithmetic of the decoder. f64: double precision; f32: single precision (onnx, c99, numpy); fixed16: integers with
     /// 16-bit weights (networks and ridge, c99), which takes integers in nano-, micro- or milliohm and returns nanometres
-    #[arg(long, value_name = "f64|f32|fixed16", default_value_t)]
+    #[arg(long, value_name = "f64|f32|fixed16", default_value_t, value_parser = BundlePrecision::parse)]
     precision: BundlePrecision,
     /// Folder to create, which must not exist or must be an empty folder
     #[arg(long, value_name = "PATH")]

@@ -12,7 +12,7 @@ use clap::{
 use decoupler_core::{
     dataset::{Dataset, Folds, Seed, SplitBy, Stream},
     evaluation::{
-        Measured, RunError, RunSettings, Scores, TrainingSize, Workload,
+        RunError, RunSettings, Scores, TrainingSize, Workload,
         recorded::{Determinacy, Determination, Findings, FittedModel, Interval, StudyStep},
     },
     job::Job,
@@ -87,13 +87,14 @@ impl StudyArguments {
     pub(super) fn run(&self, import: &ImportArguments, is_json: bool) -> Result<(), Failure> {
         const FOLDS: usize = 5;
         let plan = import.plan(&self.inputs)?;
+        import.refuse_unused_shares()?;
         if plan.test.is_some() {
             let message = "--test-data: a recording is analysed by cross-validation; leave the test files out";
             return Err(Failure::Arguments(message.to_owned()));
         }
         let recording = with_bar(is_json, |watch| plan.recording(working_folder(), watch))?;
         import.save_recipe(&plan)?;
-        let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        let mut settings = RunSettings::measured(RowModel::Shared);
         settings.hidden = self.hidden.unwrap_or(settings.hidden);
         settings.seed = self.seed.map_or(settings.seed, Seed);
         let by = plan.division.by;
@@ -161,8 +162,7 @@ fn time_of_networks(settings: &RunSettings, set: &Dataset, folds: usize) -> Dura
         networks: 1,
     };
     Workload::of(settings, size)
-        .time()
-        .all_epochs
+        .training_time()
         .saturating_mul(folds as u32)
 }
 

@@ -280,6 +280,20 @@ impl ImportArguments {
         refuse(&given, message)
     }
 
+    /// Refuses shares of samples held out where cross-validation tests on every sample, unless a recipe keeps them.
+    pub(super) fn refuse_unused_shares(&self) -> Result<(), Failure> {
+        let is_unused = self.save_recipe.is_none();
+        let given = [
+            (is_unused && self.test_fraction.is_some(), "--test-fraction"),
+            (is_unused && self.validation_fraction.is_some(), "--validation-fraction"),
+        ];
+        refuse(&given, |argument| {
+            format!(
+                "{argument}: a recording is analysed by cross-validation; leave it out, or keep it in a recipe with --save-recipe"
+            )
+        })
+    }
+
     /// Refuses arguments that differ from the `saved` plan of a training that is resumed. File names are not compared:
     /// files may have been [moved](Self::relocated).
     pub(super) fn check_resumed(&self, saved: &Plan) -> Result<(), Failure> {

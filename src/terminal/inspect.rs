@@ -35,8 +35,7 @@ use super::{
 /// Reads CSV, Excel, .npy, .npz and .mat. Each column has its name, unit, kind, range, number of missing cells and a histogram
 /// over its range. The names are those that train --data takes. With --inputs and --targets (or --recipe), and with the
 /// arguments of train --data, it measures on held-out samples how well the readings determine each target, how optimistic
-/// a random split would be, how much each channel contributes and how the error falls with the number of samples, with
-/// confidence intervals.
+/// a random split would be and how much each channel contributes, with confidence intervals.
 #[derive(Args)]
 pub(super) struct Inspect {
     #[command(flatten)]

@@ -4,9 +4,9 @@ use std::io::Write;
 
 use clap::ValueEnum;
 use decoupler_core::{
-    evaluation::{Intervals, Run},
+    evaluation::{Intervals, Run, RunError},
     job::Job,
-    live::{Drift, DriftEvent, DriftMonitor},
+    live::{Drift, DriftMonitor},
     problem::Channel,
 };
 use decoupler_files::{
@@ -62,6 +62,7 @@ pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) {
     match calibrated {
         Ok(intervals) => run.set_intervals(intervals),
         // The training is complete without them.
+        Err(RunError::Cancelled(_)) => note("No prediction intervals: interrupted"),
         Err(reason) => note(&format!("No prediction intervals: {reason}")),
     }
 }
@@ -105,17 +106,20 @@ impl<'a> DriftWarnings<'a> {
     pub(super) fn take(&mut self, line: u64, readings: &[f64]) {
         let Some(monitor) = &mut self.monitor else { return };
         self.lines += 1;
-        match monitor.take(line, readings) {
-            Some(DriftEvent::Began(drift)) if self.is_stream => {
+        let Some(drift) = monitor.take(line, readings) else {
+            return;
+        };
+        match (self.is_stream, drift.has_ended) {
+            (true, false) => {
                 let lines = format!("line {line} (since line {})", drift.first);
                 note(&self.warning(&lines, &drift));
             }
-            Some(DriftEvent::Ended(drift)) if self.is_stream => note(&format!(
+            (true, true) => note(&format!(
                 "line {line}: since line {}, the readings look like the training readings again",
                 drift.last + 1
             )),
-            Some(DriftEvent::Ended(drift)) => self.ended.push(drift),
-            _ => {}
+            (false, true) => self.ended.push(drift),
+            (false, false) => {}
         }
     }
 

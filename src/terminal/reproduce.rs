@@ -12,8 +12,8 @@ use decoupler_core::{
     evaluation::{
         CrossValidation, ErrorMeasure, MAX_STARTS, RunError,
         experiments::{
-            Axis, AxisKind, CellSummary, Experiment, ExperimentResults, Figure, PaperTable, TrialSamples,
-            run_experiments, worker_threads,
+            self, Axis, AxisKind, Experiment, ExperimentResults, Figure, PaperTable, TrialSamples, run_experiments,
+            worker_threads,
         },
     },
     network::LARGEST_HIDDEN,
@@ -299,9 +299,9 @@ struct CellReport {
 
 impl CellReport {
     /// `None` for a recording, which does not occur in the paper's tables.
-    fn of(summary: CellSummary) -> Option<Self> {
-        let figure = |measure| summary.error(measure).cloned();
-        let settings = summary.cell.settings;
+    fn of(cell: &experiments::Cell) -> Option<Self> {
+        let figure = |measure| cell.error(measure);
+        let settings = cell.settings;
         let simulation = settings.simulation()?;
         Some(Self {
             array: simulation.sensor.scale,
@@ -311,17 +311,17 @@ impl CellReport {
             epochs: settings.training.stopping.epochs,
             starts: settings.starts,
             seed: settings.seed,
-            trials: summary.trials,
-            expected_trials: summary.expected_trials,
+            trials: cell.trials.len(),
+            expected_trials: cell.expected,
             z_percent: figure(ErrorMeasure::ZPercent)?,
             x_percent: figure(ErrorMeasure::XPercent)?,
             y_percent: figure(ErrorMeasure::YPercent)?,
             z_mm: figure(ErrorMeasure::ZMm)?,
-            mean_z_percent: summary.mean_percent,
-            linear_z_percent: summary.linear_percent,
-            epochs_run: summary.epochs_run,
-            training_seconds: summary.training_seconds,
-            epoch_ms: summary.epoch_ms,
+            mean_z_percent: cell.mean_percent(),
+            linear_z_percent: cell.linear_percent(),
+            epochs_run: cell.epochs_run(),
+            training_seconds: cell.training_seconds(),
+            epoch_ms: cell.epoch_ms(),
         })
     }
 }
@@ -335,7 +335,7 @@ fn print_json(reproduced: &[Reproduced], took: Duration) -> Result<(), Failure> 
         seeds: results.experiment.seeds,
         cross_validation: results.experiment.cross_validation,
         is_complete: results.is_complete(),
-        cells: results.summaries().into_iter().filter_map(CellReport::of).collect(),
+        cells: results.cells.iter().filter_map(CellReport::of).collect(),
         failures: describe_failures(results),
         remarks: describe_worse_than_mean(results),
     };

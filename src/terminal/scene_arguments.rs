@@ -4,7 +4,7 @@ use super::{count, failure::Failure, interruption::check_same, number};
 use decoupler_core::{
     dataset::Simulation,
     decoupling::DecoderKind,
-    evaluation::{Measured, Preset, RunSettings},
+    evaluation::{Preset, RunSettings},
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Loading, Movement, Noise, NoisySets, RowModel, Rows, Scene},
     text::Named,
@@ -150,7 +150,7 @@ impl SceneArguments {
                 );
             }
         };
-        let mut settings = RunSettings::from(Measured { rows });
+        let mut settings = RunSettings::measured(rows);
         settings.inputs.scaling = self.scaling.unwrap_or(settings.inputs.scaling);
         Ok(settings)
     }

@@ -11,16 +11,13 @@ use super::{
 use decoupler_core::{
     dataset::SplitBy,
     decoupling::Precision,
-    evaluation::{
-        ErrorTable, RunSets, TradeOffCost, TradeOffLevel, TradeOffPoint, decoded_unit, fastest_under,
-        most_accurate_under,
-    },
+    evaluation::{ErrorTable, RunSets, TradeOffPoint, decoded_unit, fastest_under, most_accurate_under},
     problem::Problem,
     sensor::ArrayScale,
 };
 use decoupler_files::{
     export::{Table, TableColumn, error_table, format_number, trade_off_summary},
-    figure::point_name,
+    figure::{TradeOffCost, TradeOffLevel, point_name},
     import::Recordings,
 };
 
@@ -308,7 +305,7 @@ impl MeasuredLevel {
     fn target_table(&self, problem: &Problem) -> Table {
         let points = &self.level.points;
         let errors = points.iter().map(|point| ("", &point.report.errors));
-        let mut table = error_table(&ErrorTable::new(problem, &Vec::from_iter(errors)));
+        let mut table = error_table(&ErrorTable::of_errors(problem, &Vec::from_iter(errors)));
         // The rows of each target are the points in their order.
         for (row, point) in table.rows.iter_mut().zip(points.iter().cycle()) {
             row[1] = point_name(point).into();

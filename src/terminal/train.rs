@@ -19,7 +19,7 @@ use super::{
 use decoupler_core::{
     decoupling::DecoderKind,
     evaluation::{
-        Begin, DecoderReport, DecoderSet, Run, RunError,
+        DecoderReport, DecoderSet, Run, RunError,
         auto::{AutoFixed, DEFAULT_BUDGET_S},
     },
     job::Job,
@@ -103,7 +103,7 @@ impl Train {
                 };
                 self.import.save_recipe(&setup)?;
                 announce_recording(&setup, &sets);
-                let run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED)?;
+                let run = sets.run(&setup, None, &Job::UNINTERRUPTED)?;
                 (run, sets)
             }
         };
@@ -277,7 +277,7 @@ impl Train {
         })?;
         if training != saved.settings().training {
             sets.forget_choice();
-            run.set_blend(None);
+            run.set_combined(None);
         }
         self.continue_run(&mut run, saved.settings().training, training)?;
         Ok((run, sets))

@@ -15,7 +15,7 @@ use super::{
 use decoupler_core::{
     dataset::Simulation,
     evaluation::{
-        Combination, DecoderReport, Errors, Outlook, Run, RunError, StartRecord, TestErrors,
+        Combination, DecoderReport, ErrorTable, Errors, Outlook, Run, RunError, StartRecord, TestErrors,
         auto::AutoRecord,
         best_start, error_remarks,
         recorded::{Determination, Extrapolation, HysteresisLoop, Undetermined},
@@ -175,7 +175,7 @@ impl<'a> ArrayReport<'a> {
     fn new(file: &'a NetworkFile, source: &Simulation, remarks: Vec<String>) -> Result<Self, RunError> {
         let (settings, training) = (&file.settings, &file.training);
         let best = training.history.get(training.best_epoch);
-        let size = source.model_size()?;
+        let (rows, scale) = (source.rows()?, source.sensor.scale);
         let best_start = best_start(&training.starts).and_then(|number| training.starts.get(number));
         let nodes = |errors: &TestErrors| *errors.nodes().expect("the targets are nodes");
         let baselines = &file.scores.baselines;
@@ -208,8 +208,8 @@ impl<'a> ArrayReport<'a> {
             }),
             scene: source.scene,
             inputs: settings.inputs,
-            unknowns: size.unknowns,
-            equations: size.equations,
+            unknowns: rows * source.scene.unknowns_per_row(scale),
+            equations: rows * scale.columns(),
             condition: condition(Outlook::of(source).ok().as_ref()),
             remarks,
             model_based: model_based.map(|errors| ModelBased {
@@ -382,7 +382,9 @@ impl<'a> Trained<'a> {
             writeln!(out)?;
         }
         let loops = self.loops();
-        write!(out, "{}", error_table(&file.error_table().with_loops(&loops)).aligned())?;
+        let mut tables = file.error_table();
+        ErrorTable::add_loops(&mut tables, &loops);
+        write!(out, "{}", error_table(&tables).aligned())?;
         for (target, found) in file.problem.targets.iter().zip(&loops) {
             if let Some(found) = found {
                 writeln!(out, "{}", found.sentence(&target.name))?;
@@ -503,14 +505,14 @@ fn write_array(file: &NetworkFile, source: &Simulation, out: &mut dyn Write) -> 
         write!(out, ", {noise}")?;
     }
     writeln!(out)?;
-    let size = source.model_size().ok();
-    if let Some(size) = size {
+    let (rows, scale) = (source.rows().ok(), source.sensor.scale);
+    if let Some(rows) = rows {
         write!(
             out,
             "A frame has {} and {}; {} with {}",
-            counted(size.unknowns, "unknown"),
-            counted(size.equations, "equation"),
-            counted(size.networks, "network"),
+            counted(rows * source.scene.unknowns_per_row(scale), "unknown"),
+            counted(rows * scale.columns(), "equation"),
+            counted(source.scene.rows.model().decoders(rows), "network"),
             counted(file.network.weights(), "weight")
         )?;
     }
@@ -518,7 +520,7 @@ fn write_array(file: &NetworkFile, source: &Simulation, out: &mut dyn Write) -> 
         Some(condition) => writeln!(out, "; condition number of the worst row {condition:.1e}")?,
         None => writeln!(out)?,
     }
-    let rows = size.map_or(1, |size| size.rows);
+    let rows = rows.unwrap_or(1);
     let whole = |samples: usize| samples.div_ceil(rows) * rows;
     writeln!(
         out,

@@ -362,7 +362,7 @@ mod tests {
     use clap::{Command, FromArgMatches};
 
     use super::*;
-    use decoupler_core::{evaluation::Measured, scene::RowModel};
+    use decoupler_core::scene::RowModel;
     use decoupler_files::export::report::train_command;
 
     fn parsed(line: &str) -> TrainingArguments {
@@ -384,7 +384,7 @@ mod tests {
     #[test]
     fn recordings_have_the_defaults_of_the_library() {
         let recorded = |line: &str| parsed(line).recorded(false).unwrap();
-        let default = RunSettings::from(Measured { rows: RowModel::Shared });
+        let default = RunSettings::measured(RowModel::Shared);
         assert_eq!(recorded("train"), default);
         // Naming the default method keeps its settings for recordings.
         assert_eq!(recorded("train --method br"), default);

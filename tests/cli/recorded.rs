@@ -464,6 +464,10 @@ fn options_that_need_targets_are_refused_without_them() {
             "leave the test files out",
         ),
         ("inspect --data r.csv --inputs a --targets x --folds 999", "999 folds"),
+        (
+            "inspect --data r.csv --inputs a --targets x --test-fraction 0.3",
+            "--test-fraction: a recording is analysed by cross-validation",
+        ),
     ] {
         let output = decoupler(arguments, folder.path());
         let message = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -58,9 +58,9 @@ fn check_all(text: &str) -> bool {
         check::<Separator>(text),
         check::<Decimal>(text),
         check::<Encoding>(text),
-        check::<BundleDecoder>(text),
-        check::<BundleFormat>(text),
-        check::<BundlePrecision>(text),
+        check::<Name<BundleDecoder>>(text),
+        check::<Name<BundleFormat>>(text),
+        check::<Name<BundlePrecision>>(text),
         check::<TrialId>(text),
     ]
     .contains(&true)

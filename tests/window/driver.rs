@@ -555,8 +555,8 @@ pub(crate) fn trained(settings: RunSettings) -> Run {
 /// Returns the error table computed by the library for `run`, formatted as in the window.
 pub(crate) fn table_of(run: &Run) -> Vec<String> {
     let columns = ["Z %", "X %", "Y %", "mm", "stroke %"];
-    let table = ErrorTable::of_scores(run.problem(), &run.scores().unwrap(), None);
-    let cells = table.blocks[0].rows.iter().flat_map(|row| {
+    let tables = ErrorTable::of_scores(run.problem(), &run.scores().unwrap(), None);
+    let cells = tables[0].rows.iter().flat_map(|row| {
         let named = columns.iter().zip(&row.errors);
         named.map(|(column, value)| format!("{}, {column}: {}", row.name, format_number(*value)))
     });

@@ -134,9 +134,7 @@ fn a_cell_of_a_cross_validation_is_trained_where_it_is_opened() {
     driver.click(OPEN);
     wait_for_the_network(&mut driver);
     let state = driver.state();
-    let wanted = driver.views().experiments.outcome().unwrap().results.cells[0]
-        .cell
-        .settings;
+    let wanted = driver.views().experiments.outcome().unwrap().results.cells[0].settings;
     assert_eq!(state.draft, wanted);
     assert_eq!(state.result().unwrap().epochs_run, 3);
 }
@@ -227,7 +225,7 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     let outcome = driver.views().experiments.outcome().unwrap();
     let results = by_library(&outcome.results.experiment);
     for (cell, z) in results.cells.iter().zip(["2, 50", "3, 50", "2, 100", "3, 100"]) {
-        let percent = decoupler_files::export::format_percent(cell.summary().percent().median);
+        let percent = decoupler_files::export::format_percent(cell.percent().median);
         let label = format!("{z}: median Z error {percent}");
         assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
     }

@@ -9,7 +9,7 @@ use std::{
 use decoupler::window::Phase;
 use decoupler_core::{
     dataset::{Division, Seed},
-    evaluation::{Begin, Measured, Run, RunSets, RunSettings},
+    evaluation::{Run, RunSets, RunSettings},
     job::Job,
     scene::RowModel,
 };
@@ -147,7 +147,7 @@ pub(crate) fn plan(path: &Path) -> Plan {
 
 /// The library's settings for measured samples, with five epochs.
 pub(crate) fn settings() -> RunSettings {
-    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let mut settings = RunSettings::measured(RowModel::Shared);
     settings.training.stopping.epochs = 5;
     settings
 }
@@ -159,7 +159,7 @@ pub(crate) fn trained(plan: &Plan) -> Run {
     let mut run = Run::with_baselines(
         settings(),
         RunSets::new(sets.split, sets.test),
-        Begin::Initialize,
+        None,
         &Job::UNINTERRUPTED,
     )
     .unwrap();

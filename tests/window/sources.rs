@@ -5,7 +5,7 @@ use std::{fmt::Write as _, fs, path::Path, sync::Arc};
 use decoupler::window::{Effect, Phase, SourceKind};
 use decoupler_core::{
     dataset::Division,
-    evaluation::{Begin, ErrorMeasure, Measured, Run, RunSettings},
+    evaluation::{ErrorMeasure, Run, RunSettings},
     job::Job,
     scene::RowModel,
 };
@@ -56,7 +56,7 @@ pub(crate) fn trained_small(source: SourceKind) -> Opened {
 
 /// Settings of a small training on a recording.
 pub(crate) fn small_settings() -> RunSettings {
-    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let mut settings = RunSettings::measured(RowModel::Shared);
     settings.hidden = 6;
     settings.training = small().training;
     settings
@@ -129,7 +129,7 @@ fn setup(folder: &Path, name: &str, text: &str, targets: &[&str]) -> Setup {
 /// Returns a run of the library that has begun.
 pub(crate) fn begun(setup: &Setup) -> Run {
     let sets = setup.sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
-    sets.run(setup, Begin::Initialize, &Job::UNINTERRUPTED).unwrap()
+    sets.run(setup, None, &Job::UNINTERRUPTED).unwrap()
 }
 
 /// The same, trained to the end.
@@ -149,14 +149,14 @@ pub(crate) fn with_epochs(setup: &Setup, epochs: usize) -> Setup {
 /// Returns the figures of the network in the error table, formatted as in the window: `network, Z %: 2.28`, `x (mm), network, RMSE: 0.01`.
 pub(crate) fn network_figures(run: &Run) -> Vec<String> {
     let (problem, scores) = (run.problem(), run.scores().unwrap());
-    let table = decoupler_core::evaluation::ErrorTable::of_scores(problem, &scores, None);
+    let tables = decoupler_core::evaluation::ErrorTable::of_scores(problem, &scores, None);
     let mut figures = Vec::new();
-    for block in &table.blocks {
-        let caption = block
+    for table in &tables {
+        let caption = table
             .target
             .as_ref()
             .map_or_else(String::new, |target| format!("{}, ", target.title()));
-        let row = block.rows.iter().find(|row| row.name == "network").unwrap();
+        let row = table.rows.iter().find(|row| row.name == "network").unwrap();
         for (measure, error) in table.measures.iter().zip(&row.errors) {
             let heading = match measure {
                 ErrorMeasure::ZPercent => "Z %",

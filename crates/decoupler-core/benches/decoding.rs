@@ -15,10 +15,11 @@ use std::{hint::black_box, time::Instant};
 
 use decoupler_core::{
     dataset::{Dataset, Seed, Stream},
-    decoupling::{Decoder, DecoderKind, Estimator, FitProblem, NewtonDecoder, Precision, ProgramDecoder},
+    decoupling::{Decoder, DecoderKind, Estimator, NewtonDecoder, Precision, ProgramDecoder},
+    evaluation::{DecoderSet, RunSettings},
     network::{InputChoice, Quantity, ScalingChoice, tanh_in_place, tanh_in_place_single},
-    scene::{Noise, NoiseSource, RowModel, Rows, Scene},
-    sensor::{ArrayScale, Axes, RowConductance, SensorModel},
+    scene::{Noise, RowModel, Rows, Scene},
+    sensor::{ArrayScale, SensorModel},
 };
 use glam::DVec3;
 use pulp::{Simd, WithSimd};
@@ -141,17 +142,15 @@ fn print_scale(scale: ArrayScale) {
         ("fuzzy rules", DecoderKind::Fuzzy),
         ("radial basis, 100 centres", DecoderKind::RadialBasis),
     ];
-    let problem = FitProblem {
-        training: &training,
-        row_model: RowModel::Each,
+    let settings = RunSettings {
         inputs: InputChoice::BEST,
-        unseen: NoiseSource::default(),
-        sensor: None,
-        networks: None,
-        precision: Precision::Double,
-        seed: Seed(0),
+        ..RunSettings::measured(RowModel::Each)
     };
-    let fitted = kinds.map(|(name, kind)| (name.to_owned(), kind.fit(&problem).unwrap().unwrap()));
+    let set = DecoderSet::new(settings, training.clone(), None);
+    let fitted = kinds.map(|(name, kind)| {
+        let decoder = set.decoder(kind, Precision::Double).unwrap().unwrap();
+        (name.to_owned(), decoder)
+    });
     let mut decoders: Vec<(String, Box<dyn Decoder>)> = fitted.into();
     for hidden in [6, 12, 24, 48] {
         for quantity in Quantity::ALL {
@@ -224,20 +223,14 @@ fn print_scale(scale: ArrayScale) {
             }
         }),
     ));
-    for axes in [Axes::Z, Axes::Xyz] {
-        let mut conductance = RowConductance::new(&model, axes);
-        let pressed = &pressed;
-        let model = &model;
-        works.push((
-            format!("forward model and Jacobian, {axes:?}"),
-            Box::new(move || {
-                for row in 0..m1 {
-                    conductance.evaluate(model, row, black_box(pressed));
-                    black_box(&conductance);
-                }
-            }),
-        ));
-    }
+    works.push((
+        "forward model and Jacobian".into(),
+        Box::new(|| {
+            for row in 0..m1 {
+                black_box(model.row_jacobian(row, black_box(&pressed)).unwrap());
+            }
+        }),
+    ));
     let mut distances = vec![30.0_f64; m1 * m2 * scale.nodes_per_column() * m4];
     works.push((
         "arithmetic of the forward model".into(),

@@ -7,7 +7,7 @@
 
 use std::f64::consts::TAU;
 
-use decoupler_core::live::{DriftEvent, DriftMonitor, DriftReference};
+use decoupler_core::live::{DriftMonitor, DriftReference};
 use ndarray::{Array1, Array2, Axis};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
@@ -163,8 +163,8 @@ fn main() {
                 sizes[1].push(reference.blocks_in_a_row());
                 let mut monitor = DriftMonitor::new(reference.clone());
                 for _ in 0..BLOCKS * block {
-                    let event = monitor.take(0, &source.next().to_vec());
-                    alarms += usize::from(matches!(event, Some(DriftEvent::Began(_))));
+                    let drift = monitor.take(0, &source.next().to_vec());
+                    alarms += usize::from(drift.is_some_and(|drift| !drift.has_ended));
                 }
                 blocks += BLOCKS;
                 let (mean, last) = (training.mean_axis(Axis(0)).unwrap(), source.next());

@@ -7,11 +7,10 @@
 use std::time::Instant;
 
 use decoupler_core::{
-    dataset::{Dataset, Seed, Stream},
-    decoupling::{Decoder, DecoderKind, FitProblem, Precision, decode_set},
-    evaluation::Errors,
-    network::InputChoice,
-    scene::{Noise, NoiseSource, Rows, Scene},
+    dataset::{Dataset, Seed, Simulation, Stream},
+    decoupling::{DecoderKind, Precision, decode_set},
+    evaluation::{DecoderSet, Errors, RunSettings},
+    scene::{Noise, Rows, Scene},
     sensor::SensorModel,
 };
 
@@ -34,17 +33,13 @@ fn print_scene(array: &str, loading: &str, noise: Noise, rows: Rows) {
     test.disturb(&model, &noise, &mut Seed(2).rng(Stream::TestNoise))
         .unwrap();
     let errors = |kind: DecoderKind| {
-        let problem = FitProblem {
-            training: &test,
-            row_model: rows.model(),
-            inputs: InputChoice::BEST,
-            unseen: NoiseSource::default(),
-            sensor: Some((&model, &scene)),
-            networks: None,
-            precision: Precision::Double,
-            seed: Seed(0),
-        };
-        let mut decoder: Box<dyn Decoder> = kind.fit(&problem).unwrap().unwrap();
+        let settings = RunSettings::from(Simulation {
+            sensor: model,
+            scene,
+            ..Simulation::default()
+        });
+        let decoders = DecoderSet::new(settings, test.clone(), None);
+        let mut decoder = decoders.decoder(kind, Precision::Double).unwrap().unwrap();
         let begun = Instant::now();
         let answers_mm = decode_set(decoder.as_mut(), &test).unwrap();
         let micros = begun.elapsed().as_micros() as f64 / SNAPSHOTS as f64;

@@ -7,7 +7,7 @@ use std::error::Error;
 use decoupler_core::{
     calibration::{Calibration, SensorParameter},
     dataset::{Dataset, Division, Seed, Simulation, Stream},
-    evaluation::{Errors, Preset, Run, RunSettings, fine_tune, pressed_rows},
+    evaluation::{Errors, Preset, Run, RunSettings, fine_tune},
     glam::DVec3,
     job::Job,
     machine::MemoryBudget,
@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let (frames, test) = (recorded(60, 1)?, recorded(100, 2)?);
 
-    let calibration = Calibration::fit(&nominal, &pressed_rows(&frames, &nominal)?)?;
+    let calibration = Calibration::fit(&nominal, &frames)?;
     for parameter in &calibration.parameters {
         println!("{parameter}");
     }
@@ -60,10 +60,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         validation_fraction: 0.2,
         ..Division::default()
     };
-    let parts = division.divide_for_training(&frames, &mut Seed(0).rng(Stream::Split))?;
+    let (split, _) = division.sets(&moved(&frames)?, Some(&test), Seed(0))?;
     let tuned = fine_tune(
         &calibrated,
-        &parts.split(&moved(&frames)?),
+        &split,
         settings.training,
         MemoryBudget::UNLIMITED,
         &Job::UNINTERRUPTED,
@@ -86,7 +86,7 @@ fn coverage(
     const SEEDS: u64 = 50;
     let (mut of_each, mut of_all) = ([0; SensorParameter::ALL.len()], 0);
     for seed in 0..SEEDS {
-        let calibration = Calibration::fit(nominal, &pressed_rows(&recorded(60, seed)?, nominal)?)?;
+        let calibration = Calibration::fit(nominal, &recorded(60, seed)?)?;
         let holds = SensorParameter::ALL.map(|parameter| {
             let (fitted, truth) = (calibration.parameter(parameter), parameter.of(real));
             match fitted.half_width {

@@ -6,7 +6,7 @@ use std::error::Error;
 
 use decoupler_core::{
     dataset::{Dataset, Seed, SplitBy, Stream},
-    evaluation::{Begin, CrossValidation, Measured, Run, RunSets, RunSettings},
+    evaluation::{CrossValidation, Run, RunSets, RunSettings},
     job::Job,
     ndarray::Array2,
     scene::RowModel,
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let targets = Array2::from_shape_fn((600, 2), |(s, target)| [probe(s).0, probe(s).1][target]);
     // Moments of one press form a group of 20.
     let set = Dataset::new(readings, targets, None, (0..600).map(|sample| sample / 20).collect())?;
-    let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let settings = RunSettings::measured(RowModel::Shared);
     let folds = CrossValidation {
         folds: 5,
         repeats: 1,
@@ -41,14 +41,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let test = set.select(&Vec::from_iter(500..600));
     let training = set.select(&Vec::from_iter(0..500));
-    let parts = SplitBy::Group.hold_out(&training, 5, &mut Seed(0).rng(Stream::Split));
-    let split = parts.split(&training);
-    let mut run = Run::with_baselines(
-        settings,
-        RunSets::new(split, test),
-        Begin::Initialize,
-        &Job::UNINTERRUPTED,
-    )?;
+    let split = SplitBy::Group.hold_out(&training, 5, &mut Seed(0).rng(Stream::Split));
+    let mut run = Run::with_baselines(settings, RunSets::new(split, test), None, &Job::UNINTERRUPTED)?;
     while run.step().is_none() {}
     println!("one network, last 100 moments: R² {:?}", run.errors().targets()[0].r2);
     Ok(())

@@ -18,9 +18,9 @@ fn main() -> Result<(), RunError> {
         }
     };
     let scores = run.scores().expect("the baselines are measured");
-    let table = ErrorTable::of_scores(run.problem(), &scores, settings.published().as_ref());
+    let tables = ErrorTable::of_scores(run.problem(), &scores, settings.published().as_ref());
     println!("{} epochs: {reason}", run.leader().latest().epoch);
-    for row in table.blocks.iter().flat_map(|block| &block.rows) {
+    for row in tables.iter().flat_map(|table| &table.rows) {
         println!("{:<14} Z {:.3} %", row.name, row.errors[0].unwrap_or(f64::NAN));
     }
     Ok(())

@@ -2,7 +2,6 @@
 
 use faer::Mat;
 use glam::DVec3;
-use thiserror::Error;
 
 use crate::{
     sensor::{Axes, RelativeNoise, RowConductance, SensorError, SensorModel},
@@ -45,10 +44,10 @@ impl Identifiability {
         displacements_mm: &[DVec3],
         axes: Axes,
         noise: RelativeNoise,
-    ) -> Result<Self, IdentifiabilityError> {
+    ) -> Result<Self, SensorError> {
         let (rows, equations) = (model.scale.rows(), model.scale.columns());
         if row >= rows {
-            return Err(IdentifiabilityError::Row { row, rows });
+            return Err(SensorError::Row { row, rows });
         }
         model.row_resistances(row, displacements_mm)?;
         let mut conductance = RowConductance::new(model, axes);
@@ -69,9 +68,7 @@ impl Identifiability {
                 (0..equations).for_each(|k| jacobian[(k, unknown)] -= (1.0 - weight) * mean);
             }
         }
-        let svd = jacobian
-            .thin_svd()
-            .map_err(|_| IdentifiabilityError::NotConverged(row))?;
+        let svd = jacobian.thin_svd().map_err(|_| SensorError::NotConverged(row))?;
         // Rounding would turn the zeros of the added rows into about 1e-17.
         let singular_values = svd.S().column_vector().iter().enumerate();
         let singular_values = singular_values.map(|(pattern, &value)| if pattern < equations { value } else { 0.0 });
@@ -140,22 +137,12 @@ impl Identifiability {
     }
 }
 
-/// Two row-wires whose undeformed readings are most alike.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RowPair {
-    /// One row-wire, from 0.
-    pub first: usize,
-    /// The other.
-    pub second: usize,
-    /// rms over readings of the difference of ln R, apart from an error common to all readings.
-    pub difference: f64,
-}
-
 impl Identifiability {
     /// Rows whose undeformed readings differ by less count as identical even without noise.
     pub const SAME_ROWS: f64 = 1e-9;
 
-    /// The two row-wires whose undeformed readings are most alike; `None` for a single row-wire.
+    /// The two row-wires whose undeformed readings are most alike, with the rms over readings of the difference of ln R apart
+    /// from an error common to all readings; `None` for a single row-wire.
     ///
     /// A layout that is symmetric about a line between row-wires gives mirror rows the same readings: no decoder can
     /// distinguish them unless the electronics report the row. If `noise` has a common error, such as the gain of a
@@ -163,50 +150,29 @@ impl Identifiability {
     ///
     /// # Errors
     /// If the undeformed sensor has no resistance.
-    pub fn most_alike_rows(model: &SensorModel, noise: RelativeNoise) -> Result<Option<RowPair>, SensorError> {
+    pub fn most_alike_rows(
+        model: &SensorModel,
+        noise: RelativeNoise,
+    ) -> Result<Option<([usize; 2], f64)>, SensorError> {
         let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
         let readings: Vec<Vec<f64>> = (0..model.scale.rows())
             .map(|row| model.row_resistances(row, &rest))
             .collect::<Result<_, _>>()?;
         let weight = noise.weight_of_mean(model.scale.columns());
-        let mut closest: Option<RowPair> = None;
+        let mut closest = None;
         for (second, of_second) in readings.iter().enumerate() {
             for (first, of_first) in readings[..second].iter().enumerate() {
                 let differences = of_first.iter().zip(of_second).map(|(a, b)| (a / b).ln());
                 let hidden = (1.0 - weight) * differences.clone().sum::<f64>() / of_first.len() as f64;
                 let squares = differences.map(|difference| (difference - hidden).powi(2));
                 let difference = (squares.sum::<f64>() / of_first.len() as f64).sqrt();
-                if closest.is_none_or(|pair| difference < pair.difference) {
-                    closest = Some(RowPair {
-                        first,
-                        second,
-                        difference,
-                    });
+                if closest.is_none_or(|(_, smallest)| difference < smallest) {
+                    closest = Some(([first, second], difference));
                 }
             }
         }
         Ok(closest)
     }
-}
-
-/// Error of an identifiability analysis.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum IdentifiabilityError {
-    /// The model has no resistance for the deformation.
-    #[error(transparent)]
-    Sensor(#[from] SensorError),
-    /// The array has no such row-wire.
-    #[error("row {} does not exist: the array has rows 1 to {rows}", row + 1)]
-    Row {
-        /// Row-wire requested, from 0.
-        row: usize,
-        /// Number of row-wires of the array.
-        rows: usize,
-    },
-    /// The decomposition did not converge.
-    #[error("the singular values of row {} did not converge: use lengths of similar size in the geometry", .0 + 1)]
-    NotConverged(usize),
 }
 
 impl Identifiability {
@@ -219,7 +185,7 @@ impl Identifiability {
     /// Describes obstacles to decoupling and what to change, most severe first. `noise` is the independent relative error of
     /// a reading (for a common error see [`Self::of_row`] and [`Self::most_alike_rows`]), `prior_mm` the standard deviation
     /// of each unknown before reading; `alike` the most similar rows if the row is not known beforehand.
-    pub fn warnings(&self, noise: f64, prior_mm: f64, alike: Option<RowPair>) -> Vec<String> {
+    pub fn warnings(&self, noise: f64, prior_mm: f64, alike: Option<([usize; 2], f64)>) -> Vec<String> {
         let (equations, unknowns, condition) = (self.equations, self.unknowns(), self.condition());
         let mut warnings = Vec::new();
         if equations < unknowns {
@@ -229,13 +195,13 @@ impl Identifiability {
                 counted(equations, "reading")
             ));
         }
-        if let Some(pair) = alike.filter(|pair| pair.difference <= noise.max(Self::SAME_ROWS)) {
+        let same = alike.filter(|(_, difference)| *difference <= noise.max(Self::SAME_ROWS));
+        if let Some(([first, second], difference)) = same {
             warnings.push(format!(
-                "row-wires {} and {} cannot be told apart: at rest their readings differ by {:.1e}, the noise is {noise:.1e}; \
+                "row-wires {} and {} cannot be told apart: at rest their readings differ by {difference:.1e}, the noise is {noise:.1e}; \
                  shift the column nodes so that no row mirrors another, or use a known row",
-                pair.first + 1,
-                pair.second + 1,
-                pair.difference
+                first + 1,
+                second + 1
             ));
         }
         let share = self.remaining_share(noise, prior_mm);
@@ -374,14 +340,15 @@ mod tests {
         let default = Identifiability::most_alike_rows(&model, RelativeNoise::default())
             .unwrap()
             .unwrap();
-        assert!(default.difference > 1e-3, "{default:?}");
+        assert!(default.1 > 1e-3, "{default:?}");
         // Column nodes at 7.5, 12.5, 17.5 are symmetric about x = 12.5, the middle of rows 8 to 17.
         model.geometry.column_node_x0_mm = 7.5;
         let pair = Identifiability::most_alike_rows(&model, RelativeNoise::default())
             .unwrap()
             .unwrap();
-        assert!(pair.difference < 1e-14, "{pair:?}");
-        assert_eq!(pair.first + pair.second, 9);
+        let ([first, second], difference) = pair;
+        assert!(difference < 1e-14, "{pair:?}");
+        assert_eq!(first + second, 9);
         let warnings = Identifiability::of_row(&model, 0, &[DVec3::ZERO; 6], Axes::Z, RelativeNoise::default())
             .unwrap()
             .warnings(0.0, 0.3, Some(pair));
@@ -402,7 +369,7 @@ mod tests {
         let error =
             Identifiability::of_row(&model, 10, &[DVec3::ZERO; 10], Axes::Z, RelativeNoise::default()).unwrap_err();
         assert_eq!(error.to_string(), "row 11 does not exist: the array has rows 1 to 10");
-        assert!(IdentifiabilityError::NotConverged(0).to_string().contains("row 1 "));
+        assert!(SensorError::NotConverged(0).to_string().contains("row 1 "));
     }
 
     #[test]

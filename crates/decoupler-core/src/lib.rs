@@ -13,8 +13,8 @@
 //! | [`identifiability`] | deformation patterns that the readings determine, and how well |
 //! | [`machine`] | budget of memory, speed of the machine |
 //! | [`scene`] | what happens to the sensor: rows, movement, loading, noise |
-//! | [`calibration`] | geometry and resistivity fitted to the readings of known deformations |
 //! | [`dataset`] | samples with their row-wire and snapshot, simulated or recorded; frames, folds, splits |
+//! | [`calibration`] | geometry and resistivity fitted to the readings of known deformations |
 //! | [`network`] | the three-layer network, its initialisation and scaling |
 //! | [`settings`] | the table of settings: name, help, range and access of each |
 //! | [`training`] | methods, the stepped [`training::Trainer`], stop reasons |

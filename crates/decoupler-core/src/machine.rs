@@ -8,45 +8,40 @@ use glam::DVec3;
 
 use crate::sensor::{ArrayScale, SensorModel};
 
-/// Memory that trainings may use, with its source for messages.
+/// Memory in bytes that trainings may use, by its source for messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MemoryBudget {
-    /// Size in bytes.
-    pub bytes: u64,
-    /// Source of the size.
-    pub source: MemorySource,
-}
-
-/// Source of the size of the memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MemorySource {
-    /// The system.
-    System,
-    /// The user, by the option `--memory-limit` or [`MemoryBudget::VARIABLE`].
-    User,
+pub enum MemoryBudget {
+    /// Reported by the system.
+    System(u64),
+    /// Set by the user, by the option `--memory-limit` or [`MemoryBudget::VARIABLE`].
+    User(u64),
     /// Assumed, since neither is known.
-    Assumed,
+    Assumed(u64),
 }
 
 impl MemoryBudget {
     /// Memory that is assumed if the system does not report it: that of an ordinary machine.
     pub const ASSUMED_BYTES: u64 = 8_000_000_000;
     /// No limit, for work that is known to be small.
-    pub const UNLIMITED: Self = Self {
-        bytes: u64::MAX,
-        source: MemorySource::Assumed,
-    };
+    pub const UNLIMITED: Self = Self::Assumed(u64::MAX);
     /// Environment variable with the memory that the program may use, in GB (10⁹ bytes).
     pub const VARIABLE: &str = "DECOUPLER_MEMORY_GB";
+
+    /// Size in bytes.
+    pub fn bytes(self) -> u64 {
+        match self {
+            Self::System(bytes) | Self::User(bytes) | Self::Assumed(bytes) => bytes,
+        }
+    }
 }
 
 impl fmt::Display for MemoryBudget {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (gigabytes, variable) = (self.bytes as f64 * 1e-9, Self::VARIABLE);
-        match self.source {
-            MemorySource::System => write!(f, "the machine has {gigabytes:.1} GB"),
-            MemorySource::User => write!(f, "--memory-limit or {variable} allows {gigabytes:.1} GB"),
-            MemorySource::Assumed => write!(
+        let (gigabytes, variable) = (self.bytes() as f64 * 1e-9, Self::VARIABLE);
+        match self {
+            Self::System(_) => write!(f, "the machine has {gigabytes:.1} GB"),
+            Self::User(_) => write!(f, "--memory-limit or {variable} allows {gigabytes:.1} GB"),
+            Self::Assumed(_) => write!(
                 f,
                 "{gigabytes:.1} GB are assumed, since the system does not report its memory (set the environment variable \
                  {variable} to the GB that the machine has)"

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     dataset::{Dataset, Memory, Simulation},
-    surface::Lattice,
+    surface::lattice,
     text::{cleaned, cleaned_if_any, escaped_if_any},
 };
 
@@ -23,45 +23,6 @@ pub struct Problem {
     /// Sensor whose resistances the readings are, with its scene, if it is known. The targets are then the coordinates
     /// x, y and z of the nodes of a row-wire, in millimetres.
     pub sensor: Option<Simulation>,
-}
-
-/// A [`Problem`] as it is saved next to the settings of a run, which contain its sensor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SavedProblem {
-    inputs: Vec<Channel>,
-    targets: Vec<Channel>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    memory: Option<Memory>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    positions: Vec<TargetPosition>,
-    #[serde(default)]
-    has_nodes: bool,
-}
-
-impl From<Problem> for SavedProblem {
-    fn from(problem: Problem) -> Self {
-        Self {
-            has_nodes: problem.has_nodes(),
-            inputs: problem.inputs,
-            targets: problem.targets,
-            memory: problem.memory,
-            positions: problem.positions,
-        }
-    }
-}
-
-impl SavedProblem {
-    /// Returns the problem with this sensor, if its targets are nodes; `None` if there is no sensor for them.
-    pub fn with_sensor(self, sensor: Option<&Simulation>) -> Option<Problem> {
-        Some(Problem {
-            sensor: if self.has_nodes { Some(*sensor?) } else { None },
-            inputs: self.inputs,
-            targets: self.targets,
-            memory: self.memory,
-            positions: self.positions,
-        })
-    }
 }
 
 /// Name and unit of a reading or target.
@@ -210,9 +171,11 @@ impl Channel {
 }
 
 impl TargetPosition {
-    /// Returns the lattice whose nodes are these positions; `None` if there are none or they do not form a lattice.
-    pub fn lattice(positions: &[Self]) -> Option<Lattice> {
-        Lattice::of(&Self::places_mm(positions))
+    /// Returns the lattice whose nodes are these positions: its lines along x and along y in millimetres, ascending, and the
+    /// index of the position at each node, in the order of the values of a [`SurfaceMap`](crate::surface::SurfaceMap).
+    /// `None` if there are none or they do not form a lattice.
+    pub fn lattice(positions: &[Self]) -> Option<([Vec<f64>; 2], Vec<usize>)> {
+        lattice(&Self::places_mm(positions))
     }
 
     /// Returns the positions (x, y) in millimetres.

@@ -10,7 +10,7 @@ use std::{
 use clap::ValueEnum;
 use decoupler_core::{
     decoupling::DecoderKind,
-    evaluation::{Begin, Run, TrainingSize, Workload},
+    evaluation::{Run, TrainingSize, Workload},
     job::Job,
 };
 use decoupler_files::{
@@ -191,7 +191,7 @@ pub(super) fn train(
         Some(resumed) => resumed,
         None => {
             let sets = sets(&trial.setup, true)?;
-            let run = sets.run(&trial.setup, Begin::Initialize, &Job::UNINTERRUPTED)?;
+            let run = sets.run(&trial.setup, None, &Job::UNINTERRUPTED)?;
             (run, sets, Duration::ZERO)
         }
     };

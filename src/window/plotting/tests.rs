@@ -11,7 +11,7 @@ use decoupler_core::{
     dataset::SplitBy,
     decoupling::DecoderKind,
     evaluation::{
-        CrossValidation, Preset, Run, RunSets, RunSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint,
+        CrossValidation, Preset, Run, RunSets, RunSettings, TradeOffPoint,
         experiments::{Axis, AxisKind, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments},
         measure_trade_off,
     },
@@ -22,8 +22,9 @@ use decoupler_core::{
     training::EpochRecord,
 };
 use decoupler_files::figure::{
-    EpochOutline, Figure, compared_losses_figure, error_histogram_figure, experiment_figure, loss_figure, node_figure,
-    regression_figure, singular_values_figure, trade_off_figure, training_state_figure, z_pairs_mm,
+    EpochOutline, Figure, TradeOffLevel, TradeOffLimits, compared_losses_figure, error_histogram_figure,
+    experiment_figure, loss_figure, node_figure, regression_figure, singular_values_figure, trade_off_figure,
+    training_state_figure, z_pairs_mm,
 };
 
 /// Texts and numbers of marks in a picture.

@@ -7,7 +7,7 @@ use crate::window::{
 };
 use decoupler_core::{
     decoupling::DecoderKind,
-    evaluation::{ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable},
+    evaluation::{ErrorMeasure, ErrorRow, ErrorTable},
 };
 use decoupler_files::export::{format_number, format_r2};
 
@@ -40,27 +40,29 @@ fn column(measure: ErrorMeasure) -> TableColumn<'static> {
 
 /// Lays out an error table: rows of baselines, network, model-based and published figures, for recordings target by target;
 /// below, the intervals of the network, if they were calibrated.
-pub fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
+pub fn error_table_ui(ui: &mut Ui, tables: &[ErrorTable]) {
+    let Some(ErrorTable { measures, .. }) = tables.first() else {
+        return;
+    };
     let palette = Theme::of(ui).palette;
-    let shown = Vec::from_iter((0..table.measures.len()).filter(|&place| is_in_table(table.measures[place])));
-    let measures = shown.iter().map(|&place| column(table.measures[place]));
-    let columns = Vec::from_iter(std::iter::once(TableColumn::text("")).chain(measures));
+    let shown = Vec::from_iter((0..measures.len()).filter(|&place| is_in_table(measures[place])));
+    let columns = shown.iter().map(|&place| column(measures[place]));
+    let columns = Vec::from_iter(std::iter::once(TableColumn::text("")).chain(columns));
     // The error that decides whether a baseline is better.
-    let judged = table
-        .measures
+    let judged = measures
         .iter()
         .position(|measure| matches!(measure, ErrorMeasure::ZMm | ErrorMeasure::Rmse));
     let mut rows = Vec::new();
-    let used = table.used();
-    for block in &table.blocks {
+    for table in tables {
+        let used = table.used();
         let judged = |row: &ErrorRow| judged.and_then(|place| row.errors.get(place).copied().flatten());
-        let of_network = block.rows.iter().find(|row| row.name == used).and_then(judged);
-        let figure = |row: &ErrorRow, place: usize| match table.measures[place] {
+        let of_used = table.rows.iter().find(|row| row.name == used).and_then(judged);
+        let figure = |row: &ErrorRow, place: usize| match measures[place] {
             ErrorMeasure::R2 => format_r2(row.errors[place]),
             _ => format_number(row.errors[place]),
         };
         let row = |row: &ErrorRow| {
-            let name = match &block.target {
+            let name = match &table.target {
                 Some(target) => format!("{}, {}", target.title(), row.name),
                 None => row.name.to_owned(),
             };
@@ -73,29 +75,29 @@ pub fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
                     _ => palette.text,
                 })
                 .strong(row.name == used)
-                .mark(if beats(row.name, judged(row), of_network) {
+                .mark(if beats(row.name, judged(row), of_used) {
                     BETTER
                 } else {
                     ""
                 })
         };
-        rows.extend(block.target.as_ref().map(|target| TableRow::section(target.title())));
-        rows.extend(block.rows.iter().map(row));
+        rows.extend(table.target.as_ref().map(|target| TableRow::section(target.title())));
+        rows.extend(table.rows.iter().map(row));
     }
     TableView::new("errors", &columns).show_all(ui, rows);
-    intervals_ui(ui, table);
+    intervals_ui(ui, measures, tables);
 }
 
 /// The half-width of the interval of each target, and its coverage on the test set.
-fn intervals_ui(ui: &mut Ui, table: &ErrorTable) {
-    let places = OF_INTERVALS.map(|measure| table.measures.iter().position(|found| *found == measure));
+fn intervals_ui(ui: &mut Ui, measures: &[ErrorMeasure], tables: &[ErrorTable]) {
+    let places = OF_INTERVALS.map(|measure| measures.iter().position(|found| *found == measure));
     let [Some(half_width), Some(coverage)] = places else {
         return;
     };
-    let row = |block: &ErrorBlock| {
-        let network = block.rows.iter().find(|row| row.name == table.used())?;
+    let row = |table: &ErrorTable| {
+        let network = table.rows.iter().find(|row| row.name == table.used())?;
         let figures = [half_width, coverage].map(|place| network.errors.get(place).copied().flatten());
-        let title = block.target.as_ref()?.title();
+        let title = table.target.as_ref()?.title();
         let cells = [title.clone()].into_iter().chain(figures.map(format_number));
         figures
             .iter()
@@ -108,7 +110,7 @@ fn intervals_ui(ui: &mut Ui, table: &ErrorTable) {
         TableColumn::figure("coverage, %").meaning(ErrorMeasure::CoveragePercent.definition()),
     ];
     ui.add_space(space(2));
-    let rows = table.blocks.iter().filter_map(row).collect();
+    let rows = tables.iter().filter_map(row).collect();
     TableView::new("intervals", &columns).show_all(ui, rows);
 }
 

@@ -11,6 +11,7 @@ use decoupler_core::{
     decoupling::{DecoderKind, Precision},
     evaluation::{DecoderReport, Run},
     job::Job,
+    text::Named,
 };
 use decoupler_files::{
     export::{
@@ -123,7 +124,7 @@ pub fn network_exports<'a>(
 
 /// Every form of a network with its precisions.
 pub(super) fn bundles() -> impl Iterator<Item = (BundleFormat, BundlePrecision)> {
-    BundleFormat::ALL.into_iter().flat_map(|format| {
+    BundleFormat::ALL.iter().flat_map(|&format| {
         let precisions = format.precisions().iter();
         precisions.map(move |&precision| (format, precision))
     })
@@ -300,7 +301,7 @@ impl DecoderSource {
         let decoder = BundleDecoder::Kind(kind);
         let words = bundle_words(format, decoder);
         let what = format!("{kind}-{format}-{precision}");
-        let write = move |path: &Path, exported: Result<ExportedDecoder<'_>, BundleError>| {
+        let write = move |path: &Path, exported: Result<ExportedDecoder, BundleError>| {
             let report = exported.and_then(|exported| export_bundle(exported, format, precision, &free_folder(path)));
             report.map(|report| said_of(&report)).map_err(|error| error.to_string())
         };

@@ -113,7 +113,7 @@ impl RunView {
     }
 
     /// Error table of this result.
-    pub fn error_table(&self, result: &RunResult) -> ErrorTable {
+    pub fn error_table(&self, result: &RunResult) -> Vec<ErrorTable> {
         ErrorTable::of_scores(&self.problem, &self.scores(result), self.published.as_ref())
     }
 

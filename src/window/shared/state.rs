@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use decoupler_core::{
     dataset::Simulation,
-    evaluation::{Baselines, Measured, RunSettings, auto::AutoProgress},
+    evaluation::{Baselines, RunSettings, auto::AutoProgress},
     scene::{Indenter, Loading, RowModel, Scene},
     training::{StopReason, TrainingSettings},
 };
@@ -86,7 +86,7 @@ impl RecordingDraft {
 impl Default for RecordingDraft {
     fn default() -> Self {
         Self {
-            settings: RunSettings::from(Measured { rows: RowModel::Shared }),
+            settings: RunSettings::measured(RowModel::Shared),
             is_auto: true,
             plan: Err(Self::NOTHING_OPEN.to_owned()),
         }

@@ -1,6 +1,6 @@
 use decoupler_core::{
     dataset::{Dataset, SplitBy},
-    evaluation::{Intervals, NoIntervals, Run},
+    evaluation::{Intervals, Run, RunError},
     job::Job,
     training::StopReason,
 };
@@ -12,7 +12,7 @@ pub struct Calibration {
     /// Rule by which samples are held out.
     by: SplitBy,
     /// Intervals from the held-out answers of the choice of settings; `None` if they were not chosen.
-    chosen: Option<Result<Intervals, NoIntervals>>,
+    chosen: Option<Result<Intervals, RunError>>,
 }
 
 impl Calibration {
@@ -54,6 +54,9 @@ impl Calibration {
                 Intervals::cross_validate(run.settings(), &self.training, self.by, job)
             }
         };
-        calibrated.map_err(|reason| format!("no 90 % intervals: {reason}"))
+        calibrated.map_err(|reason| match reason {
+            RunError::Cancelled(_) => "no 90 % intervals: interrupted".to_owned(),
+            reason => format!("no 90 % intervals: {reason}"),
+        })
     }
 }

@@ -15,7 +15,7 @@ use decoupler_core::{
         Baselines, Coverage, Run, RunError, RunSettings, StartRecord, TestErrors,
         auto::{AutoProgress, AutoRecord},
     },
-    live::{DriftReference, NoDriftMonitor},
+    live::{DriftReference, LiveError},
     network::Networks,
     problem::Problem,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
@@ -104,7 +104,7 @@ pub struct TrainedRun {
     /// Origin of recorded samples; `None` for a simulated array.
     pub recorded: Option<Recorded>,
     /// Training readings of a recording, by which a later drift is detected, or the reason why they are not monitored.
-    pub drift: Result<DriftReference, NoDriftMonitor>,
+    pub drift: Result<DriftReference, LiveError>,
     /// Remarks on the samples of a recording.
     pub of_samples: Vec<String>,
     /// Calibration of its intervals when it has ended; `None` for a simulated array.

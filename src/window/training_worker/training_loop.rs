@@ -25,13 +25,13 @@ use crate::window::{
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
-        Begin, Run, Scores, TestErrors,
+        Run, Scores, TestErrors,
         auto::{AutoFixed, DEFAULT_BUDGET_S},
         frame_us,
         recorded::Determination,
     },
     job::Job,
-    training::TrainingSettings,
+    training::{TrainerState, TrainingSettings},
 };
 use decoupler_files::{
     export::{
@@ -134,7 +134,7 @@ impl<'a> TrainingLoop<'a> {
     fn answer(&mut self, request: Request) {
         match request {
             Request::Train(setup) => {
-                let prepared = self.prepare_setup(&setup, Begin::Initialize);
+                let prepared = self.prepare_setup(&setup, None);
                 self.begin(prepared, None, Event::Began);
             }
             Request::Choose(setup) => {
@@ -149,7 +149,7 @@ impl<'a> TrainingLoop<'a> {
                 self.begin(prepared, None, Event::Opened);
             }
             Request::TakeUp(setup, states) => {
-                let prepared = self.prepare_setup(&setup, Begin::Resume(states));
+                let prepared = self.prepare_setup(&setup, Some(states));
                 self.begin(prepared.map_err(|error| error.to_string()), None, Event::Opened);
             }
             Request::Continue(training) => self.continue_training(training),
@@ -230,10 +230,14 @@ impl<'a> TrainingLoop<'a> {
     }
 
     /// Draws or reads the samples of `setup` and begins its trainings.
-    fn prepare_setup(&self, setup: &Setup, begin: Begin) -> Result<(TrainedRun, Box<Began>), TestViewError> {
+    fn prepare_setup(
+        &self,
+        setup: &Setup,
+        states: Option<Vec<TrainerState>>,
+    ) -> Result<(TrainedRun, Box<Began>), TestViewError> {
         self.prepare(|job, on_progress| {
             let sets = setup.sets(Path::new(""), job, on_progress)?;
-            let run = sets.run(setup, begin, job)?;
+            let run = sets.run(setup, states, job)?;
             Ok(TrainedRun::new(run, &sets))
         })
     }
@@ -250,7 +254,7 @@ impl<'a> TrainingLoop<'a> {
             };
             let (fixed, folder) = (AutoFixed::default(), Path::new(""));
             let chosen = setup.choose(&fixed, DEFAULT_BUDGET_S, folder, job, &mut on_choosing)?;
-            let run = chosen.sets.run(&chosen.setup, Begin::Initialize, job)?;
+            let run = chosen.sets.run(&chosen.setup, None, job)?;
             Ok(TrainedRun::new(run, &chosen.sets))
         })
     }
@@ -317,7 +321,7 @@ impl<'a> TrainingLoop<'a> {
                 .map(|()| {
                     if let (Some(recorded), Some(calibration)) = (recorded, calibration) {
                         recorded.forget_choice();
-                        run.set_blend(None);
+                        run.set_combined(None);
                         calibration.forget_choice();
                     }
                     *run.settings()
@@ -495,12 +499,12 @@ impl<'a> TrainingLoop<'a> {
         remarks.extend(describe_determinacy(
             &run.problem().targets,
             &determined,
-            run.blend().is_some(),
+            run.combined().is_some(),
         ));
         if let Some(baselines) = run.baselines() {
             let scores = Scores {
                 network: errors.clone(),
-                network_alone: run.blend().is_some().then(|| errors.clone()),
+                network_alone: run.combined().is_some().then(|| errors.clone()),
                 baselines: baselines.clone(),
                 coverage: Vec::new(),
             };

@@ -1,11 +1,13 @@
 use std::collections::BTreeMap;
 
 use super::{
-    CalibratedParameter, CalibrationError, PressedRow, SensorParameter, check_presses,
+    CalibratedParameter, CalibrationError, PressedRow, SensorParameter,
     equations::{COUNT, Problem, Slopes, restricted},
+    limits::check,
     warning::warnings,
 };
 use crate::{
+    dataset::Dataset,
     numerics::{Linearised, Spectrum, two_sided_normal_quantile},
     sensor::SensorModel,
 };
@@ -32,7 +34,8 @@ impl Calibration {
     /// readings determine it better than this.
     pub(super) const NOMINAL_TOLERANCE: f64 = 0.1;
 
-    /// Fits geometry and resistivity of Eq. (2) to `samples`, starting from `nominal`.
+    /// Fits geometry and resistivity of Eq. (2) to the samples of `set`, starting from `nominal`. The targets must be the
+    /// absolute coordinates of the row's nodes in millimetres, with the rest positions of `nominal`.
     ///
     /// A fit with the prior that nominal values are correct to ±10 % (two standard deviations), which exists for any
     /// number of readings, decides which parameters the readings determine; these are then fitted without a prior.
@@ -42,10 +45,17 @@ impl Calibration {
     /// misfit of single crossings and for a drift from frame to frame.
     ///
     /// # Errors
-    /// If the nominal sensor is impossible, a sample does not belong to the array or has a reading that is not a
-    /// resistance, or the fit does not converge.
-    pub fn fit(nominal: &SensorModel, samples: &[PressedRow]) -> Result<Self, CalibrationError> {
-        check_presses(nominal, None, samples)?;
+    /// If the nominal sensor is impossible, the samples have no row-wires, a sample does not belong to the array or has a
+    /// reading that is not a resistance, or the fit does not converge.
+    ///
+    /// # Panics
+    /// If there are not 3·M2 targets.
+    pub fn fit(nominal: &SensorModel, set: &Dataset) -> Result<Self, CalibrationError> {
+        Self::of_presses(nominal, &PressedRow::of(set, nominal)?)
+    }
+
+    pub(super) fn of_presses(nominal: &SensorModel, samples: &[PressedRow]) -> Result<Self, CalibrationError> {
+        check(nominal, None, samples)?;
         // The position of the first row-wire is not fitted, so it alone leaves no ambiguity.
         if let Some(row) = samples.first().map(|sample| sample.row).filter(|&row| row > 0)
             && samples.iter().all(|sample| sample.row == row)

@@ -1,5 +1,6 @@
 use super::{CalibrationError, PressedRow};
 use crate::{
+    dataset::Dataset,
     numerics::median,
     scene::Scene,
     sensor::{SensorModel, short},
@@ -10,14 +11,21 @@ const TOLERANCE: f64 = 0.02;
 /// Factor by which a reading may differ from the value that the sensor model and the other readings suggest.
 const LARGEST_FACTOR: f64 = 1e3;
 
-/// Checks samples of known presses on a sensor like `nominal`, before they are used to calibrate it or to train a
+/// Checks the samples of `set`, known presses on a sensor like `nominal` as in [`Calibration::fit`](super::Calibration::fit), before they are used to calibrate it or to train a
 /// network. A sensor whose readings all differ from those of `nominal` by the same factor passes. Nodes move as far as in
 /// `scene`; without one, down as far as the column-wires, and sideways by any distance.
 ///
 /// # Errors
-/// If the nominal sensor is impossible, or a sample does not belong to the array, has a reading that is not a
+/// If the nominal sensor is impossible, the samples have no row-wires, or a sample does not belong to the array, has a reading that is not a
 /// resistance or is implausible, or a displacement outside these limits.
-pub fn check_presses(
+///
+/// # Panics
+/// If there are not 3·M2 targets.
+pub fn check_presses(nominal: &SensorModel, scene: Option<&Scene>, set: &Dataset) -> Result<(), CalibrationError> {
+    check(nominal, scene, &PressedRow::of(set, nominal)?)
+}
+
+pub(super) fn check(
     nominal: &SensorModel,
     scene: Option<&Scene>,
     samples: &[PressedRow],

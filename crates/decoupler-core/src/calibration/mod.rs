@@ -18,19 +18,46 @@ pub use parameter::{CalibratedParameter, SensorParameter};
 use glam::DVec3;
 use thiserror::Error;
 
-use crate::{sensor::SensorError, text::counted};
+use crate::{
+    dataset::Dataset,
+    sensor::{SensorError, SensorModel},
+    text::counted,
+};
 
 /// Readings of one row-wire under a known deformation.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PressedRow {
+#[derive(Clone)]
+struct PressedRow {
     /// Frame that it belongs to; equal numbers mean the same moment.
-    pub frame: usize,
+    frame: usize,
     /// Row-wire, from 0.
-    pub row: usize,
+    row: usize,
     /// Displacement of each node (M2), z counting downwards.
-    pub displacements_mm: Vec<DVec3>,
+    displacements_mm: Vec<DVec3>,
     /// Resistance to each column-wire (M4).
-    pub resistances_ohm: Vec<f64>,
+    resistances_ohm: Vec<f64>,
+}
+
+impl PressedRow {
+    /// Returns the samples of `set`, with the rest positions of `sensor`.
+    fn of(set: &Dataset, sensor: &SensorModel) -> Result<Vec<Self>, CalibrationError> {
+        assert_eq!(
+            set.outputs(),
+            sensor.scale.coordinates_per_row(),
+            "targets are coordinates of the row's nodes"
+        );
+        let pressed = |sample: usize| {
+            let row = set.row_wire(sample).ok_or(CalibrationError::NoRowWires)?;
+            let position = |(node, mm): (usize, &[f64])| sensor.displacement_mm(row, node, DVec3::from_slice(mm));
+            let positions = set.sample_targets(sample).chunks_exact(3).enumerate();
+            Ok(Self {
+                frame: set.groups()[sample],
+                row,
+                displacements_mm: positions.map(position).collect(),
+                resistances_ohm: set.sample_readings(sample).to_vec(),
+            })
+        };
+        (0..set.samples()).map(pressed).collect()
+    }
 }
 
 /// Reason why a sensor cannot be calibrated.
@@ -40,6 +67,9 @@ pub enum CalibrationError {
     /// The nominal sensor is impossible.
     #[error(transparent)]
     Sensor(#[from] SensorError),
+    /// The samples have no row-wires.
+    #[error("samples of a simulated sensor need a row-wire: build the set with row-wires, or declare it as measured")]
+    NoRowWires,
     /// A sample does not belong to the array, or no press can produce it.
     #[error("sample {}{fault}", .sample + 1)]
     Sample {
@@ -80,7 +110,7 @@ impl CalibrationError {
     pub fn sample(&self) -> Option<usize> {
         match *self {
             Self::Sample { sample, .. } => Some(sample),
-            Self::Sensor(_) | Self::OneRow { .. } | Self::TooFew { .. } | Self::NotConverged => None,
+            Self::Sensor(_) | Self::NoRowWires | Self::OneRow { .. } | Self::TooFew { .. } | Self::NotConverged => None,
         }
     }
 }

@@ -83,7 +83,7 @@ fn a_sensor_off_by_5_percent_is_recovered_within_the_stated_intervals() {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let real = real(&mut rng);
         let samples = frames(&real, &Vec::from_iter(0..10), 12, 1e-3, &mut rng);
-        let calibration = Calibration::fit(&nominal(), &samples).unwrap();
+        let calibration = Calibration::of_presses(&nominal(), &samples).unwrap();
         for parameter in [
             SensorParameter::Height,
             SensorParameter::RowPitch,
@@ -109,7 +109,7 @@ fn readings_without_noise_give_the_sensor_exactly() {
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let real = real(&mut rng);
     let samples = frames(&real, &Vec::from_iter(0..10), 6, 0.0, &mut rng);
-    let calibration = Calibration::fit(&nominal(), &samples).unwrap();
+    let calibration = Calibration::of_presses(&nominal(), &samples).unwrap();
     assert_eq!(determined(&calibration), SensorParameter::ALL);
     for fitted in &calibration.parameters {
         let truth = fitted.parameter.of(&real);
@@ -125,7 +125,7 @@ fn parameters_undetermined_by_one_row_keep_their_nominal_values() {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let real = real(&mut rng);
         let samples = frames(&real, &[0], 60, 1e-4, &mut rng);
-        let calibration = Calibration::fit(&nominal(), &samples).unwrap();
+        let calibration = Calibration::of_presses(&nominal(), &samples).unwrap();
         let determined = determined(&calibration);
         assert!(!determined.contains(&SensorParameter::RowPitch), "{determined:?}");
         within += usize::from(intervals_hold(&calibration, &real));
@@ -133,7 +133,7 @@ fn parameters_undetermined_by_one_row_keep_their_nominal_values() {
     assert!(within >= 17, "{within} of 20");
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let samples = frames(&real(&mut rng), &[0], 20, 1e-3, &mut rng);
-    let pitch = Calibration::fit(&nominal(), &samples)
+    let pitch = Calibration::of_presses(&nominal(), &samples)
         .unwrap()
         .parameter(SensorParameter::RowPitch);
     assert_eq!(
@@ -147,7 +147,7 @@ fn parameters_undetermined_by_one_row_keep_their_nominal_values() {
 fn a_single_row_other_than_the_first_is_refused() {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let samples = frames(&real(&mut rng), &[6], 60, 1e-4, &mut rng);
-    let error = Calibration::fit(&nominal(), &samples).unwrap_err();
+    let error = Calibration::of_presses(&nominal(), &samples).unwrap_err();
     assert!(matches!(error, CalibrationError::OneRow { row: 6 }), "{error}");
     assert!(error.to_string().starts_with("all samples are of row-wire 7:"));
 }
@@ -170,7 +170,7 @@ fn intervals_allow_for_deviating_wires() {
                 .zip(crossings)
                 .for_each(|(ohm, factor)| *ohm *= factor);
         }
-        let calibration = Calibration::fit(&nominal(), &samples).unwrap();
+        let calibration = Calibration::of_presses(&nominal(), &samples).unwrap();
         let half_width = calibration.parameter(SensorParameter::Height).half_width;
         half_width.map_or(f64::INFINITY, |half_width| half_width / calibration.residual)
     };
@@ -206,8 +206,8 @@ fn few_frames_and_frames_at_rest_converge_within_the_intervals() {
                         .collect();
                 }
             }
-            let calibration =
-                Calibration::fit(&nominal, &samples).unwrap_or_else(|error| panic!("{scale}, seed {seed}: {error}"));
+            let calibration = Calibration::of_presses(&nominal, &samples)
+                .unwrap_or_else(|error| panic!("{scale}, seed {seed}: {error}"));
             assert!(calibration.residual < 1.6 * noise, "{scale}: {}", calibration.residual);
             assert!(calibration.warnings.is_empty(), "{scale}, seed {seed}");
             within += usize::from(at_rest || intervals_hold(&calibration, &real));
@@ -223,19 +223,21 @@ fn few_frames_and_frames_at_rest_converge_within_the_intervals() {
 fn a_wrong_sensor_gives_a_warning() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let samples = frames(&of_scale("4x3_2x8"), &[0, 1, 2, 3], 30, 1e-3, &mut rng);
-    let calibration = Calibration::fit(&of_scale("4x3_3x8"), &samples).unwrap();
+    let calibration = Calibration::of_presses(&of_scale("4x3_3x8"), &samples).unwrap();
     let words = &calibration.warnings[0];
     assert!(
         words.contains("resistance per millimetre: 15") && words.contains("check the array scale"),
         "{words}"
     );
-    let calibration = Calibration::fit(&of_scale("4x3_2x8"), &samples).unwrap();
+    let calibration = Calibration::of_presses(&of_scale("4x3_2x8"), &samples).unwrap();
     assert!(calibration.warnings.is_empty());
     let mut swapped = samples;
     for sample in &mut swapped {
         sample.resistances_ohm.swap(0, 3);
     }
-    let warnings = Calibration::fit(&of_scale("4x3_2x8"), &swapped).unwrap().warnings;
+    let warnings = Calibration::of_presses(&of_scale("4x3_2x8"), &swapped)
+        .unwrap()
+        .warnings;
     let is_misfit = |warning: &String| warning.starts_with("the readings of a crossing are off by ");
     assert!(warnings.iter().any(is_misfit), "{warnings:?}");
 }
@@ -248,11 +250,11 @@ fn presses_outside_the_limits_are_named() {
         movement: Movement::SIDEWAYS,
         ..Scene::default()
     };
-    assert_eq!(check_presses(&nominal(), Some(&scene), &good), Ok(()));
+    assert_eq!(limits::check(&nominal(), Some(&scene), &good), Ok(()));
     let message = |spoil: &dyn Fn(&mut PressedRow)| {
         let mut samples = good.clone();
         spoil(&mut samples[4]);
-        let error = check_presses(&nominal(), Some(&scene), &samples).unwrap_err();
+        let error = limits::check(&nominal(), Some(&scene), &samples).unwrap_err();
         assert_eq!(error.sample(), Some(4), "{error}");
         error.to_string()
     };
@@ -267,7 +269,7 @@ fn presses_outside_the_limits_are_named() {
     for sample in &mut samples {
         sample.resistances_ohm.iter_mut().for_each(|ohm| *ohm *= 1e9);
     }
-    assert_eq!(check_presses(&nominal(), Some(&scene), &samples), Ok(()));
+    assert_eq!(limits::check(&nominal(), Some(&scene), &samples), Ok(()));
 }
 
 #[test]
@@ -277,7 +279,7 @@ fn invalid_samples_are_named() {
     let message = |spoil: &dyn Fn(&mut PressedRow)| {
         let mut samples = good.clone();
         spoil(&mut samples[4]);
-        Calibration::fit(&nominal(), &samples).unwrap_err().to_string()
+        Calibration::of_presses(&nominal(), &samples).unwrap_err().to_string()
     };
     assert!(message(&|sample| sample.row = 10).contains("sample 5"));
     assert!(message(&|sample| sample.resistances_ohm.truncate(3)).contains("3 readings"));
@@ -285,7 +287,7 @@ fn invalid_samples_are_named() {
     assert!(message(&|sample| sample.displacements_mm[2].z = 5.0).contains("sample 5, node 3"));
     assert!(message(&|sample| sample.displacements_mm[2].x = f64::NAN).contains("node 3"));
     assert_eq!(
-        Calibration::fit(&nominal(), &[]),
+        Calibration::of_presses(&nominal(), &[]),
         Err(CalibrationError::TooFew {
             readings: 0,
             parameters: 7

@@ -23,13 +23,13 @@ pub struct Division {
 
 /// Samples of each part of a divided set, as ascending indices.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct DividedSamples {
+pub(crate) struct DividedSamples {
     /// Samples that the training method fits.
-    pub training: Vec<usize>,
+    pub(crate) training: Vec<usize>,
     /// Samples that select the best weights; empty if nothing is held out.
-    pub validation: Vec<usize>,
+    pub(crate) validation: Vec<usize>,
     /// Samples that no fit has seen; empty if the test set is a separate file.
-    pub test: Vec<usize>,
+    pub(crate) test: Vec<usize>,
 }
 
 impl Default for Division {
@@ -45,36 +45,44 @@ impl Default for Division {
 }
 
 impl Division {
-    /// Divides `set` into training, validation and test samples. The training and the test set get at least one unit
-    /// (a sample or a group) each; a part that cannot be filled exactly with whole groups gets the number of samples
-    /// nearest to its share. Nothing is held out for validation if only one unit remains.
+    /// Divides `set` for a run with this seed, and returns its training, validation and test samples: those of `test` if it is
+    /// given.
+    ///
+    /// The training and the test set get at least one unit (a sample or a group) each; a part that cannot be filled exactly
+    /// with whole groups gets the number of samples nearest to its share. Nothing is held out for validation if only one
+    /// unit remains.
     ///
     /// If every target would be constant in the training samples, as with a single press near the end of a recording, the
     /// first units are held out in place of the last.
     ///
     /// # Errors
+    /// If a share is out of range, the set is a single unit, or `test` has other row-wires.
+    pub fn sets(&self, set: &Dataset, test: Option<&Dataset>, seed: Seed) -> Result<(Split, Dataset), DatasetError> {
+        let parts = self.divide(set, test.is_some(), seed)?;
+        let test = match test {
+            None => set.select(&parts.test),
+            Some(test) => test.clone().among_rows(set.row_wires_read().unwrap_or_default())?,
+        };
+        Ok((parts.split(set), test))
+    }
+
+    /// Returns the training samples of [`Self::sets`], as ascending indices.
+    ///
+    /// # Errors
     /// If a share is out of range, or the set is a single unit.
-    pub fn divide(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DatasetError> {
-        let parts = self.parts(set, self.test_fraction, rng)?;
-        if parts.test.is_empty() {
+    pub fn training(&self, set: &Dataset, has_test_set: bool, seed: Seed) -> Result<Vec<usize>, DatasetError> {
+        Ok(self.divide(set, has_test_set, seed)?.training)
+    }
+
+    fn divide(&self, set: &Dataset, has_test_set: bool, seed: Seed) -> Result<DividedSamples, DatasetError> {
+        self.check()?;
+        let test_fraction = if has_test_set { 0.0 } else { self.test_fraction };
+        let mut units = self.by.ordered_units(set, &mut seed.rng(Stream::Split));
+        if !has_test_set && units.len() < 2 {
             let samples = set.samples();
             let unit = self.by.unit_name(1, samples);
             return Err(DatasetError::TooFew { samples, unit });
         }
-        Ok(parts)
-    }
-
-    /// Divides `set` into training and validation samples, for a separate test set; see [`Self::divide`].
-    ///
-    /// # Errors
-    /// If a share is out of range.
-    pub fn divide_for_training(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DatasetError> {
-        self.parts(set, 0.0, rng)
-    }
-
-    fn parts(&self, set: &Dataset, test_fraction: f64, rng: &mut impl Rng) -> Result<DividedSamples, DatasetError> {
-        self.check()?;
-        let mut units = self.by.ordered_units(set, rng);
         let hold_out_last = |mut units: Vec<Vec<usize>>| DividedSamples {
             test: take_last(&mut units, test_fraction),
             validation: take_last(&mut units, self.validation_fraction),
@@ -91,22 +99,6 @@ impl Division {
         }
         units.reverse();
         Ok(Some(hold_out_last(units)).filter(varies).unwrap_or(parts))
-    }
-
-    /// Divides `set` for a run with this seed, and returns its training, validation and test samples: those of `test` if it is
-    /// given.
-    ///
-    /// # Errors
-    /// If a share is out of range, the set is a single unit, or `test` has other row-wires.
-    pub fn sets(&self, set: &Dataset, test: Option<&Dataset>, seed: Seed) -> Result<(Split, Dataset), DatasetError> {
-        let mut rng = seed.rng(Stream::Split);
-        let Some(test) = test else {
-            let parts = self.divide(set, &mut rng)?;
-            return Ok((parts.split(set), set.select(&parts.test)));
-        };
-        let parts = self.divide_for_training(set, &mut rng)?;
-        let read = set.row_wires_read().unwrap_or_default();
-        Ok((parts.split(set), test.clone().among_rows(read)?))
     }
 
     /// Checks the shares.
@@ -128,7 +120,7 @@ impl DividedSamples {
     ///
     /// # Panics
     /// If the set has fewer samples.
-    pub fn split(&self, set: &Dataset) -> Split {
+    pub(crate) fn split(&self, set: &Dataset) -> Split {
         Split {
             training: set.select(&self.training),
             validation: (!self.validation.is_empty()).then(|| set.select(&self.validation)),
@@ -245,13 +237,19 @@ impl SplitBy {
 
     /// Holds out `held_out` units of `set` for validation, drawn at random unless in order of time; at least one unit
     /// remains for training.
-    pub fn hold_out(self, set: &Dataset, held_out: usize, rng: &mut impl Rng) -> DividedSamples {
+    pub fn hold_out(self, set: &Dataset, held_out: usize, rng: &mut impl Rng) -> Split {
         let mut validation = self.ordered_units(set, rng);
         let training = validation.split_off(held_out.min(validation.len().saturating_sub(1)));
-        DividedSamples {
-            training: ascending(training.concat()),
-            validation: ascending(validation.concat()),
-            test: Vec::new(),
+        if validation.is_empty() {
+            // Large sets need not be copied.
+            return Split {
+                training: set.clone(),
+                validation: None,
+            };
+        }
+        Split {
+            training: set.select(&ascending(training.concat())),
+            validation: Some(set.select(&ascending(validation.concat()))),
         }
     }
 
@@ -295,7 +293,7 @@ mod tests {
             test_fraction: 0.2,
             validation_fraction: 0.2,
         };
-        division.divide(set, &mut Seed(seed).rng(Stream::Split))
+        division.divide(set, false, Seed(seed))
     }
 
     #[test]
@@ -383,17 +381,16 @@ mod tests {
     #[test]
     fn a_separate_test_set_leaves_all_samples_for_training_and_validation() {
         let set = set((0..50).collect());
-        let rng = &mut Seed(0).rng(Stream::Split);
         let a_fifth_held_out = Division {
             validation_fraction: 0.2,
             ..Division::default()
         };
-        let parts = a_fifth_held_out.divide_for_training(&set, rng).unwrap();
+        let parts = a_fifth_held_out.divide(&set, true, Seed(0)).unwrap();
         assert_eq!(
             (parts.training.len(), parts.validation.len(), parts.test.len()),
             (40, 10, 0)
         );
-        let parts = Division::default().divide_for_training(&set, rng).unwrap();
+        let parts = Division::default().divide(&set, true, Seed(0)).unwrap();
         assert_eq!(parts.split(&set).validation, None);
     }
 
@@ -407,7 +404,7 @@ mod tests {
                 test_fraction,
                 validation_fraction,
             };
-            let error = division.divide(&set(vec![0, 1]), &mut Seed(0).rng(Stream::Split));
+            let error = division.divide(&set(vec![0, 1]), false, Seed(0));
             assert!(matches!(error, Err(DatasetError::Fraction { .. })), "{division:?}");
         }
         assert!(SplitBy::parse("block").is_err());
@@ -417,8 +414,8 @@ mod tests {
     fn split(samples: usize, held_out: usize) -> (Dataset, Split) {
         let model = SensorModel::new("10x6_3x18".parse().unwrap());
         let set = Dataset::simulate(&model, &Scene::default(), samples, &mut Seed(0).rng(Stream::Training)).unwrap();
-        let parts = SplitBy::Group.hold_out(&set, held_out, &mut Seed(0).rng(Stream::Split));
-        (set.clone(), parts.split(&set))
+        let split = SplitBy::Group.hold_out(&set, held_out, &mut Seed(0).rng(Stream::Split));
+        (set, split)
     }
 
     #[test]

@@ -73,7 +73,7 @@ impl Folds {
 
     /// Divides the samples with fold `fold` for the test. If `holds_out` and there are at least three folds, the next fold
     /// is the validation set.
-    pub fn divided(&self, fold: usize, holds_out: bool) -> DividedSamples {
+    pub(crate) fn divided(&self, fold: usize, holds_out: bool) -> DividedSamples {
         let next = (fold + 1) % self.count();
         let validation = (holds_out && self.count() > 2).then_some(next);
         DividedSamples {

@@ -20,7 +20,8 @@ mod simulation;
 mod span;
 
 pub use continuation::{GAP, Place, RowOrder, Series};
-pub use division::{DividedSamples, Division, Split, SplitBy};
+pub(crate) use division::DividedSamples;
+pub use division::{Division, Split, SplitBy};
 pub use error::DatasetError;
 pub use folds::Folds;
 pub use frames::{Frames, PerRow};
@@ -28,5 +29,5 @@ pub use history::{History, MemoryStream};
 pub use memory::{LARGEST_LAG, Memory, MemoryConstants};
 pub use samples::{Dataset, LARGEST_SAMPLES};
 pub use seed::{Seed, Stream};
-pub use simulation::{ModelSize, Simulation};
+pub use simulation::Simulation;
 pub use span::Span;

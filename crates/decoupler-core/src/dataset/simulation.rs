@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Dataset, DatasetError, LARGEST_SAMPLES};
 use crate::{
-    scene::{DeformationSampler, Noise, NoiseSource, RowModel, Scene, SceneError},
+    scene::{DeformationSampler, Noise, NoiseSource, Scene, SceneError},
     sensor::{ArrayScale, SensorError, SensorModel},
 };
 
@@ -24,19 +24,6 @@ pub struct Simulation {
     pub test_samples: usize,
 }
 
-/// Size of the model of a scene; coordinates that do not vary are not counted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ModelSize {
-    /// Number of row-wires read.
-    pub rows: usize,
-    /// Number of unknown coordinates in a frame, over all rows.
-    pub unknowns: usize,
-    /// Number of resistances in a frame.
-    pub equations: usize,
-    /// Number of networks: one, or one per known row.
-    pub networks: usize,
-}
-
 impl Default for Simulation {
     /// Returns the paper's main experiment: 10×10_5×30, 1000 training and 100 test samples.
     fn default() -> Self {
@@ -51,20 +38,12 @@ impl Default for Simulation {
 }
 
 impl Simulation {
-    /// Counts the unknowns, equations and networks.
+    /// Number of row-wires read.
     ///
     /// # Errors
     /// If the array lacks a row of the scene.
-    pub fn model_size(&self) -> Result<ModelSize, SceneError> {
-        let scale = self.sensor.scale;
-        let rows = self.scene.rows.read(scale.rows())?.len();
-        let is_shared = self.scene.rows.model() == RowModel::Shared;
-        Ok(ModelSize {
-            rows,
-            unknowns: rows * self.scene.unknowns_per_row(scale),
-            equations: rows * scale.columns(),
-            networks: if is_shared { 1 } else { rows },
-        })
+    pub fn rows(&self) -> Result<usize, SceneError> {
+        Ok(self.scene.rows.read(self.sensor.scale.rows())?.len())
     }
 
     /// Maximum travel of a node in millimetres, the full scale of its deformation.

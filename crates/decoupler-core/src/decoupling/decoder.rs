@@ -52,7 +52,7 @@ pub trait Decoder: Send {
     /// If the slices do not consist of whole rows.
     fn decode(&mut self, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         /// Rows that are decoded at once: their indices are on the stack.
-        const BLOCK: usize = 64;
+        const BLOCK: usize = 16;
         let (channels, outputs) = (self.channels(), self.outputs());
         assert_eq!(readings.len() / channels, targets.len() / outputs);
         let blocks = readings

@@ -155,23 +155,23 @@ impl fmt::Display for DecoderKind {
 
 /// Training samples and settings from which a decoder is fitted.
 #[derive(Clone, Copy)]
-pub struct FitProblem<'a> {
+pub(crate) struct FitProblem<'a> {
     /// Training samples.
-    pub training: &'a Dataset,
+    pub(crate) training: &'a Dataset,
     /// Whether all row-wires share a decoder or each has its own.
-    pub row_model: RowModel,
+    pub(crate) row_model: RowModel,
     /// Quantity and scaling of the inputs.
-    pub inputs: InputChoice,
+    pub(crate) inputs: InputChoice,
     /// Noise of the readings that the training samples lack.
-    pub unseen: NoiseSource,
+    pub(crate) unseen: NoiseSource,
     /// The sensor and its scene, if they are known.
-    pub sensor: Option<(&'a SensorModel, &'a Scene)>,
+    pub(crate) sensor: Option<(&'a SensorModel, &'a Scene)>,
     /// Trained networks, if there are any.
-    pub networks: Option<&'a Networks>,
+    pub(crate) networks: Option<&'a Networks>,
     /// Precision in which networks compute.
-    pub precision: Precision,
+    pub(crate) precision: Precision,
     /// Seed of random choices.
-    pub seed: Seed,
+    pub(crate) seed: Seed,
 }
 
 impl DecoderKind {
@@ -179,7 +179,7 @@ impl DecoderKind {
     ///
     /// # Errors
     /// If samples cannot be scaled, or the sensor has no resistances at rest.
-    pub fn fit(self, problem: &FitProblem<'_>) -> Result<Option<Box<dyn Decoder>>, NetworkError> {
+    pub(crate) fn fit(self, problem: &FitProblem<'_>) -> Result<Option<Box<dyn Decoder>>, NetworkError> {
         let FitProblem { inputs, unseen, .. } = *problem;
         let mut rng = problem.seed.rng(Stream::Expectation);
         match self {

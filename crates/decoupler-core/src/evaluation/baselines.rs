@@ -224,15 +224,14 @@ mod tests {
     fn the_linear_map_knows_the_row_if_the_network_does() {
         let errors = |rows, samples| {
             let mut settings = RunSettings::default();
-            settings.source = Simulation {
+            *settings.simulation_mut().unwrap() = Simulation {
                 sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
                 scene: Scene {
                     rows,
                     ..Scene::default()
                 },
                 ..*settings.simulation().unwrap()
-            }
-            .into();
+            };
             let draw = |samples, stream| {
                 let Simulation { sensor, scene, .. } = settings.simulation().unwrap();
                 Dataset::simulate(sensor, scene, samples, &mut settings.seed.rng(stream)).unwrap()

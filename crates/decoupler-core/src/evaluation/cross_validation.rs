@@ -4,7 +4,7 @@ use ndarray::{Array2, Axis};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
-use super::{Baselines, Begin, Run, RunError, RunSets, RunSettings, Scores, TestErrors, baselines::fit_baselines};
+use super::{Baselines, Run, RunError, RunSets, RunSettings, Scores, TestErrors, baselines::fit_baselines};
 use crate::{
     dataset::{Dataset, Folds, Seed, SplitBy, Stream},
     decoupling::decode_set,
@@ -53,20 +53,20 @@ pub struct CrossValidated {
     /// Answers of the linear maps.
     pub linear: Array2<f64>,
     /// Epochs and time of the trainings.
-    pub effort: Effort,
+    pub(super) effort: Effort,
 }
 
 /// Networks trained, with the number and time of their epochs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Effort {
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Effort {
     /// Number of networks trained, each with all starts: 1, or one per fold.
-    pub networks: usize,
+    pub(super) networks: usize,
     /// Number of epochs, over all starts and folds.
-    pub epochs: usize,
+    pub(super) epochs: usize,
     /// Total time of the epochs.
-    pub seconds: f64,
+    pub(super) seconds: f64,
     /// Time of the fastest epoch, which is least affected by other load on the machine.
-    pub min_epoch_seconds: f64,
+    pub(super) min_epoch_seconds: f64,
 }
 
 impl CrossValidation {
@@ -121,7 +121,7 @@ impl CrossValidated {
                 ..*settings
             };
             let sets = RunSets::new(split, test).described(problem.clone());
-            let mut run = match Run::new(settings, sets, Begin::Initialize, job) {
+            let mut run = match Run::new(settings, sets, None, job) {
                 // Every target is constant without this fold: the constant is the answer.
                 Err(RunError::Training(TrainingError::NothingVaries)) if set.has_varying_target() => {
                     scatter(&mut network, samples, &answers_of_mean);

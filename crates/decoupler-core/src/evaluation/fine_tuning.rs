@@ -1,48 +1,11 @@
-use glam::DVec3;
-
 use super::{RunError, run_sets::check_networks};
 use crate::{
-    calibration::PressedRow,
     dataset::{Dataset, PerRow, Split},
     job::Job,
     machine::MemoryBudget,
     network::{DecouplingNetwork, Networks},
-    sensor::SensorModel,
     training::{ExampleSets, Examples, Trainer, TrainingSettings, check_width},
 };
-
-/// Returns the samples of `set` as readings of known deformations, for
-/// [`Calibration::fit`](crate::calibration::Calibration::fit). The targets must be the absolute coordinates of the
-/// row's nodes in millimetres, with the rest positions of `sensor`.
-///
-/// # Errors
-/// If the samples have no row-wires.
-///
-/// # Panics
-/// If there are not 3·M2 targets, or the array lacks a row-wire.
-pub fn pressed_rows(set: &Dataset, sensor: &SensorModel) -> Result<Vec<PressedRow>, RunError> {
-    assert_eq!(
-        set.outputs(),
-        sensor.scale.coordinates_per_row(),
-        "targets are coordinates of the row's nodes"
-    );
-    let pressed = |sample: usize| {
-        let row = set.row_wire(sample).ok_or(RunError::NoRowWires)?;
-        let position = |(node, mm): (usize, &[f64])| sensor.displacement_mm(row, node, DVec3::from_slice(mm));
-        Ok(PressedRow {
-            frame: set.groups()[sample],
-            row,
-            displacements_mm: set
-                .sample_targets(sample)
-                .chunks_exact(3)
-                .enumerate()
-                .map(position)
-                .collect(),
-            resistances_ohm: set.sample_readings(sample).to_vec(),
-        })
-    };
-    (0..set.samples()).map(pressed).collect()
-}
 
 /// Continues the training of `networks` on other samples, such as frames of the real sensor after training on its
 /// calibrated model. Scalings do not change. The weights with the lowest validation error

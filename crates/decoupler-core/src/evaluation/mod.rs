@@ -27,21 +27,17 @@ mod trade;
 mod workload;
 
 pub use baselines::{Baselines, PublishedErrors, Scores, published_errors};
-pub use cross_validation::{CrossValidated, CrossValidation, Effort};
+pub use cross_validation::{CrossValidated, CrossValidation};
 pub use decoder_set::{DecoderReport, DecoderSet};
 pub use errors::{Errors, NodeAddress, Spread, TargetErrors, TestErrors, node_rms_mm};
-pub use fine_tuning::{fine_tune, pressed_rows};
-pub use intervals::{Coverage, HalfWidth, Intervals, NoIntervals};
-pub use preparation::Begin;
+pub use fine_tuning::fine_tune;
+pub use intervals::{Coverage, HalfWidth, Intervals};
 pub use presets::Preset;
 pub use remark::error_remarks;
 pub use run::{Run, RunError};
 pub use run_sets::RunSets;
-pub use settings::{Combination, Initialization, MAX_STARTS, Measured, RunSettings, Source};
+pub use settings::{Combination, Initialization, MAX_STARTS, RunSettings, Source};
 pub use starts::{StartRecord, StartTrainer, best_start};
-pub use table::{ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, decoded_unit, frame_us};
-pub use trade::{
-    Outlook, TradeOffCost, TradeOffLevel, TradeOffLimits, TradeOffPoint, fastest_under, measure_trade_off,
-    most_accurate_under,
-};
-pub use workload::{TrainingSize, Workload, WorkloadTime};
+pub use table::{ErrorMeasure, ErrorRow, ErrorTable, decoded_unit, frame_us};
+pub use trade::{Outlook, TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under, pareto_front};
+pub use workload::{TrainingSize, Workload};

@@ -4,8 +4,8 @@ use rand::Rng;
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Initialization, Run, RunError, RunSets, RunSettings, StartTrainer, linear_start::LinearStart,
-    run_sets::check_sets,
+    Baselines, Initialization, Run, RunError, RunSets, RunSettings, StartTrainer, TrainingSize,
+    linear_start::LinearStart, run_sets::check_sets,
 };
 use crate::{
     dataset::{Dataset, PerRow, Simulation, Split},
@@ -16,16 +16,6 @@ use crate::{
     training::{ExampleSets, Examples, Trainer, TrainerState, TrainingError, check_width},
 };
 
-/// Weights with which the trainings of a run begin.
-#[derive(Clone, Debug, Default)]
-pub enum Begin {
-    /// Those of the [`Initialization`] of the settings.
-    #[default]
-    Initialize,
-    /// Those of saved trainings, start by start and in each row by row: [`Run::states`].
-    Resume(Vec<TrainerState>),
-}
-
 impl Run {
     /// Draws the sets of a simulated array, measures the baselines, and initialises the networks, without a limit of
     /// memory.
@@ -34,28 +24,39 @@ impl Run {
     /// If the settings are invalid or those of a recording.
     pub fn prepare(settings: RunSettings) -> Result<Self, RunError> {
         let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
-        Self::with_baselines(settings, sets, Begin::Initialize, &Job::UNINTERRUPTED)
+        Self::with_baselines(settings, sets, None, &Job::UNINTERRUPTED)
     }
 
     /// As [`Self::new`], and measures the baselines.
     ///
     /// # Errors
     /// As [`Self::new`], or if a baseline cannot be fitted.
-    pub fn with_baselines(settings: RunSettings, sets: RunSets, begin: Begin, job: &Job<'_>) -> Result<Self, RunError> {
+    pub fn with_baselines(
+        settings: RunSettings,
+        sets: RunSets,
+        states: Option<Vec<TrainerState>>,
+        job: &Job<'_>,
+    ) -> Result<Self, RunError> {
         let baselines = Baselines::measure(&settings, &sets, job)?;
-        let run = Self::new(settings, sets, begin, job)?;
+        let run = Self::new(settings, sets, states, job)?;
         Ok(Self {
             baselines: Some(baselines),
             ..run
         })
     }
 
-    /// Scales the sets and begins the trainings.
+    /// Scales the sets and begins the trainings with the [`Initialization`] of the settings, or with the `states` of saved
+    /// trainings ([`Self::states`]).
     ///
     /// # Errors
     /// If the settings are invalid, the sets do not belong together, saved trainings are damaged or do not match settings
     /// and sets, the networks are too wide for the memory of the sets, or the job is cancelled.
-    pub fn new(settings: RunSettings, sets: RunSets, begin: Begin, job: &Job<'_>) -> Result<Self, RunError> {
+    pub fn new(
+        settings: RunSettings,
+        sets: RunSets,
+        states: Option<Vec<TrainerState>>,
+        job: &Job<'_>,
+    ) -> Result<Self, RunError> {
         check_sets(&settings, &sets)?;
         let RunSets {
             split,
@@ -72,10 +73,11 @@ impl Run {
         check_width(&settings.training.method, first.shape, samples, trainings, memory)?;
         job.check()?;
         let begun = Instant::now();
-        let (starts, is_resumed) = match begin {
-            Begin::Initialize => (initialize(settings, tasks.values())?, false),
-            Begin::Resume(states) => (resume(settings, states, tasks.values())?, true),
-        };
+        let is_resumed = states.is_some();
+        let starts = match states {
+            None => initialize(settings, tasks.values()),
+            Some(states) => resume(settings, states, tasks.values()),
+        }?;
         let wall_time = match &starts[..] {
             _ if !is_resumed => Some(begun.elapsed()),
             [only] if only.rows().len() == 1 => Some(only.elapsed()),
@@ -91,7 +93,7 @@ impl Run {
             scalings: tasks.map(|task| task.scaling.clone()),
             starts,
             baselines: None,
-            blend: None,
+            combined: None,
             intervals: None,
         })
     }
@@ -132,7 +134,7 @@ impl RunSettings {
     /// Checks these settings and the number of saved trainings, before samples are drawn for them.
     pub fn check_states(&self, states: &[TrainerState]) -> Result<(), RunError> {
         self.check_counts()?;
-        check_states(states, self.starts * self.drawn()?.model_size()?.networks)
+        check_states(states, self.starts * TrainingSize::drawn(self)?.networks)
     }
 }
 
@@ -251,7 +253,7 @@ mod tests {
     use ndarray::{Axis, Slice};
 
     use super::*;
-    use crate::{evaluation::Measured, network::InputChoice, scene::Noise};
+    use crate::{network::InputChoice, scene::Noise};
 
     /// Returns a run of few samples, cancelled at poll number `poll` of the token, from 0, and the number of polls.
     fn cancelled_at(poll: usize, prepare: &dyn Fn(&Job<'_>) -> Result<Run, RunError>) -> (Option<Run>, usize) {
@@ -289,14 +291,14 @@ mod tests {
             let mut with_test = Run::with_baselines(
                 settings,
                 RunSets::new(split_of_one.clone(), test).described(problem.clone()),
-                Begin::Initialize,
+                None,
                 &Job::UNINTERRUPTED,
             )
             .unwrap();
             let mut without = Run::new(
                 settings,
                 RunSets::without_test(split_of_one).described(problem.clone()),
-                Begin::Initialize,
+                None,
                 &Job::UNINTERRUPTED,
             )
             .unwrap();
@@ -317,11 +319,11 @@ mod tests {
         simulation.sensor.scale = "4x4_2x12".parse().unwrap();
         (simulation.samples, simulation.test_samples) = (40, 8);
         let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
-        let begin = |settings| Run::new(settings, sets.clone(), Begin::Initialize, &Job::UNINTERRUPTED).map(|_| ());
+        let begin = |settings| Run::new(settings, sets.clone(), None, &Job::UNINTERRUPTED).map(|_| ());
         assert_eq!(begin(settings), Ok(()));
         settings.simulation_mut().unwrap().scene.largest_compression = 0.1;
         assert_eq!(begin(settings), Err(RunError::OtherSensor));
-        let recorded = RunSettings::from(Measured { rows: RowModel::Shared });
+        let recorded = RunSettings::measured(RowModel::Shared);
         assert_eq!(begin(recorded), Err(RunError::OtherSensor));
         let message = Run::prepare(recorded).err().unwrap().to_string();
         assert!(message.contains("read, not drawn"), "{message}");
@@ -354,7 +356,7 @@ mod tests {
         ) = (3, 40, 8);
         let whole = Run::prepare(settings).unwrap();
         let (states, answers_mm) = (whole.states(), whole.decouple_test());
-        for begin in [Begin::Initialize, Begin::Resume(states)] {
+        for begin in [None, Some(states)] {
             let prepare = |job: &Job<'_>| {
                 let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, job)?;
                 Run::with_baselines(settings, sets, begin.clone(), job)

@@ -228,9 +228,7 @@ mod tests {
             worst_sample: 0,
             percent_of_range: None,
         };
-        let settings = RunSettings::from(crate::evaluation::Measured {
-            rows: crate::scene::RowModel::Shared,
-        });
+        let settings = RunSettings::measured(crate::scene::RowModel::Shared);
         // Metres, ohm, and a constant.
         let errors = [target(3e-12, Some(-1.0)), target(5.0, Some(0.5)), target(1e-17, None)];
         let mean = [target(2e-12, Some(0.0)), target(7.0, Some(0.0)), target(0.0, None)];

@@ -13,15 +13,15 @@ use super::{
     starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, DatasetError, PerRow},
-    decoupling::{Blend, DecodeError, Precision, Program, ProgramDecoder},
-    identifiability::IdentifiabilityError,
+    dataset::{Dataset, DatasetError, PerRow, Seed},
+    decoupling::{Combined, DecodeError, Program, ProgramDecoder},
     job::{Cancelled, Job},
     machine::MemoryBudget,
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, NetworkError, Networks},
     problem::Problem,
     scene::SceneError,
     sensor::SensorError,
+    text::counted,
     training::{Method, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingError, check_width},
 };
 
@@ -44,7 +44,7 @@ pub struct Run {
     /// Errors of the baselines; `None` if only the networks are needed.
     pub(super) baselines: Option<Baselines>,
     /// What a choice of settings answers with once the network is trained; `None` for the network alone.
-    pub(super) blend: Option<Blend>,
+    pub(super) combined: Option<Combined>,
     /// Intervals of the present network, with their coverage on the test set.
     pub(super) intervals: Option<(Intervals, Vec<Option<Coverage>>)>,
 }
@@ -117,8 +117,8 @@ impl Run {
     /// ended: some failed or diverged. The text includes the remedy; `None` if there is no defect.
     pub fn defect(&self) -> Option<String> {
         match self.settings.combine {
-            Combination::Best => defect_of(self.leader(), self.blend().is_some()),
-            Combination::Mean => (self.starts.iter()).find_map(|start| defect_of(start, self.blend().is_some())),
+            Combination::Best => defect_of(self.leader(), self.combined().is_some()),
+            Combination::Mean => (self.starts.iter()).find_map(|start| defect_of(start, self.combined().is_some())),
         }
     }
 
@@ -188,7 +188,7 @@ impl Run {
         self.starts.par_iter().map(record).collect()
     }
 
-    /// Returns the states of all trainings for [`Begin::Resume`](super::Begin::Resume): start by start, and in each row by row.
+    /// Returns the states of all trainings for [`Self::new`]: start by start, and in each row by row.
     pub fn states(&self) -> Vec<TrainerState> {
         self.starts
             .iter()
@@ -236,24 +236,20 @@ impl Run {
     }
 
     /// Sets what the run answers with once it has ended by itself, instead of its network alone.
-    pub fn set_blend(&mut self, blend: Option<Blend>) {
-        self.blend = blend;
+    pub fn set_combined(&mut self, combined: Option<Combined>) {
+        self.combined = combined;
     }
 
     /// What the run answers with instead of its network alone: `None` unless the training has ended by itself.
-    pub fn blend(&self) -> Option<&Blend> {
+    pub fn combined(&self) -> Option<&Combined> {
         let has_ended = self.stop_reason().is_some_and(|reason| reason != StopReason::Stopped);
-        self.blend.as_ref().filter(|_| has_ended)
+        self.combined.as_ref().filter(|_| has_ended)
     }
 
     /// Returns the program of the answers: of the combination, if settings were chosen and the training has ended, otherwise of
     /// [`Self::network`]. For a recording, readings are limited to their range in training, extended by a tenth.
     pub fn program(&self) -> Program {
-        match self.blend() {
-            Some(blend) => blend.program(&self.network(), Precision::Double),
-            None if self.problem.has_nodes() => self.network().program(Precision::Double),
-            None => self.network().clipped_program(Precision::Double),
-        }
+        self.network().decoder_program(&self.problem, self.combined())
     }
 
     /// Returns the answers of [`Self::program`] to the test set: samples × outputs, in the units of the targets.
@@ -295,13 +291,15 @@ impl Run {
     /// Returns the errors of [`Self::network`] and of the baselines on the test set; `None` for the run of a fold.
     pub fn scores(&self) -> Option<Scores> {
         let alone = || {
-            self.errors_of(
-                &ProgramDecoder::new(self.network().clipped_program(Precision::Double)).answers_to(&self.test),
-            )
+            let network = self.network().decoder_program(&self.problem, None);
+            self.errors_of(&ProgramDecoder::new(network).answers_to(&self.test))
         };
         Some(Scores {
             network: self.errors(),
-            network_alone: self.blend().filter(|blend| !blend.others.is_empty()).map(|_| alone()),
+            network_alone: self
+                .combined()
+                .filter(|combined| !combined.others.is_empty())
+                .map(|_| alone()),
             baselines: self.baselines.clone()?,
             coverage: self.coverage().to_vec(),
         })
@@ -446,6 +444,32 @@ pub enum RunError {
         /// Number of trainings expected.
         expected: usize,
     },
+    /// No target has enough effective samples for an interval.
+    #[error(
+        "there are fewer than 9 independent training samples (their errors are correlated in time or within groups)"
+    )]
+    NoIntervals,
+    /// The number of saved intervals is not the number of targets.
+    #[error("{} for {}", counted(*.found, "interval"), counted(*.expected, "target"))]
+    IntervalCount {
+        /// Number of intervals.
+        found: usize,
+        /// Number of targets.
+        expected: usize,
+    },
+    /// A saved half-width is negative or not finite, or its answers are not ascending.
+    #[error("the interval of target {0} is not valid")]
+    Interval(usize),
+    /// A trial of an experiment failed.
+    #[error("seed {seed}: {source}")]
+    Trial {
+        /// Seed of the trial.
+        seed: Seed,
+        /// Index of the repeat of a cross-validation, from 0.
+        repeat: usize,
+        /// Reason for the failure.
+        source: Box<RunError>,
+    },
     /// An axis of an experiment has no values.
     #[error("there are no values for {0}: give at least one")]
     NoValues(&'static str),
@@ -480,9 +504,6 @@ pub enum RunError {
     /// The operating system provides no threads.
     #[error("cannot start worker threads: {0}")]
     Threads(String),
-    /// A scene cannot be analysed.
-    #[error(transparent)]
-    Identifiability(#[from] IdentifiabilityError),
 }
 
 impl RunError {

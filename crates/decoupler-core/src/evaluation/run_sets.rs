@@ -35,7 +35,7 @@ impl RunSets {
         settings.check_counts()?;
         settings.training.check().map_err(TrainingError::from)?;
         Workload::of(settings, TrainingSize::drawn(settings)?).check_memory(memory)?;
-        let rows = source.model_size()?.rows;
+        let rows = source.rows()?;
         let held_out = source.validation_samples.div_ceil(rows);
         let total = (source.samples.div_ceil(rows) + held_out) * rows;
         if total > LARGEST_SAMPLES {
@@ -52,16 +52,7 @@ impl RunSets {
         let drawn = source.draw_training(total, seed)?;
         job.check()?;
         // Whole snapshots, so that no validation sample was read at the same moment as a training sample.
-        let held_out = SplitBy::Group.hold_out(&drawn, held_out, &mut seed.rng(Stream::Split));
-        let split = if held_out.validation.is_empty() {
-            // Large sets need not be copied.
-            Split {
-                training: drawn,
-                validation: None,
-            }
-        } else {
-            held_out.split(&drawn)
-        };
+        let split = SplitBy::Group.hold_out(&drawn, held_out, &mut seed.rng(Stream::Split));
         Ok(Self {
             memory,
             ..Self::new(split, test).described(source.problem())

@@ -41,20 +41,15 @@ pub struct RunSettings {
     reason = "there is one per run, and with a box the settings would not be `Copy`"
 )]
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Source {
     /// Samples drawn from a model of the sensor.
     Simulated(Simulation),
-    /// Sets of measured samples.
-    Measured(Measured),
-}
-
-/// Measured samples; only the readings of the sensor are known.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Measured {
-    /// One network shared by all row-wires or one per row-wire; without row-wires the two are the same.
-    pub rows: RowModel,
+    /// Sets of measured samples; only the readings of the sensor are known.
+    Measured {
+        /// One network shared by all row-wires or one per row-wire; without row-wires the two are the same.
+        rows: RowModel,
+    },
 }
 
 impl From<Simulation> for Source {
@@ -63,18 +58,12 @@ impl From<Simulation> for Source {
     }
 }
 
-impl From<Measured> for Source {
-    fn from(measured: Measured) -> Self {
-        Self::Measured(measured)
-    }
-}
-
 impl Source {
     /// Returns the row model: one network shared by all row-wires, or one per row-wire.
     pub fn row_model(&self) -> RowModel {
         match self {
             Self::Simulated(simulation) => simulation.scene.rows.model(),
-            Self::Measured(measured) => measured.rows,
+            Self::Measured { rows } => *rows,
         }
     }
 }
@@ -169,7 +158,7 @@ impl From<Simulation> for RunSettings {
     }
 }
 
-impl From<Measured> for RunSettings {
+impl RunSettings {
     /// Returns the settings for measured samples: raw readings scaled to [−1, 1], and 300 epochs of Bayesian
     /// regularisation for [recordings](Method::recorded_regularization) with nothing held out.
     ///
@@ -178,15 +167,13 @@ impl From<Measured> for RunSettings {
     /// errors vary twofold with the seed; with Bayesian regularisation on the whole recording they do not. It estimates
     /// the noise of each target, and regularises each class of weights with its own strength: with one strength for
     /// all, it is worse than ridge regression on 20 samples. Selecting the best of several starts by training error has no benefit.
-    fn from(measured: Measured) -> Self {
-        let mut settings = Self::of(measured.into(), InputChoice::MEASURED);
+    pub fn measured(rows: RowModel) -> Self {
+        let mut settings = Self::of(Source::Measured { rows }, InputChoice::MEASURED);
         settings.training.method = Method::recorded_regularization();
         settings.training.stopping = StoppingRules::recorded(&settings.training.method);
         settings
     }
-}
 
-impl RunSettings {
     fn of(source: Source, inputs: InputChoice) -> Self {
         Self {
             source,
@@ -204,7 +191,7 @@ impl RunSettings {
     pub fn simulation(&self) -> Option<&Simulation> {
         match &self.source {
             Source::Simulated(simulation) => Some(simulation),
-            Source::Measured(_) => None,
+            Source::Measured { .. } => None,
         }
     }
 
@@ -212,7 +199,7 @@ impl RunSettings {
     pub fn simulation_mut(&mut self) -> Option<&mut Simulation> {
         match &mut self.source {
             Source::Simulated(simulation) => Some(simulation),
-            Source::Measured(_) => None,
+            Source::Measured { .. } => None,
         }
     }
 
@@ -301,7 +288,7 @@ mod tests {
 
     #[test]
     fn a_method_chosen_for_a_recording_brings_its_settings_and_rules_unless_the_user_set_others() {
-        let measured = || RunSettings::from(Measured { rows: RowModel::Shared });
+        let measured = || RunSettings::measured(RowModel::Shared);
         let scg = Method::scaled_conjugate_gradient(0.0);
         let mut settings = measured();
         settings.choose_method(scg);

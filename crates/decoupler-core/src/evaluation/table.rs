@@ -9,20 +9,13 @@ use crate::{
 };
 
 /// Error table with baselines and decoders as rows; the columns depend on the channels. Each target of a recording has
-/// a block of rows, and so have all targets together if they share a unit.
+/// its table, and so have all targets together if they share a unit; all these tables have the same columns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorTable {
-    /// Measures of error, one for each column.
-    pub measures: &'static [ErrorMeasure],
-    /// Blocks of rows.
-    pub blocks: Vec<ErrorBlock>,
-}
-
-/// Rows of an error table on the same targets.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ErrorBlock {
     /// Target; `None` for the nodes of an array.
     pub target: Option<Channel>,
+    /// Measures of error, one for each column.
+    pub measures: &'static [ErrorMeasure],
     /// Rows: baselines, decoders, model-based and published figures.
     pub rows: Vec<ErrorRow>,
 }
@@ -75,7 +68,7 @@ const CHOSEN: &str = "chosen";
 /// Name of the row of the decoder that knows the sensor model.
 const MODEL_BASED: &str = "model-based";
 
-/// Name of the block of all targets.
+/// Name of the table of all targets.
 const ALL_TARGETS: &str = "all targets";
 
 impl ErrorMeasure {
@@ -211,9 +204,9 @@ impl ErrorRow {
 }
 
 impl ErrorTable {
-    /// Returns the table of the baselines, the network, the model-based decoder unless its errors are only rounding, and
+    /// Returns the tables of the baselines, the network, the model-based decoder unless its errors are only rounding, and
     /// the published errors, if there are any.
-    pub fn of_scores(problem: &Problem, scores: &Scores, published: Option<&PublishedErrors>) -> Self {
+    pub fn of_scores(problem: &Problem, scores: &Scores, published: Option<&PublishedErrors>) -> Vec<Self> {
         let baselines = &scores.baselines;
         let mut rows = vec![
             ("training mean", &baselines.mean),
@@ -227,91 +220,90 @@ impl ErrorTable {
         let model_based = baselines.model_based.as_ref();
         let model_based = model_based.filter(|errors| !errors.nodes().is_some_and(Errors::is_rounding));
         rows.extend(model_based.map(|errors| (MODEL_BASED, errors)));
-        let mut table = Self::new(problem, &rows);
+        let mut tables = Self::of_errors(problem, &rows);
         if !problem.has_nodes() && scores.coverage.iter().any(Option::is_some) {
-            table.add_coverage(&scores.coverage);
+            let coverage = scores.coverage.iter().copied().chain(std::iter::repeat(None));
+            tables
+                .iter_mut()
+                .zip(coverage)
+                .for_each(|(table, coverage)| table.add_coverage(coverage));
         }
-        let last = table.blocks.last_mut();
-        if let (Some(published), Some(block)) = (published, last.filter(|_| problem.has_nodes())) {
+        let last = tables.last_mut();
+        if let (Some(published), Some(table)) = (published, last.filter(|_| problem.has_nodes())) {
             let row = ErrorRow::new("published", table.measures, Figures::Published(published));
-            block.rows.push(row);
+            table.rows.push(row);
         }
-        table
+        tables
     }
 
     /// Name of the row of what is used: `chosen` if there is one, otherwise `network`.
     pub fn used(&self) -> &'static str {
-        let mut rows = self.blocks.iter().flat_map(|block| &block.rows);
-        if rows.any(|row| row.name == CHOSEN) {
-            CHOSEN
-        } else {
-            NETWORK
+        match self.rows.iter().any(|row| row.name == CHOSEN) {
+            true => CHOSEN,
+            false => NETWORK,
         }
     }
 
     /// Adds rows for the errors of the network while each target rises and while it falls; `loops` are in the order of
     /// the targets, `None` for those that do not rise and fall.
-    #[must_use]
-    pub fn with_loops(mut self, loops: &[Option<HysteresisLoop>]) -> Self {
-        let used = self.used();
-        for (block, found) in self.blocks.iter_mut().zip(loops) {
+    pub fn add_loops(tables: &mut [Self], loops: &[Option<HysteresisLoop>]) {
+        for (table, found) in tables.iter_mut().zip(loops) {
             let Some(HysteresisLoop { loading, unloading, .. }) = found else {
                 continue;
             };
-            let rows = match used {
+            let rows = match table.used() {
                 CHOSEN => [("chosen, loading", loading), ("chosen, unloading", unloading)],
                 _ => [("network, loading", loading), ("network, unloading", unloading)],
             };
-            let row = |(name, errors)| ErrorRow::new(name, self.measures, Figures::Target(errors));
-            block.rows.extend(rows.map(row));
+            let row = |(name, errors)| ErrorRow::new(name, table.measures, Figures::Target(errors));
+            table.rows.extend(rows.map(row));
         }
-        self
     }
 
-    /// Adds the measures of the intervals of the network, target by target.
-    fn add_coverage(&mut self, coverage: &[Option<Coverage>]) {
+    /// Adds the measures of the intervals of what is used.
+    fn add_coverage(&mut self, coverage: Option<Coverage>) {
         let used = self.used();
         self.measures = &ErrorMeasure::OF_TARGETS_WITH_INTERVALS;
         let added = &self.measures[ErrorMeasure::OF_TARGETS.len()..];
-        for (index, block) in self.blocks.iter_mut().enumerate() {
-            for row in &mut block.rows {
-                let coverage = coverage.get(index).copied().flatten().filter(|_| row.name == used);
-                let of = |measure: &ErrorMeasure| measure.of(Figures::Intervals(coverage.as_ref()?));
-                row.errors.extend(added.iter().map(of));
-            }
+        for row in &mut self.rows {
+            let coverage = coverage.as_ref().filter(|_| row.name == used);
+            let of = |measure: &ErrorMeasure| measure.of(Figures::Intervals(coverage?));
+            row.errors.extend(added.iter().map(of));
         }
     }
 
-    /// Returns the table of these errors, each with its name.
-    pub fn new(problem: &Problem, rows: &[(&'static str, &TestErrors)]) -> Self {
+    /// Returns the tables of these errors, each with its name.
+    pub fn of_errors(problem: &Problem, rows: &[(&'static str, &TestErrors)]) -> Vec<Self> {
         if problem.has_nodes() {
             let measures = &ErrorMeasure::OF_NODES;
             let row = |(name, errors): &(&'static str, &TestErrors)| {
                 Some(ErrorRow::new(name, measures, Figures::Nodes(errors.nodes()?)))
             };
             let rows = rows.iter().filter_map(row).collect();
-            return Self {
+            return vec![Self {
+                target: None,
                 measures,
-                blocks: vec![ErrorBlock { target: None, rows }],
-            };
+                rows,
+            }];
         }
         let measures = ErrorMeasure::OF_TARGETS;
-        let block = |target: Channel, errors: &dyn Fn(&TestErrors) -> Option<TargetErrors>| ErrorBlock {
+        let table = |target: Channel, errors: &dyn Fn(&TestErrors) -> Option<TargetErrors>| Self {
             target: Some(target),
+            measures,
             rows: Vec::from_iter(rows.iter().filter_map(|(name, of_row)| {
                 let errors = errors(of_row)?;
                 Some(ErrorRow::new(name, measures, Figures::Target(&errors)))
             })),
         };
         let targets = problem.targets.iter().enumerate();
-        let mut blocks = Vec::from_iter(
-            targets.map(|(index, target)| block(target.clone(), &|errors| errors.targets().get(index).copied())),
+        let mut tables = Vec::from_iter(
+            targets.map(|(index, target)| table(target.clone(), &|errors| errors.targets().get(index).copied())),
         );
         if let Some(unit) = problem.shared_unit().filter(|_| problem.targets.len() > 1) {
             let all = Channel::new(ALL_TARGETS, Some(unit));
-            blocks.push(block(all, &|errors| TargetErrors::over_all(errors.targets())));
+            tables.push(table(all, &|errors| TargetErrors::over_all(errors.targets())));
         }
-        Self { measures, blocks }
+        tables
     }
 }
 
@@ -383,24 +375,20 @@ mod tests {
     }
 
     #[test]
-    fn targets_that_share_a_unit_have_a_block_for_all_targets() {
+    fn targets_that_share_a_unit_have_a_table_for_all_targets() {
         // From scikit-learn: mean_squared_error(t, a) ** 0.5, mean_absolute_error, r2_score (uniform average), max.
         let targets = array![[0.0, 10.0], [1.0, 12.0], [2.0, 14.0], [3.0, 18.0]];
         let answers = array![[0.5, 10.0], [1.0, 11.0], [2.0, 14.0], [2.0, 20.0]];
         let errors = TestErrors::Targets(TargetErrors::measure(targets.view(), answers.view()));
-        let table = ErrorTable::new(&problem(["N", "N"]), &[("ridge", &errors)]);
-        assert_eq!(table.blocks.len(), 3);
-        let all = &table.blocks[2];
+        let tables = ErrorTable::of_errors(&problem(["N", "N"]), &[("ridge", &errors)]);
+        assert_eq!(tables.len(), 3);
+        let all = &tables[2];
         assert_eq!(all.target.as_ref().unwrap().title(), "all targets (N)");
         let expected = [0.883_883_476_483_184_4, 0.5625, 0.803_571_428_571_428_6, 2.0, 10.937_5];
         for (found, expected) in all.rows[0].errors.iter().zip(expected) {
             assert!((found.unwrap() - expected).abs() < 1e-12, "{found:?} {expected}");
         }
-        assert_eq!(
-            ErrorTable::new(&problem(["N", "mm"]), &[("ridge", &errors)])
-                .blocks
-                .len(),
-            2
-        );
+        let of_two_units = ErrorTable::of_errors(&problem(["N", "mm"]), &[("ridge", &errors)]);
+        assert_eq!(of_two_units.len(), 2);
     }
 }

@@ -1,6 +1,4 @@
-use super::{
-    Baselines, Begin, DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, TestErrors,
-};
+use super::{Baselines, DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, TestErrors};
 use crate::{
     dataset::Simulation, decoupling::DecoderKind, identifiability::Identifiability, job::Job, scene::Rows,
     sensor::RelativeNoise, training::Method,
@@ -76,7 +74,7 @@ pub fn measure_trade_off(
         let settings = RunSettings { hidden, ..*settings };
         let mut run = None;
         if offered[0].needs_network() {
-            let run = run.insert(Run::new(settings, sets.clone(), Begin::Initialize, job)?);
+            let run = run.insert(Run::new(settings, sets.clone(), None, job)?);
             run.baselines = Some(baselines.clone());
             run.finish(job)?;
             set.networks = Some(run.network());
@@ -103,7 +101,7 @@ pub fn measure_trade_off(
 
 /// Marks the points (cost, error) on the Pareto front: those for which no other point is better in one coordinate and
 /// at least as good in the other.
-pub(crate) fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
+pub fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
     let is_beaten = |&(cost, error): &(f64, f64)| {
         let beats = |other: &(f64, f64)| other.0 <= cost && other.1 <= error && (other.0 < cost || other.1 < error);
         points.iter().any(beats)
@@ -125,81 +123,6 @@ pub fn most_accurate_under(points: &[TradeOffPoint], microseconds: f64) -> Optio
     let error = |place: usize| points[place].percent();
     let places = (0..points.len()).filter(is_quick);
     places.min_by(|&a, &b| error(a).total_cmp(&error(b)))
-}
-
-/// Cost that is plotted against the error.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum TradeOffCost {
-    /// Time to decode a frame on one thread.
-    #[default]
-    Decoding,
-    /// Processor time of training and fitting.
-    Training,
-}
-
-impl TradeOffCost {
-    /// Both costs, in the order offered to the user.
-    pub const ALL: [Self; 2] = [Self::Decoding, Self::Training];
-
-    /// Returns the cost (microseconds of decoding, or seconds of training) and the error in percent.
-    pub fn of(self, point: &TradeOffPoint) -> (f64, f64) {
-        let cost = match self {
-            Self::Decoding => point.report.frame_us,
-            Self::Training => point.training_seconds,
-        };
-        (cost, point.percent())
-    }
-
-    /// Returns the name of the cost with its unit.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Decoding => "time to decode a frame (µs)",
-            Self::Training => "training time (s)",
-        }
-    }
-}
-
-/// Limits of the questions "fastest under" and "most accurate under".
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TradeOffLimits {
-    /// Maximum error in percent.
-    pub percent: f64,
-    /// Maximum time per frame in microseconds.
-    pub microseconds: f64,
-}
-
-impl Default for TradeOffLimits {
-    fn default() -> Self {
-        Self {
-            percent: 1.0,
-            microseconds: 10.0,
-        }
-    }
-}
-
-/// Points of the trade-off at one noise level, or on a recording.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TradeOffLevel {
-    /// Relative error of a reading, if it is simulated.
-    pub noise: Option<f64>,
-    /// Points in the order in which they were measured.
-    pub points: Vec<TradeOffPoint>,
-}
-
-impl TradeOffLevel {
-    /// Marks the points on the Pareto front for this cost.
-    pub fn front(&self, cost: TradeOffCost) -> Vec<bool> {
-        let points: Vec<_> = self.points.iter().map(|point| cost.of(point)).collect();
-        pareto_front(&points)
-    }
-
-    /// Returns the indices of the points that answer "fastest under" and "most accurate under".
-    pub fn answers(&self, limits: &TradeOffLimits) -> [Option<usize>; 2] {
-        [
-            fastest_under(&self.points, limits.percent),
-            most_accurate_under(&self.points, limits.microseconds),
-        ]
-    }
 }
 
 /// Conditioning of a scene and the resulting warnings, known before anything is trained.

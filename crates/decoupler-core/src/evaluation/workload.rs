@@ -6,7 +6,7 @@ use crate::{
     decoupling::{DecoderKind, GaussianPrior},
     machine::{MemoryBudget, Speed, node_pairs_per_row},
     network::{ScalingChoice, Shape},
-    scene::{Movement, RowModel, Rows},
+    scene::{Movement, Rows},
     training::Method,
 };
 
@@ -43,10 +43,7 @@ impl TrainingSize {
             samples: training.samples(),
             inputs: training.readings().ncols(),
             targets: training.targets().ncols(),
-            networks: match settings.source.row_model() {
-                RowModel::Shared => 1,
-                RowModel::Each => training.row_count(),
-            },
+            networks: settings.source.row_model().decoders(training.row_count()),
         }
     }
 
@@ -57,7 +54,7 @@ impl TrainingSize {
     pub fn drawn(settings: &RunSettings) -> Result<Self, RunError> {
         let simulation = settings.drawn()?;
         let Simulation { sensor, scene, .. } = simulation;
-        let (scale, size) = (sensor.scale, simulation.model_size()?);
+        let (scale, rows) = (sensor.scale, simulation.rows()?);
         let varying_axes = match (scene.movement, scene.rows) {
             (Movement::Xyz { .. }, _) => 3,
             // A network that does not know the row also learns the x coordinate.
@@ -65,23 +62,12 @@ impl TrainingSize {
             (Movement::Z, _) => 1,
         };
         Ok(Self {
-            samples: simulation.samples.div_ceil(size.rows) * size.rows,
+            samples: simulation.samples.div_ceil(rows) * rows,
             inputs: scale.columns(),
             targets: varying_axes * scale.nodes_per_row(),
-            networks: size.networks,
+            networks: scene.rows.model().decoders(rows),
         })
     }
-}
-
-/// Time of a run on this machine, from rates measured on one thread. Large runs are faster with more threads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WorkloadTime {
-    /// Time to draw the samples.
-    pub drawing: Duration,
-    /// Time per epoch.
-    pub epoch: Duration,
-    /// Time of all epochs, if none of the other stopping rules ends the training.
-    pub all_epochs: Duration,
 }
 
 impl Workload {
@@ -120,12 +106,12 @@ impl Workload {
     /// Returns the methods that would train on the same recording in less than half of this time, with the time of each
     /// for the number of epochs that it gets by default.
     pub fn faster_methods(&self, settings: &RunSettings, size: TrainingSize) -> Vec<(Method, Duration)> {
-        let present = self.time().all_epochs;
+        let present = self.training_time();
         let candidates = [Method::default(), Method::scaled_conjugate_gradient(0.0)];
         let of_each = candidates.into_iter().map(|method| {
             let mut other = *settings;
             other.choose_method(method);
-            (method, Self::of(&other, size).time().all_epochs)
+            (method, Self::of(&other, size).training_time())
         });
         of_each.filter(|(_, time)| time.saturating_mul(2) < present).collect()
     }
@@ -156,15 +142,20 @@ impl Workload {
         self.epoch_multiplications * self.epochs as f64
     }
 
-    /// Computes the time on this machine. The first call measures its speed, which takes about 20 ms.
-    pub fn time(&self) -> WorkloadTime {
-        let speed = Speed::measured();
-        let duration = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
-        WorkloadTime {
-            drawing: duration(self.node_pairs / speed.node_pairs),
-            epoch: duration(self.epoch_multiplications / speed.multiplications),
-            all_epochs: duration(self.multiplications() / speed.multiplications),
-        }
+    /// Time to draw the samples on one thread of this machine. The first call of this or another time measures its speed,
+    /// which takes about 20 ms; large runs are faster with more threads.
+    pub fn drawing_time(&self) -> Duration {
+        duration(self.node_pairs / Speed::measured().node_pairs)
+    }
+
+    /// Time per epoch on one thread of this machine.
+    pub fn epoch_time(&self) -> Duration {
+        duration(self.epoch_multiplications / Speed::measured().multiplications)
+    }
+
+    /// Time of all epochs on one thread of this machine, if none of the other stopping rules ends the training.
+    pub fn training_time(&self) -> Duration {
+        duration(self.multiplications() / Speed::measured().multiplications)
     }
 
     /// Checks that the work fits into `memory`.
@@ -172,7 +163,7 @@ impl Workload {
     /// # Errors
     /// [`RunError::Memory`] if it does not.
     pub fn check_memory(&self, memory: MemoryBudget) -> Result<(), RunError> {
-        if self.bytes > memory.bytes {
+        if self.bytes > memory.bytes() {
             return Err(RunError::Memory {
                 bytes: self.bytes,
                 memory,
@@ -182,18 +173,22 @@ impl Workload {
     }
 }
 
+fn duration(seconds: f64) -> Duration {
+    Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
+}
+
 /// Returns the memory of drawn samples and the priors of their rows in bytes, and the number of pairs of their nodes; `None`
 /// without the rows of the scene, where nothing can be drawn.
 fn drawing(simulation: &Simulation, size: TrainingSize) -> Option<(u64, f64)> {
-    let (model, scale) = (simulation.model_size().ok()?, simulation.sensor.scale);
-    let whole = |samples: usize| samples.div_ceil(model.rows) * model.rows;
+    let (rows, scale) = (simulation.rows().ok()?, simulation.sensor.scale);
+    let whole = |samples: usize| samples.div_ceil(rows) * rows;
     let held_out = whole(simulation.validation_samples) + whole(simulation.test_samples);
     let drawn = size.samples.saturating_add(held_out);
     // Readings and targets are drawn, split, scaled, and copied to blocks for the training.
     let per_sample = 3 * scale.columns() + 3 * scale.coordinates_per_row() + size.inputs + 1 + size.targets;
     let needs_prior = !(simulation.scene.noise.in_test().is_none() && simulation.is_determined());
-    let unknowns = model.unknowns / model.rows;
-    let prior = || GaussianPrior::bytes(simulation.scene.loading, model.rows, unknowns);
+    let unknowns = simulation.scene.unknowns_per_row(scale);
+    let prior = || GaussianPrior::bytes(simulation.scene.loading, rows, unknowns);
     let prior = if needs_prior { prior() } else { 0 };
     let node_pairs = drawn as f64 * node_pairs_per_row(&simulation.sensor);
     Some((float_bytes(drawn, per_sample).saturating_add(prior), node_pairs))
@@ -207,7 +202,6 @@ fn float_bytes(rows: usize, columns: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{evaluation::Measured, machine::MemorySource};
 
     fn settings(array: &str, method: &str, hidden: usize) -> RunSettings {
         let mut settings = RunSettings {
@@ -265,10 +259,7 @@ mod tests {
         settings.starts = 100;
         let workload = drawn(&settings);
         assert!(workload.bytes > 500_000_000_000, "{workload:?}");
-        let memory = MemoryBudget {
-            bytes: 500_000_000_000,
-            source: MemorySource::System,
-        };
+        let memory = MemoryBudget::System(500_000_000_000);
         let message = workload.check_memory(memory).unwrap_err().to_string();
         assert!(
             message.contains("GB of memory, and the machine has 500.0 GB"),
@@ -279,7 +270,7 @@ mod tests {
 
     #[test]
     fn wide_inputs_make_a_training_on_a_recording_long_and_conjugate_gradients_faster() {
-        let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        let settings = RunSettings::measured(crate::scene::RowModel::Shared);
         let size = TrainingSize {
             samples: 5000,
             inputs: 192,

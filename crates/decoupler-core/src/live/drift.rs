@@ -3,8 +3,8 @@ use std::collections::VecDeque;
 use faer::{Mat, Side};
 use ndarray::{ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
+use super::LiveError;
 use crate::{numerics::correlation_time, problem::Channel};
 
 /// Description of the training readings against which [`DriftMonitor`] compares later readings: the range over blocks of
@@ -31,45 +31,6 @@ pub struct DriftReference {
     /// Smallest and largest value of each [`Statistic`] in the training blocks, widened by [`LEVEL_MARGIN`] or
     /// [`RATIO_MARGIN`].
     ranges: Vec<[f64; 2]>,
-}
-
-/// Reason why the readings of a network are not monitored.
-#[derive(Clone, Debug, PartialEq, Eq, Error, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum NoDriftMonitor {
-    /// No input varies.
-    #[error("every input is constant in the training samples")]
-    Constant,
-    /// There are too few independent training readings.
-    #[error(
-        "there are {blocks} independent blocks of training readings, each {block} long, which is five times as long as \
-         neighbouring readings are correlated, and {} are needed: record longer",
-        DriftReference::MIN_BLOCKS
-    )]
-    TooFewReadings {
-        /// Number of independent blocks.
-        blocks: usize,
-        /// Number of readings in a block.
-        block: usize,
-    },
-    /// There are too many inputs.
-    #[error(
-        "the network has {found} inputs, and at most {} can be monitored",
-        DriftReference::MAX_CHANNELS
-    )]
-    TooManyInputs {
-        /// Number of inputs.
-        found: usize,
-    },
-    /// Readings are NaN, infinite, or too large to compute with.
-    #[error("training readings are not finite, or too large")]
-    NotFinite,
-    /// The row-wires are known, and each has readings of its own.
-    #[error("the network has inputs by row-wire, which are not monitored")]
-    RowWires,
-    /// The training readings were not described.
-    #[error("the network file does not describe the training readings, as those of older versions: train again")]
-    NotDescribed,
 }
 
 /// Regularisation of the correlation matrix.
@@ -183,7 +144,7 @@ impl Block {
 
 impl DriftReference {
     /// Minimum number of training blocks.
-    const MIN_BLOCKS: usize = 10;
+    pub(super) const MIN_BLOCKS: usize = 10;
     /// Minimum length of a block in correlation times.
     const MIN_TIMES: f64 = 5.0;
     /// Maximum length: longer blocks detect smaller changes, but later.
@@ -193,22 +154,21 @@ impl DriftReference {
     /// Number of parts of the training set; the squares of each are measured with the correlation of the others, as
     /// those of later readings are.
     const PARTS: usize = 5;
-    const MAX_CHANNELS: usize = 512;
+    pub(super) const MAX_CHANNELS: usize = 512;
 
     /// Describes the training `readings` (samples × channels, in the order of time).
     ///
     /// # Errors
     /// If there are too few independent readings or too many channels, no channel varies, or a reading is not finite.
-    pub fn of(readings: ArrayView2<'_, f64>) -> Result<Self, NoDriftMonitor> {
+    pub fn of(readings: ArrayView2<'_, f64>) -> Result<Self, LiveError> {
         let (samples, channels) = readings.dim();
         if channels > Self::MAX_CHANNELS {
-            return Err(NoDriftMonitor::TooManyInputs { found: channels });
+            return Err(LiveError::TooManyInputs { found: channels });
         }
         let scales: Option<Vec<(f64, f64)>> = readings.columns().into_iter().map(scale).collect();
-        let (means, inverse_deviations): (Vec<f64>, Vec<f64>) =
-            scales.ok_or(NoDriftMonitor::NotFinite)?.into_iter().unzip();
+        let (means, inverse_deviations): (Vec<f64>, Vec<f64>) = scales.ok_or(LiveError::NotFinite)?.into_iter().unzip();
         if inverse_deviations.iter().all(|inverse| *inverse == 0.0) {
-            return Err(NoDriftMonitor::Constant);
+            return Err(LiveError::Constant);
         }
         let mut reference = Self {
             means,
@@ -228,7 +188,7 @@ impl DriftReference {
         let block = (length * time).ceil() as usize;
         let blocks = samples / block;
         if blocks < Self::MIN_BLOCKS {
-            return Err(NoDriftMonitor::TooFewReadings { blocks, block });
+            return Err(LiveError::TooFewReadings { blocks, block });
         }
         let parts = (0..Self::PARTS).map(|part| part * samples / Self::PARTS..(part + 1) * samples / Self::PARTS);
         let moments = parts.clone().map(|part| {
@@ -239,12 +199,12 @@ impl DriftReference {
             scaled.transpose() * &scaled
         });
         let moments: Vec<Mat<f64>> = moments.collect();
-        let (_, factor) = factor_of(moments.iter()).ok_or(NoDriftMonitor::NotFinite)?;
+        let (_, factor) = factor_of(moments.iter()).ok_or(LiveError::NotFinite)?;
         (reference.block, reference.blocks, reference.factor) = (block, blocks, factor);
         let (mut block, mut held_out) = (Block::new(channels), vec![0.0; channels]);
         for (part, samples) in parts.enumerate() {
             let others = moments.iter().enumerate().filter(|(other, _)| *other != part);
-            let (means, factor) = factor_of(others.map(|(_, moments)| moments)).ok_or(NoDriftMonitor::NotFinite)?;
+            let (means, factor) = factor_of(others.map(|(_, moments)| moments)).ok_or(LiveError::NotFinite)?;
             for sample in samples {
                 block.read(&reference, readings.row(sample));
                 let centred = block.scaled.iter().zip(&means).map(|(scaled, mean)| scaled - mean);
@@ -369,6 +329,8 @@ pub struct Drift {
     pub first: u64,
     /// Position of the last of these readings so far.
     pub last: u64,
+    /// `true` once the readings look like the training readings again.
+    pub has_ended: bool,
     statistic: Statistic,
     is_larger: bool,
 }
@@ -393,15 +355,6 @@ impl Drift {
             }
         }
     }
-}
-
-/// Change of the state of a [`DriftMonitor`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DriftEvent {
-    /// The readings no longer look like the training readings.
-    Began(Drift),
-    /// They look like the training readings again.
-    Ended(Drift),
 }
 
 /// Monitor that reports when readings no longer look like the training readings, so that the intervals of the network no
@@ -447,11 +400,11 @@ impl DriftMonitor {
     }
 
     /// Takes the next readings, with their position such as the number of their line; further values, such as those of a
-    /// memory, are ignored, and so are readings that are not finite.
+    /// memory, are ignored, and so are readings that are not finite. Returns a drift when it begins, and again when it ends.
     ///
     /// # Panics
     /// If there are fewer readings than channels.
-    pub fn take(&mut self, position: u64, readings: &[f64]) -> Option<DriftEvent> {
+    pub fn take(&mut self, position: u64, readings: &[f64]) -> Option<Drift> {
         let readings = &readings[..self.reference.channels()];
         if !readings.iter().all(|reading| reading.is_finite()) {
             return None;
@@ -473,7 +426,7 @@ impl DriftMonitor {
     }
 
     /// Judges the block that ends at `position`.
-    fn judge(&mut self, position: u64, statistics: &[f64]) -> Option<DriftEvent> {
+    fn judge(&mut self, position: u64, statistics: &[f64]) -> Option<Drift> {
         let mut sign = None;
         for (index, (value, [low, high])) in statistics.iter().zip(&self.reference.ranges).enumerate() {
             let (runs, is_drifted) = (&mut self.runs[index], &mut self.is_drifted[index]);
@@ -490,11 +443,12 @@ impl DriftMonitor {
                 let drift = Drift {
                     first: *self.begins.front()?,
                     last: position,
+                    has_ended: false,
                     statistic: Statistic::at(statistic, self.reference.channels()),
                     is_larger,
                 };
                 self.drift = Some(drift);
-                Some(DriftEvent::Began(drift))
+                self.drift
             }
             (Some(_), Some(drift)) => {
                 drift.last = position;
@@ -508,7 +462,11 @@ impl DriftMonitor {
                 }
                 self.blocks_without = 0;
                 self.is_drifted.fill([false; 2]);
-                self.drift.take().map(DriftEvent::Ended)
+                let ended = self.drift.take();
+                ended.map(|drift| Drift {
+                    has_ended: true,
+                    ..drift
+                })
             }
             (None, None) => None,
         }

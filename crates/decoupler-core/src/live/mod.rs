@@ -5,11 +5,13 @@
 //! unloaded state from recent frames.
 
 mod drift;
+mod error;
 mod left_out_decoder;
 mod re_zero;
 mod wire_check;
 
-pub use drift::{Drift, DriftEvent, DriftMonitor, DriftReference, NoDriftMonitor};
+pub use drift::{Drift, DriftMonitor, DriftReference};
+pub use error::LiveError;
 pub use left_out_decoder::LeftOutDecoder;
-pub use re_zero::{ReZero, ReZeroError, ZeroGains};
+pub use re_zero::{ReZero, ZeroGains};
 pub use wire_check::{Diagnosis, FaultCause, FaultEvent, FaultyWire, WireCheck};

@@ -2,8 +2,8 @@ use std::collections::VecDeque;
 
 use ndarray::{Array1, Array2, ArrayViewMut1};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
+use super::LiveError;
 use crate::{numerics::median, scene::NoiseSource};
 
 /// Estimates the unloaded state from recent frames, without erasing a sustained contact.
@@ -41,43 +41,6 @@ pub struct ZeroGains {
     pub gains: Vec<f64>,
     /// True for rows in contact, whose gains are those of their columns.
     pub in_contact: Vec<bool>,
-}
-
-/// Reason why the unloaded state cannot be estimated.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum ReZeroError {
-    /// Too few frames.
-    #[error("only {found} of {needed} frames have been received: wait a moment and try again")]
-    Frames {
-        /// Number of frames received.
-        found: usize,
-        /// Number of frames needed.
-        needed: usize,
-    },
-    /// Half of the rows or more are in contact.
-    #[error("{touched} of {rows} rows are in contact: remove the load from at least half of the rows and try again")]
-    Contact {
-        /// Number of rows in contact.
-        touched: usize,
-        /// Number of rows read.
-        rows: usize,
-    },
-    /// A gain is far from 1.
-    #[error(
-        "row {}, column {}: the reading is {gain:.2} times that at rest, which is too much for drift; check the wire, or \
-         remove the load",
-        row + 1,
-        column + 1
-    )]
-    Gain {
-        /// Index of the row among those read, from 0.
-        row: usize,
-        /// Column-wire, from 0.
-        column: usize,
-        /// Its gain.
-        gain: f64,
-    },
 }
 
 /// Median absolute deviation of a normal distribution in units of its standard deviation.
@@ -125,10 +88,10 @@ impl ReZero {
     ///
     /// # Errors
     /// If there are too few frames, too many rows are in contact, or a gain is far from 1.
-    pub fn gains(&self) -> Result<ZeroGains, ReZeroError> {
+    pub fn gains(&self) -> Result<ZeroGains, LiveError> {
         let (found, needed) = (self.frames_ohm.len(), Self::FRAMES);
         if found < needed {
-            return Err(ReZeroError::Frames { found, needed });
+            return Err(LiveError::Frames { found, needed });
         }
         // Logarithms of the readings of each channel relative to its resistance at rest, without the common gain error.
         let rest_ohm = self.rest_ohm.iter().enumerate();
@@ -181,7 +144,7 @@ impl ReZero {
             .collect();
         let touched = in_contact.iter().filter(|touched| **touched).count();
         if 2 * touched >= rows && touched > 0 {
-            return Err(ReZeroError::Contact { touched, rows });
+            return Err(LiveError::Contact { touched, rows });
         }
         let gain = |((row, column), ratio): ((usize, usize), &f64)| {
             let log_gain = if in_contact[row] {
@@ -194,7 +157,7 @@ impl ReZero {
         let gains = Vec::from_iter(ratios.indexed_iter().map(gain));
         let is_far = |gain: &f64| !(1.0 / LARGEST_GAIN..=LARGEST_GAIN).contains(gain);
         if let Some(index) = gains.iter().position(is_far) {
-            return Err(ReZeroError::Gain {
+            return Err(LiveError::Gain {
                 row: index / columns,
                 column: index % columns,
                 gain: gains[index],
@@ -449,7 +412,7 @@ mod tests {
         let error = re_zero(moving, &[1.0; 30], &mut rng).gains().unwrap_err();
         assert!(error.to_string().contains("rows are in contact"), "{error}");
         let new = ReZero::new(at_rest(&model), 30, NoiseSource::default());
-        assert_eq!(new.gains().unwrap_err(), ReZeroError::Frames { found: 0, needed: 25 });
+        assert_eq!(new.gains().unwrap_err(), LiveError::Frames { found: 0, needed: 25 });
     }
 
     /// Noise of every kind, known and unknown.
@@ -506,10 +469,7 @@ mod tests {
             let assumed = if assumed.is_none() { assumed } else { noise };
             let mut rng = Seed(3).rng(Stream::Live);
             let found = re_zero_in(noise, assumed, moving, &[1.0; 30], &mut rng).gains();
-            assert!(
-                matches!(found, Err(ReZeroError::Contact { .. })),
-                "{noise:?} {assumed:?}"
-            );
+            assert!(matches!(found, Err(LiveError::Contact { .. })), "{noise:?} {assumed:?}");
         }
     }
 

@@ -27,6 +27,16 @@ pub enum RowModel {
     Each,
 }
 
+impl RowModel {
+    /// Number of decoders for this many row-wires.
+    pub fn decoders(self, rows: usize) -> usize {
+        match self {
+            Self::Shared => 1,
+            Self::Each => rows,
+        }
+    }
+}
+
 impl Rows {
     /// Returns the row-wires read in an array with `rows` row-wires.
     ///

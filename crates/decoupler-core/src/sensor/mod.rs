@@ -5,8 +5,10 @@ mod array_scale;
 mod conductance;
 mod geometry;
 mod resistance;
+#[cfg(test)]
+mod rounding;
 
 pub use array_scale::{ArrayScale, LARGEST_COUNT};
-pub use conductance::RowConductance;
+pub(crate) use conductance::RowConductance;
 pub use geometry::{Axes, Geometry};
 pub use resistance::{DEFAULT_RESISTIVITY_OHM_PER_MM, RelativeNoise, SensorError, SensorModel, short};

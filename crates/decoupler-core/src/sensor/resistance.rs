@@ -78,6 +78,17 @@ pub enum SensorError {
         /// Computed value.
         resistance_ohm: f64,
     },
+    /// The array has no such row-wire.
+    #[error("row {} does not exist: the array has rows 1 to {rows}", row + 1)]
+    Row {
+        /// Row-wire requested, from 0.
+        row: usize,
+        /// Number of row-wires of the array.
+        rows: usize,
+    },
+    /// The singular value decomposition of the Jacobian of a row-wire did not converge.
+    #[error("the singular values of row {} did not converge: use lengths of similar size in the geometry", .0 + 1)]
+    NotConverged(usize),
 }
 
 impl SensorModel {

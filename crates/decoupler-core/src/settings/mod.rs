@@ -6,7 +6,7 @@ mod rows;
 mod training;
 
 pub use method::{Damping, Method, RegularizationSettings};
-pub use rows::{AsText, Field, Kind, Setting, SettingError, Value};
+pub use rows::{Field, Kind, Setting, SettingError, Value};
 use training::METHOD;
 pub(crate) use training::MIN_MU;
 pub use training::{EPOCHS, StoppingRules, TrainingSettings};

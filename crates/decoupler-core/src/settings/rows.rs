@@ -8,11 +8,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::Method;
-use crate::{
-    sensor::{ArrayScale, SensorError, short},
-    text::Named,
-};
+use crate::{sensor::short, text::Named};
 
 /// A setting of `S`: a row of a table.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +36,8 @@ pub enum Kind {
     Text,
 }
 
+type ReadText<'a> = Box<dyn FnOnce(&str) -> Result<(), String> + 'a>;
+
 /// Access to the value of a setting.
 pub enum Field<'a> {
     /// Number; an integer if the [kind](Setting::kind) is [`Kind::Integer`].
@@ -48,52 +46,23 @@ pub enum Field<'a> {
     Count(&'a mut usize),
     /// Integer of 64 bits, such as a seed.
     Integer(&'a mut u64),
-    /// Name or text.
-    Text(&'a mut dyn AsText),
+    /// Name or text, and how it is read; an error is a sentence that says what is possible instead.
+    Text(String, ReadText<'a>),
 }
 
-/// Value that is read and written as text.
-pub trait AsText {
-    /// Returns the value as text.
-    fn text(&self) -> String;
-
-    /// Reads the value from text.
-    ///
-    /// # Errors
-    /// A sentence that says what is possible instead.
-    fn read(&mut self, text: &str) -> Result<(), String>;
-}
-
-impl AsText for Method {
-    fn text(&self) -> String {
-        self.short_name().to_owned()
+impl<'a> Field<'a> {
+    /// Gives access to an enum by the names of its variants.
+    pub fn named<T: Named>(value: &'a mut T) -> Self {
+        Self::text(value.name().to_owned(), value, T::parse)
     }
 
-    fn read(&mut self, text: &str) -> Result<(), String> {
-        *self = Self::named(text).map_err(|error| error.to_string())?;
-        Ok(())
-    }
-}
-
-impl AsText for ArrayScale {
-    fn text(&self) -> String {
-        self.to_string()
-    }
-
-    fn read(&mut self, text: &str) -> Result<(), String> {
-        *self = text.parse().map_err(|error: SensorError| error.to_string())?;
-        Ok(())
-    }
-}
-
-impl<T: Named> AsText for T {
-    fn text(&self) -> String {
-        self.name().to_owned()
-    }
-
-    fn read(&mut self, text: &str) -> Result<(), String> {
-        *self = Self::parse(text).map_err(|error| error.to_string())?;
-        Ok(())
+    /// Gives access to a value by its text, which `parse` reads.
+    pub fn text<T, E: ToString + 'a>(text: String, value: &'a mut T, parse: fn(&str) -> Result<T, E>) -> Self {
+        let read = move |text: &str| {
+            *value = parse(text).map_err(|error| error.to_string())?;
+            Ok(())
+        };
+        Self::Text(text, Box::new(read))
     }
 }
 
@@ -178,7 +147,7 @@ impl<S: Clone> Setting<S> {
             Field::Number(value) => Value::Number(*value),
             Field::Count(value) => Value::Integer(*value as u64),
             Field::Integer(value) => Value::Integer(*value),
-            Field::Text(value) => Value::Text(value.text()),
+            Field::Text(text, _) => Value::Text(text),
         })
     }
 
@@ -204,8 +173,8 @@ impl<S: Clone> Setting<S> {
                 *field = usize::try_from(*value).unwrap_or(usize::MAX);
             }
             (Some(Field::Integer(field)), Value::Integer(value)) => *field = *value,
-            (Some(Field::Text(field)), Value::Text(text)) => {
-                field.read(text).map_err(|message| self.refusal(message))?;
+            (Some(Field::Text(_, read)), Value::Text(text)) => {
+                read(text).map_err(|message| self.refusal(message))?;
             }
             (Some(_), value) => return Err(self.refusal(format!("'{value}' is not {}", self.kind))),
         }

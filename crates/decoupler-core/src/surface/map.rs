@@ -1,7 +1,4 @@
-use std::{
-    fmt,
-    sync::{Arc, Mutex, PoisonError, Weak},
-};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use glam::DVec2;
 
@@ -20,36 +17,11 @@ const MAX_WEIGHTS: usize = 1_100_000;
 /// Number of grid points per side, as far as [`MAX_WEIGHTS`] allows.
 const GRID_POINTS: usize = 110;
 
-/// Interpolation between the nodes. Each kind reproduces constants and planes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Interpolation {
-    /// The biharmonic spline with a plane (Duchon 1977). MATLAB's `griddata(…, 'v4')`, used for the paper's figures, has
-    /// no plane, so that its surfaces sag between nodes of equal height and depend on the unit of length.
-    ThinPlateSpline,
-    /// A natural cubic spline along a single row or column of nodes, constant across it; level for a single node.
-    CubicSpline,
-    /// Bilinear between neighbours, continued with the same slope beyond the outermost nodes. Used for more than a
-    /// thousand nodes, and for nodes so unevenly spaced that a spline would overshoot a thousandfold or be lost in
-    /// rounding errors.
-    Bilinear,
-}
-
-impl fmt::Display for Interpolation {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(match self {
-            Self::ThinPlateSpline => "thin-plate spline (the biharmonic spline with a plane)",
-            Self::CubicSpline => "natural cubic spline",
-            Self::Bilinear => "bilinear",
-        })
-    }
-}
-
 /// Interpolation through nodes, factored once, so that each frame takes one matrix-vector product.
 #[derive(Clone, Debug)]
 pub struct SurfaceMap {
     pub(super) grid: Grid,
     pub(super) nodes: usize,
-    pub(super) interpolation: Interpolation,
     /// Weights of the spline; `None` if it is not used.
     pub(super) weights: Option<Weights>,
     /// Row of the weights at each grid point; `None` where there is no surface.
@@ -121,11 +93,6 @@ impl SurfaceMap {
         let places_mm = x_mm.iter().flat_map(|&x| y_mm.iter().map(move |&y| DVec2::new(x, y)));
         let weights = (nodes <= MAX_SPLINE_NODES).then(|| Weights::new(&Vec::from_iter(places_mm), &points));
         let weights = weights.flatten();
-        let interpolation = match weights {
-            Some(_) if is_line => Interpolation::CubicSpline,
-            Some(_) => Interpolation::ThinPlateSpline,
-            None => Interpolation::Bilinear,
-        };
         if weights.is_none() {
             grid = self::grid(&lattice, GRID_POINTS);
         }
@@ -133,7 +100,6 @@ impl SurfaceMap {
             beyond: grid.beyond(),
             grid,
             nodes,
-            interpolation,
             weights,
             rows,
             lattice: Some(lattice),
@@ -156,9 +122,21 @@ impl SurfaceMap {
         self.nodes
     }
 
-    /// Returns the interpolation used between the nodes.
-    pub fn interpolation(&self) -> Interpolation {
-        self.interpolation
+    /// Describes the interpolation between the nodes, which reproduces constants and planes:
+    ///
+    /// - a thin-plate spline, the biharmonic spline with a plane (Duchon 1977). MATLAB's `griddata(…, 'v4')`, used for the
+    ///   paper's figures, has no plane, so that its surfaces sag between nodes of equal height and depend on the unit of
+    ///   length.
+    /// - a natural cubic spline along a single row or column of nodes, constant across it; level for a single node.
+    /// - bilinear between neighbours, continued with the same slope beyond the outermost nodes: for more than a thousand
+    ///   nodes, and for nodes so unevenly spaced that a spline would overshoot a thousandfold or be lost in rounding errors.
+    pub fn interpolation(&self) -> &'static str {
+        let is_line = self.lattice.iter().flatten().any(|axis| axis.nodes_mm.len() == 1);
+        match &self.weights {
+            None => "bilinear",
+            Some(_) if is_line => "natural cubic spline",
+            Some(_) => "thin-plate spline (the biharmonic spline with a plane)",
+        }
     }
 
     /// Returns the surface through `node_values` (for a lattice `rows × nodes_per_row`, row by row; in any unit): `x points

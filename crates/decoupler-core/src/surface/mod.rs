@@ -3,8 +3,8 @@
 //! The positions of the nodes in (x, y) are fixed, so the interpolation is factored once per array and each frame is one
 //! matrix-vector product. A [`SurfaceMap`] evaluates it on a [`Grid`]: as a thin-plate spline through a lattice or
 //! scattered nodes, as a curve if the nodes are on one line, or bilinearly if neither is feasible. All of them reproduce
-//! constants and planes, and none depends on the unit of length or the origin. [`Lattice`] detects a lattice among points
-//! in any order.
+//! constants and planes, and none depends on the unit of length or the origin. A lattice
+//! is detected among points in any order.
 
 mod error;
 mod grid;
@@ -15,5 +15,5 @@ mod spline;
 
 pub use error::SurfaceError;
 pub use grid::Grid;
-pub use lattice::Lattice;
-pub use map::{Interpolation, SurfaceMap};
+pub(crate) use lattice::lattice;
+pub use map::SurfaceMap;

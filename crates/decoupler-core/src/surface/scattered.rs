@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::{
     error::SurfaceError,
     grid::{CLOSEST_RELATIVE, Grid, GridAxis, check_coordinates},
-    map::{Interpolation, MAX_SPLINE_NODES, SurfaceMap, affordable},
+    map::{MAX_SPLINE_NODES, SurfaceMap, affordable},
     spline::{Point, Weights},
 };
 
@@ -71,7 +71,6 @@ impl SurfaceMap {
         Ok(Self {
             grid,
             nodes,
-            interpolation: Interpolation::ThinPlateSpline,
             weights: Some(Weights::new(&places, &points).ok_or(SurfaceError::Uneven)?),
             rows,
             beyond,

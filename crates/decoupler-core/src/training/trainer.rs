@@ -102,7 +102,7 @@ pub fn check_width(
         bytes,
         memory,
     };
-    if bytes > memory.bytes { Err(too_wide) } else { Ok(()) }
+    if bytes > memory.bytes() { Err(too_wide) } else { Ok(()) }
 }
 
 /// A training in progress. It runs one epoch for each call of [`Self::step`], so pausing only means not calling `step`.
@@ -373,7 +373,7 @@ impl Evaluation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{machine::MemorySource, network::Shape};
+    use crate::network::Shape;
 
     #[test]
     fn simultaneous_trainings_share_the_memory() {
@@ -382,10 +382,7 @@ mod tests {
             hidden: 12,
             outputs: 30,
         };
-        let memory = MemoryBudget {
-            bytes: 1_000_000_000,
-            source: MemorySource::User,
-        };
+        let memory = MemoryBudget::User(1_000_000_000);
         let check = |trainings| check_width(&Method::default(), shape, 1000, trainings, memory);
         assert_eq!(check(1), Ok(()));
         let refused = check(1_000_000_000).unwrap_err().to_string();

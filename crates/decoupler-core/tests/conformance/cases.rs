@@ -1,8 +1,9 @@
 //! Fitted decoders with samples to decode.
 
 use decoupler_core::{
-    dataset::{Dataset, PerRow, Seed, Stream},
-    decoupling::{Decoder, DecoderKind, FitProblem},
+    dataset::{Dataset, PerRow, Seed, Simulation, Stream},
+    decoupling::{Decoder, DecoderKind},
+    evaluation::{DecoderSet, RunSettings},
     network::{
         DecouplingNetwork, InputChoice, Inputs, MinMax, NetworkError, Networks, Quantity, ScalingChoice, Shape,
         nguyen_widrow,
@@ -26,7 +27,7 @@ pub(crate) struct Case {
 /// Samples, with the sensor and scene if they were simulated.
 struct Source {
     name: &'static str,
-    sensor: Option<(SensorModel, Scene)>,
+    sensor: Option<Simulation>,
     training: Dataset,
     test: Dataset,
     inputs: Vec<InputChoice>,
@@ -34,7 +35,7 @@ struct Source {
 
 impl Source {
     fn is_noisy(&self) -> bool {
-        self.sensor.is_some_and(|(_, scene)| !scene.noise.is_none())
+        self.sensor.is_some_and(|simulation| !simulation.scene.noise.is_none())
     }
 }
 
@@ -60,17 +61,15 @@ pub(crate) fn cases() -> Vec<Case> {
                     };
                     for &choice in inputs {
                         let networks = untrained(&source.training, row_model, choice);
-                        let problem = FitProblem {
-                            training: &source.training,
-                            row_model,
+                        let settings = RunSettings {
                             inputs: choice,
-                            unseen: NoiseSource::default(),
-                            sensor: source.sensor.as_ref().map(|(model, scene)| (model, scene)),
-                            networks: Some(&networks),
-                            precision,
                             seed: Seed(1),
+                            ..source
+                                .sensor
+                                .map_or_else(|| RunSettings::measured(row_model), RunSettings::from)
                         };
-                        let Some(decoder) = kind.fit(&problem).unwrap() else {
+                        let set = DecoderSet::new(settings, source.training.clone(), Some(networks));
+                        let Some(decoder) = set.decoder(kind, precision).unwrap() else {
                             assert!(kind.needs_sensor() && source.sensor.is_none());
                             continue;
                         };
@@ -136,7 +135,11 @@ fn simulated(row_model: RowModel, noise: f64) -> Source {
         name: if noise > 0.0 { "noisy" } else { "exact" },
         training: draw(40, Stream::Training, Stream::TrainingNoise),
         test: draw(11, Stream::Test, Stream::TestNoise),
-        sensor: Some((model, scene)),
+        sensor: Some(Simulation {
+            sensor: model,
+            scene,
+            ..Simulation::default()
+        }),
         inputs,
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use decoupler_core::surface::{Interpolation, SurfaceMap};
+use decoupler_core::surface::SurfaceMap;
 use proptest::prelude::*;
 
 use crate::cases;
@@ -68,7 +68,7 @@ proptest! {
     #[test]
     fn the_surface_passes_through_every_node(lattice in lattices()) {
         let (map, values) = (lattice.map(), lattice.surface());
-        prop_assert_ne!(map.interpolation(), Interpolation::Bilinear);
+        prop_assert_ne!(map.interpolation(), "bilinear");
         let place = |axis: &[f64], at: f64| axis.iter().position(|&point| point == at).unwrap();
         let nodes = lattice.x_mm.iter().flat_map(|&x| lattice.y_mm.iter().map(move |&y| (x, y)));
         for ((x, y), &height_mm) in nodes.zip(&lattice.heights_mm) {

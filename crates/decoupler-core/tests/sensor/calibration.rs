@@ -3,7 +3,7 @@
 use decoupler_core::{
     calibration::Calibration,
     dataset::{Dataset, Division, Seed, Stream},
-    evaluation::{Errors, Preset, Run, RunError, RunSettings, fine_tune, pressed_rows},
+    evaluation::{Errors, Preset, Run, RunError, RunSettings, fine_tune},
     glam::DVec3,
     job::Job,
     machine::MemoryBudget,
@@ -77,7 +77,7 @@ fn calibration_and_fine_tuning_adapt_a_network_to_the_real_sensor() {
     let mut settings = settings();
     let nominal = settings.simulation().unwrap().sensor;
     let (frames, test) = (recorded(&settings, 40, 1), recorded(&settings, 60, 2));
-    let calibration = Calibration::fit(&nominal, &pressed_rows(&frames, &nominal).unwrap()).unwrap();
+    let calibration = Calibration::fit(&nominal, &frames).unwrap();
     let stroke_mm = settings.simulation().unwrap().stroke_mm();
     let z_mm = |set: &Dataset, networks: &Networks| Errors::measure(set, &networks.decouple(set), stroke_mm).z_mm;
     let before = z_mm(&test, &trained(settings));
@@ -95,10 +95,7 @@ fn calibration_and_fine_tuning_adapt_a_network_to_the_real_sensor() {
         validation_fraction: 0.2,
         ..Division::default()
     };
-    let parts = division
-        .divide_for_training(&frames, &mut Seed(0).rng(Stream::Split))
-        .unwrap();
-    let split = parts.split(&frames);
+    let (split, _) = division.sets(&frames, Some(&test), Seed(0)).unwrap();
     let tuned = fine_tune(
         &networks,
         &split,
@@ -128,8 +125,8 @@ fn calibration_and_fine_tuning_adapt_a_network_to_the_real_sensor() {
 #[test]
 fn samples_of_another_sensor_are_refused() {
     let mut settings = settings();
-    let split = Division::default().divide_for_training(&recorded(&settings, 10, 1), &mut Seed(0).rng(Stream::Split));
-    let split = split.unwrap().split(&recorded(&settings, 10, 1));
+    let split = Division::default().sets(&recorded(&settings, 10, 1), None, Seed(0));
+    let (split, _) = split.unwrap();
     settings.simulation_mut().unwrap().sensor.scale = "4x5_3x15".parse().unwrap();
     settings.training.stopping.epochs = 1;
     let message = fine_tune(

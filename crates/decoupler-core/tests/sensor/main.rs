@@ -6,4 +6,3 @@ mod calibration;
 mod model;
 mod noisy_rows;
 mod recorded;
-mod rounding;

@@ -3,7 +3,7 @@
 use decoupler_core::{
     dataset::{Dataset, Division, Folds, Seed, SplitBy, Stream},
     evaluation::{
-        CrossValidated, Measured, RunError, RunSettings,
+        CrossValidated, RunError, RunSettings,
         recorded::{Findings, FittedModel, SplitComparison, StudyStep, nonlinear_gains, ridge_remark},
     },
     job::Job,
@@ -28,7 +28,7 @@ fn set(samples: usize, channels: usize, seed: u64, target: impl Fn(&[f64], &mut 
 }
 
 fn settings() -> RunSettings {
-    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let mut settings = RunSettings::measured(RowModel::Shared);
     (settings.hidden, settings.training.stopping.epochs) = (4, 30);
     settings
 }
@@ -169,11 +169,9 @@ fn folds_of_every_rule_are_checked_and_seeded() {
         assert!(r2.iter().all(|r2| *r2 > 0.95), "{by}: {r2:?}");
     }
     assert_eq!(settings().validation_fraction(), 0.0);
-    let parts = Division::default()
-        .divide(&set, &mut Seed(0).rng(Stream::Split))
-        .unwrap();
+    let (split, test) = Division::default().sets(&set, None, Seed(0)).unwrap();
     assert_eq!(
-        (parts.training.len(), parts.validation.len(), parts.test.len()),
-        (96, 0, 24)
+        (split.training.samples(), split.validation, test.samples()),
+        (96, None, 24)
     );
 }

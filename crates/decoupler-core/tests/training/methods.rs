@@ -2,7 +2,7 @@
 //! return NaN.
 
 use decoupler_core::{
-    machine::{MemoryBudget, MemorySource},
+    machine::MemoryBudget,
     network::{Mlp, Shape},
     settings::Value,
     training::{ExampleSets, Examples, Method, StopReason, StoppingRules, Trainer, TrainingSettings, check_width},
@@ -95,10 +95,7 @@ fn a_network_too_wide_for_the_normal_equations_is_refused_with_a_remedy() {
         hidden: 512,
         outputs: 1,
     };
-    let memory = MemoryBudget {
-        bytes: 16_000_000_000,
-        source: MemorySource::System,
-    };
+    let memory = MemoryBudget::System(16_000_000_000);
     let train = |name: &str| check_width(&named(name), shape, 5, 1, memory);
     let refusal = train("br").expect_err("20 GB are refused").to_string();
     assert!(refusal.contains("scg"), "{refusal}");

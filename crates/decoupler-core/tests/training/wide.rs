@@ -1,7 +1,7 @@
 //! Networks too wide for their equations to be factorised.
 
 use decoupler_core::{
-    machine::{MemoryBudget, MemorySource},
+    machine::MemoryBudget,
     network::{Mlp, Shape},
     training::{ExampleSets, Examples, Method, StoppingRules, Trainer, TrainingError, TrainingSettings, check_width},
 };
@@ -70,10 +70,7 @@ fn only_methods_that_factorise_refuse_a_very_wide_network() {
         hidden: 1000,
         outputs: 3,
     };
-    let memory = MemoryBudget {
-        bytes: 16_000_000_000,
-        source: MemorySource::System,
-    };
+    let memory = MemoryBudget::System(16_000_000_000);
     let refused = check_width(&named("br"), shape, 8, 1, memory).unwrap_err();
     assert!(
         matches!(refused, TrainingError::TooWide { trainings: 1, memory: of, .. } if of == memory),

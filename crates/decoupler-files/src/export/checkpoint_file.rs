@@ -11,7 +11,7 @@ use super::{
 };
 use crate::import::{Progress, Recorded, Setup, SetupError, SetupSets};
 use decoupler_core::{
-    evaluation::{Begin, Run, RunSettings},
+    evaluation::{Run, RunSettings},
     job::Job,
     training::TrainerState,
 };
@@ -82,10 +82,10 @@ impl CheckpointFile {
         sets.check_saved(self.recorded.as_ref())?;
         if let (Some(recordings), Some(saved)) = (&mut sets.recordings, self.recorded) {
             recordings.recorded.search = saved.search;
-            recordings.recorded.blend = saved.blend;
+            recordings.recorded.combined = saved.combined;
             recordings.recorded.chosen_intervals = saved.chosen_intervals;
         }
-        let run = sets.run(&setup, Begin::Resume(self.starts), job)?;
+        let run = sets.run(&setup, Some(self.starts), job)?;
         Ok((run.with_wall_time(self.wall_time), sets))
     }
 

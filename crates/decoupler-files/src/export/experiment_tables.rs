@@ -9,9 +9,7 @@ use decoupler_core::{
     dataset::{Simulation, SplitBy},
     evaluation::{
         Combination, CrossValidation, ErrorMeasure, TargetErrors,
-        experiments::{
-            AxisKind, CellResults, CellSummary, Experiment, ExperimentRecording, ExperimentResults, Figure, Trial,
-        },
+        experiments::{self, AxisKind, Experiment, ExperimentRecording, ExperimentResults, Figure, Trial},
     },
     network::suggested_hidden,
     problem::Channel,
@@ -66,24 +64,21 @@ type CellFigure = (ExperimentColumn, Option<f64>, String);
 impl ExperimentTable {
     /// The results so far.
     pub fn new(results: &ExperimentResults) -> Self {
-        let summaries = results.summaries();
-        let has_published = results.cells.iter().any(|cell| cell.cell.published.is_some());
+        let has_published = results.cells.iter().any(|cell| cell.published.is_some());
         let axes = results.experiment.axes().map(|axis| ExperimentColumn {
             heading: axis.kind.name(),
             kind: ExperimentColumnKind::Axis,
         });
-        let first = summaries
-            .first()
-            .map(|summary| figures(summary, has_published))
-            .unwrap_or_default();
+        let first = results.cells.first().map(|cell| figures(cell, has_published));
+        let first = first.unwrap_or_default();
         let columns = axes.chain(first.into_iter().map(|(column, ..)| column)).collect();
-        let row = |(cell, summary): (&CellResults, &CellSummary)| {
-            let places = [cell.cell.column, cell.cell.row].map(|place| Some(place as f64));
+        let row = |cell: &experiments::Cell| {
+            let places = [cell.column, cell.row].map(|place| Some(place as f64));
             let labels = places.into_iter().zip(results.cell_labels(cell));
-            let figures = figures(summary, has_published).into_iter();
+            let figures = figures(cell, has_published).into_iter();
             labels.chain(figures.map(|(_, value, text)| (value, text))).unzip()
         };
-        let (values, rows) = results.cells.iter().zip(&summaries).map(row).unzip();
+        let (values, rows) = results.cells.iter().map(row).unzip();
         let note = match results.experiment.recording {
             None => NODES_NOTE,
             Some(_) => TARGETS_NOTE,
@@ -126,7 +121,7 @@ const TARGETS_NOTE: &str = "Median, minimum and maximum over seeds. error: mean 
      ridge regression; epochs: mean of the starts; training: one network, all its starts.";
 
 /// Columns with the figures of a cell.
-fn figures(summary: &CellSummary, has_published: bool) -> Vec<CellFigure> {
+fn figures(cell: &experiments::Cell, has_published: bool) -> Vec<CellFigure> {
     use ExperimentColumnKind::{Linear, Other, Published, Ranking, Time};
     let number = |heading, kind, value: Option<f64>| {
         let column = ExperimentColumn { heading, kind };
@@ -136,33 +131,33 @@ fn figures(summary: &CellSummary, has_published: bool) -> Vec<CellFigure> {
         let value = figure.published;
         has_published.then(|| number(heading, Published, value))
     };
-    let percent = summary.percent();
-    let is_array = summary.cell.settings.simulation().is_some();
+    let percent = cell.percent();
+    let is_array = cell.settings.simulation().is_some();
     let [publ, median, mean, linear] = if is_array {
         ["Z % publ.", "Z % median", "mean Z %", "linear Z %"]
     } else {
         ["error % publ.", "error % median", "mean %", "ridge %"]
     };
-    let mut figures = Vec::from_iter(published(publ, percent));
+    let mut figures = Vec::from_iter(published(publ, &percent));
     figures.extend([
         number(median, Ranking, percent.median),
         number("min", Other, percent.min),
         number("max", Other, percent.max),
     ]);
-    for (measure, figure) in &summary.errors {
+    for (measure, figure) in cell.errors() {
         let (publ, median) = match measure {
             ErrorMeasure::XPercent => (Some("X % publ."), "X % median"),
             ErrorMeasure::YPercent => (Some("Y % publ."), "Y % median"),
             ErrorMeasure::R2 => (None, "R² median"),
             _ => continue,
         };
-        figures.extend(publ.and_then(|publ| published(publ, figure)));
+        figures.extend(publ.and_then(|publ| published(publ, &figure)));
         figures.push(number(median, Other, figure.median));
     }
-    figures.push(number(mean, Other, summary.mean_percent));
-    figures.push(number(linear, Linear, summary.linear_percent));
-    figures.push(number("epochs", Other, summary.epochs_run));
-    let seconds = summary.training_seconds;
+    figures.push(number(mean, Other, cell.mean_percent()));
+    figures.push(number(linear, Linear, cell.linear_percent()));
+    figures.push(number("epochs", Other, cell.epochs_run()));
+    let seconds = cell.training_seconds();
     let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
     let column = ExperimentColumn {
         heading: "training",
@@ -175,12 +170,11 @@ fn figures(summary: &CellSummary, has_published: bool) -> Vec<CellFigure> {
 
 /// Returns the table of all cells, for programs.
 pub fn cells_table(results: &ExperimentResults) -> Table {
-    let rows = results.cells.iter().zip(results.summaries());
-    let rows = rows.map(|(cell, summary)| {
+    let rows = results.cells.iter().map(|cell| {
         let mut fields = settings_fields(cell);
         fields.extend([
-            field("starts", summary.cell.settings.starts.into()),
-            field("trials", summary.trials.into()),
+            field("starts", cell.settings.starts.into()),
+            field("trials", cell.trials.len().into()),
         ]);
         let figure = |name: &str, figure: &Figure, has_published: bool| {
             let published = has_published.then_some(("published", figure.published));
@@ -188,19 +182,24 @@ pub fn cells_table(results: &ExperimentResults) -> Table {
             let figures = published.into_iter().chain(of_trials);
             Vec::from_iter(figures.map(|(which, value)| field(&format!("{name}_{which}"), value.into())))
         };
-        let is_array = summary.cell.settings.simulation().is_some();
-        for (measure, of_trials) in &summary.errors {
-            if *measure != ErrorMeasure::ZMm {
-                fields.extend(figure(measure.field(), of_trials, is_array));
+        let is_array = cell.settings.simulation().is_some();
+        for (measure, of_trials) in cell.errors() {
+            if measure != ErrorMeasure::ZMm {
+                fields.extend(figure(measure.field(), &of_trials, is_array));
             }
         }
-        let name = summary.errors[0].0.field();
+        let name = if is_array {
+            ErrorMeasure::ZPercent
+        } else {
+            ErrorMeasure::RangePercent
+        };
+        let name = name.field();
         fields.extend([
-            field(&format!("mean_{name}"), summary.mean_percent.into()),
-            field(&format!("linear_{name}"), summary.linear_percent.into()),
-            field("epochs_run", summary.epochs_run.into()),
-            field("training_seconds", summary.training_seconds.into()),
-            field("epoch_ms", summary.epoch_ms.into()),
+            field(&format!("mean_{name}"), cell.mean_percent().into()),
+            field(&format!("linear_{name}"), cell.linear_percent().into()),
+            field("epochs_run", cell.epochs_run().into()),
+            field("training_seconds", cell.training_seconds().into()),
+            field("epoch_ms", cell.epoch_ms().into()),
         ]);
         fields
     });
@@ -242,8 +241,8 @@ pub fn trials_table(results: &ExperimentResults) -> Table {
                 &format!("linear_{name}"),
                 trial.scores.baselines.linear.percent().into(),
             ),
-            field("epochs_run", trial.effort.epochs.into()),
-            field("seconds", trial.effort.seconds.into()),
+            field("epochs_run", trial.epochs.into()),
+            field("seconds", trial.seconds.into()),
         ]);
         fields
     }))
@@ -256,8 +255,8 @@ fn field(name: &str, value: Cell) -> Field {
 }
 
 /// Settings of a cell.
-fn settings_fields(cell: &CellResults) -> Vec<Field> {
-    let settings = &cell.cell.settings;
+fn settings_fields(cell: &experiments::Cell) -> Vec<Field> {
+    let settings = &cell.settings;
     let method = field("method", settings.training.method.short_name().into());
     let epochs = field("epochs", settings.training.stopping.epochs.into());
     match settings.simulation() {
@@ -269,7 +268,7 @@ fn settings_fields(cell: &CellResults) -> Vec<Field> {
             epochs,
         ],
         None => {
-            let split = cell.cell.division.map(|division| division.by.to_string());
+            let split = cell.division.map(|division| division.by.to_string());
             vec![
                 field("split", split.unwrap_or_default().into()),
                 field("scaling", settings.inputs.scaling.to_string().into()),
@@ -432,7 +431,7 @@ pub fn describe_failures(results: &ExperimentResults) -> Vec<String> {
 
 /// Describes every cell that has networks worse than always answering the training mean, one sentence per cell.
 pub fn describe_worse_than_mean(results: &ExperimentResults) -> Vec<String> {
-    let of_cell = |cell: &CellResults| {
+    let of_cell = |cell: &experiments::Cell| {
         let is_worse = |trial: &&Trial| is_worse_than_mean(trial);
         let (worse, trials) = (cell.trials.iter().filter(is_worse).count(), cell.trials.len());
         (worse > 0).then(|| {

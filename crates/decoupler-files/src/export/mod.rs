@@ -39,6 +39,7 @@ mod recipe_file;
 pub mod report;
 mod run_folder;
 mod samples;
+mod saved_problem;
 mod search_table;
 mod sensor_file;
 mod sweep;
@@ -62,6 +63,7 @@ pub use network_file::{NetworkFile, PastNetwork};
 pub use recipe_file::{RecipeFile, RecipeSource};
 pub use run_folder::{KeptRun, KeptRuns, RunFolder, RunSummary};
 pub use samples::{TrainingRecord, write_decoded, write_decoded_header, write_samples, write_samples_header};
+pub use saved_problem::SavedProblem;
 pub use search_table::{describe_search, search_table};
 pub use sensor_file::SensorFile;
 pub use sweep::{

@@ -2,19 +2,19 @@ use std::{fmt::Display, io::Write as _, path::Path, sync::Arc, time::Duration};
 
 use decoupler_core::{
     dataset::{Dataset, MemoryStream, Simulation},
-    decoupling::{Blend, Precision, Program, ProgramDecoder},
+    decoupling::{Combined, ProgramDecoder},
     evaluation::{ErrorTable, Intervals, Run, RunSettings, Scores, StartRecord, TestErrors},
     job::Job,
-    live::{DriftReference, NoDriftMonitor},
+    live::{DriftReference, LiveError},
     network::{DecouplingNetwork, Networks},
-    problem::{Problem, SavedProblem, TargetPosition},
+    problem::{Problem, TargetPosition},
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use serde_json::value::{RawValue, to_raw_value};
 
 use super::{
-    AtomicFile, DocumentError, DocumentKind, TrainingRecord, WriteError,
+    AtomicFile, DocumentError, DocumentKind, SavedProblem, TrainingRecord, WriteError,
     atomic::{LARGEST_BYTES, too_large},
     document::PROGRAM,
     unfinished::folder_of,
@@ -48,7 +48,7 @@ pub struct NetworkFile {
     /// Prediction intervals of the answers, if they were calibrated.
     pub intervals: Option<Intervals>,
     /// Training readings of a recording, by which a later drift is detected, or the reason why they are not monitored.
-    pub drift: Result<DriftReference, NoDriftMonitor>,
+    pub drift: Result<DriftReference, LiveError>,
 }
 
 /// The part of the file that the checksum covers.
@@ -77,7 +77,7 @@ const NODES_OF_RECORDING: &str = "problem: the targets of a recording are not no
 enum SavedDrift {
     Monitored(DriftReference),
     NotMonitored {
-        not_monitored: NoDriftMonitor,
+        not_monitored: LiveError,
     },
     /// Description for the monitor of an older version.
     #[serde(skip_serializing)]
@@ -85,19 +85,19 @@ enum SavedDrift {
 }
 
 impl SavedDrift {
-    fn of(drift: Result<DriftReference, NoDriftMonitor>) -> Option<Self> {
+    fn of(drift: Result<DriftReference, LiveError>) -> Option<Self> {
         match drift {
             Ok(reference) => Some(Self::Monitored(reference)),
-            Err(NoDriftMonitor::NotDescribed) => None,
+            Err(LiveError::NotDescribed) => None,
             Err(not_monitored) => Some(Self::NotMonitored { not_monitored }),
         }
     }
 
-    fn read(saved: Option<Self>) -> Result<DriftReference, NoDriftMonitor> {
+    fn read(saved: Option<Self>) -> Result<DriftReference, LiveError> {
         match saved {
             Some(Self::Monitored(reference)) => Ok(reference),
             Some(Self::NotMonitored { not_monitored }) => Err(not_monitored),
-            Some(Self::Older(_)) | None => Err(NoDriftMonitor::NotDescribed),
+            Some(Self::Older(_)) | None => Err(LiveError::NotDescribed),
         }
     }
 }
@@ -126,7 +126,7 @@ impl NetworkFile {
     pub fn from_run(run: &Run, recorded: Option<&Recorded>) -> Result<Self, DocumentError> {
         let scores = run.scores().ok_or(DocumentError::NoPlan(KIND))?;
         let mut recorded = KIND.recorded_of(run, recorded)?;
-        if let (Some(recorded), None) = (&mut recorded, run.blend()) {
+        if let (Some(recorded), None) = (&mut recorded, run.combined()) {
             // The training was stopped, or has not ended.
             recorded.forget_choice();
         }
@@ -140,7 +140,7 @@ impl NetworkFile {
             training: TrainingRecord::of(run),
             scores,
             intervals: run.intervals().cloned(),
-            drift: Err(NoDriftMonitor::NotDescribed),
+            drift: Err(LiveError::NotDescribed),
         })
     }
 
@@ -165,30 +165,14 @@ impl NetworkFile {
     }
 
     /// Combination that the file answers with, if settings were chosen; otherwise the network alone.
-    pub fn blend(&self) -> Option<&Blend> {
-        self.recorded.as_ref()?.blend.as_ref()
+    pub fn combined(&self) -> Option<&Combined> {
+        self.recorded.as_ref()?.combined.as_ref()
     }
 
-    /// The program of the answers: of the combination if settings were chosen, otherwise of the network. For a recording,
-    /// readings are limited to their range in training, extended by a tenth.
-    pub fn decoder_program(&self) -> Program {
-        match self.blend() {
-            Some(blend) => blend.program(&self.network, Precision::Double),
-            None => self.network_program(),
-        }
-    }
-
-    /// As [`Self::decoder_program`], of the network alone.
-    pub fn network_program(&self) -> Program {
-        match self.problem.has_nodes() {
-            true => self.network.program(Precision::Double),
-            false => self.network.clipped_program(Precision::Double),
-        }
-    }
-
-    /// Decoder of [`Self::decoder_program`].
+    /// Decoder of the answers: the combination if settings were chosen, otherwise the network. For a recording, readings are
+    /// limited to their range in training, extended by a tenth.
     pub fn decoder(&self) -> ProgramDecoder {
-        ProgramDecoder::new(self.decoder_program())
+        ProgramDecoder::new(self.network.decoder_program(&self.problem, self.combined()))
     }
 
     /// Returns a parser for lines with the inputs of a network that was trained on a recording.
@@ -231,7 +215,7 @@ impl NetworkFile {
     }
 
     /// Errors of the network and of the baselines, next to the published ones if there are any.
-    pub fn error_table(&self) -> ErrorTable {
+    pub fn error_table(&self) -> Vec<ErrorTable> {
         ErrorTable::of_scores(&self.problem, &self.scores, self.settings.published().as_ref())
     }
 
@@ -456,9 +440,9 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         (drift.as_ref().ok())
             .filter(|drift| !drift.is_valid() || drift.channels() != problem.inputs.len())
             .map(|_| "drift: it does not match the inputs".to_owned()),
-        file.blend()
-            .and_then(|blend| blend.defect(problem.feature_count(), problem.targets.len()))
-            .map(|defect| format!("recorded.blend: {defect}")),
+        file.combined()
+            .and_then(|combined| combined.defect(problem.feature_count(), problem.targets.len()))
+            .map(|defect| format!("recorded.combined: {defect}")),
         unmeasured("scores.network", errors, problem),
         alone
             .as_ref()
@@ -529,11 +513,11 @@ fn starts_defect(file: &NetworkFile) -> Option<String> {
 fn number_defect(network: &Networks, settings: &RunSettings, row_wires: Option<&[usize]>) -> Option<String> {
     let found = network.values().len();
     match settings.simulation() {
-        Some(source) => match source.model_size() {
-            Ok(size) if size.networks == found => None,
-            Ok(size) => Some(format!(
-                "network: {found} of them, but rows {} of {} need {}",
-                source.scene.rows, source.sensor.scale, size.networks
+        Some(source) => match source.rows().map(|rows| source.scene.rows.model().decoders(rows)) {
+            Ok(needed) if needed == found => None,
+            Ok(needed) => Some(format!(
+                "network: {found} of them, but rows {} of {} need {needed}",
+                source.scene.rows, source.sensor.scale
             )),
             Err(defect) => Some(format!("settings.source.scene.rows: {defect}")),
         },
@@ -621,11 +605,11 @@ mod tests {
         let older =
             r#"{"metric":{"means":[0.0],"inverse_deviations":[1.0],"factor":[1.005]},"block":5,"distances":[1.0]}"#;
         for (saved, expected) in [
-            (older, NoDriftMonitor::NotDescribed),
-            (r#"{"not_monitored":"constant"}"#, NoDriftMonitor::Constant),
+            (older, LiveError::NotDescribed),
+            (r#"{"not_monitored":"constant"}"#, LiveError::Constant),
             (
                 r#"{"not_monitored":{"too_few_readings":{"blocks":4,"block":5}}}"#,
-                NoDriftMonitor::TooFewReadings { blocks: 4, block: 5 },
+                LiveError::TooFewReadings { blocks: 4, block: 5 },
             ),
         ] {
             let found = SavedDrift::read(Some(serde_json::from_str(saved).unwrap()));

@@ -1,9 +1,9 @@
 use std::io::{self, Write};
 
 use decoupler_core::{
-    dataset::{Dataset, Seed, SplitBy, Stream},
+    dataset::{Dataset, Seed, SplitBy},
     evaluation::{
-        Coverage, DecoderReport, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, HalfWidth, Intervals, Scores,
+        Coverage, DecoderReport, ErrorMeasure, ErrorRow, ErrorTable, Errors, HalfWidth, Intervals, Scores,
         TargetErrors, TestErrors,
         recorded::{
             Determinacy, Determination, Findings, TargetFindings, Undetermined, channel_remarks, ridge_remark,
@@ -22,24 +22,23 @@ use crate::import::{Recording, SetupSets};
 
 /// Returns the error table: a row for each decoder and baseline; for a recording, a row for each of them and each
 /// target.
-pub fn error_table(table: &ErrorTable) -> Table {
-    let has_targets = table.blocks.iter().any(|block| block.target.is_some());
+pub fn error_table(tables: &[ErrorTable]) -> Table {
+    let has_targets = tables.iter().any(|table| table.target.is_some());
     let target = has_targets.then(|| TableColumn::new("target", "Target", ""));
-    let measures = table.measures.iter().copied().map(error_column);
-    let row = |block: &ErrorBlock, row: &ErrorRow| -> Vec<Cell> {
-        let target = has_targets.then(|| block.target.as_ref().map_or(String::new(), Channel::title).into());
-        let errors = row.errors.iter().zip(table.measures).map(error_cell);
+    let measures = tables.first().map_or(&[][..], |table| table.measures);
+    let row = |table: &ErrorTable, row: &ErrorRow| -> Vec<Cell> {
+        let target = has_targets.then(|| table.target.as_ref().map_or(String::new(), Channel::title).into());
+        let errors = row.errors.iter().zip(measures).map(error_cell);
         target.into_iter().chain([row.name.into()]).chain(errors).collect()
     };
-    let rows = table
-        .blocks
+    let rows = tables
         .iter()
-        .flat_map(|block| block.rows.iter().map(move |line| row(block, line)));
+        .flat_map(|table| table.rows.iter().map(move |line| row(table, line)));
     Table {
         columns: target
             .into_iter()
             .chain([TableColumn::new("decoupler", "Decoder", "")])
-            .chain(measures)
+            .chain(measures.iter().copied().map(error_column))
             .collect(),
         rows: rows.collect(),
     }
@@ -230,9 +229,9 @@ fn in_last_number(bytes: &[u8], error: &serde_json::Error) -> bool {
 pub fn describe_determinacy(
     targets: &[Channel],
     measured: &[Result<Determination, Undetermined>],
-    is_blend: bool,
+    is_combined: bool,
 ) -> Vec<String> {
-    let explains = if is_blend {
+    let explains = if is_combined {
         "the chosen combination explains"
     } else {
         "the network explains"
@@ -315,7 +314,7 @@ pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
         count => format!("{count} targets have positions"),
     };
     Some(match TargetPosition::lattice(positions) {
-        Some(lattice) => format!("{count}: a grid of {} × {}", lattice.x_mm.len(), lattice.y_mm.len()),
+        Some(([x_mm, y_mm], _)) => format!("{count}: a grid of {} × {}", x_mm.len(), y_mm.len()),
         None => format!("{count}, scattered over the skin"),
     })
 }
@@ -344,8 +343,9 @@ pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
     } = &recordings.training;
     let division = recordings.recorded.plan.division;
     let mut warnings = target_remarks(training, division.by, inputs, targets);
-    let parts = division.divide(set, &mut Seed(0).rng(Stream::Split));
-    let tests_first = parts.is_ok_and(|parts| parts.test.first() == Some(&0));
+    // In time, the first samples are those for testing unless they are for training.
+    let trained = division.training(set, false, Seed(0));
+    let tests_first = trained.is_ok_and(|samples| samples.first() != Some(&0));
     if division.by == SplitBy::Time && recordings.test.is_none() && tests_first {
         let text = "all changes of the targets are in the last part of the recording, so that the first part was held out \
                     for testing in its place";
@@ -435,8 +435,8 @@ mod tests {
             sensor: Some(Simulation::default()),
             ..Problem::default()
         };
-        let mut errors = ErrorTable::new(&problem, &[]);
-        errors.blocks[0].rows.push(row);
+        let mut errors = ErrorTable::of_errors(&problem, &[]);
+        errors[0].rows.push(row);
         let mut table = Vec::new();
         error_table(&errors).write_csv(&mut table).unwrap();
         assert_eq!(

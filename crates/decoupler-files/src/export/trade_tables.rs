@@ -2,13 +2,16 @@ use std::time::Duration;
 
 use decoupler_core::{
     decoupling::Precision,
-    evaluation::{RunSettings, TradeOffCost, TradeOffLevel, TradeOffPoint, TrainingSize, Workload, WorkloadTime},
-    machine::MemorySource,
+    evaluation::{RunSettings, TradeOffPoint, TrainingSize, Workload},
+    machine::MemoryBudget,
     text::counted,
 };
 
 use super::{Cell, Table, TableColumn, format_duration};
-use crate::{figure::point_name, machine::memory_budget};
+use crate::{
+    figure::{TradeOffCost, TradeOffLevel, point_name},
+    machine::memory_budget,
+};
 
 /// Returns the table of all points of all levels with all their figures, for programs.
 pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
@@ -131,23 +134,17 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
 /// about 20 ms.
 pub fn describe_workload(workload: &Workload) -> String {
     let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 * 1e-9);
-    let memory = memory_budget();
-    let machine = match memory.source {
-        MemorySource::System | MemorySource::User => format!(" of {}", gigabytes(memory.bytes)),
-        MemorySource::Assumed => String::new(),
+    let machine = match memory_budget() {
+        MemoryBudget::System(bytes) | MemoryBudget::User(bytes) => format!(" of {}", gigabytes(bytes)),
+        MemoryBudget::Assumed(_) => String::new(),
     };
-    let WorkloadTime {
-        drawing,
-        epoch,
-        all_epochs,
-    } = workload.time();
     format!(
         "about {}{machine} of memory; on one thread about {} to draw the samples and {} per epoch, {} for {}; the \
          figures of the decoders take additional time",
         gigabytes(workload.bytes),
-        format_duration(drawing),
-        format_duration(epoch),
-        format_duration(all_epochs),
+        format_duration(workload.drawing_time()),
+        format_duration(workload.epoch_time()),
+        format_duration(workload.training_time()),
         counted(workload.epochs, "epoch")
     )
 }
@@ -159,13 +156,13 @@ pub fn describe_recorded_workload(settings: &RunSettings, size: TrainingSize) ->
     const SHORT: Duration = Duration::from_secs(10);
     const LONG: Duration = Duration::from_secs(60);
     let workload = Workload::of(settings, size);
-    let WorkloadTime { epoch, all_epochs, .. } = workload.time();
+    let all_epochs = workload.training_time();
     if all_epochs < SHORT {
         return None;
     }
     let mut text = format!(
         "on one thread about {} per epoch, {} for {}",
-        format_duration(epoch),
+        format_duration(workload.epoch_time()),
         format_duration(all_epochs),
         counted(workload.epochs, "epoch")
     );
@@ -189,7 +186,7 @@ mod tests {
     use decoupler_core::{
         dataset::{Dataset, Split},
         decoupling::DecoderKind,
-        evaluation::{Measured, RunSets, measure_trade_off},
+        evaluation::{RunSets, measure_trade_off},
         scene::RowModel,
     };
     use ndarray::Array2;
@@ -205,7 +202,7 @@ mod tests {
             targets: 3,
             networks: 1,
         };
-        let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        let mut settings = RunSettings::measured(RowModel::Shared);
         assert_eq!(describe_recorded_workload(&settings, size(1)), None);
         settings.hidden = 24;
         let text = describe_recorded_workload(&settings, size(192)).unwrap();
@@ -228,7 +225,7 @@ mod tests {
             training: set(0),
             validation: None,
         };
-        let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        let mut settings = RunSettings::measured(RowModel::Shared);
         settings.training.stopping.epochs = 3;
         let mut points = Vec::new();
         let keep = |_, point: Result<TradeOffPoint, _>, _: Option<&_>| points.push(point.unwrap());

@@ -30,7 +30,9 @@ pub use of_live::{readings_figure, targets_over_time_figure, zero_gains_figure};
 pub use of_recorded::{TargetSurface, hysteresis_figure, position_error_map};
 pub use of_sample::{node_figure, pair_address, sample_figure, singular_values_figure, z_pairs_mm};
 pub use of_section::{SectionNodes, section_figure};
-pub use of_trade_off::{frame_time, point_facts, point_name, trade_off_figure, training_time};
+pub use of_trade_off::{
+    TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure, training_time,
+};
 pub use plot::{LineAt, Plot, PlotFigure, PlotPoint, PointLabel, ReferenceLine, Series, Span, along, place_labels};
 
 use decoupler_core::decoupling::DecoderKind;

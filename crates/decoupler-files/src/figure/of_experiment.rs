@@ -12,9 +12,7 @@ use crate::figure::Figure;
 use decoupler_core::{
     evaluation::{
         ErrorMeasure, TestErrors,
-        experiments::{
-            Axis, AxisKind, CellResults, CellSummary, Experiment, ExperimentResults, Figure as Measured, Trial,
-        },
+        experiments::{Axis, AxisKind, Cell, Experiment, ExperimentResults, Figure as Measured, Trial},
     },
     network::suggested_hidden,
     text::format_percent,
@@ -24,13 +22,12 @@ use decoupler_core::{
 /// cross-validation (the paper's Fig. 5), or else the error along the axis next to the published one, with R² along the axis
 /// for a recording.
 pub fn experiment_figure(results: &ExperimentResults) -> Figure {
-    let summaries = results.summaries();
     if let Some(rows) = &results.experiment.second_axis {
-        heat_map(results, &summaries, rows).into()
+        heat_map(results, rows).into()
     } else if results.experiment.cross_validation.is_some() {
-        repeats(results, &summaries).into()
+        repeats(results).into()
     } else {
-        along_the_axis(results, &summaries).into()
+        along_the_axis(results).into()
     }
 }
 
@@ -54,14 +51,14 @@ fn labels(axis: &Axis) -> Vec<String> {
     (0..axis.values.len()).map(|index| axis.label(index)).collect()
 }
 
-fn heat_map(results: &ExperimentResults, summaries: &[CellSummary], rows: &Axis) -> HeatMap {
+fn heat_map(results: &ExperimentResults, rows: &Axis) -> HeatMap {
     let columns = &results.experiment.axis;
     let shape = [rows.values.len(), columns.values.len()];
     let mut values = Array2::from_elem(shape, f64::NAN);
     let mut notes = Array2::from_elem(shape, String::new());
-    for (cell, summary) in results.cells.iter().zip(summaries) {
-        let at = [cell.cell.row, cell.cell.column];
-        let &Measured { median, min, max, .. } = summary.percent();
+    for cell in &results.cells {
+        let at = [cell.row, cell.column];
+        let Measured { median, min, max, .. } = cell.percent();
         values[at] = median.unwrap_or(f64::NAN);
         let name = results.cell_labels(cell).join(", ");
         notes[at] = format!("{name}: median {} {}", error_name(results), format_percent(median));
@@ -82,23 +79,24 @@ fn heat_map(results: &ExperimentResults, summaries: &[CellSummary], rows: &Axis)
 }
 
 /// Position of a cell on the axis: the value itself, or its index in the list.
-fn position(axis: &Axis, index: usize, cell: &CellSummary) -> f64 {
+fn position(axis: &Axis, index: usize, cell: &Cell) -> f64 {
     match axis.kind {
-        AxisKind::Hidden => cell.cell.settings.hidden as f64,
+        AxisKind::Hidden => cell.settings.hidden as f64,
         _ => index as f64,
     }
 }
 
-fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure {
+fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
     let axis = &results.experiment.axis;
     let is_number = axis.kind == AxisKind::Hidden;
-    let mut cells: Vec<(f64, &CellSummary)> = summaries
+    let mut cells: Vec<(f64, &Cell)> = results
+        .cells
         .iter()
         .enumerate()
         .map(|(index, cell)| (position(axis, index, cell), cell))
         .collect();
     cells.sort_by(|one, other| one.0.total_cmp(&other.0));
-    let points = |value: fn(&CellSummary) -> Option<f64>| {
+    let points = |value: fn(&Cell) -> Option<f64>| {
         let points = cells.iter().filter_map(move |(x, cell)| Some([*x, value(cell)?]));
         points.collect::<Vec<_>>()
     };
@@ -109,7 +107,7 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
         false => Look::marker(Hue::Grey, Marker::Ring),
     };
     let ours = cells.iter().filter_map(|(x, cell)| {
-        let &Measured { median, min, max, .. } = cell.percent();
+        let Measured { median, min, max, .. } = cell.percent();
         Some(PlotPoint {
             bar: min.zip(max).map(|(least, largest)| [least, largest]),
             ..PlotPoint::from([*x, median?])
@@ -126,7 +124,7 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
                 Some(_) => "ridge",
             },
             reference,
-            points(|cell| cell.linear_percent),
+            points(Cell::linear_percent),
         ),
         Series::new("published", published, points(|cell| cell.percent().published)),
         Series {
@@ -177,7 +175,7 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
 }
 
 /// R² of the networks along the axis; `None` for the nodes of an array.
-fn r2_plot(x: PlotAxis, cells: &[(f64, &CellSummary)], look: Look) -> Option<Plot> {
+fn r2_plot(x: PlotAxis, cells: &[(f64, &Cell)], look: Look) -> Option<Plot> {
     let points = cells.iter().map(|(x, cell)| {
         let r2 = cell.error(ErrorMeasure::R2)?;
         Some(r2.median.map(|median| PlotPoint {
@@ -193,11 +191,11 @@ fn r2_plot(x: PlotAxis, cells: &[(f64, &CellSummary)], look: Look) -> Option<Plo
     Some(Plot::new(x, PlotAxis::linear("R²").including([1.0]), vec![series]))
 }
 
-type PublishedError = fn(&CellSummary) -> Option<f64>;
+type PublishedError = fn(&Cell) -> Option<f64>;
 type TrialError = fn(&TestErrors) -> Option<f64>;
 
 /// The errors of every trial, one plot each for Z, X and Y.
-fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure {
+fn repeats(results: &ExperimentResults) -> PlotFigure {
     const HUES: [Hue; 4] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Grey];
     let experiment = &results.experiment;
     let axis = &experiment.axis;
@@ -227,14 +225,14 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
     let cells: Vec<(String, Hue)> = names.zip(HUES.into_iter().cycle()).collect();
     let plots = errors.map(|(y, published, measured)| {
         let x = PlotAxis::linear(repeat_name(results)).including([0.5, trials as f64 + 0.5]);
-        let of_cells = || results.cells.iter().zip(summaries).zip(&cells);
-        let series = of_cells().map(|((cell, _), (name, hue))| {
+        let of_cells = || results.cells.iter().zip(&cells);
+        let series = of_cells().map(|(cell, (name, hue))| {
             let look = Look::marker(*hue, Marker::Disc);
             Series::new(name, look, trial_points(experiment, cell, measured))
         });
         let mut plot = Plot::new(x.ticked(TickRule::Whole), y, series.collect());
-        let lines = of_cells().filter_map(|((_, summary), (name, hue))| {
-            let at = LineAt::Y(published(summary)?);
+        let lines = of_cells().filter_map(|(cell, (name, hue))| {
+            let at = LineAt::Y(published(cell)?);
             Some(ReferenceLine::new(
                 format!("{name}, published"),
                 at,
@@ -251,7 +249,7 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
     let published = Key::new("published", Look::line(Hue::Ink, LineStyle::Dashed));
     let is_published = plots.iter().any(|plot| !plot.lines.is_empty());
     let keys = keys.chain(is_published.then_some(published)).collect();
-    let is_zero = |cell: &CellSummary| {
+    let is_zero = |cell: &Cell| {
         cell.error(ErrorMeasure::YPercent)
             .is_some_and(|y| y.median == Some(0.0))
     };
@@ -259,7 +257,8 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
     PlotFigure {
         plots: plots.into(),
         keys,
-        notes: summaries
+        notes: results
+            .cells
             .iter()
             .any(is_zero)
             .then(|| note.to_owned())
@@ -269,10 +268,10 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
 }
 
 /// Error of each trial of a cell against the number of the trial, counted from 1 through all seeds (Fig. 5).
-fn trial_points(experiment: &Experiment, cell: &CellResults, error: TrialError) -> Vec<[f64; 2]> {
+fn trial_points(experiment: &Experiment, cell: &Cell, error: TrialError) -> Vec<[f64; 2]> {
     let repeats = experiment.cross_validation.map_or(1, |validation| validation.repeats);
     let number = |trial: &Trial| {
-        let seeds_before = trial.seed.0.wrapping_sub(cell.cell.settings.seed.0) as f64;
+        let seeds_before = trial.seed.0.wrapping_sub(cell.settings.seed.0) as f64;
         seeds_before * repeats as f64 + trial.repeat as f64 + 1.0
     };
     let points = cell.trials.iter();

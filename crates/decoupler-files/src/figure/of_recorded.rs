@@ -184,9 +184,9 @@ impl TargetSurface {
     pub fn new(positions: &[TargetPosition], targets: &[Channel]) -> Result<Self, SurfaceError> {
         let first = positions.first().and_then(|first| targets.get(first.target));
         let (map, nodes) = match TargetPosition::lattice(positions) {
-            Some(lattice) => (
-                SurfaceMap::shared(&lattice.x_mm, &lattice.y_mm)?,
-                lattice.places.iter().map(|&place| positions[place]).collect(),
+            Some(([x_mm, y_mm], order)) => (
+                SurfaceMap::shared(&x_mm, &y_mm)?,
+                order.iter().map(|&place| positions[place]).collect(),
             ),
             None => (
                 Arc::new(SurfaceMap::scattered(&TargetPosition::places_mm(positions))?),

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use decoupler_core::{
-    dataset::{Memory, Seed, Stream},
+    dataset::{Memory, Seed},
     evaluation::{
         Intervals,
         auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, choose_settings, dead_channels},
@@ -73,12 +73,9 @@ impl Setup {
             (recording, test_recording) = unless_cancelled(job, read)?;
         }
         let raw = recording.with_memory(None).map_err(ImportError::from)?;
-        let mut rng = self.settings().seed.rng(Stream::Split);
-        let divided = match test_recording {
-            None => plan.division.divide(&raw.set, &mut rng),
-            Some(_) => plan.division.divide_for_training(&raw.set, &mut rng),
-        };
-        let training = divided.map_err(ImportError::from)?.training;
+        let seed = self.settings().seed;
+        let training = plan.division.training(&raw.set, test_recording.is_some(), seed);
+        let training = training.map_err(ImportError::from)?;
         let choice = if training.len() < MIN_SAMPLES {
             None
         } else {
@@ -118,7 +115,7 @@ impl Setup {
         let mut sets = unless_cancelled(job, read)?;
         if let (Some(recordings), Some(choice)) = (&mut sets.recordings, &choice) {
             recordings.recorded.search = Some(choice.record.clone());
-            recordings.recorded.blend = Some(choice.blend.clone());
+            recordings.recorded.combined = Some(choice.combined.clone());
             // The held-out answers of the combination. Its weights, and the epochs, were chosen for these same answers, which
             // makes their errors slightly too small; that they come from fewer training samples makes them too large.
             let (training, by) = (&sets.sets.split.training, plan.division.by);
@@ -136,15 +133,11 @@ impl Setup {
 /// again without them, so that all of its channels stay.
 fn leave_out_dead(plan: &mut Plan, recording: &Recording, seed: Seed) -> Result<Vec<String>, ImportError> {
     let raw = recording.with_memory(None)?;
-    let (division, mut rng) = (plan.division, seed.rng(Stream::Split));
-    let divided = match plan.test {
-        None => division.divide(&raw.set, &mut rng)?,
-        Some(_) => division.divide_for_training(&raw.set, &mut rng)?,
-    };
-    if plan.irregular().is_some() || divided.training.len() < MIN_SAMPLES {
+    let training = plan.division.training(&raw.set, plan.test.is_some(), seed)?;
+    if plan.irregular().is_some() || training.len() < MIN_SAMPLES {
         return Ok(Vec::new());
     }
-    let dead = dead_channels(&raw.set.select(&divided.training));
+    let dead = dead_channels(&raw.set.select(&training));
     let (mut left_out, mut kept) = (Vec::new(), Vec::new());
     for (channel, input) in raw.inputs.iter().enumerate() {
         let names = if dead.contains(&channel) {

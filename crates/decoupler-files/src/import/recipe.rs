@@ -9,7 +9,7 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Memory},
-    decoupling::Blend,
+    decoupling::Combined,
     evaluation::{Intervals, auto::AutoRecord},
 };
 use serde::{Deserialize, Serialize};
@@ -201,7 +201,7 @@ pub struct Recorded {
     pub search: Option<AutoRecord>,
     /// What was found best instead of the network alone, if settings were chosen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub blend: Option<Blend>,
+    pub combined: Option<Combined>,
     /// Intervals of the answers with the chosen settings, from the held-out answers of the choice.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chosen_intervals: Option<Intervals>,
@@ -238,7 +238,7 @@ impl Recorded {
             files,
             samples_crc32: samples_crc32([&sets.recording.set, &sets.test]),
             search: None,
-            blend: None,
+            combined: None,
             chosen_intervals: None,
             plan,
         })
@@ -267,7 +267,7 @@ impl Recorded {
 
     /// Forgets what was chosen for a network with other settings.
     pub fn forget_choice(&mut self) {
-        (self.blend, self.chosen_intervals) = (None, None);
+        (self.combined, self.chosen_intervals) = (None, None);
     }
 
     /// Returns the paths of recordings that no longer exist.
@@ -286,7 +286,7 @@ impl Recorded {
             plan: self.plan.with_paths(|path| of(path)),
             samples_crc32: self.samples_crc32.clone(),
             search: self.search.clone(),
-            blend: self.blend.clone(),
+            combined: self.combined.clone(),
             chosen_intervals: self.chosen_intervals.clone(),
         }
     }

@@ -2,12 +2,13 @@ use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use decoupler_core::{
     evaluation::{
-        Begin, Intervals, NoIntervals, Run, RunError, RunSets, RunSettings,
-        experiments::{ExperimentRecording, RecordedSamples, TrialSamples},
+        Intervals, Run, RunError, RunSets, RunSettings,
+        experiments::{ExperimentRecording, TrialSamples},
     },
     job::{Cancelled, Job},
-    live::{DriftReference, NoDriftMonitor},
+    live::{DriftReference, LiveError},
     text::clean_name,
+    training::TrainerState,
 };
 use ndarray::{Axis, Slice};
 use thiserror::Error;
@@ -199,12 +200,12 @@ impl Setup {
         };
         self.check_files()?;
         let (recording, test) = unless_cancelled(job, plan.recordings(folder, &mut watch(job, on_progress)))?;
-        Ok(TrialSamples::Recorded(RecordedSamples {
+        Ok(TrialSamples::Recorded {
             problem: Arc::new(recording.problem()),
             set: Arc::new(recording.set),
             test: test.map(|test| Arc::new(test.set)),
             memory: memory_budget(),
-        }))
+        })
     }
 }
 
@@ -261,9 +262,9 @@ impl SetupSets {
     ///
     /// # Errors
     /// As [`Run::with_baselines`].
-    pub fn run(&self, setup: &Setup, begin: Begin, job: &Job<'_>) -> Result<Run, RunError> {
-        let mut run = Run::with_baselines(setup.settings, self.sets.clone(), begin, job)?;
-        run.set_blend(self.recorded().and_then(|recorded| recorded.blend.clone()));
+    pub fn run(&self, setup: &Setup, states: Option<Vec<TrainerState>>, job: &Job<'_>) -> Result<Run, RunError> {
+        let mut run = Run::with_baselines(setup.settings, self.sets.clone(), states, job)?;
+        run.set_combined(self.recorded().and_then(|recorded| recorded.combined.clone()));
         Ok(run)
     }
 
@@ -271,13 +272,13 @@ impl SetupSets {
     ///
     /// # Errors
     /// If they cannot be monitored, as those of an array, which are checked against its model.
-    pub fn drift_reference(&self) -> Result<DriftReference, NoDriftMonitor> {
+    pub fn drift_reference(&self) -> Result<DriftReference, LiveError> {
         let training = &self.sets.split.training;
         if self.recordings.is_none() {
-            return Err(NoDriftMonitor::NotDescribed);
+            return Err(LiveError::NotDescribed);
         }
         if training.row_wires_read().is_some() {
-            return Err(NoDriftMonitor::RowWires);
+            return Err(LiveError::RowWires);
         }
         // With a memory, the readings are followed by values from the past, which a monitor does not need.
         let channels = self.sets.problem.inputs.len();
@@ -287,7 +288,7 @@ impl SetupSets {
 
     /// Intervals of the network that is trained with chosen settings, from the held-out answers of the choice; `None` if
     /// nothing was chosen.
-    pub fn chosen_intervals(&self) -> Option<Result<Intervals, NoIntervals>> {
+    pub fn chosen_intervals(&self) -> Option<Result<Intervals, RunError>> {
         self.recorded()?.chosen_intervals.clone().map(Intervals::checked)
     }
 

@@ -1,6 +1,6 @@
 use std::{env, fs, sync::OnceLock};
 
-use decoupler_core::machine::{MemoryBudget, MemorySource};
+use decoupler_core::machine::MemoryBudget;
 
 static MEMORY: OnceLock<MemoryBudget> = OnceLock::new();
 
@@ -29,22 +29,13 @@ pub fn memory_budget() -> MemoryBudget {
 fn from_texts(given: Option<&str>, meminfo: Option<&str>, limit: Option<&str>) -> MemoryBudget {
     let gigabytes = given.and_then(|text| text.trim().parse().ok());
     if let Some(gigabytes) = gigabytes.filter(|gigabytes: &f64| *gigabytes > 0.0) {
-        return MemoryBudget {
-            // Saturates, also at infinity.
-            bytes: (gigabytes * 1e9) as u64,
-            source: MemorySource::User,
-        };
+        return // Saturates, also at infinity.
+MemoryBudget::User((gigabytes * 1e9) as u64);
     }
     let limit = limit.and_then(|text| text.trim().parse().ok());
     let least = [meminfo.and_then(total_bytes), limit].into_iter().flatten().min();
-    let of_system = least.map(|bytes| MemoryBudget {
-        bytes,
-        source: MemorySource::System,
-    });
-    of_system.unwrap_or(MemoryBudget {
-        bytes: MemoryBudget::ASSUMED_BYTES,
-        source: MemorySource::Assumed,
-    })
+    let of_system = least.map(MemoryBudget::System);
+    of_system.unwrap_or(MemoryBudget::Assumed(MemoryBudget::ASSUMED_BYTES))
 }
 
 fn total_bytes(meminfo: &str) -> Option<u64> {
@@ -62,10 +53,7 @@ mod tests {
     #[test]
     fn the_memory_is_the_smaller_of_machine_and_container() {
         let memory = |meminfo, limit| from_texts(None, meminfo, limit);
-        let known = |bytes| MemoryBudget {
-            bytes,
-            source: MemorySource::System,
-        };
+        let known = |bytes| MemoryBudget::System(bytes);
         assert_eq!(memory(Some(MEMINFO), None), known(24_683_956 * 1024));
         assert_eq!(memory(Some(MEMINFO), Some("max\n")), known(24_683_956 * 1024));
         assert_eq!(memory(Some(MEMINFO), Some("1000000\n")), known(1_000_000));
@@ -75,8 +63,7 @@ mod tests {
     #[test]
     fn without_a_reported_size_the_message_names_the_assumption_and_the_variable() {
         let memory = from_texts(None, Some("MemFree: 5 kB\n"), None);
-        let assumed = (MemoryBudget::ASSUMED_BYTES, MemorySource::Assumed);
-        assert_eq!((memory.bytes, memory.source), assumed);
+        assert_eq!(memory, MemoryBudget::Assumed(MemoryBudget::ASSUMED_BYTES));
         let text = memory.to_string();
         assert!(
             text.contains("8.0 GB are assumed") && text.contains("DECOUPLER_MEMORY_GB"),
@@ -87,14 +74,14 @@ mod tests {
     #[test]
     fn the_variable_overrides_the_memory() {
         let memory = |given| from_texts(Some(given), Some(MEMINFO), Some("1000000"));
-        assert_eq!(memory("64").bytes, 64_000_000_000);
+        assert_eq!(memory("64").bytes(), 64_000_000_000);
         assert_eq!(
             memory(" 0.5\n").to_string(),
             "--memory-limit or DECOUPLER_MEMORY_GB allows 0.5 GB"
         );
-        assert_eq!(memory("inf").bytes, u64::MAX);
+        assert_eq!(memory("inf").bytes(), u64::MAX);
         for refused in ["", "much", "0", "-3", "NaN"] {
-            assert_eq!(memory(refused).bytes, 1_000_000, "{refused}");
+            assert_eq!(memory(refused).bytes(), 1_000_000, "{refused}");
         }
     }
 }

@@ -1,6 +1,6 @@
 use std::fs;
 
-use decoupler_core::machine::{MemoryBudget, MemorySource};
+use decoupler_core::machine::MemoryBudget;
 use thiserror::Error;
 
 use super::memory_budget;
@@ -47,8 +47,8 @@ impl ReadingBudget {
     /// Returns the budget for reading a file now.
     pub fn now() -> Self {
         let machine = memory_budget();
-        if machine.source == MemorySource::User {
-            return Self::of(machine.bytes, true);
+        if let MemoryBudget::User(bytes) = machine {
+            return Self::of(bytes, true);
         }
         let text = |path: &str| fs::read_to_string(path).ok();
         let free = free_bytes(&Texts {
@@ -58,7 +58,7 @@ impl ReadingBudget {
             container_limit: text("/sys/fs/cgroup/memory.max"),
             container_use: text("/sys/fs/cgroup/memory.current"),
         });
-        Self::of(free.unwrap_or(machine.bytes) / 2, false)
+        Self::of(free.unwrap_or(machine.bytes()) / 2, false)
     }
 
     /// Returns a budget of `limit` bytes.

@@ -14,11 +14,11 @@ use std::{
 use decoupler_core::{
     dataset::{Seed, Simulation, SplitBy},
     evaluation::{
-        Begin, CrossValidation, Effort, ErrorMeasure, Measured, Run, RunError, RunSets, RunSettings, TestErrors,
+        CrossValidation, ErrorMeasure, Run, RunError, RunSets, RunSettings, TestErrors,
         experiments::{Axis, AxisKind, Experiment, ExperimentResults, Trial, TrialSamples, run_experiments},
     },
     job::Job,
-    machine::{MemoryBudget, MemorySource},
+    machine::MemoryBudget,
     scene::RowModel,
     sensor::{ArrayScale, SensorModel},
     training::Method,
@@ -79,10 +79,7 @@ fn threads(count: usize) -> NonZero<usize> {
 
 fn run(experiments: &[Experiment], thread_count: usize) -> Vec<ExperimentResults> {
     let mut results: Vec<_> = experiments.iter().cloned().map(ExperimentResults::new).collect();
-    let memory = MemoryBudget {
-        bytes: 8_000_000_000,
-        source: MemorySource::System,
-    };
+    let memory = MemoryBudget::System(8_000_000_000);
     run_experiments(
         experiments,
         &TrialSamples::Drawn(memory),
@@ -101,11 +98,8 @@ fn timeless(results: &[ExperimentResults]) -> Vec<Vec<Trial>> {
     let cells = results.iter().flat_map(|results| &results.cells);
     let trials = cells.map(|cell| {
         let timeless = |trial: &Trial| Trial {
-            effort: Effort {
-                seconds: 0.0,
-                min_epoch_seconds: 0.0,
-                ..trial.effort
-            },
+            seconds: 0.0,
+            min_epoch_seconds: 0.0,
             states: Vec::new(),
             ..trial.clone()
         };
@@ -139,7 +133,7 @@ fn a_trial_equals_the_run_with_its_settings() {
         for (trial, seed) in cell.trials.iter().zip(0..3) {
             let settings = RunSettings {
                 seed: Seed(seed),
-                ..cell.cell.settings
+                ..cell.settings
             };
             let mut alone = Run::prepare(settings).unwrap();
             while alone.step().is_none() {}
@@ -151,15 +145,14 @@ fn a_trial_equals_the_run_with_its_settings() {
                 [&baselines.mean, &baselines.linear]
             );
             let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
-            let begin = Begin::Resume(trial.states.clone());
+            let begin = Some(trial.states.clone());
             let taken_up = Run::new(settings, sets, begin, &Job::UNINTERRUPTED).unwrap();
             assert_eq!(taken_up.network(), alone.network());
             assert_eq!(taken_up.stop_reason(), alone.stop_reason());
             z_percent.push(alone.errors().percent().unwrap());
         }
         z_percent.sort_by(f64::total_cmp);
-        let summary = cell.summary();
-        let z = summary.percent();
+        let z = cell.percent();
         assert_eq!([z.min, z.median, z.max].map(Option::unwrap), z_percent[..]);
         let median = cell.median_trial().unwrap();
         assert_eq!(median.scores.network.percent(), Some(z_percent[1]));
@@ -176,7 +169,7 @@ fn cross_validation_decouples_every_sample_with_a_network_that_was_not_trained_o
                 // A sample left out would be decoupled as (0, 0, 0), 4 mm below any node.
                 assert!(worst_mm(&trial.scores.baselines.mean) < 1.0, "{unit}: {trial:?}");
                 assert!(worst_mm(&trial.scores.network) < 4.0, "{unit}: {trial:?}");
-                assert_eq!((trial.effort.networks, trial.states.is_empty()), (4, true));
+                assert_eq!((trial.networks, trial.states.is_empty()), (4, true));
             }
             let [first, second] = [0, 1].map(|repeat| &cell.trials[repeat]);
             assert_eq!(first.seed, second.seed);
@@ -270,7 +263,7 @@ fn a_cell_that_cannot_be_trained_gives_the_reason_and_the_others_continue() {
         message.contains("seed 0") && message.contains("memory") && message.contains("hidden nodes"),
         "{message}"
     );
-    assert_eq!(results.cells[1].summary().percent().median, None);
+    assert_eq!(results.cells[1].percent().median, None);
 }
 
 #[test]
@@ -321,7 +314,7 @@ fn recording(folder: &Path) -> Setup {
         },
         ..Plan::default()
     };
-    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let mut settings = RunSettings::measured(RowModel::Shared);
     settings.hidden = 3;
     settings.training.stopping.epochs = 6;
     Setup::recording(settings, plan)
@@ -380,13 +373,8 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
             let mut settings = *setup.settings();
             settings.seed = seed;
             settings.training.method = [Method::recorded_regularization(), Method::default()][place % 2];
-            let mut alone = Run::with_baselines(
-                settings,
-                RunSets::new(sets.split, sets.test),
-                Begin::Initialize,
-                &Job::UNINTERRUPTED,
-            )
-            .unwrap();
+            let mut alone =
+                Run::with_baselines(settings, RunSets::new(sets.split, sets.test), None, &Job::UNINTERRUPTED).unwrap();
             while alone.step().is_none() {}
             assert_eq!(trial.seed, seed);
             assert_eq!(trial.scores.network, alone.errors(), "cell {place}");
@@ -401,21 +389,20 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
             let taken_up = Run::with_baselines(
                 settings,
                 RunSets::new(sets.split, sets.test),
-                Begin::Resume(trial.states.clone()),
+                Some(trial.states.clone()),
                 &Job::UNINTERRUPTED,
             )
             .unwrap();
             assert_eq!(taken_up.network(), alone.network());
         }
-        let summary = cell.summary();
-        let r2 = summary.error(ErrorMeasure::R2).expect("a recording has targets");
+        let r2 = cell.error(ErrorMeasure::R2).expect("a recording has targets");
         let mean_r2 = |trial: &Trial| {
             let targets = trial.scores.network.targets();
             Some((targets[0].r2.unwrap() + targets[1].r2.unwrap()) / 2.0)
         };
         assert_eq!(r2.values, cell.trials.iter().map(mean_r2).collect::<Vec<_>>());
         assert_eq!(
-            summary.percent().values,
+            cell.percent().values,
             cell.trials
                 .iter()
                 .map(|trial| trial.scores.network.percent())
@@ -510,10 +497,10 @@ fn tables_of_a_recording_have_its_error_measures_and_target_names() {
     let experiment = on_recording(&setup, Axis::integers(AxisKind::Hidden, [2, 4]), None);
     let samples = samples_of(&setup);
     let mut results = run_on(&experiment, &samples, 2);
-    let TrialSamples::Recorded(recorded) = &samples else {
+    let TrialSamples::Recorded { problem, .. } = &samples else {
         panic!("the samples are recorded");
     };
-    results.problem = Some(Arc::clone(&recorded.problem));
+    results.problem = Some(Arc::clone(problem));
     let table = ExperimentTable::new(&results);
     let headings: Vec<_> = table.columns.iter().map(|column| column.heading).collect();
     assert_eq!(

@@ -3,10 +3,7 @@
 use decoupler_core::{
     dataset::{Dataset, PerRow, Split, SplitBy},
     decoupling::{DecoderKind, Precision},
-    evaluation::{
-        Begin, CrossValidation, DecoderSet, ErrorTable, Measured, Run, RunError, RunSets, RunSettings, Source,
-        TargetErrors,
-    },
+    evaluation::{CrossValidation, DecoderSet, ErrorTable, Run, RunError, RunSets, RunSettings, Source, TargetErrors},
     job::Job,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::RowModel,
@@ -30,7 +27,7 @@ fn recording(samples: usize, rows: &[usize], seed: u64) -> Dataset {
 }
 
 fn settings(rows: RowModel) -> RunSettings {
-    let mut settings = RunSettings::from(Measured { rows });
+    let mut settings = RunSettings::measured(rows);
     settings.hidden = 6;
     settings.training.stopping.epochs = 60;
     settings
@@ -48,13 +45,7 @@ fn split(set: &Dataset, first_test: usize) -> (Split, Dataset) {
 
 fn trained(settings: RunSettings, set: &Dataset, first_test: usize) -> Run {
     let (split, test) = split(set, first_test);
-    let mut run = Run::with_baselines(
-        settings,
-        RunSets::new(split, test),
-        Begin::Initialize,
-        &Job::UNINTERRUPTED,
-    )
-    .unwrap();
+    let mut run = Run::with_baselines(settings, RunSets::new(split, test), None, &Job::UNINTERRUPTED).unwrap();
     while run.step().is_none() {}
     run
 }
@@ -62,10 +53,10 @@ fn trained(settings: RunSettings, set: &Dataset, first_test: usize) -> Run {
 #[test]
 fn a_network_learns_a_nonlinear_map_that_a_linear_map_cannot() {
     let run = trained(settings(RowModel::Shared), &recording(600, &[0], 0), 500);
-    assert!(matches!(run.settings().source, Source::Measured(_)));
+    assert!(matches!(run.settings().source, Source::Measured { .. }));
     let scores = run.scores().unwrap();
-    let table = ErrorTable::of_scores(run.problem(), &scores, None);
-    for block in &table.blocks {
+    let tables = ErrorTable::of_scores(run.problem(), &scores, None);
+    for block in &tables {
         let names = Vec::from_iter(block.rows.iter().map(|row| row.name));
         assert_eq!(names, ["training mean", "ridge", "network"]);
     }
@@ -171,7 +162,7 @@ fn a_measured_training_resumes_bit_for_bit() {
     let mut paused = Run::with_baselines(
         settings(RowModel::Shared),
         RunSets::new(first.clone(), test.clone()),
-        Begin::Initialize,
+        None,
         &Job::UNINTERRUPTED,
     )
     .unwrap();
@@ -181,7 +172,7 @@ fn a_measured_training_resumes_bit_for_bit() {
     let mut resumed = Run::with_baselines(
         *paused.settings(),
         RunSets::new(first, test),
-        Begin::Resume(paused.states()),
+        Some(paused.states()),
         &Job::UNINTERRUPTED,
     )
     .unwrap();
@@ -197,7 +188,7 @@ fn mismatched_sets_are_named() {
         Run::with_baselines(
             settings(rows),
             RunSets::new(split.clone(), test),
-            Begin::Initialize,
+            None,
             &Job::UNINTERRUPTED,
         )
         .err()
@@ -239,12 +230,7 @@ fn mismatched_sets_are_named() {
     };
     let test = nameless.training.clone();
     assert!(matches!(
-        Run::with_baselines(
-            simulated,
-            RunSets::new(nameless, test),
-            Begin::Initialize,
-            &Job::UNINTERRUPTED
-        ),
+        Run::with_baselines(simulated, RunSets::new(nameless, test), None, &Job::UNINTERRUPTED),
         Err(RunError::NoRowWires)
     ));
 }
@@ -257,7 +243,7 @@ fn the_error_on_a_test_set_without_a_row_lists_the_rows() {
     let mut run = Run::with_baselines(
         settings(RowModel::Each),
         RunSets::new(split, test),
-        Begin::Initialize,
+        None,
         &Job::UNINTERRUPTED,
     )
     .unwrap();

@@ -93,7 +93,7 @@ fn folds_are_counted_by_the_rows_read() {
 #[test]
 fn a_fold_without_samples_of_a_known_row_is_named() {
     let results = finished(experiment(Rows::Known, 12, SplitBy::Random));
-    let reason = results.cells[0].failures[0].reason.to_string();
+    let reason = results.cells[0].failures[0].to_string();
     assert!(reason.contains("has no validation samples"), "{reason}");
 }
 

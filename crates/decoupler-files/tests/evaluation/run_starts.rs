@@ -2,11 +2,9 @@
 
 use decoupler_core::{
     dataset::{Seed, Simulation},
-    evaluation::{
-        Begin, MAX_STARTS, Run, RunError, RunSets, RunSettings, StartTrainer, TrainingSize, Workload, best_start,
-    },
+    evaluation::{MAX_STARTS, Run, RunError, RunSets, RunSettings, StartTrainer, TrainingSize, Workload, best_start},
     job::Job,
-    machine::{MemoryBudget, MemorySource},
+    machine::MemoryBudget,
     sensor::SensorModel,
     training::{Method, StopReason, StoppingRules, Trainer, TrainerState},
 };
@@ -54,7 +52,7 @@ fn bits(run: &Run) -> Vec<(Vec<u64>, usize, Option<StopReason>)> {
 /// Resumes a run of these settings from saved states.
 fn resumed(settings: RunSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
     let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
-    Run::new(settings, sets, Begin::Resume(states), &Job::UNINTERRUPTED)
+    Run::new(settings, sets, Some(states), &Job::UNINTERRUPTED)
 }
 
 #[test]
@@ -200,10 +198,7 @@ fn too_many_starts_are_refused() {
         starts: 100,
         ..settings(1)
     };
-    let memory = MemoryBudget {
-        bytes: Workload::of(&wide, TrainingSize::drawn(&wide).unwrap()).bytes - 1,
-        source: MemorySource::User,
-    };
+    let memory = MemoryBudget::User(Workload::of(&wide, TrainingSize::drawn(&wide).unwrap()).bytes - 1);
     let error = RunSets::draw(&wide, memory, &Job::UNINTERRUPTED).err().unwrap();
     assert!(matches!(error, RunError::Memory { .. }), "{error}");
     let states = Run::prepare(settings(2)).unwrap().states();

@@ -6,7 +6,7 @@ use decoupler_core::{
     dataset::{Seed, Simulation},
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        Begin, DecoderSet, Outlook, Preset, Run, RunError, RunSets, RunSettings, TradeOffPoint, fastest_under,
+        DecoderSet, Outlook, Preset, Run, RunError, RunSets, RunSettings, TradeOffPoint, TrainingSize, fastest_under,
         measure_trade_off, most_accurate_under,
     },
     job::Job,
@@ -51,7 +51,7 @@ fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
 /// Resumes a run of these settings from saved states.
 fn resumed(settings: RunSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
     let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
-    Run::new(settings, sets, Begin::Resume(states), &Job::UNINTERRUPTED)
+    Run::new(settings, sets, Some(states), &Job::UNINTERRUPTED)
 }
 
 #[test]
@@ -117,13 +117,12 @@ fn with_one_row_only_that_row_is_drawn_and_modelled() {
     assert_eq!(run.test().row_count(), 1);
     assert_eq!(run.test().samples(), 60);
     assert!(run.test().targets().iter().step_by(3).all(|&x| x == 10.0));
-    let size = settings.simulation().unwrap().model_size().unwrap();
-    assert_eq!((size.unknowns, size.equations, size.networks), (4, 12, 1));
+    let size = |settings: &RunSettings| TrainingSize::drawn(settings).unwrap();
+    assert_eq!((size(&settings).targets, size(&settings).networks), (4, 1));
     assert!(z_percent(&run, DecoderKind::Polish, Precision::Double) < 1e-9);
-    let known = small().simulation().unwrap().model_size().unwrap();
-    assert_eq!((known.unknowns, known.equations, known.networks), (12, 36, 3));
+    assert_eq!((size(&small()).targets, size(&small()).networks), (4, 3));
     settings.simulation_mut().unwrap().scene.movement = Movement::SIDEWAYS;
-    assert_eq!(settings.simulation().unwrap().model_size().unwrap().unknowns, 12);
+    assert_eq!(size(&settings).targets, 12);
     settings.simulation_mut().unwrap().scene.rows = Rows::One(3);
     assert!(Run::prepare(settings).is_err(), "there is no fourth row");
 }

@@ -2,14 +2,14 @@
 
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
-    evaluation::{Preset, TradeOffLevel, TradeOffLimits, TradeOffPoint, measure_trade_off},
+    evaluation::{Preset, TradeOffPoint, measure_trade_off},
     job::Job,
 };
 use decoupler_files::{
     export::figures::{Picture, PictureFormat},
     figure::{
-        Figure, HeatMap, Hue, Key, Look, Marker, Plot, PlotAxis, PlotFigure, SequentialMap, Series, node_figure,
-        trade_off_figure,
+        Figure, HeatMap, Hue, Key, Look, Marker, Plot, PlotAxis, PlotFigure, SequentialMap, Series, TradeOffLevel,
+        TradeOffLimits, node_figure, trade_off_figure,
     },
     import::Setup,
 };

@@ -8,7 +8,7 @@ use std::{
 
 use decoupler_core::{
     dataset::{Division, Seed, Simulation, SplitBy},
-    evaluation::{Begin, Measured, Run, RunSettings, TargetErrors, TestErrors},
+    evaluation::{Run, RunSettings, TargetErrors, TestErrors},
     job::Job,
     scene::RowModel,
 };
@@ -45,7 +45,7 @@ fn curved(folder: &Path) -> Plan {
 }
 
 fn settings() -> RunSettings {
-    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let mut settings = RunSettings::measured(RowModel::Shared);
     settings.hidden = 5;
     settings.training.stopping.epochs = 30;
     settings
@@ -55,7 +55,7 @@ fn settings() -> RunSettings {
 fn prepared(folder: &Path) -> (Run, SetupSets) {
     let setup = Setup::recording(settings(), curved(folder));
     let sets = setup.sets(folder, &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
-    let run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED).unwrap();
+    let run = sets.run(&setup, None, &Job::UNINTERRUPTED).unwrap();
     (run, sets)
 }
 

@@ -51,12 +51,9 @@ fn positions_are_matched_to_their_targets_in_any_order_and_layout() {
     ] {
         let found = imported(&folder, text).unwrap().positions;
         assert_eq!(found, expected, "{text}");
-        let lattice = TargetPosition::lattice(&found).unwrap();
-        assert_eq!(
-            (&lattice.x_mm[..], &lattice.y_mm[..]),
-            (&[0.0, 2.5][..], &[-1.0, 0.0][..])
-        );
-        assert_eq!(lattice.places, [3, 1, 2, 0]);
+        let (lines_mm, order) = TargetPosition::lattice(&found).unwrap();
+        assert_eq!(lines_mm, [[0.0, 2.5], [-1.0, 0.0]]);
+        assert_eq!(order, [3, 1, 2, 0]);
     }
     // A force alone also has one unit.
     let alone = imported(&folder, "target,x,y\nforce,1,2\n").unwrap().positions;

@@ -227,11 +227,7 @@ impl AxisForm {
 
 #[cfg(test)]
 mod tests {
-    use decoupler_core::{
-        evaluation::{Measured, RunSettings},
-        scene::RowModel,
-        training::Method,
-    };
+    use decoupler_core::{evaluation::RunSettings, scene::RowModel, training::Method};
 
     use super::*;
 
@@ -249,7 +245,7 @@ mod tests {
     #[test]
     fn axes_that_a_recording_lacks_are_replaced() {
         let plan = Plan::default();
-        let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        let settings = RunSettings::measured(RowModel::Shared);
         let setup = Setup::recording(settings, plan);
         let mut form = Form::new(Topic::Sweep);
         form.take(&setup);

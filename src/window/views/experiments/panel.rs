@@ -313,12 +313,12 @@ pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsView) {
 pub fn open_cell(shared: &Shared, outcome: &Outcome, cell: usize, effects: &mut Vec<Effect>) {
     let cell = outcome.results.cells.get(cell).filter(|_| !shared.phase.is_busy());
     let Some(cell) = cell else { return };
-    let mut settings = cell.cell.settings;
+    let mut settings = cell.settings;
     let median = cell.median_trial();
     if let Some(trial) = median {
         settings.seed = trial.seed;
     }
-    let plan = outcome.plan.clone().zip(cell.cell.division);
+    let plan = outcome.plan.clone().zip(cell.division);
     let plan = plan.map(|(plan, division)| Plan { division, ..plan });
     let Some(setup) = Setup::of(settings, plan).map(Box::new) else {
         return;

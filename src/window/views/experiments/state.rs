@@ -12,8 +12,7 @@ use std::{
 
 use decoupler_core::{
     evaluation::experiments::{
-        CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, TrialSamples, run_experiments,
-        worker_threads,
+        Experiment, ExperimentResults, Finished, PaperTable, Trial, TrialSamples, run_experiments, worker_threads,
     },
     job::Job,
     problem::Problem,
@@ -147,8 +146,6 @@ pub struct Outcome {
     pub table: ExperimentTable,
     /// Results as a figure.
     pub figure: Figure,
-    /// Results of each cell.
-    pub summaries: Vec<CellSummary>,
     /// Ending of the experiment, once it has ended.
     pub ending: Option<Ending>,
     /// Time it took, once it has ended.
@@ -164,7 +161,6 @@ impl Outcome {
         Self {
             table: ExperimentTable::new(&results),
             figure: experiment_figure(&results),
-            summaries: results.summaries(),
             results: Arc::new(results),
             plan,
             ending: None,
@@ -184,7 +180,7 @@ impl Outcome {
 
     fn record(&mut self, finished: Finished) {
         let results = Arc::make_mut(&mut self.results);
-        let settings = results.cells[finished.cell].cell.settings;
+        let settings = results.cells[finished.cell].settings;
         let problem = results.problem.clone();
         let outcome = finished.outcome.map(|mut trial| {
             let bytes = bytes_of(&trial, settings.hidden, problem.as_deref());
@@ -201,7 +197,6 @@ impl Outcome {
     fn refresh(&mut self) {
         self.table = ExperimentTable::new(&self.results);
         self.figure = experiment_figure(&self.results);
-        self.summaries = self.results.summaries();
     }
 }
 
@@ -378,7 +373,7 @@ fn bytes_of(trial: &Trial, hidden: usize, problem: Option<&Problem>) -> usize {
     });
     // Current weights, best weights, and about as many numbers again for the state of the method.
     let of_start = 4 * weights * size_of::<f64>();
-    trial.states.len() * of_start + trial.effort.epochs * size_of::<EpochRecord>()
+    trial.states.len() * of_start + trial.epochs * size_of::<EpochRecord>()
 }
 
 /// Event of the most recent experiment.
@@ -403,8 +398,8 @@ pub fn run(job: &mut Background<ExperimentEvent>, experiment: Experiment, setup:
                 Err(SetupError::Cancelled(_)) => return Ok(()),
                 samples => samples.map_err(|error| error.to_string())?,
             };
-            if let TrialSamples::Recorded(recorded) = &samples {
-                report.send(ExperimentEvent::Read(Arc::clone(&recorded.problem)));
+            if let TrialSamples::Recorded { problem, .. } = &samples {
+                report.send(ExperimentEvent::Read(Arc::clone(problem)));
             }
             let run = run_experiments(
                 &[experiment],

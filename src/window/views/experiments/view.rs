@@ -352,7 +352,7 @@ pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, share
 }
 
 fn loses_to_linear_map(outcome: &Outcome, cell: usize) -> bool {
-    let summary = &outcome.summaries[cell];
-    let both = summary.percent().median.zip(summary.linear_percent);
+    let cell = &outcome.results.cells[cell];
+    let both = cell.percent().median.zip(cell.linear_percent());
     both.is_some_and(|(network, linear)| network > linear)
 }

@@ -6,7 +6,7 @@ use thiserror::Error;
 use crate::window::test_view::Frame;
 use decoupler_core::{
     dataset::Simulation,
-    identifiability::{Identifiability, IdentifiabilityError, RowPair},
+    identifiability::Identifiability,
     scene::{RowModel, Scene, SceneError},
     sensor::{RelativeNoise, SensorError, SensorModel},
     surface::{SurfaceError, SurfaceMap},
@@ -47,8 +47,8 @@ pub struct Analysis {
     pub noise: RelativeNoise,
     /// Prior standard deviation of each unknown: that of a uniform distribution over the stroke.
     pub prior_mm: f64,
-    /// The most similar rows, if a decoder must distinguish them.
-    pub alike: Option<RowPair>,
+    /// The most similar rows and the difference of their readings, if a decoder must distinguish them.
+    pub alike: Option<([usize; 2], f64)>,
     /// Warnings, worst first.
     pub warnings: Vec<String>,
     /// The surface through the nodes.
@@ -69,9 +69,6 @@ pub enum AnalysisError {
     /// An invalid sensor.
     #[error(transparent)]
     Sensor(#[from] SensorError),
-    /// The singular values cannot be computed.
-    #[error(transparent)]
-    Identifiability(#[from] IdentifiabilityError),
     /// No surface can be fitted through the nodes.
     #[error(transparent)]
     Surface(#[from] SurfaceError),

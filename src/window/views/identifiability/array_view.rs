@@ -271,14 +271,7 @@ fn facts(analysis: &Analysis) -> Vec<(&'static str, &'static str, String)> {
     };
     let alike = analysis.alike.map_or_else(
         || "the row is known".to_owned(),
-        |pair| {
-            format!(
-                "{} and {}, by {}",
-                pair.first + 1,
-                pair.second + 1,
-                format_number(pair.difference)
-            )
-        },
+        |([first, second], difference)| format!("{} and {}, by {}", first + 1, second + 1, format_number(difference)),
     );
     let mut facts = vec![
         (

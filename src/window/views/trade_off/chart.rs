@@ -1,9 +1,9 @@
 //! Charts and table of the points of a noise level, fastest first.
 
-use decoupler_core::evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint};
+use decoupler_core::evaluation::TradeOffPoint;
 use decoupler_files::{
     export::format_number,
-    figure::{Hue, PlotFigure, frame_time, point_facts, point_name, training_time},
+    figure::{Hue, PlotFigure, TradeOffCost, TradeOffLevel, frame_time, point_facts, point_name, training_time},
 };
 use eframe::egui::{
     CursorIcon, Id, Pos2, Rect, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role,

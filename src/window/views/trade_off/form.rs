@@ -5,7 +5,7 @@ use std::{ops::RangeInclusive, str::FromStr};
 use decoupler_core::{
     dataset::{LARGEST_SAMPLES, Seed, Simulation},
     decoupling::DecoderKind,
-    evaluation::{Preset, RunSettings, TradeOffLevel, TradeOffPoint},
+    evaluation::{Preset, RunSettings, TradeOffPoint},
     network::LARGEST_HIDDEN,
     scene::{Noise, Scene},
     text::counted,
@@ -13,7 +13,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::format_percent,
-    figure::{frame_time, point_facts, point_name},
+    figure::{TradeOffLevel, frame_time, point_facts, point_name},
     import::{Plan, Setup},
 };
 use eframe::egui::{Label, RichText, Ui};
@@ -431,10 +431,7 @@ fn marked_ui(
 
 #[cfg(test)]
 mod tests {
-    use decoupler_core::{
-        evaluation::Measured,
-        scene::{RowModel, Rows},
-    };
+    use decoupler_core::scene::{RowModel, Rows};
 
     use super::*;
 
@@ -490,7 +487,7 @@ mod tests {
 
     #[test]
     fn each_method_trains_its_networks_and_other_decoders_are_measured_once() {
-        let base = RunSettings::from(Measured { rows: RowModel::Shared });
+        let base = RunSettings::measured(RowModel::Shared);
         let recording = |plan: &Plan| Setup::recording(base, plan.clone());
         let plan = TradeOffForm::default().plan(&recording(&Plan::default())).unwrap();
         let [level] = &plan.levels[..] else {

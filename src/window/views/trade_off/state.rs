@@ -10,16 +10,13 @@ use std::{
 
 use decoupler_core::{
     decoupling::DecoderKind,
-    evaluation::{
-        Preset, Run, RunSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint, Workload, decoded_unit,
-        measure_trade_off,
-    },
+    evaluation::{Preset, Run, RunSettings, TradeOffPoint, Workload, decoded_unit, measure_trade_off},
     job::Job,
     training::Method,
 };
 use decoupler_files::{
     export::NetworkFile,
-    figure::point_name,
+    figure::{TradeOffLevel, TradeOffLimits, point_name},
     import::{Recorded, Setup, SetupSets},
     machine::memory_budget,
 };

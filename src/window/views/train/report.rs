@@ -169,12 +169,12 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
             baselines,
             coverage: Vec::new(),
         };
-        let mut table = ErrorTable::of_scores(&simulation.problem(), &scores, published.as_ref());
-        let rows = table.blocks.iter_mut().flat_map(|block| &mut block.rows);
+        let mut tables = ErrorTable::of_scores(&simulation.problem(), &scores, published.as_ref());
+        let rows = tables.iter_mut().flat_map(|table| &mut table.rows);
         for row in rows.filter(|row| row.name == NETWORK) {
             row.errors.fill(None);
         }
-        error_table_ui(ui, &table);
+        error_table_ui(ui, &tables);
         conditioning_ui(ui, &preview.test);
         ui.add_space(space(2));
     }

@@ -3,12 +3,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use decoupler_core::{
-    decoupling::{Precision, ProgramDecoder},
-    evaluation::TestErrors,
-    network::Networks,
-    problem::Problem,
-};
+use decoupler_core::{decoupling::ProgramDecoder, evaluation::TestErrors, network::Networks, problem::Problem};
 use eframe::egui::{Align, Layout, RichText, Slider, Ui, Vec2, WidgetInfo, accesskit::Role};
 
 use crate::window::{
@@ -173,11 +168,7 @@ fn result_at(
 ) -> Option<RunResult> {
     let past = past.at(epoch, present)?;
     let (networks, best_epoch) = (past.networks, past.best_epoch);
-    let program = match problem.has_nodes() {
-        true => networks.program(Precision::Double),
-        false => networks.clipped_program(Precision::Double),
-    };
-    let answers = ProgramDecoder::new(program).answers_to(test.set());
+    let answers = ProgramDecoder::new(networks.decoder_program(problem, None)).answers_to(test.set());
     Some(RunResult {
         network_alone: None,
         errors: TestErrors::measure(problem, test.set(), &answers),

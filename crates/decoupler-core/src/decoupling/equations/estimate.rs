@@ -1,8 +1,9 @@
 /// Result of estimating the deformation of a row-wire.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// Reason for stopping.
-    pub stop: NewtonStop,
+    /// `true` if the last step was shorter than the tolerance; otherwise all allowed steps were taken, or none raises the
+    /// probability.
+    pub has_converged: bool,
     /// Number of steps, over all starts.
     pub steps: usize,
     /// Root mean square over readings of the relative misfit m/(γR) − 1, with the gain γ of [`Self::drift`].
@@ -24,17 +25,6 @@ impl Estimate {
     pub(in crate::decoupling) fn is_open(&self) -> bool {
         self.solution == Solution::Undetermined && self.spread > LARGEST_ERROR
     }
-}
-
-/// Reason for stopping the Gauss-Newton method.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NewtonStop {
-    /// The last step was shorter than the tolerance.
-    Converged,
-    /// All allowed steps were taken.
-    StepsTaken,
-    /// No damping yields a step that raises the probability.
-    NoStepHelps,
 }
 
 /// Status of an answer to the equations of a row.

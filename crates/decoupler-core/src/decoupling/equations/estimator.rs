@@ -3,7 +3,7 @@ use std::ops::Range as Columns;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use super::{
-    Estimate, LARGEST_ERROR, NewtonStop, Solution,
+    Estimate, LARGEST_ERROR, Solution,
     bounded::BoundedLeastSquares,
     estimate::{Misfits, ROUNDING},
     lanes::Lanes,
@@ -342,7 +342,7 @@ impl Estimator {
         let n = self.ranges.len();
         self.at[n..].fill(0.0);
         self.clamp();
-        let (stop, steps) = self.climb(max_steps);
+        let (has_converged, steps) = self.climb(max_steps);
         self.problem.evaluate_residuals(&self.at[..n]);
         let objective = self.objective;
         let (deviation, log_determinant) = self.bounded.spread(n);
@@ -383,7 +383,7 @@ impl Estimator {
             f64::NAN
         };
         let estimate = Estimate {
-            stop,
+            has_converged,
             steps,
             residual,
             drift: self.at.get(n).copied().unwrap_or(0.0),
@@ -398,7 +398,7 @@ impl Estimator {
     /// step within the tolerance. Steps without damping converge from anywhere nearby, though the misfit may rise on the
     /// way. Without prior they may also leave the ranges: damped steps alone would solve only half as many rows whose nodes
     /// move sideways.
-    fn climb(&mut self, max_steps: usize) -> (NewtonStop, usize) {
+    fn climb(&mut self, max_steps: usize) -> (bool, usize) {
         let tolerance = if self.is_exact() { TOLERANCE } else { NOISY_TOLERANCE };
         let mut lowest = self.linearise();
         self.best.copy_from_slice(&self.at);
@@ -413,7 +413,7 @@ impl Estimator {
             let is_last = length <= tolerance;
             if is_last && self.is_within(tolerance) {
                 self.clamp();
-                return (NewtonStop::Converged, taken);
+                return (true, taken);
             }
             if is_last || length.is_infinite() {
                 break;
@@ -421,7 +421,7 @@ impl Estimator {
             let objective = self.linearise();
             if self.is_local_minimum(length, lowest) && self.is_within(0.0) {
                 self.factor();
-                return (NewtonStop::Converged, taken);
+                return (true, taken);
             }
             if objective < lowest && self.is_within(0.0) {
                 lowest = objective;
@@ -446,7 +446,7 @@ impl Estimator {
             }
             if length <= tolerance || self.is_local_minimum(length, lowest) {
                 self.factor();
-                return (NewtonStop::Converged, step);
+                return (true, step);
             }
             if objective < lowest {
                 lowest = objective;
@@ -454,13 +454,13 @@ impl Estimator {
                 damping *= 0.1;
             } else if damping > DAMPINGS[1] {
                 self.return_to_best();
-                return (NewtonStop::NoStepHelps, step);
+                return (false, step);
             } else {
                 damping = (10.0 * damping).max(DAMPINGS[0]);
             }
         }
         self.return_to_best();
-        (NewtonStop::StepsTaken, max_steps)
+        (false, max_steps)
     }
 
     /// True after a short step to the `lowest` misfit, if exact readings have no such misfit at a solution: the next steps

@@ -1,7 +1,7 @@
 use std::sync::{Arc, OnceLock};
 
 use super::{
-    Estimate, LARGEST_ERROR, NewtonStop, Solution,
+    Estimate, LARGEST_ERROR, Solution,
     estimate::Misfits,
     estimator::TOLERANCE,
     row_problem::{Range, RowProblem, ranges, smallest_gap_mm, wide_ranges},
@@ -184,7 +184,7 @@ impl Lanes {
             }
             lane.state = State::GivenUp;
             if lane.residual <= lane.first_residual && self.equations.is_well_conditioned(index) {
-                let found = self.judge(index, inverse_row, (NewtonStop::StepsTaken, steps));
+                let found = self.judge(index, inverse_row, (false, steps));
                 self.lanes[index].state = State::Judged(found);
             }
         }
@@ -212,7 +212,7 @@ impl Lanes {
                 let inverse_rows = self.equations.largest_inverse_rows();
                 for (lane, inverse_row) in inverse_rows.into_iter().enumerate() {
                     if self.lanes[lane].state == State::Arrived {
-                        let found = self.judge(lane, inverse_row, (NewtonStop::Converged, step));
+                        let found = self.judge(lane, inverse_row, (true, step));
                         let is_determined = found.spread <= LARGEST_ERROR;
                         self.lanes[lane].state = if is_determined {
                             State::Judged(found)
@@ -293,7 +293,7 @@ impl Lanes {
     }
 
     /// Judges the answer in a lane by its residuals.
-    fn judge(&self, index: usize, inverse_row: f64, (stop, steps): (NewtonStop, usize)) -> Estimate {
+    fn judge(&self, index: usize, inverse_row: f64, (has_converged, steps): (bool, usize)) -> Estimate {
         let lane = &self.lanes[index];
         let readings = lane.readings_ohm.len();
         let (jacobian, misfits) = lane.system.split_at(lane.unknowns_mm.len() * padded(readings));
@@ -304,7 +304,7 @@ impl Lanes {
         let spread = all.norm() * inverse_row;
         let is_only = || spread <= LARGEST_ERROR && !self.symmetry.has_twin(lane.row, &lane.unknowns_mm);
         Estimate {
-            stop,
+            has_converged,
             steps,
             residual: all.residual(readings),
             drift: 0.0,

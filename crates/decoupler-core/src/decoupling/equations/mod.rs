@@ -14,7 +14,7 @@ mod tests;
 mod triangle;
 mod upper;
 
-pub use estimate::{Estimate, LARGEST_ERROR, NewtonStop, Solution};
+pub use estimate::{Estimate, LARGEST_ERROR, Solution};
 pub use estimator::Estimator;
 pub(crate) use priors::GaussianPrior;
 pub(crate) use row_problem::{Range, RowProblem};

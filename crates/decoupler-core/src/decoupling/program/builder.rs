@@ -9,7 +9,7 @@ use crate::{
 
 /// Changes of the readings from the centres of their channels.
 #[derive(Clone, Debug)]
-pub struct Changes {
+pub(crate) struct Changes {
     node: NodeId,
     /// Derivative of the quantity by the change of each channel.
     slopes: Vec<f64>,
@@ -187,7 +187,7 @@ impl Builder {
     /// | resistance, raw | R − R₀ | the change |
     /// | conductance | (R − R₀)/R | −1/R₀ times the change |
     /// | logarithm | ln(1 + (R − R₀)/R₀), in double precision | the change |
-    pub fn changes(&mut self, quantity: Quantity, centre: &[f64], precision: Precision) -> Changes {
+    pub(crate) fn changes(&mut self, quantity: Quantity, centre: &[f64], precision: Precision) -> Changes {
         let domain = match quantity {
             Quantity::Raw => Domain::Finite,
             Quantity::Resistance | Quantity::Conductance | Quantity::LogResistance => Domain::Positive,
@@ -234,12 +234,12 @@ impl Builder {
     ///
     /// # Panics
     /// If the sizes do not match.
-    pub fn affine_of(&mut self, changes: &Changes, weights: Array2<f64>, biases: &[f64]) -> NodeId {
+    pub(crate) fn affine_of(&mut self, changes: &Changes, weights: Array2<f64>, biases: &[f64]) -> NodeId {
         self.affine_padded(changes, weights, biases, 0.0)
     }
 
     /// As [`Self::affine_of`], with the value of outputs that only other row-wires have.
-    pub fn affine_padded(
+    pub(crate) fn affine_padded(
         &mut self,
         changes: &Changes,
         mut weights: Array2<f64>,

@@ -3,7 +3,7 @@ use pulp::{Simd, WithSimd};
 
 use super::{
     Node, NodeId, Operation, Program,
-    kernel::{self, LANES, Placement, Table},
+    kernel::{self, LANES, Padded, Placement, Real},
 };
 use crate::{
     dataset::{Dataset, MemoryStream, PerRow, Series},
@@ -19,6 +19,8 @@ use crate::{
 pub struct ProgramDecoder {
     program: Program,
     nodes: Vec<Prepared>,
+    /// Nodes that are evaluated for each chunk, in their order.
+    steps: Vec<usize>,
     /// Number of rows that are evaluated together.
     chunk: usize,
     /// Group and time of the current row.
@@ -31,8 +33,15 @@ struct Prepared {
     work: Work,
     /// Number of values of a row.
     size: usize,
-    /// Chunk × size, with room for the padding of the last row of a table.
-    values: Vec<f64>,
+    /// Chunk × size, in the node's precision and in that of the nodes that take the values.
+    values: Values,
+}
+
+/// Values in one or both precisions; the other is empty.
+#[derive(Clone, Debug, Default)]
+struct Values {
+    doubles: Vec<f64>,
+    singles: Vec<f32>,
 }
 
 /// Way in which a node is evaluated.
@@ -42,12 +51,13 @@ enum Work {
     Plain,
     /// The readings, or those that were checked.
     Readings,
-    /// Constants for all row-wires, repeated for each row of a chunk.
+    /// Constants for all row-wires, which are repeated for each row of a chunk from the beginning.
     Shared(Vec<f64>),
     /// Constants of each row-wire, one after the other.
-    OfRow(Vec<f64>),
+    OfRow(Values),
     /// Weights with biases, or points.
-    Table(PerRow<Table>),
+    Doubles(PerRow<Padded<f64>>),
+    Singles(PerRow<Padded<f32>>),
     Placement(PerRow<Placement>),
     /// A division whose dividend is the difference of these nodes.
     OfDifference(NodeId, NodeId),
@@ -66,44 +76,63 @@ const CHUNK_VALUES: usize = 4096;
 impl ProgramDecoder {
     /// Prepares a program for evaluation.
     pub fn new(program: Program) -> Self {
-        let mut is_taken = vec![false; program.nodes().len()];
-        is_taken[program.output().index()] = true;
-        let mut works: Vec<Work> = program.nodes().iter().map(|node| Work::of(node, &program)).collect();
+        let works: Vec<Work> = program.nodes().iter().map(|node| Work::of(node, &program)).collect();
+        // Precisions in which the values of each node are taken.
+        let (mut in_double, mut in_single) = (vec![false; works.len()], vec![false; works.len()]);
+        in_double[program.output().index()] = true;
         for (node, work) in program.nodes().iter().zip(&works) {
-            let values = match (&node.operation, work) {
+            let taken = match (&node.operation, work) {
                 (Operation::Affine { of, biases, .. }, Work::Placement(_)) => vec![*of, *biases],
                 (Operation::Affine { of, .. } | Operation::SquaredDistances { of, .. }, _) => vec![*of],
                 (Operation::Divide(_, divisor), Work::OfDifference(one, other)) => vec![*one, *other, *divisor],
                 (operation, _) => operation.operands(),
             };
-            values.iter().for_each(|id| is_taken[id.index()] = true);
+            let is_single = work.is_single(node) && !matches!(work, Work::OfDifference(..));
+            let places = if is_single { &mut in_single } else { &mut in_double };
+            taken.iter().for_each(|id| places[id.index()] = true);
         }
-        for (work, _) in works.iter_mut().zip(&is_taken).filter(|(_, is_taken)| !**is_taken) {
-            *work = Work::Skipped;
-        }
-        let sizes = program.nodes().iter().zip(&is_taken);
+        let is_taken = |place: usize| in_double[place] || in_single[place];
+        let sizes = program.nodes().iter().enumerate();
         let widest = sizes
-            .map(|(node, &is_taken)| if is_taken { node.size } else { 0 })
+            .map(|(place, node)| if is_taken(place) { node.size } else { 0 })
             .max();
         let chunk = (CHUNK_VALUES / widest.unwrap_or(0).max(1)).clamp(1, CHUNK_ROWS);
-        let prepared = |(work, node): (Work, &Node)| {
-            let length = chunk * node.size;
-            let (work, length) = match work {
-                Work::Readings | Work::Skipped => (work, 0),
-                Work::Shared(values) => (Work::Shared(values.repeat(chunk)), 0),
-                Work::Table(_) => (work, length + LANES),
-                _ => (work, length),
+        let prepared = |(place, (work, node)): (usize, (Work, &Node))| {
+            // The last row of a table is written with its padding.
+            let length = chunk * node.size + LANES;
+            let is_single = work.is_single(node);
+            let is_read = matches!(work, Work::Readings);
+            let zeros = |is_needed: bool| if is_taken(place) && is_needed { length } else { 0 };
+            let mut values = Values {
+                doubles: vec![0.0; zeros(!is_read && (in_double[place] || !is_single))],
+                singles: vec![0.0; zeros(in_single[place] || is_single)],
             };
+            if let Work::Shared(constants) = &work {
+                let repeated = constants.iter().cycle().take(chunk * node.size);
+                values
+                    .doubles
+                    .iter_mut()
+                    .zip(repeated.clone())
+                    .for_each(|(to, &value)| *to = value);
+                values
+                    .singles
+                    .iter_mut()
+                    .zip(repeated)
+                    .for_each(|(to, &value)| *to = value as f32);
+            }
             Prepared {
-                work,
+                work: if is_taken(place) { work } else { Work::Skipped },
                 size: node.size,
-                values: vec![0.0; length],
+                values,
             }
         };
-        let nodes = works.into_iter().zip(program.nodes()).map(prepared).collect();
+        let nodes = Vec::from_iter(works.into_iter().zip(program.nodes()).enumerate().map(prepared));
+        let is_step = |&place: &usize| !matches!(nodes[place].work, Work::Skipped | Work::Shared(_));
+        let steps = (0..=program.output().index()).filter(is_step).collect();
         Self {
             program,
             nodes,
+            steps,
             chunk,
             moment: (0, None),
         }
@@ -221,31 +250,36 @@ impl Work {
                     Precision::Double => value,
                     Precision::Single => f64::from(value as f32),
                 };
-                let values = tables.iter().flatten().map(rounded).collect();
+                let doubles = Vec::from_iter(tables.iter().flatten().map(rounded));
                 if tables.len() == 1 {
-                    Self::Shared(values)
-                } else {
-                    Self::OfRow(values)
+                    return Self::Shared(doubles);
                 }
+                let singles = doubles.iter().map(|&value| value as f32).collect();
+                Self::OfRow(Values { doubles, singles })
             }
             Operation::Affine { weights, biases, .. } => {
                 let (weights, biases) = (tables(weights), tables(biases));
                 let rows = weights.values().len().max(biases.values().len());
                 let rows = || (0..rows).map(|row| (weights.at(row), biases.at(row)));
-                let placements = rows().map(|(weights, _)| Placement::new(weights));
+                let placements = rows().map(|(weights, biases)| Placement::new(weights, biases));
                 match placements.collect() {
                     Some(placements) if node.precision == Precision::Double => {
                         Self::Placement(PerRow::each(placements))
                     }
+                    _ if node.precision == Precision::Double => {
+                        let stacked = rows().map(|(weights, biases)| Padded::of_affine(weights, biases));
+                        Self::Doubles(PerRow::each(stacked.collect()))
+                    }
                     _ => {
-                        let stacked = rows().map(|(weights, biases)| Table::of_affine(node.precision, weights, biases));
-                        Self::Table(PerRow::each(stacked.collect()))
+                        let stacked = rows().map(|(weights, biases)| Padded::of_affine(weights, biases));
+                        Self::Singles(PerRow::each(stacked.collect()))
                     }
                 }
             }
-            Operation::SquaredDistances { points, .. } => {
-                Self::Table(tables(points).map(|points| Table::of_points(node.precision, points)))
-            }
+            Operation::SquaredDistances { points, .. } => match node.precision {
+                Precision::Double => Self::Doubles(tables(points).map(Padded::of_points)),
+                Precision::Single => Self::Singles(tables(points).map(Padded::of_points)),
+            },
             Operation::Divide(dividend, _) => match program.node(*dividend) {
                 Node {
                     operation: Operation::Subtract(one, other),
@@ -260,6 +294,65 @@ impl Work {
                 Self::History(Box::new(stream.expect("checked when the program was built")))
             }
             _ => Self::Plain,
+        }
+    }
+
+    /// True if the values of the node are computed in single precision.
+    fn is_single(&self, node: &Node) -> bool {
+        let is_plain = match node.operation {
+            Operation::Subtract(..) | Operation::Divide(..) | Operation::Map(..) | Operation::Clip { .. } => true,
+            _ => matches!(self, Self::Singles(_)),
+        };
+        is_plain && node.precision == Precision::Single
+    }
+}
+
+/// Precision of values.
+trait Width: Real {
+    fn held(values: &Values) -> &[Self];
+
+    /// The values of a node that reads them.
+    fn read<'a>(readings: &'a [f64], converted: &'a Values) -> &'a [Self];
+
+    fn tables(work: &Work) -> Option<&PerRow<Padded<Self>>>;
+}
+
+impl Width for f64 {
+    #[inline(always)]
+    fn held(values: &Values) -> &[Self] {
+        &values.doubles
+    }
+
+    #[inline(always)]
+    fn read<'a>(readings: &'a [f64], _: &'a Values) -> &'a [Self] {
+        readings
+    }
+
+    #[inline(always)]
+    fn tables(work: &Work) -> Option<&PerRow<Padded<Self>>> {
+        match work {
+            Work::Doubles(tables) => Some(tables),
+            _ => None,
+        }
+    }
+}
+
+impl Width for f32 {
+    #[inline(always)]
+    fn held(values: &Values) -> &[Self] {
+        &values.singles
+    }
+
+    #[inline(always)]
+    fn read<'a>(_: &'a [f64], converted: &'a Values) -> &'a [Self] {
+        &converted.singles
+    }
+
+    #[inline(always)]
+    fn tables(work: &Work) -> Option<&PerRow<Padded<Self>>> {
+        match work {
+            Work::Singles(tables) => Some(tables),
+            _ => None,
         }
     }
 }
@@ -314,17 +407,59 @@ struct Rows<'a> {
 impl Rows<'_> {
     /// Values of a node that was evaluated, rows × size.
     #[inline(always)]
-    fn values<'a>(&'a self, node: &'a Prepared) -> &'a [f64] {
+    fn values<'a, T: Width>(&'a self, node: &'a Prepared) -> &'a [T] {
         let length = self.indices.len() * node.size;
         match &node.work {
-            Work::Readings => self.readings,
-            Work::Shared(constants) => &constants[..length],
+            Work::Readings => &T::read(self.readings, &node.values)[..length],
             Work::OfRow(constants) if self.is_run => {
                 let first = self.indices[0] * node.size;
-                &constants[first..first + length]
+                &T::held(constants)[first..first + length]
             }
-            _ => &node.values[..length],
+            _ => &T::held(&node.values)[..length],
         }
+    }
+
+    /// Values of a row, by its place.
+    #[inline(always)]
+    fn by_row<'a, T: Width>(&'a self, node: &'a Prepared) -> impl Fn(usize) -> &'a [T] {
+        let (size, values) = (node.size, self.values(node));
+        move |row: usize| &values[row * size..(row + 1) * size]
+    }
+
+    /// Computes values in the precision `T`; returns `false` if the operation is one of double precision alone.
+    #[inline(always)]
+    fn compute<T: Width>(&self, node: &Node, work: &Work, before: &[Prepared], results: &mut [T]) -> bool {
+        let all = |id: &NodeId| self.values::<T>(&before[id.index()]);
+        let of_rows = self.indices.iter().copied().enumerate();
+        match (&node.operation, work) {
+            (Operation::Divide(_, divisor), Work::OfDifference(one, other)) => {
+                let operands = [one, other, divisor].map(|id| self.values::<f64>(&before[id.index()]));
+                kernel::subtract_and_divide(operands, results);
+            }
+            (Operation::Subtract(one, other), _) => {
+                kernel::pairs(all(one), all(other), results, |one, other| one - other);
+            }
+            (Operation::Divide(one, other), _) => {
+                kernel::pairs(all(one), all(other), results, |one, other| one / other);
+            }
+            (Operation::Map(function, of), _) => kernel::map(*function, all(of), results),
+            (Operation::Clip { of, low, high }, _) => kernel::clip(all(of), [all(low), all(high)], results),
+            (Operation::Affine { of, .. } | Operation::SquaredDistances { of, .. }, work) => {
+                let Some(tables) = T::tables(work) else { return false };
+                let of = self.by_row(&before[of.index()]);
+                let is_affine = matches!(node.operation, Operation::Affine { .. });
+                for (row, row_index) in of_rows {
+                    let (table, results) = (tables.at(row_index), &mut results[row * node.size..]);
+                    if is_affine {
+                        table.affine(of(row), results);
+                    } else {
+                        table.squared_distances(of(row), results);
+                    }
+                }
+            }
+            _ => return false,
+        }
+        true
     }
 }
 
@@ -332,41 +467,53 @@ impl ProgramDecoder {
     #[inline(always)]
     fn evaluate_chunk(&mut self, rows: &Rows<'_>, targets: &mut [f64]) -> Result<(), DecodeError> {
         let Self {
-            program, nodes, moment, ..
+            program,
+            nodes,
+            steps,
+            moment,
+            ..
         } = self;
         let output = program.output().index();
-        // The last values are written where they are wanted, unless their padding would be too.
-        let is_padded = |node: &Prepared| matches!(node.work, Work::Table(_)) && !node.size.is_multiple_of(LANES);
-        let is_direct = !is_padded(&nodes[output]);
-        for (index, node) in program.nodes().iter().enumerate() {
+        for &index in &*steps {
+            let node = &program.nodes()[index];
             let (before, rest) = nodes.split_at_mut(index);
             let Prepared { work, size, values } = &mut rest[0];
-            let (size, precision) = (*size, node.precision);
-            let values = if index == output && is_direct {
+            let size = *size;
+            if work.is_single(node) {
+                let is_computed = rows.compute::<f32>(node, work, before, &mut values.singles);
+                assert!(is_computed, "the operation is one of single precision");
+                convert(&values.singles, &mut values.doubles, f64::from);
+                continue;
+            }
+            // The last values are written where they are wanted, unless they have padding.
+            let has_padding = matches!(work, Work::Doubles(_));
+            let results = if index == output && !has_padding {
                 &mut *targets
             } else {
-                &mut values[..]
+                &mut values.doubles[..]
             };
-            let all = |id: NodeId| rows.values(&before[id.index()]);
-            let by_row = |id: NodeId| {
-                let (size, values) = (before[id.index()].size, all(id));
-                move |row: usize| &values[row * size..(row + 1) * size]
-            };
+            let all = |id: &NodeId| rows.values::<f64>(&before[id.index()]);
+            let by_row = |id: &NodeId| rows.by_row::<f64>(&before[id.index()]);
             let of_rows = rows.indices.iter().copied().enumerate();
             match (&node.operation, work) {
-                (_, Work::Skipped | Work::Shared(_)) | (Operation::Readings, _) => {}
+                (Operation::Readings, _) => convert(rows.readings, &mut values.singles, |value| value as f32),
                 (_, Work::OfRow(constants)) => {
                     if !rows.is_run {
-                        for (r, row_index) in of_rows {
-                            let constants = &constants[row_index * size..(row_index + 1) * size];
-                            values[r * size..(r + 1) * size].copy_from_slice(constants);
+                        for (row, row_index) in of_rows {
+                            let (to, from) = (row * size..(row + 1) * size, row_index * size..(row_index + 1) * size);
+                            if !results.is_empty() {
+                                results[to.clone()].copy_from_slice(&constants.doubles[from.clone()]);
+                            }
+                            if !values.singles.is_empty() {
+                                values.singles[to].copy_from_slice(&constants.singles[from]);
+                            }
                         }
                     }
                 }
                 (Operation::Valid { of, domain }, work) => {
-                    let checked = all(*of);
-                    // Invalid readings are rare: one vectorised pass finds whether there may be any.
-                    if !checked.iter().fold(true, |all, &value| all & domain.contains(value))
+                    let checked = all(of);
+                    // Invalid readings are rare: one vectorised pass finds whether there is any.
+                    if !kernel::are_valid(*domain, checked)
                         && let Some(place) = checked.iter().position(|&value| !domain.contains(value))
                     {
                         return Err(DecodeError {
@@ -376,81 +523,76 @@ impl ProgramDecoder {
                         });
                     }
                     if !matches!(work, Work::Readings) {
-                        values[..checked.len()].copy_from_slice(checked);
+                        results[..checked.len()].copy_from_slice(checked);
                     }
+                    convert(checked, &mut values.singles, |value| value as f32);
                 }
-                (Operation::Subtract(one, other), _) => kernel::subtract(precision, all(*one), all(*other), values),
-                (Operation::Divide(_, divisor), Work::OfDifference(one, other)) => {
-                    kernel::subtract_and_divide(precision, [all(*one), all(*other), all(*divisor)], values);
-                }
-                (Operation::Divide(one, other), _) => kernel::divide(precision, all(*one), all(*other), values),
-                (Operation::Map(function, of), _) => kernel::map(precision, *function, all(*of), values),
                 (Operation::Affine { of, biases, .. }, Work::Placement(placements)) => {
-                    let (of, biases) = (by_row(*of), all(*biases));
-                    values[..biases.len()].copy_from_slice(biases);
-                    for (r, row_index) in of_rows {
+                    let (of, biases) = (by_row(of), all(biases));
+                    results[..biases.len()].copy_from_slice(biases);
+                    for (row, row_index) in of_rows {
                         placements
                             .at(row_index)
-                            .add(of(r), &mut values[r * size..(r + 1) * size]);
+                            .apply(of(row), &mut results[row * size..(row + 1) * size]);
                     }
-                }
-                (Operation::Affine { of, .. }, Work::Table(tables)) => {
-                    let of = by_row(*of);
-                    for (r, row_index) in of_rows {
-                        tables.at_mut(row_index).affine(of(r), &mut values[r * size..]);
-                    }
-                }
-                (Operation::SquaredDistances { of, .. }, Work::Table(tables)) => {
-                    let of = by_row(*of);
-                    for (r, row_index) in of_rows {
-                        tables
-                            .at_mut(row_index)
-                            .squared_distances(of(r), &mut values[r * size..]);
-                    }
-                }
-                (Operation::Clip { of, low, high }, _) => {
-                    kernel::clip(precision, all(*of), [all(*low), all(*high)], values);
                 }
                 (Operation::Concatenate(parts), _) => {
                     let mut first = 0;
                     for part in parts {
-                        let (part, of) = (before[part.index()].size, by_row(*part));
-                        for (r, _) in of_rows.clone() {
-                            values[r * size + first..r * size + first + part].copy_from_slice(of(r));
+                        let (part, of) = (before[part.index()].size, by_row(part));
+                        for (row, _) in of_rows.clone() {
+                            results[row * size + first..row * size + first + part].copy_from_slice(of(row));
                         }
                         first += part;
                     }
                 }
                 (Operation::Blend { logits, of }, Work::Blend(shares)) => {
-                    let (logits, of) = (by_row(*logits), by_row(*of));
-                    for (r, _) in of_rows {
-                        kernel::blend(logits(r), of(r), shares, &mut values[r * size..(r + 1) * size]);
+                    let (logits, of) = (by_row(logits), by_row(of));
+                    for (row, _) in of_rows {
+                        kernel::blend(logits(row), of(row), shares, &mut results[row * size..(row + 1) * size]);
                     }
                 }
                 (Operation::History { of, .. }, Work::History(stream)) => {
-                    let ((group, time_s), of) = (*moment, by_row(*of));
-                    for (r, row_wire) in of_rows {
-                        let (past, _) = stream.step(Series { group, row_wire }, of(r), time_s);
-                        values[r * size..(r + 1) * size].copy_from_slice(past);
+                    let ((group, time_s), of) = (*moment, by_row(of));
+                    for (row, row_wire) in of_rows {
+                        let (past, _) = stream.step(Series { group, row_wire }, of(row), time_s);
+                        results[row * size..(row + 1) * size].copy_from_slice(past);
                     }
                 }
                 (Operation::CountOutside { of, low, high }, _) => {
-                    let [of, low, high] = [of, low, high].map(|id| by_row(*id));
-                    for (r, _) in of_rows {
-                        let limits = low(r).iter().zip(high(r));
+                    let [of, low, high] = [of, low, high].map(by_row);
+                    for (row, _) in of_rows {
+                        let limits = low(row).iter().zip(high(row));
                         let outside = limits
-                            .zip(of(r))
+                            .zip(of(row))
                             .filter(|((low, high), value)| !(*low..=*high).contains(value));
-                        values[r] = outside.count() as f64;
+                        results[row] = outside.count() as f64;
                     }
                 }
-                _ => unreachable!("every operation is prepared as such"),
+                (_, work) => {
+                    let is_computed = rows.compute::<f64>(node, work, before, results);
+                    assert!(is_computed, "every operation is prepared as such");
+                }
+            }
+            if !matches!(rest[0].work, Work::Readings | Work::OfRow(_)) {
+                let Values { doubles, singles } = &mut rest[0].values;
+                convert(doubles, singles, |value| value as f32);
             }
         }
         let last = &nodes[output];
-        if !is_direct || matches!(last.work, Work::Readings | Work::Shared(_) | Work::OfRow(_)) {
+        let is_elsewhere = matches!(
+            last.work,
+            Work::Readings | Work::Shared(_) | Work::OfRow(_) | Work::Doubles(_) | Work::Singles(_)
+        );
+        if is_elsewhere || last.work.is_single(program.node(program.output())) {
             targets.copy_from_slice(rows.values(last));
         }
         Ok(())
     }
+}
+
+/// Converts values for the nodes that take them in the other precision, if there are any.
+#[inline(always)]
+fn convert<T: Copy, U>(from: &[T], to: &mut [U], convert: impl Fn(T) -> U) {
+    to.iter_mut().zip(from).for_each(|(to, &value)| *to = convert(value));
 }

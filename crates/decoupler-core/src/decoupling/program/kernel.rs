@@ -1,21 +1,15 @@
 //! Arithmetic of programs, written so that it fills vector registers inside a SIMD-dispatched function.
 //!
-//! All values are held as doubles. In single precision, operands are rounded when they are loaded, and the arithmetic is
-//! that of 32 bits.
-
 use std::ops::{Add, Div, Mul, Sub};
 
 use ndarray::Array2;
 
-use super::Function;
-use crate::{
-    decoupling::Precision,
-    network::{exp, tanh, tanh_single},
-};
+use super::{Domain, Function};
+use crate::network::{exp, tanh, tanh_single};
 
 /// Floating-point type of an operation.
 pub(super) trait Real:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + 'static
+    Copy + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + 'static
 {
     const ZERO: Self;
 
@@ -65,151 +59,64 @@ impl Real for f32 {
     }
 }
 
-/// Writes a function of each value. In single precision, all but the hyperbolic tangent are computed in double precision
-/// and rounded.
+/// True if all values are in the domain. Bit patterns of positive numbers are in the order of the numbers.
 #[inline(always)]
-pub(super) fn map(precision: Precision, function: Function, values: &[f64], results: &mut [f64]) {
-    match precision {
-        Precision::Double => map_in::<f64>(function, values, results),
-        Precision::Single => map_in::<f32>(function, values, results),
+pub(super) fn are_valid(domain: Domain, values: &[f64]) -> bool {
+    let infinite = f64::INFINITY.to_bits();
+    let largest = |pattern: fn(f64) -> u64| values.iter().fold(0, |largest, &value| pattern(value).max(largest));
+    match domain {
+        Domain::Finite => largest(|value| value.abs().to_bits()) < infinite,
+        // 0 becomes the largest pattern.
+        Domain::Positive => largest(|value| value.to_bits().wrapping_sub(1)) < infinite - 1,
     }
 }
 
+/// Writes a function of each value. In single precision, all but the hyperbolic tangent are computed in double precision
+/// and rounded.
 #[inline(always)]
-fn map_in<T: Real>(function: Function, values: &[f64], results: &mut [f64]) {
+pub(super) fn map<T: Real>(function: Function, values: &[T], results: &mut [T]) {
     match function {
-        Function::Log1p => each::<T>(values, results, f64::ln_1p),
-        Function::Gaussian => each::<T>(values, results, |x| exp(-x)),
+        Function::Log1p => each(values, results, f64::ln_1p),
+        Function::Gaussian => each(values, results, |x| exp(-x)),
         Function::Tanh => {
-            for (result, &value) in results.iter_mut().zip(values) {
-                *result = T::of(value).tanh().to_f64();
+            for (result, value) in results.iter_mut().zip(values) {
+                *result = value.tanh();
             }
         }
     }
 }
 
 #[inline(always)]
-fn each<T: Real>(values: &[f64], results: &mut [f64], function: impl Fn(f64) -> f64) {
-    for (result, &value) in results.iter_mut().zip(values) {
-        *result = T::of(function(T::of(value).to_f64())).to_f64();
+fn each<T: Real>(values: &[T], results: &mut [T], function: impl Fn(f64) -> f64) {
+    for (result, value) in results.iter_mut().zip(values) {
+        *result = T::of(function(value.to_f64()));
     }
 }
 
-/// Writes the differences of pairs of values.
+/// Writes a function of pairs of values.
 #[inline(always)]
-pub(super) fn subtract(precision: Precision, one: &[f64], other: &[f64], results: &mut [f64]) {
-    match precision {
-        Precision::Double => pairs::<f64>(one, other, results, |one, other| one - other),
-        Precision::Single => pairs::<f32>(one, other, results, |one, other| one - other),
-    }
-}
-
-/// Writes the quotients of pairs of values.
-#[inline(always)]
-pub(super) fn divide(precision: Precision, one: &[f64], other: &[f64], results: &mut [f64]) {
-    match precision {
-        Precision::Double => pairs::<f64>(one, other, results, |one, other| one / other),
-        Precision::Single => pairs::<f32>(one, other, results, |one, other| one / other),
+pub(super) fn pairs<T: Real>(one: &[T], other: &[T], results: &mut [T], function: impl Fn(T, T) -> T) {
+    for ((result, &one), &other) in results.iter_mut().zip(one).zip(other) {
+        *result = function(one, other);
     }
 }
 
 /// Writes (one − other) / divisor, with the difference in double precision.
 #[inline(always)]
-pub(super) fn subtract_and_divide(precision: Precision, [one, other, divisor]: [&[f64]; 3], results: &mut [f64]) {
-    let all = results.iter_mut().zip(one).zip(other).zip(divisor);
-    match precision {
-        Precision::Double => all.for_each(|(((result, one), other), divisor)| *result = (one - other) / divisor),
-        Precision::Single => all.for_each(|(((result, one), other), &divisor)| {
-            *result = f64::from((one - other) as f32 / divisor as f32);
-        }),
+pub(super) fn subtract_and_divide<T: Real>([one, other, divisor]: [&[f64]; 3], results: &mut [T]) {
+    for (((result, one), other), &divisor) in results.iter_mut().zip(one).zip(other).zip(divisor) {
+        *result = T::of(one - other) / T::of(divisor);
     }
 }
 
 /// Writes the nearest values within limits; NaN passes through.
 #[inline(always)]
-pub(super) fn clip(precision: Precision, values: &[f64], [low, high]: [&[f64]; 2], results: &mut [f64]) {
+pub(super) fn clip<T: Real>(values: &[T], [low, high]: [&[T]; 2], results: &mut [T]) {
     let limits = low.iter().zip(high);
     for ((result, &value), (&low, &high)) in results.iter_mut().zip(values).zip(limits) {
         let above = if value < low { low } else { value };
-        let clipped = if above > high { high } else { above };
-        *result = match precision {
-            Precision::Double => clipped,
-            Precision::Single => f64::from(clipped as f32),
-        };
+        *result = if above > high { high } else { above };
     }
-}
-
-#[inline(always)]
-fn pairs<T: Real>(one: &[f64], other: &[f64], results: &mut [f64], function: impl Fn(T, T) -> T) {
-    for ((result, &one), &other) in results.iter_mut().zip(one).zip(other) {
-        *result = function(T::of(one), T::of(other)).to_f64();
-    }
-}
-
-/// A table (rows × columns) in the precision of its node.
-#[derive(Clone, Debug)]
-pub(super) enum Table {
-    Double(Padded<f64>),
-    Single {
-        table: Padded<f32>,
-        /// The values rounded to single precision.
-        rounded: Vec<f32>,
-    },
-}
-
-impl Table {
-    /// Lays out tables one after the other.
-    fn new(precision: Precision, tables: &[&Array2<f64>], panels: &[usize]) -> Self {
-        match precision {
-            Precision::Double => Self::Double(Padded::new(tables, panels)),
-            Precision::Single => {
-                let table = Padded::new(tables, panels);
-                let rounded = vec![0.0; table.rows];
-                Self::Single { table, rounded }
-            }
-        }
-    }
-
-    /// An affine map with weights (inputs × outputs) and biases (1 × outputs).
-    pub(super) fn of_affine(precision: Precision, weights: &Array2<f64>, biases: &Array2<f64>) -> Self {
-        Self::new(precision, &[weights, biases], &SUMS)
-    }
-
-    /// Points (inputs × points).
-    pub(super) fn of_points(precision: Precision, points: &Array2<f64>) -> Self {
-        Self::new(precision, &[points], &DISTANCES)
-    }
-
-    /// Writes values · weights + biases with padding.
-    #[inline(always)]
-    pub(super) fn affine(&mut self, values: &[f64], results: &mut [f64]) {
-        match self {
-            Self::Double(table) => table.affine(values, results),
-            Self::Single { table, rounded } => {
-                table.affine(round(values, rounded), results);
-            }
-        }
-    }
-
-    /// Writes the squared distances of the values from each point, with padding.
-    #[inline(always)]
-    pub(super) fn squared_distances(&mut self, values: &[f64], results: &mut [f64]) {
-        match self {
-            Self::Double(table) => table.squared_distances(values, results),
-            Self::Single { table, rounded } => {
-                table.squared_distances(round(values, rounded), results);
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn round<'a>(values: &[f64], rounded: &'a mut [f32]) -> &'a [f32] {
-    let rounded = &mut rounded[..values.len()];
-    for (rounded, &value) in rounded.iter_mut().zip(values) {
-        *rounded = value as f32;
-    }
-    rounded
 }
 
 /// The number of columns of a table is padded to a multiple of this.
@@ -230,6 +137,17 @@ const SUMS: [usize; 4] = [16, 12, 8, LANES];
 const DISTANCES: [usize; 3] = [32, 16, LANES];
 
 impl<T: Real> Padded<T> {
+    /// An affine map with weights (inputs × outputs) and biases (1 × outputs).
+    pub(super) fn of_affine(weights: &Array2<f64>, biases: &Array2<f64>) -> Self {
+        Self::new(&[weights, biases], &SUMS)
+    }
+
+    /// Points (inputs × points).
+    pub(super) fn of_points(points: &Array2<f64>) -> Self {
+        Self::new(&[points], &DISTANCES)
+    }
+
+    /// Lays out tables one after the other.
     fn new(tables: &[&Array2<f64>], panels: &[usize]) -> Self {
         let width = tables[0].ncols().next_multiple_of(LANES);
         let rows = Vec::from_iter(tables.iter().flat_map(|table| table.rows()));
@@ -256,8 +174,9 @@ impl<T: Real> Padded<T> {
         self.values[first * self.rows..(first + B) * self.rows].as_chunks().0
     }
 
+    /// Writes values · weights + biases with padding.
     #[inline(always)]
-    fn affine(&self, values: &[T], results: &mut [f64]) {
+    pub(super) fn affine(&self, values: &[T], results: &mut [T]) {
         let mut first = 0;
         while first < self.width {
             first += match self.width - first {
@@ -272,7 +191,7 @@ impl<T: Real> Padded<T> {
     /// Writes the sums `first..first + B` and returns B. Even and odd values are summed separately to hide the latency of
     /// additions.
     #[inline(always)]
-    fn sums<const B: usize>(&self, values: &[T], first: usize, results: &mut [f64]) -> usize {
+    fn sums<const B: usize>(&self, values: &[T], first: usize, results: &mut [T]) -> usize {
         let (biases, weights) = self
             .panel::<B>(first)
             .split_last()
@@ -292,13 +211,14 @@ impl<T: Real> Padded<T> {
             }
         }
         for (lane, result) in results[first..first + B].iter_mut().enumerate() {
-            *result = (even[lane] + odd[lane]).to_f64();
+            *result = even[lane] + odd[lane];
         }
         B
     }
 
+    /// Writes the squared distances of the values from each point, with padding.
     #[inline(always)]
-    fn squared_distances(&self, values: &[T], results: &mut [f64]) {
+    pub(super) fn squared_distances(&self, values: &[T], results: &mut [T]) {
         let mut first = 0;
         while first < self.width {
             first += match self.width - first {
@@ -311,7 +231,7 @@ impl<T: Real> Padded<T> {
 
     /// Writes the squared distances `first..first + B` and returns B.
     #[inline(always)]
-    fn distances<const B: usize>(&self, values: &[T], first: usize, results: &mut [f64]) -> usize {
+    fn distances<const B: usize>(&self, values: &[T], first: usize, results: &mut [T]) -> usize {
         let mut squares = [T::ZERO; B];
         for (&value, points) in values.iter().zip(self.panel::<B>(first)) {
             for lane in 0..B {
@@ -320,7 +240,7 @@ impl<T: Real> Padded<T> {
             }
         }
         for (lane, result) in results[first..first + B].iter_mut().enumerate() {
-            *result = squares[lane].to_f64();
+            *result = squares[lane];
         }
         B
     }
@@ -330,9 +250,10 @@ impl<T: Real> Padded<T> {
 #[derive(Clone, Debug)]
 pub(super) struct Placement(Vec<Term>);
 
-/// A product that is added to an output.
+/// An output that is not constant: bias + weight · value.
 #[derive(Clone, Copy, Debug)]
 struct Term {
+    bias: f64,
     weight: f64,
     value: usize,
     output: usize,
@@ -340,11 +261,16 @@ struct Term {
 
 impl Placement {
     /// `None` if an output depends on several values.
-    pub(super) fn new(weights: &Array2<f64>) -> Option<Self> {
+    pub(super) fn new(weights: &Array2<f64>, biases: &Array2<f64>) -> Option<Self> {
         let mut terms = Vec::new();
-        for (output, column) in weights.columns().into_iter().enumerate() {
+        for ((output, column), &bias) in weights.columns().into_iter().enumerate().zip(biases) {
             let mut all = column.indexed_iter().filter(|(_, weight)| **weight != 0.0);
-            terms.extend(all.next().map(|(value, &weight)| Term { weight, value, output }));
+            terms.extend(all.next().map(|(value, &weight)| Term {
+                bias,
+                weight,
+                value,
+                output,
+            }));
             if all.next().is_some() {
                 return None;
             }
@@ -352,11 +278,17 @@ impl Placement {
         Some(Self(terms))
     }
 
-    /// Adds the products to the biases.
+    /// Writes the outputs that are not constant.
     #[inline(always)]
-    pub(super) fn add(&self, values: &[f64], results: &mut [f64]) {
-        for &Term { weight, value, output } in &self.0 {
-            results[output] += weight * values[value];
+    pub(super) fn apply(&self, values: &[f64], results: &mut [f64]) {
+        for &Term {
+            bias,
+            weight,
+            value,
+            output,
+        } in &self.0
+        {
+            results[output] = bias + weight * values[value];
         }
     }
 }

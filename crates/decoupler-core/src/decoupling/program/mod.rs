@@ -6,7 +6,7 @@
 //! their own.
 
 mod builder;
-mod combined;
+mod composition;
 mod evaluate;
 mod kernel;
 mod networks;
@@ -14,7 +14,7 @@ mod networks;
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-pub use builder::{Builder, Changes};
+pub use builder::Builder;
 pub use evaluate::ProgramDecoder;
 
 use super::Precision;

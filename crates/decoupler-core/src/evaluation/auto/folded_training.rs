@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use super::{
     super::{
-        Begin, Run, RunError, RunSets, RunSettings,
+        Run, RunError, RunSets, RunSettings,
         cross_validation::{nth_seed, scatter},
     },
     features::Features,
@@ -162,7 +162,7 @@ impl Part {
                 memory,
                 ..RunSets::without_test(Split { training, validation })
             };
-            let run = Run::new(settings, sets, Begin::Initialize, &Job::UNINTERRUPTED)?;
+            let run = Run::new(settings, sets, None, &Job::UNINTERRUPTED)?;
             let inputs = run.scalings.at(0).0.of(readings.view());
             part.run = Some((run, inputs));
         }

@@ -31,7 +31,7 @@ use serde::{Deserialize, Serialize};
 use super::{Initialization, RunSettings};
 use crate::{
     dataset::{Dataset, History, Memory, Span, SplitBy},
-    decoupling::Blend,
+    decoupling::Combined,
     network::{InputChoice, Quantity, ScalingChoice},
     problem::Channel,
     text::{format_below_one, format_percent},
@@ -95,7 +95,7 @@ pub struct AutoChoice {
     /// Memory from which the features are made.
     pub memory: Memory,
     /// The best combination with the network.
-    pub blend: Blend,
+    pub combined: Combined,
     /// Everything that was tried.
     pub record: AutoRecord,
     /// Held-out answers of the combination to all samples (samples × targets).

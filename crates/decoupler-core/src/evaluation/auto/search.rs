@@ -1,9 +1,9 @@
 use ndarray::{Array2, Axis, concatenate};
 
 use super::{
-    super::{Begin, Combination, Initialization, Run, RunError, RunSets, RunSettings, errors::extremes},
-    AutoChoice, AutoFixed, AutoProgress, AutoRecord, AutoSamples, Blend, MULTIPLICATIONS_PER_SECOND, Tried, TriedModel,
-    describe_features,
+    super::{Combination, Initialization, Run, RunError, RunSets, RunSettings, errors::extremes},
+    AutoChoice, AutoFixed, AutoProgress, AutoRecord, AutoSamples, Combined, MULTIPLICATIONS_PER_SECOND, Tried,
+    TriedModel, describe_features,
     features::{Features, margin},
     folded_training::{FoldedTraining, residual, training_multiplications},
     judge::Judge,
@@ -696,7 +696,7 @@ impl Search<'_> {
         Ok(AutoChoice {
             settings,
             memory: features.memory.clone(),
-            blend: Blend {
+            combined: Combined {
                 network: weights.row(network).to_vec(),
                 others,
                 margin: margin(samples),
@@ -757,7 +757,7 @@ impl Search<'_> {
                     memory: self.memory,
                     ..RunSets::without_test(Split { training, validation })
                 };
-                let mut run = Run::new(**settings, sets, Begin::Initialize, self.job)?;
+                let mut run = Run::new(**settings, sets, None, self.job)?;
                 run.finish(self.job)?;
                 let ones = vec![1.0; features.set.outputs()];
                 let network = run.network().program(Precision::Double);

@@ -4,7 +4,7 @@ use rand::RngExt as _;
 use super::*;
 use crate::{
     dataset::{Seed, SplitBy, Stream},
-    evaluation::{Begin, Measured, Run, RunError, RunSets},
+    evaluation::{Run, RunError, RunSets},
     job::Job,
     machine::MemoryBudget,
     scene::{RowModel, standard_normal},
@@ -49,7 +49,7 @@ fn choose_for(
         past: Some((&history, &samples)),
         by,
     };
-    let base = RunSettings::from(Measured { rows: RowModel::Shared });
+    let base = RunSettings::measured(RowModel::Shared);
     choose_settings(
         &base,
         fixed,
@@ -217,11 +217,11 @@ fn the_program_of_the_combination_adds_its_members() {
     let mut run = Run::new(
         choice.settings,
         RunSets::new(split, set.clone()),
-        Begin::Initialize,
+        None,
         &Job::UNINTERRUPTED,
     )
     .unwrap();
-    run.set_blend(Some(choice.blend.clone()));
+    run.set_combined(Some(choice.combined.clone()));
     let before = run.network().decouple(&set);
     assert!(
         (run.decouple_test() - before).iter().all(|off| off.abs() < 1e-9),
@@ -230,17 +230,17 @@ fn the_program_of_the_combination_adds_its_members() {
     run.finish(&Job::UNINTERRUPTED).unwrap();
     let network = run.network().decouple(&set).column(0).to_vec();
     let expected = Vec::from_iter(network.iter().enumerate().map(|(sample, network)| {
-        let others = choice.blend.others.iter().map(|(program, weights)| {
+        let others = choice.combined.others.iter().map(|(program, weights)| {
             let answer = crate::decoupling::ProgramDecoder::new(program.clone()).answers_to(&set)[[sample, 0]];
             weights[0] * answer
         });
-        choice.blend.network[0] * network + others.sum::<f64>()
+        choice.combined.network[0] * network + others.sum::<f64>()
     }));
     for (ours, expected) in run.decouple_test().iter().zip(expected) {
         assert!((ours - expected).abs() < 1e-9, "{ours} {expected}");
     }
-    assert_eq!(choice.blend.defect(set.channels(), 1), None);
-    assert!(choice.blend.defect(set.channels() + 1, 1).is_some() || choice.blend.others.is_empty());
+    assert_eq!(choice.combined.defect(set.channels(), 1), None);
+    assert!(choice.combined.defect(set.channels() + 1, 1).is_some() || choice.combined.others.is_empty());
 }
 
 #[test]
@@ -366,8 +366,8 @@ fn trained(choice: &AutoChoice) -> Run {
         validation: None,
     };
     let sets = RunSets::new(split, part(400..600));
-    let mut run = Run::with_baselines(choice.settings, sets, Begin::Initialize, &Job::UNINTERRUPTED).unwrap();
-    run.set_blend(Some(choice.blend.clone()));
+    let mut run = Run::with_baselines(choice.settings, sets, None, &Job::UNINTERRUPTED).unwrap();
+    run.set_combined(Some(choice.combined.clone()));
     run
 }
 
@@ -400,7 +400,7 @@ fn many_inputs_for_few_samples_get_weight_decay() {
         past: None,
         by: SplitBy::Random,
     };
-    let base = RunSettings::from(Measured { rows: RowModel::Shared });
+    let base = RunSettings::measured(RowModel::Shared);
     let choice = choose_settings(
         &base,
         &AutoFixed::default(),

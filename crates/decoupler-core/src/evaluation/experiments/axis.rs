@@ -56,8 +56,8 @@ static ROWS: [(AxisKind, Setting<Cell>); 11] = [
         Some(Field::Count(&mut cell.settings.hidden))
     }),
     row(AxisKind::Array, "array", Kind::Text, |cell| {
-        let source = cell.settings.simulation_mut()?;
-        Some(Field::Text(&mut source.sensor.scale))
+        let scale = &mut cell.settings.simulation_mut()?.sensor.scale;
+        Some(Field::text(scale.to_string(), scale, str::parse))
     }),
     row(AxisKind::Samples, "samples", SAMPLES, |cell| {
         let source = cell.settings.simulation_mut()?;
@@ -69,13 +69,14 @@ static ROWS: [(AxisKind, Setting<Cell>); 11] = [
     }),
     row(AxisKind::Inputs, "inputs", Kind::Choice, |cell| {
         cell.settings.simulation()?;
-        Some(Field::Text(&mut cell.settings.inputs.quantity))
+        Some(Field::named(&mut cell.settings.inputs.quantity))
     }),
     row(AxisKind::Scaling, "scaling", Kind::Choice, |cell| {
-        Some(Field::Text(&mut cell.settings.inputs.scaling))
+        Some(Field::named(&mut cell.settings.inputs.scaling))
     }),
     row(AxisKind::Method, "method", Kind::Choice, |cell| {
-        Some(Field::Text(&mut cell.settings.training.method))
+        let method = &mut cell.settings.training.method;
+        Some(Field::text(method.short_name().to_owned(), method, Method::named))
     }),
     row(AxisKind::Epochs, EPOCHS.name, EPOCHS.kind, |cell| {
         (EPOCHS.field)(&mut cell.settings.training.stopping)
@@ -84,7 +85,7 @@ static ROWS: [(AxisKind, Setting<Cell>); 11] = [
         Some(Field::Count(&mut cell.settings.starts))
     }),
     row(AxisKind::Split, "split", Kind::Choice, |cell| {
-        Some(Field::Text(&mut cell.division.as_mut()?.by))
+        Some(Field::named(&mut cell.division.as_mut()?.by))
     }),
     row(AxisKind::Seed, "seed", Kind::Integer(0, u64::MAX), |cell| {
         Some(Field::Integer(&mut cell.settings.seed.0))

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Axis, AxisKind};
+use super::{Axis, AxisKind, Trial};
 use crate::{
     dataset::{DatasetError, Division, Seed, SplitBy},
     evaluation::{CrossValidation, PublishedErrors, RunError, RunSettings},
@@ -40,8 +40,8 @@ pub struct ExperimentRecording {
     pub division: Division,
 }
 
-/// Cell of the grid.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// Cell of the grid, with its results so far.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cell {
     /// Index of its value on the first axis.
     pub column: usize,
@@ -53,6 +53,12 @@ pub struct Cell {
     pub division: Option<Division>,
     /// Errors that the paper reports for the cell, if there are any.
     pub published: Option<PublishedErrors>,
+    /// Number of trials planned.
+    pub expected: usize,
+    /// Finished trials, sorted by seed and repeat regardless of the order in which they finished.
+    pub trials: Vec<Trial>,
+    /// Failures of trials ([`RunError::Trial`]), sorted likewise.
+    pub failures: Vec<RunError>,
 }
 
 /// Maximum number of trainings in one experiment.
@@ -77,13 +83,14 @@ impl Experiment {
             row,
             settings: self.base,
             division: self.recording.as_ref().map(|recording| recording.division),
-            published: None,
+            ..Cell::default()
         };
         for (axis, index) in self.axes().zip([column, row]) {
             // A value that the setting does not have is refused by `check`.
             let _ = axis.apply(index, &mut cell);
         }
         cell.published = cell.settings.published_by(self.cross_validation.is_some());
+        cell.expected = self.trials_of(&cell.settings).count();
         cell
     }
 
@@ -181,7 +188,7 @@ impl Experiment {
         };
         simulation.scene.check()?;
         if let Some(CrossValidation { folds, by, .. }) = self.cross_validation {
-            let rows = simulation.model_size()?.rows;
+            let rows = simulation.rows()?;
             let snapshots = simulation.samples.div_ceil(rows);
             let (units, unit) = match by {
                 SplitBy::Random => (snapshots * rows, "sample"),

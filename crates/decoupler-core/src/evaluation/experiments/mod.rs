@@ -12,6 +12,6 @@ mod trial;
 
 pub use axis::{Axis, AxisKind};
 pub use experiment::{Cell, Experiment, ExperimentRecording, PaperTable};
-pub use results::{CellResults, CellSummary, ExperimentResults, Figure};
+pub use results::{ExperimentResults, Figure};
 pub use runner::{Finished, run_experiments, worker_threads};
-pub use trial::{RecordedSamples, Trial, TrialFailure, TrialSamples};
+pub use trial::{Trial, TrialSamples};

@@ -2,9 +2,9 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::{Cell, Experiment, Trial, TrialFailure};
+use super::{Cell, Experiment, Trial};
 use crate::{
-    evaluation::{ErrorMeasure, Spread, table::Figures},
+    evaluation::{ErrorMeasure, RunError, Spread, table::Figures},
     problem::Problem,
 };
 
@@ -15,34 +15,15 @@ pub struct ExperimentResults {
     pub experiment: Experiment,
     /// Description of the readings and targets; `None` until a recording is read.
     pub problem: Option<Arc<Problem>>,
-    /// Results of the cells, row by row in the order of [`Experiment::cells`].
-    pub cells: Vec<CellResults>,
-}
-
-/// Results of a cell so far.
-#[derive(Clone, Debug)]
-pub struct CellResults {
-    /// Cell to which the results belong.
-    pub cell: Cell,
-    /// Number of trials planned.
-    pub expected: usize,
-    /// Finished trials, sorted by seed and repeat regardless of the order in which they finished.
-    pub trials: Vec<Trial>,
-    /// Failed trials, sorted likewise.
-    pub failures: Vec<TrialFailure>,
+    /// Cells with their trials, row by row in the order of [`Experiment::cells`].
+    pub cells: Vec<Cell>,
 }
 
 impl ExperimentResults {
     /// Creates empty results.
     pub fn new(experiment: Experiment) -> Self {
-        let cells = experiment.cells().into_iter().map(|cell| CellResults {
-            cell,
-            expected: experiment.trials_of(&cell.settings).count(),
-            trials: Vec::new(),
-            failures: Vec::new(),
-        });
         Self {
-            cells: cells.collect(),
+            cells: experiment.cells(),
             problem: experiment
                 .base
                 .simulation()
@@ -55,34 +36,32 @@ impl ExperimentResults {
     ///
     /// # Panics
     /// If there is no such cell.
-    pub fn record(&mut self, cell: usize, outcome: Result<Trial, TrialFailure>) {
-        let CellResults { trials, failures, .. } = &mut self.cells[cell];
+    pub fn record(&mut self, cell: usize, outcome: Result<Trial, RunError>) {
+        let Cell { trials, failures, .. } = &mut self.cells[cell];
         match outcome {
             Ok(trial) => trials.push(trial),
             Err(failure) => failures.push(failure),
         }
         trials.sort_by_key(|trial| (trial.seed.0, trial.repeat));
-        failures.sort_by_key(|failure| (failure.seed.0, failure.repeat));
+        failures.sort_by_key(|failure| match failure {
+            RunError::Trial { seed, repeat, .. } => Some((seed.0, *repeat)),
+            _ => None,
+        });
     }
 
     /// Returns the value of a cell on each axis, as text.
-    pub fn cell_labels(&self, cell: &CellResults) -> Vec<String> {
-        let axes = self.experiment.axes().zip([cell.cell.column, cell.cell.row]);
+    pub fn cell_labels(&self, cell: &Cell) -> Vec<String> {
+        let axes = self.experiment.axes().zip([cell.column, cell.row]);
         axes.map(|(axis, place)| axis.label(place)).collect()
     }
 
     /// Returns `true` if every trial has finished or failed.
     pub fn is_complete(&self) -> bool {
-        self.cells.iter().all(CellResults::is_complete)
-    }
-
-    /// Returns the figures of every cell, row by row.
-    pub fn summaries(&self) -> Vec<CellSummary> {
-        self.cells.iter().map(CellResults::summary).collect()
+        self.cells.iter().all(Cell::is_complete)
     }
 }
 
-impl CellResults {
+impl Cell {
     /// Returns `true` if every trial has finished or failed.
     pub fn is_complete(&self) -> bool {
         self.trials.len() + self.failures.len() == self.expected
@@ -95,53 +74,6 @@ impl CellResults {
         let mut trials = Vec::from_iter(with_errors);
         trials.sort_by(|(one, _), (other, _)| one.total_cmp(other));
         Some(trials.get(trials.len().checked_sub(1)? / 2)?.1)
-    }
-}
-
-/// Figures of a cell for tables and files: medians unless stated otherwise, `None` if there is no such figure (yet).
-#[derive(Clone, Debug, PartialEq)]
-pub struct CellSummary {
-    /// Cell to which the figures belong.
-    pub cell: Cell,
-    /// Number of trials finished.
-    pub trials: usize,
-    /// Number of trials planned.
-    pub expected_trials: usize,
-    /// Errors of the network, the first of which ranks the cells: see [`TestErrors::figure`](crate::evaluation::TestErrors::figure).
-    pub errors: Vec<(ErrorMeasure, Figure)>,
-    /// Error in percent of always answering the mean of the training set.
-    pub mean_percent: Option<f64>,
-    /// Error in percent of the linear baseline.
-    pub linear_percent: Option<f64>,
-    /// Mean number of epochs per start.
-    pub epochs_run: Option<f64>,
-    /// Training time of a network, over all its starts.
-    pub training_seconds: Option<f64>,
-    /// Time of the fastest epoch, which is least affected by other load on the machine.
-    pub epoch_ms: Option<f64>,
-}
-
-impl CellSummary {
-    /// Errors of the nodes of an array.
-    const OF_NODES: &[ErrorMeasure] = &[
-        ErrorMeasure::ZPercent,
-        ErrorMeasure::XPercent,
-        ErrorMeasure::YPercent,
-        ErrorMeasure::ZMm,
-    ];
-    /// Errors over all targets of a recording.
-    const OF_TARGETS: &[ErrorMeasure] = &[ErrorMeasure::RangePercent, ErrorMeasure::R2];
-
-    /// Returns the error in percent by which cells are ranked.
-    pub fn percent(&self) -> &Figure {
-        &self.errors[0].1
-    }
-
-    /// Returns this error; `None` if the source has another one.
-    pub fn error(&self, measure: ErrorMeasure) -> Option<&Figure> {
-        self.errors
-            .iter()
-            .find_map(|(of, figure)| (*of == measure).then_some(figure))
     }
 }
 
@@ -160,42 +92,83 @@ pub struct Figure {
     pub values: Vec<Option<f64>>,
 }
 
-impl CellResults {
-    /// Returns the figures of this cell.
-    pub fn summary(&self) -> CellSummary {
-        let settings = &self.cell.settings;
-        let spread = |figure: &dyn Fn(&Trial) -> Option<f64>| Spread::of(self.trials.iter().filter_map(figure));
-        let median = |figure: &dyn Fn(&Trial) -> Option<f64>| spread(figure).map(|spread| spread.median);
-        let figure = |measure: ErrorMeasure| {
-            let measured = |trial: &Trial| trial.scores.network.figure(measure);
-            let spread = spread(&measured);
-            let published = self.cell.published.as_ref();
-            Figure {
-                published: published.and_then(|published| measure.of(Figures::Published(published))),
-                median: spread.map(|spread| spread.median),
-                min: spread.map(|spread| spread.smallest),
-                max: spread.map(|spread| spread.largest),
-                values: self.trials.iter().map(measured).collect(),
-            }
-        };
-        let measures = match settings.simulation() {
-            Some(_) => CellSummary::OF_NODES,
-            None => CellSummary::OF_TARGETS,
-        };
-        let epochs =
-            |trial: &Trial| trial.effort.epochs as f64 / (trial.effort.networks * settings.starts).max(1) as f64;
-        let seconds = |trial: &Trial| trial.effort.seconds / trial.effort.networks.max(1) as f64;
-        CellSummary {
-            cell: self.cell,
-            trials: self.trials.len(),
-            expected_trials: self.expected,
-            errors: measures.iter().map(|&measure| (measure, figure(measure))).collect(),
-            mean_percent: median(&|trial| trial.scores.baselines.mean.percent()),
-            linear_percent: median(&|trial| trial.scores.baselines.linear.percent()),
-            epochs_run: median(&|trial| Some(epochs(trial))),
-            training_seconds: median(&|trial| Some(seconds(trial))),
-            epoch_ms: spread(&|trial| Some(trial.effort.min_epoch_seconds)).map(|spread| 1e3 * spread.smallest),
+/// Figures for tables and files: medians unless stated otherwise, `None` if there is no such figure (yet).
+impl Cell {
+    /// Measures of the errors of the network, the first of which ranks the cells: of the nodes of an array, or over all
+    /// targets of a recording.
+    fn measures(&self) -> &'static [ErrorMeasure] {
+        match self.settings.simulation() {
+            Some(_) => &[
+                ErrorMeasure::ZPercent,
+                ErrorMeasure::XPercent,
+                ErrorMeasure::YPercent,
+                ErrorMeasure::ZMm,
+            ],
+            None => &[ErrorMeasure::RangePercent, ErrorMeasure::R2],
         }
+    }
+
+    /// Returns the [errors of the network](crate::evaluation::TestErrors::figure), the first of which ranks the cells.
+    pub fn errors(&self) -> impl Iterator<Item = (ErrorMeasure, Figure)> {
+        self.measures().iter().map(|&measure| (measure, self.figure(measure)))
+    }
+
+    /// Returns this error of the network; `None` if the source has another one.
+    pub fn error(&self, measure: ErrorMeasure) -> Option<Figure> {
+        self.measures().contains(&measure).then(|| self.figure(measure))
+    }
+
+    fn figure(&self, measure: ErrorMeasure) -> Figure {
+        let measured = |trial: &Trial| trial.scores.network.figure(measure);
+        let spread = self.spread(measured);
+        let published = self.published.as_ref();
+        Figure {
+            published: published.and_then(|published| measure.of(Figures::Published(published))),
+            median: spread.map(|spread| spread.median),
+            min: spread.map(|spread| spread.smallest),
+            max: spread.map(|spread| spread.largest),
+            values: self.trials.iter().map(measured).collect(),
+        }
+    }
+
+    /// Returns the error in percent by which cells are ranked.
+    pub fn percent(&self) -> Figure {
+        self.figure(self.measures()[0])
+    }
+
+    fn spread(&self, figure: impl Fn(&Trial) -> Option<f64>) -> Option<Spread> {
+        Spread::of(self.trials.iter().filter_map(figure))
+    }
+
+    fn median(&self, figure: impl Fn(&Trial) -> Option<f64>) -> Option<f64> {
+        self.spread(figure).map(|spread| spread.median)
+    }
+
+    /// Error in percent of always answering the mean of the training set.
+    pub fn mean_percent(&self) -> Option<f64> {
+        self.median(|trial| trial.scores.baselines.mean.percent())
+    }
+
+    /// Error in percent of the linear baseline.
+    pub fn linear_percent(&self) -> Option<f64> {
+        self.median(|trial| trial.scores.baselines.linear.percent())
+    }
+
+    /// Mean number of epochs per start.
+    pub fn epochs_run(&self) -> Option<f64> {
+        let starts = self.settings.starts;
+        self.median(|trial| Some(trial.epochs as f64 / (trial.networks * starts).max(1) as f64))
+    }
+
+    /// Training time of a network in seconds, over all its starts.
+    pub fn training_seconds(&self) -> Option<f64> {
+        self.median(|trial| Some(trial.seconds / trial.networks.max(1) as f64))
+    }
+
+    /// Time of the fastest epoch in milliseconds, which is least affected by other load on the machine.
+    pub fn epoch_ms(&self) -> Option<f64> {
+        let fastest = self.spread(|trial| Some(trial.min_epoch_seconds))?;
+        Some(1e3 * fastest.smallest)
     }
 }
 
@@ -204,7 +177,7 @@ mod tests {
     use super::*;
     use crate::{
         dataset::Seed,
-        evaluation::{Baselines, Effort, Errors, NodeAddress, Scores, TestErrors, experiments::PaperTable},
+        evaluation::{Baselines, Errors, NodeAddress, Scores, TestErrors, experiments::PaperTable},
     };
 
     fn errors(z_percent: f64) -> TestErrors {
@@ -234,12 +207,10 @@ mod tests {
                 },
                 coverage: Vec::new(),
             },
-            effort: Effort {
-                networks: 1,
-                epochs: 10,
-                seconds: 10.0,
-                min_epoch_seconds: 1.0,
-            },
+            networks: 1,
+            epochs: 10,
+            seconds: 10.0,
+            min_epoch_seconds: 1.0,
             states: Vec::new(),
         }
     }
@@ -259,8 +230,7 @@ mod tests {
         assert_eq!(backwards.cells[2].trials, trials);
         assert_eq!(forwards.cells[2].median_trial().unwrap().seed, Seed(2));
         assert!(!forwards.cells[2].is_complete());
-        let summary = forwards.cells[2].summary();
-        let z = summary.percent();
+        let z = forwards.cells[2].percent();
         assert_eq!(
             [z.published, z.min, z.median, z.max],
             [Some(2.37), Some(1.0), Some(2.5), Some(9.0)]

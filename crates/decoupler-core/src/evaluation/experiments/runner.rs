@@ -11,7 +11,7 @@ use std::{
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::{Cell, Experiment, Trial, TrialFailure, TrialSamples};
+use super::{Cell, Experiment, Trial, TrialSamples};
 use crate::{
     dataset::Seed,
     evaluation::{RunError, TrainingSize, Workload},
@@ -25,8 +25,8 @@ pub struct Finished {
     pub experiment: usize,
     /// Index of the cell, from 0, for [`ExperimentResults::record`](super::ExperimentResults::record).
     pub cell: usize,
-    /// Result of the trial, or the reason for its failure.
-    pub outcome: Result<Trial, TrialFailure>,
+    /// Result of the trial, or its failure: [`RunError::Trial`].
+    pub outcome: Result<Trial, RunError>,
     /// Number of trials finished so far, over all experiments.
     pub done: usize,
     /// Number of trials in all.
@@ -60,7 +60,7 @@ pub fn run_experiments(
 ) -> Result<(), RunError> {
     for experiment in experiments {
         experiment.check()?;
-        if experiment.recording.is_some() != matches!(samples, TrialSamples::Recorded(_)) {
+        if experiment.recording.is_some() != matches!(samples, TrialSamples::Recorded { .. }) {
             return Err(RunError::OtherSamples);
         }
     }
@@ -104,7 +104,11 @@ pub fn run_experiments(
             on_finished(Finished {
                 experiment: trial.place.0,
                 cell: trial.place.1,
-                outcome: outcome.map_err(|reason| TrialFailure { seed, repeat, reason }),
+                outcome: outcome.map_err(|source| RunError::Trial {
+                    seed,
+                    repeat,
+                    source: Box::new(source),
+                }),
                 done,
                 trials: planned.len(),
                 time_left: time_left((work, all_work), seconds, threads),
@@ -141,7 +145,7 @@ fn planned<'a>(experiments: &'a [Experiment], samples: &TrialSamples) -> Vec<Pla
             let trials = experiment.trials_of(&cell.settings).enumerate();
             planned.extend(trials.map(|(round, seed_and_repeat)| Planned {
                 experiment,
-                cell,
+                cell: cell.clone(),
                 place: (number, cell_number),
                 seed_and_repeat,
                 work,
@@ -163,7 +167,7 @@ fn time_left((work, all_work): (f64, f64), seconds: f64, threads: usize) -> Opti
 fn work(experiment: &Experiment, cell: &Cell, samples: &TrialSamples) -> f64 {
     let settings = &cell.settings;
     let size = match samples {
-        TrialSamples::Recorded(recorded) => Ok(TrainingSize::of(settings, &recorded.set)),
+        TrialSamples::Recorded { set, .. } => Ok(TrainingSize::of(settings, set)),
         TrialSamples::Drawn(_) => TrainingSize::drawn(settings),
     };
     let of_training = size.map_or(1.0, |size| Workload::of(settings, size).multiplications());

@@ -5,13 +5,11 @@ use std::time::Duration;
 
 use ndarray::{ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 use super::{CrossValidated, Run, RunError, RunSettings, recorded::Evidence};
 use crate::{
-    dataset::{Dataset, DatasetError, Folds, Seed, SplitBy, Stream},
+    dataset::{Dataset, Folds, Seed, SplitBy, Stream},
     job::Job,
-    text::counted,
 };
 pub use half_width::HalfWidth;
 
@@ -100,18 +98,10 @@ impl Intervals {
     /// # Errors
     /// If the settings are invalid, the set cannot be divided into folds or contains too few independent samples, or `job`,
     /// which is checked in every epoch, is cancelled.
-    pub fn cross_validate(
-        settings: &RunSettings,
-        set: &Dataset,
-        by: SplitBy,
-        job: &Job<'_>,
-    ) -> Result<Self, NoIntervals> {
+    pub fn cross_validate(settings: &RunSettings, set: &Dataset, by: SplitBy, job: &Job<'_>) -> Result<Self, RunError> {
         let folds = by.folds_of(set, Self::FOLDS);
         let folds = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split))?;
-        let validated = match CrossValidated::on_folds(settings, set, folds, job) {
-            Err(RunError::Cancelled(_)) => return Err(NoIntervals::Cancelled),
-            validated => validated?,
-        };
+        let validated = CrossValidated::on_folds(settings, set, folds, job)?;
         Self::calibrate(set, validated.network.view(), by).checked()
     }
 
@@ -119,9 +109,9 @@ impl Intervals {
     ///
     /// # Errors
     /// If no target has one.
-    pub fn checked(self) -> Result<Self, NoIntervals> {
+    pub fn checked(self) -> Result<Self, RunError> {
         if self.targets.iter().all(Option::is_none) {
-            return Err(NoIntervals::TooFewSamples);
+            return Err(RunError::NoIntervals);
         }
         Ok(self)
     }
@@ -149,10 +139,10 @@ impl Intervals {
     }
 
     /// Describes the first invalid value, for files.
-    pub fn check(&self, targets: usize) -> Result<(), NoIntervals> {
+    pub fn check(&self, targets: usize) -> Result<(), RunError> {
         if self.targets.len() != targets {
             let found = self.targets.len();
-            return Err(NoIntervals::Targets {
+            return Err(RunError::IntervalCount {
                 found,
                 expected: targets,
             });
@@ -165,40 +155,10 @@ impl Intervals {
                 && half_width.by_answer.windows(2).all(|pair| pair[0][0] < pair[1][0])
         };
         match self.targets.iter().position(|of| !of.as_ref().is_none_or(is_valid)) {
-            Some(target) => Err(NoIntervals::HalfWidth(target)),
+            Some(target) => Err(RunError::Interval(target)),
             None => Ok(()),
         }
     }
-}
-
-/// Reason why a network has no intervals, or saved ones are not valid.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum NoIntervals {
-    /// No target has enough effective samples.
-    #[error(
-        "there are fewer than 9 independent training samples (their errors are correlated in time or within groups)"
-    )]
-    TooFewSamples,
-    /// The calibration was cancelled.
-    #[error("interrupted")]
-    Cancelled,
-    /// The samples cannot be divided into folds.
-    #[error(transparent)]
-    Folds(#[from] DatasetError),
-    /// A training failed.
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// The number of saved intervals is not the number of targets.
-    #[error("{} for {}", counted(*.found, "interval"), counted(*.expected, "target"))]
-    Targets {
-        /// Number of intervals.
-        found: usize,
-        /// Number of targets.
-        expected: usize,
-    },
-    /// A saved half-width is negative or not finite, or its answers are not ascending.
-    #[error("the interval of target {0} is not valid")]
-    HalfWidth(usize),
 }
 
 impl Coverage {

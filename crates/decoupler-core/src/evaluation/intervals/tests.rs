@@ -143,19 +143,19 @@ fn too_few_samples_or_groups_have_no_interval() {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let few = truth.draw(8, &mut rng);
     let intervals = Intervals::calibrate(&few, few.targets().mapv(|y| y + 1.0).view(), SplitBy::Time);
-    assert_eq!(intervals.checked(), Err(NoIntervals::TooFewSamples));
+    assert_eq!(intervals.checked(), Err(RunError::NoIntervals));
     // Errors that differ only between three subjects.
     let set = truth.draw(300, &mut rng);
     let groups: Vec<usize> = (0..300).map(|sample| sample / 100).collect();
     let answers = Array2::from_shape_fn((300, 2), |(sample, _)| groups[sample] as f64);
     let set = Dataset::new(set.readings().to_owned(), Array2::zeros((300, 2)), None, groups).unwrap();
     let intervals = Intervals::calibrate(&set, answers.view(), SplitBy::Group);
-    assert_eq!(intervals.checked(), Err(NoIntervals::TooFewSamples));
+    assert_eq!(intervals.checked(), Err(RunError::NoIntervals));
     // A single subject says nothing about others.
     let one = Dataset::new(set.readings().to_owned(), set.targets().to_owned(), None, vec![0; 300]).unwrap();
     let answers = Array2::from_shape_fn((300, 2), |_| standard_normal(&mut rng));
     let intervals = Intervals::calibrate(&one, answers.view(), SplitBy::Group);
-    assert_eq!(intervals.checked(), Err(NoIntervals::TooFewSamples));
+    assert_eq!(intervals.checked(), Err(RunError::NoIntervals));
 }
 
 /// For n independent samples, the half-width is the 0.9 (n + 1)th smallest error.

@@ -20,7 +20,7 @@ fn readings(samples: usize, memory: f64, rng: &mut ChaCha8Rng) -> Array2<f64> {
 }
 
 /// Events of the monitor, with rows as positions.
-fn events(reference: &DriftReference, readings: &Array2<f64>) -> Vec<DriftEvent> {
+fn events(reference: &DriftReference, readings: &Array2<f64>) -> Vec<Drift> {
     let mut monitor = DriftMonitor::new(reference.clone());
     let rows = readings.rows().into_iter().zip(0..);
     rows.filter_map(|(row, position)| monitor.take(position, &row.to_vec()))
@@ -29,10 +29,7 @@ fn events(reference: &DriftReference, readings: &Array2<f64>) -> Vec<DriftEvent>
 
 /// First drift, if there is one.
 fn first_drift(reference: &DriftReference, readings: &Array2<f64>) -> Option<Drift> {
-    events(reference, readings).into_iter().find_map(|event| match event {
-        DriftEvent::Began(drift) => Some(drift),
-        DriftEvent::Ended(_) => None,
-    })
+    events(reference, readings).into_iter().find(|drift| !drift.has_ended)
 }
 
 type Fault = fn(&mut Array2<f64>, &Array1<f64>);
@@ -139,9 +136,10 @@ fn a_drift_ends_when_the_readings_are_back_to_normal() {
         later.row_mut(row).assign(&training.row(0));
     }
     let events = events(&reference, &later);
-    let [DriftEvent::Began(began), DriftEvent::Ended(ended)] = events[..] else {
+    let [began, ended] = events[..] else {
         panic!("{events:?}");
     };
+    assert!(!began.has_ended && ended.has_ended);
     assert_eq!(
         (began.first, began.last),
         (frozen.start as u64, ((10 + blocks) * block - 1) as u64)
@@ -191,7 +189,7 @@ fn unusable_readings_have_no_monitor_for_a_reason() {
     let mut reason = |change: fn(f64) -> f64, samples, memory| {
         DriftReference::of(readings(samples, memory, &mut rng).mapv(change).view()).err()
     };
-    let constant = Some(NoDriftMonitor::Constant);
+    let constant = Some(LiveError::Constant);
     assert_eq!(reason(|_| 0.0, 400, 0.0), constant);
     assert_eq!(reason(|_| 0.1, 400, 0.0), constant);
     assert_eq!(reason(|reading| 1e14 + 1e-9 * reading, 400, 0.0), constant);
@@ -200,19 +198,19 @@ fn unusable_readings_have_no_monitor_for_a_reason() {
     assert_eq!(reason(|reading| 3e305 * (reading - 300.0), 400, 0.0), None);
     assert_eq!(
         reason(|reading| 1e308 * (reading - 300.0), 400, 0.0),
-        Some(NoDriftMonitor::NotFinite)
+        Some(LiveError::NotFinite)
     );
-    assert_eq!(reason(|_| f64::NAN, 400, 0.0), Some(NoDriftMonitor::NotFinite));
-    let few = Some(NoDriftMonitor::TooFewReadings { blocks: 4, block: 5 });
+    assert_eq!(reason(|_| f64::NAN, 400, 0.0), Some(LiveError::NotFinite));
+    let few = Some(LiveError::TooFewReadings { blocks: 4, block: 5 });
     assert_eq!(reason(|reading| reading, 20, 0.0), few);
     let few = reason(|reading| reading, 400, 0.99);
     assert!(
-        matches!(few, Some(NoDriftMonitor::TooFewReadings { blocks: 0..10, .. })),
+        matches!(few, Some(LiveError::TooFewReadings { blocks: 0..10, .. })),
         "{few:?}"
     );
     assert_eq!(
         DriftReference::of(Array2::zeros((400, 600)).view()),
-        Err(NoDriftMonitor::TooManyInputs { found: 600 })
+        Err(LiveError::TooManyInputs { found: 600 })
     );
 }
 

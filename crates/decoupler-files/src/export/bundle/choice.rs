@@ -1,10 +1,10 @@
 //! What can be exported: decoders, formats and precisions.
 
-use std::{fmt, str::FromStr};
+use std::fmt;
 
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
-    text::{Named, UnknownName},
+    text::Named,
 };
 use thiserror::Error;
 
@@ -35,13 +35,10 @@ pub enum BundlePrecision {
     Fixed16,
 }
 
-/// Errors of unknown names and of unsupported combinations.
+/// Errors of unsupported combinations.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ChoiceError {
-    /// A name that no format, precision or decoder has.
-    #[error(transparent)]
-    Unknown(#[from] UnknownName),
     /// Radial basis in fixed point.
     #[error("fixed16 has no Gaussians: export rbf in f64 or f32, or another decoder")]
     Gaussians,
@@ -70,9 +67,6 @@ pub(super) const EQUATIONS: &str =
 pub(super) const RULES: &str = "it is only for comparison: export another decoder instead, such as rbf or ridge";
 
 impl BundleFormat {
-    /// All formats.
-    pub const ALL: [Self; 4] = [Self::Onnx, Self::C99, Self::Matlab, Self::NumPy];
-
     /// Name of the format, as in sentences.
     pub fn title(self) -> &'static str {
         match self {
@@ -105,9 +99,8 @@ impl BundleFormat {
 
     /// Help text on all formats.
     pub fn help() -> String {
-        Self::ALL
-            .map(|format| format!("{format}: {}", format.meaning()))
-            .join("; ")
+        let all = Self::ALL.iter().map(|format| format!("{format}: {}", format.meaning()));
+        Vec::from_iter(all).join("; ")
     }
 
     /// Checks that a decoder is exported in this format with this precision.
@@ -136,7 +129,7 @@ impl BundleFormat {
 
 impl Named for BundleFormat {
     const WHAT: &'static str = "a format";
-    const ALL: &'static [Self] = &Self::ALL;
+    const ALL: &'static [Self] = &[Self::Onnx, Self::C99, Self::Matlab, Self::NumPy];
 
     fn name(self) -> &'static str {
         match self {
@@ -170,22 +163,6 @@ impl fmt::Display for BundleFormat {
 impl fmt::Display for BundlePrecision {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.name())
-    }
-}
-
-impl FromStr for BundleFormat {
-    type Err = UnknownName;
-
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        Self::parse(text)
-    }
-}
-
-impl FromStr for BundlePrecision {
-    type Err = UnknownName;
-
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        Self::parse(text)
     }
 }
 
@@ -245,8 +222,8 @@ impl BundleDecoder {
 
     /// What the network file answers with.
     pub fn of(file: &NetworkFile) -> Self {
-        match file.blend() {
-            Some(blend) if !blend.others.is_empty() => Self::Chosen,
+        match file.combined() {
+            Some(combined) if !combined.others.is_empty() => Self::Chosen,
             _ => Self::default(),
         }
     }
@@ -301,14 +278,6 @@ impl fmt::Display for BundleDecoder {
     }
 }
 
-impl FromStr for BundleDecoder {
-    type Err = UnknownName;
-
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        Self::parse(text)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -316,8 +285,8 @@ mod tests {
     #[test]
     fn names_round_trip_and_unsupported_pairs_are_refused_with_the_supported_ones() {
         let network = BundleDecoder::default();
-        for format in BundleFormat::ALL {
-            assert_eq!(format.to_string().parse(), Ok(format));
+        for &format in BundleFormat::ALL {
+            assert_eq!(BundleFormat::parse(&format.to_string()), Ok(format));
             assert_eq!(
                 format.check_for(network, BundlePrecision::default()),
                 Ok(()),
@@ -325,15 +294,15 @@ mod tests {
             );
         }
         for &precision in <BundlePrecision as Named>::ALL {
-            assert_eq!(precision.to_string().parse(), Ok(precision));
+            assert_eq!(BundlePrecision::parse(&precision.to_string()), Ok(precision));
         }
         for kind in DecoderKind::ALL {
-            assert_eq!(kind.to_string().parse(), Ok(BundleDecoder::Kind(kind)));
+            assert_eq!(BundleDecoder::parse(&kind.to_string()), Ok(BundleDecoder::Kind(kind)));
         }
         let refused = BundleFormat::Onnx.check_for(network, BundlePrecision::Fixed16);
         let message = refused.unwrap_err().to_string();
         assert_eq!(message, "onnx has no precision fixed16: give f64 or f32");
-        let message = "tflite".parse::<BundleFormat>().unwrap_err().to_string();
+        let message = BundleFormat::parse("tflite").unwrap_err().to_string();
         assert!(message.contains("onnx, c99"), "{message}");
     }
 }

@@ -2,12 +2,13 @@
 
 use decoupler_core::{
     dataset::{GAP, MemoryConstants, Span},
-    decoupling::{NodeId, Operation, Precision},
+    decoupling::{Function, NodeId, Operation, Precision},
 };
+use ndarray::Array2;
 
 use super::{
     BundlePrecision,
-    exported_program::{ExportedProgram, table},
+    exported_program::ExportedProgram,
     golden::Golden,
     meaning::{Meaning, comment, wrapped},
 };
@@ -31,19 +32,45 @@ pub(super) struct Contents {
     pub(super) scales: Vec<f64>,
     pub(super) golden: Golden,
     /// Facts as JSON for users and programs that have only the bundle.
-    pub(super) metadata: serde_json::Map<String, serde_json::Value>,
+    pub(super) metadata: serde_json::Value,
     /// Remarks for the user, with cause and cure.
     pub(super) notes: Vec<String>,
+}
+
+/// Constants as they are in a file.
+pub(super) struct Constant<'a> {
+    pub(super) name: &'a str,
+    pub(super) precision: Precision,
+    /// Shape of a matrix (weights and points, inputs × outputs) or vector, after the number of row-wires if they differ.
+    pub(super) shape: Vec<usize>,
+    /// One table for all row-wires, or one for each.
+    pub(super) tables: &'a [Array2<f64>],
+}
+
+impl Constant<'_> {
+    /// All values, row by row.
+    pub(super) fn values(&self) -> impl Iterator<Item = f64> {
+        self.tables.iter().flatten().copied()
+    }
 }
 
 /// The past that a program takes, with its numbers.
 pub(super) struct PrintedHistory {
     pub(super) constants: MemoryConstants,
+    /// Number of the latest readings that it keeps.
+    pub(super) kept: usize,
+    pub(super) averages: usize,
     /// Pause in seconds after which it restarts, if the usual interval is known.
     pub(super) pause_s: f64,
 }
 
 impl PrintedHistory {
+    /// Rows of the state in languages with matrices: whether it has started, the latest time, the latest readings (the newest
+    /// first), and the averages.
+    pub(super) fn state_rows(&self) -> usize {
+        2 + self.kept + self.averages
+    }
+
     /// Rates of the averages: per second, and per reading; one of the two is 0.
     pub(super) fn rates(&self) -> (Vec<f64>, Vec<f64>) {
         let rates = self.constants.averages.iter().map(|average| match average {
@@ -51,6 +78,23 @@ impl PrintedHistory {
             Span::Samples(samples) => (0.0, 1.0 / samples),
         });
         rates.unzip()
+    }
+}
+
+/// An operation as languages with infix operators write it, with the sign of a division, and what comes before and after the
+/// names of functions.
+pub(super) fn infix(
+    operation: &Operation,
+    [divided, before, after]: [&str; 3],
+    of: impl Fn(NodeId) -> String,
+) -> String {
+    match operation {
+        Operation::Subtract(one, other) => format!("{} - {}", of(*one), of(*other)),
+        Operation::Divide(one, other) => format!("{} {divided} {}", of(*one), of(*other)),
+        Operation::Map(Function::Log1p, x) => format!("{before}log1p{after}({})", of(*x)),
+        Operation::Map(Function::Tanh, x) => format!("{before}tanh{after}({})", of(*x)),
+        Operation::Map(Function::Gaussian, x) => format!("{before}exp{after}(-{})", of(*x)),
+        _ => unreachable!("given, not exported, or written by every language in its own way"),
     }
 }
 
@@ -72,12 +116,34 @@ impl Contents {
             .map(|(index, node)| (NodeId::at(index), &node.operation))
     }
 
-    /// Constants with their names, one table for all row-wires or one for each: inputs × outputs or 1 × size.
-    pub(super) fn constants(&self) -> impl Iterator<Item = (NodeId, &[ndarray::Array2<f64>])> {
-        let nodes = self.exported.program.nodes().iter().enumerate();
-        nodes.filter_map(|(index, node)| match &node.operation {
-            Operation::Select { tables, .. } => Some((NodeId::at(index), &tables[..])),
-            _ => None,
+    /// A statement for each node that is computed.
+    pub(super) fn body(&self, statement: impl Fn(NodeId, &Operation) -> String) -> String {
+        self.computed()
+            .map(|(id, operation)| statement(id, operation))
+            .collect()
+    }
+
+    /// Constants with their names.
+    pub(super) fn constants(&self) -> impl Iterator<Item = Constant<'_>> {
+        let operations = || self.exported.program.nodes().iter().map(|node| &node.operation);
+        operations().enumerate().filter_map(move |(index, operation)| {
+            let Operation::Select { tables, .. } = operation else {
+                return None;
+            };
+            let id = NodeId::at(index);
+            let is_matrix = |operation: &Operation| match operation {
+                Operation::Affine { weights: of, .. } | Operation::SquaredDistances { points: of, .. } => *of == id,
+                _ => false,
+            };
+            let dimensions = if operations().any(is_matrix) { 2 } else { 1 };
+            let of_rows = (tables.len() > 1).then_some(tables.len());
+            let shape = of_rows.iter().chain(&tables[0].shape()[2 - dimensions..]);
+            Some(Constant {
+                name: self.name_of(id),
+                precision: self.precision_of(id),
+                shape: shape.copied().collect(),
+                tables,
+            })
         })
     }
 
@@ -86,48 +152,17 @@ impl Contents {
         matches!(&self.exported.program.node(id).operation, Operation::Select { tables, .. } if tables.len() > 1)
     }
 
-    /// Shape of the constants of one row-wire.
-    pub(super) fn shape(&self, id: NodeId) -> (usize, usize) {
-        table(self.exported.program.nodes(), id, 0).dim()
-    }
-
-    /// `true` for weights and points, which are matrices; other constants are vectors.
-    pub(super) fn is_matrix(&self, id: NodeId) -> bool {
-        let mut operations = self.exported.program.nodes().iter().map(|node| &node.operation);
-        operations.any(|operation| match operation {
-            Operation::Affine { weights: matrix, .. } | Operation::SquaredDistances { points: matrix, .. } => {
-                *matrix == id
-            }
-            _ => false,
-        })
-    }
-
     /// Names of the parts of an answer.
     pub(super) fn parts(&self) -> Vec<&str> {
-        let exported = &self.exported;
-        let all = [Some(exported.targets), exported.half_widths, exported.outside];
-        all.into_iter().flatten().map(|id| self.name_of(id)).collect()
+        self.exported.parts().map(|id| self.name_of(id)).collect()
     }
 
-    /// Shape of a constant in a file: of each row-wire, if they differ, and as a matrix or vector.
-    pub(super) fn full_shape(&self, id: NodeId, tables: usize) -> Vec<usize> {
-        let (rows, columns) = self.shape(id);
-        let mut shape = if self.is_matrix(id) {
-            vec![rows, columns]
-        } else {
-            vec![columns]
-        };
-        if tables > 1 {
-            shape.insert(0, tables);
-        }
-        shape
-    }
-
-    /// The notes as lines for a comment of any language.
-    pub(super) fn note_lines(&self) -> impl Iterator<Item = String> {
-        self.notes
-            .iter()
-            .flat_map(|note| wrapped(&comment(&format!("Note: {note}."))))
+    /// The names of the channels, `more` and the notes as lines for a comment of any language.
+    pub(super) fn legend(&self, more: &str) -> Vec<String> {
+        let notes = self.notes.iter().map(|note| comment(&format!("Note: {note}.")));
+        let notes = notes.flat_map(|note| wrapped(&note));
+        let lines = self.meaning.legend().into_iter().chain(wrapped(more));
+        lines.chain(notes).collect()
     }
 
     pub(super) fn size(&self, id: NodeId) -> usize {
@@ -165,8 +200,11 @@ impl Contents {
         nodes.find_map(|node| match &node.operation {
             Operation::History { of, memory } => {
                 let constants = MemoryConstants::of(memory, self.size(*of));
+                let constants = constants.expect("checked when the program was built");
                 Some(PrintedHistory {
-                    constants: constants.expect("checked when the program was built"),
+                    kept: constants.longest_lag(),
+                    averages: constants.averages.len(),
+                    constants,
                     pause_s: memory.interval_s.map_or(f64::INFINITY, |usual_s| GAP * usual_s),
                 })
             }
@@ -176,7 +214,7 @@ impl Contents {
 
     /// A deviation relative to [`Self::scales`], in mm for an array, and in per cent of the range of a target of own data.
     pub(super) fn in_words(&self, relative: f64) -> String {
-        match self.meaning.is_array() {
+        match self.meaning.is_array {
             true => format!("{} mm", format_number(relative * self.scales[0])),
             false => format!("{} % of its range in training", format_number(100.0 * relative)),
         }

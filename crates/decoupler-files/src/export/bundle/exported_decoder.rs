@@ -2,19 +2,19 @@ use std::sync::Arc;
 
 use decoupler_core::{
     dataset::{Dataset, GAP, PerRow, Seed, Simulation, Stream},
-    decoupling::{Blend, DecoderKind, Function, NodeId, Operation, Precision, Program, decode_set},
-    evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
-    network::{MinMax, Networks},
+    decoupling::{Combined, Decoder, Function, NodeId, Operation, Precision, Program, decode_set},
+    evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, Scores, TargetErrors, TestErrors},
+    network::{MinMax, Networks, Quantity},
     problem::{Channel, Problem},
 };
 use rand::RngExt;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::{
     BundleDecoder, BundleError, BundlePrecision, ChoiceError,
-    choice::{EQUATIONS, RULES},
+    choice::RULES,
     contents::Contents,
-    exported_program::{ExportedProgram, Limits},
+    exported_program::{ExportedProgram, Limits, are_positive},
     golden::{Golden, GoldenRow},
     meaning::Meaning,
     names::names,
@@ -25,55 +25,71 @@ use crate::{
 };
 
 /// A decoder to be exported, with the meaning of its readings and targets.
-pub struct ExportedDecoder<'a> {
-    /// Network file of the run, if a network was trained.
-    file: Option<&'a NetworkFile>,
-    origin: Origin,
-    fitted: FittedDecoder,
+pub struct ExportedDecoder {
+    kind: BundleDecoder,
+    program: Program,
+    /// The program of a network without limits of the readings, for integers, which saturate.
+    unlimited: Option<Program>,
+    /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
+    reading_ranges: Vec<Option<MinMax>>,
+    /// Ranges of the targets in training: one for all row-wires, or one for each if the row is an argument.
+    target_ranges: Vec<MinMax>,
+    /// Errors on the test samples.
+    errors: TestErrors,
+    /// 90 % prediction intervals of the answers, if every target has one.
+    half_widths: Vec<HalfWidth>,
     /// Test samples, if they are known.
     test: Option<Arc<Dataset>>,
+    origin: Origin,
 }
 
-/// Facts about a decoder, for users and programs that have only the bundle: names of fields and JSON values.
-type Metadata = Map<String, Value>;
+/// Facts about the samples to which an exported decoder was fitted, for the metadata of its bundle.
+struct Origin {
+    /// Program and version that trained or fitted it.
+    program: String,
+    settings: RunSettings,
+    /// Names, units and positions of readings and targets.
+    problem: Problem,
+    /// Row-wires of the samples in ascending order, from 0, if they are known.
+    row_wires: Option<Vec<usize>>,
+    /// Names of the recordings without their folders; empty for a simulated array.
+    files: Vec<String>,
+    /// Errors of the linear baseline on the test samples.
+    errors_of_linear: TestErrors,
+}
 
-impl<'a> From<&'a NetworkFile> for ExportedDecoder<'a> {
-    /// Exports the network of a file.
-    fn from(file: &'a NetworkFile) -> Self {
+impl From<&NetworkFile> for ExportedDecoder {
+    /// Exports what a file answers with: the combination that a choice of settings found, or the network.
+    fn from(file: &NetworkFile) -> Self {
         // Without the recording, readings are drawn from the range in training.
         let test = match file.settings.simulation() {
             Some(_) => None,
             None => file.test_set().ok(),
         };
         Self {
-            fitted: FittedDecoder::of_file(file, BundleDecoder::of(file)),
-            origin: Origin::of_file(file),
-            file: Some(file),
             test,
+            ..Self::of_file(file, BundleDecoder::Chosen)
         }
     }
 }
 
-impl<'a> ExportedDecoder<'a> {
+impl ExportedDecoder {
     /// Fits a decoder to the training samples of the run of `file`; `sets` are its samples, drawn or read again. If the
-    /// decoder is the network, uses the network of the file.
+    /// decoder contains the network, uses the network of the file.
     ///
     /// # Errors
     /// The recording has changed, the samples cannot be scaled or decoded, or no other program can compute what the decoder
     /// does.
-    pub fn of_run(file: &'a NetworkFile, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
+    pub fn of_run(file: &NetworkFile, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
         sets.check_saved(file.recorded.as_ref())?;
-        let test = Some(Arc::clone(&sets.sets.test));
-        let fitted = match decoder.is_network() {
-            true => FittedDecoder::of_file(file, decoder),
-            false => FittedDecoder::fit(file.settings, sets.sets, Some(file.network.clone()), decoder)?,
-        };
-        Ok(Self {
-            origin: Origin::of_file(file),
-            fitted,
-            file: Some(file),
-            test,
-        })
+        if decoder.is_network() {
+            let test = Some(sets.sets.test);
+            return Ok(Self {
+                test,
+                ..Self::of_file(file, decoder)
+            });
+        }
+        Self::fit(Origin::of_file(file), sets.sets, decoder)
     }
 
     /// Fits a decoder that needs no network to the training samples of `setup`, which are `sets`.
@@ -81,94 +97,161 @@ impl<'a> ExportedDecoder<'a> {
     /// # Errors
     /// As [`Self::of_run`], or if the decoder needs a network.
     pub fn of_setup(setup: &Setup, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
-        Ok(Self {
-            origin: Origin::of_sets(setup, &sets)?,
-            test: Some(Arc::clone(&sets.sets.test)),
-            fitted: FittedDecoder::fit(*setup.settings(), sets.sets, None, decoder)?,
-            file: None,
-        })
+        let (settings, sets) = (*setup.settings(), sets.sets);
+        let set = DecoderSet::new(settings, sets.split.training.clone(), None);
+        let origin = Origin {
+            program: PROGRAM.to_owned(),
+            problem: Problem::clone(&sets.problem),
+            row_wires: sets.test.row_wires_read().map(<[usize]>::to_vec),
+            files: file_names(setup.plan()),
+            errors_of_linear: errors(&mut *set.linear().map_err(Box::new)?, &sets.problem, &sets.test)?,
+            settings,
+        };
+        Self::fit(origin, sets, decoder)
     }
 
     /// Exports networks that were trained on samples in memory, with the description of their channels and the row-wires
     /// with a network each. Without test samples the bundle contains no errors.
     pub fn of_networks(
-        (networks, blend): (&Networks, Option<&Blend>),
+        networks: &Networks,
+        combined: Option<&Combined>,
         settings: RunSettings,
         problem: Problem,
         row_wires: Option<Vec<usize>>,
     ) -> Self {
-        let none = TestErrors::Targets(Vec::new());
-        let mut fitted = FittedDecoder::of_networks(networks, none.clone());
-        match blend {
-            Some(blend) => {
-                fitted.kind = BundleDecoder::Chosen;
-                fitted.program = blend.program(networks, Precision::Double);
-            }
-            None if problem.has_nodes() => {}
-            None => fitted.program = networks.clipped_program(Precision::Double),
-        }
+        let origin = Origin {
+            program: PROGRAM.to_owned(),
+            settings,
+            problem,
+            row_wires,
+            files: Vec::new(),
+            errors_of_linear: TestErrors::Targets(Vec::new()),
+        };
+        Self::of_trained(networks, combined, origin)
+    }
+
+    /// Wraps what a file answers with, or its network alone.
+    fn of_file(file: &NetworkFile, decoder: BundleDecoder) -> Self {
+        let combined = file.combined().filter(|_| decoder == BundleDecoder::Chosen);
+        let exported = Self::of_trained(&file.network, combined, Origin::of_file(file));
+        let Scores {
+            network: used,
+            network_alone,
+            ..
+        } = &file.scores;
+        let errors = match network_alone {
+            Some(alone) if exported.kind != BundleDecoder::Chosen => alone,
+            _ => used,
+        };
+        // The intervals are those of what the file answers with.
+        let intervals = file.intervals.as_ref().filter(|_| errors == used);
+        let half_widths = intervals.and_then(|intervals| intervals.targets.iter().cloned().collect());
         Self {
-            file: None,
-            test: None,
-            origin: Origin {
-                program: PROGRAM.to_owned(),
-                settings,
-                problem,
-                row_wires,
-                files: Vec::new(),
-                errors_of_linear: none,
-            },
-            fitted,
+            errors: errors.clone(),
+            half_widths: half_widths.unwrap_or_default(),
+            ..exported
         }
+    }
+
+    /// Wraps trained networks, which contain the ranges of their readings and targets, alone or in a combination.
+    fn of_trained(networks: &Networks, combined: Option<&Combined>, origin: Origin) -> Self {
+        let all = networks.values().iter();
+        let combined = combined.filter(|combined| !combined.others.is_empty());
+        let kind = combined.map_or_else(BundleDecoder::default, |_| BundleDecoder::Chosen);
+        Self {
+            program: networks.decoder_program(&origin.problem, combined),
+            unlimited: combined.is_none().then(|| networks.program(Precision::Double)),
+            kind,
+            target_ranges: all.clone().map(|network| network.outputs().clone()).collect(),
+            reading_ranges: all.map(|network| network.inputs().range().cloned()).collect(),
+            errors: TestErrors::Targets(Vec::new()),
+            half_widths: Vec::new(),
+            test: None,
+            origin,
+        }
+    }
+
+    /// Fits a decoder that needs no network to the training samples of `sets` and measures it on the test samples.
+    ///
+    /// # Errors
+    /// The decoder needs a network, the samples cannot be scaled or decoded, or no other program can compute what the decoder
+    /// does.
+    fn fit(origin: Origin, sets: RunSets, kind: BundleDecoder) -> Result<Self, BundleError> {
+        kind.check()?;
+        let training = sets.split.training;
+        let of_row = |set: &Dataset| Ok::<_, BundleError>((MinMax::of(set.readings()), MinMax::of(set.targets())));
+        let in_training = PerRow::fit(&training, origin.settings.source.row_model(), of_row)?;
+        let (reading_ranges, target_ranges): (_, Vec<_>) = in_training.values().iter().cloned().unzip();
+        let set = DecoderSet::new(origin.settings, training, None);
+        let decoder = match kind {
+            BundleDecoder::Linear => Some(set.linear().map_err(Box::new)?),
+            BundleDecoder::Kind(kind) => set.decoder(kind, Precision::Double).map_err(Box::new)?,
+            BundleDecoder::Chosen => None,
+        };
+        let mut decoder = decoder.ok_or(BundleError::NoNetwork(kind))?;
+        let not_described = || ChoiceError::NotDescribed {
+            decoder: kind,
+            reason: RULES,
+        };
+        Ok(Self {
+            kind,
+            program: decoder.program().ok_or_else(not_described)?,
+            unlimited: None,
+            reading_ranges,
+            target_ranges: target_ranges.into_iter().flatten().collect(),
+            errors: errors(&mut *decoder, &sets.problem, &sets.test)?,
+            half_widths: Vec::new(),
+            test: Some(sets.test),
+            origin,
+        })
     }
 
     /// Kind of decoder.
     pub fn kind(&self) -> BundleDecoder {
-        self.fitted.kind
+        self.kind
     }
 
     /// Number of row-wires that are distinguished; 1 if the row is not an argument.
     fn rows(&self) -> usize {
-        self.fitted.reading_ranges.len().max(self.fitted.program.rows())
+        self.reading_ranges.len().max(self.program.rows())
     }
 
     fn meaning(&self) -> Meaning {
-        match &self.origin.problem.sensor {
-            Some(simulation) => Meaning::Array(simulation.sensor.scale),
-            None => Meaning::Own {
-                inputs: self.origin.problem.inputs.clone(),
-                targets: self.origin.problem.targets.clone(),
-                row_wires: match (&self.origin.row_wires, self.rows()) {
-                    (Some(row_wires), 2..) => row_wires.clone(),
-                    _ => Vec::new(),
-                },
+        let Problem {
+            inputs,
+            targets,
+            sensor,
+            ..
+        } = self.origin.problem.clone();
+        // Comments of C have no Ω.
+        let in_ohm = |channel: Channel| Channel::new(channel.name, Some("ohm"));
+        Meaning {
+            is_array: sensor.is_some(),
+            inputs: match sensor {
+                Some(_) => inputs.into_iter().map(in_ohm).collect(),
+                None => inputs,
+            },
+            targets,
+            row_wires: match (&self.origin.row_wires, self.rows()) {
+                (Some(row_wires), 2..) => row_wires.clone(),
+                _ => Vec::new(),
             },
         }
-    }
-
-    /// 90 % prediction intervals of the network, if every target has one.
-    fn half_widths(&self) -> Vec<HalfWidth> {
-        // The intervals are those of what the file answers with.
-        let has_them =
-            |file: &&NetworkFile| self.fitted.kind.is_network() && self.fitted.kind == BundleDecoder::of(file);
-        let intervals = self.file.filter(has_them).and_then(|file| file.intervals.as_ref());
-        let all = intervals.and_then(|intervals| intervals.targets.iter().cloned().collect());
-        all.unwrap_or_default()
     }
 
     /// Limits of the readings, or of the features of a history, beyond which they count as outside: for all row-wires or for
     /// each; `None` if the range in training is not known.
     pub(super) fn limits(&self) -> Option<Limits> {
-        let quantity = ExportedProgram::quantity_of(&self.fitted.program);
+        let quantity = match are_positive(&self.program) {
+            true => Quantity::Resistance,
+            false => Quantity::Raw,
+        };
         let of_row = |range: &Option<MinMax>| {
             let range = range.as_ref()?;
-            Some(
-                (0..range.channels())
-                    .map(|channel| range.limits(quantity, channel))
-                    .collect(),
-            )
+            let channels = 0..range.channels();
+            Some(channels.map(|channel| range.limits(quantity, channel)).collect())
         };
-        self.fitted.reading_ranges.iter().map(of_row).collect()
+        self.reading_ranges.iter().map(of_row).collect()
     }
 
     /// Collects what a bundle contains.
@@ -179,30 +262,28 @@ impl<'a> ExportedDecoder<'a> {
         let problem = &self.origin.problem;
         let channels = problem.inputs.len();
         let meaning = self.meaning();
-        let mut program = match self.file {
-            // Integers saturate, and need no limits.
-            Some(file) if precision == BundlePrecision::Fixed16 && self.fitted.kind == BundleDecoder::default() => {
-                file.network.program(Precision::Double)
-            }
-            _ => self.fitted.program.clone(),
-        };
+        let unlimited = self
+            .unlimited
+            .as_ref()
+            .filter(|_| precision == BundlePrecision::Fixed16);
+        let mut program = unlimited.unwrap_or(&self.program).clone();
         if let Some(memory) = problem.memory.as_ref().filter(|memory| !memory.is_empty()) {
             let with_history = program.with_history(memory, channels);
             program = with_history.map_err(|error| Box::new(RunError::from(error)))?;
         }
-        let exported = ExportedProgram::of(&program, &self.half_widths(), self.limits().as_ref());
+        let exported = ExportedProgram::of(&program, &self.half_widths, self.limits().as_ref());
         let (rows, printed) = self.readings(channels)?;
         let golden = Golden::of(rows, printed, &program, exported.outputs())?;
-        let targets = &self.fitted.target_extremes;
-        let scales = match meaning.is_array() {
-            true => vec![scale(targets, 0..exported.outputs()); exported.outputs()],
-            false => (0..exported.outputs())
-                .map(|output| scale(targets, output..output + 1))
-                .collect(),
-        };
+        let targets = &self.target_ranges;
+        let outputs = exported.outputs();
+        let scales = (0..outputs).map(|output| match meaning.is_array {
+            true => scale(targets, 0..outputs),
+            false => scale(targets, output..output + 1),
+        });
+        let scales = scales.collect();
         let mut contents = Contents {
             name: name.to_owned(),
-            noun: self.fitted.kind.noun(),
+            noun: self.kind.noun(),
             precision,
             names: names(&exported, &meaning),
             rows: self.rows(),
@@ -210,7 +291,7 @@ impl<'a> ExportedDecoder<'a> {
             exported,
             scales,
             golden,
-            metadata: Metadata::new(),
+            metadata: Value::Null,
             notes: Vec::new(),
         };
         if self.test.is_none() && problem.sensor.is_none() {
@@ -230,69 +311,46 @@ impl<'a> ExportedDecoder<'a> {
         /// Rows by which the accuracy is found, and those of them in the bundle.
         const ROWS: [usize; 2] = [200, 30];
         let takes_row = self.rows() > 1;
-        let of_set = |set: &Dataset, sample: usize| GoldenRow {
-            is_new_series: false,
-            time_s: None,
-            row: if takes_row { set.row_index(sample) } else { 0 },
-            readings: set.sample_readings(sample)[..channels].to_vec(),
-            targets: Vec::new(),
+        let of_set = |set: &Dataset, sample: usize| {
+            let row = if takes_row { set.row_index(sample) } else { 0 };
+            GoldenRow::new(row, set.sample_readings(sample)[..channels].to_vec())
         };
-        let has_history = self
-            .origin
-            .problem
-            .memory
-            .as_ref()
-            .is_some_and(|memory| !memory.is_empty());
+        let memory = self.origin.problem.memory.as_ref().filter(|memory| !memory.is_empty());
         let mut rows = match (&self.origin.problem.sensor, &self.test) {
             (Some(simulation), _) => {
-                let rows = simulation.model_size().map_or(1, |size| size.rows);
-                let test_samples = ROWS[0].next_multiple_of(rows.max(1));
+                let rows = simulation.rows().unwrap_or(1);
                 let few = Simulation {
-                    test_samples,
+                    test_samples: ROWS[0].next_multiple_of(rows.max(1)),
                     ..*simulation
                 };
                 let set = few.draw_test(self.origin.settings.seed).map_err(Box::new)?;
-                (0..set.samples().min(2 * ROWS[0]))
-                    .map(|sample| of_set(&set, sample))
-                    .collect()
+                let samples = 0..set.samples().min(2 * ROWS[0]);
+                samples.map(|sample| of_set(&set, sample)).collect()
             }
-            (None, Some(test)) if has_history => (0..test.samples().min(ROWS[0]))
-                .map(|sample| of_set(test, sample))
-                .collect(),
             (None, Some(test)) => {
                 let count = test.samples().min(ROWS[0]);
-                (0..count)
-                    .map(|place| of_set(test, place * test.samples() / count))
-                    .collect()
+                // Readings with a history are successive.
+                let sample = |place| match memory {
+                    Some(_) => place,
+                    None => place * test.samples() / count,
+                };
+                (0..count).map(|place| of_set(test, sample(place))).collect()
             }
             (None, None) => self.drawn(channels, ROWS[0])?,
         };
-        match &self.origin.problem.memory {
-            Some(memory) if has_history => set_times(&mut rows, memory.interval_s.unwrap_or(1.0)),
-            _ => rows.splice(..0, self.corners()).for_each(drop),
+        match memory {
+            Some(memory) => set_times(&mut rows, memory.interval_s.unwrap_or(1.0)),
+            None => rows.splice(..0, self.corners()).for_each(drop),
         }
         Ok((rows, ROWS[1] + self.rows()))
     }
 
     /// The smallest, middle and largest readings of each range in training.
     fn corners(&self) -> Vec<GoldenRow> {
-        let ranges = self.fitted.reading_ranges.iter().enumerate();
+        let ranges = self.reading_ranges.iter().enumerate();
         let known = ranges.filter_map(|(row, range)| Some((row, range.as_ref()?)));
         let of_range = |(row, range): (usize, &MinMax)| {
-            let at = |place: f64| {
-                let between = |channel| {
-                    let (low, high) = range.extremes(channel);
-                    if place == 1.0 { high } else { low + place * (high - low) }
-                };
-                (0..range.channels()).map(between).collect()
-            };
-            [0.0, 0.5, 1.0].map(|place| GoldenRow {
-                is_new_series: false,
-                time_s: None,
-                row,
-                readings: at(place),
-                targets: Vec::new(),
-            })
+            [0.0, 0.5, 1.0].map(|place| GoldenRow::new(row, readings_at(range, range.channels(), || place)))
         };
         known.flat_map(of_range).collect()
     }
@@ -300,77 +358,60 @@ impl<'a> ExportedDecoder<'a> {
     /// Readings that are uniform in their range in training.
     fn drawn(&self, channels: usize, count: usize) -> Result<Vec<GoldenRow>, BundleError> {
         let mut rng = Seed::default().rng(Stream::Test);
-        let ranges = &self.fitted.reading_ranges;
         let row = |place: usize| {
-            let row = place % ranges.len();
-            let range = ranges[row].as_ref().ok_or(BundleError::NoRange)?;
-            let mut between = |channel| {
-                let (low, high) = range.extremes(channel);
-                low + rng.random::<f64>() * (high - low)
-            };
-            Ok(GoldenRow {
-                is_new_series: false,
-                time_s: None,
-                row,
-                readings: (0..channels).map(&mut between).collect(),
-                targets: Vec::new(),
-            })
+            let row = place % self.reading_ranges.len();
+            let range = self.reading_ranges[row].as_ref().ok_or(BundleError::NoRange)?;
+            let readings = readings_at(range, channels, || rng.random::<f64>());
+            Ok(GoldenRow::new(row, readings))
         };
         (0..count).map(row).collect()
     }
 
     /// Collects the metadata of a bundle.
-    fn metadata(&self, contents: &Contents) -> Metadata {
-        let common = json!({
-            "program": PROGRAM,
-            "decoder": self.fitted.kind.to_string(),
-            "takes_row": contents.takes_row(),
-            "steps": steps(contents),
-            "precision": contents.precision.to_string(),
-        });
-        let errors = &self.fitted.errors;
-        let own = match &self.origin.problem.sensor {
-            Some(simulation) => self.of_array(simulation, contents, errors),
-            None => self.of_recording(contents, errors),
+    fn metadata(&self, contents: &Contents) -> Value {
+        let mut fields = match &self.origin.problem.sensor {
+            Some(simulation) => self.of_array(simulation, contents),
+            None => self.of_recording(contents),
         };
-        let mut fields = Metadata::new();
-        for part in [common, own] {
-            if let Value::Object(part) = part {
-                fields.extend(part);
-            }
-        }
-        if self.fitted.kind == BundleDecoder::default() {
+        fields["program"] = json!(PROGRAM);
+        fields["trained_by"] = json!(self.origin.program);
+        fields["decoder"] = json!(self.kind.to_string());
+        fields["takes_row"] = json!(contents.takes_row());
+        fields["steps"] = json!(steps(contents));
+        fields["precision"] = json!(contents.precision.to_string());
+        fields["seed"] = json!(self.origin.settings.seed);
+        if self.kind == BundleDecoder::default() {
             let mut operations = contents.computed();
             let hidden = operations.find(|(_, operation)| matches!(operation, Operation::Map(Function::Tanh, _)));
-            fields.insert(
-                "hidden_nodes".to_owned(),
-                json!(hidden.map(|(id, _)| contents.size(id))),
-            );
+            fields["hidden_nodes"] = json!(hidden.map(|(id, _)| contents.size(id)));
         }
         fields
     }
 
-    fn of_array(&self, simulation: &Simulation, contents: &Contents, errors: &TestErrors) -> Value {
-        let Simulation { sensor, scene, .. } = simulation;
-        let names = |channels: Vec<Channel>| channels.into_iter().map(|channel| channel.name).collect::<Vec<_>>();
+    fn of_array(
+        &self,
+        Simulation {
+            sensor, scene, samples, ..
+        }: &Simulation,
+        contents: &Contents,
+    ) -> Value {
+        let names = |channels: &[Channel]| Vec::from_iter(channels.iter().map(|channel| channel.name.clone()));
         json!({
-            "trained_by": self.origin.program,
             "array": sensor.scale.to_string(),
             "geometry": sensor.geometry,
             "scene": scene,
             "rows": scene.rows.to_string(),
             "row_numbers": contents.takes_row().then_some([1, contents.rows]),
-            "inputs": { "names": names(contents.meaning.inputs(contents.channels())), "unit": "ohm" },
-            "outputs": { "names": names(contents.meaning.targets()), "unit": "mm" },
-            "training_samples": simulation.samples,
-            "seed": self.origin.settings.seed,
-            "errors": errors.nodes(),
+            "inputs": { "names": names(&contents.meaning.inputs), "unit": "ohm" },
+            "outputs": { "names": names(&contents.meaning.targets), "unit": "mm" },
+            "training_samples": samples,
+            "errors": self.errors.nodes(),
             "readings_in_training_ohm": self.ranges(),
             "output_range_mm": contents.scales[0],
         })
     }
 
-    fn of_recording(&self, contents: &Contents, errors: &TestErrors) -> Value {
+    fn of_recording(&self, contents: &Contents) -> Value {
         let origin = &self.origin;
         let columns = |channels: &[Channel]| {
             let (names, units): (Vec<_>, Vec<_>) =
@@ -384,15 +425,13 @@ impl<'a> ExportedDecoder<'a> {
         };
         let row_wires = origin.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
         json!({
-            "trained_by": origin.program,
             "files": origin.files,
             "row_numbers": contents.takes_row().then(|| row_wires.collect::<Vec<_>>()),
             "inputs": columns(&origin.problem.inputs),
             "memory": origin.problem.memory,
             "outputs": columns(&origin.problem.targets),
             "method": origin.settings.training.method.short_name(),
-            "seed": origin.settings.seed,
-            "errors": named(errors),
+            "errors": named(&self.errors),
             "errors_of_ridge": named(&origin.errors_of_linear),
             "readings_in_training": self.ranges(),
             "output_ranges": contents.scales,
@@ -406,12 +445,18 @@ impl<'a> ExportedDecoder<'a> {
             let (minimum, maximum): (Vec<f64>, Vec<f64>) = extremes.unzip();
             json!({ "minimum": minimum, "maximum": maximum })
         };
-        self.fitted
-            .reading_ranges
-            .iter()
-            .map(|of_row| of_row.as_ref().map(range))
-            .collect()
+        let of_rows = self.reading_ranges.iter();
+        of_rows.map(|of_row| of_row.as_ref().map(range)).collect()
     }
+}
+
+/// Readings at a place from 0 to 1 of the range of each channel.
+fn readings_at(range: &MinMax, channels: usize, mut place: impl FnMut() -> f64) -> Vec<f64> {
+    let mut between = |channel| {
+        let ((low, high), place) = (range.extremes(channel), place());
+        if place == 1.0 { high } else { low + place * (high - low) }
+    };
+    (0..channels).map(&mut between).collect()
 }
 
 /// Times at the usual interval with a pause and a step back, and a series that begins after half of the rows.
@@ -431,9 +476,11 @@ fn set_times(rows: &mut [GoldenRow], interval_s: f64) {
 }
 
 /// Widest range in training among these outputs of all rows.
-fn scale(targets: &[Vec<(f64, f64)>], outputs: std::ops::Range<usize>) -> f64 {
-    let extremes = targets.iter().flat_map(|row| row[outputs.clone()].iter());
-    let (width, largest) = extremes.fold((0.0_f64, 0.0_f64), |(width, largest), &(low, high)| {
+fn scale(targets: &[MinMax], outputs: std::ops::Range<usize>) -> f64 {
+    let extremes = targets
+        .iter()
+        .flat_map(|of_row| outputs.clone().map(|output| of_row.extremes(output)));
+    let (width, largest) = extremes.fold((0.0_f64, 0.0_f64), |(width, largest), (low, high)| {
         (width.max(high - low), largest.max(low.abs()).max(high.abs()))
     });
     // Outputs that did not vary are constants, and deviations are relative to these.
@@ -457,118 +504,9 @@ fn steps(contents: &Contents) -> Vec<String> {
     contents.computed().filter_map(step).collect()
 }
 
-/// A decoder fitted to training samples, with the facts about them that a bundle contains.
-pub(super) struct FittedDecoder {
-    pub(super) kind: BundleDecoder,
-    pub(super) program: Program,
-    /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
-    pub(super) reading_ranges: Vec<Option<MinMax>>,
-    /// Ranges of the targets in training: one for all row-wires, or one for each if the row is an argument.
-    pub(super) target_extremes: Vec<Vec<(f64, f64)>>,
-    /// Errors on the test samples.
-    pub(super) errors: TestErrors,
-}
-
-impl FittedDecoder {
-    /// Wraps what a network file answers with, or its network alone.
-    pub(super) fn of_file(file: &NetworkFile, kind: BundleDecoder) -> Self {
-        let (program, errors) = match kind {
-            BundleDecoder::Chosen => (file.decoder_program(), file.scores.network.clone()),
-            _ => (
-                file.network_program(),
-                file.scores
-                    .network_alone
-                    .as_ref()
-                    .unwrap_or(&file.scores.network)
-                    .clone(),
-            ),
-        };
-        Self {
-            kind,
-            program,
-            ..Self::of_networks(&file.network, errors)
-        }
-    }
-
-    /// Wraps trained networks, which contain the range of their readings, and their errors on the test samples.
-    pub(super) fn of_networks(networks: &Networks, errors: TestErrors) -> Self {
-        let all = networks.values().iter();
-        let extremes = all.clone().map(|network| {
-            let outputs = network.outputs();
-            (0..outputs.channels()).map(|output| outputs.extremes(output)).collect()
-        });
-        Self {
-            kind: BundleDecoder::Kind(DecoderKind::Network),
-            program: networks.program(Precision::Double),
-            reading_ranges: all.map(|network| network.inputs().range().cloned()).collect(),
-            target_extremes: extremes.collect(),
-            errors,
-        }
-    }
-
-    /// Fits a decoder to the training samples of `sets` by these settings and measures it on the test samples; `networks` are
-    /// those trained with these settings, for the decoders that need them.
-    ///
-    /// # Errors
-    /// The samples cannot be scaled or decoded, or no other program can compute what the decoder does.
-    pub(super) fn fit(
-        settings: RunSettings,
-        sets: RunSets,
-        networks: Option<Networks>,
-        kind: BundleDecoder,
-    ) -> Result<Self, BundleError> {
-        if kind.is_network() && networks.is_none() {
-            return Err(BundleError::NoNetwork(kind));
-        }
-        let (training, test, problem) = (sets.split.training, sets.test, sets.problem);
-        let of_row = |set: &Dataset| {
-            let targets = set.targets();
-            let extremes = targets.columns().into_iter().map(|column| {
-                let both = |(low, high): (f64, f64), &value: &f64| (low.min(value), high.max(value));
-                column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), both)
-            });
-            Ok::<_, BundleError>((MinMax::of(set.readings()), extremes.collect::<Vec<_>>()))
-        };
-        let in_training = PerRow::fit(&training, settings.source.row_model(), of_row)?;
-        let (reading_ranges, target_extremes) = in_training.values().iter().cloned().unzip();
-        let set = DecoderSet::new(settings, training, networks);
-        let decoder = match kind {
-            BundleDecoder::Linear => Some(set.linear().map_err(Box::new)?),
-            BundleDecoder::Kind(kind) => set.decoder(kind, Precision::Double).map_err(Box::new)?,
-            BundleDecoder::Chosen => set.decoder(DecoderKind::Network, Precision::Double).map_err(Box::new)?,
-        };
-        let not_described = |reason| ChoiceError::NotDescribed { decoder: kind, reason };
-        let mut decoder = decoder.ok_or_else(|| not_described(EQUATIONS))?;
-        let program = decoder.program().ok_or_else(|| not_described(RULES))?;
-        let answers = decode_set(&mut *decoder, &test).map_err(|error| Box::new(RunError::from(error)))?;
-        Ok(Self {
-            kind,
-            program,
-            reading_ranges,
-            target_extremes,
-            errors: TestErrors::measure(&problem, &test, &answers),
-        })
-    }
-}
-
-/// Facts about the samples to which an exported decoder was fitted, for the metadata of its bundle.
-pub(super) struct Origin {
-    /// Program and version that trained or fitted it.
-    pub(super) program: String,
-    pub(super) settings: RunSettings,
-    /// Names, units and positions of readings and targets.
-    pub(super) problem: Problem,
-    /// Row-wires of the samples in ascending order, from 0, if they are known.
-    pub(super) row_wires: Option<Vec<usize>>,
-    /// Names of the recordings without their folders; empty for a simulated array.
-    pub(super) files: Vec<String>,
-    /// Errors of the linear baseline on the test samples.
-    pub(super) errors_of_linear: TestErrors,
-}
-
 impl Origin {
-    /// Returns the facts from the file of a trained network.
-    pub(super) fn of_file(file: &NetworkFile) -> Self {
+    /// The facts from the file of a trained network.
+    fn of_file(file: &NetworkFile) -> Self {
         Self {
             program: file.program.clone(),
             settings: file.settings,
@@ -578,25 +516,12 @@ impl Origin {
             errors_of_linear: file.scores.baselines.linear.clone(),
         }
     }
+}
 
-    /// Returns the facts from the samples of `setup`, for a decoder without a network.
-    ///
-    /// # Errors
-    /// The samples cannot be scaled or decoded.
-    pub(super) fn of_sets(setup: &Setup, sets: &SetupSets) -> Result<Self, BundleError> {
-        let (settings, samples) = (*setup.settings(), &sets.sets);
-        let set = DecoderSet::new(settings, samples.split.training.clone(), None);
-        let mut linear = set.linear().map_err(Box::new)?;
-        let answers = decode_set(&mut *linear, &samples.test).map_err(|error| Box::new(RunError::from(error)))?;
-        Ok(Self {
-            program: PROGRAM.to_owned(),
-            problem: Problem::clone(&samples.problem),
-            row_wires: samples.test.row_wires_read().map(<[usize]>::to_vec),
-            files: file_names(setup.plan()),
-            errors_of_linear: TestErrors::measure(&samples.problem, &samples.test, &answers),
-            settings,
-        })
-    }
+/// Errors of a decoder on test samples.
+fn errors(decoder: &mut dyn Decoder, problem: &Problem, test: &Dataset) -> Result<TestErrors, BundleError> {
+    let answers = decode_set(decoder, test).map_err(|error| Box::new(RunError::from(error)))?;
+    Ok(TestErrors::measure(problem, test, &answers))
 }
 
 fn file_names(plan: Option<&Plan>) -> Vec<String> {

@@ -3,7 +3,6 @@
 use decoupler_core::{
     decoupling::{Domain, Node, NodeId, Operation, Precision, Program},
     evaluation::HalfWidth,
-    network::Quantity,
 };
 use ndarray::Array2;
 
@@ -25,9 +24,8 @@ pub(super) type Limits = Vec<Vec<(f64, f64)>>;
 impl ExportedProgram {
     /// Extends the program of a decoder; its successive affine maps are joined.
     pub(super) fn of(program: &Program, half_widths: &[HalfWidth], limits: Option<&Limits>) -> Self {
-        let mut nodes = program.nodes().to_vec();
+        let mut nodes = join_affine_maps(program);
         let targets = program.output();
-        join_affine_maps(&mut nodes, targets);
         let of_widths = (!half_widths.is_empty()).then(|| push_half_widths(&mut nodes, targets, half_widths));
         let outside = limits.map(|limits| push_outside(&mut nodes, limits));
         let parts = Vec::from_iter([Some(targets), of_widths, outside].into_iter().flatten());
@@ -45,23 +43,18 @@ impl ExportedProgram {
     /// The same program in single precision, except for the nodes up to the layer number `wide`, the state of a history and the
     /// comparison with limits.
     pub(super) fn in_single(&self, wide: usize) -> Self {
-        let first = match wide {
-            0 => 0,
-            _ => self.layers()[wide - 1] + 1,
-        };
+        let first = wide.checked_sub(1).map_or(0, |last| self.layers()[last] + 1);
         let mut nodes = self.program.nodes().to_vec();
-        for index in (0..nodes.len()).rev() {
-            let is_double = match nodes[index].operation {
-                Operation::History { .. } | Operation::CountOutside { .. } => true,
+        for index in 0..nodes.len() {
+            let precision = match nodes[index].operation {
                 // Those of tables follow from the nodes that take them.
                 Operation::Select { .. } => continue,
-                Operation::Readings | Operation::Valid { .. } => false,
-                _ => index < first,
-            };
-            let precision = if is_double {
-                Precision::Double
-            } else {
-                Precision::Single
+                // A checked value has the precision of the value.
+                Operation::Valid { of, .. } => nodes[of.index()].precision,
+                Operation::History { .. } | Operation::CountOutside { .. } => Precision::Double,
+                Operation::Readings => Precision::Single,
+                _ if index < first => Precision::Double,
+                _ => Precision::Single,
             };
             nodes[index].precision = precision;
             for operand in nodes[index].operation.operands() {
@@ -69,12 +62,6 @@ impl ExportedProgram {
                 if let Operation::Select { .. } = operand.operation {
                     operand.precision = precision;
                 }
-            }
-        }
-        // A checked value has the precision of the value.
-        for index in 0..nodes.len() {
-            if let Operation::Valid { of, .. } = nodes[index].operation {
-                nodes[index].precision = nodes[of.index()].precision;
             }
         }
         Self {
@@ -103,48 +90,35 @@ impl ExportedProgram {
 
     /// Indices of the nodes with sums of products.
     pub(super) fn layers(&self) -> Vec<usize> {
-        let is_layer = |node: &Node| {
-            matches!(
-                node.operation,
-                Operation::Affine { .. } | Operation::SquaredDistances { .. }
-            )
+        let index_of_layer = |(index, node): (usize, &Node)| match node.operation {
+            Operation::Affine { .. } | Operation::SquaredDistances { .. } => Some(index),
+            _ => None,
         };
-        let nodes = self.program.nodes().iter().enumerate();
-        nodes
-            .filter(|(_, node)| is_layer(node))
-            .map(|(index, _)| index)
+        self.program
+            .nodes()
+            .iter()
+            .enumerate()
+            .filter_map(index_of_layer)
             .collect()
+    }
+
+    /// The parts of an answer.
+    pub(super) fn parts(&self) -> impl Iterator<Item = NodeId> {
+        [Some(self.targets), self.half_widths, self.outside]
+            .into_iter()
+            .flatten()
     }
 
     /// Number of targets.
     pub(super) fn outputs(&self) -> usize {
         self.program.node(self.targets).size
     }
-
-    /// `true` if a reading must be above 0.
-    pub(super) fn are_positive(&self) -> bool {
-        are_positive(&self.program)
-    }
-
-    /// Quantity by whose rule limits are set.
-    pub(super) fn quantity_of(program: &Program) -> Quantity {
-        match are_positive(program) {
-            true => Quantity::Resistance,
-            false => Quantity::Raw,
-        }
-    }
 }
 
-fn are_positive(program: &Program) -> bool {
-    program.nodes().iter().any(|node| {
-        matches!(
-            node.operation,
-            Operation::Valid {
-                domain: Domain::Positive,
-                ..
-            }
-        )
-    })
+/// `true` if a reading of this program must be above 0.
+pub(super) fn are_positive(program: &Program) -> bool {
+    let mut operations = program.nodes().iter().map(|node| &node.operation);
+    operations.any(|operation| matches!(operation, Operation::Valid { domain, .. } if *domain == Domain::Positive))
 }
 
 fn push(nodes: &mut Vec<Node>, operation: Operation, size: usize) -> NodeId {
@@ -167,21 +141,20 @@ fn row(values: Vec<f64>) -> Array2<f64> {
 
 /// The constants of node `id`, of row-wire `row`.
 pub(super) fn table(nodes: &[Node], id: NodeId, row: usize) -> &Array2<f64> {
+    let tables = tables(nodes, id);
+    &tables[row.min(tables.len() - 1)]
+}
+
+fn tables(nodes: &[Node], id: NodeId) -> &[Array2<f64>] {
     match &nodes[id.index()].operation {
-        Operation::Select { tables, .. } => &tables[row.min(tables.len() - 1)],
+        Operation::Select { tables, .. } => tables,
         _ => panic!("the tables of an operation are constants"),
     }
 }
 
-fn tables_of(nodes: &[Node], id: NodeId) -> usize {
-    match &nodes[id.index()].operation {
-        Operation::Select { tables, .. } => tables.len(),
-        _ => 1,
-    }
-}
-
 /// Joins affine maps of affine maps: the constants that restore the units of targets need no layer of their own.
-fn join_affine_maps(nodes: &mut [Node], output: NodeId) {
+fn join_affine_maps(program: &Program) -> Vec<Node> {
+    let mut nodes = program.nodes().to_vec();
     for index in 0..nodes.len() {
         let Operation::Affine { of, weights, biases } = nodes[index].operation else {
             continue;
@@ -194,15 +167,14 @@ fn join_affine_maps(nodes: &mut [Node], output: NodeId) {
         else {
             continue;
         };
-        let operands = nodes.iter().flat_map(|node| node.operation.operands());
-        if of == output || operands.filter(|&operand| operand == of).count() > 1 {
+        if program.uses(of) > 1 {
             continue;
         }
         let all = [weights, biases, first_weights, first_biases];
-        let rows = all.map(|id| tables_of(nodes, id)).into_iter().max().unwrap_or(1);
+        let rows = all.map(|id| tables(&nodes, id).len()).into_iter().max().unwrap_or(1);
         let (mut joined_weights, mut joined_biases) = (Vec::new(), Vec::new());
         for row in 0..rows {
-            let [weights, biases, first_weights, first_biases] = all.map(|id| table(nodes, id, row));
+            let [weights, biases, first_weights, first_biases] = all.map(|id| table(&nodes, id, row));
             joined_weights.push(first_weights.dot(weights));
             joined_biases.push(first_biases.dot(weights) + biases);
         }
@@ -216,6 +188,7 @@ fn join_affine_maps(nodes: &mut [Node], output: NodeId) {
             biases,
         };
     }
+    nodes
 }
 
 /// Adds half-widths that are constant, or piecewise linear in the target: a constant and, for each segment, a slope times

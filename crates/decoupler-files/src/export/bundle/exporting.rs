@@ -7,6 +7,7 @@ use super::{
     choice::{BundleFormat, BundlePrecision},
     contents::Contents,
     exported_decoder::ExportedDecoder,
+    exported_program::are_positive,
     fixed16::FixedProgram,
     folder::{AtomicFolder, identifier},
     golden::Golden,
@@ -25,27 +26,23 @@ const LARGEST_ROUNDING: f64 = 0.01;
 /// # Errors
 /// The format lacks the precision, the decoder cannot be written in it, `path` is taken or cannot be written, or the
 /// bundle deviates from the decoder. Nothing is left behind.
-pub fn export_bundle<'a>(
-    decoder: impl Into<ExportedDecoder<'a>>,
+pub fn export_bundle(
+    decoder: impl Into<ExportedDecoder>,
     format: BundleFormat,
     precision: BundlePrecision,
     path: &Path,
 ) -> Result<BundleReport, BundleError> {
-    let decoder: ExportedDecoder<'_> = decoder.into();
+    let decoder: ExportedDecoder = decoder.into();
     format.check_for(decoder.kind(), precision)?;
-    let folder = AtomicFolder::create(path)?;
+    let mut folder = AtomicFolder::create(path)?;
     let mut contents = decoder.contents(&identifier(path), precision)?;
     let accuracy = match precision {
         BundlePrecision::Double => in_double(&mut contents)?,
         BundlePrecision::Single => in_single(&mut contents)?,
         BundlePrecision::Fixed16 => in_fixed16(&mut contents, &decoder)?,
     };
-    let Accuracy {
-        limit,
-        rounding,
-        fixed,
-        checks,
-    } = accuracy;
+    let (limit, rounding, fixed) = (accuracy.limit, accuracy.rounding, accuracy.fixed.as_ref());
+    let bounds = fixed.map(|fixed| contents.meaning.named(&fixed.bounds));
     let mut report = BundleReport {
         format,
         precision,
@@ -53,53 +50,35 @@ pub fn export_bundle<'a>(
         files: Vec::new(),
         verified: contents.golden.count(),
         golden: contents.golden.rows().len(),
-        checks,
+        checks: accuracy.checks,
         limit,
         rounding,
-        output_range_mm: contents.meaning.is_array().then(|| contents.scales[0]),
-        bounds: fixed
-            .as_ref()
-            .map_or_else(Vec::new, |fixed| contents.meaning.named(&fixed.bounds)),
+        output_range_mm: contents.meaning.is_array.then(|| contents.scales[0]),
+        bounds: bounds.unwrap_or_default(),
         remarks: contents.notes.clone(),
     };
-    let verification = json!({ "limit": limit, "change_by_rounding_readings": rounding, "remarks": report.remarks });
-    contents.metadata.insert("verification".to_owned(), verification);
+    contents.metadata["verification"] =
+        json!({ "limit": limit, "change_by_rounding_readings": rounding, "remarks": report.remarks });
     let usage = match format {
-        BundleFormat::Onnx => {
-            onnx::print(&contents, &folder)?;
-            onnx::usage(&contents)
-        }
-        BundleFormat::NumPy => {
-            numpy::print(&contents, &folder)?;
-            numpy::usage(&contents)
-        }
-        BundleFormat::Matlab => {
-            matlab::print(&contents, &folder)?;
-            matlab::usage(&contents)
-        }
-        BundleFormat::C99 => {
-            let compiled = c99::print(&contents, fixed.as_ref(), limit, &folder, &mut report.remarks)?;
-            report.checks.extend(compiled);
-            c99::usage(&contents, fixed.as_ref())
-        }
+        BundleFormat::Onnx => onnx::print(&contents, &mut folder)?,
+        BundleFormat::NumPy => numpy::print(&contents, &mut folder)?,
+        BundleFormat::Matlab => matlab::print(&contents, &mut folder)?,
+        BundleFormat::C99 => c99::print(&contents, fixed, &mut folder, &mut report)?,
     };
     folder.write("golden.csv", contents.golden.csv(&contents))?;
-    folder.write(
-        "metadata.json",
-        format!("{:#}\n", serde_json::Value::Object(contents.metadata.clone())),
-    )?;
+    folder.write("metadata.json", format!("{:#}\n", contents.metadata))?;
     folder.write("README.txt", readme(&contents, decoder.kind(), &usage, &report))?;
-    report.files = folder.sizes()?;
-    folder.commit()?;
+    report.files = folder.commit()?;
     Ok(report)
 }
 
 /// What is known about the deviation of other programs.
+#[derive(Default)]
 struct Accuracy {
     limit: f64,
     rounding: Option<f64>,
-    fixed: Option<FixedProgram>,
     checks: Vec<BundleCheck>,
+    fixed: Option<FixedProgram>,
 }
 
 /// A reading as a program in single precision takes it.
@@ -109,12 +88,8 @@ fn in_f32(_channel: usize, reading: f64) -> f64 {
 
 /// Deviation of the program in single precision with `wide` layers in double precision, from readings as it takes them.
 fn deviation_in_single(contents: &Contents, wide: usize) -> Result<f64, BundleError> {
-    let of_taken = Golden::of(
-        contents.golden.all().iter().map(|row| row.rounded(in_f32)).collect(),
-        0,
-        &contents.exported.program,
-        contents.outputs(),
-    )?;
+    let taken = contents.golden.all().iter().map(|row| row.rounded(in_f32)).collect();
+    let of_taken = Golden::of(taken, 0, &contents.exported.program, contents.outputs())?;
     let single = contents.exported.in_single(wide).program;
     Ok(of_taken.deviation(&single, &contents.scales, |_, reading| reading)?)
 }
@@ -147,9 +122,7 @@ fn in_double(contents: &mut Contents) -> Result<Accuracy, BundleError> {
     }
     Ok(Accuracy {
         limit,
-        rounding: None,
-        fixed: None,
-        checks: Vec::new(),
+        ..Accuracy::default()
     })
 }
 
@@ -160,12 +133,12 @@ fn in_single(contents: &mut Contents) -> Result<Accuracy, BundleError> {
     const PART: f64 = 0.2;
     /// Factor for other orders of the sums and other functions.
     const SAFETY: f64 = 8.0;
-    let positive = contents.exported.are_positive();
+    let positive = are_positive(&contents.exported.program);
     for row in contents.golden.all() {
         let is_taken = |&reading: &f64| (reading as f32).is_finite() && (!positive || reading as f32 > 0.0);
         if let Some(channel) = row.readings.iter().position(|reading| !is_taken(reading)) {
             return Err(BundleError::ReadingBeyond {
-                channel: contents.meaning.inputs(contents.channels())[channel].name.clone(),
+                channel: contents.meaning.inputs[channel].name.clone(),
                 reading: row.readings[channel],
             });
         }
@@ -187,8 +160,7 @@ fn in_single(contents: &mut Contents) -> Result<Accuracy, BundleError> {
     }
     let layers = contents.exported.layers().len();
     let (mut wide, mut found) = (0, deviation_in_single(contents, 0)?);
-    // Written so that NaN is not enough.
-    while !matches!(found.partial_cmp(&(PART * SINGLE)), Some(std::cmp::Ordering::Less)) && wide < layers {
+    while (found.is_nan() || found >= PART * SINGLE) && wide < layers {
         wide += 1;
         found = deviation_in_single(contents, wide)?;
     }
@@ -213,15 +185,16 @@ fn in_single(contents: &mut Contents) -> Result<Accuracy, BundleError> {
     Ok(Accuracy {
         limit: arithmetic + rounding,
         rounding: Some(rounding),
-        fixed: None,
         checks: vec![BundleCheck {
             evaluator: "this program in single precision",
             deviation,
         }],
+        fixed: None,
     })
 }
 
-fn in_fixed16(contents: &mut Contents, decoder: &ExportedDecoder<'_>) -> Result<Accuracy, BundleError> {
+/// The program in fixed point, with its golden readings.
+fn in_fixed16(contents: &mut Contents, decoder: &ExportedDecoder) -> Result<Accuracy, BundleError> {
     let limits = decoder.limits();
     let fixed = FixedProgram::of(&contents.exported, limits.as_ref(), &contents.meaning, &contents.scales)?;
     // The bound holds for these.
@@ -240,9 +213,8 @@ fn in_fixed16(contents: &mut Contents, decoder: &ExportedDecoder<'_>) -> Result<
     }
     Ok(Accuracy {
         limit,
-        rounding: None,
         fixed: Some(fixed),
-        checks: Vec::new(),
+        ..Accuracy::default()
     })
 }
 
@@ -250,28 +222,23 @@ fn in_fixed16(contents: &mut Contents, decoder: &ExportedDecoder<'_>) -> Result<
 fn cure(contents: &Contents) -> String {
     /// Fraction of a reading below which its range hides the change.
     const NARROW: f64 = 0.1;
-    let rows = contents.golden.all();
-    let of_channel = |channel: usize| {
-        let readings = rows.iter().map(|row| row.readings[channel]);
-        let (low, high) = readings.fold((f64::MAX, f64::MIN), |(low, high), value| {
-            (low.min(value), high.max(value))
-        });
+    let is_narrow = |channel: usize| {
+        let readings = || contents.golden.all().iter().map(|row| row.readings[channel]);
+        let (low, high) = (readings().fold(f64::MAX, f64::min), readings().fold(f64::MIN, f64::max));
         high - low < NARROW * low.abs().max(high.abs())
     };
-    match !contents.meaning.is_array() && (0..contents.channels()).any(of_channel) {
+    let smaller = match !contents.meaning.is_array && (0..contents.channels()).any(is_narrow) {
         true => {
-            "give --precision f64, or subtract a constant from each input before training, because the readings vary \
-                 little in proportion to their size"
-                .to_owned()
+            "subtract a constant from each input before training, because the readings vary little in proportion to their size"
         }
-        false => format!(
-            "give --precision f64, or {} for one that amplifies less",
-            contents.meaning.smaller_weights()
-        ),
-    }
+        false => &format!("{} for one that amplifies less", contents.meaning.smaller_weights()),
+    };
+    format!("give --precision f64, or {smaller}")
 }
 
 fn are_constants_finite(contents: &Contents, is_finite: impl Fn(f64) -> bool) -> bool {
-    let mut values = contents.constants().flat_map(|(_, tables)| tables.iter().flatten());
-    values.all(|&value| is_finite(value))
+    let mut values = contents
+        .constants()
+        .flat_map(|constant| Vec::from_iter(constant.values()));
+    values.all(is_finite)
 }

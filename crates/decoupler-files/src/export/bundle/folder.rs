@@ -12,6 +12,8 @@ use crate::export::{WriteError, unfinished::UnfinishedFolder};
 pub(super) struct AtomicFolder {
     target: PathBuf,
     folder: UnfinishedFolder,
+    /// Names of its files, with their sizes in bytes.
+    files: Vec<(String, u64)>,
 }
 
 impl AtomicFolder {
@@ -36,6 +38,7 @@ impl AtomicFolder {
         Ok(Self {
             target: parent.join(name),
             folder,
+            files: Vec::new(),
         })
     }
 
@@ -48,44 +51,31 @@ impl AtomicFolder {
     ///
     /// # Errors
     /// The operating system refuses.
-    pub(super) fn write(&self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), BundleError> {
+    pub(super) fn write(&mut self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), BundleError> {
         let path = self.path().join(name);
-        let written = fs::write(&path, contents).and_then(|()| fs::File::open(&path)?.sync_all());
-        Ok(written.map_err(|error| WriteError::io(&self.target.join(name), error))?)
+        let written = fs::write(&path, &contents).and_then(|()| fs::File::open(&path)?.sync_all());
+        written.map_err(|error| WriteError::io(&self.target.join(name), error))?;
+        self.files.push((name.to_owned(), contents.as_ref().len() as u64));
+        Ok(())
     }
 
-    /// Names of its files in order, with their sizes in bytes.
-    ///
-    /// # Errors
-    /// The operating system refuses.
-    pub(super) fn sizes(&self) -> Result<Vec<(String, u64)>, BundleError> {
-        let sizes = || {
-            let mut sizes = Vec::new();
-            for entry in fs::read_dir(self.path())? {
-                let entry = entry?;
-                sizes.push((
-                    entry.file_name().to_string_lossy().into_owned(),
-                    entry.metadata()?.len(),
-                ));
-            }
-            sizes.sort();
-            Ok(sizes)
-        };
-        Ok(sizes().map_err(|error| WriteError::io(&self.target, error))?)
-    }
-
-    /// Renames it to its target.
+    /// Renames it to its target. Returns the names of its files in order, with their sizes in bytes.
     ///
     /// # Errors
     /// Something has been created there in the meantime, or the operating system refuses.
-    pub(super) fn commit(self) -> Result<(), BundleError> {
-        let Self { target, folder } = self;
+    pub(super) fn commit(self) -> Result<Vec<(String, u64)>, BundleError> {
+        let Self {
+            target,
+            folder,
+            mut files,
+        } = self;
         if is_empty_folder(&target) {
             fs::remove_dir(&target).map_err(|error| WriteError::io(&target, error))?;
         }
-        Ok(folder
-            .persist(&target)
-            .map_err(|error| WriteError::io(&target, error))?)
+        let persisted = folder.persist(&target);
+        persisted.map_err(|error| WriteError::io(&target, error))?;
+        files.sort();
+        Ok(files)
     }
 }
 
@@ -124,12 +114,12 @@ mod tests {
     fn a_folder_exists_completely_or_not_at_all() {
         let home = tempfile::tempdir().unwrap();
         let target = home.path().join("bundle");
-        let dropped = AtomicFolder::create(&target).unwrap();
+        let mut dropped = AtomicFolder::create(&target).unwrap();
         dropped.write("half", "1").unwrap();
         drop(dropped);
         assert_eq!(names(home.path()), [""; 0]);
         fs::create_dir(&target).unwrap();
-        let folder = AtomicFolder::create(&target).unwrap();
+        let mut folder = AtomicFolder::create(&target).unwrap();
         folder.write("whole", "2").unwrap();
         folder.commit().unwrap();
         assert_eq!(

@@ -31,6 +31,17 @@ pub(super) struct GoldenRow {
 }
 
 impl GoldenRow {
+    /// Readings of a row that continue those before, without a time.
+    pub(super) fn new(row: usize, readings: Vec<f64>) -> Self {
+        Self {
+            is_new_series: false,
+            time_s: None,
+            row,
+            readings,
+            targets: Vec::new(),
+        }
+    }
+
     /// The same row with other readings.
     pub(super) fn rounded(&self, taken: impl Fn(usize, f64) -> f64) -> Self {
         let readings = self.readings.iter().enumerate();
@@ -97,9 +108,8 @@ impl Golden {
         taken: impl Fn(usize, f64) -> f64,
     ) -> Result<f64, DecodeError> {
         let changes = self.changes(program, taken)?;
-        Ok(largest(
-            changes.iter().flatten().copied().zip(scales.iter().copied().cycle()),
-        ))
+        let pairs = changes.into_iter().flatten().zip(scales.iter().copied().cycle());
+        Ok(largest(pairs))
     }
 
     /// Change of the targets by rounding the readings to single precision: at most, over all ways in which the readings may be
@@ -115,9 +125,8 @@ impl Golden {
                 false => reading,
             };
             for (sums, changes) in sums.iter_mut().zip(self.changes(program, taken)?) {
-                sums.iter_mut()
-                    .zip(changes)
-                    .for_each(|(sum, change)| *sum += change.abs());
+                let pairs = sums.iter_mut().zip(changes);
+                pairs.for_each(|(sum, change)| *sum += change.abs());
             }
         }
         let at_most = largest(sums.into_iter().flatten().zip(scales.iter().copied().cycle()));
@@ -130,11 +139,8 @@ impl Golden {
         let answers = answers(&self.rows, program, taken)?;
         let pairs = self.rows.iter().zip(answers);
         let of_row = |(row, answer): (&GoldenRow, Vec<f64>)| {
-            row.targets
-                .iter()
-                .zip(answer)
-                .map(|(target, answer)| answer - target)
-                .collect()
+            let targets = row.targets.iter().zip(answer);
+            targets.map(|(target, answer)| answer - target).collect()
         };
         Ok(pairs.map(of_row).collect())
     }
@@ -144,15 +150,12 @@ impl Golden {
     pub(super) fn csv(&self, contents: &Contents) -> String {
         let meaning = &contents.meaning;
         let (is_sequence, takes_row) = (contents.history().is_some(), contents.takes_row());
-        let mut names: Vec<String> = Vec::new();
-        if is_sequence {
-            names.extend(["new_series", "time_s"].map(str::to_owned));
-        }
-        if takes_row {
-            names.push("row".to_owned());
-        }
-        let channels = meaning.inputs(contents.channels()).into_iter().chain(meaning.targets());
-        names.extend(channels.map(|channel| inert(&channel.name)));
+        let of_sequence = ["new_series", "time_s"].iter().filter(|_| is_sequence);
+        let names = of_sequence
+            .chain(["row"].iter().filter(|_| takes_row))
+            .map(|&name| name.to_owned());
+        let channels = meaning.inputs.iter().chain(&meaning.targets);
+        let names = names.chain(channels.map(|channel| inert(&channel.name))).collect();
         // User-defined names may contain commas and quotation marks.
         let mut writer = csv::Writer::from_writer(Vec::new());
         let mut write = |fields: Vec<String>| writer.write_record(fields).expect("writing to memory does not fail");

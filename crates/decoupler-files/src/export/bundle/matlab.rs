@@ -3,13 +3,13 @@
 use std::fmt::Write;
 
 use decoupler_core::{
-    decoupling::{Domain, Function, NodeId, Operation},
+    decoupling::{Domain, NodeId, Operation},
     text::counted,
 };
 use ndarray::Array2;
 
 use super::{
-    contents::{Contents, PrintedHistory},
+    contents::{Contents, PrintedHistory, infix},
     folder::AtomicFolder,
     report::BundleError,
 };
@@ -18,8 +18,9 @@ use super::{
 ///
 /// # Errors
 /// The operating system refuses.
-pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<(), BundleError> {
-    folder.write(&format!("{}_decode.m", contents.name), function(contents))
+pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<String, BundleError> {
+    folder.write(&format!("{}_decode.m", contents.name), function(contents))?;
+    Ok(usage(contents))
 }
 
 /// Text of the function file.
@@ -28,17 +29,10 @@ fn function(contents: &Contents) -> String {
     let (input, channels) = (contents.meaning.readings(), contents.channels());
     let history = contents.history();
     let parts = contents.parts();
-    let returned = match history {
-        Some(_) => format!("{}, state", parts.join(", ")),
-        None => parts.join(", "),
-    };
+    let state = history.iter().map(|_| "state");
+    let returned = Vec::from_iter(parts.iter().copied().chain(state)).join(", ");
     let arguments = arguments(contents);
-    let legend = contents
-        .meaning
-        .legend(channels)
-        .into_iter()
-        .chain(contents.note_lines());
-    let legend: String = legend.map(|line| format!("%   {line}\n")).collect();
+    let legend = format!("%   {}\n", contents.legend("").join("\n%   "));
     let upper = name.to_uppercase();
     let mut text = format!(
         "function [{returned}] = {name}({arguments})\n%{upper} {}.\n%   [{}] = {upper}({}) has a line of {} for each line of\n\
@@ -62,7 +56,7 @@ fn function(contents: &Contents) -> String {
             "TIME_S is the time of each sample in seconds, in order. STATE is [] at the start, and continues from an earlier \
              call. {about}"
         ));
-        text += &lines.iter().map(|line| format!("%   {line}\n")).collect::<String>();
+        let _ = writeln!(text, "%   {}", lines.join("\n%   "));
     }
     let _ = write!(
         text,
@@ -76,47 +70,31 @@ fn function(contents: &Contents) -> String {
         ),
         false => "row = ones(samples, 1);\n".to_owned(),
     };
-    for (id, tables) in contents.constants() {
-        for (index, table) in tables.iter().enumerate() {
-            push_matrix(&mut text, &format!("{}_{{{}}}", contents.name_of(id), index + 1), table);
+    for constant in contents.constants() {
+        for (index, table) in constant.tables.iter().enumerate() {
+            push_matrix(&mut text, &format!("{}_{{{}}}", constant.name, index + 1), table);
         }
     }
-    let part_sizes = parts.iter().map(|part| match *part {
-        "readings_outside" => (*part, 1),
-        part => (part, contents.outputs()),
-    });
-    for (part, size) in part_sizes {
+    let sizes = contents.exported.parts().map(|id| contents.size(id));
+    for (part, size) in parts.iter().zip(sizes) {
         let _ = writeln!(text, "{part} = zeros(samples, {size});");
     }
-    let body: String = contents
-        .computed()
-        .map(|(id, operation)| statement(contents, id, operation))
-        .collect();
-    let taken: String = parts
-        .iter()
-        .map(|part| format!("    {part}(mine, :) = {part}_;\n"))
-        .collect();
-    match &history {
-        None => {
-            let _ = write!(
-                text,
-                "for k = 1:{}\n    mine = find(row(:) == k);\n    {input}_ = {input}(mine, :);\n{body}{taken}end\nend\n",
-                contents.rows
-            );
-        }
-        Some(history) => {
-            let constants = &history.constants;
-            let rows = 2 + constants.longest_lag() + constants.averages.len();
-            let _ = write!(
-                text,
-                "if isscalar(time_s)\n    time_s = repmat(time_s, samples, 1);\nend\n\
-                 if nargin < 3 || isempty(state)\n    state = zeros({rows}, {channels});\nend\n\
-                 for mine = 1:samples\n    k = row(mine);\n    {input}_ = {input}(mine, :);\n{body}{taken}end\nend\n\n{}",
-                remembering(history)
-            );
-        }
+    let body = contents.body(|id, operation| statement(contents, id, operation));
+    let taken = parts.iter().map(|part| format!("    {part}(mine, :) = {part}_;\n"));
+    let decoded = format!(
+        "    {input}_ = {input}(mine, :);\n{body}{}end\nend\n",
+        taken.collect::<String>()
+    );
+    text + &match &history {
+        None => format!("for k = 1:{}\n    mine = find(row(:) == k);\n{decoded}", contents.rows),
+        Some(history) => format!(
+            "if isscalar(time_s)\n    time_s = repmat(time_s, samples, 1);\nend\n\
+             if nargin < 3 || isempty(state)\n    state = zeros({rows}, {channels});\nend\n\
+             for mine = 1:samples\n    k = row(mine);\n{decoded}\n{}",
+            remembering(history),
+            rows = history.state_rows(),
+        ),
     }
-    text
 }
 
 fn arguments(contents: &Contents) -> String {
@@ -152,13 +130,6 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
                 "    if ~all({is_valid})\n        error('{plain}: give finite numbers{above}');\n    end\n"
             );
         }
-        Operation::Subtract(one, other) => format!("{} - {}", of(*one), of(*other)),
-        Operation::Divide(one, other) => format!("{} ./ {}", of(*one), of(*other)),
-        Operation::Map(function, x) => match function {
-            Function::Log1p => format!("log1p({})", of(*x)),
-            Function::Tanh => format!("tanh({})", of(*x)),
-            Function::Gaussian => format!("exp(-{})", of(*x)),
-        },
         Operation::Affine { of: x, weights, biases } => format!("{} * {} + {}", of(*x), of(*weights), of(*biases)),
         Operation::SquaredDistances { of: x, points } => {
             return format!(
@@ -180,9 +151,7 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
         Operation::CountOutside { of: x, low, high } => {
             format!("sum({x} < {} | {x} > {}, 2)", of(*low), of(*high), x = of(*x))
         }
-        Operation::Readings | Operation::Select { .. } | Operation::Blend { .. } => {
-            unreachable!("given, or not exported")
-        }
+        _ => infix(operation, ["./", "", ""], of),
     };
     format!("    {name} = {expression};\n")
 }
@@ -194,15 +163,11 @@ fn remembering(history: &PrintedHistory) -> String {
     let list = |values: Vec<String>| format!("[{}]", values.join("; "));
     let (per_second, per_reading) = history.rates();
     let texts = |values: Vec<f64>| values.iter().map(|value| format!("{value:e}")).collect();
-    let kept = constants.longest_lag();
-    let pause = match history.pause_s {
-        f64::INFINITY => "Inf".to_owned(),
-        pause_s => format!("{pause_s:e}"),
-    };
+    let kept = history.kept;
     format!(
         "function [features, state] = remember(state, now, time_s)\n\
          has_started = state(1, 1) > 0;\nelapsed_s = time_s - state(2, 1);\n\
-         if ~has_started || elapsed_s < 0 || elapsed_s > {pause}\n    \
+         if ~has_started || elapsed_s < 0 || elapsed_s > {pause:e}\n    \
          state([1, 3:end], :) = repmat(now, size(state, 1) - 1, 1);\n    state(1, :) = 1;\n    elapsed_s = NaN;\nend\n\
          if isfinite(time_s) || ~has_started\n    state(2, :) = time_s;\nend\n\
          if ~isfinite(elapsed_s)\n    elapsed_s = {usual:e};\nend\n\
@@ -212,6 +177,7 @@ fn remembering(history: &PrintedHistory) -> String {
          state(average, :) = state(average, :) + weights(k) * (now - state(average, :));\n    \
          past = [past; state(average, :)];\nend\n\
          {shift}{difference}features = [now, reshape(past', 1, [])];\nend\n",
+        pause = history.pause_s,
         usual = constants.interval_s,
         lags = list(constants.lags.iter().map(|lag| (lag + 2).to_string()).collect()),
         per_second = list(texts(per_second)),
@@ -221,10 +187,9 @@ fn remembering(history: &PrintedHistory) -> String {
             0 => String::new(),
             kept => format!("state(3:{}, :) = [now; state(3:{}, :)];\n", kept + 2, kept + 1),
         },
-        difference = if constants.differences {
-            "past = repmat(now, size(past, 1), 1) - past;\n"
-        } else {
-            ""
+        difference = match constants.differences {
+            true => "past = repmat(now, size(past, 1), 1) - past;\n",
+            false => "",
         },
     )
 }
@@ -245,17 +210,15 @@ fn push_matrix(text: &mut String, name: &str, matrix: &Array2<f64>) {
 }
 
 /// Lines of a program that decodes.
-pub(super) fn usage(contents: &Contents) -> String {
-    let state = if contents.history().is_some() { ", state" } else { "" };
+fn usage(contents: &Contents) -> String {
+    let (state, about) = match contents.history() {
+        Some(_) => (", state", " state is [] at the start."),
+        None => ("", ""),
+    };
     format!(
-        "    [{}{state}] = {}_decode({})\n\nin MATLAB (from R2016b) or GNU Octave.{}\n",
+        "    [{}{state}] = {}_decode({})\n\nin MATLAB (from R2016b) or GNU Octave.{about}\n",
         contents.parts().join(", "),
         contents.name,
         arguments(contents),
-        if state.is_empty() {
-            ""
-        } else {
-            " state is [] at the start."
-        },
     )
 }

@@ -1,21 +1,20 @@
 use decoupler_core::{
     problem::Channel,
-    sensor::ArrayScale,
     text::{counted, is_unprintable},
 };
 
 /// Meaning of the readings and outputs of an exported network, and the words for them in its files.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Meaning {
-    /// Resistances of a row-wire of an array in ohm, and the coordinates of its nodes in mm.
-    Array(ArrayScale),
-    /// Columns of own data, in the user's units.
-    Own {
-        inputs: Vec<Channel>,
-        targets: Vec<Channel>,
-        /// Row-wires that have a network each, from 0, in their order; empty if one network serves all.
-        row_wires: Vec<usize>,
-    },
+pub(super) struct Meaning {
+    /// `true` for resistances of a row-wire of an array in ohm, and the coordinates of its nodes in mm; `false` for columns of
+    /// own data, in the user's units.
+    pub(super) is_array: bool,
+    /// Names and units of the readings: r_1, r_2, … in ohm, or those of the columns.
+    pub(super) inputs: Vec<Channel>,
+    /// Names and units of the outputs: x_1, y_1, z_1, x_2, … in mm, or those of the columns.
+    pub(super) targets: Vec<Channel>,
+    /// Row-wires of own data that have a network each, from 0, in their order; empty if one network serves all.
+    pub(super) row_wires: Vec<usize>,
 }
 
 impl Meaning {
@@ -52,11 +51,6 @@ impl Meaning {
         self.either("train with noise (--noise)", "train with fewer hidden nodes or epochs")
     }
 
-    /// `true` for an array.
-    pub(super) fn is_array(&self) -> bool {
-        matches!(self, Self::Array(_))
-    }
-
     /// A sentence on what the decoder does.
     pub(super) fn purpose(&self) -> &'static str {
         self.either(
@@ -76,77 +70,38 @@ impl Meaning {
     }
 
     pub(super) fn either(&self, array: &'static str, own: &'static str) -> &'static str {
-        match self {
-            Self::Array(_) => array,
-            Self::Own { .. } => own,
-        }
-    }
-
-    /// Names and units of the readings: r_1, r_2, … in ohm, or those of the columns.
-    pub(super) fn inputs(&self, count: usize) -> Vec<Channel> {
-        match self {
-            Self::Array(_) => (1..=count)
-                .map(|channel| Channel::new(format!("r_{channel}"), Some("ohm")))
-                .collect(),
-            Self::Own { inputs, .. } => inputs.clone(),
-        }
-    }
-
-    /// Names and units of the outputs: x_1, y_1, z_1, x_2, … in mm, or those of the columns.
-    pub(super) fn targets(&self) -> Vec<Channel> {
-        match self {
-            Self::Array(scale) => (0..scale.coordinates_per_row())
-                .map(|output| {
-                    Channel::new(
-                        format!("{}_{}", ["x", "y", "z"][output % 3], output / 3 + 1),
-                        Some("mm"),
-                    )
-                })
-                .collect(),
-            Self::Own { targets, .. } => targets.clone(),
-        }
+        if self.is_array { array } else { own }
     }
 
     /// Returns values of the outputs with their names and units: the largest over all coordinates, or one per target.
     pub(super) fn named(&self, figures: &[f64]) -> Vec<(Channel, f64)> {
-        match self {
-            Self::Array(_) => {
-                let largest = figures.iter().fold(0.0_f64, |largest, &figure| largest.max(figure));
-                vec![(Channel::new("any coordinate", Some("mm")), largest)]
-            }
-            Self::Own { targets, .. } => targets.iter().cloned().zip(figures.iter().copied()).collect(),
+        if self.is_array {
+            let largest = figures.iter().copied().fold(0.0, f64::max);
+            return vec![(Channel::new("any coordinate", Some("mm")), largest)];
         }
+        self.targets.iter().cloned().zip(figures.iter().copied()).collect()
     }
 
     /// Sentences with the names and units of the channels, in lines of at most 100 characters that fit into a comment of any
     /// language.
-    pub(super) fn legend(&self, channels: usize) -> Vec<String> {
-        let Self::Own {
-            inputs,
-            targets,
-            row_wires,
-        } = self
-        else {
-            let last = self
-                .targets()
-                .last()
-                .map_or(String::new(), |target| target.name.clone());
+    pub(super) fn legend(&self) -> Vec<String> {
+        let Self { inputs, targets, .. } = self;
+        if self.is_array {
+            let (last, channels) = (targets.last().map_or("", |target| &target.name), inputs.len());
             return wrapped(&format!(
                 "Readings are r_1 to r_{channels}; coordinates are x_1, y_1, z_1, x_2, ... {last}."
             ));
-        };
+        }
         let list = |what: &str, channels: &[Channel]| {
             let titles: Vec<String> = channels.iter().map(|channel| comment(&channel.title())).collect();
             format!("{what}, in this order: {}.", titles.join(", "))
         };
         let mut sentences = vec![list("Readings", inputs), list("Targets", targets)];
         // The usual numbering is not mentioned.
-        if row_wires.iter().enumerate().any(|(index, &row_wire)| index != row_wire) {
-            let rows = row_wires.iter().enumerate();
-            let rows: Vec<String> = rows
-                .map(|(index, row_wire)| format!("{} is row-wire {}", index + 1, row_wire + 1))
-                .collect();
-            sentences.push(format!("Rows: {}.", rows.join(", ")));
+        let rows = || self.row_wires.iter().enumerate();
+        if rows().any(|(index, &row_wire)| index != row_wire) {
+            let is_row_wire = |(index, row_wire)| format!("{} is row-wire {}", index + 1, row_wire + 1);
+            sentences.push(format!("Rows: {}.", Vec::from_iter(rows().map(is_row_wire)).join(", ")));
         }
         sentences.iter().flat_map(|sentence| wrapped(sentence)).collect()
     }
@@ -186,12 +141,13 @@ mod tests {
     fn user_defined_names_do_not_end_comments() {
         let odd = ["a */ b", "/* c", "d\n*/", "e\u{202e}f", "??/", "**/", "*\n/", "/\u{7}*"];
         let channel = |name: &&str| Channel::new(*name, Some("µT*/"));
-        let meaning = Meaning::Own {
+        let meaning = Meaning {
+            is_array: false,
             inputs: odd.iter().map(channel).collect(),
             targets: vec![channel(&"x")],
             row_wires: vec![0, 4],
         };
-        let text = meaning.legend(8).join("\n");
+        let text = meaning.legend().join("\n");
         for forbidden in ["*/", "/*", "??", "\u{202e}", "\u{7}"] {
             assert!(!text.contains(forbidden), "{forbidden}: {text}");
         }
@@ -200,13 +156,5 @@ mod tests {
             "{text}"
         );
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
-    }
-
-    #[test]
-    fn an_array_has_the_names_of_the_paper() {
-        let meaning = Meaning::Array("3x2_2x6".parse().unwrap());
-        let titles = |channels: Vec<Channel>| channels.iter().map(Channel::title).collect::<Vec<_>>();
-        assert_eq!(titles(meaning.inputs(6))[5], "r_6 (ohm)");
-        assert_eq!(titles(meaning.targets())[4], "y_2 (mm)");
     }
 }

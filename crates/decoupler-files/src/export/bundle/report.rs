@@ -88,7 +88,7 @@ impl BundleReport {
 
 /// Returns the README of a bundle: its usage and its accuracy.
 pub(super) fn readme(contents: &Contents, decoder: BundleDecoder, usage: &str, report: &BundleReport) -> String {
-    let meaning = &contents.meaning;
+    let (meaning, noun, rows) = (&contents.meaning, contents.noun, contents.rows);
     let mut text = format!(
         "{}, exported by {PROGRAM} as {}, {}.\n\n{}\nIt takes {} and returns {}{}.\n\n{}\n",
         decoder.name(),
@@ -98,13 +98,10 @@ pub(super) fn readme(contents: &Contents, decoder: BundleDecoder, usage: &str, r
         counted(contents.channels(), "reading"),
         meaning.outputs_in_words(contents.outputs()),
         contents.parts_in_words(),
-        meaning.legend(contents.channels()).join("\n"),
+        meaning.legend().join("\n"),
     );
     if contents.takes_row() {
-        text += &format!(
-            "There is one {} for each row, from 1 to {}.\n",
-            contents.noun, contents.rows
-        );
+        text += &format!("There is one {noun} for each row, from 1 to {rows}.\n");
     }
     text += &format!(
         "\nUsage\n\n{usage}\nA line of readings has {}, a line of the answer {}.\n",
@@ -119,18 +116,15 @@ pub(super) fn readme(contents: &Contents, decoder: BundleDecoder, usage: &str, r
         .output_range_mm
         .map_or_else(String::new, |range| format!(" ({} mm)", format_number(range)));
     text += &format!(
-        "Answers agree with those of the {} within {:.1e} of {}{range}.\n",
-        contents.noun,
+        "Answers agree with those of the {noun} within {:.1e} of {}{range}.\n",
         report.limit,
         meaning.scale()
     );
     for check in &report.checks {
         text += &format!("{}: largest deviation {:.1e}.\n", check.evaluator, check.deviation);
     }
-    for sentence in [report.describe_rounding(), report.describe_bounds()]
-        .into_iter()
-        .flatten()
-    {
+    let sentences = [report.describe_rounding(), report.describe_bounds()];
+    for sentence in sentences.into_iter().flatten() {
         text += &format!("{sentence}.\n");
     }
     for remark in &report.remarks {
@@ -142,7 +136,6 @@ pub(super) fn readme(contents: &Contents, decoder: BundleDecoder, usage: &str, r
          metadata.json has names and units, the errors of the {noun} on test samples, if there were any, the range of the\n\
          readings in training, the seed and the version of the program.\n",
         output = meaning.output(),
-        noun = contents.noun,
     )
 }
 

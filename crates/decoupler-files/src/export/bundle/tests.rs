@@ -8,11 +8,12 @@ use super::{
 use crate::export::NetworkFile;
 use decoupler_core::{
     decoupling::{DecoderKind, Operation, Precision},
-    evaluation::{Measured, Run, RunSettings},
+    evaluation::{Run, RunSettings},
     job::Job,
     network::{InputChoice, Quantity, ScalingChoice},
     problem::{Channel, Problem},
     scene::{Noise, RowModel, Rows},
+    text::Named,
 };
 
 /// A network of a small array after little training.
@@ -49,7 +50,7 @@ fn networks() -> Vec<(String, NetworkFile)> {
 }
 
 /// The decoder fitted to the training samples of `file`.
-fn decoder(file: &NetworkFile, kind: BundleDecoder) -> ExportedDecoder<'_> {
+fn decoder(file: &NetworkFile, kind: BundleDecoder) -> ExportedDecoder {
     let sets = file
         .setup()
         .sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ())
@@ -71,10 +72,9 @@ fn tables(contents: &Contents) -> Vec<(String, Vec<f64>)> {
         Precision::Double => value,
         Precision::Single => f64::from(value as f32),
     };
-    let all = contents.constants().map(|(id, tables)| {
-        let values = tables.iter().flat_map(|table| table.iter());
-        let values = values.map(|&value| rounded(contents.precision_of(id), value));
-        (contents.name_of(id).to_owned(), values.collect())
+    let all = contents.constants().map(|constant| {
+        let values = constant.values().map(|value| rounded(constant.precision, value));
+        (constant.name.to_owned(), values.collect())
     });
     all.collect()
 }
@@ -86,7 +86,7 @@ fn printed_constants_are_those_of_the_program() {
     let home = tempfile::tempdir().unwrap();
     for (name, file) in [networks().remove(0), networks().remove(3)] {
         let exported = ExportedDecoder::from(&file);
-        for format in BundleFormat::ALL {
+        for &format in BundleFormat::ALL {
             for &precision in format.precisions() {
                 let path = home.path().join(format!("{name} {format} {precision}"));
                 let report = export_bundle(&file, format, precision, &path).unwrap();
@@ -186,7 +186,7 @@ fn every_decoder_and_format_is_written_and_the_compiled_source_agrees_with_the_d
     for rows in [Rows::All, Rows::Known, Rows::One(1)] {
         let file = trained(rows, Quantity::Conductance, ScalingChoice::Whitening, 1e-3);
         for kind in BundleDecoder::all() {
-            for format in BundleFormat::ALL {
+            for &format in BundleFormat::ALL {
                 for &precision in format.precisions() {
                     if format.check_for(kind, precision).is_err() {
                         assert_eq!(kind, BundleDecoder::Kind(DecoderKind::RadialBasis));
@@ -259,11 +259,11 @@ fn steps_of_affine_maps_are_joined() {
 fn networks_of_samples_in_memory_are_exported_without_errors() {
     let home = tempfile::tempdir().unwrap();
     let network = trained(Rows::All, Quantity::Resistance, ScalingChoice::MinMax, 1e-3).network;
-    let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let settings = RunSettings::measured(RowModel::Shared);
     let mut problem = Problem::unnamed(6, network.at(0).outputs().channels());
     problem.inputs[5] = Channel::new("odd \u{200b}*/ \"name\"", Some("µT"));
     let path = home.path().join("bundle");
-    let exported = ExportedDecoder::of_networks((&network, None), settings, problem, None);
+    let exported = ExportedDecoder::of_networks(&network, None, settings, problem, None);
     export_bundle(exported, BundleFormat::C99, BundlePrecision::Double, &path).unwrap();
     let metadata = fs::read_to_string(path.join("metadata.json")).unwrap();
     let metadata: serde_json::Value = serde_json::from_str(&metadata).unwrap();
@@ -319,7 +319,7 @@ fn refused_exports_leave_no_files() {
         assert!(message.contains(expected), "{message}");
     }
     // Without the range, the other bundles have no count of readings outside.
-    for format in BundleFormat::ALL {
+    for &format in BundleFormat::ALL {
         export_bundle(
             &without_range,
             format,

@@ -5,7 +5,7 @@ use std::{fmt, path::Path};
 use crate::import::{DialectChoice, FileSet, Plan, Recipe, Setup};
 use decoupler_core::{
     dataset::{Division, Simulation, Span, SplitBy},
-    evaluation::{Measured, RunSettings},
+    evaluation::RunSettings,
     scene::{Loading, Movement, NoisySets, RowModel, Scene},
     sensor::SensorModel,
 };
@@ -37,7 +37,7 @@ pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, Com
             default
         }
         (None, Some(plan)) => {
-            let default = RunSettings::from(Measured { rows: RowModel::Shared });
+            let default = RunSettings::measured(RowModel::Shared);
             check([(
                 settings.inputs.quantity != default.inputs.quantity,
                 "the quantity of the inputs",

@@ -3,7 +3,7 @@ use std::{path::Path, time::Duration};
 use decoupler_core::{
     dataset::{Dataset, Simulation},
     evaluation::{
-        DecoderReport, Errors, Outlook, StartRecord, TestErrors, error_remarks,
+        DecoderReport, ErrorTable, Errors, Outlook, StartRecord, TestErrors, error_remarks,
         recorded::{Determination, HysteresisLoop},
     },
     sensor::Geometry,
@@ -72,7 +72,9 @@ impl RunReport<'_> {
             html.element("p", "warning", &remark);
         }
         html.section("Errors on the test set", |html| {
-            html.table(&error_table(&file.error_table().with_loops(&loops)), "network");
+            let mut tables = file.error_table();
+            ErrorTable::add_loops(&mut tables, &loops);
+            html.table(&error_table(&tables), "network");
             let text = match setup.plan() {
                 None => {
                     "Means of |error|, in percent of the coordinate as in the paper, in mm, or in percent of the stroke. \
@@ -228,7 +230,7 @@ impl RunReport<'_> {
 
     fn recording_remarks(&self, plan: &Plan, answers: &ndarray::Array2<f64>) -> Vec<String> {
         let measured = Determination::measure(self.test, answers.view(), plan.division.by);
-        let mut remarks = describe_determinacy(&self.file.problem.targets, &measured, self.file.blend().is_some());
+        let mut remarks = describe_determinacy(&self.file.problem.targets, &measured, self.file.combined().is_some());
         let NetworkFile { problem, scores, .. } = self.file;
         remarks.extend(describe_worse_than_ridge(problem, scores));
         if plan.is_optimistic() {

@@ -10,7 +10,7 @@ use crate::{
 use decoupler_core::{
     dataset::SplitBy,
     decoupling::{DecoderKind, Precision},
-    evaluation::{Begin, DecoderSet, Measured, Run, RunSets, RunSettings},
+    evaluation::{DecoderSet, Run, RunSets, RunSettings},
     job::Job,
     machine::MemoryBudget,
     scene::{Indenter, Loading, RowModel},
@@ -108,7 +108,7 @@ fn a_report_contains_the_figures_of_its_run() {
                 .collect()
         })
         .collect();
-    for row in &file.error_table().blocks[0].rows {
+    for row in &file.error_table()[0].rows {
         let mut expected = vec![row.name.to_owned()];
         expected.extend(row.errors.iter().map(|error| format_number(*error)));
         assert!(rows.contains(&expected), "{expected:?} is not among {rows:#?}");
@@ -164,11 +164,11 @@ fn recorded_run(folder: &Path) -> (Run, NetworkFile) {
         },
         ..Plan::default()
     };
-    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let mut settings = RunSettings::measured(RowModel::Shared);
     (settings.hidden, settings.training.stopping.epochs) = (2, 5);
     let setup = Setup::recording(settings, plan);
     let sets = setup.sets(folder, &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
-    let mut run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED).unwrap();
+    let mut run = sets.run(&setup, None, &Job::UNINTERRUPTED).unwrap();
     while run.step().is_none() {}
     let file = NetworkFile::from_run(&run, sets.recorded()).unwrap();
     (run, file)
@@ -197,7 +197,7 @@ fn a_report_of_a_recording_has_its_errors_figures_and_command() {
         let cells = row.children().filter_map(|cell| cell.text().map(str::to_owned));
         Vec::from_iter(cells)
     }));
-    for block in &file.error_table().blocks {
+    for block in &file.error_table() {
         for row in &block.rows {
             let mut expected = vec![block.target.as_ref().unwrap().title(), row.name.to_owned()];
             expected.extend(row.errors.iter().map(|error| format_number(*error)));
@@ -249,7 +249,7 @@ fn the_command_of_a_recording_names_files_columns_and_division() {
         ..Plan::default()
     };
     plan.division.by = SplitBy::Group;
-    let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let settings = RunSettings::measured(RowModel::Shared);
     let command = |plan: &Plan, settings, recipe: Option<&str>| {
         let setup = Setup::recording(settings, plan.clone());
         train_command(&setup, recipe.map(Path::new)).map_err(|gap| gap.to_string())

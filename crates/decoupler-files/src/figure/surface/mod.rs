@@ -128,12 +128,8 @@ impl SurfaceFigure {
 
     /// Returns the note common to all surfaces: "Between the nodes: bilinear."
     pub fn note(&self) -> String {
-        let mut kinds: Vec<String> = Vec::new();
-        for kind in self
-            .surfaces
-            .iter()
-            .map(|surface| surface.map.interpolation().to_string())
-        {
+        let mut kinds: Vec<&str> = Vec::new();
+        for kind in self.surfaces.iter().map(|surface| surface.map.interpolation()) {
             if !kinds.contains(&kind) {
                 kinds.push(kind);
             }

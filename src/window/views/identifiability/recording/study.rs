@@ -196,7 +196,7 @@ pub struct FoldsResult {
     /// Number of samples, each tested once.
     pub samples: usize,
     /// Errors of the mean, of ridge and of the networks.
-    pub table: ErrorTable,
+    pub table: Vec<ErrorTable>,
     /// Remarks on the readings, target by target, and where a network is no better than ridge.
     pub remarks: Vec<String>,
 }

@@ -10,7 +10,7 @@ use ndarray::Array2;
 use crate::window::test_view::Frame;
 use decoupler_core::{
     dataset::Simulation,
-    live::{Diagnosis, Drift, NoDriftMonitor, ZeroGains},
+    live::{Diagnosis, Drift, LiveError, ZeroGains},
     problem::Problem,
     sensor::SensorModel,
     surface::SurfaceMap,
@@ -164,7 +164,7 @@ pub struct LiveTargets {
     /// The network, which may have prediction intervals.
     pub network: Arc<NetworkFile>,
     /// Present drift of the readings, or the reason why they are not monitored.
-    pub drift: Result<Option<Drift>, NoDriftMonitor>,
+    pub drift: Result<Option<Drift>, LiveError>,
     /// Surface through the targets, if they have positions.
     pub surface: Option<Arc<TargetSurface>>,
     /// Smallest and largest value of each target so far.

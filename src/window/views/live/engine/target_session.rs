@@ -9,7 +9,7 @@ use std::{
 
 use decoupler_core::{
     decoupling::{Decoder, ProgramDecoder},
-    live::{DriftMonitor, NoDriftMonitor},
+    live::{DriftMonitor, LiveError},
     problem::Problem,
 };
 use decoupler_files::{
@@ -47,7 +47,7 @@ pub(super) struct TargetSession {
     history: VecDeque<(f64, Arc<[f64]>)>,
     ranges: Vec<(f64, f64)>,
     outside: (Option<usize>, usize),
-    drift: Result<DriftMonitor, NoDriftMonitor>,
+    drift: Result<DriftMonitor, LiveError>,
     has_events: bool,
 }
 
@@ -344,7 +344,7 @@ mod tests {
 
     use decoupler_core::{
         dataset::{Memory, Span},
-        evaluation::{Measured, RunSettings},
+        evaluation::RunSettings,
         scene::RowModel,
     };
     use decoupler_files::import::{Plan, Recipe, Recorded, Setup};
@@ -354,7 +354,6 @@ mod tests {
         job::Background,
         views::live::engine::{SourcePlan, run},
     };
-    use decoupler_core::evaluation::Begin;
     use decoupler_core::job::Job;
 
     /// A network of a recording, and the file that it was trained on.
@@ -376,11 +375,11 @@ mod tests {
             },
             ..Plan::default()
         };
-        let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        let mut settings = RunSettings::measured(RowModel::Shared);
         settings.training.stopping.epochs = 3;
         let setup = Setup::recording(settings, plan);
         let sets = setup.sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
-        let mut run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED).unwrap();
+        let mut run = sets.run(&setup, None, &Job::UNINTERRUPTED).unwrap();
         while run.step().is_none() {}
         let file = NetworkFile::from_run(&run, sets.recorded()).unwrap();
         (Arc::new(file), path)

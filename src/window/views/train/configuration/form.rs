@@ -2,7 +2,7 @@
 
 use decoupler_core::{
     dataset::Simulation,
-    evaluation::{Measured, Outlook, Preset, RunSettings, TrainingSize},
+    evaluation::{Outlook, Preset, RunSettings, Source, TrainingSize},
     network::{InputChoice, Quantity, ScalingChoice, Shape},
     scene::{Loading, Movement, RowModel, Rows, Scene},
     sensor::{Geometry, SensorModel},
@@ -189,7 +189,7 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
         let rules = StoppingRules::recorded(&settings.training.method);
         training_ui(ui, &mut settings, rules, shared.phase);
     }
-    let usual = RunSettings::from(Measured { rows: RowModel::Shared });
+    let usual = RunSettings::measured(RowModel::Shared);
     let hint = "Bayesian regularisation for recordings, 12 hidden nodes, 300 epochs";
     reset_ui(ui, "Reset to the default settings", hint, &mut settings, usual, is_busy);
     if settings != shared.recording.settings {
@@ -513,7 +513,7 @@ fn recording_rows_ui(ui: &mut Ui, settings: &mut RunSettings, has_row_wires: boo
     ];
     let rows = settings.source.row_model();
     if let Some(rows) = options_ui(ui, "Rows", glossary::ROWS.hint, &options, rows) {
-        settings.source = Measured { rows }.into();
+        settings.source = Source::Measured { rows };
     }
 }
 

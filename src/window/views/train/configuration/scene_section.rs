@@ -50,7 +50,7 @@ pub fn samples_section_ui(ui: &mut Ui, draft: &mut RunSettings) {
     let Some(simulation) = draft.simulation_mut() else {
         return;
     };
-    let rows = simulation.model_size().map_or(1, |size| size.rows);
+    let rows = simulation.rows().unwrap_or(1);
     let hint = match rows {
         1 => "Number of samples to which the network is fitted.".to_owned(),
         _ => format!(
@@ -238,11 +238,12 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
 
 /// Shows the numbers of unknowns and equations of the scene.
 fn size_ui(ui: &mut Ui, simulation: &Simulation) {
-    let Ok(size) = simulation.model_size() else { return };
+    let Ok(rows) = simulation.rows() else { return };
+    let scale = simulation.sensor.scale;
     let text = format!(
         "{}, {} per frame",
-        counted(size.unknowns, "unknown"),
-        counted(size.equations, "equation")
+        counted(rows * simulation.scene.unknowns_per_row(scale), "unknown"),
+        counted(rows * scale.columns(), "equation")
     );
     dim_ui(ui, &text).on_hover_text(
         "A frame is one reading of every row. Unknowns are the coordinates that vary in the scene; each resistance \

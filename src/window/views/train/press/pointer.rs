@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use decoupler_core::{
-    evaluation::{Begin, Run, RunError, RunSets, RunSettings},
+    evaluation::{Run, RunError, RunSets, RunSettings},
     job::Job,
     network::Networks,
     scene::IndenterShape,
@@ -348,7 +348,7 @@ impl ReadyNetwork {
                 let is_cancelled = || report.is_cancelled();
                 let job = Job::new(&is_cancelled);
                 let sets = RunSets::draw(&settings, memory_budget(), &job)?;
-                let mut run = Run::new(settings, sets, Begin::Initialize, &job)?;
+                let mut run = Run::new(settings, sets, None, &job)?;
                 run.finish(&job)?;
                 Ok(run.network())
             },

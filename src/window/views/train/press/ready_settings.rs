@@ -17,9 +17,9 @@ pub(super) fn ready_settings(source: &Simulation) -> Option<RunSettings> {
     const MAX_PAIRS: f64 = 5e7;
     /// Maximum number of unknowns and readings of all rows, with which the time of an epoch grows.
     const MAX_CHANNELS: usize = 2000;
-    let rows = source.model_size().ok()?;
-    let samples = SAMPLES * rows.rows;
-    let channels = rows.unknowns + rows.equations;
+    let (rows, scale) = (source.rows().ok()?, source.sensor.scale);
+    let samples = SAMPLES * rows;
+    let channels = rows * (source.scene.unknowns_per_row(scale) + scale.columns());
     if samples as f64 * node_pairs_per_row(&source.sensor) > MAX_PAIRS || channels > MAX_CHANNELS {
         return None;
     }
@@ -37,7 +37,7 @@ pub(super) fn ready_settings(source: &Simulation) -> Option<RunSettings> {
         scene,
         samples,
         validation_samples: 0,
-        test_samples: rows.rows,
+        test_samples: rows,
     });
     settings.inputs = InputChoice {
         quantity: Quantity::Conductance,

@@ -17,7 +17,7 @@ use crate::window::{
     training_worker::RunId,
 };
 use decoupler_core::{
-    evaluation::{Measured, RunSettings, TrainingSize},
+    evaluation::{RunSettings, Source, TrainingSize},
     scene::RowModel,
 };
 use decoupler_files::{
@@ -342,7 +342,7 @@ impl RecordingEditor {
     fn follow_row_wires(&self, settings: &RunSettings, effects: &mut Vec<Effect>) {
         if settings.source.row_model() == RowModel::Each && !self.has_row_wires() && !self.opening.is_reopening {
             effects.push(Effect::ConfigureRecording(Box::new(RunSettings {
-                source: Measured { rows: RowModel::Shared }.into(),
+                source: Source::Measured { rows: RowModel::Shared },
                 ..*settings
             })));
         }

@@ -319,7 +319,7 @@ impl From<Plan> for Reopened {
             files: plan.files().map(unknown).collect(),
             samples_crc32: String::new(),
             search: None,
-            blend: None,
+            combined: None,
             chosen_intervals: None,
             plan,
         })

@@ -26,21 +26,16 @@ const FLAGS: [&str; 7] = [
     "-O2",
 ];
 
-/// Outcome of compiling and running a self-test.
-#[derive(Clone, Debug, PartialEq)]
-pub(in crate::export::bundle) enum Compiled {
-    /// Largest deviation of the golden answers, relative to the range of the outputs.
-    Ran { deviation: f64 },
-    /// Not compiled, with the reason.
-    NoCompiler(&'static str),
-}
-
-/// Compiles the source and the self-test in `folder` and runs the self-test; no files are left there.
+/// Compiles the source and the self-test in `folder` and runs the self-test; no files are left there. Returns the largest
+/// deviation of the golden answers, relative to the range of the outputs, or the reason why nothing was compiled.
 ///
 /// # Errors
 /// The compiler refuses the source, or the self-test fails.
-pub(in crate::export::bundle) fn run_self_test(folder: &Path, name: &str) -> Result<Compiled, BundleError> {
-    let sources = ["decode", "selftest"].map(|part| format!("{name}_{part}.c"));
+pub(in crate::export::bundle) fn run_self_test(
+    folder: &Path,
+    name: &str,
+) -> Result<Result<f64, &'static str>, BundleError> {
+    let sources = ["decode", "selftest"].map(|part| folder.join(format!("{name}_{part}.c")));
     let failed = |step: &'static str, reason: String| BundleError::SelfTest { step, reason };
     let temporary = std::env::temp_dir();
     let home = UnfinishedFolder::begin(&temporary).map_err(|error| {
@@ -52,23 +47,17 @@ pub(in crate::export::bundle) fn run_self_test(folder: &Path, name: &str) -> Res
     let trial = home.path().join("trial.c");
     let hello = "#include <math.h>\n#include <stdio.h>\nint main(void)\n{\n    return puts(\"\") < 0;\n}\n";
     let tried = std::fs::write(&trial, hello).and_then(|()| compile(&[&trial], &program, home.path()));
-    match tried {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            return Ok(Compiled::NoCompiler("no C compiler found"));
-        }
+    let reason = match tried {
+        Ok(output) if output.status.success() => None,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Some("no C compiler found"),
         Err(error) if error.kind() == io::ErrorKind::TimedOut => {
-            return Ok(Compiled::NoCompiler(
-                "the C compiler 'cc' does not end with an empty program",
-            ));
+            Some("the C compiler 'cc' does not end with an empty program")
         }
-        Ok(output) if output.status.success() => {}
-        _ => {
-            return Ok(Compiled::NoCompiler(
-                "the C compiler 'cc' cannot compile an empty program",
-            ));
-        }
+        _ => Some("the C compiler 'cc' cannot compile an empty program"),
+    };
+    if let Some(reason) = reason {
+        return Ok(Err(reason));
     }
-    let sources = sources.each_ref().map(|source| folder.join(source));
     let output = compile(&[&sources[0], &sources[1]], &program, home.path());
     let output = output.map_err(|error| failed("compiling the C source", error.to_string()))?;
     if !output.status.success() {
@@ -80,7 +69,7 @@ pub(in crate::export::bundle) fn run_self_test(folder: &Path, name: &str) -> Res
     let printed = text.split_once("largest deviation: ");
     let deviation = printed.and_then(|(_, rest)| rest.split(' ').next()?.parse().ok());
     match deviation {
-        Some(deviation) if output.status.success() => Ok(Compiled::Ran { deviation }),
+        Some(deviation) if output.status.success() => Ok(Ok(deviation)),
         _ => Err(failed("the self-test of the C source", text)),
     }
 }

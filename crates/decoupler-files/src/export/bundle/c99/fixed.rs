@@ -3,71 +3,37 @@
 use std::fmt::Write;
 
 use super::{header::Header, push_array, source::row_check};
-use crate::export::bundle::fixed16::{
-    CONDUCTANCE_BITS, FixedLayer, FixedProgram, FixedRow, LARGEST_INPUT, TangentTable,
+use crate::export::bundle::{
+    exported_program::are_positive,
+    fixed16::{CONDUCTANCE_BITS, FixedProgram, LARGEST_INPUT, TangentTable},
 };
 
 /// Writes the source, which has no floating-point numbers.
 pub(super) fn source(header: &Header<'_>, fixed: &FixedProgram) -> String {
-    let (contents, upper) = (header.contents, header.upper());
-    let (rows, channels) = (fixed.rows.len(), contents.channels());
-    let mut text = format!("#include \"{}_decode.h\"\n\n", contents.name);
-    let mut of_rows = |kind: &str, name: &str, size: usize, of: &dyn Fn(&FixedRow) -> Vec<String>| {
-        let declaration = format!("static const {kind} {name}[{rows}][{size}]");
-        push_array(&mut text, &declaration, &[rows, size], fixed.rows.iter().flat_map(of));
-    };
-    of_rows("int32_t", "centres", channels, &|row| texts(&row.centres));
-    of_rows("int32_t", "factors", channels, &|row| texts(&row.factors));
-    of_rows("uint8_t", "factor_shifts", channels, &|row| texts(&row.shifts));
-    let layers = fixed.rows[0].layers.len();
-    for layer in 0..layers {
-        let FixedLayer { inputs, biases, .. } = &fixed.rows[0].layers[layer];
-        let (inputs, sums) = (*inputs, biases.len());
-        let declaration = format!("static const int16_t weights_{}[{rows}][{sums}][{inputs}]", layer + 1);
-        let weights = fixed.rows.iter().flat_map(|row| &row.layers[layer].weights);
-        push_array(&mut text, &declaration, &[rows, sums, inputs], weights);
-        let mut of_rows = |kind: &str, name: &str, of: &dyn Fn(&FixedLayer) -> Vec<String>| {
-            let declaration = format!("static const {kind} {name}_{}[{rows}][{sums}]", layer + 1);
-            let values = fixed.rows.iter().flat_map(|row| of(&row.layers[layer]));
-            push_array(&mut text, &declaration, &[rows, sums], values);
-        };
-        let long = |value: &i64| format!("INT64_C({value})");
-        of_rows("int64_t", "biases", &|layer| layer.biases.iter().map(long).collect());
-        of_rows("uint8_t", "sum_shifts", &|layer| texts(&layer.shifts));
+    let mut text = format!("#include \"{}_decode.h\"\n\n", header.contents.name);
+    for table in &fixed.tables {
+        let shape = [&[fixed.rows], &table.shape[..]].concat();
+        let values = table.values.iter().map(|value| match table.kind {
+            "int64_t" => format!("INT64_C({value})"),
+            _ => value.to_string(),
+        });
+        push_array(&mut text, table.kind, &table.name, &shape, values);
     }
-    if layers > 1 {
-        let values = &fixed.tangent.values;
+    let has_tangent = fixed.layers.len() > 1;
+    if has_tangent {
+        let TangentTable { values, error } = &fixed.tangent;
         let _ = writeln!(
             text,
-            "/* tanh, in 2^-15: largest error with interpolation {:.1e}. */",
-            fixed.tangent.error
+            "/* tanh, in 2^-15: largest error with interpolation {error:.1e}. */"
         );
-        push_array(
-            &mut text,
-            &format!("static const int16_t tangents[{}]", values.len()),
-            &[values.len()],
-            values,
-        );
+        push_array(&mut text, "int16_t", "tangents", &[values.len()], values);
     }
-    if contents.exported.outside.is_some() {
-        let mut limits = |name: &str, pick: fn(&(i32, i32)) -> i32| {
-            let declaration = format!("static const int32_t {name}[{rows}][{channels}]");
-            let values = fixed.rows.iter().flat_map(|row| row.limits.iter().map(pick));
-            push_array(&mut text, &declaration, &[rows, channels], values);
-        };
-        limits("lowest", |limits| limits.0);
-        limits("highest", |limits| limits.1);
-    }
-    text += &arithmetic(fixed, layers);
-    text + &decode(header, fixed, &upper)
-}
-
-fn texts<T: ToString>(values: &[T]) -> Vec<String> {
-    values.iter().map(T::to_string).collect()
+    text += &arithmetic(fixed, has_tangent);
+    text + &decode(header, fixed)
 }
 
 /// Functions on integers.
-fn arithmetic(fixed: &FixedProgram, layers: usize) -> String {
+fn arithmetic(fixed: &FixedProgram, has_tangent: bool) -> String {
     let tangent = format!(
         "/* tanh of an argument in 2^-{fraction}, in 2^-15. */\n\
          static int32_t tangent(int32_t argument)\n{{\n    \
@@ -102,22 +68,19 @@ fn arithmetic(fixed: &FixedProgram, layers: usize) -> String {
          static int64_t clamped(int64_t value, int64_t largest)\n{{\n    \
          return value > largest ? largest : value < -largest ? -largest : value;\n}}\n\n\
          {}/* {about}. */\nstatic int64_t changed(int32_t reading, int32_t centre)\n{{\n    return {change};\n}}\n\n",
-        if layers > 1 { &tangent } else { "" }
+        if has_tangent { &tangent } else { "" }
     )
 }
 
-fn decode(header: &Header<'_>, fixed: &FixedProgram, upper: &str) -> String {
-    let contents = header.contents;
-    let readings = header.readings;
-    let refusal = match contents.exported.are_positive() {
+fn decode(header: &Header<'_>, fixed: &FixedProgram) -> String {
+    let (contents, readings, upper) = (header.contents, header.readings, header.upper());
+    let refusal = match are_positive(&contents.exported.program) {
         true => format!("        if ({readings}[i] <= 0) {{\n            return {upper}_BAD_READING;\n        }}\n"),
         false => String::new(),
     };
-    let network = match contents.takes_row() && fixed.rows.len() > 1 {
-        true => String::new(),
-        false => "    const int network = 0;\n".to_owned(),
-    };
     // A row that only the limits depend on is still checked.
+    let is_of_row = fixed.rows > 1;
+    let network = if is_of_row { "" } else { "    const int network = 0;\n" };
     let mut text = format!(
         "{signature}\n{{\n{check}{network}    int32_t values_1[{upper}_CHANNELS];\n    \
          for (int i = 0; i < {upper}_CHANNELS; ++i) {{\n{refusal}        \
@@ -125,25 +88,17 @@ fn decode(header: &Header<'_>, fixed: &FixedProgram, upper: &str) -> String {
          shifted(changed({readings}[i], centres[network][i]) * factors[network][i], factor_shifts[network][i]),\n            \
          {LARGEST_INPUT});\n    }}\n",
         signature = header.signature(),
-        check = match fixed.rows.len() {
-            1 => row_check(contents, upper).replace("    const int network = row - 1;\n", ""),
-            _ => row_check(contents, upper),
-        },
+        check = row_check(contents, &upper, is_of_row),
     );
-    let layers = &fixed.rows[0].layers;
-    for (index, FixedLayer { inputs, biases, .. }) in layers.iter().enumerate() {
-        let (layer, sums, is_last) = (index + 1, biases.len(), index + 1 == layers.len());
+    for (index, [inputs, sums]) in fixed.layers.iter().enumerate() {
+        let (layer, is_last) = (index + 1, index + 1 == fixed.layers.len());
+        let clamped =
+            |largest: &str| format!("(int32_t)clamped(shifted(sum, sum_shifts_{layer}[network][k]), {largest})");
         let (target, value) = match is_last {
-            true => (
-                format!("answer->{}[k]", header.outputs),
-                format!("(int32_t)clamped(shifted(sum, sum_shifts_{layer}[network][k]), INT32_MAX)"),
-            ),
+            true => (format!("answer->{}[k]", header.outputs), clamped("INT32_MAX")),
             false => (
                 format!("values_{}[k]", layer + 1),
-                format!(
-                    "tangent((int32_t)clamped(shifted(sum, sum_shifts_{layer}[network][k]), {}))",
-                    TangentTable::LARGEST
-                ),
+                format!("tangent({})", clamped(&TangentTable::LARGEST.to_string())),
             ),
         };
         if !is_last {
@@ -157,12 +112,9 @@ fn decode(header: &Header<'_>, fixed: &FixedProgram, upper: &str) -> String {
              {target} = {value};\n    }}\n"
         );
     }
-    if contents.exported.outside.is_some() {
-        let _ = write!(
-            text,
-            "    answer->readings_outside = 0;\n    for (int i = 0; i < {upper}_CHANNELS; ++i) {{\n        \
-             answer->readings_outside += {readings}[i] < lowest[network][i] || {readings}[i] > highest[network][i];\n    }}\n"
-        );
-    }
-    text + &format!("    return {upper}_OK;\n}}\n")
+    text + &format!(
+        "    answer->readings_outside = 0;\n    for (int i = 0; i < {upper}_CHANNELS; ++i) {{\n        \
+         answer->readings_outside += {readings}[i] < lowest[network][i] || {readings}[i] > highest[network][i];\n    }}\n    \
+         return {upper}_OK;\n}}\n"
+    )
 }

@@ -6,38 +6,24 @@ use crate::export::bundle::{contents::Contents, fixed16::FixedProgram, meaning::
 /// Types and names of the interface.
 pub(super) struct Header<'a> {
     pub(super) contents: &'a Contents,
-    fixed: Option<&'a FixedProgram>,
-    /// Types of a reading and of a target.
-    pub(super) reading: &'static str,
-    pub(super) target: &'static str,
+    pub(super) fixed: Option<&'a FixedProgram>,
+    /// Type of a reading and of a target.
+    pub(super) number: &'static str,
     pub(super) readings: &'static str,
     pub(super) outputs: &'static str,
 }
 
 impl<'a> Header<'a> {
     pub(super) fn of(contents: &'a Contents, fixed: Option<&'a FixedProgram>) -> Self {
-        let number = type_name(contents.outer_precision());
         let (readings, outputs) = (contents.meaning.readings(), contents.meaning.outputs());
-        match fixed {
-            Some(fixed) => Self {
-                contents,
-                fixed: Some(fixed),
-                reading: "int32_t",
-                target: "int32_t",
-                readings: fixed.readings_name(readings),
-                outputs: if contents.meaning.is_array() {
-                    "coordinates_nm"
-                } else {
-                    outputs
-                },
-            },
-            None => Self {
-                contents,
-                fixed: None,
-                reading: number,
-                target: number,
-                readings,
-                outputs,
+        Self {
+            contents,
+            fixed,
+            number: fixed.map_or(type_name(contents.outer_precision()), |_| "int32_t"),
+            readings: fixed.map_or(readings, |fixed| fixed.readings_name(readings)),
+            outputs: match fixed {
+                Some(_) if contents.meaning.is_array => "coordinates_nm",
+                _ => outputs,
             },
         }
     }
@@ -50,61 +36,77 @@ impl<'a> Header<'a> {
     /// Declares the function that decodes.
     pub(super) fn signature(&self) -> String {
         let (name, upper) = (&self.contents.name, self.upper());
-        let row = if self.contents.takes_row() { "int row, " } else { "" };
-        let (function, state, time) = match self.contents.history() {
-            Some(_) => ("step", format!("{name}_state *state, "), "double time_s, "),
-            None => ("decode", String::new(), ""),
-        };
+        let state = format!("{name}_state *state");
+        let readings = format!("const {} {}[{upper}_CHANNELS]", self.number, self.readings);
         format!(
-            "int {name}_{function}({state}{row}{time}const {} {}[{upper}_CHANNELS],\n    {name}_answer *answer)",
-            self.reading, self.readings
+            "int {}({},\n    {name}_answer *answer)",
+            self.function(),
+            self.arguments(&state, "int row", "double time_s", &readings)
         )
+    }
+
+    /// Calls the function with these arguments, of which it may not take all.
+    pub(super) fn call(&self, state: &str, row: &str, time: &str, readings: &str) -> String {
+        format!(
+            "{}({}, &answer)",
+            self.function(),
+            self.arguments(state, row, time, readings)
+        )
+    }
+
+    fn function(&self) -> String {
+        let is_sequence = self.contents.history().is_some();
+        format!("{}_{}", self.contents.name, if is_sequence { "step" } else { "decode" })
+    }
+
+    fn arguments(&self, state: &str, row: &str, time: &str, readings: &str) -> String {
+        let (is_sequence, takes_row) = (self.contents.history().is_some(), self.contents.takes_row());
+        let [state, time] = [state, time].map(|argument| is_sequence.then_some(argument));
+        let taken = [state, takes_row.then_some(row), time, Some(readings)];
+        Vec::from_iter(taken.into_iter().flatten()).join(", ")
     }
 
     /// Text of the header file.
     pub(super) fn text(&self) -> String {
         let (contents, upper) = (self.contents, self.upper());
         let name = &contents.name;
-        let mut lines = contents.meaning.legend(contents.channels());
-        lines.extend(
-            self.fixed
-                .iter()
-                .flat_map(|fixed| wrapped(&fixed.units_in_words(&contents.meaning))),
-        );
-        lines.extend(contents.note_lines());
+        let of_units = self.fixed.map(|fixed| fixed.units_in_words(&contents.meaning));
+        let lines = contents.legend(&of_units.unwrap_or_default());
         let mut text = format!(
             "/* {}\n   {} */\n#ifndef {upper}_DECODE_H\n#define {upper}_DECODE_H\n\n",
             contents.meaning.purpose(),
             lines.join("\n   ")
         );
-        if self.fixed.is_some() {
-            text += "#include <stdint.h>\n\n";
-        }
+        text += if self.fixed.is_some() {
+            "#include <stdint.h>\n\n"
+        } else {
+            ""
+        };
         if contents.takes_row() {
             let _ = writeln!(text, "#define {upper}_ROWS {}", contents.rows);
         }
-        let _ = write!(
+        let (channels, outputs) = (contents.channels(), contents.outputs());
+        let _ = writeln!(
             text,
-            "#define {upper}_CHANNELS {}\n#define {upper}_OUTPUTS {}\n\n",
-            contents.channels(),
-            contents.outputs()
+            "#define {upper}_CHANNELS {channels}\n#define {upper}_OUTPUTS {outputs}\n"
         );
-        text += &self
+        let of_units = self
             .fixed
-            .map_or_else(String::new, |fixed| fixed.unit_definitions(&upper, &contents.meaning));
+            .map(|fixed| fixed.unit_definitions(&upper, &contents.meaning));
+        text += &of_units.unwrap_or_default();
         text += "#ifdef __cplusplus\nextern \"C\" {\n#endif\n\n";
         let _ = write!(
             text,
             "/* What the function returns. */\nenum {{\n    {upper}_OK = 0,\n    {upper}_NO_SUCH_ROW = -1,\n    \
              {upper}_BAD_READING = -2\n}};\n\ntypedef struct {{\n    {} {}[{upper}_OUTPUTS];\n",
-            self.target, self.outputs
+            self.number, self.outputs
         );
         if contents.exported.half_widths.is_some() {
             let _ = write!(
                 text,
                 "    /* Half-widths of the 90 % prediction intervals, valid for all answers together. */\n    \
                  {} half_widths[{upper}_OUTPUTS];\n",
-                self.target
+                self.number
             );
         }
         if contents.exported.outside.is_some() {
@@ -113,11 +115,8 @@ impl<'a> Header<'a> {
                 contents.outside_in_words(),
                 contents.noun
             ));
-            let _ = write!(
-                text,
-                "    /* {} */\n    int readings_outside;\n",
-                what.join("\n       ")
-            );
+            let what = what.join("\n       ");
+            let _ = writeln!(text, "    /* {what} */\n    int readings_outside;");
         }
         let _ = write!(text, "}} {name}_answer;\n\n");
         text += &self.state();
@@ -142,8 +141,7 @@ impl<'a> Header<'a> {
         let (Some(history), Some(about)) = (self.contents.history(), self.contents.state_in_words()) else {
             return String::new();
         };
-        let (name, upper, constants) = (&self.contents.name, self.upper(), &history.constants);
-        let (kept, averages) = (constants.longest_lag(), constants.averages.len());
+        let (name, upper) = (&self.contents.name, self.upper());
         let array = |field: &str, count: usize| match count {
             0 => String::new(),
             count => format!("    double {field}[{count}][{upper}_CHANNELS];\n"),
@@ -153,8 +151,8 @@ impl<'a> Header<'a> {
              double time_s;\n    int latest;\n{}{}}} {name}_state;\n\n\
              /* Forgets the past: the next reading is the first. */\nvoid {name}_start({name}_state *state);\n\n",
             wrapped(&about).join("\n   "),
-            array("kept", kept),
-            array("averages", averages),
+            array("kept", history.kept),
+            array("averages", history.averages),
         )
     }
 }

@@ -14,64 +14,51 @@ use super::{
     contents::Contents,
     fixed16::FixedProgram,
     folder::AtomicFolder,
-    report::{BundleCheck, BundleError},
+    report::{BundleCheck, BundleError, BundleReport},
 };
-use compile::{Compiled, run_self_test};
+use compile::run_self_test;
 use header::Header;
-use self_test::SelfTest;
+use self_test::self_test;
 
 /// Writes header, source and self-test, compiles them where there is a compiler, and runs the self-test. `fixed` is the
-/// program in fixed point, if that is wanted.
+/// program in fixed point, if that is wanted. Adds the outcome to `report`, and returns lines of a program that decodes.
 ///
 /// # Errors
 /// They cannot be written, compiled or run, or the self-test finds a larger deviation than `limit`, relative to the scales.
 pub(super) fn print(
     contents: &Contents,
     fixed: Option<&FixedProgram>,
-    limit: f64,
-    folder: &AtomicFolder,
-    remarks: &mut Vec<String>,
-) -> Result<Option<BundleCheck>, BundleError> {
+    folder: &mut AtomicFolder,
+    report: &mut BundleReport,
+) -> Result<String, BundleError> {
     let header = Header::of(contents, fixed);
     let source = match fixed {
         Some(fixed) => fixed::source(&header, fixed),
         None => source::source(&header),
     };
-    let self_test = SelfTest {
-        header: &header,
-        fixed,
-        limit,
-    };
     let name = &contents.name;
     folder.write(&format!("{name}_decode.h"), header.text())?;
     folder.write(&format!("{name}_decode.c"), source)?;
-    folder.write(&format!("{name}_selftest.c"), self_test.text())?;
+    folder.write(&format!("{name}_selftest.c"), self_test(&header, report.limit))?;
     match run_self_test(folder.path(), name)? {
-        Compiled::Ran { deviation } => Ok(Some(BundleCheck {
+        Ok(deviation) => report.checks.push(BundleCheck {
             evaluator: "C source, compiled and run",
             deviation,
-        })),
-        Compiled::NoCompiler(reason) => {
-            remarks.push(format!("the C source was not compiled: {reason}"));
-            Ok(None)
-        }
+        }),
+        Err(reason) => report.remarks.push(format!("the C source was not compiled: {reason}")),
     }
+    Ok(usage(&header))
 }
 
 /// Lines of a program that decodes.
-pub(super) fn usage(contents: &Contents, fixed: Option<&FixedProgram>) -> String {
-    let header = Header::of(contents, fixed);
+fn usage(header: &Header<'_>) -> String {
+    let (contents, is_fixed) = (header.contents, header.fixed.is_some());
     let (name, upper) = (&contents.name, header.upper());
-    let row = if contents.takes_row() { "1, " } else { "" };
-    let (function, state, time) = match contents.history() {
-        Some(_) => ("step", "&state, ", "time_s, "),
-        None => ("decode", "", ""),
-    };
     let declared = match contents.history() {
         Some(_) => format!("    {name}_state state;\n    {name}_start(&state);\n"),
         None => String::new(),
     };
-    let units = match fixed.is_some() && !contents.meaning.is_array() {
+    let units = match is_fixed && !contents.meaning.is_array {
         true => format!(
             "Readings and targets are integers in the units {upper}_READING_UNITS and {upper}_TARGET_UNITS in the header:\n\
              round(reading / unit) goes in, and unit * number comes out.\n"
@@ -80,14 +67,14 @@ pub(super) fn usage(contents: &Contents, fixed: Option<&FixedProgram>) -> String
     };
     format!(
         "    #include \"{name}_decode.h\"\n{declared}    {} {}[{upper}_CHANNELS];\n    {name}_answer answer;\n    \
-         int status = {name}_{function}({state}{row}{time}{}, &answer);\n\n\
+         int status = {};\n\n\
          The status is {upper}_OK, or the reason why there is no answer. Compile {name}_decode.c with your program{}.\n\
          {units}The self-test compares the golden answers:\n\n    \
          cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n",
-        header.reading,
+        header.number,
         header.readings,
-        header.readings,
-        if fixed.is_some() { "" } else { ", and link with -lm" },
+        header.call("&state", "1", "time_s", header.readings),
+        if is_fixed { "" } else { ", and link with -lm" },
     )
 }
 
@@ -107,9 +94,16 @@ fn number(precision: Precision, value: f64) -> String {
     }
 }
 
-/// Appends `declaration = { … };` with the nested braces of `shape`. The elements are given row by row.
-fn push_array(text: &mut String, declaration: &str, shape: &[usize], elements: impl IntoIterator<Item = impl Display>) {
-    let _ = write!(text, "{declaration} = ");
+/// Appends `static const kind name[…] = { … };` with the nested braces of `shape`. The elements are given row by row.
+fn push_array(
+    text: &mut String,
+    kind: &str,
+    name: &str,
+    shape: &[usize],
+    elements: impl IntoIterator<Item = impl Display>,
+) {
+    let brackets: String = shape.iter().map(|size| format!("[{size}]")).collect();
+    let _ = write!(text, "static const {kind} {name}{brackets} = ");
     push_level(text, shape, &mut elements.into_iter(), 0);
     text.push_str(";\n\n");
 }
@@ -165,7 +159,7 @@ mod tests {
     #[test]
     fn every_dimension_has_its_braces() {
         let mut text = String::new();
-        push_array(&mut text, "static const int a[2][2]", &[2, 2], [1, 2, 3, 4]);
+        push_array(&mut text, "int", "a", &[2, 2], [1, 2, 3, 4]);
         let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
         assert_eq!(words, "static const int a[2][2] = { { 1, 2, }, { 3, 4, }, };");
     }

@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use decoupler_core::decoupling::{Domain, Function, NodeId, Operation, Precision};
+use decoupler_core::decoupling::{Domain, NodeId, Operation, Precision};
 
 use super::{header::Header, number, push_array, type_name};
-use crate::export::bundle::contents::{Contents, PrintedHistory};
+use crate::export::bundle::contents::{Contents, PrintedHistory, infix};
 
 /// Writes the source.
 pub(super) fn source(header: &Header<'_>) -> String {
@@ -14,46 +14,29 @@ pub(super) fn source(header: &Header<'_>) -> String {
         "#include \"{}_decode.h\"\n\n#include <float.h>\n#include <math.h>\n\n",
         contents.name
     );
-    for (id, tables) in contents.constants() {
-        let shape = contents.full_shape(id, tables.len());
-        let (precision, brackets) = (contents.precision_of(id), brackets(&shape));
-        let declaration = format!(
-            "static const {} {}{brackets}",
-            type_name(precision),
-            contents.name_of(id)
-        );
-        let values = tables
-            .iter()
-            .flat_map(|table| table.iter())
-            .map(|&value| number(precision, value));
-        push_array(&mut text, &declaration, &shape, values);
+    for constant in contents.constants() {
+        let precision = constant.precision;
+        let values = constant.values().map(|value| number(precision, value));
+        push_array(&mut text, type_name(precision), constant.name, &constant.shape, values);
     }
     if let Some(history) = contents.history() {
         text += &remembering(header, &history);
     }
     let _ = write!(text, "{}\n{{\n", header.signature());
-    text += &row_check(contents, &upper);
-    let body = contents
-        .computed()
-        .map(|(id, operation)| statements(contents, &upper, id, operation));
-    text += &body.collect::<String>();
+    let is_of_row = contents.constants().any(|constant| constant.tables.len() > 1);
+    text += &row_check(contents, &upper, is_of_row);
+    text += &contents.body(|id, operation| statements(contents, &upper, id, operation));
     text + &answer(header)
 }
 
-pub(super) fn brackets(shape: &[usize]) -> String {
-    shape.iter().map(|size| format!("[{size}]")).collect()
-}
-
-/// Statements that refuse other rows and set `network`.
-pub(super) fn row_check(contents: &Contents, upper: &str) -> String {
+/// Statements that refuse other rows, and set `network` where constants are those of a row.
+pub(super) fn row_check(contents: &Contents, upper: &str, is_of_row: bool) -> String {
     if !contents.takes_row() {
         return String::new();
     }
-    let is_used = contents.constants().any(|(id, _)| contents.is_of_row(id));
-    let network = if is_used {
-        "    const int network = row - 1;\n"
-    } else {
-        ""
+    let network = match is_of_row {
+        true => "    const int network = row - 1;\n",
+        false => "",
     };
     format!("    if (row < 1 || row > {upper}_ROWS) {{\n        return {upper}_NO_SUCH_ROW;\n    }}\n{network}")
 }
@@ -75,54 +58,38 @@ fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operatio
     let declared = format!("    {kind} {name}[{size}];\n");
     let each = |size: usize, body: &str| format!("    for (int i = 0; i < {size}; ++i) {{\n        {body}\n    }}\n");
     let assigned = |expression: String| declared.clone() + &each(size, &format!("{name}[i] = {expression};"));
+    let sums = |inputs: usize, body: &str| {
+        let inner = format!("for (int k = 0; k < {size}; ++k) {{\n            {body}\n        }}");
+        each(inputs, &inner)
+    };
     let suffix = if precision == Precision::Single { "f" } else { "" };
     match operation {
         Operation::Valid { of, domain } => {
             let reading = value(contents, *of, "i", contents.precision_of(*of));
-            let most = match contents.precision_of(*of) {
-                Precision::Single => "FLT_MAX",
-                Precision::Double => "DBL_MAX",
-            };
+            let most = largest(contents.precision_of(*of));
             let lowest = match domain {
                 Domain::Positive => format!("{reading} > 0"),
                 Domain::Finite => format!("{reading} >= -{most}"),
             };
-            each(
-                size,
-                &format!(
-                    "if (!({lowest} && {reading} <= {most})) {{\n            return {upper}_BAD_READING;\n        }}"
-                ),
-            )
-        }
-        Operation::Subtract(one, other) => assigned(format!("{} - {}", of(*one, "i"), of(*other, "i"))),
-        Operation::Divide(one, other) => assigned(format!("{} / {}", of(*one, "i"), of(*other, "i"))),
-        Operation::Map(function, values) => {
-            let x = of(*values, "i");
-            assigned(match function {
-                Function::Log1p => format!("log1p{suffix}({x})"),
-                Function::Tanh => format!("tanh{suffix}({x})"),
-                Function::Gaussian => format!("exp{suffix}(-{x})"),
-            })
+            let is_valid = format!("{lowest} && {reading} <= {most}");
+            let refusal = format!("if (!({is_valid})) {{\n            return {upper}_BAD_READING;\n        }}");
+            each(size, &refusal)
         }
         Operation::Affine {
             of: values,
             weights,
             biases,
         } => {
-            let inputs = contents.size(*values);
-            let sums = format!("{name}[k] += {} * {};", of(*values, "i"), of(*weights, "i][k"));
-            let inner = format!("for (int k = 0; k < {size}; ++k) {{\n            {sums}\n        }}");
-            assigned(of(*biases, "i")) + &each(inputs, &inner)
+            let body = format!("{name}[k] += {} * {};", of(*values, "i"), of(*weights, "i][k"));
+            assigned(of(*biases, "i")) + &sums(contents.size(*values), &body)
         }
         Operation::SquaredDistances { of: values, points } => {
-            let inputs = contents.size(*values);
-            let sums = format!(
+            let body = format!(
                 "const {kind} apart = {} - {};\n            {name}[k] += apart * apart;",
                 of(*values, "i"),
                 of(*points, "i][k")
             );
-            let inner = format!("for (int k = 0; k < {size}; ++k) {{\n            {sums}\n        }}");
-            assigned("0".to_owned()) + &each(inputs, &inner)
+            assigned("0".to_owned()) + &sums(contents.size(*values), &body)
         }
         Operation::Clip { of: values, low, high } => {
             let (x, low, high) = (of(*values, "i"), of(*low, "i"), of(*high, "i"));
@@ -132,31 +99,34 @@ fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operatio
             let mut text = declared.clone();
             let mut first = 0;
             for part in parts {
-                let target = if first == 0 {
-                    "i".to_owned()
+                let shift = if first == 0 {
+                    String::new()
                 } else {
-                    format!("{first} + i")
+                    format!("{first} + ")
                 };
-                text += &each(contents.size(*part), &format!("{name}[{target}] = {};", of(*part, "i")));
+                text += &each(contents.size(*part), &format!("{name}[{shift}i] = {};", of(*part, "i")));
                 first += contents.size(*part);
             }
             text
         }
         Operation::History { .. } => {
-            declared
-                + &format!(
-                    "    remember(state, time_s, {}, {name});\n",
-                    contents.meaning.readings()
-                )
+            let readings = contents.meaning.readings();
+            format!("{declared}    remember(state, time_s, {readings}, {name});\n")
         }
         Operation::CountOutside { of: values, low, high } => {
             let x = of(*values, "i");
             let count = format!("{name} += !({x} >= {} && {x} <= {});", of(*low, "i"), of(*high, "i"));
             format!("    int {name} = 0;\n") + &each(contents.size(*values), &count)
         }
-        Operation::Readings | Operation::Select { .. } | Operation::Blend { .. } => {
-            unreachable!("given, or not exported")
-        }
+        _ => assigned(infix(operation, ["/", "", suffix], |id| of(id, "i"))),
+    }
+}
+
+/// Name of the largest number.
+fn largest(precision: Precision) -> &'static str {
+    match precision {
+        Precision::Single => "FLT_MAX",
+        Precision::Double => "DBL_MAX",
     }
 }
 
@@ -164,19 +134,14 @@ fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operatio
 fn answer(header: &Header<'_>) -> String {
     let (contents, upper) = (header.contents, header.upper());
     let targets = contents.name_of(contents.exported.targets);
-    let most = match contents.outer_precision() {
-        Precision::Single => "FLT_MAX",
-        Precision::Double => "DBL_MAX",
-    };
+    let most = largest(contents.outer_precision());
     let mut text = format!(
         "    for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n        \
          if (!({targets}[k] >= -{most} && {targets}[k] <= {most})) {{\n            return {upper}_BAD_READING;\n        }}\n    }}\n"
     );
     let copied = |id: NodeId| {
-        let (name, computed) = (
-            contents.name_of(id),
-            value(contents, id, "k", contents.outer_precision()),
-        );
+        let name = contents.name_of(id);
+        let computed = value(contents, id, "k", contents.outer_precision());
         format!("    for (int k = 0; k < {upper}_OUTPUTS; ++k) {{\n        answer->{name}[k] = {computed};\n    }}\n")
     };
     text += &copied(contents.exported.targets);
@@ -191,17 +156,11 @@ fn answer(header: &Header<'_>) -> String {
 fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
     let (contents, constants) = (header.contents, &history.constants);
     let (name, channels) = (&contents.name, constants.channels);
-    let (kept, averages) = (constants.longest_lag(), constants.averages.len());
+    let (kept, averages) = (history.kept, history.averages);
     let mut text = String::new();
     let mut array = |kind: &str, name: &str, values: Vec<String>| {
-        let count = values.len();
-        if count > 0 {
-            push_array(
-                &mut text,
-                &format!("static const {kind} {name}[{count}]"),
-                &[count],
-                values,
-            );
+        if !values.is_empty() {
+            push_array(&mut text, kind, name, &[values.len()], values);
         }
     };
     array("int", "lags", constants.lags.iter().map(usize::to_string).collect());
@@ -214,37 +173,31 @@ fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
         true => format!("now - {value}"),
         false => value.to_owned(),
     };
-    let start_of = |field: &str, count: usize| match count {
+    let channel_loop = format!("for (int i = 0; i < {channels}; ++i) {{");
+    let loops = |count: usize, indent: &str, first: &str, body: &str| match count {
         0 => String::new(),
-        count => format!(
-            "        for (int k = 0; k < {count}; ++k) {{\n            for (int i = 0; i < {channels}; ++i) {{\n                \
-             state->{field}[k][i] = readings[i];\n            }}\n        }}\n"
+        _ => format!(
+            "{indent}for (int k = 0; k < {count}; ++k) {{\n{first}{indent}    {channel_loop}\n{body}{indent}    }}\n{indent}}}\n"
         ),
     };
-    let of_lags = match constants.lags.len() {
-        0 => String::new(),
-        count => format!(
-            "    for (int k = 0; k < {count}; ++k) {{\n        const int at = (state->latest - lags[k] + 1 + {kept}) % {kept};\n        \
-             for (int i = 0; i < {channels}; ++i) {{\n            const double now = readings[i];\n            \
-             *feature++ = {};\n        }}\n    }}\n",
-            past("state->kept[at][i]")
-        ),
+    let start_of = |field: &str, count: usize| {
+        let body = format!("                state->{field}[k][i] = readings[i];\n");
+        loops(count, "        ", "", &body)
     };
-    let of_averages = match averages {
-        0 => String::new(),
-        count => format!(
-            "    for (int k = 0; k < {count}; ++k) {{\n        \
-             const double weight = -expm1(-(elapsed_s * per_second[k] + per_reading[k]));\n        \
-             for (int i = 0; i < {channels}; ++i) {{\n            const double now = readings[i];\n            \
-             state->averages[k][i] += weight * (now - state->averages[k][i]);\n            \
-             *feature++ = {};\n        }}\n    }}\n",
-            past("state->averages[k][i]")
-        ),
-    };
+    let now = "            const double now = readings[i];\n            ";
+    let first = format!("        const int at = (state->latest - lags[k] + 1 + {kept}) % {kept};\n");
+    let body = format!("{now}*feature++ = {};\n", past("state->kept[at][i]"));
+    let of_lags = loops(constants.lags.len(), "    ", &first, &body);
+    let first = "        const double weight = -expm1(-(elapsed_s * per_second[k] + per_reading[k]));\n";
+    let body = format!(
+        "{now}state->averages[k][i] += weight * (now - state->averages[k][i]);\n            *feature++ = {};\n",
+        past("state->averages[k][i]")
+    );
+    let of_averages = loops(averages, "    ", first, &body);
     let shifting = match kept {
         0 => String::new(),
         kept => format!(
-            "    state->latest = (state->latest + 1) % {kept};\n    for (int i = 0; i < {channels}; ++i) {{\n        \
+            "    state->latest = (state->latest + 1) % {kept};\n    {channel_loop}\n        \
              state->kept[state->latest][i] = readings[i];\n    }}\n"
         ),
     };
@@ -253,7 +206,7 @@ fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
         f64::INFINITY => String::new(),
         pause_s => format!(" || elapsed_s > {}", double(pause_s)),
     };
-    let reading = header.reading;
+    let reading = header.number;
     text + &format!(
         "void {name}_start({name}_state *state)\n{{\n    state->has_started = 0;\n    state->has_time = 0;\n    \
          state->time_s = 0;\n    state->latest = 0;\n}}\n\n\
@@ -264,7 +217,7 @@ fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
          if (elapsed_s < 0{pause}) {{\n            state->has_started = 0;\n            elapsed_s = {usual};\n        }}\n    }}\n    \
          if (has_time) {{\n        state->has_time = 1;\n        state->time_s = time_s;\n    }}\n    \
          if (!state->has_started) {{\n        state->has_started = 1;\n{kept_start}{averages_start}    }}\n{elapsed}    \
-         for (int i = 0; i < {channels}; ++i) {{\n        *feature++ = readings[i];\n    }}\n\
+         {channel_loop}\n        *feature++ = readings[i];\n    }}\n\
          {of_lags}{of_averages}{shifting}}}\n\n",
         usual = double(constants.interval_s),
         kept_start = start_of("kept", kept),

@@ -22,7 +22,7 @@ use self::{
 };
 use super::{
     exported_program::{ExportedProgram, Limits, table},
-    meaning::Meaning,
+    meaning::{Meaning, comment},
 };
 use crate::export::format_number;
 
@@ -71,39 +71,34 @@ const LARGEST_TARGET: f64 = (1_u32 << 30) as f64;
 /// A program in fixed point.
 #[derive(Clone, Debug)]
 pub(super) struct FixedProgram {
-    readings: Units,
-    targets: Units,
+    pub(super) readings: Units,
+    pub(super) targets: Units,
     /// The changes of the readings are relative ones, as of conductances.
     pub(super) is_relative: bool,
     pub(super) tangent: TangentTable,
-    /// The numbers of all row-wires, or of each.
-    pub(super) rows: Vec<FixedRow>,
+    /// Number of row-wires with numbers of their own.
+    pub(super) rows: usize,
+    /// Inputs and sums of each layer. A hyperbolic tangent follows each but the last.
+    pub(super) layers: Vec<[usize; 2]>,
+    /// Of the readings: `centres` relative to which the change of each is measured, `factors` of the change, and
+    /// `factor_shifts` after it. Of each layer: `weights` (sums × inputs), `biases` and `sum_shifts`. Limits beyond which a
+    /// reading counts as outside: `lowest` and `highest`.
+    pub(super) tables: Vec<FixedTable>,
     /// Bound on the error of each target within the limits of the readings, including the rounding of readings to units, in
     /// the unit of the target.
     pub(super) bounds: Vec<f64>,
 }
 
-/// The numbers of one row-wire.
-#[derive(Clone, Debug, Default)]
-pub(super) struct FixedRow {
-    /// Reading relative to which the change of each channel is measured, factor of the change, and the shift after it.
-    pub(super) centres: Vec<i32>,
-    pub(super) factors: Vec<i32>,
-    pub(super) shifts: Vec<u8>,
-    /// A hyperbolic tangent follows each layer but the last.
-    pub(super) layers: Vec<FixedLayer>,
-    /// Limits beyond which a reading counts as outside.
-    pub(super) limits: Vec<(i32, i32)>,
-}
-
-/// Weighted sums of integers.
-#[derive(Clone, Debug, Default)]
-pub(super) struct FixedLayer {
-    pub(super) inputs: usize,
-    /// Sums × inputs.
-    pub(super) weights: Vec<i32>,
-    pub(super) biases: Vec<i64>,
-    pub(super) shifts: Vec<u8>,
+/// Integers of a program.
+#[derive(Clone, Debug)]
+pub(super) struct FixedTable {
+    pub(super) name: String,
+    /// Type in C.
+    pub(super) kind: &'static str,
+    /// Shape for each row-wire.
+    pub(super) shape: Vec<usize>,
+    /// The values of all row-wires, one after the other.
+    pub(super) values: Vec<i64>,
 }
 
 /// Steps from the changes of the readings to the targets.
@@ -140,16 +135,11 @@ impl FixedProgram {
         let [weights, biases] = *chain.layers.last().expect("there is a layer of targets");
         let reach = |target: usize| {
             let of_row = |row: usize| {
-                let weights = tables(weights, row)
-                    .column(target)
-                    .iter()
-                    .map(|weight| weight.abs())
-                    .sum::<f64>();
-                // The targets of a single layer are sums of changes, whose size is that of the range.
-                let most = if chain.layers.len() > 1 {
-                    weights
-                } else {
-                    scales[target]
+                let weights = tables(weights, row).column(target);
+                let most = match chain.layers.len() {
+                    // The targets of a single layer are sums of changes, whose size is that of the range.
+                    1 => scales[target],
+                    _ => weights.iter().map(|weight| weight.abs()).sum::<f64>(),
                 };
                 tables(biases, row)[[0, target]].abs() + most
             };
@@ -159,17 +149,17 @@ impl FixedProgram {
         let mut fixed = Self {
             is_relative: chain.is_relative,
             tangent: TangentTable::new(),
-            rows: Vec::new(),
+            rows,
+            layers: Vec::new(),
+            tables: Vec::new(),
             bounds: vec![0.0; exported.outputs()],
             readings,
             targets,
         };
         for row in 0..rows {
             let limits = PerRow::each(limits.clone());
-            let numbers = [chain.reference]
-                .into_iter()
-                .chain(chain.layers.iter().flatten().copied());
-            let tables: Vec<&Array2<f64>> = numbers.map(|id| tables(id, row)).collect();
+            let numbers = [&chain.reference].into_iter().chain(chain.layers.iter().flatten());
+            let tables: Vec<&Array2<f64>> = numbers.map(|id| tables(*id, row)).collect();
             let bounds = fixed.push_row(&tables, limits.at(row));
             let bounds = bounds.map_err(|what| FixedPointError::Range { what, cure })?;
             for (target, (bound, of_row)) in fixed.bounds.iter_mut().zip(bounds).enumerate() {
@@ -199,15 +189,13 @@ impl FixedProgram {
             Change::of(self.is_relative, self.readings.per_one(channel), limits, reference)
         });
         let changes: Vec<Change> = changes.collect();
-        let mut row = FixedRow {
-            centres: changes.iter().map(|change| change.centre).collect(),
-            factors: changes.iter().map(|change| change.multiplier().factor).collect(),
-            shifts: changes.iter().map(|change| change.multiplier().shift).collect(),
-            limits: (limits.iter().enumerate())
-                .map(|(channel, &(low, high))| (self.readings.whole(channel, low), self.readings.whole(channel, high)))
-                .collect(),
-            ..FixedRow::default()
-        };
+        let shape = [changes.len()];
+        let centres = changes.iter().map(|change| i64::from(change.centre));
+        self.put("centres", "int32_t", &shape, centres);
+        let factors = changes.iter().map(|change| i64::from(change.multiplier().factor));
+        self.put("factors", "int32_t", &shape, factors);
+        let shifts = changes.iter().map(|change| i64::from(change.multiplier().shift));
+        self.put("factor_shifts", "uint8_t", &shape, shifts);
         // Each input is a number of 15 bits after the point times a slope, plus an offset.
         let mut slopes: Vec<f64> = changes.iter().map(Change::slope).collect();
         let mut offsets: Vec<f64> = changes.iter().map(|change| change.offset).collect();
@@ -216,11 +204,8 @@ impl FixedProgram {
         for (index, layer) in layers.chunks_exact(2).enumerate() {
             let (weights, biases) = (layer[0], layer[1]);
             let is_last = index + 1 == count;
-            let mut fixed = FixedLayer {
-                inputs: weights.nrows(),
-                ..FixedLayer::default()
-            };
             let mut next_errors = Vec::new();
+            let (mut whole_weights, mut whole_biases, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
             for (sum, weights) in weights.columns().into_iter().enumerate() {
                 // Sums in units of the target, or arguments of the tangent.
                 let per_one = if is_last { self.targets.per_one(sum) } else { 1.0 };
@@ -239,37 +224,50 @@ impl FixedProgram {
                 let of_inputs = scaled.iter().zip(&errors).map(|(weight, error)| weight.abs() * error);
                 let rounding = 0.5 * 2.0_f64.powi(-result_bits);
                 let error = of_inputs.sum::<f64>() + row.error + of_bias + rounding;
+                let rounded = bias as f64 * 2.0_f64.powi(-sum_bits);
                 next_errors.push(match is_last {
                     true => error,
-                    false => self
-                        .tangent
-                        .passed_on(error, bias as f64 * 2.0_f64.powi(-sum_bits), &scaled),
+                    false => self.tangent.passed_on(error, rounded, &scaled),
                 });
-                fixed.weights.extend(row.weights);
-                fixed.biases.push(bias);
-                fixed.shifts.push((sum_bits - result_bits) as u8);
+                whole_weights.extend(row.weights.into_iter().map(i64::from));
+                whole_biases.push(bias);
+                shifts.push(i64::from(sum_bits - result_bits));
             }
-            row.layers.push(fixed);
+            let (inputs, sums) = weights.dim();
+            if index == self.layers.len() {
+                self.layers.push([inputs, sums]);
+            }
+            let name = |of: &str| format!("{of}_{}", index + 1);
+            self.put(&name("weights"), "int16_t", &[sums, inputs], whole_weights);
+            self.put(&name("biases"), "int64_t", &[sums], whole_biases);
+            self.put(&name("sum_shifts"), "uint8_t", &[sums], shifts);
             errors = next_errors;
             (slopes, offsets) = (vec![1.0; errors.len()], vec![0.0; errors.len()]);
         }
-        self.rows.push(row);
+        let limits = limits.iter().enumerate();
+        let whole = limits.map(|(channel, &(low, high))| [low, high].map(|limit| self.readings.whole(channel, limit)));
+        let whole = Vec::from_iter(whole);
+        self.put("lowest", "int32_t", &shape, whole.iter().map(|limits| limits[0]));
+        self.put("highest", "int32_t", &shape, whole.iter().map(|limits| limits[1]));
         Ok(errors)
     }
 
-    /// Number of units in 1 of each reading.
-    pub(super) fn readings_per_one(&self) -> impl Iterator<Item = f64> {
-        self.readings.all().map(|unit| 1.0 / unit)
-    }
-
-    /// Unit of each target, in that of the decoder.
-    pub(super) fn target_units(&self) -> impl Iterator<Item = f64> {
-        self.targets.all()
+    /// Adds the values of a row-wire to those of the others.
+    fn put(&mut self, name: &str, kind: &'static str, shape: &[usize], values: impl IntoIterator<Item = i64>) {
+        match self.tables.iter_mut().find(|table| table.name == name) {
+            Some(table) => table.values.extend(values),
+            None => self.tables.push(FixedTable {
+                name: name.to_owned(),
+                kind,
+                shape: shape.to_vec(),
+                values: values.into_iter().collect(),
+            }),
+        }
     }
 
     /// Name of the readings, with their unit where they share one.
     pub(super) fn readings_name(&self, name: &'static str) -> &'static str {
-        match (name, self.readings.first_decimals()) {
+        match (name, self.readings.decimals[0]) {
             ("resistances_ohm", 9) => "resistances_nanoohm",
             ("resistances_ohm", 6) => "resistances_microohm",
             ("resistances_ohm", 3) => "resistances_milliohm",
@@ -280,15 +278,10 @@ impl FixedProgram {
     /// The sentences on units and bounds.
     pub(super) fn units_in_words(&self, meaning: &Meaning) -> String {
         let saturation = "All readings are decoded without overflow: numbers out of range saturate.";
-        let bounds = meaning.named(&self.bounds).into_iter().map(|(target, bound)| {
-            format!(
-                "{} ({})",
-                format_number(bound),
-                super::meaning::comment(&target.title())
-            )
-        });
+        let named = meaning.named(&self.bounds).into_iter();
+        let bounds = named.map(|(target, bound)| format!("{} ({})", format_number(bound), comment(&target.title())));
         let bounds = Vec::from_iter(bounds).join(", ");
-        let units = match meaning.is_array() {
+        let units = match meaning.is_array {
             true => format!(
                 "Readings are integers in units of {:e} ohm, coordinates integers in nanometres.",
                 self.readings.unit(0)
@@ -300,7 +293,7 @@ impl FixedProgram {
 
     /// Units of own data as initialisers of arrays; empty for an array, whose names contain the units.
     pub(super) fn unit_definitions(&self, upper: &str, meaning: &Meaning) -> String {
-        if meaning.is_array() {
+        if meaning.is_array {
             return String::new();
         }
         let define = |what: &str, units: &Units| {

@@ -24,9 +24,7 @@ impl ScaledRow {
     ///
     /// `None` for a weight that is too large even with the fewest bits.
     pub(super) fn of(weights: &[f64], fewest: i32) -> Option<Self> {
-        let largest = weights
-            .iter()
-            .fold(0.0_f64, |largest, weight| largest.max(weight.abs()));
+        let largest = weights.iter().map(|weight| weight.abs()).fold(0.0, f64::max);
         let fitting = (f64::from((1 << (WEIGHT_BITS - 1)) - 1) / largest).log2().floor();
         // NaN if a weight is NaN, and infinite if all are 0.
         if fitting.is_nan() || fitting < f64::from(fewest) {

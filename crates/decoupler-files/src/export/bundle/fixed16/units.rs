@@ -3,8 +3,8 @@ use crate::export::bundle::{exported_program::Limits, meaning::Meaning};
 
 /// Units of integers: each is 10^−`decimals` of the decoder's unit of the reading or target.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Units {
-    decimals: Vec<i32>,
+pub(in crate::export::bundle) struct Units {
+    pub(super) decimals: Vec<i32>,
 }
 
 /// Upper bound of readings within their limits, which leaves a factor of 2 for readings outside.
@@ -25,7 +25,7 @@ impl Units {
             limits.fold(0.0_f64, |largest, (low, high)| largest.max(low.abs()).max(high.abs()))
         };
         let channels = 0..limits[0].len();
-        let decimals = if meaning.is_array() {
+        let decimals = if meaning.is_array {
             let largest_ohm = channels.clone().map(largest).fold(0.0, f64::max);
             let fits = |&decimals: &i32| largest_ohm * ten_to(decimals) <= LARGEST_READING;
             let decimals = [9, 6, 3, 0].into_iter().find(fits);
@@ -40,7 +40,7 @@ impl Units {
 
     /// Units of the targets: nanometres for an array; `reach` is the largest magnitude of a target over all activations.
     pub(super) fn of_targets(meaning: &Meaning, scales: &[f64], reach: impl Fn(usize) -> f64) -> Self {
-        let decimals = |(target, &scale): (usize, &f64)| match meaning.is_array() {
+        let decimals = |(target, &scale): (usize, &f64)| match meaning.is_array {
             true => 6,
             false => max_decimals(scale, TARGET_UNITS).min(max_decimals(reach(target), LARGEST_TARGET)),
         };
@@ -54,24 +54,19 @@ impl Units {
         ten_to(self.decimals[index])
     }
 
-    /// Decimals of the first, and of all where they share one.
-    pub(super) fn first_decimals(&self) -> i32 {
-        self.decimals[0]
-    }
-
     /// A unit in those of the decoder: 1e-6.
     pub(super) fn unit(&self, index: usize) -> f64 {
         ten_to(-self.decimals[index])
     }
 
     /// Every unit in those of the decoder.
-    pub(super) fn all(&self) -> impl Iterator<Item = f64> {
+    pub(in crate::export::bundle) fn all(&self) -> impl Iterator<Item = f64> {
         (0..self.decimals.len()).map(|index| self.unit(index))
     }
 
     /// Returns the value in units, limited to the largest number.
-    pub(super) fn whole(&self, index: usize, value: f64) -> i32 {
-        (value * self.per_one(index)).round() as i32
+    pub(super) fn whole(&self, index: usize, value: f64) -> i64 {
+        i64::from((value * self.per_one(index)).round() as i32)
     }
 }
 

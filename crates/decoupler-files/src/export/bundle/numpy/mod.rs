@@ -2,39 +2,28 @@
 
 mod npz;
 
-use decoupler_core::decoupling::{Domain, Function, NodeId, Operation, Precision};
+use decoupler_core::decoupling::{Domain, NodeId, Operation, Precision};
 
 use super::{
-    contents::{Contents, PrintedHistory},
+    contents::{Contents, PrintedHistory, infix},
     folder::AtomicFolder,
     report::BundleError,
 };
-use npz::NamedArray;
 
 /// Writes constants and program.
 ///
 /// # Errors
 /// The operating system refuses.
-pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<(), BundleError> {
-    let arrays = contents.constants().map(|(id, tables)| NamedArray {
-        name: contents.name_of(id).to_owned(),
-        precision: contents.precision_of(id),
-        shape: contents.full_shape(id, tables.len()),
-        values: tables.iter().flat_map(|table| table.iter().copied()).collect(),
-    });
-    folder.write(&format!("{}.npz", contents.noun), npz::write(&Vec::from_iter(arrays)))?;
-    folder.write("decode.py", program(contents))
+pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<String, BundleError> {
+    folder.write(&format!("{}.npz", contents.noun), npz::write(contents.constants()))?;
+    folder.write("decode.py", program(contents))?;
+    Ok(usage(contents))
 }
 
 /// Text of the program.
 fn program(contents: &Contents) -> String {
     let (input, channels) = (contents.meaning.readings(), contents.channels());
-    let legend = contents
-        .meaning
-        .legend(channels)
-        .into_iter()
-        .chain(contents.note_lines());
-    let legend: String = legend.map(|line| format!("# {line}\n")).collect();
+    let legend = format!("# {}\n", contents.legend("").join("\n# "));
     let dtype = dtype(contents.outer_precision());
     let (row, row_text) = match contents.takes_row() {
         true => (", row", "; row: row of each sample, from 1"),
@@ -42,10 +31,7 @@ fn program(contents: &Contents) -> String {
     };
     let is_sequence = contents.history().is_some();
     let state = if is_sequence { ", state, time_s" } else { "" };
-    let body: String = contents
-        .computed()
-        .map(|(id, operation)| statement(contents, id, operation))
-        .collect();
+    let body = contents.body(|id, operation| statement(contents, id, operation));
     let mut text = format!(
         "\"\"\"{}; see README.txt.\"\"\"\n{legend}\nimport pathlib\n\nimport numpy as np\n\n\
          CONSTANTS = dict(np.load(pathlib.Path(__file__).with_name(\"{}.npz\")))\n\n\n\
@@ -101,11 +87,9 @@ fn program(contents: &Contents) -> String {
 fn returned_parts(contents: &Contents) -> Vec<String> {
     let exported = &contents.exported;
     let numbers = [Some(exported.targets), exported.half_widths].into_iter().flatten();
-    let mut parts: Vec<String> = numbers
-        .map(|id| value(contents, id, contents.outer_precision()))
-        .collect();
-    parts.extend(exported.outside.map(|id| contents.name_of(id).to_owned()));
-    parts
+    let numbers = numbers.map(|id| value(contents, id, contents.outer_precision()));
+    let outside = exported.outside.map(|id| contents.name_of(id).to_owned());
+    numbers.chain(outside).collect()
 }
 
 fn dtype(precision: Precision) -> &'static str {
@@ -143,13 +127,6 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
                 "    if not ({is_valid}).all():\n        raise ValueError(\"{x}: give finite numbers{above}\")\n"
             );
         }
-        Operation::Subtract(one, other) => format!("{} - {}", of(*one), of(*other)),
-        Operation::Divide(one, other) => format!("{} / {}", of(*one), of(*other)),
-        Operation::Map(function, x) => match function {
-            Function::Log1p => format!("np.log1p({})", of(*x)),
-            Function::Tanh => format!("np.tanh({})", of(*x)),
-            Function::Gaussian => format!("np.exp(-{})", of(*x)),
-        },
         Operation::Affine { of: x, weights, biases } => format!("{} @ {} + {}", of(*x), of(*weights), of(*biases)),
         Operation::SquaredDistances { of: x, points } => {
             format!(
@@ -167,9 +144,7 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
         Operation::CountOutside { of: x, low, high } => {
             format!("(({x} < {}) | ({x} > {})).sum(axis=1)", of(*low), of(*high), x = of(*x))
         }
-        Operation::Readings | Operation::Select { .. } | Operation::Blend { .. } => {
-            unreachable!("given, or not exported")
-        }
+        _ => infix(operation, ["/", "np.", ""], of),
     };
     format!("    {name} = {expression}\n")
 }
@@ -177,7 +152,6 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
 /// The functions that start a state and take a reading into it.
 fn remembering(contents: &Contents, history: &PrintedHistory) -> String {
     let constants = &history.constants;
-    let (kept, averages) = (constants.longest_lag(), constants.averages.len());
     let (per_second, per_reading) = history.rates();
     let lags = Vec::from_iter(constants.lags.iter().map(|lag| lag - 1));
     let pause = match history.pause_s {
@@ -191,7 +165,7 @@ fn remembering(contents: &Contents, history: &PrintedHistory) -> String {
          PER_SECOND, PER_READING = np.array({per_second:?}, dtype=float), np.array({per_reading:?}, dtype=float)\n\n\n\
          def start():\n    \"\"\"The state before the first reading. {about} A copy is a state to continue from.\"\"\"\n    \
          # Whether it has started, the latest time, the latest readings (the newest first), and the averages.\n    \
-         return np.zeros((2 + {kept} + {averages}, {channels}))\n\n\n\
+         return np.zeros(({rows}, {channels}))\n\n\n\
          def remember(state, now, time_s):\n    \
          \"\"\"Takes the next readings into the state; returns them with their past.\"\"\"\n    \
          has_started, latest_s = state[0, 0] > 0, state[1, 0]\n    \
@@ -206,19 +180,20 @@ fn remembering(contents: &Contents, history: &PrintedHistory) -> String {
          past = np.concatenate([past_of_lags, averages])\n    \
          kept[1:], kept[:1] = kept[:-1].copy(), now\n    \
          return np.concatenate([now, {past}])\n\n\n",
+        kept = history.kept,
+        rows = history.state_rows(),
         usual = constants.interval_s,
         channels = constants.channels,
         about = contents.state_in_words().unwrap_or_default(),
-        past = if constants.differences {
-            "(now - past).ravel()"
-        } else {
-            "past.ravel()"
+        past = match constants.differences {
+            true => "(now - past).ravel()",
+            false => "past.ravel()",
         },
     )
 }
 
 /// Lines of a program that decodes.
-pub(super) fn usage(contents: &Contents) -> String {
+fn usage(contents: &Contents) -> String {
     let (input, parts) = (contents.meaning.readings(), contents.parts().join(", "));
     let row = if contents.takes_row() { ", row" } else { "" };
     match contents.history() {

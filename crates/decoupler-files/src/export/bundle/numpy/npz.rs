@@ -5,20 +5,12 @@ use std::io::{Cursor, Write};
 use decoupler_core::decoupling::Precision;
 use zip::{CompressionMethod, DateTime, ZipWriter, result::ZipResult, write::SimpleFileOptions};
 
-/// An array with its name.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct NamedArray {
-    pub(super) name: String,
-    pub(super) precision: Precision,
-    pub(super) shape: Vec<usize>,
-    /// Row by row.
-    pub(super) values: Vec<f64>,
-}
+use crate::export::bundle::contents::Constant;
 
 const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
 
 /// Writes the archive. The same arrays always give the same bytes.
-pub(super) fn write(arrays: &[NamedArray]) -> Vec<u8> {
+pub(super) fn write<'a>(arrays: impl Iterator<Item = Constant<'a>>) -> Vec<u8> {
     let archive = || -> ZipResult<Vec<u8>> {
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Stored)
@@ -26,14 +18,14 @@ pub(super) fn write(arrays: &[NamedArray]) -> Vec<u8> {
         let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
         for array in arrays {
             archive.start_file(format!("{}.npy", array.name), options)?;
-            archive.write_all(&write_array(array))?;
+            archive.write_all(&write_array(&array))?;
         }
         Ok(archive.finish()?.into_inner())
     };
     archive().expect("writing to memory does not fail, and every array has a short, unique name and less than 4 GB")
 }
 
-fn write_array(array: &NamedArray) -> Vec<u8> {
+fn write_array(array: &Constant<'_>) -> Vec<u8> {
     let descr = match array.precision {
         Precision::Single => "<f4",
         Precision::Double => "<f8",
@@ -52,7 +44,7 @@ fn write_array(array: &NamedArray) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend((header.len() as u16).to_le_bytes());
     bytes.extend(header.as_bytes());
-    for &value in &array.values {
+    for value in array.values() {
         match array.precision {
             Precision::Single => bytes.extend((value as f32).to_le_bytes()),
             Precision::Double => bytes.extend(value.to_le_bytes()),

@@ -1,19 +1,17 @@
 use decoupler_core::decoupling::Precision;
 
-use super::schema::{
-    Attribute, BOOL, DOUBLE, Dimension, FLOAT, Graph, INT_ATTRIBUTE, INT64, Node, TensorData, TensorShape, TensorType,
-    TypeOfValue, ValueInfo,
-};
+use super::message::{DOUBLE, FLOAT, INT_ATTRIBUTE, INT64, Message};
 
 /// Builder of a graph.
 #[derive(Default)]
 pub(super) struct GraphBuilder {
-    pub(super) graph: Graph,
+    pub(super) nodes: Vec<Message>,
+    pub(super) initializers: Vec<Message>,
     count: usize,
 }
 
 /// ONNX type of numbers of this precision.
-pub(super) fn element_type(precision: Precision) -> i32 {
+pub(super) fn element_type(precision: Precision) -> i64 {
     match precision {
         Precision::Single => FLOAT,
         Precision::Double => DOUBLE,
@@ -49,13 +47,12 @@ impl GraphBuilder {
         self.numbers(&name, precision, &[], std::iter::once(value))
     }
 
-    fn constant(&mut self, name: &str, data_type: i32, shape: &[usize], raw_data: Vec<u8>) -> String {
-        self.graph.initializer.push(TensorData {
-            dims: shape.iter().map(|&size| size as i64).collect(),
-            data_type,
-            name: name.to_owned(),
-            raw_data,
-        });
+    fn constant(&mut self, name: &str, data_type: i64, shape: &[usize], raw_data: Vec<u8>) -> String {
+        let dims = shape
+            .iter()
+            .fold(Message::default(), |tensor, &size| tensor.int(1, size as i64));
+        let tensor = dims.int(2, data_type).bytes(8, name).bytes(9, raw_data);
+        self.initializers.push(tensor);
         name.to_owned()
     }
 
@@ -73,18 +70,11 @@ impl GraphBuilder {
         attributes: &[(&str, i64)],
         output: &str,
     ) -> String {
-        let attribute = attributes.iter().map(|&(name, value)| Attribute {
-            name: name.to_owned(),
-            i: Some(value),
-            kind: INT_ATTRIBUTE,
-        });
-        self.graph.node.push(Node {
-            input: inputs.iter().map(|&name| name.to_owned()).collect(),
-            output: vec![output.to_owned()],
-            name: format!("{output}_node"),
-            op_type: operation.to_owned(),
-            attribute: attribute.collect(),
-        });
+        let attribute =
+            |&(name, value): &(&str, i64)| Message::default().bytes(1, name).int(3, value).int(20, INT_ATTRIBUTE);
+        let node = Message::default().all(1, inputs).bytes(2, output);
+        let node = node.bytes(3, format!("{output}_node")).bytes(4, operation);
+        self.nodes.push(node.all(5, attributes.iter().map(attribute)));
         output.to_owned()
     }
 
@@ -94,21 +84,11 @@ impl GraphBuilder {
         self.named(operation, inputs, attributes, &name)
     }
 
-    /// Adds a conversion to numbers of this precision.
-    pub(super) fn cast(&mut self, input: &str, precision: Precision) -> String {
-        self.with("Cast", &[input], &[("to", i64::from(element_type(precision)))])
-    }
-
-    /// Adds a sum over the second axis, which is kept with size 1 or dropped.
-    pub(super) fn sum(&mut self, input: &str, is_kept: bool) -> String {
+    /// Adds the number of true values of each line, as whole numbers (batch × 1).
+    pub(super) fn count(&mut self, condition: &str) -> String {
+        let ones = self.with("Cast", &[condition], &[("to", INT64)]);
         let axes = self.whole(&[1], &[1]);
-        self.with("ReduceSum", &[input, &axes], &[("keepdims", i64::from(is_kept))])
-    }
-
-    /// Adds the number of true values of each line, as whole numbers.
-    pub(super) fn count(&mut self, condition: &str, is_kept: bool) -> String {
-        let ones = self.with("Cast", &[condition], &[("to", i64::from(INT64))]);
-        self.sum(&ones, is_kept)
+        self.with("ReduceSum", &[&ones, &axes], &[("keepdims", 1)])
     }
 
     /// A name that no other value has.
@@ -118,27 +98,14 @@ impl GraphBuilder {
     }
 }
 
-/// A size of a tensor, or its name.
-pub(super) fn dimension(size: Option<usize>) -> Dimension {
-    Dimension {
-        dim_value: size.map(|size| size as i64),
-        dim_param: size.is_none().then(|| "batch".to_owned()),
-    }
-}
-
-/// An input or output of a graph.
-pub(super) fn value(name: &str, elem_type: i32, shape: &[Option<usize>], doc_string: String) -> ValueInfo {
-    debug_assert_ne!(elem_type, BOOL);
-    ValueInfo {
-        name: name.to_owned(),
-        kind: Some(TypeOfValue {
-            tensor_type: Some(TensorType {
-                elem_type,
-                shape: Some(TensorShape {
-                    dim: shape.iter().map(|&size| dimension(size)).collect(),
-                }),
-            }),
-        }),
-        doc_string,
-    }
+/// An input or output of a graph; a size that is not given is that of the batch.
+pub(super) fn value(name: &str, elem_type: i64, shape: &[Option<usize>], about: &str) -> Message {
+    let dimension = |size: &Option<usize>| match size {
+        Some(size) => Message::default().int(1, *size as i64),
+        None => Message::default().bytes(2, "batch"),
+    };
+    let shape = Message::default().all(1, shape.iter().map(dimension));
+    let tensor_type = Message::default().int(1, elem_type).bytes(2, shape);
+    let kind = Message::default().bytes(1, tensor_type);
+    Message::default().bytes(1, name).bytes(2, kind).bytes(3, about)
 }

@@ -4,46 +4,25 @@
 use decoupler_core::decoupling::Precision;
 
 use super::Printer;
-use crate::export::bundle::contents::Contents;
 
 const DOUBLE: Precision = Precision::Double;
 
-/// Rows and columns of the state.
-pub(super) fn state_shape(contents: &Contents) -> [Option<usize>; 2] {
-    let constants = contents
-        .history()
-        .expect("only graphs with a history have a state")
-        .constants;
-    let rows = 2 + constants.longest_lag() + constants.averages.len();
-    [Some(rows), Some(constants.channels)]
-}
-
 impl Printer<'_> {
-    pub(super) fn state_shape(&self) -> [Option<usize>; 2] {
-        state_shape(self.contents)
-    }
-
     /// Adds the features of the readings `now` (1 × channels, double), and the next state.
     pub(super) fn add_history(&mut self, now: &str, name: &str) {
         let history = self.contents.history().expect("there is a history");
         let constants = &history.constants;
-        let (kept, averages, channels) = (constants.longest_lag(), constants.averages.len(), constants.channels);
+        let (kept, averages, channels) = (history.kept, history.averages, constants.channels);
         let builder = &mut self.builder;
         let axis = builder.whole(&[1], &[0]);
         // Rows from `first` to `end` of a value.
         macro_rules! rows {
             ($of:expr, $first:expr, $end:expr) => {{
-                let (first, end) = (
-                    builder.whole(&[1], &[$first as i64]),
-                    builder.whole(&[1], &[$end as i64]),
-                );
+                let [first, end] = [$first, $end].map(|row| builder.whole(&[1], &[row as i64]));
                 builder.op("Slice", &[$of, &first, &end, &axis])
             }};
         }
-        let (zero, usual) = (
-            builder.scalar(DOUBLE, 0.0),
-            builder.scalar(DOUBLE, constants.interval_s),
-        );
+        let [zero, usual] = [0.0, constants.interval_s].map(|value| builder.scalar(DOUBLE, value));
         let started = rows!("state", 0, 1);
         let has_started = builder.op("Greater", &[&started, &zero]);
         let latest = rows!("state", 1, 2);
@@ -111,7 +90,6 @@ impl Printer<'_> {
         let line = builder.op("Reshape", &[&past, &shape]);
         builder.named("Concat", &[now, &line], &[("axis", 1)], name);
         // The latest time fills every column.
-        let size = builder.whole(&[2], &[1, channels as i64]);
         next_rows[1] = builder.op("Expand", &[&next_rows[1].clone(), &size]);
         let names = Vec::from_iter(next_rows.iter().map(String::as_str));
         self.next_state = Some(builder.with("Concat", &names, &[("axis", 0)]));

@@ -15,7 +15,7 @@
 
 mod builder;
 mod history;
-mod schema;
+mod message;
 
 use std::collections::HashMap;
 
@@ -23,11 +23,10 @@ use decoupler_core::{
     decoupling::{Domain, Function, NodeId, Operation, Precision},
     problem::Channel,
 };
-use prost::Message;
 
 use self::{
     builder::{GraphBuilder, element_type, value},
-    schema::{Graph, INT64, Model, OperatorSet, Property},
+    message::{INT64, Message},
 };
 use super::{contents::Contents, folder::AtomicFolder, meaning::comment, report::BundleError};
 
@@ -41,38 +40,33 @@ const MAX_LAG: usize = 1000;
 ///
 /// # Errors
 /// A lag is too long, or the operating system refuses.
-pub(super) fn print(contents: &Contents, folder: &AtomicFolder) -> Result<(), BundleError> {
-    if let Some(history) = contents.history()
-        && history.constants.longest_lag() > MAX_LAG
-    {
-        return Err(BundleError::LongLag(history.constants.longest_lag()));
+pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<String, BundleError> {
+    let lag = contents.history().map_or(0, |history| history.kept);
+    if lag > MAX_LAG {
+        return Err(BundleError::LongLag(lag));
     }
-    let properties = contents.metadata.iter().map(|(key, value)| Property {
-        key: key.clone(),
-        value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
-    });
     let notes = contents.notes.iter().map(|note| format!(" Note: {note}."));
+    let state = contents.state_in_words().map(|about| format!(" {about}"));
     let about = format!(
         "{}. Answers are NaN where a reading or the row is invalid.{}{}",
         contents.meaning.purpose_without_stop(),
-        contents
-            .state_in_words()
-            .map_or_else(String::new, |about| format!(" {about}")),
+        state.unwrap_or_default(),
         notes.collect::<String>()
     );
-    let model = Model {
-        ir_version: IR_VERSION,
-        producer_name: "decoupler".to_owned(),
-        producer_version: env!("CARGO_PKG_VERSION").to_owned(),
-        doc_string: about,
-        graph: Some(Printer::graph(contents)),
-        opset_import: vec![OperatorSet {
-            domain: String::new(),
-            version: OPSET,
-        }],
-        metadata_props: properties.collect(),
-    };
-    folder.write(&format!("{}.onnx", contents.noun), model.encode_to_vec())
+    let properties = contents.metadata.as_object().into_iter().flatten().map(|(key, value)| {
+        let value = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        Message::default().bytes(1, key).bytes(2, value)
+    });
+    let model = Message::default()
+        .int(1, IR_VERSION)
+        .bytes(2, "decoupler")
+        .bytes(3, env!("CARGO_PKG_VERSION"))
+        .bytes(6, about)
+        .bytes(7, Printer::graph(contents))
+        .bytes(8, Message::default().int(2, OPSET))
+        .all(14, properties);
+    folder.write(&format!("{}.onnx", contents.noun), model)?;
+    Ok(usage(contents))
 }
 
 /// A graph in progress.
@@ -87,7 +81,7 @@ struct Printer<'a> {
 }
 
 impl Printer<'_> {
-    fn graph(contents: &Contents) -> Graph {
+    fn graph(contents: &Contents) -> Message {
         let mut printer = Printer {
             contents,
             builder: GraphBuilder::default(),
@@ -96,20 +90,15 @@ impl Printer<'_> {
             next_state: None,
         };
         printer.check_row();
-        for (id, tables) in contents.constants() {
-            let shape = contents.full_shape(id, tables.len());
-            let values = tables.iter().flat_map(|table| table.iter().copied());
-            let precision = contents.precision_of(id);
-            if tables.len() > 1 {
-                let all =
-                    printer
-                        .builder
-                        .numbers(&format!("{}_of_rows", contents.name_of(id)), precision, &shape, values);
-                printer
-                    .builder
-                    .named("Gather", &[&all, "row_index"], &[("axis", 0)], contents.name_of(id));
-            } else {
-                printer.builder.numbers(contents.name_of(id), precision, &shape, values);
+        let builder = &mut printer.builder;
+        for constant in contents.constants() {
+            let name = match constant.tables.len() {
+                1 => constant.name,
+                _ => &format!("{}_of_rows", constant.name),
+            };
+            let all = builder.numbers(name, constant.precision, &constant.shape, constant.values());
+            if all != constant.name {
+                builder.named("Gather", &[&all, "row_index"], &[("axis", 0)], constant.name);
             }
         }
         for (id, operation) in contents.computed() {
@@ -124,10 +113,7 @@ impl Printer<'_> {
             return;
         }
         let builder = &mut self.builder;
-        let (first, last) = (
-            builder.whole(&[], &[1]),
-            builder.whole(&[], &[self.contents.rows as i64]),
-        );
+        let [first, last] = [1, self.contents.rows].map(|row| builder.whole(&[], &[row as i64]));
         let not_below = builder.op("GreaterOrEqual", &["row", &first]);
         let not_above = builder.op("LessOrEqual", &["row", &last]);
         let is_row = builder.op("And", &[&not_below, &not_above]);
@@ -155,18 +141,15 @@ impl Printer<'_> {
         }
         let Self { casts, builder, .. } = self;
         let cast = casts.entry((id.index(), precision));
-        cast.or_insert_with(|| builder.cast(&name, precision)).clone()
+        let to = [("to", element_type(precision))];
+        cast.or_insert_with(|| builder.with("Cast", &[&name], &to)).clone()
     }
 
     fn add(&mut self, id: NodeId, operation: &Operation) {
         let contents = self.contents;
         let (name, precision) = (self.name(id), contents.precision_of(id));
-        let operands = Vec::from_iter(
-            operation
-                .operands()
-                .into_iter()
-                .map(|operand| self.value(operand, precision)),
-        );
+        let operands = operation.operands().into_iter();
+        let operands = Vec::from_iter(operands.map(|operand| self.value(operand, precision)));
         let operands = Vec::from_iter(operands.iter().map(String::as_str));
         let builder = &mut self.builder;
         match operation {
@@ -182,7 +165,7 @@ impl Printer<'_> {
                     is_valid = builder.op("And", &[&is_valid, &is_positive]);
                 }
                 let is_invalid = builder.op("Not", &[&is_valid]);
-                let invalid = builder.count(&is_invalid, true);
+                let invalid = builder.count(&is_invalid);
                 let none = builder.whole(&[], &[0]);
                 self.valid.push(builder.op("Equal", &[&invalid, &none]));
             }
@@ -218,7 +201,7 @@ impl Printer<'_> {
                 let below = builder.op("Less", &operands[..2]);
                 let above = builder.op("Greater", &[operands[0], operands[2]]);
                 let is_outside = builder.op("Or", &[&below, &above]);
-                let ones = builder.with("Cast", &[&is_outside], &[("to", i64::from(INT64))]);
+                let ones = builder.with("Cast", &[&is_outside], &[("to", INT64)]);
                 let axes = builder.whole(&[1], &[1]);
                 builder.named("ReduceSum", &[&ones, &axes], &[("keepdims", 0)], "readings_outside");
             }
@@ -253,118 +236,87 @@ impl Printer<'_> {
     }
 
     /// Adds the outputs, NaN where there is no answer.
-    fn finish(mut self) -> Graph {
+    fn finish(mut self) -> Message {
         let contents = self.contents;
-        let exported = &contents.exported;
-        let meaning = &contents.meaning;
+        let (exported, meaning) = (&contents.exported, &contents.meaning);
         let batch = if contents.history().is_some() { Some(1) } else { None };
-        let is_valid = self
-            .valid
-            .iter()
-            .cloned()
-            .reduce(|all, one| self.builder.op("And", &[&all, &one]));
+        let valid = std::mem::take(&mut self.valid).into_iter();
+        let is_valid = valid.reduce(|all, one| self.builder.op("And", &[&all, &one]));
         let is_valid = is_valid.expect("every decoder checks its readings");
         let precision = contents.outer_precision();
         let kind = element_type(precision);
         let mut outputs = Vec::new();
-        for (id, output) in [
-            (Some(exported.targets), meaning.outputs()),
-            (exported.half_widths, "half_widths"),
+        let targets = meaning.either("Coordinates in mm", "Targets");
+        let targets = channel_names(targets, &meaning.targets, meaning.is_array);
+        let widths = "Half-widths of the 90 % prediction intervals, valid for all answers together";
+        for (id, output, about) in [
+            (Some(exported.targets), meaning.outputs(), targets.as_str()),
+            (exported.half_widths, "half_widths", widths),
         ] {
             let Some(id) = id else { continue };
             let computed = self.value(id, precision);
             let nan = self.builder.scalar(precision, f64::NAN);
             self.builder.named("Where", &[&is_valid, &computed, &nan], &[], output);
-            let about = match output {
-                "half_widths" => {
-                    "Half-widths of the 90 % prediction intervals, valid for all answers together".to_owned()
-                }
-                _ => channel_names(
-                    meaning.either("Coordinates in mm", "Targets"),
-                    &meaning.targets(),
-                    meaning.is_array(),
-                ),
-            };
             outputs.push(value(output, kind, &[batch, Some(contents.outputs())], about));
         }
         if exported.outside.is_some() {
-            let about = contents.outside_in_words().to_owned();
+            let about = contents.outside_in_words();
             outputs.push(value("readings_outside", INT64, &[batch], about));
         }
-        let about = channel_names(
-            meaning.either("Readings in ohm", "Readings"),
-            &meaning.inputs(contents.channels()),
-            meaning.is_array(),
-        );
-        let mut inputs = vec![value(
-            meaning.readings(),
-            kind,
-            &[batch, Some(contents.channels())],
-            about,
-        )];
+        let about = meaning.either("Readings in ohm", "Readings");
+        let about = channel_names(about, &meaning.inputs, meaning.is_array);
+        let shape = [batch, Some(contents.channels())];
+        let mut inputs = vec![value(meaning.readings(), kind, &shape, &about)];
         if contents.takes_row() {
             let about = format!("Row of each reading, from 1 to {}", contents.rows);
-            inputs.push(value("row", INT64, &[batch], about));
+            inputs.push(value("row", INT64, &[batch], &about));
         }
-        if let Some(next) = self.next_state.take() {
+        if let (Some(next), Some(history)) = (self.next_state.take(), contents.history()) {
             let double = element_type(Precision::Double);
-            let shape = self.state_shape();
-            self.builder
-                .named("Where", &[&is_valid, &next, "state"], &[], "next_state");
+            let shape = [Some(history.state_rows()), Some(contents.channels())];
+            let builder = &mut self.builder;
+            builder.named("Where", &[&is_valid, &next, "state"], &[], "next_state");
             let of_state = "State of a series: zeros at the start, then next_state of the reading before";
-            inputs.push(value(
-                "time_s",
-                double,
-                &[Some(1), Some(1)],
-                "Time in seconds, NaN if it is not known".to_owned(),
-            ));
-            inputs.push(value("state", double, &shape, of_state.to_owned()));
-            outputs.push(value(
-                "next_state",
-                double,
-                &shape,
-                "State after this reading".to_owned(),
-            ));
+            let of_time = "Time in seconds, NaN if it is not known";
+            inputs.push(value("time_s", double, &[Some(1), Some(1)], of_time));
+            inputs.push(value("state", double, &shape, of_state));
+            outputs.push(value("next_state", double, &shape, "State after this reading"));
         }
-        Graph {
-            name: "decoupler".to_owned(),
-            input: inputs,
-            output: outputs,
-            ..self.builder.graph
-        }
+        Message::default()
+            .all(1, self.builder.nodes)
+            .bytes(2, "decoupler")
+            .all(5, self.builder.initializers)
+            .all(11, inputs)
+            .all(12, outputs)
     }
 }
 
 /// A list of channels, with units for own data.
 fn channel_names(what: &str, channels: &[Channel], is_array: bool) -> String {
-    let name = |channel: &Channel| {
-        if is_array {
-            channel.name.clone()
-        } else {
-            comment(&channel.title())
-        }
+    let name = |channel: &Channel| match is_array {
+        true => channel.name.clone(),
+        false => comment(&channel.title()),
     };
     format!("{what}: {}", Vec::from_iter(channels.iter().map(name)).join(", "))
 }
 
 /// Lines of a program that decodes.
-pub(super) fn usage(contents: &Contents) -> String {
+fn usage(contents: &Contents) -> String {
     let (input, output) = (contents.meaning.readings(), contents.meaning.outputs());
     let kind = match contents.outer_precision() {
         Precision::Single => "float32",
         Precision::Double => "float64",
     };
-    let row = if contents.takes_row() {
-        ", \"row\": np.array([1], np.int64)"
-    } else {
-        ""
+    let row = match contents.takes_row() {
+        true => ", \"row\": np.array([1], np.int64)",
+        false => "",
     };
     let loaded = format!(
         "    import numpy as np\n    import onnxruntime\n    session = onnxruntime.InferenceSession(\"{}.onnx\")\n",
         contents.noun
     );
-    if contents.history().is_some() {
-        let [rows, columns] = history::state_shape(contents).map(|size| size.unwrap_or(1));
+    if let Some(history) = contents.history() {
+        let (rows, columns) = (history.state_rows(), contents.channels());
         return format!(
             "{loaded}    state = np.zeros(({rows}, {columns}))\n    \
              {output}, state = session.run([\"{output}\", \"next_state\"],\n        \
@@ -384,15 +336,31 @@ pub(super) fn usage(contents: &Contents) -> String {
 /// Values of a constant of a graph that was written, which has its own name or that of all row-wires.
 #[cfg(test)]
 pub(super) fn initializer(bytes: &[u8], name: &str) -> Vec<f64> {
-    let graph = Model::decode(bytes).unwrap().graph.unwrap();
+    use message::tests::{Field, fields};
     let of_rows = format!("{name}_of_rows");
-    let tensor = graph
-        .initializer
-        .iter()
-        .find(|tensor| tensor.name == name || tensor.name == of_rows);
-    let tensor = tensor.unwrap_or_else(|| panic!("no {name}"));
-    let bytes = &tensor.raw_data;
-    match tensor.data_type == schema::DOUBLE {
+    let graph = fields(bytes).into_iter().find(|(field, _)| *field == 7);
+    let Some((_, Field::Bytes(graph))) = graph else {
+        panic!("no graph");
+    };
+    let mut initializers = fields(graph).into_iter().filter(|(field, _)| *field == 5);
+    let found = initializers.find_map(|(_, tensor)| {
+        let Field::Bytes(tensor) = tensor else { return None };
+        let get = |number| {
+            fields(tensor)
+                .into_iter()
+                .find(|(field, _)| *field == number)
+                .map(|(_, value)| value)
+        };
+        let is_named = [name, &of_rows]
+            .map(|name| Some(Field::Bytes(name.as_bytes())))
+            .contains(&get(8));
+        match (is_named, get(2), get(9)) {
+            (true, Some(Field::Int(kind)), Some(Field::Bytes(raw))) => Some((kind as i64, raw)),
+            _ => None,
+        }
+    });
+    let (kind, bytes) = found.unwrap_or_else(|| panic!("no {name}"));
+    match kind == message::DOUBLE {
         true => bytes
             .as_chunks()
             .0

@@ -5,8 +5,9 @@ use ndarray::{Array2, ArrayView1, Axis, Slice};
 use super::{Builder, Domain, Node, NodeId, Operation, Program};
 use crate::{
     dataset::PerRow,
-    decoupling::Precision,
+    decoupling::{Combined, Precision},
     network::{DecouplingNetwork, MARGIN, Quantity},
+    problem::Problem,
 };
 
 impl Program {
@@ -130,12 +131,17 @@ impl Builder {
 }
 
 impl PerRow<DecouplingNetwork> {
-    /// As [`Self::program`], with limited readings: see [`Self::clipped`].
+    /// The program that answers to the readings of `problem`: that of a combination with these networks, if there is one,
+    /// otherwise that of the networks. For a recording, readings are limited to their range in training, extended by a tenth.
     ///
     /// # Panics
-    /// As [`Self::program`].
-    pub fn clipped_program(&self, precision: Precision) -> Program {
-        self.clipped(MARGIN, |network| network.program(precision))
+    /// As [`Self::program`], or if the combination has other readings or targets.
+    pub fn decoder_program(&self, problem: &Problem, combined: Option<&Combined>) -> Program {
+        match combined {
+            Some(combined) => combined.program(self),
+            None if problem.has_nodes() => self.program(Precision::Double),
+            None => self.clipped(MARGIN, |network| network.program(Precision::Double)),
+        }
     }
 
     /// Joins one program for each network, with the readings limited to their range in training, extended by `margin` of

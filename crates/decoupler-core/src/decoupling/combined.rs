@@ -7,7 +7,7 @@ use crate::network::Networks;
 /// samples, the network of the run among them. Its weights are those with the smallest held-out error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Blend {
+pub struct Combined {
     /// Weight of the network for each target.
     pub network: Vec<f64>,
     /// Other decoders, each with its weight for each target.
@@ -17,15 +17,15 @@ pub struct Blend {
     pub margin: f64,
 }
 
-impl Blend {
+impl Combined {
     /// The combination with this network as a program. Its readings are limited to their range in training, extended by a
     /// margin.
     ///
     /// # Panics
     /// If the network has other channels or targets.
-    pub fn program(&self, networks: &Networks, precision: Precision) -> Program {
+    pub(super) fn program(&self, networks: &Networks) -> Program {
         let network = self.network.iter().any(|weight| *weight > 0.0);
-        let network = network.then(|| (networks.program(precision), self.network.clone()));
+        let network = network.then(|| (networks.program(Precision::Double), self.network.clone()));
         let parts = Vec::from_iter(network.into_iter().chain(self.others.iter().cloned()));
         networks.clipped(self.margin, |_| Program::combination(&parts))
     }

@@ -3,12 +3,13 @@
 #![expect(clippy::print_stdout, reason = "the table is shown with --nocapture")]
 
 use dashu_float::{FBig, round::mode::HalfEven};
-use decoupler_core::{
+use glam::DVec3;
+use rand::RngExt;
+
+use crate::{
     dataset::{Seed, Stream},
-    rand::RngExt,
     sensor::{Axes, Geometry, RowConductance, SensorModel},
 };
-use glam::DVec3;
 
 type Exact = FBig<HalfEven, 2>;
 
