@@ -8,8 +8,6 @@ use decoupler_core::{
 };
 use thiserror::Error;
 
-use crate::export::NetworkFile;
-
 /// Format in which a decoder is exported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BundleFormat {
@@ -61,10 +59,10 @@ pub enum ChoiceError {
 }
 
 /// Why a decoder that solves equations is not exported.
-pub(super) const EQUATIONS: &str =
+const EQUATIONS: &str =
     "it solves the equations of the sensor, which bundles do not contain: export a network or ridge instead";
 /// Why fuzzy rules are not exported.
-pub(super) const RULES: &str = "it is only for comparison: export another decoder instead, such as rbf or ridge";
+const RULES: &str = "it is only for comparison: export another decoder instead, such as rbf or ridge";
 
 impl BundleFormat {
     /// Name of the format, as in sentences.
@@ -218,14 +216,6 @@ impl BundleDecoder {
     /// `true` for the trained network, and for the combination with it: those that a network file contains.
     pub fn is_network(self) -> bool {
         matches!(self, Self::Chosen | Self::Kind(DecoderKind::Network))
-    }
-
-    /// What the network file answers with.
-    pub fn of(file: &NetworkFile) -> Self {
-        match file.combined() {
-            Some(combined) if !combined.others.is_empty() => Self::Chosen,
-            _ => Self::default(),
-        }
     }
 
     /// Name in sentences.

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use decoupler_core::{
     dataset::{Dataset, GAP, PerRow, Seed, Simulation, Stream},
     decoupling::{Combined, Decoder, Function, NodeId, Operation, Precision, Program, decode_set},
-    evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, Scores, TargetErrors, TestErrors},
+    evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
     network::{MinMax, Networks, Quantity},
     problem::{Channel, Problem},
 };
@@ -11,8 +11,7 @@ use rand::RngExt;
 use serde_json::{Value, json};
 
 use super::{
-    BundleDecoder, BundleError, BundlePrecision, ChoiceError,
-    choice::RULES,
+    BundleDecoder, BundleError, BundlePrecision,
     contents::Contents,
     exported_program::{ExportedProgram, Limits, are_positive},
     golden::{Golden, GoldenRow},
@@ -62,10 +61,7 @@ impl From<&NetworkFile> for ExportedDecoder {
     /// Exports what a file answers with: the combination that a choice of settings found, or the network.
     fn from(file: &NetworkFile) -> Self {
         // Without the recording, readings are drawn from the range in training.
-        let test = match file.settings.simulation() {
-            Some(_) => None,
-            None => file.test_set().ok(),
-        };
+        let test = file.recorded.as_ref().and_then(|_| file.test_set().ok());
         Self {
             test,
             ..Self::of_file(file, BundleDecoder::Chosen)
@@ -134,20 +130,13 @@ impl ExportedDecoder {
     fn of_file(file: &NetworkFile, decoder: BundleDecoder) -> Self {
         let combined = file.combined().filter(|_| decoder == BundleDecoder::Chosen);
         let exported = Self::of_trained(&file.network, combined, Origin::of_file(file));
-        let Scores {
-            network: used,
-            network_alone,
-            ..
-        } = &file.scores;
-        let errors = match network_alone {
-            Some(alone) if exported.kind != BundleDecoder::Chosen => alone,
-            _ => used,
-        };
+        let alone = file.scores.network_alone.as_ref();
+        let alone = alone.filter(|_| exported.kind != BundleDecoder::Chosen);
         // The intervals are those of what the file answers with.
-        let intervals = file.intervals.as_ref().filter(|_| errors == used);
+        let intervals = file.intervals.as_ref().filter(|_| alone.is_none());
         let half_widths = intervals.and_then(|intervals| intervals.targets.iter().cloned().collect());
         Self {
-            errors: errors.clone(),
+            errors: alone.unwrap_or(&file.scores.network).clone(),
             half_widths: half_widths.unwrap_or_default(),
             ..exported
         }
@@ -189,13 +178,9 @@ impl ExportedDecoder {
             BundleDecoder::Chosen => None,
         };
         let mut decoder = decoder.ok_or(BundleError::NoNetwork(kind))?;
-        let not_described = || ChoiceError::NotDescribed {
-            decoder: kind,
-            reason: RULES,
-        };
         Ok(Self {
             kind,
-            program: decoder.program().ok_or_else(not_described)?,
+            program: decoder.program().expect("a decoder without a program is refused"),
             unlimited: None,
             reading_ranges,
             target_ranges: target_ranges.into_iter().flatten().collect(),
@@ -217,21 +202,16 @@ impl ExportedDecoder {
     }
 
     fn meaning(&self) -> Meaning {
-        let Problem {
-            inputs,
-            targets,
-            sensor,
-            ..
-        } = self.origin.problem.clone();
+        let problem = self.origin.problem.clone();
         // Comments of C have no Ω.
         let in_ohm = |channel: Channel| Channel::new(channel.name, Some("ohm"));
         Meaning {
-            is_array: sensor.is_some(),
-            inputs: match sensor {
-                Some(_) => inputs.into_iter().map(in_ohm).collect(),
-                None => inputs,
+            is_array: problem.sensor.is_some(),
+            inputs: match problem.sensor {
+                Some(_) => problem.inputs.into_iter().map(in_ohm).collect(),
+                None => problem.inputs,
             },
-            targets,
+            targets: problem.targets,
             row_wires: match (&self.origin.row_wires, self.rows()) {
                 (Some(row_wires), 2..) => row_wires.clone(),
                 _ => Vec::new(),
@@ -388,13 +368,8 @@ impl ExportedDecoder {
         fields
     }
 
-    fn of_array(
-        &self,
-        Simulation {
-            sensor, scene, samples, ..
-        }: &Simulation,
-        contents: &Contents,
-    ) -> Value {
+    fn of_array(&self, simulation: &Simulation, contents: &Contents) -> Value {
+        let (sensor, scene) = (&simulation.sensor, &simulation.scene);
         let names = |channels: &[Channel]| Vec::from_iter(channels.iter().map(|channel| channel.name.clone()));
         json!({
             "array": sensor.scale.to_string(),
@@ -404,7 +379,7 @@ impl ExportedDecoder {
             "row_numbers": contents.takes_row().then_some([1, contents.rows]),
             "inputs": { "names": names(&contents.meaning.inputs), "unit": "ohm" },
             "outputs": { "names": names(&contents.meaning.targets), "unit": "mm" },
-            "training_samples": samples,
+            "training_samples": simulation.samples,
             "errors": self.errors.nodes(),
             "readings_in_training_ohm": self.ranges(),
             "output_range_mm": contents.scales[0],

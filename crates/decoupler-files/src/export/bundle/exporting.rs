@@ -237,8 +237,5 @@ fn cure(contents: &Contents) -> String {
 }
 
 fn are_constants_finite(contents: &Contents, is_finite: impl Fn(f64) -> bool) -> bool {
-    let mut values = contents
-        .constants()
-        .flat_map(|constant| Vec::from_iter(constant.values()));
-    values.all(is_finite)
+    contents.constants().all(|constant| constant.values().all(&is_finite))
 }
