@@ -1,6 +1,6 @@
-use ndarray::{Array2, Axis, Zip};
+use ndarray::{Array2, Axis};
 
-use super::{AutoSamples, judge::Judge};
+use super::{super::errors::extremes, AutoSamples, judge::Judge};
 use crate::{
     dataset::{Dataset, Memory},
     decoupling::{KernelShape, Program, ProgramDecoder, ridge},
@@ -40,6 +40,19 @@ impl Features {
         if is_defined { wanted } else { Quantity::Raw }
     }
 
+    /// Returns `true` if the quantity is defined for all readings and clearly not linear in them.
+    pub(super) fn suits(&self, quantity: Quantity) -> bool {
+        /// Ratio of the largest to the smallest reading of a channel.
+        const RATIO: f64 = 3.0;
+        let is_curved = |column| {
+            let (low, high) = extremes(column);
+            high > RATIO * low
+        };
+        let readings = self.set.readings();
+        let mut columns = readings.columns().into_iter();
+        quantity == Quantity::Raw || self.quantity(quantity) == quantity && columns.any(is_curved)
+    }
+
     /// Readings of the samples `inside`, limited as they will be in use: to the range of those outside, extended by a margin.
     pub(super) fn held_out(&self, outside: &[usize], inside: &[usize], quantity: Quantity) -> Array2<f64> {
         let all = self.set.readings();
@@ -61,20 +74,16 @@ impl Features {
             .iter()
             .map(|folds| ridge(values.view(), self.set.targets(), folds));
         let fits = fits.collect::<Result<Vec<_>, _>>()?;
-        let mut maps = fits.iter().flat_map(|fit| &fit.held_out);
-        let answers = judge.collect(|outside, inside| {
-            let map = maps.next().ok_or(NetworkError::Empty)?;
-            let values = self
-                .held_out(outside, inside, quantity)
-                .mapv(|reading| quantity.of(reading));
-            Ok::<_, NetworkError>(linear(map, &values))
-        })?;
-        let mean = fits
-            .iter()
-            .fold(Array2::zeros(fits[0].map.dim()), |sum, fit| sum + &fit.map)
-            / fits.len() as f64;
         let centre = values.mean_axis(Axis(0)).ok_or(NetworkError::Empty)?.to_vec();
-        Ok((answers, Program::of_map(&mean, quantity, &centre)))
+        let mut maps = fits.iter().flat_map(|fit| &fit.held_out);
+        let answers = self.answers(judge, quantity, |_| {
+            let map = maps.next().ok_or(NetworkError::Empty)?;
+            Ok(Program::of_map(map, quantity, &centre))
+        })?;
+        let sum = fits
+            .iter()
+            .fold(Array2::zeros(fits[0].map.dim()), |sum, fit| sum + &fit.map);
+        Ok((answers, Program::of_map(&(sum / fits.len() as f64), quantity, &centre)))
     }
 
     /// Returns the held-out answers of kernel ridge regression and the shape of its kernel.
@@ -84,19 +93,22 @@ impl Features {
         (inputs, is_linear, subset): (InputChoice, bool, usize),
     ) -> Result<(Array2<f64>, KernelShape), NetworkError> {
         let shape = KernelShape::choose(&self.set, inputs, is_linear, &judge.repeats[0])?;
-        let answers = judge.collect(|outside, inside| {
-            let program = Program::kernel(&self.set.select(outside), &shape, subset)?;
-            let readings = self.held_out(outside, inside, inputs.quantity);
-            Ok::<_, NetworkError>(ProgramDecoder::new(program).answers(&vec![0; inside.len()], readings.view()))
+        let answers = self.answers(judge, inputs.quantity, |outside| {
+            Program::kernel(&self.set.select(outside), &shape, subset)
         })?;
         Ok((answers, shape))
     }
-}
 
-/// Answers of an affine map, whose constants are the last row.
-fn linear(map: &Array2<f64>, values: &Array2<f64>) -> Array2<f64> {
-    let (weights, constants) = map.view().split_at(Axis(0), values.ncols());
-    let mut answers = values.dot(&weights);
-    Zip::from(answers.rows_mut()).for_each(|mut row| row += &constants.row(0));
-    answers
+    /// Returns the held-out answers of programs that are fitted to the samples outside of each fold.
+    pub(super) fn answers(
+        &self,
+        judge: &Judge,
+        quantity: Quantity,
+        mut fit: impl FnMut(&[usize]) -> Result<Program, NetworkError>,
+    ) -> Result<Array2<f64>, NetworkError> {
+        judge.collect(|outside, inside| {
+            let readings = self.held_out(outside, inside, quantity);
+            Ok(ProgramDecoder::new(fit(outside)?).answers(&vec![0; inside.len()], readings.view()))
+        })
+    }
 }

@@ -65,6 +65,15 @@ pub(super) fn residual(set: &Dataset, settings: &RunSettings) -> Result<(Program
     Ok((ridge, residual?))
 }
 
+/// Returns the sets of a run on all samples of `training`.
+pub(super) fn all_for_training(training: Dataset, memory: MemoryBudget) -> RunSets {
+    let validation = None;
+    RunSets {
+        memory,
+        ..RunSets::without_test(Split { training, validation })
+    }
+}
+
 impl<'a> FoldedTraining<'a> {
     /// Prepares trainings with `settings` on every `stride`th sample outside each fold; of what ridge regression leaves, with
     /// `is_on_residual`.
@@ -157,12 +166,7 @@ impl Part {
             rows,
         };
         if training.has_varying_target() {
-            let validation = None;
-            let sets = RunSets {
-                memory,
-                ..RunSets::without_test(Split { training, validation })
-            };
-            let run = Run::new(settings, sets, None, &Job::UNINTERRUPTED)?;
+            let run = Run::new(settings, all_for_training(training, memory), None, &Job::UNINTERRUPTED)?;
             let inputs = run.scalings.at(0).0.of(readings.view());
             part.run = Some((run, inputs));
         }

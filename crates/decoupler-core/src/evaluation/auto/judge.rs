@@ -1,15 +1,16 @@
-use ndarray::{Array2, ArrayView1, ArrayView2};
+use ndarray::{Array1, Array2, ArrayView1, Axis, concatenate};
 
 use super::{
     super::{
         RunError,
         cross_validation::{nth_seed, scatter},
-        errors::{mean, varies},
+        errors::varies,
     },
     AutoSamples,
 };
 use crate::{
     dataset::{Folds, Seed, SplitBy, Stream},
+    network::NetworkError,
     numerics::student_quantile,
 };
 
@@ -39,14 +40,12 @@ impl Judge {
         let is_few = set.samples() < Self::FEW && samples.by != SplitBy::Time;
         let count = if is_few { Self::DIVISIONS } else { 1 };
         let divide = |repeat| folds(samples, wanted, nth_seed(seed, repeat));
-        let mut truth = set.targets().to_owned();
-        for _ in 1..count {
-            truth.append(ndarray::Axis(0), set.targets()).expect("the same targets");
-        }
+        // One that varies only by rounding does not vary.
+        let variance = |column: ArrayView1<'_, f64>| if varies(column) { column.var(0.0) } else { 0.0 };
         Ok(Self {
             repeats: (0..count).map(divide).collect::<Result<_, _>>()?,
-            truth,
-            variances: variances(set.targets()),
+            truth: concatenate(Axis(0), &vec![set.targets(); count]).expect("the same targets"),
+            variances: set.targets().columns().into_iter().map(variance).collect(),
         })
     }
 
@@ -76,10 +75,10 @@ impl Judge {
     }
 
     /// Collects held-out answers, part by part.
-    pub(super) fn collect<E>(
+    pub(super) fn collect(
         &self,
-        mut answer: impl FnMut(&[usize], &[usize]) -> Result<Array2<f64>, E>,
-    ) -> Result<Array2<f64>, E> {
+        mut answer: impl FnMut(&[usize], &[usize]) -> Result<Array2<f64>, NetworkError>,
+    ) -> Result<Array2<f64>, NetworkError> {
         let mut all = Array2::zeros(self.truth.dim());
         for (outside, inside, rows) in self.divisions() {
             scatter(&mut all, &rows, &answer(&outside, inside)?);
@@ -87,35 +86,41 @@ impl Judge {
         Ok(all)
     }
 
+    /// Targets that count.
+    pub(super) fn counted(&self) -> Vec<usize> {
+        (0..self.variances.len())
+            .filter(|&target| self.variances[target] > 0.0)
+            .collect()
+    }
+
+    /// Relative squared error of each held-out answer for a target that counts.
+    fn squares(&self, target: usize, answers: &Array2<f64>) -> Array1<f64> {
+        (&answers.column(target) - &self.truth.column(target)).powi(2) / self.variances[target]
+    }
+
     /// Mean of e/σ² of held-out answers in each part.
     fn of_parts(&self, answers: &Array2<f64>) -> Vec<f64> {
+        let counted = self.counted();
+        let squares = counted.iter().map(|target| self.squares(*target, answers));
+        let squares = squares.fold(Array1::<f64>::zeros(answers.nrows()), |sum, squares| sum + squares);
         let of_part = |(_, _, rows): (Vec<usize>, &[usize], Vec<usize>)| {
-            let squares = rows.iter().map(|&row| self.square(answers, row));
-            squares.sum::<f64>() / self.counted() / rows.len().max(1) as f64
+            squares.select(Axis(0), &rows).sum() / (counted.len() * rows.len()).max(1) as f64
         };
         self.divisions().map(of_part).collect()
     }
 
-    fn counted(&self) -> f64 {
-        self.variances.iter().filter(|variance| **variance > 0.0).count().max(1) as f64
-    }
-
     /// Relative error of held-out answers, and its standard error from the differences between parts.
     pub(super) fn error(&self, answers: &Array2<f64>) -> (f64, f64) {
-        let square: f64 = (0..self.variances.len())
-            .map(|target| self.unexplained(target, answers))
-            .sum();
-        let error = (square / self.counted()).sqrt();
+        let counted = self.counted();
+        let squares = counted.iter().map(|target| self.unexplained(*target, answers));
+        let error = (squares.sum::<f64>() / counted.len().max(1) as f64).sqrt();
         let spread = standard_error(&self.of_parts(answers));
         (error, spread / (2.0 * error).max(f64::MIN_POSITIVE))
     }
 
-    /// Share e/σ² of the variance of a target that held-out answers leave; 0 if it does not count.
+    /// Share e/σ² of the variance of a target that held-out answers leave.
     pub(super) fn unexplained(&self, target: usize, answers: &Array2<f64>) -> f64 {
-        let variance = self.variances[target];
-        let off = &answers.column(target) - &self.truth.column(target);
-        let square = off.mapv(|error| error * error).sum() / off.len() as f64;
-        if variance > 0.0 { square / variance } else { 0.0 }
+        self.squares(target, answers).sum() / answers.nrows() as f64
     }
 
     /// Returns `true` if `ours` are better than `theirs`, and than the mean, by a paired t-test of the logarithms of their errors
@@ -133,21 +138,10 @@ impl Judge {
             && error < WORTH * self.error(theirs).0.min(1.0)
             && mean > student_quantile(0.02 / candidates as f64, gains.len() as f64 - 1.0) * standard_error(&gains)
     }
-
-    /// Sum of e/σ² of one row of held-out answers over the targets that count.
-    fn square(&self, answers: &Array2<f64>, row: usize) -> f64 {
-        let targets = self
-            .variances
-            .iter()
-            .enumerate()
-            .filter(|(_, variance)| **variance > 0.0);
-        let square = |(t, variance): (usize, &f64)| (answers[[row, t]] - self.truth[[row, t]]).powi(2) / variance;
-        targets.map(square).sum()
-    }
 }
 
 /// Divides the samples into up to `wanted` folds by their rule; a part without enough groups is divided in time.
-pub(super) fn folds(samples: &AutoSamples<'_>, wanted: usize, seed: Seed) -> Result<Folds, RunError> {
+fn folds(samples: &AutoSamples<'_>, wanted: usize, seed: Seed) -> Result<Folds, RunError> {
     let mut rng = seed.rng(Stream::Folds);
     let (set, groups) = (samples.set, samples.set.snapshots().len());
     Ok(match samples.by {
@@ -158,24 +152,8 @@ pub(super) fn folds(samples: &AutoSamples<'_>, wanted: usize, seed: Seed) -> Res
     })
 }
 
-/// Variance of each target; 0 for one that does not vary, or only by rounding.
-fn variances(targets: ArrayView2<'_, f64>) -> Vec<f64> {
-    let of_target = |column: ArrayView1<'_, f64>| {
-        let mean = mean(column);
-        let squares = column.iter().map(|value| (value - mean).powi(2));
-        if varies(column) {
-            squares.sum::<f64>() / column.len() as f64
-        } else {
-            0.0
-        }
-    };
-    targets.columns().into_iter().map(of_target).collect()
-}
-
 /// Standard error of the mean of a few values.
 fn standard_error(values: &[f64]) -> f64 {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    (squares / (count - 1.0).max(1.0) / count).sqrt()
+    let freedom = (values.len() as f64 - 1.0).max(1.0);
+    (ArrayView1::from(values).var(0.0) / freedom).sqrt()
 }

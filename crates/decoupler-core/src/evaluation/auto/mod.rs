@@ -59,6 +59,13 @@ pub struct AutoSamples<'a> {
     pub by: SplitBy,
 }
 
+impl AutoSamples<'_> {
+    /// Returns `true` if the times of the readings are known.
+    fn is_timed(&self) -> bool {
+        self.past.is_some_and(|(history, _)| history.times_s().is_some())
+    }
+}
+
 /// Settings given by the user, which are not searched.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AutoFixed {
@@ -103,7 +110,7 @@ pub struct AutoChoice {
 }
 
 /// Everything that a search tried.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AutoRecord {
     /// Budget in seconds of one core.

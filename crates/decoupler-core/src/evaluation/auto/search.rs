@@ -1,16 +1,16 @@
 use ndarray::{Array2, Axis, concatenate};
 
 use super::{
-    super::{Combination, Initialization, Run, RunError, RunSets, RunSettings, errors::extremes},
+    super::{Combination, Initialization, Run, RunError, RunSettings},
     AutoChoice, AutoFixed, AutoProgress, AutoRecord, AutoSamples, Combined, MULTIPLICATIONS_PER_SECOND, Tried,
     TriedModel, describe_features,
     features::{Features, margin},
-    folded_training::{FoldedTraining, residual, training_multiplications},
+    folded_training::{FoldedTraining, all_for_training, residual, training_multiplications},
     judge::Judge,
     spans::memories,
 };
 use crate::{
-    dataset::{Memory, Split, SplitBy},
+    dataset::{Memory, SplitBy},
     decoupling::{KernelShape, Precision, Program, Regression},
     job::Job,
     machine::MemoryBudget,
@@ -65,18 +65,18 @@ enum Fit {
     Done(Program),
     /// A kernel of this shape, with this many centres.
     Kernel(KernelShape, usize),
-    /// A network of these settings; on what ridge regression leaves unless it is the last member.
-    Network(Box<RunSettings>),
+    /// A network; on what ridge regression leaves unless it is the last member.
+    Network,
 }
 
 /// A candidate that was cross-validated.
 #[derive(Clone)]
 struct Member {
     fit: Fit,
+    /// Settings of a network, and the inputs of others.
+    settings: RunSettings,
     /// Held-out answers.
     answers: Array2<f64>,
-    /// Relative error.
-    error: f64,
     /// Index of its record.
     place: usize,
 }
@@ -95,8 +95,8 @@ struct Search<'a> {
     /// Multiplications used so far.
     work: f64,
     record: AutoRecord,
-    /// Networks that were tried.
-    networks: Vec<Member>,
+    /// The best network so far.
+    best: Option<Member>,
     job: &'a Job<'a>,
     on_progress: &'a mut dyn FnMut(AutoProgress),
 }
@@ -116,7 +116,7 @@ pub fn choose_settings(
     on_progress: &mut dyn FnMut(AutoProgress),
 ) -> Result<AutoChoice, RunError> {
     let judge = Judge::new(samples, Judge::FOLDS, base.seed)?;
-    if judge.variances.iter().all(|variance| *variance == 0.0) {
+    if judge.counted().is_empty() {
         return Err(TrainingError::NothingVaries.into());
     }
     let search = Search {
@@ -131,16 +131,10 @@ pub fn choose_settings(
             budget_s,
             folds: judge.repeats[0].count(),
             by: samples.by,
-            tried: Vec::new(),
-            chosen: 0,
-            combined: None,
-            training_s: 0.0,
-            left_out: Vec::new(),
-            undetermined: Vec::new(),
-            leaks: Vec::new(),
+            ..AutoRecord::default()
         },
         judge,
-        networks: Vec::new(),
+        best: None,
         job,
         on_progress,
     };
@@ -151,20 +145,25 @@ impl Search<'_> {
     /// Compares what is cheap, which decides on the features, and then networks.
     fn run(mut self) -> Result<AutoChoice, RunError> {
         let (features, mut members, inputs) = self.compare_fits()?;
-        self.is_wide = self.shape(&features, FIRST_HIDDEN[0]).weights() > self.samples.set.samples();
+        let small = RunSettings {
+            hidden: FIRST_HIDDEN[0],
+            inputs: InputChoice::MEASURED,
+            ..self.base
+        };
+        self.is_wide = self.shape(&features, &small).weights() > self.samples.set.samples();
         self.try_networks(&features, inputs)?;
-        let best = self.best().ok_or(TrainingError::NothingVaries)?;
+        let best = self.best.clone().ok_or(TrainingError::NothingVaries)?;
         let network = self.finalist(&features, best)?;
         self.record.chosen = network.place;
-        if let Fit::Network(settings) = &network.fit {
-            let alone = RunSettings {
-                starts: 1,
-                initialization: Initialization::Random,
-                ..**settings
-            };
-            let limit = 0.5 * self.left(&features, &alone);
-            members.extend(self.try_network(&features, (alone, true), (limit, MIN_EPOCHS))?);
-        }
+        let alone = RunSettings {
+            starts: 1,
+            initialization: Initialization::Random,
+            ..network.settings
+        };
+        // The training on all samples must fit into the budget, too.
+        let training = self.epoch_of_all(&features, &alone) * alone.training.stopping.epochs as f64;
+        let limit = 0.5 * (self.budget() - self.work - training).max(0.0);
+        members.extend(self.try_network(&features, (alone, true), (limit, MIN_EPOCHS))?);
         members.push(network);
         self.combine(&features, &members)
     }
@@ -176,16 +175,15 @@ impl Search<'_> {
         let plain = Features::of(self.samples, &none).ok_or(TrainingError::NothingVaries)?;
         let mut ridges = Vec::new();
         for quantity in [Quantity::Raw, Quantity::LogResistance, Quantity::Conductance] {
-            if self.suits(quantity) {
-                ridges.extend(self.try_ridge(&plain, quantity)?.map(|ridge| (ridge, quantity)));
+            if plain.suits(quantity) {
+                ridges.extend(self.try_ridge(&plain, quantity)?);
             }
         }
-        let best = |one: &&(Member, Quantity), other: &&(Member, Quantity)| one.0.error.total_cmp(&other.0.error);
-        let (ridge, quantity) = ridges
+        let best = ridges
             .iter()
-            .min_by(best)
-            .cloned()
-            .ok_or(TrainingError::NothingVaries)?;
+            .min_by(|one, other| self.error(one).total_cmp(&self.error(other)));
+        let ridge = best.cloned().ok_or(TrainingError::NothingVaries)?;
+        let quantity = ridge.settings.inputs.quantity;
         let scaling = self.fixed.scaling.unwrap_or_default();
         let mut inputs = InputChoice { quantity, scaling };
         let mut members = vec![self.mean(&plain)?, ridge];
@@ -193,7 +191,10 @@ impl Search<'_> {
         let tried = match &self.fixed.memory {
             Some(memory) => Vec::from_iter(Some(memory.clone()).filter(|memory| !memory.is_empty())),
             // Differences have no logarithms and reciprocals.
-            None if self.tries_memory() => memories(self.samples, quantity == Quantity::Raw),
+            // Not where neighbours are in different folds.
+            None if self.samples.by != SplitBy::Random && (self.fixed.tries_memory || self.samples.is_timed()) => {
+                memories(self.samples, quantity == Quantity::Raw)
+            }
             None => Vec::new(),
         };
         let mut past = Vec::new();
@@ -204,7 +205,7 @@ impl Search<'_> {
             }
         }
         let varying = self.judge.variances.clone();
-        for target in (0..varying.len()).filter(|target| varying[*target] > 0.0) {
+        for target in self.judge.counted() {
             let now = self.least(target, members.iter());
             let then = self.least(target, past.iter().map(|(_, ridge)| ridge));
             if now > LEAK[0] && then < LEAK[1] {
@@ -218,9 +219,9 @@ impl Search<'_> {
         finer.variances.clone_from(&self.judge.variances);
         let of_plain = plain.ridge(&finer, quantity)?.0;
         let is_taken = |(with, _): &&(Features, Member)| {
-            let of_memory = || Some(with.ridge(&finer, with.quantity(quantity)).ok()?.0);
-            let is_better = |answers: Array2<f64>| finer.is_clearly_better(&answers, &of_plain, past.len());
-            self.fixed.memory.is_some() || of_memory().is_some_and(is_better)
+            let of_memory = || with.ridge(&finer, with.quantity(quantity));
+            let is_better = |(answers, _)| finer.is_clearly_better(&answers, &of_plain, past.len());
+            self.fixed.memory.is_some() || of_memory().is_ok_and(is_better)
         };
         let error = |(_, with): &(Features, Member)| self.judge.error(&with.answers).0;
         let taken = past
@@ -236,12 +237,11 @@ impl Search<'_> {
             members.extend(self.try_kernels(&features, inputs)?);
         }
         self.leave_out_open(&features, &members);
-        compared.extend(ridges.into_iter().map(|(ridge, _)| ridge));
+        compared.extend(ridges);
         compared.extend(past.into_iter().map(|(_, ridge)| ridge));
-        for member in members.iter_mut().chain(&mut compared) {
+        for member in members.iter().chain(&compared) {
             let tried = &mut self.record.tried[member.place];
             (tried.error, tried.standard_error) = self.judge.error(&member.answers);
-            member.error = tried.error;
         }
         Ok((features, members, inputs))
     }
@@ -255,7 +255,7 @@ impl Search<'_> {
     /// Lets only those targets count that a member explains, unless none does.
     fn leave_out_open(&mut self, features: &Features, members: &[Member]) {
         let is_leak = |target: &usize| self.record.leaks.iter().any(|(leak, _)| leak == target);
-        let varying = Vec::from_iter((0..self.judge.variances.len()).filter(|t| self.judge.variances[*t] > 0.0));
+        let varying = self.judge.counted();
         let is_open = |target: &usize| {
             features.memory.is_empty() && is_leak(target) || self.least(*target, members.iter()) > UNDETERMINED
         };
@@ -266,25 +266,14 @@ impl Search<'_> {
         }
     }
 
-    /// Memories are tried only where time is known, and never where neighbours are in different folds.
-    fn tries_memory(&self) -> bool {
-        let is_timed = self
-            .samples
-            .past
-            .is_some_and(|(history, _)| history.times_s().is_some());
-        self.samples.by != SplitBy::Random && (is_timed || self.fixed.tries_memory)
+    /// Error of a member.
+    fn error(&self, member: &Member) -> f64 {
+        self.record.tried[member.place].error
     }
 
     fn mean(&mut self, features: &Features) -> Result<Member, RunError> {
-        let targets = self.samples.set.targets();
-        let answers = self.judge.collect(|outside, inside| {
-            let mean = targets
-                .select(Axis(0), outside)
-                .mean_axis(Axis(0))
-                .ok_or(TrainingError::NothingVaries)?;
-            let shape = (inside.len(), mean.len());
-            Ok::<_, RunError>(mean.broadcast(shape).expect("rows of the mean").to_owned())
-        })?;
+        let mean = |outside: &[usize]| Ok(Program::mean(&features.set.select(outside)));
+        let answers = features.answers(&self.judge, Quantity::Raw, mean)?;
         let fit = Fit::Done(Program::mean(&features.set));
         Ok(self.keep(features, InputChoice::MEASURED, TriedModel::Mean, (fit, answers), 0.0))
     }
@@ -361,7 +350,7 @@ impl Search<'_> {
             }));
         }
         self.try_all(features, begun, 0.45)?;
-        let best = self.settings().ok_or(TrainingError::NothingVaries)?;
+        let best = self.best.as_ref().ok_or(TrainingError::NothingVaries)?.settings;
         if self.fixed.hidden.is_none() {
             let hidden = |hidden| with(best, |settings| settings.hidden = hidden);
             let largest = if is_few { 2 * first } else { HIDDEN[HIDDEN.len() - 1] };
@@ -374,7 +363,7 @@ impl Search<'_> {
                 self.try_while_better(features, fewer)?;
             }
         }
-        let best = self.settings().unwrap_or(best);
+        let best = self.best.as_ref().map_or(best, |best| best.settings);
         let mut variants = Vec::new();
         if self.fixed.scaling.is_none() {
             variants.push(with(best, |settings| {
@@ -392,35 +381,27 @@ impl Search<'_> {
                     .map(|method| with(best, |settings| settings.training.method = method)),
             );
         }
-        self.try_all(features, variants, 0.7)
+        self.try_all(features, variants, 0.7)?;
+        Ok(())
     }
 
-    /// Settings of the best network so far.
-    fn settings(&self) -> Option<RunSettings> {
-        match self.best()?.fit {
-            Fit::Network(settings) => Some(*settings),
-            _ => None,
-        }
-    }
-
-    fn best(&self) -> Option<Member> {
-        let best = self
-            .networks
-            .iter()
-            .min_by(|one, other| one.error.total_cmp(&other.error));
-        best.cloned()
-    }
-
-    /// Cross-validates networks within this share of the budget for all work until then.
-    fn try_all(&mut self, features: &Features, all: Vec<RunSettings>, share: f64) -> Result<(), RunError> {
-        let mut left = all.len();
+    /// Cross-validates networks within this share of the budget for all work until then; returns `true` if one is better than
+    /// all before.
+    fn try_all(&mut self, features: &Features, all: Vec<RunSettings>, share: f64) -> Result<bool, RunError> {
+        let (mut left, mut is_any_better) = (all.len(), false);
         for settings in all {
             let limit = (share * self.budget() - self.work).max(0.0) / left as f64;
-            let tried = self.try_network(features, (settings, false), (limit, MIN_EPOCHS))?;
-            self.networks.extend(tried);
+            if let Some(tried) = self.try_network(features, (settings, false), (limit, MIN_EPOCHS))?
+                && self
+                    .best
+                    .as_ref()
+                    .is_none_or(|best| self.error(&tried) < self.error(best))
+            {
+                (self.best, is_any_better) = (Some(tried), true);
+            }
             left -= 1;
         }
-        Ok(())
+        Ok(is_any_better)
     }
 
     /// Cross-validates networks up to the first that is no better than all before it; returns `true` if there is a better one.
@@ -431,9 +412,7 @@ impl Search<'_> {
     ) -> Result<bool, RunError> {
         let mut is_any_better = false;
         for settings in candidates {
-            let before = self.best().map_or(f64::INFINITY, |best| best.error);
-            self.try_all(features, vec![settings], 0.6)?;
-            if self.best().is_none_or(|best| best.error >= before) {
+            if !self.try_all(features, vec![settings], 0.6)? {
                 break;
             }
             is_any_better = true;
@@ -441,15 +420,9 @@ impl Search<'_> {
         Ok(is_any_better)
     }
 
-    /// Multiplications that are left for the cross-validation of a network if its training is to fit into the budget.
-    fn left(&self, features: &Features, settings: &RunSettings) -> f64 {
-        let epochs = settings.training.stopping.epochs;
-        (self.budget() - self.work - self.epoch_of_all(features, settings) * epochs as f64).max(0.0)
-    }
-
     /// Multiplications of an epoch on all samples.
     fn epoch_of_all(&self, features: &Features, settings: &RunSettings) -> f64 {
-        let shape = self.shape_of(features, settings);
+        let shape = self.shape(features, settings);
         training_multiplications(settings, shape, self.judge.samples(), 0)
     }
 
@@ -461,7 +434,7 @@ impl Search<'_> {
         (settings, is_on_residual): (RunSettings, bool),
         (limit, needed): (f64, usize),
     ) -> Result<Option<Member>, RunError> {
-        let is_first = self.networks.is_empty();
+        let is_first = self.best.is_none();
         let stride = self.stride(features, &settings, limit, needed);
         let Some(stride) = stride.or(is_first.then_some(self.largest_stride())) else {
             return Ok(None);
@@ -502,15 +475,13 @@ impl Search<'_> {
             training.step();
             used += training.epoch_multiplications;
         }
-        self.work += used;
         let Some((epoch, _, answers)) = training.best else {
+            self.work += used;
             return Ok(None);
         };
         let epochs = self.fixed.epochs.unwrap_or(epoch);
-        let mut settings = settings;
-        settings.training.stopping.epochs = epochs;
-        let fit = Fit::Network(Box::new(settings));
-        let member = self.keep(features, settings.inputs, model(epochs), (fit, answers), used);
+        let mut member = self.keep(features, settings.inputs, model(epochs), (Fit::Network, answers), used);
+        member.settings = with(settings, |settings| settings.training.stopping.epochs = epochs);
         self.record.tried[member.place].is_cut_off = is_cut_off;
         Ok(Some(member))
     }
@@ -518,7 +489,7 @@ impl Search<'_> {
     /// Returns the smallest number such that, with every so manieth sample, trainings of [`TYPICAL_EPOCHS`] stay within
     /// `limit` multiplications; `None` if too few samples would be left, even for the `needed` epochs.
     fn stride(&self, features: &Features, settings: &RunSettings, limit: f64, needed: usize) -> Option<usize> {
-        let shape = self.shape_of(features, settings);
+        let shape = self.shape(features, settings);
         let folds = self.record.folds;
         let samples = self.judge.samples() * (folds - 1) / folds;
         let epoch = |stride: usize| {
@@ -540,16 +511,12 @@ impl Search<'_> {
         (self.judge.samples() / ENOUGH).clamp(1, 20)
     }
 
-    fn shape(&self, features: &Features, hidden: usize) -> Shape {
-        Shape {
+    fn shape(&self, features: &Features, settings: &RunSettings) -> Shape {
+        let mut shape = Shape {
             inputs: features.set.channels(),
-            hidden,
+            hidden: settings.hidden,
             outputs: features.set.outputs(),
-        }
-    }
-
-    fn shape_of(&self, features: &Features, settings: &RunSettings) -> Shape {
-        let mut shape = self.shape(features, settings.hidden);
+        };
         if settings.inputs.scaling == ScalingChoice::Whitening {
             let inputs = Inputs::fit(settings.inputs, features.set.readings(), NoiseSource::default());
             if let Ok(InputScaling::Whitening(whitening)) = inputs.as_ref().map(Inputs::scaling) {
@@ -589,9 +556,7 @@ impl Search<'_> {
         (fit, answers): (Fit, Array2<f64>),
         work: f64,
     ) -> Member {
-        if !matches!(fit, Fit::Network(..)) {
-            self.work += work;
-        }
+        self.work += work;
         let (error, standard_error) = self.judge.error(&answers);
         self.record.tried.push(Tried {
             memory: features.memory.clone(),
@@ -605,24 +570,10 @@ impl Search<'_> {
         });
         Member {
             fit,
+            settings: RunSettings { inputs, ..self.base },
             answers,
-            error,
             place: self.record.tried.len() - 1,
         }
-    }
-
-    /// Returns `true` if the quantity is defined for all readings and clearly not linear in them.
-    fn suits(&self, quantity: Quantity) -> bool {
-        /// Ratio of the largest to the smallest reading of a channel.
-        const RATIO: f64 = 3.0;
-        let readings = self.samples.set.readings();
-        let is_curved = |column| {
-            let (low, high) = extremes(column);
-            high > RATIO * low
-        };
-        quantity == Quantity::Raw
-            || readings.iter().all(|&reading| quantity.accepts(reading))
-                && readings.columns().into_iter().any(is_curved)
     }
 
     /// The scaled conjugate gradient with this weight decay for each sample.
@@ -634,10 +585,7 @@ impl Search<'_> {
     fn finalist(&mut self, features: &Features, best: Member) -> Result<Member, RunError> {
         /// Epochs beyond the best.
         const BEYOND: usize = 5;
-        let Fit::Network(settings) = &best.fit else {
-            return Ok(best);
-        };
-        let settings = **settings;
+        let settings = best.settings;
         let epochs = settings.training.stopping.epochs + BEYOND;
         // Each is trained once without every fold, and once on all samples.
         let of_one = self.epoch_of_all(features, &settings) * (epochs * self.judge.parts()) as f64;
@@ -652,7 +600,7 @@ impl Search<'_> {
             None
         };
         Ok(match tried {
-            Some(tried) if tried.error < best.error || self.fixed.starts.is_some() => tried,
+            Some(tried) if self.error(&tried) < self.error(&best) || self.fixed.starts.is_some() => tried,
             _ => best,
         })
     }
@@ -671,22 +619,20 @@ impl Search<'_> {
                     .scaled_add(*weight, &members[member].answers.column(target));
             }
         }
-        let counted = Vec::from_iter((0..targets).filter(|target| self.judge.variances[*target] > 0.0));
+        let counted = self.judge.counted();
         for (member, weights) in members.iter().zip(weights.rows()) {
             let sum: f64 = counted.iter().map(|target| weights[*target]).sum();
             self.record.tried[member.place].share = sum / counted.len().max(1) as f64;
         }
         self.record.combined = Some(self.judge.error(&answers).0);
         let network = members.len() - 1;
-        let Fit::Network(settings) = &members[network].fit else {
-            return Err(TrainingError::NothingVaries.into());
-        };
-        let mut settings = **settings;
-        settings.combine = Combination::Mean;
+        let settings = with(members[network].settings, |settings| {
+            settings.combine = Combination::Mean
+        });
         let mut others = Vec::new();
         for (member, weights) in members[..network].iter().zip(weights.rows()) {
             if weights.iter().any(|weight| *weight > 0.0) {
-                others.push((self.fitted(features, &member.fit)?, weights.to_vec()));
+                others.push((self.fitted(features, member)?, weights.to_vec()));
             }
         }
         let epochs = settings.training.stopping.epochs as f64;
@@ -745,19 +691,15 @@ impl Search<'_> {
     }
 
     /// Fits a candidate to all samples.
-    fn fitted(&mut self, features: &Features, fit: &Fit) -> Result<Program, RunError> {
+    fn fitted(&mut self, features: &Features, member: &Member) -> Result<Program, RunError> {
         self.job.check()?;
-        Ok(match fit {
+        Ok(match &member.fit {
             Fit::Done(program) => program.clone(),
             Fit::Kernel(shape, subset) => Program::kernel(&features.set, shape, *subset)?,
-            Fit::Network(settings) => {
-                let (ridge, training) = residual(&features.set, settings)?;
-                let validation = None;
-                let sets = RunSets {
-                    memory: self.memory,
-                    ..RunSets::without_test(Split { training, validation })
-                };
-                let mut run = Run::new(**settings, sets, None, self.job)?;
+            Fit::Network => {
+                let (ridge, training) = residual(&features.set, &member.settings)?;
+                let sets = all_for_training(training, self.memory);
+                let mut run = Run::new(member.settings, sets, None, self.job)?;
                 run.finish(self.job)?;
                 let ones = vec![1.0; features.set.outputs()];
                 let network = run.network().program(Precision::Double);

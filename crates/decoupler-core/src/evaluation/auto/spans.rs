@@ -16,7 +16,8 @@ pub(super) fn memories(samples: &AutoSamples<'_>, differences: bool) -> Vec<Memo
     let span = |place: i32| {
         let length = SHORTEST * ratio.powf(f64::from(place) / f64::from(CONSTANTS - 1));
         match interval_s {
-            Some(interval_s) => Span::Seconds(rounded(length * interval_s)),
+            // Two significant digits.
+            Some(interval_s) => Span::Seconds(format!("{:.1e}", length * interval_s).parse().expect("a number")),
             None => Span::Samples(length.round()),
         }
     };
@@ -28,15 +29,4 @@ pub(super) fn memories(samples: &AutoSamples<'_>, differences: bool) -> Vec<Memo
         ..Memory::default()
     };
     sets.into_iter().map(memory).collect()
-}
-
-/// Rounds to two significant digits.
-fn rounded(value: f64) -> f64 {
-    let unit = 10.0_f64.powf(value.log10().floor() - 1.0);
-    // Division by a power of ten gives the nearest double of the decimal.
-    if unit >= 1.0 {
-        (value / unit).round() * unit
-    } else {
-        (value / unit).round() / (1.0 / unit).round()
-    }
 }
