@@ -275,13 +275,12 @@ impl AutoRecord {
                 format_below_one(*now, 2)
             )
         }));
-        let ridges = self.tried.iter().filter(|tried| tried.model == TriedModel::Ridge);
-        let best = |one: &&Tried, other: &&Tried| one.error.total_cmp(&other.error);
-        let networks = self
-            .tried
-            .iter()
-            .filter(|tried| matches!(tried.model, TriedModel::Network { .. }));
-        if let (Some(network), Some(ridge)) = (networks.min_by(best), ridges.min_by(best))
+        let best = |is_one: fn(&TriedModel) -> bool| {
+            let of_model = self.tried.iter().filter(|tried| is_one(&tried.model));
+            of_model.min_by(|one, other| one.error.total_cmp(&other.error))
+        };
+        let network = best(|model| matches!(model, TriedModel::Network { .. }));
+        if let (Some(network), Some(ridge)) = (network, best(|model| *model == TriedModel::Ridge))
             && network.error >= ridge.error
         {
             remarks.push(format!(

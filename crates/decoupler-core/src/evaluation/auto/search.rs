@@ -1,4 +1,4 @@
-use ndarray::{Array2, Axis, concatenate};
+use ndarray::{Array2, ArrayView1, Axis};
 
 use super::{
     super::{Combination, Initialization, Run, RunError, RunSettings},
@@ -352,15 +352,20 @@ impl Search<'_> {
         self.try_all(features, begun, 0.45)?;
         let best = self.best.as_ref().ok_or(TrainingError::NothingVaries)?.settings;
         if self.fixed.hidden.is_none() {
-            let hidden = |hidden| with(best, |settings| settings.hidden = hidden);
             let largest = if is_few { 2 * first } else { HIDDEN[HIDDEN.len() - 1] };
-            let more = HIDDEN
-                .into_iter()
-                .filter(|&hidden| hidden > first && hidden <= largest)
-                .map(hidden);
-            if !self.try_while_better(features, more)? {
-                let fewer = HIDDEN.into_iter().rev().filter(|&hidden| hidden < first).map(hidden);
-                self.try_while_better(features, fewer)?;
+            let more = HIDDEN.into_iter().filter(|&hidden| hidden > first && hidden <= largest);
+            let fewer = HIDDEN.into_iter().rev().filter(|&hidden| hidden < first);
+            for numbers in [Vec::from_iter(more), Vec::from_iter(fewer)] {
+                for hidden in numbers {
+                    let settings = with(best, |settings| settings.hidden = hidden);
+                    if !self.try_all(features, vec![settings], 0.6)? {
+                        break;
+                    }
+                }
+                // Fewer are tried only if more are no better.
+                if self.best.as_ref().is_some_and(|best| best.settings.hidden != first) {
+                    break;
+                }
             }
         }
         let best = self.best.as_ref().map_or(best, |best| best.settings);
@@ -400,22 +405,6 @@ impl Search<'_> {
                 (self.best, is_any_better) = (Some(tried), true);
             }
             left -= 1;
-        }
-        Ok(is_any_better)
-    }
-
-    /// Cross-validates networks up to the first that is no better than all before it; returns `true` if there is a better one.
-    fn try_while_better(
-        &mut self,
-        features: &Features,
-        candidates: impl Iterator<Item = RunSettings>,
-    ) -> Result<bool, RunError> {
-        let mut is_any_better = false;
-        for settings in candidates {
-            if !self.try_all(features, vec![settings], 0.6)? {
-                break;
-            }
-            is_any_better = true;
         }
         Ok(is_any_better)
     }
@@ -594,31 +583,23 @@ impl Search<'_> {
         let starts = self.fixed.starts.unwrap_or(starts.clamp(1.0, most) as usize);
         let committee = with(settings, |settings| settings.starts = starts);
         let limit = of_one * starts as f64;
-        let tried = if starts > 1 {
-            self.try_network(features, (committee, false), (limit, epochs))?
-        } else {
-            None
-        };
-        Ok(match tried {
-            Some(tried) if self.error(&tried) < self.error(&best) || self.fixed.starts.is_some() => tried,
-            _ => best,
-        })
+        if starts > 1
+            && let Some(tried) = self.try_network(features, (committee, false), (limit, epochs))?
+            && (self.error(&tried) < self.error(&best) || self.fixed.starts.is_some())
+        {
+            return Ok(tried);
+        }
+        Ok(best)
     }
 
     /// Combines the members, the last of which is the network.
     fn combine(mut self, features: &Features, members: &[Member]) -> Result<AutoChoice, RunError> {
         let (samples, targets) = (self.judge.samples(), self.samples.set.outputs());
-        let mut answers = Array2::zeros(self.judge.truth.dim());
-        let mut weights = Array2::<f64>::zeros((members.len(), targets));
-        for target in 0..targets {
-            let of_target = self.weights(members, target);
-            for (member, weight) in of_target.iter().enumerate() {
-                weights[[member, target]] = *weight;
-                answers
-                    .column_mut(target)
-                    .scaled_add(*weight, &members[member].answers.column(target));
-            }
-        }
+        let of_targets = Vec::from_iter((0..targets).map(|target| self.weights(members, target)));
+        let weights = Array2::from_shape_fn((members.len(), targets), |(member, target)| of_targets[target][member]);
+        let parts = members.iter().zip(weights.rows());
+        let parts = parts.map(|(member, weights)| &member.answers * &weights);
+        let answers = parts.fold(Array2::zeros(self.judge.truth.dim()), |sum, part| sum + part);
         let counted = self.judge.counted();
         for (member, weights) in members.iter().zip(weights.rows()) {
             let sum: f64 = counted.iter().map(|target| weights[*target]).sum();
@@ -656,7 +637,7 @@ impl Search<'_> {
     /// their place, and never worse than the best alone.
     fn weights(&self, members: &[Member], target: usize) -> Vec<f64> {
         let truth = self.judge.truth.column(target);
-        let square = |answers: ndarray::ArrayView1<'_, f64>| (&answers - &truth).mapv(|error| error * error).sum();
+        let square = |answers: ArrayView1<'_, f64>| (&answers - &truth).mapv(|error| error * error).sum();
         let squares = Vec::from_iter(members.iter().map(|member| square(member.answers.column(target))));
         let best = squares.iter().copied().fold(f64::INFINITY, f64::min);
         let least = best / (truth.len() as f64 * truth.var(0.0)).max(f64::MIN_POSITIVE);
@@ -666,17 +647,13 @@ impl Search<'_> {
         let is_among = |m: &usize| squares[*m] <= best * WORST_MEMBER.powi(2) && (*m < 2 || !is_open);
         let mut among = Vec::from_iter((0..members.len()).filter(is_among));
         loop {
-            let columns = Vec::from_iter(
-                among
-                    .iter()
-                    .map(|&m| members[m].answers.column(target).insert_axis(Axis(1))),
-            );
-            let columns = concatenate(Axis(1), &columns).expect("one answer for each sample");
+            let answer = |(row, place): (usize, usize)| members[among[place]].answers[[row, target]];
+            let columns = Array2::from_shape_fn((truth.len(), among.len()), answer);
             let found = convex_weights(&columns, truth);
             let kept = Vec::from_iter((0..among.len()).filter(|&place| found[place] >= SMALLEST_WEIGHT));
             let mut weights = vec![0.0; members.len()];
             if kept.len() == among.len() || kept.is_empty() {
-                if square(columns.dot(&ndarray::ArrayView1::from(&found)).view()) > best || kept.is_empty() {
+                if square(columns.dot(&ArrayView1::from(&found)).view()) > best || kept.is_empty() {
                     weights[squares.iter().position(|square| *square == best).unwrap_or(0)] = 1.0;
                 } else {
                     among
@@ -716,13 +693,8 @@ fn with(mut settings: RunSettings, change: impl FnOnce(&mut RunSettings)) -> Run
 
 /// Bayesian regularisation for recordings.
 fn regularized() -> Method {
-    let usual = RegularizationSettings::recorded();
-    Method::BayesianRegularization(RegularizationSettings {
-        damping: Damping {
-            mu: PER_NOISE * DAMPING.mu,
-            mu_decrease: DAMPING.mu_decrease,
-            ..usual.damping
-        },
-        ..usual
-    })
+    let mut settings = RegularizationSettings::recorded();
+    settings.damping.mu = PER_NOISE * DAMPING.mu;
+    settings.damping.mu_decrease = DAMPING.mu_decrease;
+    Method::BayesianRegularization(settings)
 }

@@ -1,7 +1,7 @@
 use ndarray::{Array1, ArrayView1, ArrayView2};
 use thiserror::Error;
 
-use super::{Evidence, Interval, interval::SumVariance, product, scaled_deviations};
+use super::{Evidence, Interval, interval::SumVariance, scaled_deviations};
 use crate::{
     dataset::{Dataset, SplitBy},
     evaluation::{
@@ -87,9 +87,9 @@ impl Determination {
         }
         let (off, scale) = scaled_deviations(truth);
         let errors = (&answers - &truth) / scale;
-        let variation = product(&off, &off);
+        let variation = off.dot(&off);
         // 1 − R².
-        let unexplained = product(&errors, &errors) / variation;
+        let unexplained = errors.dot(&errors) / variation;
         // Influence of each sample, to first order.
         let influences = (&errors * &errors - &off * unexplained * &off) / variation;
         let spread = evidence.variance(&influences);
@@ -167,11 +167,11 @@ impl Determination {
 /// variance of the products of the residuals with the noise in the answers, whose share is 1 − slope of the targets on
 /// the answers.
 fn of_fits(evidence: &Evidence, off: &Array1<f64>, answers: &Array1<f64>) -> f64 {
-    let (variation, squares) = (product(off, off), product(answers, answers));
+    let (variation, squares) = (off.dot(off), answers.dot(answers));
     if squares <= f64::EPSILON * f64::EPSILON * variation {
         return 0.0;
     }
-    let slope = product(off, answers) / squares;
+    let slope = off.dot(answers) / squares;
     let cross = (off - answers * slope) * answers * 2.0 / variation;
     (1.0 - slope).clamp(0.0, 1.0) * evidence.variance(&cross).variance
 }

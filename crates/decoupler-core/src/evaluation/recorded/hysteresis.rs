@@ -3,7 +3,10 @@ use serde::Serialize;
 
 use crate::{
     dataset::{Dataset, SplitBy},
-    evaluation::{TargetErrors, errors::extremes},
+    evaluation::{
+        TargetErrors,
+        errors::{extremes, mean},
+    },
     numerics::student_quantile,
 };
 
@@ -120,7 +123,7 @@ impl HysteresisLoop {
         }
         let means = Vec::from_iter(errors.iter().map(|branches| {
             let is_common = branches.iter().all(|errors| errors.len() >= Self::MIN_SAMPLES);
-            is_common.then(|| branches.each_ref().map(|errors| mean(errors)))
+            is_common.then(|| branches.each_ref().map(|errors| mean(errors.into())))
         }));
         // Mean distance of each excursion from the middle of the branches.
         let distance = |&sample: &usize| {
@@ -131,7 +134,7 @@ impl HysteresisLoop {
             let distances = branch
                 .iter()
                 .map(|samples| Vec::from_iter(samples.iter().filter_map(distance)));
-            Vec::from_iter(distances.filter(|of| !of.is_empty()).map(|of| mean(&of)))
+            Vec::from_iter(distances.filter(|of| !of.is_empty()).map(|of| mean((&of).into())))
         });
         let level = |(level, means): (usize, &Option<[f64; 2]>)| {
             let [loading, unloading] = (*means)?;
@@ -172,10 +175,6 @@ impl HysteresisLoop {
     }
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
 /// Returns `true` if the means of the values of two branches differ significantly.
 fn differ(branches: [Vec<f64>; 2]) -> bool {
     let [loading, unloading] = branches.each_ref().map(|values| values.len() as f64);
@@ -183,7 +182,7 @@ fn differ(branches: [Vec<f64>; 2]) -> bool {
         return false;
     }
     let freedom = loading + unloading - 2.0;
-    let means = branches.each_ref().map(|values| mean(values));
+    let means = branches.each_ref().map(|values| mean(values.into()));
     let pairs = branches.iter().zip(means);
     let squares = pairs.flat_map(|(values, mean)| values.iter().map(move |value| (value - mean).powi(2)));
     let standard_error = (squares.sum::<f64>() / freedom * (1.0 / loading + 1.0 / unloading)).sqrt();

@@ -32,7 +32,3 @@ fn scaled_deviations(values: ArrayView1<'_, f64>) -> (Array1<f64>, f64) {
     let largest = off.fold(0.0_f64, |largest, off| largest.max(off.abs()));
     (off / largest, largest)
 }
-
-fn product(one: &Array1<f64>, other: &Array1<f64>) -> f64 {
-    one.iter().zip(other).map(|(one, other)| one * other).sum()
-}

@@ -1,6 +1,6 @@
 use ndarray::{Array1, ArrayView1};
 
-use super::{product, scaled_deviations};
+use super::scaled_deviations;
 use crate::{
     dataset::{Dataset, SplitBy},
     problem::Channel,
@@ -101,7 +101,7 @@ fn unit_vector(channel: ArrayView1<'_, f64>) -> Option<Array1<f64>> {
     let is_constant = channel.iter().all(|value| *value == channel[0]);
     (!is_constant).then(|| {
         let (off, _) = scaled_deviations(channel);
-        let length = product(&off, &off).sqrt();
+        let length = off.dot(&off).sqrt();
         off / length
     })
 }
@@ -109,7 +109,7 @@ fn unit_vector(channel: ArrayView1<'_, f64>) -> Option<Array1<f64>> {
 /// Returns the index of the first of `others` that equals this vector up to sign and a `distance`; all have length 1.
 fn position_of_parallel(one: &Array1<f64>, others: &[Option<Array1<f64>>], distance: f64) -> Option<usize> {
     let is_parallel = |other: &Array1<f64>| {
-        let along = product(one, other);
+        let along = one.dot(other);
         let apart = one.iter().zip(other).map(|(a, b)| (a - along.signum() * b).powi(2));
         along.abs() > 0.999_999 && apart.sum::<f64>().sqrt() < distance
     };
