@@ -1,6 +1,10 @@
 use ndarray::{Array2, Axis};
 
-use super::{super::errors::extremes, AutoSamples, judge::Judge};
+use super::{
+    super::{cross_validation::scatter, errors::extremes},
+    AutoSamples,
+    judge::Judge,
+};
 use crate::{
     dataset::{Dataset, Memory},
     decoupling::{KernelShape, Program, ProgramDecoder, ridge},
@@ -75,40 +79,43 @@ impl Features {
             .map(|folds| ridge(values.view(), self.set.targets(), folds));
         let fits = fits.collect::<Result<Vec<_>, _>>()?;
         let centre = values.mean_axis(Axis(0)).ok_or(NetworkError::Empty)?.to_vec();
-        let mut maps = fits.iter().flat_map(|fit| &fit.held_out);
-        let answers = self.answers(judge, quantity, |_| {
-            let map = maps.next().ok_or(NetworkError::Empty)?;
-            Ok(Program::of_map(map, quantity, &centre))
-        })?;
         let sum = fits
             .iter()
             .fold(Array2::zeros(fits[0].map.dim()), |sum, fit| sum + &fit.map);
-        Ok((answers, Program::of_map(&(sum / fits.len() as f64), quantity, &centre)))
+        let mean = sum / fits.len() as f64;
+        let mut maps = fits.iter().flat_map(|fit| &fit.held_out).chain([&mean]);
+        self.fitted(judge, quantity, |_| {
+            let map = maps.next().ok_or(NetworkError::Empty)?;
+            Ok(Program::of_map(map, quantity, &centre))
+        })
     }
 
-    /// Returns the held-out answers of kernel ridge regression and the shape of its kernel.
+    /// Returns the held-out answers of kernel ridge regression and the regression fitted to all samples.
     pub(super) fn kernel(
         &self,
         judge: &Judge,
         (inputs, is_linear, subset): (InputChoice, bool, usize),
-    ) -> Result<(Array2<f64>, KernelShape), NetworkError> {
+    ) -> Result<(Array2<f64>, Program), NetworkError> {
         let shape = KernelShape::choose(&self.set, inputs, is_linear, &judge.repeats[0])?;
-        let answers = self.answers(judge, inputs.quantity, |outside| {
-            Program::kernel(&self.set.select(outside), &shape, subset)
-        })?;
-        Ok((answers, shape))
+        self.fitted(judge, inputs.quantity, |samples| {
+            Program::kernel(&self.set.select(samples), &shape, subset)
+        })
     }
 
-    /// Returns the held-out answers of programs that are fitted to the samples outside of each fold.
-    pub(super) fn answers(
+    /// Returns the held-out answers of programs that are fitted to the samples outside of each fold, and the program that is
+    /// fitted to all samples, which comes last.
+    pub(super) fn fitted(
         &self,
         judge: &Judge,
         quantity: Quantity,
         mut fit: impl FnMut(&[usize]) -> Result<Program, NetworkError>,
-    ) -> Result<Array2<f64>, NetworkError> {
-        judge.collect(|outside, inside| {
-            let readings = self.held_out(outside, inside, quantity);
-            Ok(ProgramDecoder::new(fit(outside)?).answers(&vec![0; inside.len()], readings.view()))
-        })
+    ) -> Result<(Array2<f64>, Program), NetworkError> {
+        let mut answers = Array2::zeros(judge.truth.dim());
+        for (outside, inside, rows) in judge.divisions() {
+            let readings = self.held_out(&outside, inside, quantity);
+            let of_part = ProgramDecoder::new(fit(&outside)?).answers(&vec![0; inside.len()], readings.view());
+            scatter(&mut answers, &rows, &of_part);
+        }
+        Ok((answers, fit(&Vec::from_iter(0..self.set.samples()))?))
     }
 }

@@ -1,16 +1,11 @@
 use ndarray::{Array1, Array2, ArrayView1, Axis, concatenate};
 
 use super::{
-    super::{
-        RunError,
-        cross_validation::{nth_seed, scatter},
-        errors::varies,
-    },
+    super::{RunError, cross_validation::nth_seed, errors::varies},
     AutoSamples,
 };
 use crate::{
     dataset::{Folds, Seed, SplitBy, Stream},
-    network::NetworkError,
     numerics::student_quantile,
 };
 
@@ -72,18 +67,6 @@ impl Judge {
                 )
             })
         })
-    }
-
-    /// Collects held-out answers, part by part.
-    pub(super) fn collect(
-        &self,
-        mut answer: impl FnMut(&[usize], &[usize]) -> Result<Array2<f64>, NetworkError>,
-    ) -> Result<Array2<f64>, NetworkError> {
-        let mut all = Array2::zeros(self.truth.dim());
-        for (outside, inside, rows) in self.divisions() {
-            scatter(&mut all, &rows, &answer(&outside, inside)?);
-        }
-        Ok(all)
     }
 
     /// Targets that count.

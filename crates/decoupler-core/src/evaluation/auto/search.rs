@@ -58,21 +58,11 @@ const DAMPING: Damping = Damping {
 /// Ratio of the damping of Bayesian regularisation, which is relative to the noise, to that of Levenberg-Marquardt.
 const PER_NOISE: f64 = 100.0;
 
-/// How a candidate is fitted to all samples.
-#[derive(Clone)]
-enum Fit {
-    /// It is fitted.
-    Done(Program),
-    /// A kernel of this shape, with this many centres.
-    Kernel(KernelShape, usize),
-    /// A network; on what ridge regression leaves unless it is the last member.
-    Network,
-}
-
 /// A candidate that was cross-validated.
 #[derive(Clone)]
 struct Member {
-    fit: Fit,
+    /// The candidate fitted to all samples; `None` for a network, which is trained if it is used.
+    program: Option<Program>,
     /// Settings of a network, and the inputs of others.
     settings: RunSettings,
     /// Held-out answers.
@@ -272,10 +262,9 @@ impl Search<'_> {
     }
 
     fn mean(&mut self, features: &Features) -> Result<Member, RunError> {
-        let mean = |outside: &[usize]| Ok(Program::mean(&features.set.select(outside)));
-        let answers = features.answers(&self.judge, Quantity::Raw, mean)?;
-        let fit = Fit::Done(Program::mean(&features.set));
-        Ok(self.keep(features, InputChoice::MEASURED, TriedModel::Mean, (fit, answers), 0.0))
+        let mean = |samples: &[usize]| Ok(Program::mean(&features.set.select(samples)));
+        let fitted = features.fitted(&self.judge, Quantity::Raw, mean)?;
+        Ok(self.keep(features, InputChoice::MEASURED, TriedModel::Mean, fitted, 0.0))
     }
 
     fn try_ridge(&mut self, features: &Features, quantity: Quantity) -> Result<Option<Member>, RunError> {
@@ -289,11 +278,10 @@ impl Search<'_> {
             return Ok(None);
         }
         self.announce(features, inputs, &TriedModel::Ridge)?;
-        let Ok((answers, program)) = features.ridge(&self.judge, quantity) else {
-            return Ok(None);
-        };
-        let fit = (Fit::Done(program), answers);
-        Ok(Some(self.keep(features, inputs, TriedModel::Ridge, fit, work)))
+        let fitted = features.ridge(&self.judge, quantity);
+        Ok(fitted
+            .ok()
+            .map(|fitted| self.keep(features, inputs, TriedModel::Ridge, fitted, work)))
     }
 
     /// Tries kernel ridge regression with and without a linear kernel, with as many centres as a quarter of the budget allows.
@@ -316,9 +304,12 @@ impl Search<'_> {
             let model = TriedModel::Kernel { is_linear };
             self.announce(features, inputs, &model)?;
             let work = work(subset);
-            if let Ok((answers, shape)) = features.kernel(&self.judge, (inputs, is_linear, subset)) {
-                members.push(self.keep(features, inputs, model, (Fit::Kernel(shape, subset), answers), work));
-            }
+            let fitted = features.kernel(&self.judge, (inputs, is_linear, subset));
+            members.extend(
+                fitted
+                    .ok()
+                    .map(|fitted| self.keep(features, inputs, model, fitted, work)),
+            );
         }
         Ok(members)
     }
@@ -469,7 +460,13 @@ impl Search<'_> {
             return Ok(None);
         };
         let epochs = self.fixed.epochs.unwrap_or(epoch);
-        let mut member = self.keep(features, settings.inputs, model(epochs), (Fit::Network, answers), used);
+        let mut member = self.keep(
+            features,
+            settings.inputs,
+            model(epochs),
+            (answers, None::<Program>),
+            used,
+        );
         member.settings = with(settings, |settings| settings.training.stopping.epochs = epochs);
         self.record.tried[member.place].is_cut_off = is_cut_off;
         Ok(Some(member))
@@ -542,7 +539,7 @@ impl Search<'_> {
         features: &Features,
         inputs: InputChoice,
         model: TriedModel,
-        (fit, answers): (Fit, Array2<f64>),
+        (answers, program): (Array2<f64>, impl Into<Option<Program>>),
         work: f64,
     ) -> Member {
         self.work += work;
@@ -558,7 +555,7 @@ impl Search<'_> {
             is_cut_off: false,
         });
         Member {
-            fit,
+            program: program.into(),
             settings: RunSettings { inputs, ..self.base },
             answers,
             place: self.record.tried.len() - 1,
@@ -667,22 +664,18 @@ impl Search<'_> {
         }
     }
 
-    /// Fits a candidate to all samples.
+    /// Returns the candidate fitted to all samples; a network on what ridge regression leaves of them.
     fn fitted(&mut self, features: &Features, member: &Member) -> Result<Program, RunError> {
+        if let Some(program) = &member.program {
+            return Ok(program.clone());
+        }
         self.job.check()?;
-        Ok(match &member.fit {
-            Fit::Done(program) => program.clone(),
-            Fit::Kernel(shape, subset) => Program::kernel(&features.set, shape, *subset)?,
-            Fit::Network => {
-                let (ridge, training) = residual(&features.set, &member.settings)?;
-                let sets = all_for_training(training, self.memory);
-                let mut run = Run::new(member.settings, sets, None, self.job)?;
-                run.finish(self.job)?;
-                let ones = vec![1.0; features.set.outputs()];
-                let network = run.network().program(Precision::Double);
-                Program::combination(&[(ridge, ones.clone()), (network, ones)])
-            }
-        })
+        let (ridge, training) = residual(&features.set, &member.settings)?;
+        let mut run = Run::new(member.settings, all_for_training(training, self.memory), None, self.job)?;
+        run.finish(self.job)?;
+        let ones = vec![1.0; features.set.outputs()];
+        let network = run.network().program(Precision::Double);
+        Ok(Program::combination(&[(ridge, ones.clone()), (network, ones)]))
     }
 }
 
