@@ -29,12 +29,21 @@ impl Judge {
     pub(super) const FEW: usize = 40;
     const DIVISIONS: usize = 4;
 
-    /// Divides the samples by their rule into up to `wanted` folds.
+    /// Divides the samples by their rule into up to `wanted` folds; without enough groups, in time.
     pub(super) fn new(samples: &AutoSamples<'_>, wanted: usize, seed: Seed) -> Result<Self, RunError> {
         let set = samples.set;
         let is_few = set.samples() < Self::FEW && samples.by != SplitBy::Time;
         let count = if is_few { Self::DIVISIONS } else { 1 };
-        let divide = |repeat| folds(samples, wanted, nth_seed(seed, repeat));
+        let groups = set.snapshots().len();
+        let divide = |repeat| {
+            let mut rng = nth_seed(seed, repeat).rng(Stream::Folds);
+            match samples.by {
+                SplitBy::Random => Folds::by(set, wanted, SplitBy::Random, &mut rng),
+                SplitBy::Group if groups >= 2 => Folds::by(set, wanted.min(groups), SplitBy::Group, &mut rng),
+                SplitBy::Time if groups >= 2 * wanted => Folds::by(set, wanted, SplitBy::Time, &mut rng),
+                SplitBy::Time | SplitBy::Group => Folds::by(&set.ungrouped(), wanted, SplitBy::Time, &mut rng),
+            }
+        };
         // One that varies only by rounding does not vary.
         let variance = |column: ArrayView1<'_, f64>| if varies(column) { column.var(0.0) } else { 0.0 };
         Ok(Self {
@@ -121,18 +130,6 @@ impl Judge {
             && error < WORTH * self.error(theirs).0.min(1.0)
             && mean > student_quantile(0.02 / candidates as f64, gains.len() as f64 - 1.0) * standard_error(&gains)
     }
-}
-
-/// Divides the samples into up to `wanted` folds by their rule; a part without enough groups is divided in time.
-fn folds(samples: &AutoSamples<'_>, wanted: usize, seed: Seed) -> Result<Folds, RunError> {
-    let mut rng = seed.rng(Stream::Folds);
-    let (set, groups) = (samples.set, samples.set.snapshots().len());
-    Ok(match samples.by {
-        SplitBy::Random => Folds::by(set, wanted, SplitBy::Random, &mut rng)?,
-        SplitBy::Group if groups >= 2 => Folds::by(set, wanted.min(groups), SplitBy::Group, &mut rng)?,
-        SplitBy::Time if groups >= 2 * wanted => Folds::by(set, wanted, SplitBy::Time, &mut rng)?,
-        SplitBy::Time | SplitBy::Group => Folds::by(&set.ungrouped(), wanted, SplitBy::Time, &mut rng)?,
-    })
 }
 
 /// Standard error of the mean of a few values.

@@ -209,29 +209,28 @@ impl Tried {
 impl fmt::Display for TriedModel {
     /// Writes `ridge`, or `2 × 8 hidden nodes, br`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self::Network {
-            hidden,
-            method,
-            starts,
-            is_on_residual,
-            ..
-        } = self
-        else {
-            return f.write_str(match self {
-                Self::Mean => "mean",
-                Self::Kernel { is_linear: true } => "kernel ridge, Gaussian + linear",
-                Self::Kernel { is_linear: false } => "kernel ridge, Gaussian",
-                _ => "ridge",
-            });
-        };
-        write!(f, "{starts} × {hidden} hidden nodes, {}", method.short_name())?;
-        // Candidates that differ in nothing else.
-        if let Method::ScaledConjugateGradient { decay, .. } = method
-            && *decay > 0.0
-        {
-            write!(f, ", decay {decay:.2}")?;
+        match self {
+            Self::Mean => f.write_str("mean"),
+            Self::Ridge => f.write_str("ridge"),
+            Self::Kernel { is_linear: true } => f.write_str("kernel ridge, Gaussian + linear"),
+            Self::Kernel { is_linear: false } => f.write_str("kernel ridge, Gaussian"),
+            Self::Network {
+                hidden,
+                method,
+                starts,
+                is_on_residual,
+                ..
+            } => {
+                write!(f, "{starts} × {hidden} hidden nodes, {}", method.short_name())?;
+                // Candidates that differ in nothing else.
+                if let Method::ScaledConjugateGradient { decay, .. } = method
+                    && *decay > 0.0
+                {
+                    write!(f, ", decay {decay:.2}")?;
+                }
+                f.write_str(if *is_on_residual { ", added to ridge" } else { "" })
+            }
         }
-        f.write_str(if *is_on_residual { ", added to ridge" } else { "" })
     }
 }
 

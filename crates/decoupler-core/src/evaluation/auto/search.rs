@@ -605,7 +605,7 @@ impl Search<'_> {
         self.record.combined = Some(self.judge.error(&answers).0);
         let network = members.len() - 1;
         let settings = with(members[network].settings, |settings| {
-            settings.combine = Combination::Mean
+            settings.combine = Combination::Mean;
         });
         let mut others = Vec::new();
         for (member, weights) in members[..network].iter().zip(weights.rows()) {

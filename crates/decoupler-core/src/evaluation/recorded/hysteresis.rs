@@ -1,4 +1,4 @@
-use ndarray::{Array2, ArrayView2};
+use ndarray::{ArrayView1, ArrayView2, Axis};
 use serde::Serialize;
 
 use crate::{
@@ -84,13 +84,13 @@ impl HysteresisLoop {
         };
         let pairs = targets.columns().into_iter().zip(answers.columns());
         pairs
-            .map(|(targets, answers)| Self::of_one(&targets.to_vec(), &answers.to_vec(), &stretches))
+            .map(|(targets, answers)| Self::of_one(targets, answers, &stretches))
             .collect()
     }
 
     /// Measures the answers for one target; the samples of each stretch have the same number in `stretches`.
-    fn of_one(actual: &[f64], decoded: &[f64], stretches: &[usize]) -> Option<Self> {
-        let (lowest, highest) = extremes(actual.into());
+    fn of_one(actual: ArrayView1<'_, f64>, decoded: ArrayView1<'_, f64>, stretches: &[usize]) -> Option<Self> {
+        let (lowest, highest) = extremes(actual);
         let range = highest - lowest;
         if !(range > 0.0 && range.is_finite()) {
             return None;
@@ -109,7 +109,7 @@ impl HysteresisLoop {
             return None;
         }
         let branches = passages.each_ref().map(|branch| branch.concat());
-        let error = |sample: usize| decoded[sample] - actual[sample];
+        let error = &decoded - &actual;
         let level_of = |sample: usize| {
             let level = ((actual[sample] - lowest) / range * Self::LEVELS as f64) as usize;
             level.min(Self::LEVELS - 1)
@@ -118,7 +118,7 @@ impl HysteresisLoop {
         let mut errors = vec![[Vec::new(), Vec::new()]; Self::LEVELS];
         for (branch, samples) in branches.iter().enumerate() {
             for &sample in samples {
-                errors[level_of(sample)][branch].push(error(sample));
+                errors[level_of(sample)][branch].push(error[sample]);
             }
         }
         let means = Vec::from_iter(errors.iter().map(|branches| {
@@ -128,7 +128,7 @@ impl HysteresisLoop {
         // Mean distance of each excursion from the middle of the branches.
         let distance = |&sample: &usize| {
             let [loading, unloading] = means[level_of(sample)]?;
-            Some(error(sample) - 0.5 * (loading + unloading))
+            Some(error[sample] - 0.5 * (loading + unloading))
         };
         let distances = passages.map(|branch| {
             let distances = branch
@@ -152,9 +152,8 @@ impl HysteresisLoop {
             return None;
         }
         let [loading, unloading] = branches.each_ref().map(|samples| {
-            let column =
-                |values: &[f64]| Array2::from_shape_fn((samples.len(), 1), |(place, _)| values[samples[place]]);
-            TargetErrors::measure(column(actual).view(), column(decoded).view()).remove(0)
+            let [actual, decoded] = [actual, decoded].map(|of| of.select(Axis(0), samples).insert_axis(Axis(1)));
+            TargetErrors::measure(actual.view(), decoded.view()).remove(0)
         });
         Some(Self {
             loading,
@@ -190,7 +189,7 @@ fn differ(branches: [Vec<f64>; 2]) -> bool {
 }
 
 /// Adds the excursions of one stretch between the first and the last turning point that are certain.
-fn add_passages(passages: &mut Passages, actual: &[f64], stretch: &[usize], range: f64) {
+fn add_passages(passages: &mut Passages, actual: ArrayView1<'_, f64>, stretch: &[usize], range: f64) {
     let (reversal, rest) = (HysteresisLoop::REVERSAL * range, HysteresisLoop::REST * range);
     let mut turning_points = Vec::new();
     let (mut lowest, mut highest) = (stretch[0], stretch[0]);
@@ -222,6 +221,7 @@ fn add_passages(passages: &mut Passages, actual: &[f64], stretch: &[usize], rang
 
 #[cfg(test)]
 mod tests {
+    use ndarray::Array2;
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;
