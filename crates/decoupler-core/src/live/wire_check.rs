@@ -121,7 +121,7 @@ struct Fit {
 }
 
 /// A reading predicted from others.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Predicted {
     log_reading: f64,
     /// ln R̂ with the gain of the row.
@@ -183,10 +183,8 @@ impl WireCheck {
         let own = |&ohm: &f64| source.relative_to(ohm).own.max(SMALLEST_NOISE);
         let stroke_mm = scene.stroke_mm(&model.geometry);
         let half_way = vec![DVec3::Z * (0.5 * stroke_mm); model.scale.nodes_per_row()];
-        let mut half_way_ohm = Vec::with_capacity(rows.len() * model.scale.columns());
-        for &row in rows {
-            half_way_ohm.extend(model.row_resistances(row, &half_way)?);
-        }
+        let half_way_ohm: Result<Vec<_>, _> = rows.iter().map(|&row| model.row_resistances(row, &half_way)).collect();
+        let half_way_ohm = half_way_ohm?.concat();
         Ok(Self {
             model: *model,
             rows: rows.to_vec(),
@@ -199,7 +197,7 @@ impl WireCheck {
             // Rows are decoded one by one but share this error: it must not be penalised more than once in total.
             common: noise.drift * (rows.len() as f64).sqrt(),
             log_full_scale: (noise.range_ohm(model)?.1 * (1.0 - 1e-9)).ln(),
-            suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * half_way_ohm.len()),
+            suspicious_ohm: Vec::new(),
             half_way_ohm,
             coordinates_mm: vec![0.0; model.scale.coordinates_per_row()],
             displacements_mm: half_way,
@@ -297,10 +295,8 @@ impl WireCheck {
     fn residual(&mut self, row_index: usize, readings_ohm: &[f64], missing: &Range<usize>) -> Option<Fit> {
         let row = self.rows[row_index];
         let coordinates_mm = &mut self.coordinates_mm;
-        (self
-            .estimator
-            .solve_without(missing.clone(), row, readings_ohm, coordinates_mm))
-        .ok()?;
+        let solved = (self.estimator).solve_without(missing.clone(), row, readings_ohm, coordinates_mm);
+        solved.ok()?;
         let nodes = self.displacements_mm.iter_mut().zip(coordinates_mm.chunks_exact(3));
         for (node, (displacement, at)) in nodes.enumerate() {
             *displacement = self.model.displacement_mm(row, node, DVec3::from_slice(at));
