@@ -1,8 +1,8 @@
 //! Arithmetic on frames as they arrive: re-zeroing, drift, and faulty wires from the residual.
 //!
 //! [`WireCheck`] checks whether Eq. (2) explains the readings, identifies the faulty wire, and decodes without it.
-//! [`DriftMonitor`] reports readings that no longer look like those of the training. [`ZeroGains`] are those of the
-//! unloaded state, from recent frames.
+//! [`DriftMonitor`] reports readings that no longer look like those of the training. [`ZeroGains`] are the gains of the
+//! unloaded state, estimated from recent frames.
 
 mod drift;
 mod error;
