@@ -14,7 +14,7 @@ use std::{
 use clap::Args;
 use decoupler_core::{
     dataset::{DatasetError, Place, Simulation},
-    live::{FaultEvent, LeftOutDecoder, WireCheck},
+    live::{FaultEvent, WireCheck},
     scene::Noise,
 };
 use decoupler_files::{
@@ -333,7 +333,6 @@ pub(super) struct Faults {
 
 struct Watch {
     check: WireCheck,
-    left_out: LeftOutDecoder,
     /// Latest readings of every row read: rows × M4.
     frame_ohm: Vec<f64>,
     /// True for rows with readings since the last check.
@@ -372,7 +371,6 @@ impl Faults {
         Ok(Self {
             watch: Some(Watch {
                 check: WireCheck::new(sensor, &scene, &rows).map_err(Failure::Sensor)?,
-                left_out: LeftOutDecoder::new(sensor, &scene, &rows).map_err(Failure::Sensor)?,
                 frame_ohm: vec![0.0; rows.len() * scale.columns()],
                 is_new: vec![false; rows.len()],
                 columns: scale.columns(),
@@ -389,10 +387,10 @@ impl Faults {
         }
     }
 
-    /// Decoder that leaves out the wires of the reported fault, if any, with the latest readings of every row read.
-    pub(super) fn left_out(&mut self) -> Option<(&mut LeftOutDecoder, &[f64])> {
+    /// Check that decodes without the wires of the reported fault, if any, with the latest readings of every row read.
+    pub(super) fn left_out(&mut self) -> Option<(&mut WireCheck, &[f64])> {
         let watch = self.watch.as_mut()?;
-        Some((&mut watch.left_out, &watch.frame_ohm))
+        Some((&mut watch.check, &watch.frame_ohm))
     }
 
     /// Stores the readings of a line; returns `true` if all rows have new readings since the last check.
@@ -427,7 +425,7 @@ impl Faults {
         let Some(watch) = &mut self.watch else { return };
         watch.is_new.fill(false);
         match watch.check.check(&watch.frame_ohm) {
-            Some(FaultEvent::Named(fault)) => {
+            Some(fault @ FaultEvent::Named { .. }) => {
                 warn(&format!(
                     "line {line}: {fault}; left out from here on; frames are decoded from the other readings \
                      by the Gauss-Newton method"
@@ -438,13 +436,10 @@ impl Faults {
                  be wrong; check the wiring, the geometry and the order of the rows"
             )),
             Some(FaultEvent::Recovered) => {
-                warn(&format!(
-                    "line {line}: the readings agree with Eq. (2) again; all wires are used"
-                ));
+                warn(&format!("line {line}: {}; all wires are used", FaultEvent::Recovered));
             }
             None => {}
         }
-        watch.left_out.leave_out(watch.check.named());
     }
 }
 

@@ -7,7 +7,7 @@ use std::{
 use clap::ValueEnum;
 use decoupler_core::{
     decoupling::{Decoder, ProgramDecoder},
-    live::LeftOutDecoder,
+    live::WireCheck,
     text::counted,
 };
 use decoupler_files::{
@@ -207,7 +207,7 @@ impl<'a> Answers<'a> {
         line: u64,
         parsed: ParsedLine<'_>,
         kept: &[KeptCell],
-        left_out: Option<(&mut LeftOutDecoder, &[f64])>,
+        left_out: Option<(&mut WireCheck, &[f64])>,
     ) -> io::Result<bool> {
         let outputs = self.file.problem.targets.len();
         let (first_row, readings) = match parsed {
@@ -224,15 +224,12 @@ impl<'a> Answers<'a> {
         // A wire can be left out only if the row is known.
         let fault = left_out
             .as_ref()
-            .and_then(|(left_out, _)| left_out.fault())
+            .and_then(|(check, _)| check.named())
             .filter(|_| first_row.is_some());
         let first_row = first_row.unwrap_or(0);
         let lines = || readings.chunks_exact(channels);
         let is_answered = match left_out {
-            Some((left_out, frame_ohm)) if fault.is_some() => match parsed {
-                ParsedLine::Snapshot(_) => left_out.decode(readings, answer),
-                _ => left_out.decode_row_of(frame_ohm, first_row, answer),
-            },
+            Some((check, frame_ohm)) if fault.is_some() => check.decode(frame_ohm, first_row..first_row + rows, answer),
             _ => {
                 let mut rows = lines().zip(answer.chunks_exact_mut(outputs)).enumerate();
                 rows.try_for_each(|(row, (readings, answer))| {
@@ -286,7 +283,7 @@ impl<'a> Answers<'a> {
                 }
                 write!(self.output, ",\"coordinates_outside\":{targets_outside}")?;
                 match fault {
-                    Some(fault) => writeln!(self.output, ",\"left_out\":\"{}\"}}", fault.wire)?,
+                    Some(wire) => writeln!(self.output, ",\"left_out\":\"{wire}\"}}")?,
                     None => writeln!(self.output, ",\"left_out\":null}}")?,
                 }
             }

@@ -18,7 +18,7 @@ use decoupler_core::{
         Combination, DecoderReport, ErrorTable, Errors, Outlook, Run, RunError, StartRecord, TestErrors,
         auto::AutoRecord,
         best_start, error_remarks,
-        recorded::{Determination, Extrapolation, HysteresisLoop, Undetermined},
+        recorded::{Determination, HysteresisLoop, Undetermined, extrapolation},
     },
     network::InputChoice,
     problem::{Channel, Problem},
@@ -238,7 +238,7 @@ impl<'a> Trained<'a> {
         let source = match (&self.sets.recordings, settings.simulation()) {
             (Some(recordings), _) => SourceReport::Recording(Box::new(RecordingFigures {
                 recording: RecordingReport::new(&self.sets.sets, recordings),
-                test_outside_training: self.extrapolation().map_or(0.0, |found| found.share),
+                test_outside_training: self.extrapolation().map_or(0.0, |(share, _)| share),
                 seconds: self.run.wall_time().map(|time| time.as_secs_f64()),
                 targets: targets(&file.problem.targets, &scores.network, &determined, &scores.coverage),
                 baselines: BTreeMap::from([
@@ -293,11 +293,11 @@ impl<'a> Trained<'a> {
         HysteresisLoop::of_test(self.run.test(), self.run.decouple_test().view(), by)
     }
 
-    /// Test samples of a recording outside the range of its training samples.
-    fn extrapolation(&self) -> Option<Extrapolation> {
+    /// Share of the test samples of a recording outside the range of its training samples, with a warning.
+    fn extrapolation(&self) -> Option<(f64, Option<String>)> {
         let Recording { inputs, targets, .. } = &self.sets.recordings.as_ref()?.training;
         let training = &self.sets.sets.split.training;
-        Some(Extrapolation::measure(training, self.run.test(), inputs, targets))
+        Some(extrapolation(training, self.run.test(), inputs, targets))
     }
 
     /// Warnings of the source and of the training.
@@ -309,7 +309,7 @@ impl<'a> Trained<'a> {
         of_array
             .map(ToString::to_string)
             .chain(of_import.into_iter().flatten())
-            .chain(self.extrapolation().and_then(|found| found.warning))
+            .chain(self.extrapolation().and_then(|(_, warning)| warning))
             .chain(describe_samples(self.sets))
             .chain(
                 search(self.file)

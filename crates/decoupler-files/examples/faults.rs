@@ -9,7 +9,7 @@ use decoupler_core::{
     dataset::{Seed, Simulation, Stream},
     decoupling::Decoder,
     evaluation::{Preset, Run, RunSettings},
-    live::{FaultEvent, FaultyWire, LeftOutDecoder, WireCheck},
+    live::{FaultEvent, FaultyWire, WireCheck},
     rand::{Rng, RngExt},
     scene::{Indenter, Loading, Noise},
     sensor::ArrayScale,
@@ -130,27 +130,26 @@ fn examine(
     let mut check = WireCheck::new(sensor, scene, source.rows())?;
     let (mut intact_ohm, mut frame_ohm) = (vec![0.0; source.readings()], vec![0.0; source.readings()]);
     let mut answer_mm = vec![0.0; source.rows().len() * network.outputs()];
-    let mut left_out: Option<LeftOutDecoder> = None;
+    let mut is_named = false;
     tally.faults += 1;
     for frame in 0..FRAMES {
         intact.next_frame(&mut intact_ohm)?;
         source.next_frame(&mut frame_ohm)?;
-        if let Some(FaultEvent::Named(found)) = check.check(&frame_ohm) {
-            if found.wire == wire {
+        if let Some(event @ FaultEvent::Named { wire: found, .. }) = check.check(&frame_ohm) {
+            is_named = true;
+            if found == wire {
                 tally.right += 1;
                 tally.frames += frame + 1;
             } else {
                 tally.wrong += 1;
-                println!("{fault}: {found}");
+                println!("{fault}: {event}");
             }
-            let mut decoder = LeftOutDecoder::new(sensor, scene, source.rows())?;
-            decoder.leave_out(Some(found));
-            left_out = Some(decoder);
         }
-        let Some(left_out) = &mut left_out else { continue };
-        let mut error_mm = |decoder: &mut dyn Decoder, frame_ohm: &[f64]| -> Result<f64, Box<dyn Error>> {
-            decoder.decode(frame_ohm, &mut answer_mm)?;
-            let rows = answer_mm.chunks_exact(decoder.outputs()).enumerate();
+        if check.named().is_none() {
+            continue;
+        }
+        let error_mm = |answer_mm: &[f64]| -> f64 {
+            let rows = answer_mm.chunks_exact(sensor.scale.coordinates_per_row()).enumerate();
             let errors = rows.flat_map(|(row, answer_mm)| {
                 let truth = source.deformation().row_positions_mm(sensor, row);
                 answer_mm
@@ -158,14 +157,17 @@ fn examine(
                     .zip(truth)
                     .map(|(node, truth)| (node[2] - truth.z).abs())
             });
-            Ok(errors.sum())
+            errors.sum()
         };
-        tally.errors_mm[0] += error_mm(network, &intact_ohm)?;
-        tally.errors_mm[1] += error_mm(network, &frame_ohm)?;
-        tally.errors_mm[2] += error_mm(left_out, &frame_ohm)?;
+        network.decode(&intact_ohm, &mut answer_mm)?;
+        tally.errors_mm[0] += error_mm(&answer_mm);
+        network.decode(&frame_ohm, &mut answer_mm)?;
+        tally.errors_mm[1] += error_mm(&answer_mm);
+        check.decode(&frame_ohm, 0..source.rows().len(), &mut answer_mm)?;
+        tally.errors_mm[2] += error_mm(&answer_mm);
         tally.values += source.rows().len() * sensor.scale.nodes_per_row();
     }
-    if left_out.is_none() {
+    if !is_named {
         println!("{fault}: not named");
     }
     Ok(())

@@ -4,8 +4,7 @@
 
 use decoupler_core::{
     dataset::Seed,
-    decoupling::Decoder,
-    live::{Diagnosis, FaultCause, FaultyWire, LeftOutDecoder, WireCheck},
+    live::{FaultyWire, WireCheck},
     scene::{Noise, Rows, Scene},
     sensor::SensorModel,
 };
@@ -48,13 +47,14 @@ fn a_line_is_parsed_and_monitored_without_allocating() {
     source.next_frame(&mut frame_ohm).unwrap();
     let mut parser = LineParser::new(model.scale, scene.rows, true).unwrap();
     let mut check = WireCheck::new(&model, &scene, source.rows()).unwrap();
-    let mut decoder = LeftOutDecoder::new(&model, &scene, source.rows()).unwrap();
-    decoder.leave_out(Some(Diagnosis {
-        wire: FaultyWire::Column(3),
-        cause: FaultCause::Unknown,
-        probability: 1.0,
-    }));
-    let mut answer_mm = vec![0.0; decoder.outputs()];
+    let mut faulty = WireCheck::new(&model, &scene, source.rows()).unwrap();
+    for _ in 0..8 {
+        let mut faulty_ohm = frame_ohm.clone();
+        faulty_ohm.iter_mut().skip(3).step_by(18).for_each(|ohm| *ohm *= 1.1);
+        faulty.check(&faulty_ohm);
+    }
+    assert_eq!(faulty.named(), Some(FaultyWire::Column(3)));
+    let mut answer_mm = vec![0.0; model.scale.coordinates_per_row()];
     let mut latencies = Latencies::default();
     for frame in 0..3 {
         let line = frame_ohm.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
@@ -63,9 +63,7 @@ fn a_line_is_parsed_and_monitored_without_allocating() {
                 panic!("a snapshot is parsed");
             };
             assert_eq!(check.check(readings_ohm), None);
-            decoder
-                .decode_row(4, &readings_ohm[4 * 18..5 * 18], &mut answer_mm)
-                .unwrap();
+            faulty.decode(readings_ohm, 4..5, &mut answer_mm).unwrap();
             latencies.add(std::time::Duration::from_micros(7));
         });
         // The first line determines the number of fields.

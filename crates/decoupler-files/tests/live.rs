@@ -6,8 +6,7 @@ use std::collections::BTreeSet;
 
 use decoupler_core::{
     dataset::{Seed, Stream},
-    decoupling::Decoder,
-    live::{Diagnosis, FaultCause, FaultEvent, FaultyWire, LeftOutDecoder, WireCheck},
+    live::{FaultCause, FaultEvent, FaultyWire, WireCheck},
     scene::{Deformation, Indenter, Loading, Noise, Scene},
     sensor::SensorModel,
 };
@@ -199,15 +198,25 @@ fn the_faulty_wire_is_named_once_with_its_cause_until_it_recovers() {
         for _ in 0..2 {
             source.set_fault(Some(text.parse().unwrap())).unwrap();
             let found = events(&mut source, 12);
-            let [(frame, FaultEvent::Named(named))] = found[..] else {
+            let [
+                (
+                    frame,
+                    event @ FaultEvent::Named {
+                        wire: named,
+                        cause: found,
+                        probability,
+                    },
+                ),
+            ] = found[..]
+            else {
                 panic!("{text}: {found:?}");
             };
             assert!(frame + 1 >= WireCheck::PERSISTENCE, "{text}: {frame}");
-            assert!(named.probability >= WireCheck::SURE);
-            assert_eq!(named.wire, wire, "{text}");
-            match (named.cause, cause) {
+            assert!(probability >= WireCheck::SURE);
+            assert_eq!(named, wire, "{text}");
+            match (found, cause) {
                 (FaultCause::Gain { relative: found }, FaultCause::Gain { relative }) => {
-                    assert!((found - relative).abs() < 2e-3, "{text}: {named}");
+                    assert!((found - relative).abs() < 2e-3, "{text}: {event}");
                 }
                 (found, cause) => assert_eq!(found, cause, "{text}"),
             }
@@ -275,7 +284,7 @@ fn each_fault_of_each_wire_is_named_within_eight_frames() {
                 events.extend(check.check(frame_ohm));
             });
             match events[..] {
-                [FaultEvent::Named(named)] if named.wire == *wire => {}
+                [FaultEvent::Named { wire: named, .. }] if named == *wire => {}
                 _ => late.push(format!("{loading}, {text}: {events:?}")),
             }
         }
@@ -412,30 +421,35 @@ fn equal_readings_of_symmetric_rows_are_not_a_short() {
     }
 }
 
-fn left_out(sensor: &SensorModel, scene: &Scene, rows: &[usize]) -> LeftOutDecoder {
-    LeftOutDecoder::new(sensor, scene, rows).unwrap()
+/// Check of all rows that has named the wire of this fault.
+fn named(sensor: &SensorModel, scene: &Scene, fault: &str, wire: FaultyWire) -> WireCheck {
+    let rows = Vec::from_iter(0..sensor.scale.rows());
+    let mut check = WireCheck::new(sensor, scene, &rows).unwrap();
+    frames(sensor, scene, Some(fault.parse().unwrap()), 12, |frame_ohm, _| {
+        check.check(frame_ohm);
+    });
+    assert_eq!(check.named(), Some(wire), "{fault}");
+    check
 }
 
 /// Without one of its columns, a row is decoded like a row of an array that does not have it.
 #[test]
 fn a_left_out_column_has_no_influence() {
     let (sensor, scene) = sensor_and_scene();
-    let fault = |wire| Diagnosis {
-        wire,
-        cause: FaultCause::Unknown,
-        probability: 1.0,
-    };
-    let mut without = left_out(&sensor, &scene, &[0]);
-    let mut whole = left_out(&sensor, &scene, &[0]);
-    for wire in [FaultyWire::Column(17), FaultyWire::Columns(0), FaultyWire::Column(8)] {
-        without.leave_out(Some(fault(wire)));
+    let mut whole = WireCheck::new(&sensor, &scene, &Vec::from_iter(0..10)).unwrap();
+    for (fault, wire) in [
+        ("gain:18=-0.19", FaultyWire::Column(17)),
+        ("short-columns:1-2", FaultyWire::Columns(0)),
+        ("stuck:9=high", FaultyWire::Column(8)),
+    ] {
+        let mut without = named(&sensor, &scene, fault, wire);
         frames(&sensor, &scene, None, 10, |frame_ohm, _| {
-            let mut spoiled = frame_ohm[..18].to_vec();
+            let mut spoiled = frame_ohm.to_vec();
             let [mut one, mut other] = [vec![0.0; 18], vec![0.0; 18]];
-            without.decode_row(0, &spoiled, &mut one).unwrap();
+            without.decode(&spoiled, 0..1, &mut one).unwrap();
             let columns = wire.columns();
             columns.clone().for_each(|column| spoiled[column] *= 7.0);
-            without.decode_row(0, &spoiled, &mut other).unwrap();
+            without.decode(&spoiled, 0..1, &mut other).unwrap();
             assert_eq!(one, other, "{wire}");
             // Readings in place of the missing ones that agree with the answer leave it unchanged.
             let at: Vec<DVec3> = (0..6)
@@ -443,7 +457,7 @@ fn a_left_out_column_has_no_influence() {
                 .collect();
             let predicted_ohm = sensor.row_resistances(0, &at).unwrap();
             columns.for_each(|column| spoiled[column] = predicted_ohm[column]);
-            whole.decode_row(0, &spoiled, &mut other).unwrap();
+            whole.decode(&spoiled, 0..1, &mut other).unwrap();
             let apart = one.iter().zip(&other).map(|(one, other)| (one - other).abs());
             assert!(
                 apart.clone().fold(0.0, f64::max) < 1e-4,
@@ -457,34 +471,25 @@ fn a_left_out_column_has_no_influence() {
 #[test]
 fn an_answer_without_a_wire_does_not_depend_on_earlier_frames() {
     let (sensor, scene) = sensor_and_scene();
-    let rows = Vec::from_iter(0..10);
-    let mut decoder = left_out(&sensor, &scene, &rows);
+    let outputs = sensor.scale.coordinates_per_row();
     let mut all_ohm = Vec::new();
     frames(&sensor, &scene, None, 6, |frame_ohm, _| {
         all_ohm.push(frame_ohm.to_vec());
     });
-    for (wire, cause) in [
-        (FaultyWire::Row(4), FaultCause::Open),
-        (FaultyWire::Row(0), FaultCause::Unknown),
-        (FaultyWire::Columns(3), FaultCause::Shorted),
-        (FaultyWire::Column(2), FaultCause::Open),
+    for (fault, wire) in [
+        ("open-row:5", FaultyWire::Row(4)),
+        ("open-row:1", FaultyWire::Row(0)),
+        ("short-columns:4-5", FaultyWire::Columns(3)),
+        ("open-column:3", FaultyWire::Column(2)),
     ] {
-        decoder.leave_out(Some(Diagnosis {
-            wire,
-            cause,
-            probability: 1.0,
-        }));
+        let mut check = named(&sensor, &scene, fault, wire);
         let mut decode = |frame_ohm: &[f64]| {
-            let mut answer_mm = vec![0.0; 10 * decoder.outputs()];
-            decoder.decode(frame_ohm, &mut answer_mm).unwrap();
+            let mut answer_mm = vec![0.0; 10 * outputs];
+            check.decode(frame_ohm, 0..10, &mut answer_mm).unwrap();
             for row in 0..10 {
-                let mut of_row = vec![0.0; decoder.outputs()];
-                decoder.decode_row_of(frame_ohm, row, &mut of_row).unwrap();
-                assert_eq!(
-                    of_row,
-                    answer_mm[row * decoder.outputs()..][..of_row.len()],
-                    "{wire} {row}"
-                );
+                let mut of_row = vec![0.0; outputs];
+                check.decode(frame_ohm, row..row + 1, &mut of_row).unwrap();
+                assert_eq!(of_row, answer_mm[row * outputs..][..outputs], "{wire} {row}");
             }
             answer_mm
         };
@@ -494,14 +499,10 @@ fn an_answer_without_a_wire_does_not_depend_on_earlier_frames() {
         assert_eq!(forwards, backwards, "{wire}");
     }
     // A row without signal is interpolated from its neighbours.
-    decoder.leave_out(Some(Diagnosis {
-        wire: FaultyWire::Row(4),
-        cause: FaultCause::Open,
-        probability: 1.0,
-    }));
-    let mut answer_mm = vec![0.0; 10 * decoder.outputs()];
-    decoder.decode(&all_ohm[0], &mut answer_mm).unwrap();
-    let z_mm = |row: usize| answer_mm[row * decoder.outputs() + 2];
+    let mut check = named(&sensor, &scene, "open-row:5", FaultyWire::Row(4));
+    let mut answer_mm = vec![0.0; 10 * outputs];
+    check.decode(&all_ohm[0], 0..10, &mut answer_mm).unwrap();
+    let z_mm = |row: usize| answer_mm[row * outputs + 2];
     assert!((z_mm(4) - 0.5 * (z_mm(3) + z_mm(5))).abs() < 1e-12);
 }
 
@@ -514,19 +515,21 @@ fn leaving_the_wire_out_restores_the_answer() {
         let mut source = Simulated::new(&sensor, &scene, Seed(7), 10.0).unwrap();
         source.set_fault(Some(text.parse().unwrap())).unwrap();
         let mut check = WireCheck::new(&sensor, &scene, source.rows()).unwrap();
-        let mut decoder = left_out(&sensor, &scene, source.rows());
+        let mut whole = WireCheck::new(&sensor, &scene, source.rows()).unwrap();
         let (mut intact_ohm, mut frame_ohm) = (vec![0.0; source.readings()], vec![0.0; source.readings()]);
-        let mut answer_mm = vec![0.0; 10 * decoder.outputs()];
+        let mut answer_mm = vec![0.0; 10 * sensor.scale.coordinates_per_row()];
         let mut errors_mm = [0.0; 3];
         for _ in 0..20 {
             intact.next_frame(&mut intact_ohm).unwrap();
             source.next_frame(&mut frame_ohm).unwrap();
             check.check(&frame_ohm);
-            let Some(named) = check.named() else { continue };
-            let decoded = [(&frame_ohm, None), (&frame_ohm, Some(named)), (&intact_ohm, None)];
-            for (error_mm, (frame_ohm, fault)) in errors_mm.iter_mut().zip(decoded) {
-                decoder.leave_out(fault);
-                decoder.decode(frame_ohm, &mut answer_mm).unwrap();
+            if check.named().is_none() {
+                continue;
+            }
+            let decoded = [(&frame_ohm, true), (&frame_ohm, false), (&intact_ohm, true)];
+            for (error_mm, (frame_ohm, is_whole)) in errors_mm.iter_mut().zip(decoded) {
+                let decoder = if is_whole { &mut whole } else { &mut check };
+                decoder.decode(frame_ohm, 0..10, &mut answer_mm).unwrap();
                 let truth = (0..10).flat_map(|row| source.deformation().row_positions_mm(&sensor, row));
                 let pairs = answer_mm.chunks_exact(3).zip(truth);
                 *error_mm += pairs.map(|(node, truth)| (node[2] - truth.z).abs()).sum::<f64>();

@@ -266,8 +266,8 @@ impl DriftReference {
         let numbers = [&self.means, &self.inverse_deviations, factor].into_iter().flatten();
         let mut numbers = numbers.chain(self.ranges.iter().flatten());
         let mut diagonal = (0..channels).map(|row| row * (row + 3) / 2);
-        (self.inverse_deviations.len(), factor.len()) == (channels, channels * (channels + 1) / 2)
-            && self.ranges.len() == Statistic::count(channels)
+        let sizes = (self.inverse_deviations.len(), factor.len(), self.ranges.len());
+        sizes == (channels, channels * (channels + 1) / 2, Statistic::count(channels))
             && numbers.all(|number| number.is_finite())
             && diagonal.all(|place| factor[place] > 0.0)
             && self.block > 0
@@ -282,10 +282,7 @@ fn scale(readings: ArrayView1<'_, f64>) -> Option<(f64, f64)> {
     // Differences are exact in readings with a large offset, and 0 in constant ones.
     let first = *readings.first()?;
     let mean = first + readings.iter().map(|reading| (reading - first) / count).sum::<f64>();
-    let largest = readings
-        .iter()
-        .map(|reading| (reading - mean).abs())
-        .fold(0.0, f64::max);
+    let largest = readings.fold(0.0_f64, |largest, reading| largest.max((reading - mean).abs()));
     let is_finite = readings.iter().all(|reading| reading.is_finite()) && mean.is_finite() && largest.is_finite();
     let square = |reading: &f64| ((reading - mean) / largest).powi(2);
     let deviation = largest * (readings.iter().map(square).sum::<f64>() / count).sqrt();
@@ -372,7 +369,6 @@ pub struct DriftMonitor {
     runs: Vec<[usize; 2]>,
     /// True for runs that have become long enough since the drift began.
     is_drifted: Vec<[bool; 2]>,
-    blocks_in_a_row: usize,
     /// Positions of the first readings of the latest blocks.
     begins: VecDeque<u64>,
     drift: Option<Drift>,
@@ -391,7 +387,6 @@ impl DriftMonitor {
             block: Block::new(reference.channels()),
             runs: vec![[0; 2]; statistics],
             is_drifted: vec![[false; 2]; statistics],
-            blocks_in_a_row: reference.blocks_in_a_row(),
             begins: VecDeque::new(),
             drift: None,
             blocks_without: 0,
@@ -417,59 +412,45 @@ impl DriftMonitor {
         if self.block.count < self.reference.block {
             return None;
         }
-        let statistics = self.block.finish();
-        let event = self.judge(position, &statistics);
-        if self.begins.len() == self.blocks_in_a_row {
+        let in_a_row = self.reference.blocks_in_a_row();
+        if self.begins.len() > in_a_row {
             self.begins.pop_front();
         }
-        event
-    }
-
-    /// Judges the block that ends at `position`.
-    fn judge(&mut self, position: u64, statistics: &[f64]) -> Option<Drift> {
         let mut sign = None;
-        for (index, (value, [low, high])) in statistics.iter().zip(&self.reference.ranges).enumerate() {
+        for (index, (value, [low, high])) in self.block.finish().iter().zip(&self.reference.ranges).enumerate() {
             let (runs, is_drifted) = (&mut self.runs[index], &mut self.is_drifted[index]);
             for (side, is_beyond) in [value < low, value > high].into_iter().enumerate() {
                 runs[side] = if is_beyond { runs[side] + 1 } else { 0 };
-                is_drifted[side] |= runs[side] >= self.blocks_in_a_row;
+                is_drifted[side] |= runs[side] >= in_a_row;
                 if is_beyond && is_drifted[side] {
                     sign.get_or_insert((index, side == 1));
                 }
             }
         }
-        match (sign, &mut self.drift) {
-            (Some((statistic, is_larger)), None) => {
-                let drift = Drift {
-                    first: *self.begins.front()?,
-                    last: position,
-                    has_ended: false,
-                    statistic: Statistic::at(statistic, self.reference.channels()),
-                    is_larger,
-                };
-                self.drift = Some(drift);
-                self.drift
-            }
-            (Some(_), Some(drift)) => {
-                drift.last = position;
-                self.blocks_without = 0;
-                None
-            }
-            (None, Some(_)) => {
-                self.blocks_without += 1;
-                if self.blocks_without < self.blocks_in_a_row {
-                    return None;
-                }
-                self.blocks_without = 0;
-                self.is_drifted.fill([false; 2]);
-                let ended = self.drift.take();
-                ended.map(|drift| Drift {
-                    has_ended: true,
-                    ..drift
-                })
-            }
-            (None, None) => None,
+        let Some(drift) = &mut self.drift else {
+            let (statistic, is_larger) = sign?;
+            self.drift = Some(Drift {
+                first: *self.begins.front()?,
+                last: position,
+                has_ended: false,
+                statistic: Statistic::at(statistic, self.reference.channels()),
+                is_larger,
+            });
+            return self.drift;
+        };
+        if sign.is_some() {
+            drift.last = position;
+            self.blocks_without = 0;
+            return None;
         }
+        self.blocks_without += 1;
+        if self.blocks_without < in_a_row {
+            return None;
+        }
+        self.blocks_without = 0;
+        self.is_drifted.fill([false; 2]);
+        drift.has_ended = true;
+        self.drift.take()
     }
 
     /// Current drift; `None` as long as the readings look like the training readings.

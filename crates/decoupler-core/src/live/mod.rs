@@ -1,17 +1,16 @@
 //! Arithmetic on frames as they arrive: re-zeroing, drift, and faulty wires from the residual.
 //!
-//! [`WireCheck`] checks whether Eq. (2) explains the readings and identifies the faulty wire; [`LeftOutDecoder`] decodes
-//! without it. [`DriftMonitor`] reports readings that no longer look like those of the training. [`ReZero`] estimates the
-//! unloaded state from recent frames.
+//! [`WireCheck`] checks whether Eq. (2) explains the readings, identifies the faulty wire, and decodes without it.
+//! [`DriftMonitor`] reports readings that no longer look like those of the training. [`ZeroGains`] are the gains of the
+//! unloaded state, estimated from recent frames.
 
 mod drift;
 mod error;
-mod left_out_decoder;
+mod left_out;
 mod re_zero;
 mod wire_check;
 
 pub use drift::{Drift, DriftMonitor, DriftReference};
 pub use error::LiveError;
-pub use left_out_decoder::LeftOutDecoder;
-pub use re_zero::{ReZero, ZeroGains};
-pub use wire_check::{Diagnosis, FaultCause, FaultEvent, FaultyWire, WireCheck};
+pub use re_zero::ZeroGains;
+pub use wire_check::{FaultCause, FaultEvent, FaultyWire, WireCheck};

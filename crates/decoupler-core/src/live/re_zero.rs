@@ -1,37 +1,26 @@
 use std::collections::VecDeque;
 
-use ndarray::{Array1, Array2, ArrayViewMut1};
+use ndarray::{Array1, Array2, ArrayViewMut1, Axis};
 use serde::{Deserialize, Serialize};
 
 use super::LiveError;
 use crate::{numerics::median, scene::NoiseSource};
 
-/// Estimates the unloaded state from recent frames, without erasing a sustained contact.
+/// Gain of every channel in the unloaded state: the reading divided by the resistance at rest.
 ///
-/// Each channel's gain is the ratio of its median reading over the frames to its resistance at rest. Amplifiers and
-/// temperature affect whole columns and the whole array; a contact lowers the readings of a few rows. The logarithms of
-/// the ratios are therefore decomposed by median polish (Tukey, "Exploratory Data Analysis", 1977) into a common part,
-/// column parts, row parts and residuals. A contact on fewer than half of the rows does not affect the common and column
-/// parts.
+/// [`Self::estimate`] finds it from recent frames, without erasing a sustained contact. Each channel's gain is the ratio of
+/// its median reading over the frames to its resistance at rest. Amplifiers and temperature affect whole columns and the
+/// whole array; a contact lowers the readings of a few rows. The logarithms of the ratios are therefore decomposed by
+/// median polish (Tukey, "Exploratory Data Analysis", 1977) into a common part, column parts, row parts and residuals. A
+/// contact on fewer than half of the rows does not affect the common and column parts.
 ///
-/// A row is in contact if its part plus its mean residual is below zero by more than [`ReZero::DEVIATIONS`] standard
+/// A row is in contact if its part plus its mean residual is below zero by more than [`Self::DEVIATIONS`] standard
 /// deviations, estimated from the other rows or from the noise. It is also in contact if its readings, corrected for the
 /// gain error that a snapshot has in common, changed during the frames by more than noise and converter steps explain.
 /// Channels of rows in contact use the common and column parts only; all others use their full ratio. If the noise is
 /// unknown, it is estimated from the differences of successive frames, to which slow movement contributes little.
 ///
 /// A contact on more than half of the rows cannot be distinguished from drift; it is refused if the readings move.
-#[derive(Clone, Debug)]
-pub struct ReZero {
-    /// Resistances at rest: rows × columns.
-    rest_ohm: Array2<f64>,
-    /// Noise of the readings; none if unknown.
-    noise: NoiseSource,
-    /// Latest frames, each rows × columns.
-    frames_ohm: VecDeque<Vec<f64>>,
-}
-
-/// Gain of every channel in the unloaded state: the reading divided by the resistance at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ZeroGains {
@@ -48,113 +37,74 @@ const NORMAL_MAD: f64 = 0.674_489_750_196_081_7;
 /// Largest gain that is attributed to drift; the smallest is its reciprocal.
 const LARGEST_GAIN: f64 = 2.0;
 
-impl ReZero {
+impl ZeroGains {
     /// Number of standard deviations beyond which a row is in contact.
     pub const DEVIATIONS: f64 = 4.0;
     /// Number of frames needed.
     pub const FRAMES: usize = 25;
 
-    /// Prepares for frames of `rest_ohm.len() / columns` rows with these resistances at rest. If `noise` is none, it is
+    /// Returns the gains of the unloaded state from the last frames, of which there are [`Self::FRAMES`], with readings that
+    /// are finite and above 0; `rest_ohm` are the resistances at rest (rows × columns each). If `noise` is none, it is
     /// estimated from the frames.
-    ///
-    /// # Panics
-    /// If the resistances do not form whole rows, or are not above 0.
-    pub fn new(rest_ohm: Vec<f64>, columns: usize, noise: NoiseSource) -> Self {
-        assert!(columns > 0 && rest_ohm.len().is_multiple_of(columns) && !rest_ohm.is_empty());
-        assert!(rest_ohm.iter().all(|&ohm| ohm > 0.0));
-        let shape = (rest_ohm.len() / columns, columns);
-        Self {
-            rest_ohm: Array2::from_shape_vec(shape, rest_ohm).expect("whole rows"),
-            noise,
-            frames_ohm: VecDeque::with_capacity(Self::FRAMES),
-        }
-    }
-
-    /// Adds a frame (rows × columns), whose readings must be finite and above 0. Allocates only for the first
-    /// [`Self::FRAMES`] frames.
-    ///
-    /// # Panics
-    /// If the frame has the wrong length.
-    pub fn observe(&mut self, frame_ohm: &[f64]) {
-        assert_eq!(frame_ohm.len(), self.rest_ohm.len());
-        let oldest = (self.frames_ohm.len() == Self::FRAMES).then(|| self.frames_ohm.pop_front());
-        let mut latest = oldest.flatten().unwrap_or_default();
-        latest.clear();
-        latest.extend_from_slice(frame_ohm);
-        self.frames_ohm.push_back(latest);
-    }
-
-    /// Returns the gains of the unloaded state estimated from the latest frames.
     ///
     /// # Errors
     /// If there are too few frames, too many rows are in contact, or a gain is far from 1.
-    pub fn gains(&self) -> Result<ZeroGains, LiveError> {
-        let (found, needed) = (self.frames_ohm.len(), Self::FRAMES);
+    ///
+    /// # Panics
+    /// If the resistances do not form whole rows, or a frame has another length.
+    pub fn estimate(
+        frames_ohm: &VecDeque<Vec<f64>>,
+        rest_ohm: &[f64],
+        columns: usize,
+        noise: &NoiseSource,
+    ) -> Result<Self, LiveError> {
+        assert!(columns > 0 && rest_ohm.len().is_multiple_of(columns) && !rest_ohm.is_empty());
+        assert!(frames_ohm.iter().all(|ohm| ohm.len() == rest_ohm.len()));
+        let (found, needed, rows) = (frames_ohm.len(), Self::FRAMES, rest_ohm.len() / columns);
         if found < needed {
             return Err(LiveError::Frames { found, needed });
         }
         // Logarithms of the readings of each channel relative to its resistance at rest, without the common gain error.
-        let rest_ohm = self.rest_ohm.iter().enumerate();
+        let latest = frames_ohm.range(found - needed..);
         let of_channel = |(channel, rest_ohm): (usize, &f64)| -> Vec<f64> {
-            let frames_ohm = self.frames_ohm.iter();
-            frames_ohm.map(|ohm| (ohm[channel] / rest_ohm).ln()).collect()
+            let ohm = latest.clone().map(|ohm| ohm[channel]);
+            ohm.map(|ohm| (ohm / rest_ohm).ln()).collect()
         };
-        let mut channels: Vec<Vec<f64>> = rest_ohm.map(of_channel).collect();
-        let common_of_frames = self.common(&channels);
+        let mut channels: Vec<Vec<f64>> = rest_ohm.iter().enumerate().map(of_channel).collect();
+        let common = common_of_frames(&channels, noise);
         for logs in &mut channels {
-            logs.iter_mut()
-                .zip(&common_of_frames)
-                .for_each(|(log, common)| *log -= common);
+            logs.iter_mut().zip(&common).for_each(|(log, common)| *log -= common);
         }
-        let deviations = self.deviations(&channels);
-        let (rows, columns) = self.rest_ohm.dim();
+        let deviations = deviations(&channels, rest_ohm, noise);
         let mut moves = vec![false; rows];
         for (index, (logs, deviation)) in channels.iter().zip(&deviations).enumerate() {
-            let rest_ohm = self.rest_ohm[[index / columns, index % columns]];
-            let (from, to) = self.noise.rounded_from_ohm(rest_ohm).unwrap_or_default();
-            moves[index / columns] |= change(logs) > largest_change(*deviation) + (to - from) / rest_ohm;
+            let (from, to) = noise.rounded_from_ohm(rest_ohm[index]).unwrap_or_default();
+            moves[index / columns] |= change(logs) > largest_change(*deviation) + (to - from) / rest_ohm[index];
         }
-        let common = median(common_of_frames);
+        let common = median(common);
         let squares = deviations.iter().map(|deviation| deviation * deviation);
         let noise = (squares.sum::<f64>() / channels.len() as f64).sqrt();
         let ratios = channels.into_iter().map(|logs| median(logs) + common).collect();
         let ratios = Array2::from_shape_vec((rows, columns), ratios).expect("a ratio for each resistance");
-        let Polished {
-            common,
-            of_rows,
-            of_columns,
-            rest,
-        } = Polished::new(ratios.clone());
+        let mut rest = ratios.clone();
+        let (common, of_rows, of_columns) = polish(&mut rest);
         // Mean and spread of the residuals of each row, including the row part.
         let spread = median(rest.iter().map(|e| e.abs()).collect()) / NORMAL_MAD;
         let of_mean = spread.max(noise / (Self::FRAMES as f64).sqrt()) / (columns as f64).sqrt();
-        let sums = rest.rows().into_iter().map(|row| row.iter().sum::<f64>());
-        let means = Vec::from_iter(
-            of_rows
-                .iter()
-                .zip(sums)
-                .map(|(of_row, sum)| of_row + sum / columns as f64),
-        );
+        let means = of_rows + rest.sum_axis(Axis(1)) / columns as f64;
         let apart = median(means.iter().map(|mean| mean.abs()).collect()) / NORMAL_MAD;
         let limit = -Self::DEVIATIONS * of_mean.max(apart);
-        let in_contact: Vec<bool> = means
-            .iter()
-            .zip(moves)
-            .map(|(mean, moves)| *mean < limit || moves)
-            .collect();
+        let in_contact = means.iter().zip(moves).map(|(mean, moves)| *mean < limit || moves);
+        let in_contact: Vec<bool> = in_contact.collect();
         let touched = in_contact.iter().filter(|touched| **touched).count();
         if 2 * touched >= rows && touched > 0 {
             return Err(LiveError::Contact { touched, rows });
         }
-        let gain = |((row, column), ratio): ((usize, usize), &f64)| {
-            let log_gain = if in_contact[row] {
-                common + of_columns[column]
-            } else {
-                *ratio
-            };
-            log_gain.exp()
+        let log_gain = |((row, column), ratio): ((usize, usize), &f64)| match in_contact[row] {
+            true => common + of_columns[column],
+            false => *ratio,
         };
-        let gains = Vec::from_iter(ratios.indexed_iter().map(gain));
+        let gains = Vec::from_iter(ratios.indexed_iter().map(|at| log_gain(at).exp()));
         let is_far = |gain: &f64| !(1.0 / LARGEST_GAIN..=LARGEST_GAIN).contains(gain);
         if let Some(index) = gains.iter().position(is_far) {
             return Err(LiveError::Gain {
@@ -163,46 +113,61 @@ impl ReZero {
                 gain: gains[index],
             });
         }
-        Ok(ZeroGains {
+        Ok(Self {
             columns,
             gains,
             in_contact,
         })
     }
 
-    /// Logarithm of the common gain error of each frame; 0 if all rows have moved, which is not noise.
-    fn common(&self, channels: &[Vec<f64>]) -> Vec<f64> {
-        let middles: Vec<f64> = channels.iter().map(|logs| median(logs.clone())).collect();
-        let of_frame = |frame: usize| median(channels.iter().zip(&middles).map(|(logs, m)| logs[frame] - m).collect());
-        let common: Vec<f64> = (0..Self::FRAMES).map(of_frame).collect();
-        let drift = if self.noise.is_none() {
-            jitter(&common)
-        } else {
-            self.noise.noise.drift
-        };
-        if change(&common) <= largest_change(drift) {
-            common
-        } else {
-            vec![0.0; Self::FRAMES]
-        }
+    /// Divides the readings of a frame, rows × columns in ohm, by the gains.
+    ///
+    /// # Panics
+    /// If the frame has the wrong length.
+    pub fn apply(&self, frame_ohm: &mut [f64]) {
+        assert_eq!(frame_ohm.len(), self.gains.len());
+        let readings = frame_ohm.iter_mut().zip(&self.gains);
+        readings.for_each(|(ohm, gain)| *ohm /= gain);
     }
 
-    /// Noise of each channel relative to its reading, without the common gain error (standard deviation).
-    fn deviations(&self, channels: &[Vec<f64>]) -> Vec<f64> {
-        if !self.noise.is_none() {
-            let own = self.rest_ohm.iter().map(|&ohm| self.noise.relative_to(ohm).own);
-            return own.collect();
-        }
-        let found: Vec<f64> = channels.iter().map(|logs| jitter(logs)).collect();
-        let middle = median(found.clone());
-        // The estimate from a few frames is rough, and a trembling contact must not be mistaken for noise.
-        let limited = |deviation: f64| deviation.clamp(middle, 3.0 * middle);
-        found.into_iter().map(limited).collect()
+    /// Returns `true` if there are gains for this many rows and columns, all finite and above 0: they may come from a
+    /// file.
+    pub fn is_sound(&self, rows: usize, columns: usize) -> bool {
+        let is_gain = |gain: &f64| *gain > 0.0 && gain.is_finite();
+        let sizes = (self.in_contact.len(), self.columns, self.gains.len());
+        sizes == (rows, columns, rows * columns) && self.gains.iter().all(is_gain)
     }
 }
 
+/// Logarithm of the common gain error of each frame; 0 if all rows have moved, which is not noise.
+fn common_of_frames(channels: &[Vec<f64>], noise: &NoiseSource) -> Vec<f64> {
+    let middles: Vec<f64> = channels.iter().map(|logs| median(logs.clone())).collect();
+    let of_frame = |frame: usize| median(channels.iter().zip(&middles).map(|(logs, m)| logs[frame] - m).collect());
+    let mut common: Vec<f64> = (0..ZeroGains::FRAMES).map(of_frame).collect();
+    let drift = match noise.is_none() {
+        true => jitter(&common),
+        false => noise.noise.drift,
+    };
+    if change(&common) > largest_change(drift) {
+        common.fill(0.0);
+    }
+    common
+}
+
+/// Noise of each channel relative to its reading, without the common gain error (standard deviation).
+fn deviations(channels: &[Vec<f64>], rest_ohm: &[f64], noise: &NoiseSource) -> Vec<f64> {
+    if !noise.is_none() {
+        return rest_ohm.iter().map(|&ohm| noise.relative_to(ohm).own).collect();
+    }
+    let found: Vec<f64> = channels.iter().map(|logs| jitter(logs)).collect();
+    let middle = median(found.clone());
+    // The estimate from a few frames is rough, and a trembling contact must not be mistaken for noise.
+    let limited = |deviation: f64| deviation.clamp(middle, 3.0 * middle);
+    found.into_iter().map(limited).collect()
+}
+
 /// Number of frames at the beginning and at the end whose medians are compared.
-const HALF: usize = ReZero::FRAMES / 2;
+const HALF: usize = ZeroGains::FRAMES / 2;
 
 /// Difference between the medians of the last and the first values.
 fn change(values: &[f64]) -> f64 {
@@ -212,7 +177,7 @@ fn change(values: &[f64]) -> f64 {
 /// Largest [`change`] expected by chance for values with this standard deviation. The standard deviation of a median of n
 /// normal values is 1.2533/√n times theirs; the limit allows for the many channels of an array.
 fn largest_change(deviation: f64) -> f64 {
-    1.5 * ReZero::DEVIATIONS * 1.2533 * (2.0 / HALF as f64).sqrt() * deviation
+    1.5 * ZeroGains::DEVIATIONS * 1.2533 * (2.0 / HALF as f64).sqrt() * deviation
 }
 
 /// Standard deviation of values around a slow movement, estimated from successive differences.
@@ -221,66 +186,27 @@ fn jitter(values: &[f64]) -> f64 {
     median(differences.collect()) / (NORMAL_MAD * 2.0_f64.sqrt())
 }
 
-impl ZeroGains {
-    /// Divides the readings of a frame, rows × columns in ohm, by the gains.
-    ///
-    /// # Panics
-    /// If the frame has the wrong length.
-    pub fn apply(&self, frame_ohm: &mut [f64]) {
-        assert_eq!(frame_ohm.len(), self.gains.len());
-        frame_ohm
-            .iter_mut()
-            .zip(&self.gains)
-            .for_each(|(ohm, gain)| *ohm /= gain);
-    }
-
-    /// Returns `true` if there are gains for this many rows and columns, all finite and above 0: they may come from a
-    /// file.
-    pub fn is_sound(&self, rows: usize, columns: usize) -> bool {
-        let is_gain = |gain: &f64| *gain > 0.0 && gain.is_finite();
-        self.columns == columns
-            && self.gains.len() == rows * columns
-            && self.in_contact.len() == rows
-            && self.gains.iter().all(is_gain)
-    }
-}
-
 /// Iterations of median polish: two or three are enough.
 const ROUNDS: usize = 6;
 
-/// Values decomposed into a common part, row parts and column parts.
-struct Polished {
-    common: f64,
-    of_rows: Array1<f64>,
-    of_columns: Array1<f64>,
-    /// Residuals: rows × columns.
-    rest: Array2<f64>,
-}
-
-impl Polished {
-    /// Decomposes values (rows × columns) by median polish.
-    fn new(mut rest: Array2<f64>) -> Self {
-        let centre = |mut values: ArrayViewMut1<'_, f64>| {
-            let shift = median(values.to_vec());
-            values.iter_mut().for_each(|value| *value -= shift);
-            shift
-        };
-        let (mut common, mut of_rows, mut of_columns) = (0.0, Array1::zeros(rest.nrows()), Array1::zeros(rest.ncols()));
-        for _ in 0..ROUNDS {
-            let columns = of_columns.iter_mut().zip(rest.columns_mut());
-            columns.for_each(|(part, column)| *part += centre(column));
-            let rows = of_rows.iter_mut().zip(rest.rows_mut());
-            rows.for_each(|(part, row)| *part += centre(row));
-            common += centre(of_columns.view_mut());
-            common += centre(of_rows.view_mut());
-        }
-        Self {
-            common,
-            of_rows,
-            of_columns,
-            rest,
-        }
+/// Decomposes values (rows × columns), which become residuals, by median polish; returns the common part, the parts of the
+/// rows and those of the columns.
+fn polish(rest: &mut Array2<f64>) -> (f64, Array1<f64>, Array1<f64>) {
+    let centre = |mut values: ArrayViewMut1<'_, f64>| {
+        let shift = median(values.to_vec());
+        values.iter_mut().for_each(|value| *value -= shift);
+        shift
+    };
+    let (mut common, mut of_rows, mut of_columns) = (0.0, Array1::zeros(rest.nrows()), Array1::zeros(rest.ncols()));
+    for _ in 0..ROUNDS {
+        let columns = of_columns.iter_mut().zip(rest.columns_mut());
+        columns.for_each(|(part, column)| *part += centre(column));
+        let rows = of_rows.iter_mut().zip(rest.rows_mut());
+        rows.for_each(|(part, row)| *part += centre(row));
+        common += centre(of_columns.view_mut());
+        common += centre(of_rows.view_mut());
     }
+    (common, of_rows, of_columns)
 }
 
 #[cfg(test)]
@@ -315,7 +241,11 @@ mod tests {
         (0..30).map(|_| 1.02 * (1.0 + 0.01 * standard_normal(rng))).collect()
     }
 
-    fn re_zero(deformation: impl Fn(usize) -> Deformation, gains: &[f64], rng: &mut impl Rng) -> ReZero {
+    fn re_zero(
+        deformation: impl Fn(usize) -> Deformation,
+        gains: &[f64],
+        rng: &mut impl Rng,
+    ) -> Result<ZeroGains, LiveError> {
         let noise = Noise::relative(NOISE);
         re_zero_in(noise, noise, deformation, gains, rng)
     }
@@ -327,19 +257,19 @@ mod tests {
         deformation: impl Fn(usize) -> Deformation,
         gains: &[f64],
         rng: &mut impl Rng,
-    ) -> ReZero {
+    ) -> Result<ZeroGains, LiveError> {
         let model = model();
         let source = noise.source(&model).unwrap();
-        let mut re_zero = ReZero::new(at_rest(&model), 30, assumed.source(&model).unwrap());
-        for frame in 0..ReZero::FRAMES {
+        let mut frames_ohm = VecDeque::new();
+        for frame in 0..ZeroGains::FRAMES {
             let mut ohm = readings(&model, &deformation(frame));
             ohm.iter_mut()
                 .enumerate()
                 .for_each(|(index, ohm)| *ohm *= gains[index % 30]);
             source.disturb(&mut ohm, rng);
-            re_zero.observe(&ohm);
+            frames_ohm.push_back(ohm);
         }
-        re_zero
+        ZeroGains::estimate(&frames_ohm, &at_rest(&model), 30, &assumed.source(&model).unwrap())
     }
 
     #[test]
@@ -347,12 +277,12 @@ mod tests {
         let mut rng = Seed(1).rng(Stream::Live);
         let gains = drift(&mut rng);
         let model = model();
-        let re_zero = re_zero(
+        let found = re_zero(
             |_| Deformation::from_fn(model.scale, |_, _| DVec3::ZERO),
             &gains,
             &mut rng,
         );
-        let found = re_zero.gains().unwrap();
+        let found = found.unwrap();
         assert_eq!(found.in_contact, [false; 10]);
         for (index, gain) in found.gains.iter().enumerate() {
             assert!((gain / gains[index % 30] - 1.0).abs() < 2e-3, "{index}: {gain}");
@@ -384,7 +314,7 @@ mod tests {
             let mut rng = Seed(seed).rng(Stream::Live);
             let gains = drift(&mut rng);
             let held = punch.press(&model, DVec2::new(11.0, 12.5), 0.5);
-            let found = re_zero(|_| held.clone(), &gains, &mut rng).gains().unwrap();
+            let found = re_zero(|_| held.clone(), &gains, &mut rng).unwrap();
             let mut ohm = readings(&model, &held);
             let before = ohm.clone();
             ohm.iter_mut()
@@ -409,10 +339,10 @@ mod tests {
         let mut rng = Seed(3).rng(Stream::Live);
         let ball = Indenter::default();
         let moving = |frame: usize| ball.press(&model, DVec2::new(12.0, 12.0), 0.04 * frame as f64);
-        let error = re_zero(moving, &[1.0; 30], &mut rng).gains().unwrap_err();
+        let error = re_zero(moving, &[1.0; 30], &mut rng).unwrap_err();
         assert!(error.to_string().contains("rows are in contact"), "{error}");
-        let new = ReZero::new(at_rest(&model), 30, NoiseSource::default());
-        assert_eq!(new.gains().unwrap_err(), LiveError::Frames { found: 0, needed: 25 });
+        let new = ZeroGains::estimate(&VecDeque::new(), &at_rest(&model), 30, &NoiseSource::default());
+        assert_eq!(new, Err(LiveError::Frames { found: 0, needed: 25 }));
     }
 
     /// Noise of every kind, known and unknown.
@@ -445,7 +375,7 @@ mod tests {
             for seed in 0..10 {
                 let mut rng = Seed(seed).rng(Stream::Live);
                 let at_rest = |_| Deformation::from_fn(model.scale, |_, _| DVec3::ZERO);
-                let found = re_zero_in(noise, assumed, at_rest, &[1.0; 30], &mut rng).gains();
+                let found = re_zero_in(noise, assumed, at_rest, &[1.0; 30], &mut rng);
                 let found = found.unwrap_or_else(|error| panic!("{noise:?} {assumed:?} {seed}: {error}"));
                 assert_eq!(found.in_contact, [false; 10], "{noise:?} {assumed:?} {seed}");
             }
@@ -468,7 +398,7 @@ mod tests {
             };
             let assumed = if assumed.is_none() { assumed } else { noise };
             let mut rng = Seed(3).rng(Stream::Live);
-            let found = re_zero_in(noise, assumed, moving, &[1.0; 30], &mut rng).gains();
+            let found = re_zero_in(noise, assumed, moving, &[1.0; 30], &mut rng);
             assert!(matches!(found, Err(LiveError::Contact { .. })), "{noise:?} {assumed:?}");
         }
     }
@@ -479,9 +409,7 @@ mod tests {
         let mut gains = [1.0; 30];
         gains[4] = 3.0;
         let at_rest = |_| Deformation::from_fn(model.scale, |_, _| DVec3::ZERO);
-        let error = re_zero(at_rest, &gains, &mut Seed(4).rng(Stream::Live))
-            .gains()
-            .unwrap_err();
+        let error = re_zero(at_rest, &gains, &mut Seed(4).rng(Stream::Live)).unwrap_err();
         assert!(
             error.to_string().starts_with("row 1, column 5: the reading is 3.0"),
             "{error}"
@@ -493,22 +421,13 @@ mod tests {
     fn additive_parts_are_found_despite_outliers() {
         let (rows, columns) = ([-2.0, 0.0, 1.0, 0.0, 3.0], [0.5, 0.0, -0.25]);
         let value = |index: usize| 10.0 + rows[index / 3] + columns[index % 3] - if index == 4 { 7.0 } else { 0.0 };
-        let found = Polished::new(Array2::from_shape_fn((5, 3), |(row, column)| value(3 * row + column)));
+        let mut rest = Array2::from_shape_fn((5, 3), |(row, column)| value(3 * row + column));
+        let (common, of_rows, of_columns) = polish(&mut rest);
         assert_eq!(
-            (
-                found.common,
-                &found.of_rows.to_vec()[..],
-                &found.of_columns.to_vec()[..]
-            ),
+            (common, &of_rows.to_vec()[..], &of_columns.to_vec()[..]),
             (10.0, &rows[..], &columns[..])
         );
-        assert_eq!(found.rest[[1, 1]], -7.0);
-        assert!(
-            found
-                .rest
-                .iter()
-                .enumerate()
-                .all(|(index, rest)| index == 4 || *rest == 0.0)
-        );
+        assert_eq!(rest[[1, 1]], -7.0);
+        assert!(rest.iter().enumerate().all(|(index, rest)| index == 4 || *rest == 0.0));
     }
 }

@@ -1,4 +1,4 @@
-use std::{f64::consts::TAU, fmt, iter::Sum, mem::discriminant, ops::Range};
+use std::{collections::BTreeSet, f64::consts::TAU, fmt, iter::Sum, mem::discriminant, ops::Range};
 
 use faer::{Mat, Side, linalg::solvers::Solve};
 
@@ -40,29 +40,25 @@ pub enum FaultCause {
     Unknown,
 }
 
-/// Fault identified from the readings.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Diagnosis {
-    /// Faulty wire.
-    pub wire: FaultyWire,
-    /// Most probable cause.
-    pub cause: FaultCause,
-    /// Probability of this wire, summed over all causes, given that exactly one fault explains the readings.
-    pub probability: f64,
-}
-
 /// Event of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultEvent {
     /// A fault was identified: its wire should be left out.
-    Named(Diagnosis),
+    Named {
+        /// Faulty wire.
+        wire: FaultyWire,
+        /// Most probable cause.
+        cause: FaultCause,
+        /// Probability of this wire, summed over all causes, given that exactly one fault explains the readings.
+        probability: f64,
+    },
     /// The readings contradict Eq. (2), and no fault of a single wire explains them.
     Unexplained,
     /// The readings agree with Eq. (2) again.
     Recovered,
 }
 
-/// Checks whether Eq. (2) explains the frames, and identifies the faulty wire if it does not.
+/// Checks whether Eq. (2) explains the frames, identifies the faulty wire if it does not, and decodes without it.
 ///
 /// A frame is suspicious if its residual after decoding, χ² = Σ (ln m − ln R)²/σ² over all readings m with relative noise
 /// σ, exceeds a limit that intact frames exceed with a probability of 10⁻³. When [`Self::PERSISTENCE`] consecutive frames
@@ -74,9 +70,14 @@ pub enum FaultEvent {
 /// Faults that Eq. (2) explains by some deformation cannot be found: two row-wires that touch, for example.
 #[derive(Debug)]
 pub struct WireCheck {
-    model: SensorModel,
+    pub(super) model: SensorModel,
     /// Row-wires read.
-    rows: Vec<usize>,
+    pub(super) rows: Vec<usize>,
+    /// Estimator of the scene, for answers.
+    pub(super) decoder: Estimator,
+    /// True if the deformations of neighbouring rows are correlated.
+    pub(super) has_neighbours: bool,
+    /// Estimator of any presses, for the residual.
     estimator: Estimator,
     axes: &'static [usize],
     stroke_mm: f64,
@@ -92,7 +93,8 @@ pub struct WireCheck {
     coordinates_mm: Vec<f64>,
     displacements_mm: Vec<DVec3>,
     predicted_ohm: Vec<f64>,
-    /// Columns of the latest residual.
+    /// Most probable logarithm of the gain of the row, and columns of the latest residual.
+    log_gain: f64,
     used: Vec<usize>,
     /// Last event; [`FaultEvent::Recovered`] at first.
     state: FaultEvent,
@@ -119,7 +121,7 @@ struct Fit {
 }
 
 /// A reading predicted from others.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Predicted {
     log_reading: f64,
     /// ln R̂ with the gain of the row.
@@ -128,9 +130,6 @@ struct Predicted {
     /// Part of the variance that is noise of the reading.
     noise: f64,
 }
-
-/// Fit of a row without some readings, and these readings.
-type PartialRow = (Fit, Vec<Predicted>);
 
 /// A fault that may explain some frames.
 type Hypothesis = (FaultyWire, FaultCause, Fit);
@@ -168,7 +167,7 @@ impl WireCheck {
     }
 
     /// Prepares to check frames of `rows` with the noise of `scene`, which must not be zero. Presses may differ from those
-    /// of the scene.
+    /// of the scene, but answers are the most probable ones for the scene.
     ///
     /// # Errors
     /// If the model has no resistance.
@@ -184,13 +183,13 @@ impl WireCheck {
         let own = |&ohm: &f64| source.relative_to(ohm).own.max(SMALLEST_NOISE);
         let stroke_mm = scene.stroke_mm(&model.geometry);
         let half_way = vec![DVec3::Z * (0.5 * stroke_mm); model.scale.nodes_per_row()];
-        let mut half_way_ohm = Vec::with_capacity(rows.len() * model.scale.columns());
-        for &row in rows {
-            half_way_ohm.extend(model.row_resistances(row, &half_way)?);
-        }
+        let half_way_ohm: Result<Vec<_>, _> = rows.iter().map(|&row| model.row_resistances(row, &half_way)).collect();
+        let half_way_ohm = half_way_ohm?.concat();
         Ok(Self {
             model: *model,
             rows: rows.to_vec(),
+            decoder: Estimator::new(model, scene, rows)?,
+            has_neighbours: scene.loading != Loading::RandomNodes,
             estimator: Estimator::new(model, &any_press, rows)?,
             axes: scene.movement.axes().indices(),
             stroke_mm,
@@ -198,11 +197,12 @@ impl WireCheck {
             // Rows are decoded one by one but share this error: it must not be penalised more than once in total.
             common: noise.drift * (rows.len() as f64).sqrt(),
             log_full_scale: (noise.range_ohm(model)?.1 * (1.0 - 1e-9)).ln(),
-            suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * half_way_ohm.len()),
+            suspicious_ohm: Vec::new(),
             half_way_ohm,
             coordinates_mm: vec![0.0; model.scale.coordinates_per_row()],
             displacements_mm: half_way,
             predicted_ohm: vec![0.0; model.scale.columns()],
+            log_gain: 0.0,
             used: Vec::with_capacity(model.scale.columns()),
             state: FaultEvent::Recovered,
             suspicious: 0,
@@ -211,10 +211,10 @@ impl WireCheck {
         })
     }
 
-    /// Returns the fault currently reported.
-    pub fn named(&self) -> Option<Diagnosis> {
+    /// Returns the wire of the fault currently reported.
+    pub fn named(&self) -> Option<FaultyWire> {
         match self.state {
-            FaultEvent::Named(diagnosis) => Some(diagnosis),
+            FaultEvent::Named { wire, .. } => Some(wire),
             FaultEvent::Unexplained | FaultEvent::Recovered => None,
         }
     }
@@ -237,9 +237,8 @@ impl WireCheck {
             return None;
         }
         self.normal = 0;
-        if self
-            .named()
-            .is_some_and(|named| self.is_explained(frame_ohm, Some(named.wire)))
+        if let Some(wire) = self.named()
+            && self.is_explained(frame_ohm, Some(wire))
         {
             self.suspicious = 0;
             return None;
@@ -254,20 +253,18 @@ impl WireCheck {
         }
         self.suspicious = 0;
         let frames_ohm = std::mem::take(&mut self.suspicious_ohm);
-        let found = self.compare(&frames_ohm);
-        self.suspicious_ohm = frames_ohm;
-        self.next_comparison = match found {
-            Some(_) => Self::PERSISTENCE,
-            None => (2 * self.next_comparison).min(LONGEST_WAIT * Self::PERSISTENCE),
+        let event = self.explain(&frames_ohm).unwrap_or(FaultEvent::Unexplained);
+        self.next_comparison = match event {
+            FaultEvent::Unexplained => (2 * self.next_comparison).min(LONGEST_WAIT * Self::PERSISTENCE),
+            _ => Self::PERSISTENCE,
         };
-        let event = found.map_or(FaultEvent::Unexplained, FaultEvent::Named);
-        let last = std::mem::replace(&mut self.state, event);
-        let is_known = match (last, event) {
-            (FaultEvent::Named(last), FaultEvent::Named(named)) => {
-                last.wire == named.wire && discriminant(&last.cause) == discriminant(&named.cause)
+        let is_known = match (self.state, event) {
+            (FaultEvent::Named { wire: a, cause: b, .. }, FaultEvent::Named { wire, cause, .. }) => {
+                a == wire && discriminant(&b) == discriminant(&cause)
             }
-            _ => last == event,
+            (last, event) => last == event,
         };
+        self.state = event;
         (!is_known).then_some(event)
     }
 
@@ -276,11 +273,11 @@ impl WireCheck {
         let missing = left_out.map_or(0..0, FaultyWire::columns);
         let rows = frame_ohm.chunks_exact(self.columns()).enumerate();
         let fits = rows.filter_map(|(row_index, readings_ohm)| {
-            let is_left_out = left_out.is_some_and(|wire| wire.is_row(self.rows[row_index]));
-            (!is_left_out).then(|| self.residual(row_index, readings_ohm, &missing).0)
+            let is_left_out = left_out == Some(FaultyWire::Row(self.rows[row_index]));
+            (!is_left_out).then(|| self.residual(row_index, readings_ohm, &missing))
         });
-        let all = fits.sum();
-        self.is_within_limit(all)
+        let all: Option<Fit> = fits.sum();
+        all.is_some_and(|fit| self.is_within_limit(fit))
     }
 
     /// Returns `true` if χ² is that of intact wires; `false` for NaN.
@@ -289,48 +286,44 @@ impl WireCheck {
         fit.chi_squared <= chi_squared_quantile(fit.readings, DEVIATE) + OF_PRIOR * unknowns as f64
     }
 
-    fn columns(&self) -> usize {
+    /// Number of column-wires.
+    pub fn columns(&self) -> usize {
         self.predicted_ohm.len()
     }
 
-    /// Decodes a row, and returns its χ² with the most probable logarithm of its gain. The score is not set.
-    fn residual(&mut self, row_index: usize, readings_ohm: &[f64], missing: &Range<usize>) -> (Fit, f64) {
+    /// Decodes a row, and returns its χ² with the most probable gain; `None` without an answer. The score is not set.
+    fn residual(&mut self, row_index: usize, readings_ohm: &[f64], missing: &Range<usize>) -> Option<Fit> {
         let row = self.rows[row_index];
         let coordinates_mm = &mut self.coordinates_mm;
-        let decoded = (self.estimator).solve_without(missing.clone(), row, readings_ohm, coordinates_mm);
-        let mut fit = Fit {
-            rows: 1,
-            ..Fit::default()
-        };
+        let solved = (self.estimator).solve_without(missing.clone(), row, readings_ohm, coordinates_mm);
+        solved.ok()?;
         let nodes = self.displacements_mm.iter_mut().zip(coordinates_mm.chunks_exact(3));
         for (node, (displacement, at)) in nodes.enumerate() {
             *displacement = self.model.displacement_mm(row, node, DVec3::from_slice(at));
         }
         let predicted = (self.model).row_resistances_into(row, &self.displacements_mm, &mut self.predicted_ohm);
-        if decoded.is_err() || predicted.is_err() {
-            fit.chi_squared = f64::INFINITY;
-            return (fit, 0.0);
-        }
+        predicted.ok()?;
         self.used.clear();
-        let (mut sum, mut weights) = (0.0, 0.0);
+        let (mut chi_squared, mut sum, mut weights) = (0.0, 0.0, 0.0);
         for column in (0..readings_ohm.len()).filter(|column| !missing.contains(column)) {
             let logs = [readings_ohm[column], self.predicted_ohm[column]].map(f64::ln);
             let (misfit, variance) = (logs[0] - logs[1], self.variance(row_index, column));
             // Where both are clipped, the reading is certain.
             if logs.iter().any(|log| *log < self.log_full_scale) {
-                fit.chi_squared += misfit * misfit / variance;
+                chi_squared += misfit * misfit / variance;
                 sum += misfit / variance;
                 weights += 1.0 / variance;
                 self.used.push(column);
             }
         }
-        fit.readings = self.used.len();
-        if self.common == 0.0 {
-            return (fit, 0.0);
-        }
-        let log_gain = sum / (weights + self.common.powi(-2));
-        fit.chi_squared -= sum * log_gain;
-        (fit, log_gain)
+        // 0 without a common error, whose precision is infinite.
+        self.log_gain = sum / (weights + self.common.powi(-2));
+        Some(Fit {
+            score: 0.0,
+            chi_squared: chi_squared - sum * self.log_gain,
+            readings: self.used.len(),
+            rows: 1,
+        })
     }
 
     /// Variance of the noise of ln m.
@@ -338,75 +331,59 @@ impl WireCheck {
         self.deviations[row_index * self.columns() + column].powi(2)
     }
 
-    /// Decodes a row without the missing readings, and predicts these.
-    fn partial_row(&mut self, row_index: usize, readings_ohm: &[f64], missing: &Range<usize>) -> PartialRow {
-        let (mut fit, log_gain) = self.residual(row_index, readings_ohm, missing);
-        let Self {
-            displacements_mm,
-            predicted_ohm,
-            ..
-        } = &*self;
-        let jacobian = self.model.row_jacobian(self.rows[row_index], displacements_mm);
-        let Ok(jacobian) = jacobian else {
-            fit.score = f64::INFINITY;
-            return (fit, vec![Predicted::default(); missing.len()]);
-        };
-        // Slopes of ln R by the unknowns, in units of their prior standard deviations: the stroke, and that of the gain.
-        let moving = displacements_mm.len() * self.axes.len();
-        let slopes = |column: usize| {
-            Mat::from_fn(moving + 1, 1, |unknown, _| {
-                let (node, axis) = (unknown / self.axes.len(), unknown % self.axes.len());
-                if unknown == moving {
-                    self.common
-                } else {
-                    jacobian[[column, node, self.axes[axis]]] / predicted_ohm[column] * self.stroke_mm
-                }
-            })
-        };
-        let mut precision = Mat::<f64>::identity(moving + 1, moving + 1);
-        for &column in &self.used {
-            let (noise, slopes) = (self.variance(row_index, column), slopes(column));
-            precision += faer::Scale(1.0 / noise) * &slopes * slopes.transpose();
-            fit.score += (TAU * noise).ln();
-        }
-        let factor = precision.llt(Side::Lower).ok();
-        let diagonal = factor
-            .iter()
-            .flat_map(|factor| factor.L().diagonal().column_vector().iter());
-        fit.score += fit.chi_squared + 2.0 * diagonal.map(|entry| entry.ln()).sum::<f64>();
-        let predicted = missing.clone().map(|column| {
-            let (noise, slopes) = (self.variance(row_index, column), slopes(column));
-            let solved = factor.as_ref().map(|factor| slopes.transpose() * factor.solve(&slopes));
-            Predicted {
-                log_reading: readings_ohm[column].ln(),
-                log_ohm: predicted_ohm[column].ln() + log_gain,
-                variance: noise + solved.map_or(f64::INFINITY, |variance| variance[(0, 0)]),
-                noise,
+    /// Decodes all rows of the frames without the missing readings, and predicts these; `None` if a row has no answer.
+    fn partial_rows(&mut self, frames_ohm: &[f64], missing: Range<usize>) -> Option<Vec<(Fit, Vec<Predicted>)>> {
+        let lines = frames_ohm.chunks_exact(self.columns()).enumerate();
+        let of_line = |(line, readings_ohm): (usize, &[f64])| {
+            let row_index = line % self.rows.len();
+            let mut fit = self.residual(row_index, readings_ohm, &missing)?;
+            let (displacements_mm, predicted_ohm) = (&self.displacements_mm, &self.predicted_ohm);
+            let jacobian = self.model.row_jacobian(self.rows[row_index], displacements_mm).ok()?;
+            // Slopes of ln R by the unknowns, in units of their prior standard deviations: the stroke, and that of the gain.
+            let moving = displacements_mm.len() * self.axes.len();
+            let slopes = |column: usize| {
+                Mat::from_fn(moving + 1, 1, |unknown, _| {
+                    let (node, axis) = (unknown / self.axes.len(), unknown % self.axes.len());
+                    if unknown == moving {
+                        self.common
+                    } else {
+                        jacobian[[column, node, self.axes[axis]]] / predicted_ohm[column] * self.stroke_mm
+                    }
+                })
+            };
+            let mut precision = Mat::<f64>::identity(moving + 1, moving + 1);
+            for &column in &self.used {
+                let (noise, slopes) = (self.variance(row_index, column), slopes(column));
+                precision += faer::Scale(1.0 / noise) * &slopes * slopes.transpose();
+                fit.score += (TAU * noise).ln();
             }
-        });
-        (fit, predicted.collect())
-    }
-
-    /// All rows of the frames without the missing readings.
-    fn partial_rows(&mut self, frames_ohm: &[f64], missing: Range<usize>) -> Vec<PartialRow> {
-        let rows = self.rows.len();
-        let readings = frames_ohm.chunks_exact(self.columns()).enumerate();
-        readings
-            .map(|(line, ohm)| self.partial_row(line % rows, ohm, &missing))
-            .collect()
+            let factor = precision.llt(Side::Lower).ok()?;
+            let diagonal = factor.L().diagonal().column_vector();
+            fit.score += fit.chi_squared + 2.0 * diagonal.iter().map(|entry| entry.ln()).sum::<f64>();
+            let predicted = missing.clone().map(|column| {
+                let (noise, slopes) = (self.variance(row_index, column), slopes(column));
+                Predicted {
+                    log_reading: readings_ohm[column].ln(),
+                    log_ohm: predicted_ohm[column].ln() + self.log_gain,
+                    variance: noise + (slopes.transpose() * factor.solve(&slopes))[(0, 0)],
+                    noise,
+                }
+            });
+            Some((fit, predicted.collect()))
+        };
+        lines.map(of_line).collect()
     }
 
     /// The fault that explains these frames, if there is one.
-    fn compare(&mut self, frames_ohm: &[f64]) -> Option<Diagnosis> {
-        let intact: Vec<Fit> = (self.partial_rows(frames_ohm, 0..0).iter().map(|(fit, _)| *fit)).collect();
+    fn explain(&mut self, frames_ohm: &[f64]) -> Option<FaultEvent> {
+        let intact: Vec<Fit> = (self.partial_rows(frames_ohm, 0..0)?.iter().map(|(fit, _)| *fit)).collect();
         let rows = 0..self.rows.len();
         let mut hypotheses: Vec<Hypothesis> = rows.map(|row| self.of_row(frames_ohm, row, &intact)).collect();
         let suspects = self.suspects(frames_ohm, &intact);
         for &column in &suspects {
-            let rows = self.partial_rows(frames_ohm, column..column + 1);
-            hypotheses.extend(self.of_column(column, &rows));
+            hypotheses.extend(self.of_column(frames_ohm, column)?);
             if suspects.contains(&(column + 1)) {
-                hypotheses.push(of_short(column, &self.partial_rows(frames_ohm, column..column + 2)));
+                hypotheses.push(self.of_short(frames_ohm, column)?);
             }
         }
         hypotheses.retain(|(.., fit)| self.is_within_limit(*fit));
@@ -414,7 +391,7 @@ impl WireCheck {
         let weight = |(.., fit): &Hypothesis| (-0.5 * (fit.score - best.score)).exp();
         let of_wire = hypotheses.iter().filter(|(other, ..)| *other == wire);
         let probability = of_wire.map(weight).sum::<f64>() / hypotheses.iter().map(weight).sum::<f64>();
-        (probability >= Self::SURE).then_some(Diagnosis {
+        (probability >= Self::SURE).then_some(FaultEvent::Named {
             wire,
             cause,
             probability,
@@ -439,30 +416,34 @@ impl WireCheck {
 
     /// Column-wires without which the worst rows of the last frame have the smallest χ², and the neighbours of the best:
     /// two touching columns mask each other.
-    fn suspects(&mut self, frames_ohm: &[f64], intact: &[Fit]) -> Vec<usize> {
+    fn suspects(&mut self, frames_ohm: &[f64], intact: &[Fit]) -> BTreeSet<usize> {
         let (rows, columns) = (self.rows.len(), self.columns());
         let mut lines: Vec<usize> = (intact.len() - rows..intact.len()).collect();
         lines.sort_by(|&a, &b| intact[b].chi_squared.total_cmp(&intact[a].chi_squared));
         lines.truncate(WORST_ROWS);
-        let mut order: Vec<(f64, usize)> = Vec::with_capacity(columns);
-        for column in 0..columns {
+        let without = |column: usize| {
             let fits = lines.iter().map(|&line| {
                 let readings_ohm = &frames_ohm[line * columns..][..columns];
-                self.residual(line % rows, readings_ohm, &(column..column + 1)).0
+                let fit = self.residual(line % rows, readings_ohm, &(column..column + 1));
+                fit.map_or(f64::INFINITY, |fit| fit.chi_squared)
             });
-            order.push((fits.map(|fit| fit.chi_squared).sum(), column));
-        }
+            (fits.sum::<f64>(), column)
+        };
+        let mut order: Vec<(f64, usize)> = (0..columns).map(without).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let best = order[0].1;
-        let mut suspects: Vec<usize> = order.iter().take(MAX_SUSPECTS).map(|(_, column)| *column).collect();
-        suspects.extend([best.saturating_sub(1), (best + 1).min(columns - 1)]);
-        suspects.sort_unstable();
-        suspects.dedup();
-        suspects
+        let neighbours = best.saturating_sub(1)..=(best + 1).min(columns - 1);
+        (order
+            .iter()
+            .take(MAX_SUSPECTS)
+            .map(|(_, column)| *column)
+            .chain(neighbours))
+        .collect()
     }
 
     /// Faults of a column-wire, from all rows without it.
-    fn of_column(&self, column: usize, rows: &[PartialRow]) -> [Hypothesis; 3] {
+    fn of_column(&mut self, frames_ohm: &[f64], column: usize) -> Option<[Hypothesis; 3]> {
+        let rows = self.partial_rows(frames_ohm, column..column + 1)?;
         let rest: Fit = rows.iter().map(|(fit, _)| *fit).sum();
         let readings = rows.iter().flat_map(|(_, missing)| missing);
         let (level, of_level) = level(readings.clone().map(|reading| (reading.log_reading, reading.noise)));
@@ -481,28 +462,29 @@ impl WireCheck {
         let other = if is_high { FaultCause::Open } else { FaultCause::Unknown };
         let (log_gain, of_gain) = self::level(misfits);
         let relative = log_gain.exp_m1();
-        [
+        let causes = [
             constant,
             (FaultCause::Gain { relative }, of_gain),
             (other, unpredicted(rows.len())),
-        ]
-        .map(|(cause, fit)| (FaultyWire::Column(column), cause, [rest, fit].into_iter().sum()))
+        ];
+        Some(causes.map(|(cause, fit)| (FaultyWire::Column(column), cause, [rest, fit].into_iter().sum())))
     }
-}
 
-/// Two columns that touch: their readings differ only by noise, and have the mean conductance of both.
-fn of_short(column: usize, rows: &[PartialRow]) -> Hypothesis {
-    let of_rows = rows.iter().flat_map(|(fit, missing)| {
-        let [one, other] = [missing[0], missing[1]];
-        let noise = one.noise + other.noise;
-        let apart = normal(one.log_reading - other.log_reading, noise);
-        // The mean conductance is known at least as well as both on average.
-        let log_ohm = -(0.5 * ((-one.log_ohm).exp() + (-other.log_ohm).exp())).ln();
-        let misfit = 0.5 * (one.log_reading + other.log_reading) - log_ohm;
-        let mean = normal(misfit, 0.5 * (one.variance + other.variance) - 0.25 * noise);
-        [*fit, apart, mean]
-    });
-    (FaultyWire::Columns(column), FaultCause::Shorted, of_rows.sum())
+    /// Two columns that touch: their readings differ only by noise, and have the mean conductance of both.
+    fn of_short(&mut self, frames_ohm: &[f64], column: usize) -> Option<Hypothesis> {
+        let rows = self.partial_rows(frames_ohm, column..column + 2)?;
+        let of_rows = rows.iter().flat_map(|(fit, missing)| {
+            let [one, other] = [missing[0], missing[1]];
+            let noise = one.noise + other.noise;
+            let apart = normal(one.log_reading - other.log_reading, noise);
+            // The mean conductance is known at least as well as both on average.
+            let log_ohm = -(0.5 * ((-one.log_ohm).exp() + (-other.log_ohm).exp())).ln();
+            let misfit = 0.5 * (one.log_reading + other.log_reading) - log_ohm;
+            let mean = normal(misfit, 0.5 * (one.variance + other.variance) - 0.25 * noise);
+            [*fit, apart, mean]
+        });
+        Some((FaultyWire::Columns(column), FaultCause::Shorted, of_rows.sum()))
+    }
 }
 
 /// Fit of so many readings that nothing predicts.
@@ -546,11 +528,6 @@ impl Sum for Fit {
 }
 
 impl FaultyWire {
-    /// Returns `true` if only the readings of this row-wire are affected.
-    pub fn is_row(self, row: usize) -> bool {
-        self == Self::Row(row)
-    }
-
     /// Returns the faulty column-wires.
     pub fn columns(self) -> Range<usize> {
         match self {
@@ -571,10 +548,19 @@ impl fmt::Display for FaultyWire {
     }
 }
 
-impl fmt::Display for Diagnosis {
+impl fmt::Display for FaultEvent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: ", self.wire)?;
-        match self.cause {
+        let (wire, cause, probability) = match *self {
+            Self::Named {
+                wire,
+                cause,
+                probability,
+            } => (wire, cause, probability),
+            Self::Unexplained => return write!(f, "the readings contradict Eq. (2)"),
+            Self::Recovered => return write!(f, "the readings agree with Eq. (2) again"),
+        };
+        write!(f, "{wire}: ")?;
+        match cause {
             FaultCause::Open => write!(f, "open, as if broken or not connected"),
             FaultCause::Stuck => write!(f, "stuck, its readings do not change"),
             FaultCause::Shorted => write!(f, "shorted, the wires touch"),
@@ -583,6 +569,6 @@ impl fmt::Display for Diagnosis {
             }
             FaultCause::Unknown => write!(f, "its readings contradict all others"),
         }?;
-        write!(f, " (probability {:.4})", self.probability)
+        write!(f, " (probability {probability:.4})")
     }
 }

@@ -1,6 +1,9 @@
 use std::sync::Arc;
 
-use decoupler_core::{live::ZeroGains, sensor::ArrayScale};
+use decoupler_core::{
+    live::{FaultyWire, ZeroGains},
+    sensor::ArrayScale,
+};
 use decoupler_files::{
     export::format_number,
     figure::{
@@ -139,13 +142,7 @@ const DECAY: f64 = 0.999;
 impl DropScale {
     /// Updates the limit with a frame; faulty wires do not count.
     pub fn take(&mut self, frame: &LiveFrame) {
-        let wire = match &frame.watched {
-            Watched::Named(diagnosis) => Some(diagnosis.wire),
-            Watched::Off(_) | Watched::Normal | Watched::Unexplained => None,
-        };
-        let is_healthy = |row: usize, column: usize| {
-            wire.is_none_or(|wire| !wire.is_row(frame.rows[row]) && !wire.columns().contains(&column))
-        };
+        let is_healthy = |row: usize, column: usize| !frame.watched.leaves_out(frame.rows[row], column);
         let drops = frame.drops_percent.indexed_iter();
         let drops = drops.filter(|((row, column), drop)| is_healthy(*row, *column) && drop.is_finite());
         let largest = drops.map(|(_, &drop)| drop).fold(0.0, f64::max);
@@ -289,15 +286,14 @@ fn gains_of(zero: &ZeroGains, frame: &LiveFrame) -> Option<Array2<f64>> {
 
 /// Returns the rows and columns of the map whose wires are faulty.
 fn marked(frame: &LiveFrame) -> (Vec<usize>, Vec<usize>) {
-    let Watched::Named(diagnosis) = &frame.watched else {
+    let Some(wire) = frame.watched.wire() else {
         return (Vec::new(), Vec::new());
     };
     let rows = frame.rows.iter().enumerate();
     let rows = rows
-        .filter(|(_, row)| diagnosis.wire.is_row(**row))
+        .filter(|(_, row)| wire == FaultyWire::Row(**row))
         .map(|(place, _)| place);
-    let columns = diagnosis.wire.columns();
-    (rows.collect(), columns.collect())
+    (rows.collect(), wire.columns().collect())
 }
 
 /// Form of the fault of the simulated wires.

@@ -12,7 +12,7 @@ use crate::window::{
     widgets::{coloured_fact_ui, dim_ui, fact_ui, fields::capitalised, ghost_button, note_ui, section_heading_ui},
 };
 use decoupler_core::{
-    live::{FaultyWire, ZeroGains},
+    live::{FaultEvent, FaultyWire, ZeroGains},
     text::counted,
 };
 use decoupler_files::export::{format_duration, format_number, format_percent};
@@ -35,25 +35,25 @@ pub fn figures_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &m
 /// Shows warnings, above everything else.
 fn warnings_ui(ui: &mut Ui, frame: &LiveFrame) {
     match &frame.watched {
-        Watched::Named(diagnosis) => {
-            let its = match diagnosis.wire {
+        Watched::Checked(event @ FaultEvent::Named { wire, .. }) => {
+            let its = match wire {
                 FaultyWire::Row(_) | FaultyWire::Column(_) => "Its readings are left out",
                 FaultyWire::Columns(_) => "Their readings are left out",
             };
-            let text = capitalised(&diagnosis.to_string());
+            let text = capitalised(&event.to_string());
             note_ui(
                 ui,
                 &format!("{text}. {its}, and the others decoded by Gauss-Newton steps on Eq. (2)."),
             );
         }
-        Watched::Unexplained => {
+        Watched::Checked(FaultEvent::Unexplained) => {
             note_ui(
                 ui,
                 "The readings contradict Eq. (2), and no fault of a single wire explains them: the answers may be wrong. \
                  Check the wiring, the geometry, the order of the rows, and the relative noise on the left.",
             );
         }
-        Watched::Off(_) | Watched::Normal => {}
+        Watched::Off(_) | Watched::Checked(FaultEvent::Recovered) => {}
     }
 }
 
@@ -106,9 +106,9 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
         Watched::Off(reason) => {
             dim_ui(ui, &format!("Faults of wires are {reason}."));
         }
-        Watched::Normal => fact_ui(ui, "Fault", hint, "none"),
-        Watched::Unexplained => fact_ui(ui, "Fault", hint, "not a single-wire fault"),
-        Watched::Named(diagnosis) => fact_ui(ui, "Fault", hint, &diagnosis.wire.to_string()),
+        Watched::Checked(FaultEvent::Recovered) => fact_ui(ui, "Fault", hint, "none"),
+        Watched::Checked(FaultEvent::Unexplained) => fact_ui(ui, "Fault", hint, "not a single-wire fault"),
+        Watched::Checked(FaultEvent::Named { wire, .. }) => fact_ui(ui, "Fault", hint, &wire.to_string()),
     }
     let Some(errors) = frame.errors else { return };
     let in_mm = |mm: Option<f64>| match mm {

@@ -14,7 +14,7 @@ use crate::window::{
     theme::{Theme, space, type_size},
     widgets::{card_ui, scrolled_ui, state_ui},
 };
-use decoupler_core::text::counted;
+use decoupler_core::{live::FaultEvent, text::counted};
 
 impl View for LiveView {
     fn name(&self) -> &'static str {
@@ -116,8 +116,12 @@ fn status_ui(ui: &mut Ui, view: &LiveView) {
         (None, _) => (palette.dim, "Ready: press Start".to_owned()),
         (Some(_), _) if !view.shown.has_answer() => (palette.accent, "Waiting for the first frame".to_owned()),
         (Some(_), _) if counts.is_waiting => (palette.warning, "No frame for two seconds".to_owned()),
-        (Some(_), Some(Watched::Named(diagnosis))) => (palette.warning, format!("Fault: {}", diagnosis.wire)),
-        (Some(_), Some(Watched::Unexplained)) => (palette.warning, "The readings contradict Eq. (2)".to_owned()),
+        (Some(_), Some(Watched::Checked(FaultEvent::Named { wire, .. }))) => {
+            (palette.warning, format!("Fault: {wire}"))
+        }
+        (Some(_), Some(Watched::Checked(FaultEvent::Unexplained))) => {
+            (palette.warning, "The readings contradict Eq. (2)".to_owned())
+        }
         (Some(running), _) => match (&running.source, view.shown.replay) {
             (SourcePlan::Replay { .. }, Some(replay)) if !replay.is_playing => {
                 (palette.dim, "Replay paused".to_owned())

@@ -4,69 +4,61 @@ use ndarray::ArrayView2;
 
 use crate::{dataset::Dataset, evaluation::errors::extremes, problem::Channel};
 
-/// Test samples outside the range of the training samples: those with a reading or a target outside it by more than a tenth of
-/// its width. Such readings are limited to the range, extended by a tenth.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Extrapolation {
-    /// Share of the test samples that are outside.
-    pub share: f64,
-    /// Warning with the names of the columns, if that is more than one in a hundred.
-    pub warning: Option<String>,
-}
+/// Fraction of the range by which a value may be outside it: the extremes of few training samples are exceeded slightly by
+/// others of the same kind.
+const MARGIN: f64 = 0.1;
+/// Minimum share of the test samples that is worth a warning.
+const MIN_SHARE: f64 = 0.01;
+/// Number of columns that a warning names.
+const NAMED: usize = 3;
 
-impl Extrapolation {
-    /// Fraction of the range by which a value may be outside it: the extremes of few training samples are exceeded slightly by
-    /// others of the same kind.
-    const MARGIN: f64 = 0.1;
-    /// Minimum share of the test samples that is worth a warning.
-    const MIN_SHARE: f64 = 0.01;
-    /// Number of columns that a warning names.
-    const NAMED: usize = 3;
-
-    /// Compares the samples of `test` with the ranges of the samples of `training`; both have these channels and targets.
-    pub fn measure(training: &Dataset, test: &Dataset, inputs: &[Channel], targets: &[Channel]) -> Self {
-        let mut is_outside = vec![false; test.samples()];
-        let mut list = |kind: &str, channels: &[Channel], [training, test]: [ArrayView2<'_, f64>; 2]| {
-            let mut counts = Vec::new();
-            for ((channel, training), test) in channels.iter().zip(training.columns()).zip(test.columns()) {
-                let (low, high) = extremes(training);
-                let margin = Self::MARGIN * (high - low);
-                let range = low - margin..=high + margin;
-                let outside = test
-                    .iter()
-                    .zip(&mut is_outside)
-                    .filter(|(value, _)| !range.contains(value));
-                counts.push((outside.map(|(_, is_outside)| *is_outside = true).count(), &channel.name));
-            }
-            counts.retain(|(count, _)| *count > 0);
-            counts.sort_by_key(|(count, _)| Reverse(*count));
-            let named = counts.iter().take(Self::NAMED);
-            let mut parts = Vec::from_iter(named.map(|(count, name)| format!("{name} in {count}")));
-            if counts.len() > Self::NAMED {
-                parts.push(format!("{} others", counts.len() - Self::NAMED));
-            }
-            (!parts.is_empty()).then(|| format!("{kind} {}", parts.join(", ")))
-        };
-        let listed = [
-            list("readings", inputs, [training.readings(), test.readings()]),
-            list("targets", targets, [training.targets(), test.targets()]),
-        ];
-        let (samples, outside) = (
-            test.samples(),
-            is_outside.into_iter().filter(|outside| *outside).count(),
-        );
-        let share = outside as f64 / samples.max(1) as f64;
-        let warning = format!(
-            "{:.0} % of the test samples ({outside} of {samples}) are outside the range of the training samples by more than \
-             a tenth of it ({}); readings are limited to that range, and the error within it may be smaller",
-            100.0 * share,
-            Vec::from_iter(listed.into_iter().flatten()).join("; ")
-        );
-        Self {
-            share,
-            warning: (share >= Self::MIN_SHARE).then_some(warning),
+/// Returns the share of the test samples outside the range of the training samples: those with a reading or a target outside it
+/// by more than a tenth of its width; with a warning that names the columns if that is more than one in a hundred. Such readings
+/// are limited to the range, extended by a tenth. Both sets have these channels and targets.
+pub fn extrapolation(
+    training: &Dataset,
+    test: &Dataset,
+    inputs: &[Channel],
+    targets: &[Channel],
+) -> (f64, Option<String>) {
+    let mut is_outside = vec![false; test.samples()];
+    let mut list = |kind: &str, channels: &[Channel], [training, test]: [ArrayView2<'_, f64>; 2]| {
+        let mut counts = Vec::new();
+        for ((channel, training), test) in channels.iter().zip(training.columns()).zip(test.columns()) {
+            let (low, high) = extremes(training);
+            let margin = MARGIN * (high - low);
+            let range = low - margin..=high + margin;
+            let outside = test
+                .iter()
+                .zip(&mut is_outside)
+                .filter(|(value, _)| !range.contains(value));
+            counts.push((outside.map(|(_, is_outside)| *is_outside = true).count(), &channel.name));
         }
-    }
+        counts.retain(|(count, _)| *count > 0);
+        counts.sort_by_key(|(count, _)| Reverse(*count));
+        let named = counts.iter().take(NAMED);
+        let mut parts = Vec::from_iter(named.map(|(count, name)| format!("{name} in {count}")));
+        if counts.len() > NAMED {
+            parts.push(format!("{} others", counts.len() - NAMED));
+        }
+        (!parts.is_empty()).then(|| format!("{kind} {}", parts.join(", ")))
+    };
+    let listed = [
+        list("readings", inputs, [training.readings(), test.readings()]),
+        list("targets", targets, [training.targets(), test.targets()]),
+    ];
+    let (samples, outside) = (
+        test.samples(),
+        is_outside.into_iter().filter(|outside| *outside).count(),
+    );
+    let share = outside as f64 / samples.max(1) as f64;
+    let warning = format!(
+        "{:.0} % of the test samples ({outside} of {samples}) are outside the range of the training samples by more than \
+             a tenth of it ({}); readings are limited to that range, and the error within it may be smaller",
+        100.0 * share,
+        Vec::from_iter(listed.into_iter().flatten()).join("; ")
+    );
+    (share, (share >= MIN_SHARE).then_some(warning))
 }
 
 #[cfg(test)]
@@ -93,15 +85,15 @@ mod tests {
             array![[0.5], [0.5], [2.0], [-0.11]],
         );
         let (inputs, targets) = (channels(&["a", "b"]), channels(&["force"]));
-        let found = Extrapolation::measure(&training, &test, &inputs, &targets);
-        assert_eq!(found.share, 0.75);
-        let warning = found.warning.unwrap();
+        let (share, warning) = extrapolation(&training, &test, &inputs, &targets);
+        assert_eq!(share, 0.75);
+        let warning = warning.unwrap();
         assert!(
             warning.contains("75 % of the test samples (3 of 4)")
                 && warning.contains("readings a in 2, b in 1; targets force in 2"),
             "{warning}"
         );
-        let inside = Extrapolation::measure(&training, &training, &inputs, &targets);
-        assert_eq!((inside.share, inside.warning), (0.0, None));
+        let inside = extrapolation(&training, &training, &inputs, &targets);
+        assert_eq!(inside, (0.0, None));
     }
 }

@@ -17,7 +17,7 @@ use ndarray::{Array1, ArrayView1};
 
 use super::errors::mean;
 pub use determination::{Determinacy, Determination, Undetermined, nonlinear_gains, ridge_remark};
-pub use extrapolation::Extrapolation;
+pub use extrapolation::extrapolation;
 pub use findings::{Findings, FittedModel, StudyStep, TargetFindings};
 pub use hysteresis::{HysteresisLoop, LoopLevel};
 pub(crate) use interval::Evidence;

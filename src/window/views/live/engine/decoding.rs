@@ -1,18 +1,15 @@
-use std::{ops::RangeInclusive, sync::Arc, time::Instant};
+use std::{collections::VecDeque, ops::RangeInclusive, sync::Arc, time::Instant};
 
 use glam::DVec3;
 use ndarray::Array2;
 
-use super::{
-    message::{TruthErrors, Watched},
-    session::Watch,
-};
+use super::{message::TruthErrors, session::Watch};
 use crate::window::test_view::Frame;
 use decoupler_core::{
     dataset::Simulation,
     decoupling::{Decoder, ProgramDecoder},
-    live::{ReZero, ZeroGains},
-    scene::{Deformation, Scene},
+    live::ZeroGains,
+    scene::{Deformation, NoiseSource, Scene},
     sensor::SensorModel,
     surface::SurfaceMap,
 };
@@ -30,7 +27,9 @@ pub(super) struct Decoding {
     pub(super) z_range_mm: RangeInclusive<f64>,
     /// Readings without load: rows × M4, in ohm.
     rest_ohm: Vec<f64>,
-    re_zero: ReZero,
+    /// Latest frames as received, for [`ZeroGains::estimate`].
+    latest_ohm: VecDeque<Vec<f64>>,
+    noise: NoiseSource,
     zero: Option<ZeroGains>,
     pub(super) watch: Watch,
     /// The last frame, divided by the gains.
@@ -75,7 +74,8 @@ impl Decoding {
             sensor,
             surface,
             z_range_mm: height_mm - scene.stroke_mm(&sensor.geometry)..=height_mm,
-            re_zero: ReZero::new(rest_ohm.clone(), scale.columns(), noise),
+            latest_ohm: VecDeque::with_capacity(ZeroGains::FRAMES),
+            noise,
             zero: zero.filter(|zero| zero.is_sound(rows.len(), scale.columns())),
             watch: Watch::new(&sensor, scene, &rows).map_err(|error| error.to_string())?,
             frame_ohm: rest_ohm.clone(),
@@ -103,7 +103,11 @@ impl Decoding {
         truth: Option<&Deformation>,
         now: Instant,
     ) -> Result<Option<f64>, String> {
-        self.re_zero.observe(readings_ohm);
+        let oldest = (self.latest_ohm.len() == ZeroGains::FRAMES).then(|| self.latest_ohm.pop_front());
+        let mut latest = oldest.flatten().unwrap_or_default();
+        latest.clear();
+        latest.extend_from_slice(readings_ohm);
+        self.latest_ohm.push_back(latest);
         let mut frame_ohm = std::mem::take(&mut self.frame_ohm);
         frame_ohm.copy_from_slice(readings_ohm);
         if let Some(zero) = &self.zero {
@@ -155,16 +159,18 @@ impl Decoding {
     /// Returns the errors if the truth is known; `shown_mm` is the recent mean error.
     pub(super) fn truth_errors(&self, shown_mm: Option<f64>) -> TruthErrors {
         let (sums, count) = self.since_named;
-        let is_named = matches!(self.watch.state(), Watched::Named(_));
         TruthErrors {
             shown_mm,
-            since_named_mm: (is_named && count > 0).then(|| sums.map(|sum| sum / count as f64)),
+            since_named_mm: (self.watch.state().wire().is_some() && count > 0)
+                .then(|| sums.map(|sum| sum / count as f64)),
         }
     }
 
     /// Takes the unloaded state from the latest frames, and divides readings by its gains from now on.
     pub(super) fn take_zero(&mut self) -> Result<ZeroGains, String> {
-        let gains = self.re_zero.gains().map_err(|error| error.to_string())?;
+        let columns = self.sensor.scale.columns();
+        let gains = ZeroGains::estimate(&self.latest_ohm, &self.rest_ohm, columns, &self.noise);
+        let gains = gains.map_err(|error| error.to_string())?;
         self.zero = Some(gains.clone());
         Ok(gains)
     }
@@ -223,7 +229,7 @@ impl Decoding {
             if modelled.is_err() {
                 return f64::INFINITY;
             }
-            let used = (0..scale.columns()).filter(|&column| !self.watch.leaves_out(row, column));
+            let used = (0..scale.columns()).filter(|&column| !self.watch.state().leaves_out(row, column));
             for column in used {
                 sum += (ohm[column] / model_ohm[column] - 1.0).powi(2);
                 count += 1;
@@ -239,7 +245,7 @@ impl Decoding {
         for (index, (ohm, mm)) in self.lines().enumerate() {
             let network = self.network.network.at(index);
             let inputs = network.inputs();
-            let is_used = |column: &usize| !self.watch.leaves_out(self.rows[index], *column);
+            let is_used = |column: &usize| !self.watch.state().leaves_out(self.rows[index], *column);
             let of_row = inputs.range();
             let of_row = of_row.map(|range| range.outside(inputs.quantity(), ohm).filter(is_used).count());
             outside.0 = outside.0.zip(of_row).map(|(sum, count)| sum + count);
@@ -312,7 +318,7 @@ mod tests {
             shown_mm = decoding.decode(&ohm, Some(source.deformation()), at).unwrap();
         }
         let state = decoding.watch.state();
-        assert!(matches!(state, Watched::Named(_)), "{state:?}");
+        assert!(state.wire().is_some(), "{state:?}");
         assert!(decoding.residual() < 3e-3, "{}", decoding.residual());
         let [by_all, left_out] = decoding.truth_errors(shown_mm).since_named_mm.unwrap();
         assert!(left_out < by_all, "{left_out} and {by_all}");

@@ -10,7 +10,7 @@ use ndarray::Array2;
 use crate::window::test_view::Frame;
 use decoupler_core::{
     dataset::Simulation,
-    live::{Diagnosis, Drift, LiveError, ZeroGains},
+    live::{Drift, FaultEvent, FaultyWire, LiveError, ZeroGains},
     problem::Problem,
     sensor::SensorModel,
     surface::SurfaceMap,
@@ -220,12 +220,23 @@ pub struct LiveFrame {
 pub enum Watched {
     /// Faults are not looked for, with the reason.
     Off(&'static str),
-    /// Eq. (2) explains the readings.
-    Normal,
-    /// Neither Eq. (2) nor a fault of a single wire explains them.
-    Unexplained,
-    /// A fault of these wires, whose readings are left out.
-    Named(Diagnosis),
+    /// Last event; [`FaultEvent::Recovered`] at first. The readings of a named wire are left out.
+    Checked(FaultEvent),
+}
+
+impl Watched {
+    /// Returns the wire of the fault that was named.
+    pub fn wire(&self) -> Option<FaultyWire> {
+        match *self {
+            Self::Checked(FaultEvent::Named { wire, .. }) => Some(wire),
+            Self::Off(_) | Self::Checked(_) => None,
+        }
+    }
+
+    /// Returns `true` for a reading that is left out.
+    pub fn leaves_out(&self, row: usize, column: usize) -> bool {
+        (self.wire()).is_some_and(|wire| wire == FaultyWire::Row(row) || wire.columns().contains(&column))
+    }
 }
 
 /// Mean |error| of z over all nodes, in millimetres.

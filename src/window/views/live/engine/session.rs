@@ -5,8 +5,7 @@ use std::{
 
 use decoupler_core::{
     dataset::Simulation,
-    decoupling::Decoder,
-    live::{FaultEvent, LeftOutDecoder, WireCheck},
+    live::{FaultEvent, WireCheck},
     scene::Scene,
     sensor::{SensorError, SensorModel},
 };
@@ -394,14 +393,8 @@ fn show(session: &mut dyn LiveSession, report: &Report<LiveEvent>) {
 #[derive(Debug)]
 pub(super) struct Watch {
     state: Watched,
-    parts: Option<LiveParts>,
+    check: Option<WireCheck>,
     checked: Option<Instant>,
-}
-
-#[derive(Debug)]
-struct LiveParts {
-    check: WireCheck,
-    left_out: LeftOutDecoder,
 }
 
 /// Minimum time between checks, so that no frame is dropped because of them.
@@ -420,16 +413,13 @@ impl Watch {
         } else {
             None
         };
-        let parts = match reason {
+        let check = match reason {
             Some(_) => None,
-            None => Some(LiveParts {
-                check: WireCheck::new(sensor, scene, rows)?,
-                left_out: LeftOutDecoder::new(sensor, scene, rows)?,
-            }),
+            None => Some(WireCheck::new(sensor, scene, rows)?),
         };
         Ok(Self {
-            state: reason.map_or(Watched::Normal, Watched::Off),
-            parts,
+            state: reason.map_or(Watched::Checked(FaultEvent::Recovered), Watched::Off),
+            check,
             checked: None,
         })
     }
@@ -438,44 +428,30 @@ impl Watch {
         &self.state
     }
 
-    /// Returns `true` for a reading that is left out.
-    pub(super) fn leaves_out(&self, row: usize, column: usize) -> bool {
-        match &self.state {
-            Watched::Named(diagnosis) => diagnosis.wire.is_row(row) || diagnosis.wire.columns().contains(&column),
-            Watched::Off(_) | Watched::Normal | Watched::Unexplained => false,
-        }
-    }
-
     /// Checks a frame for faults, unless another was checked just now: its readings, divided by the gains of the unloaded
     /// state. Returns `true` if the fault named has changed.
     pub(super) fn check(&mut self, frame_ohm: &[f64], now: Instant) -> bool {
-        let Some(parts) = &mut self.parts else { return false };
+        let Some(check) = &mut self.check else { return false };
         let is_due = |checked: Instant| now.saturating_duration_since(checked) >= BETWEEN_CHECKS;
         if !self.checked.is_none_or(is_due) {
             return false;
         }
-        let Some(event) = parts.check.check(frame_ohm) else {
+        let Some(event) = check.check(frame_ohm) else {
             self.checked = Some(Instant::now());
             return false;
         };
         self.checked = Some(Instant::now());
-        self.state = match event {
-            FaultEvent::Named(diagnosis) => Watched::Named(diagnosis),
-            FaultEvent::Unexplained => Watched::Unexplained,
-            FaultEvent::Recovered => Watched::Normal,
-        };
-        parts.left_out.leave_out(parts.check.named());
-        matches!(event, FaultEvent::Named(_))
+        self.state = Watched::Checked(event);
+        matches!(event, FaultEvent::Named { .. })
     }
 
     /// Decodes a frame without the wires of the named fault; returns `false` if there is no fault or no answer.
     pub(super) fn decode(&mut self, frame_ohm: &[f64], answer_mm: &mut [f64]) -> bool {
-        match (&self.state, &mut self.parts) {
-            (Watched::Named(_), Some(parts)) => {
-                parts.left_out.decode(frame_ohm, answer_mm).is_ok() && answer_mm.iter().all(|mm| mm.is_finite())
-            }
-            _ => false,
-        }
+        let Some(check) = &mut self.check else { return false };
+        let rows = 0..frame_ohm.len() / check.columns();
+        check.named().is_some()
+            && check.decode(frame_ohm, rows, answer_mm).is_ok()
+            && answer_mm.iter().all(|mm| mm.is_finite())
     }
 }
 

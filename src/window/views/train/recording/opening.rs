@@ -10,7 +10,7 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Seed, Simulation},
-    evaluation::recorded::{Extrapolation, channel_remarks},
+    evaluation::recorded::{channel_remarks, extrapolation},
 };
 use decoupler_files::{
     export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, RecipeSource, describe_positions},
@@ -460,7 +460,7 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
         inputs, targets, set, ..
     } = &sets.recording;
     warnings.extend(channel_remarks(set, plan.division.by, inputs, targets));
-    warnings.extend(Extrapolation::measure(&sets.split.training, &sets.test, inputs, targets).warning);
+    warnings.extend(extrapolation(&sets.split.training, &sets.test, inputs, targets).1);
     let validation = sets.split.validation.as_ref().map_or(0, Dataset::samples);
     Ok(Box::new(Checked {
         samples: [sets.split.training.samples(), validation, sets.test.samples()],
