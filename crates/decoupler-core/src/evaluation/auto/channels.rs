@@ -27,7 +27,6 @@ pub fn dead_channels(set: &Dataset) -> Vec<usize> {
         let has_few = counts.len() < FEW_VALUES.min(set.samples() / 2);
         (has_few, count as f64 / readings.len() as f64, f64::from_bits(bits))
     }));
-    let is_silent = |(has_few, share, _): &(bool, f64, f64)| *has_few && *share >= AT_ONE_VALUE.0;
     // Most channels of a skin are at rest while it is touched elsewhere.
     if 2 * stuck.iter().filter(|(_, share, _)| *share > AT_REST).count() > stuck.len() {
         return Vec::new();
@@ -35,7 +34,7 @@ pub fn dead_channels(set: &Dataset) -> Vec<usize> {
     let is_dead = |channel: &usize| {
         let (has_few, share, usual) = stuck[*channel];
         let is_suspect = has_few || share >= AT_ONE_VALUE.1;
-        is_silent(&stuck[*channel]) || is_suspect && !is_related(set, readings.column(*channel), usual)
+        has_few && share >= AT_ONE_VALUE.0 || is_suspect && !is_related(set, readings.column(*channel), usual)
     };
     let dead = Vec::from_iter((0..set.channels()).filter(is_dead));
     if dead.len() < set.channels() { dead } else { Vec::new() }

@@ -84,14 +84,11 @@ impl<'a> FoldedTraining<'a> {
         (stride, is_on_residual): (usize, bool),
         memory: MemoryBudget,
     ) -> Result<Self, RunError> {
-        let mut endless = *settings;
-        endless.training.stopping.epochs = StoppingRules::MAX_EPOCHS;
         let divisions = Vec::from_iter(judge.divisions().enumerate());
         let parts = divisions.into_par_iter().map(|(part, (outside, inside, rows))| {
-            let settings = RunSettings {
-                seed: nth_seed(settings.seed, part),
-                ..endless
-            };
+            let mut settings = *settings;
+            settings.seed = nth_seed(settings.seed, part);
+            settings.training.stopping.epochs = StoppingRules::MAX_EPOCHS;
             let readings = features.held_out(&outside, inside, settings.inputs.quantity);
             let thinned = Vec::from_iter(outside.into_iter().step_by(stride));
             let mut training = features.set.select(&thinned);
@@ -101,9 +98,22 @@ impl<'a> FoldedTraining<'a> {
                 (ridge, training) = residual(&training, &settings)?;
                 base = ProgramDecoder::new(ridge).answers(&vec![0; inside.len()], readings.view());
             }
-            Part::new(settings, training, (readings, base, rows), memory)
+            let constant = |(row, target)| base[[row, target]] + training.targets()[[0, target]];
+            let answers = Array2::from_shape_fn(base.dim(), constant);
+            let mut run = None;
+            if training.has_varying_target() {
+                let begun = Run::new(settings, all_for_training(training, memory), None, &Job::UNINTERRUPTED)?;
+                let inputs = begun.scalings.at(0).0.of(readings.view());
+                run = Some((begun, inputs));
+            }
+            Ok(Part {
+                run,
+                base,
+                answers,
+                rows,
+            })
         });
-        let parts: Vec<Part> = parts.collect::<Result<_, _>>()?;
+        let parts: Vec<Part> = parts.collect::<Result<_, RunError>>()?;
         if parts.iter().all(|part| part.run.is_none()) {
             return Err(TrainingError::NothingVaries.into());
         }
@@ -152,27 +162,6 @@ impl<'a> FoldedTraining<'a> {
 }
 
 impl Part {
-    fn new(
-        settings: RunSettings,
-        training: Dataset,
-        (readings, base, rows): (Array2<f64>, Array2<f64>, Vec<usize>),
-        memory: MemoryBudget,
-    ) -> Result<Self, RunError> {
-        let constant = |(row, target)| base[[row, target]] + training.targets()[[0, target]];
-        let mut part = Self {
-            run: None,
-            answers: Array2::from_shape_fn(base.dim(), constant),
-            base,
-            rows,
-        };
-        if training.has_varying_target() {
-            let run = Run::new(settings, all_for_training(training, memory), None, &Job::UNINTERRUPTED)?;
-            let inputs = run.scalings.at(0).0.of(readings.view());
-            part.run = Some((run, inputs));
-        }
-        Ok(part)
-    }
-
     fn step(&mut self) {
         let Some((run, inputs)) = &mut self.run else { return };
         run.step();

@@ -180,8 +180,7 @@ impl Search<'_> {
         members.extend(self.try_kernels(&plain, inputs)?);
         let tried = match &self.fixed.memory {
             Some(memory) => Vec::from_iter(Some(memory.clone()).filter(|memory| !memory.is_empty())),
-            // Differences have no logarithms and reciprocals.
-            // Not where neighbours are in different folds.
+            // Neighbours in different folds give each other away. Differences have no logarithms and reciprocals.
             None if self.samples.by != SplitBy::Random && (self.fixed.tries_memory || self.samples.is_timed()) => {
                 memories(self.samples, quantity == Quantity::Raw)
             }
