@@ -128,7 +128,8 @@ impl ExportedDecoder {
 
     /// Wraps what a file answers with, or its network alone.
     fn of_file(file: &NetworkFile, decoder: BundleDecoder) -> Self {
-        let combined = file.combined().filter(|_| decoder == BundleDecoder::Chosen);
+        let is_wanted = |combined: &&Combined| decoder == BundleDecoder::Chosen || combined.others.is_empty();
+        let combined = file.combined().filter(is_wanted);
         let exported = Self::of_trained(&file.network, combined, Origin::of_file(file));
         let alone = file.scores.network_alone.as_ref();
         let alone = alone.filter(|_| exported.kind != BundleDecoder::Chosen);
@@ -145,12 +146,12 @@ impl ExportedDecoder {
     /// Wraps trained networks, which contain the ranges of their readings and targets, alone or in a combination.
     fn of_trained(networks: &Networks, combined: Option<&Combined>, origin: Origin) -> Self {
         let all = networks.values().iter();
-        let combined = combined.filter(|combined| !combined.others.is_empty());
-        let kind = combined.map_or_else(BundleDecoder::default, |_| BundleDecoder::Chosen);
+        // A combination of the network alone differs from it only in the limits of the readings.
+        let of_several = combined.filter(|combined| !combined.others.is_empty());
         Self {
             program: networks.decoder_program(&origin.problem, combined),
-            unlimited: combined.is_none().then(|| networks.program(Precision::Double)),
-            kind,
+            unlimited: of_several.is_none().then(|| networks.program(Precision::Double)),
+            kind: of_several.map_or_else(BundleDecoder::default, |_| BundleDecoder::Chosen),
             target_ranges: all.clone().map(|network| network.outputs().clone()).collect(),
             reading_ranges: all.map(|network| network.inputs().range().cloned()).collect(),
             errors: TestErrors::Targets(Vec::new()),
