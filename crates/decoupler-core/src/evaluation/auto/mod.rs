@@ -202,7 +202,20 @@ pub enum TriedModel {
 impl Tried {
     /// Describes the features: `readings`, `averages 2s, 10s`.
     pub fn features(&self) -> String {
-        describe_features(&self.memory, self.inputs)
+        let mut parts = vec![match self.inputs.quantity {
+            Quantity::Raw | Quantity::Resistance => "readings".to_owned(),
+            Quantity::Conductance => "1/readings".to_owned(),
+            Quantity::LogResistance => "log readings".to_owned(),
+        }];
+        let mut list = |name: &str, spans: &[Span]| {
+            let spans = Vec::from_iter(spans.iter().map(Span::to_string));
+            parts.extend((!spans.is_empty()).then(|| format!("{name} {}", spans.join(", "))));
+        };
+        list("lags", &self.memory.lags);
+        list("averages", &self.memory.averages);
+        parts.extend(self.memory.differences.then(|| "as differences".to_owned()));
+        parts.extend((self.inputs.scaling == ScalingChoice::Whitening).then(|| "whitened".to_owned()));
+        parts.join(", ")
     }
 }
 
@@ -292,21 +305,4 @@ impl AutoRecord {
         }
         remarks
     }
-}
-
-fn describe_features(memory: &Memory, inputs: InputChoice) -> String {
-    let mut parts = vec![match inputs.quantity {
-        Quantity::Raw | Quantity::Resistance => "readings".to_owned(),
-        Quantity::Conductance => "1/readings".to_owned(),
-        Quantity::LogResistance => "log readings".to_owned(),
-    }];
-    let mut list = |name: &str, spans: &[Span]| {
-        let spans = Vec::from_iter(spans.iter().map(Span::to_string));
-        parts.extend((!spans.is_empty()).then(|| format!("{name} {}", spans.join(", "))));
-    };
-    list("lags", &memory.lags);
-    list("averages", &memory.averages);
-    parts.extend(memory.differences.then(|| "as differences".to_owned()));
-    parts.extend((inputs.scaling == ScalingChoice::Whitening).then(|| "whitened".to_owned()));
-    parts.join(", ")
 }

@@ -3,7 +3,7 @@ use ndarray::{Array2, ArrayView1, Axis};
 use super::{
     super::{Combination, Initialization, Run, RunError, RunSettings},
     AutoChoice, AutoFixed, AutoProgress, AutoRecord, AutoSamples, Combined, MULTIPLICATIONS_PER_SECOND, Tried,
-    TriedModel, describe_features,
+    TriedModel,
     features::{Features, margin},
     folded_training::{FoldedTraining, all_for_training, residual, training_multiplications},
     judge::Judge,
@@ -261,9 +261,10 @@ impl Search<'_> {
     }
 
     fn mean(&mut self, features: &Features) -> Result<Member, RunError> {
+        let tried = self.begin(features, InputChoice::MEASURED, TriedModel::Mean)?;
         let mean = |samples: &[usize]| Ok(Program::mean(&features.set.select(samples)));
         let fitted = features.fitted(&self.judge, Quantity::Raw, mean)?;
-        Ok(self.keep(features, InputChoice::MEASURED, TriedModel::Mean, fitted, 0.0))
+        Ok(self.keep(tried, fitted, 0.0))
     }
 
     fn try_ridge(&mut self, features: &Features, quantity: Quantity) -> Result<Option<Member>, RunError> {
@@ -276,11 +277,9 @@ impl Search<'_> {
         if !self.record.tried.is_empty() && work > 0.05 * self.budget() {
             return Ok(None);
         }
-        self.announce(features, inputs, &TriedModel::Ridge)?;
+        let tried = self.begin(features, inputs, TriedModel::Ridge)?;
         let fitted = features.ridge(&self.judge, quantity);
-        Ok(fitted
-            .ok()
-            .map(|fitted| self.keep(features, inputs, TriedModel::Ridge, fitted, work)))
+        Ok(fitted.ok().map(|fitted| self.keep(tried, fitted, work)))
     }
 
     /// Tries kernel ridge regression with and without a linear kernel, with as many centres as a quarter of the budget allows.
@@ -300,15 +299,9 @@ impl Search<'_> {
         };
         let mut members = Vec::new();
         for is_linear in [false, true] {
-            let model = TriedModel::Kernel { is_linear };
-            self.announce(features, inputs, &model)?;
-            let work = work(subset);
+            let tried = self.begin(features, inputs, TriedModel::Kernel { is_linear })?;
             let fitted = features.kernel(&self.judge, (inputs, is_linear, subset));
-            members.extend(
-                fitted
-                    .ok()
-                    .map(|fitted| self.keep(features, inputs, model, fitted, work)),
-            );
+            members.extend(fitted.ok().map(|fitted| self.keep(tried, fitted, work(subset))));
         }
         Ok(members)
     }
@@ -426,7 +419,7 @@ impl Search<'_> {
             begin: settings.initialization,
             is_on_residual,
         };
-        self.announce(features, settings.inputs, &model(0))?;
+        let mut tried = self.begin(features, settings.inputs, model(0))?;
         let part = (stride, is_on_residual);
         let mut training = match FoldedTraining::new(&settings, features, &self.judge, part, self.memory) {
             Ok(training) => training,
@@ -442,12 +435,12 @@ impl Search<'_> {
             needed => needed,
         };
         let final_epoch = self.epoch_of_all(features, &settings);
-        let (mut used, mut is_cut_off) = (0.0, false);
+        let mut used = 0.0;
         while training.epoch < max_epochs && !training.has_passed_its_best(patience) {
             // The training on all samples must fit into what is left, too.
             let left = self.budget() - self.work - used - final_epoch * training.epoch as f64;
-            is_cut_off = used + training.epoch_multiplications > limit || left < 0.0;
-            if is_cut_off && training.epoch >= needed {
+            tried.is_cut_off = used + training.epoch_multiplications > limit || left < 0.0;
+            if tried.is_cut_off && training.epoch >= needed {
                 break;
             }
             self.job.check()?;
@@ -459,15 +452,9 @@ impl Search<'_> {
             return Ok(None);
         };
         let epochs = self.fixed.epochs.unwrap_or(epoch);
-        let mut member = self.keep(
-            features,
-            settings.inputs,
-            model(epochs),
-            (answers, None::<Program>),
-            used,
-        );
+        tried.model = model(epochs);
+        let mut member = self.keep(tried, (answers, None::<Program>), used);
         member.settings = with(settings, |settings| settings.training.stopping.epochs = epochs);
-        self.record.tried[member.place].is_cut_off = is_cut_off;
         Ok(Some(member))
     }
 
@@ -516,43 +503,42 @@ impl Search<'_> {
         self.budget_s * MULTIPLICATIONS_PER_SECOND
     }
 
-    fn announce(&mut self, features: &Features, inputs: InputChoice, model: &TriedModel) -> Result<(), RunError> {
+    /// Announces a candidate, and returns its record, which has no error yet.
+    fn begin(&mut self, features: &Features, inputs: InputChoice, model: TriedModel) -> Result<Tried, RunError> {
         self.job.check()?;
+        let tried = Tried {
+            memory: features.memory.clone(),
+            inputs,
+            model,
+            error: f64::NAN,
+            standard_error: f64::NAN,
+            seconds: 0.0,
+            share: 0.0,
+            is_cut_off: false,
+        };
         let number = self.record.tried.len() + 1;
-        let mut text = format!(
-            "Trying candidate {number}: {}, {model}",
-            describe_features(&features.memory, inputs)
-        );
+        let mut text = format!("Trying candidate {number}: {}, {model}", tried.features());
         let errors = self.record.tried.iter().map(|tried| tried.error);
         if let Some(best) = errors.min_by(f64::total_cmp) {
             text += &format!(", best error so far {}", format_percent(100.0 * best));
         }
         let share = (self.work / self.budget()).min(1.0);
         (self.on_progress)(AutoProgress { text, share });
-        Ok(())
+        Ok(tried)
     }
 
     /// Records a candidate with its held-out answers.
     fn keep(
         &mut self,
-        features: &Features,
-        inputs: InputChoice,
-        model: TriedModel,
+        mut tried: Tried,
         (answers, program): (Array2<f64>, impl Into<Option<Program>>),
         work: f64,
     ) -> Member {
         self.work += work;
-        let (error, standard_error) = self.judge.error(&answers);
-        self.record.tried.push(Tried {
-            memory: features.memory.clone(),
-            inputs,
-            model,
-            error,
-            standard_error,
-            seconds: work / MULTIPLICATIONS_PER_SECOND,
-            share: 0.0,
-            is_cut_off: false,
-        });
+        tried.seconds = work / MULTIPLICATIONS_PER_SECOND;
+        (tried.error, tried.standard_error) = self.judge.error(&answers);
+        let inputs = tried.inputs;
+        self.record.tried.push(tried);
         Member {
             program: program.into(),
             settings: RunSettings { inputs, ..self.base },
