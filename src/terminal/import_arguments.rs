@@ -523,7 +523,7 @@ impl ImportArguments {
         let (is_none, is_auto) = (has(MemoryArgument::None), has(MemoryArgument::Auto));
         let is_mixed = self.memory.len() > 1 || !self.lags.is_empty() || self.differences;
         if (is_none || is_auto) && is_mixed {
-            let message = "--memory: none and auto stand alone; give them without spans, --lags and --differences";
+            let message = "--memory: give none and auto without spans, --lags and --differences";
             return Err(Failure::Arguments(message.to_owned()));
         }
         Ok((is_none.then(Memory::default), is_auto))

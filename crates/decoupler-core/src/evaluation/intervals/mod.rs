@@ -42,7 +42,7 @@ pub struct Coverage {
     pub expected: [f64; 2],
     /// Mean error (answer − target), in the unit of the target.
     pub bias: f64,
-    /// `true` if so many errors are within a quarter of the half-width that the intervals are much too wide.
+    /// `true` if too many errors are within a quarter of the half-width that the intervals are much too wide.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_too_wide: bool,
 }
