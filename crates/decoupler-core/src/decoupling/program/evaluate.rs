@@ -309,11 +309,13 @@ impl Work {
 
 /// Precision of values.
 trait Width: Real {
+    /// The values in this precision.
     fn held(values: &Values) -> &[Self];
 
     /// The values of a node that reads them.
     fn read<'a>(readings: &'a [f64], converted: &'a Values) -> &'a [Self];
 
+    /// Weights or points in this precision, if the node has any.
     fn tables(work: &Work) -> Option<&PerRow<Padded<Self>>>;
 }
 

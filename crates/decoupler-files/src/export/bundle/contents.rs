@@ -81,8 +81,8 @@ impl PrintedHistory {
     }
 }
 
-/// An operation as languages with infix operators write it, with the sign of a division, and what comes before and after the
-/// names of functions.
+/// An operation as languages with infix operators write it, with the sign of a division, and the prefix and suffix of the names
+/// of functions.
 pub(super) fn infix(
     operation: &Operation,
     [divided, before, after]: [&str; 3],
