@@ -109,13 +109,11 @@ fn an_incomplete_table_does_not_replace_a_larger_one() {
     for table in ["table.csv", "table.json"] {
         succeed(&format!("sweep --merge runs --out {table}"), folder);
     }
-    let trial = names(&folder.join("runs"))
-        .into_iter()
-        .find(|name| !name.starts_with("sweep-"));
+    let trial = names(&folder.join("runs")).into_iter().next();
     fs::remove_file(folder.join("runs").join(trial.unwrap())).unwrap();
     for table in ["table.csv", "table.json"] {
         let before = fs::read(folder.join(table)).unwrap();
-        let output = decoupler(&format!("sweep --merge runs --out {table}"), folder);
+        let output = decoupler(&format!("sweep --merge runs --spec sweep.json --out {table}"), folder);
         let message = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{message}");
         assert!(
@@ -124,7 +122,7 @@ fn an_incomplete_table_does_not_replace_a_larger_one() {
         );
         assert_eq!(fs::read(folder.join(table)).unwrap(), before, "{table}");
     }
-    let output = decoupler("sweep --merge runs --out new.csv", folder);
+    let output = decoupler("sweep --merge runs --spec sweep.json --out new.csv", folder);
     assert!(output.status.code() == Some(1) && lines(folder, "new.csv").len() == 4);
 }
 
@@ -139,7 +137,7 @@ fn an_incomplete_table_does_not_replace_one_that_cannot_be_read() {
         succeed(&format!("sweep --merge runs --out {table}"), folder);
     }
     let runs = folder.join("runs");
-    let mut trials = names(&runs).into_iter().filter(|name| !name.starts_with("sweep-"));
+    let mut trials = names(&runs).into_iter();
     fs::remove_file(runs.join(trials.next().unwrap())).unwrap();
     // A number of cells that changes, and a text that is cut off.
     for (table, damage) in [("table.csv", "1,2\n"), ("table.json", "")] {
@@ -150,7 +148,7 @@ fn an_incomplete_table_does_not_replace_one_that_cannot_be_read() {
             line => whole.lines().next().unwrap().to_owned() + "\n" + line,
         };
         fs::write(&path, &damaged).unwrap();
-        let output = decoupler(&format!("sweep --merge runs --out {table}"), folder);
+        let output = decoupler(&format!("sweep --merge runs --spec sweep.json --out {table}"), folder);
         let message = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{message}");
         assert!(message.contains("cannot be read, and is left as it is"), "{message}");

@@ -1,6 +1,6 @@
 use std::{fs, path::Path};
 
-use decoupler_files::export::{MergedSweep, PlanAxis, SweepPlan, SweepTableFormat, Trial, TrialOptions};
+use decoupler_files::export::{MergedSweep, SweepTableFormat, Trial, TrialOptions};
 use serde_json::{Value, json};
 
 use crate::{
@@ -19,7 +19,7 @@ fn options(hidden: u64) -> TrialOptions {
     .into()
 }
 
-/// Fills a folder with two trials and their plan; a third trial is missing.
+/// Fills a folder with two trials; a third is begun.
 fn fill(folder: &Path) {
     let report = |error: f64| {
         json!({
@@ -32,15 +32,8 @@ fn fill(folder: &Path) {
     for (hidden, error) in [(8, 0.25), (10, 1e-3)] {
         Trial::new(options(hidden), report(error), 2.5).save_in(folder).unwrap();
     }
-    let plan = SweepPlan {
-        axes: vec![PlanAxis {
-            option: "hidden".to_owned(),
-            values: vec![json!(8), json!(10), json!(12)],
-        }],
-        trials: [8, 10, 12].map(|hidden| Trial::id_of(&options(hidden))).to_vec(),
-        recordings: Vec::new(),
-    };
-    plan.save_in(folder).unwrap();
+    let begun = Trial::path(folder, Trial::id_of(&options(12)));
+    fs::write(begun.with_extension("claim"), "").unwrap();
 }
 
 /// Checks the tables of a merge: the JSON contains every row, and the CSV has one line for each, all of the same width.
@@ -79,13 +72,14 @@ fn damage_changes_no_result_and_is_listed() {
     let folder = tempfile::tempdir().unwrap();
     fill(folder.path());
     let read = || MergedSweep::read(&[folder.path().to_owned()]).unwrap();
+    let is_result = |path: &std::path::PathBuf| path.extension().is_some_and(|extension| extension == "json");
     let whole = read();
     assert_eq!(
         (whole.trials.len(), whole.missing.len(), whole.damaged.len()),
         (2, 1, 0)
     );
     let valid_rows = rows(&whole);
-    for path in files(folder.path()) {
+    for path in files(folder.path()).into_iter().filter(is_result) {
         let valid = fs::read(&path).unwrap();
         for_each_seed(150, |rng| {
             let damaged = mutated(&valid, rng);
@@ -112,7 +106,7 @@ fn name_of(bytes: &[u8]) -> Option<String> {
     Some(files(folder.path()).first()?.file_name()?.to_str()?.to_owned())
 }
 
-/// Reads each input as a trial and as a plan, with valid checksums and under the name of its options.
+/// Reads each input as a trial, with valid checksums and under the name of its options.
 #[test]
 fn any_input() {
     let folder = tempfile::tempdir().unwrap();
@@ -134,7 +128,6 @@ fn any_input() {
     };
     let accepted = std::sync::atomic::AtomicUsize::new(0);
     let check = |bytes: &[u8]| {
-        read("sweep-00000000000000000000000000000000.json", bytes);
         let name = name_of(bytes).unwrap_or_else(|| "00000000000000000000000000000000.json".to_owned());
         let trials = read(&name, bytes);
         accepted.fetch_add(usize::from(trials > 2), std::sync::atomic::Ordering::Relaxed);

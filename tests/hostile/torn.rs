@@ -70,7 +70,7 @@ const READ: [(&str, &str); 12] = [
         "sensor.json",
         "train --sensor sensor.json --samples 6 --test-samples 2 --validation-samples 0 --hidden 1 --epochs 1 --out out.json",
     ),
-    ("spec.json", "sweep --spec spec.json --engine slurm --out out"),
+    ("spec.json", "sweep --spec spec.json --out out"),
     ("runs/TRIAL", "sweep --merge runs --out out.csv"),
 ];
 

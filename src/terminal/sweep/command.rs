@@ -18,7 +18,7 @@ use serde::Serialize;
 use super::{
     filling::{Filled, fill},
     specification::{Specification, TrainOptions},
-    trials::{Engine, Trials},
+    trials::Trials,
 };
 use crate::terminal::{
     count,
@@ -42,18 +42,14 @@ use crate::terminal::{
 ///   decoupler sweep --data press.csv --inputs c1..c4 --targets fz --hidden 4,8,12 --method lm,br --seeds 3 --out results
 ///
 /// The output of train --json for each trial is saved as a file in the folder. Running the command again trains only
-/// missing trials, and any number of programs can fill one folder together. Ctrl-C, SIGTERM and SIGHUP save the trainings in
+/// missing trials, and any number of programs can fill one folder together: each leaves to the others the trials that they
+/// are training. Ctrl-C, SIGTERM and SIGHUP save the trainings in
 /// progress, which are resumed with bit-identical results. A trial gives bit-identical results on machines with the same
 /// vector instructions; on others the last digits may differ.
 #[derive(Args)]
 pub(in crate::terminal) struct Sweep {
     /// Specification of the trials, as JSON
-    #[arg(
-        long,
-        value_name = "FILE",
-        required_unless_present_any = ["merge", "axes"],
-        conflicts_with = "merge"
-    )]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["merge", "axes"])]
     spec: Option<PathBuf>,
     #[command(flatten)]
     given: SweepArguments,
@@ -61,59 +57,39 @@ pub(in crate::terminal) struct Sweep {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Train only part I of N parts, which together contain every trial once
-    #[arg(long, value_name = "I/N", conflicts_with_all = ["merge", "engine"])]
+    #[arg(long, value_name = "I/N", conflicts_with = "merge")]
     shard: Option<Shard>,
     /// Number of trials trained at the same time, each on one thread [default: number of cores]
-    #[arg(long, value_name = "N", value_parser = count(1..=MAX_THREADS), conflicts_with_all = ["merge", "engine"])]
+    #[arg(long, value_name = "N", value_parser = count(1..=MAX_THREADS), conflicts_with = "merge")]
     threads: Option<usize>,
-    /// Print a script that has this program distribute the trials, and train nothing
-    #[arg(
-        long,
-        value_name = "slurm|parallel|hyperqueue",
-        value_enum,
-        hide_possible_values = true,
-        conflicts_with = "merge"
-    )]
-    engine: Option<Engine>,
-    /// Number of jobs in the script [default: one per trial, at most 1000]
-    #[arg(long, value_name = "N", value_parser = count(1..=MAX_JOBS), requires = "engine")]
-    jobs: Option<usize>,
-    /// Write one table of all trials in these folders, and list missing and conflicting trials
+    /// Write one table of all trials in these folders, and list unfinished and conflicting trials; with --spec also those that
+    /// have not begun
     #[arg(long, value_name = "DIR", num_args = 1..)]
     merge: Vec<PathBuf>,
     /// Print one JSON object instead of text and progress
-    #[arg(long, conflicts_with = "engine")]
+    #[arg(long)]
     json: bool,
 }
 
 const MAX_THREADS: usize = 1024;
-const MAX_JOBS: usize = 100_000;
 
 #[derive(Serialize)]
 struct FilledReport {
     trials: usize,
     present: usize,
     trained: usize,
+    elsewhere: usize,
     failed: usize,
     seconds: f64,
 }
 
 impl Sweep {
     pub(in crate::terminal) fn run(self) -> Result<(), Failure> {
-        match (&self.spec, self.engine) {
-            (None, _) if !self.merge.is_empty() => self.merge(),
-            (None, Some(_)) => {
-                let message = "--engine: jobs need a specification; write one and give it with --spec";
-                Err(Failure::Arguments(message.to_owned()))
-            }
-            (None, None) => self.fill(&self.given.trials()?),
-            (Some(specification), None) => self.fill(&Trials::read(specification)?),
-            (Some(specification), Some(engine)) => {
-                let trials = Trials::read(specification)?.count();
-                let jobs = self.jobs.unwrap_or(Engine::MAX_JOBS).min(trials);
-                let script = engine.script(specification, &self.out, trials, jobs)?;
-                print(|output| write!(output, "{script}"))
-            }
+        let specified = self.spec.as_deref().map(Trials::read).transpose()?;
+        match specified {
+            trials if !self.merge.is_empty() => self.merge(trials.as_ref()),
+            Some(trials) => self.fill(&trials),
+            None => self.fill(&self.given.trials()?),
         }
     }
 
@@ -124,39 +100,46 @@ impl Sweep {
             path: folder.clone(),
             source,
         })?;
-        trials.save_plan(folder)?;
-        let positions: Vec<_> = self.shard.unwrap_or_default().positions(trials.count()).collect();
+        let positions = self.shard.unwrap_or_default().positions(trials.count());
         let of_shard = positions.len();
         let bar = progress_bar(self.json, of_shard, "{bar:30} {pos} of {len} trials, {elapsed} elapsed");
         let stop = Stop::begin();
         let threads = self.threads.and_then(NonZero::new).unwrap_or_else(worker_threads);
+        let threads = NonZero::new(of_shard).map_or(threads, |trials| threads.min(trials));
         let filled = fill(folder, trials, positions, threads, &bar, &stop);
         bar.finish_and_clear();
+        let filled = filled?;
         let Filled {
             present,
             trained,
+            elsewhere,
             failed,
-        } = filled?;
+        } = filled;
         if self.json {
             print_object(&FilledReport {
                 trials: of_shard,
                 present,
                 trained,
+                elsewhere,
                 failed,
                 seconds: begun.elapsed().as_secs_f64(),
             })?;
         } else {
             let time = format_duration(begun.elapsed());
+            let elsewhere = match elsewhere {
+                0 => String::new(),
+                count => format!("{count} left to other programs that train them, "),
+            };
             print(|output| {
                 writeln!(
                     output,
-                    "{}: {present} already done, {trained} trained, {failed} failed, in {time}",
+                    "{}: {present} already done, {trained} trained, {elsewhere}{failed} failed, in {time}",
                     counted(of_shard, "trial")
                 )
             })?;
         }
         match stop.graceful.is_end_requested() {
-            true if present + trained + failed < of_shard => Err(Failure::InterruptedSweep {
+            true if filled.total() < of_shard => Err(Failure::InterruptedSweep {
                 done: present + trained,
                 trials: of_shard,
             }),
@@ -168,7 +151,8 @@ impl Sweep {
         }
     }
 
-    fn merge(&self) -> Result<(), Failure> {
+    /// Merges the folders; `specified` are the trials that they should contain, if these are known.
+    fn merge(&self, specified: Option<&Trials>) -> Result<(), Failure> {
         let out = &self.out;
         let format = SweepTableFormat::of(out).ok_or_else(|| {
             let message = format!(
@@ -178,7 +162,11 @@ impl Sweep {
             Failure::Arguments(message)
         })?;
         check_writable(out)?;
-        let merged = MergedSweep::read(&self.merge)?;
+        let mut merged = MergedSweep::read(&self.merge)?;
+        if let Some(trials) = specified {
+            let missing = (0..trials.count()).filter(|&position| !merged.has(trials.id(position)));
+            merged.missing = missing.map(|position| trials.describe(position)).collect();
+        }
         // A table that cannot be read may have more trials.
         let has_fewer = || {
             format
@@ -404,7 +392,7 @@ impl Default for Shard {
 
 impl Shard {
     /// Positions of its trials among this many.
-    pub(super) fn positions(self, trials: usize) -> impl Iterator<Item = usize> {
+    pub(super) fn positions(self, trials: usize) -> impl ExactSizeIterator<Item = usize> + Send {
         (self.index..trials).step_by(self.count)
     }
 }

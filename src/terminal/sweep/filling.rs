@@ -1,15 +1,10 @@
 use std::{
-    collections::VecDeque,
     io::Write,
     num::NonZero,
     panic::resume_unwind,
     path::Path,
-    sync::{
-        Mutex, PoisonError,
-        mpsc::{Sender, channel},
-    },
+    sync::{Mutex, PoisonError},
     thread,
-    time::Duration,
 };
 
 use indicatif::ProgressBar;
@@ -24,41 +19,46 @@ use crate::terminal::{failure::Failure, output::messages};
 use decoupler_core::evaluation::RunError;
 use decoupler_files::export::WriteError;
 
-/// Interval of checking a trial that another program trains.
-const PATIENCE: Duration = Duration::from_millis(200);
-
-/// Numbers of trials in a folder after a call of [`fill`].
+/// Numbers of trials after a call of [`fill`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Filled {
-    /// Existing results, and those added by other programs.
+    /// Finished before.
     pub(super) present: usize,
     pub(super) trained: usize,
+    /// In training by other programs, and left to them.
+    pub(super) elsewhere: usize,
     pub(super) failed: usize,
 }
 
-enum Event {
-    Present,
-    Trained,
-    /// A trial that cannot be trained, by position, with the reason.
-    Failed(usize, String),
-    /// Results cannot be written.
-    Ended(WriteError),
+impl Filled {
+    pub(super) fn total(self) -> usize {
+        self.present + self.trained + self.elsewhere + self.failed
+    }
+
+    fn and(self, other: Self) -> Self {
+        Self {
+            present: self.present + other.present,
+            trained: self.trained + other.trained,
+            elsewhere: self.elsewhere + other.elsewhere,
+            failed: self.failed + other.failed,
+        }
+    }
 }
 
-/// Trains the missing trials at `positions` into `folder`, and waits for those that other programs train: if such a
-/// program ends without a result, the trial is trained here. Each trial is trained on a separate thread.
+/// Trains those of the trials at `positions` that neither have a result in `folder` nor are being trained by another program,
+/// each on one of `threads` threads. Returns early once `stop` is requested.
 ///
 /// # Errors
 /// If results cannot be written. A trial that cannot be trained is reported on standard error, and the others continue.
 pub(super) fn fill(
     folder: &Path,
     trials: &Trials,
-    positions: Vec<usize>,
+    positions: impl Iterator<Item = usize> + Send,
     threads: NonZero<usize>,
     bar: &ProgressBar,
     stop: &Stop,
 ) -> Result<Filled, Failure> {
-    let threads = threads.get().min(positions.len());
+    let threads = threads.get();
     let pool = |_| {
         ThreadPoolBuilder::new()
             .num_threads(1)
@@ -67,122 +67,82 @@ pub(super) fn fill(
     };
     let pools: Result<Vec<ThreadPool>, _> = (0..threads).map(pool).collect();
     let pools = pools.map_err(|error| Failure::Run(RunError::Threads(error.to_string())))?;
-    let worker = Worker {
-        folder,
-        trials,
-        parallel: threads,
-        queue: &Mutex::new(Queue {
-            new: positions.into(),
-            others: VecDeque::new(),
-        }),
-        stop,
-    };
-    let (sender, receiver) = channel();
-    let mut filled = Filled::default();
-    let mut end = Ok(());
-    thread::scope(|scope| {
-        let workers = Vec::from_iter(pools.iter().map(|pool| {
-            let (sender, worker) = (sender.clone(), &worker);
-            scope.spawn(move || pool.install(|| worker.work(&sender)))
-        }));
-        drop(sender);
-        for event in receiver {
-            match event {
-                Event::Present => filled.present += 1,
-                Event::Trained => filled.trained += 1,
-                Event::Failed(position, failure) => {
+    let positions = Mutex::new(positions);
+    let next = || positions.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let work = || {
+        let mut options = TrainOptions::new();
+        let mut filled = Filled::default();
+        while let Some(position) = next().filter(|_| !stop.is_requested()) {
+            match attempt(folder, trials, position, threads, stop, &mut options)? {
+                Attempt::Present => filled.present += 1,
+                Attempt::Trained => filled.trained += 1,
+                Attempt::Elsewhere => filled.elsewhere += 1,
+                Attempt::Stopped => break,
+                Attempt::Failed(failure) => {
                     filled.failed += 1;
-                    let message = format!(
-                        "warning: {}: {failure}; the other trials continue",
-                        trials.describe(position)
-                    );
+                    let trial = trials.describe(position);
                     // There is no one to report to if this fails.
-                    bar.suspend(|| drop(writeln!(messages(), "{message}")));
-                }
-                Event::Ended(failure) => {
-                    stop.fail();
-                    end = Err(failure.into());
-                    continue;
+                    bar.suspend(|| {
+                        drop(writeln!(
+                            messages(),
+                            "warning: {trial}: {failure}; the other trials continue"
+                        ))
+                    });
                 }
             }
             bar.inc(1);
         }
-        for worker in workers {
+        Ok(filled)
+    };
+    thread::scope(|scope| {
+        let workers = pools.iter().map(|pool| {
+            scope.spawn(|| {
+                let worked: Result<Filled, WriteError> = pool.install(work);
+                worked.inspect_err(|_| stop.fail())
+            })
+        });
+        // All are started before the first is joined.
+        let mut workers = Vec::from_iter(workers).into_iter();
+        workers.try_fold(Filled::default(), |filled, worker| {
             // The panic of the scope itself would not contain the reason.
-            worker.join().unwrap_or_else(|panic| resume_unwind(panic));
-        }
-    });
-    end.map(|()| filled)
+            let worked = worker.join().unwrap_or_else(|panic| resume_unwind(panic));
+            Ok(filled.and(worked?))
+        })
+    })
 }
 
-/// Positions of trials that are neither done nor trained here.
-struct Queue {
-    new: VecDeque<usize>,
-    /// Trials that other programs train.
-    others: VecDeque<usize>,
+enum Attempt {
+    Present,
+    Trained,
+    Elsewhere,
+    /// Saved in a checkpoint.
+    Stopped,
+    /// The trial cannot be trained.
+    Failed(Failure),
 }
 
-struct Worker<'a> {
-    folder: &'a Path,
-    trials: &'a Trials,
-    /// Number of trials trained at the same time.
+/// Trains the trial at `position` unless it is finished or being trained.
+fn attempt(
+    folder: &Path,
+    trials: &Trials,
+    position: usize,
     parallel: usize,
-    queue: &'a Mutex<Queue>,
-    stop: &'a Stop,
-}
-
-impl Worker<'_> {
-    /// Trains until no trial is left.
-    fn work(&self, events: &Sender<Event>) {
-        let mut options = TrainOptions::new();
-        while !self.stop.is_requested() {
-            let Some((position, is_waiting)) = self.next() else {
-                return;
-            };
-            if is_waiting {
-                thread::sleep(PATIENCE);
-            }
-            let Some(event) = self.attempt(position, &mut options) else {
-                continue;
-            };
-            // The receiver is gone only if the calling thread panicked.
-            if events.send(event).is_err() {
-                return;
-            }
+    stop: &Stop,
+    options: &mut TrainOptions,
+) -> Result<Attempt, WriteError> {
+    let claim = match Claim::take(folder, trials.id(position))? {
+        Claimed::Ours(claim) => claim,
+        Claimed::Done => return Ok(Attempt::Present),
+        Claimed::Theirs => return Ok(Attempt::Elsewhere),
+    };
+    let trained = trials.get(position, options).map_err(Failure::from);
+    match trained.and_then(|trial| train(&trial, &claim, parallel, || stop.is_requested())) {
+        Ok(Some(trial)) => {
+            trial.save_in(folder)?;
+            claim.finish();
+            Ok(Attempt::Trained)
         }
-    }
-
-    /// The next position, and whether another program was training it.
-    fn next(&self) -> Option<(usize, bool)> {
-        let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
-        let new = queue.new.pop_front().map(|position| (position, false));
-        new.or_else(|| Some((queue.others.pop_front()?, true)))
-    }
-
-    /// Trains the trial at `position` unless it is finished or being trained. Returns none if it is not finished yet.
-    fn attempt(&self, position: usize, options: &mut TrainOptions) -> Option<Event> {
-        let claim = match Claim::take(self.folder, self.trials.plan().trials[position]) {
-            Ok(Claimed::Ours(claim)) => claim,
-            Ok(Claimed::Done) => return Some(Event::Present),
-            Ok(Claimed::Theirs) => {
-                let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
-                queue.others.push_back(position);
-                return None;
-            }
-            Err(error) => return Some(Event::Ended(error)),
-        };
-        let trained = self.trials.get(position, options).map_err(Failure::from);
-        let trained = trained.and_then(|trial| train(&trial, &claim, self.parallel, || self.stop.is_requested()));
-        let trial = match trained {
-            Ok(trial) => trial?,
-            Err(failure) => return Some(Event::Failed(position, failure.to_string())),
-        };
-        match trial.save_in(self.folder) {
-            Ok(()) => {
-                claim.finish();
-                Some(Event::Trained)
-            }
-            Err(error) => Some(Event::Ended(error)),
-        }
+        Ok(None) => Ok(Attempt::Stopped),
+        Err(failure) => Ok(Attempt::Failed(failure)),
     }
 }

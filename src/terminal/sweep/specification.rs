@@ -171,16 +171,37 @@ impl Specification {
             .ok_or_else(|| SpecificationError::TooMany(self.path.clone()))
     }
 
-    /// Arguments of the trial at `position`.
-    pub(super) fn words_at(&self, position: usize) -> Vec<&String> {
+    /// The varied options of the trial at `position`, each with its value.
+    fn values_at(&self, position: usize) -> Vec<(&str, &AxisValue)> {
         let mut rest = position;
-        let mut of_axes = Vec::new();
+        let mut values = Vec::new();
         // The last axis varies fastest.
         for axis in self.axes.iter().rev() {
-            of_axes.push(&axis.values[rest % axis.values.len()].words);
+            values.push((&*axis.option, &axis.values[rest % axis.values.len()]));
             rest /= axis.values.len();
         }
-        self.shared.iter().chain(of_axes.into_iter().rev().flatten()).collect()
+        values.reverse();
+        values
+    }
+
+    /// Arguments of the trial at `position`.
+    pub(super) fn words_at(&self, position: usize) -> Vec<&String> {
+        let varied = self.values_at(position).into_iter();
+        self.shared
+            .iter()
+            .chain(varied.flat_map(|(_, value)| &value.words))
+            .collect()
+    }
+
+    /// Values of the axes at `position`, as in `hidden 8, seed 3`.
+    pub(super) fn describe(&self, position: usize) -> String {
+        let values = self.values_at(position).into_iter();
+        let values = Vec::from_iter(values.map(|(option, value)| format!("{option} {}", written(&value.value))));
+        if values.is_empty() {
+            return "the only trial".to_owned();
+        }
+        // Any text may be a value.
+        in_one_line(&values.join(", "))
     }
 
     /// An error at `place` of the file.
@@ -190,6 +211,15 @@ impl Specification {
             place: in_one_line(&place),
             message: in_one_line(&message),
         }
+    }
+}
+
+/// A value without the quotes of JSON.
+fn written(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Array(values) => values.iter().map(written).collect::<Vec<_>>().join(" "),
+        other => other.to_string(),
     }
 }
 
@@ -386,8 +416,27 @@ impl TrainOptions {
 #[cfg(test)]
 mod tests {
     use decoupler_files::export::{TrialOptions, decoders_in_order, train_options};
+    use serde_json::json;
 
     use super::*;
+
+    #[test]
+    fn the_last_axis_varies_fastest() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sweep.json");
+        let axes = json!({"hidden": [6, 8], "set": ["mu=1", ["mu=2", "mu-decrease=0.5"], "mu=3"]});
+        std::fs::write(&path, json!({"axes": axes}).to_string()).unwrap();
+        let specification = Specification::read(&path, &mut TrainOptions::new()).unwrap();
+        let positions = [0, 1, 5].map(|position| specification.describe(position));
+        assert_eq!(
+            positions,
+            [
+                "hidden 6, set mu=1",
+                "hidden 6, set mu=2 mu-decrease=0.5",
+                "hidden 8, set mu=3"
+            ]
+        );
+    }
 
     fn read_back(options: &TrialOptions) -> TrainingArguments {
         let mut train = TrainOptions::new();

@@ -1,13 +1,11 @@
 use std::{
     collections::HashMap,
-    env,
     ops::ControlFlow,
-    path::{self, Path, PathBuf},
+    path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
-use clap::ValueEnum;
 use decoupler_core::{
     decoupling::DecoderKind,
     evaluation::{Run, TrainingSize, Workload},
@@ -15,10 +13,10 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        CheckpointFile, Checkpointing, NetworkFile, PlanAxis, SweepPlan, Trial, TrialId, TrialOptions, WriteError,
-        decoders_in_order, recording_options, report::quoted, train_options,
+        CheckpointFile, Checkpointing, NetworkFile, Trial, TrialId, TrialOptions, decoders_in_order, recording_options,
+        train_options,
     },
-    import::{FileChecksum, ImportError, Plan, Setup, SetupSets, file_crc32, stored},
+    import::{ImportError, Plan, Setup, SetupSets, file_crc32},
     machine::memory_budget,
 };
 use serde_json::Value;
@@ -38,7 +36,8 @@ use crate::terminal::{
 /// All trials of a specification, without duplicates, each accepted by `train`.
 pub(super) struct Trials {
     specification: Specification,
-    plan: SweepPlan,
+    /// By position.
+    ids: Vec<TrialId>,
     /// CRC-32 of the files of recordings in hexadecimal.
     checksums: Mutex<HashMap<PathBuf, String>>,
 }
@@ -63,18 +62,10 @@ impl Trials {
 
     /// Plans the trials of `specification`.
     pub fn of(specification: Specification, train: &mut TrainOptions) -> Result<Self, SpecificationError> {
-        let axes = specification.axes.iter().map(|axis| PlanAxis {
-            option: axis.option.clone(),
-            values: axis.values.iter().map(|value| value.value.clone()).collect(),
-        });
         let mut trials = Self {
-            plan: SweepPlan {
-                axes: axes.collect(),
-                trials: Vec::new(),
-                recordings: Vec::new(),
-            },
-            checksums: Mutex::default(),
             specification,
+            ids: Vec::new(),
+            checksums: Mutex::default(),
         };
         let mut positions = HashMap::new();
         for position in 0..trials.specification.count()? {
@@ -85,7 +76,7 @@ impl Trials {
                 let message = format!("the same options as {first}; leave one of the values out");
                 return Err(trials.error(position, message));
             }
-            trials.plan.trials.push(trial.id);
+            trials.ids.push(trial.id);
         }
         Ok(trials)
     }
@@ -130,21 +121,6 @@ impl Trials {
         plan.files().map(of_file).collect()
     }
 
-    /// Writes the plan of the sweep to `folder`.
-    pub fn save_plan(&self, folder: &Path) -> Result<(), WriteError> {
-        let checksums = self.checksums.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut recordings = Vec::from_iter(checksums.iter().map(|(path, crc32)| FileChecksum {
-            path: stored(path, folder),
-            crc32: crc32.clone(),
-        }));
-        recordings.sort_by(|one, other| one.path.cmp(&other.path));
-        let plan = SweepPlan {
-            recordings,
-            ..self.plan.clone()
-        };
-        plan.save_in(folder)
-    }
-
     /// The trial at `position`.
     pub(super) fn get(&self, position: usize, train: &mut TrainOptions) -> Result<PlannedTrial, SpecificationError> {
         let trial = self.parsed(position, train);
@@ -152,16 +128,16 @@ impl Trials {
     }
 
     pub(super) fn count(&self) -> usize {
-        self.plan.trials.len()
+        self.ids.len()
     }
 
-    pub(super) fn plan(&self) -> &SweepPlan {
-        &self.plan
+    pub(super) fn id(&self, position: usize) -> TrialId {
+        self.ids[position]
     }
 
     /// Number of a trial, from 1, with its values of the varied options.
     pub(super) fn describe(&self, position: usize) -> String {
-        format!("trial {} ({})", position + 1, self.plan.describe(position))
+        format!("trial {} ({})", position + 1, self.specification.describe(position))
     }
 
     fn error(&self, position: usize, message: String) -> SpecificationError {
@@ -256,121 +232,6 @@ fn resumed(trial: &PlannedTrial, claim: &Claim) -> Option<(Run, SetupSets, Durat
     let before = file.wall_time.unwrap_or_default();
     let (run, sets) = file.resume(&Job::UNINTERRUPTED, &mut |_| ()).ok()?;
     Some((run, sets, before))
-}
-
-/// Programs that distribute jobs among machines.
-#[derive(Clone, Copy, ValueEnum)]
-pub(super) enum Engine {
-    Slurm,
-    Parallel,
-    #[value(name = "hyperqueue")]
-    HyperQueue,
-}
-
-impl Engine {
-    /// Default maximum number of jobs of a script: Slurm's limit on arrays in its default configuration.
-    pub(super) const MAX_JOBS: usize = 1000;
-
-    /// Script with which this engine trains the trials of `specification` in this many jobs, each on one thread.
-    pub(super) fn script(
-        self,
-        specification: &Path,
-        folder: &Path,
-        trials: usize,
-        jobs: usize,
-    ) -> Result<String, Failure> {
-        let program = env::current_exe().map_err(|_| refused("the path of this program is not known".to_owned()))?;
-        let command = format!(
-            "{} sweep --spec {} --out {} --threads 1 --shard",
-            absolute(&program)?,
-            absolute(specification)?,
-            absolute(folder)?
-        );
-        Ok(match self {
-            Self::Slurm => slurm(&command, trials, jobs),
-            Self::Parallel => parallel(&command, trials, jobs),
-            Self::HyperQueue => hyperqueue(&command, trials, jobs),
-        })
-    }
-}
-
-/// Quoted absolute path: a job may start in another folder.
-fn absolute(path: &Path) -> Result<String, Failure> {
-    let full = path::absolute(path).ok().filter(|full| full.to_str().is_some());
-    let full = full.ok_or_else(|| refused(format!("the path '{}' cannot be written in a script", path.display())))?;
-    Ok(quoted(&full))
-}
-
-fn refused(message: String) -> Failure {
-    Failure::Arguments(format!("--engine: {message}; move the files"))
-}
-
-fn slurm(command: &str, trials: usize, jobs: usize) -> String {
-    format!(
-        r#"#!/bin/bash
-#SBATCH --job-name=decoupler-sweep
-#SBATCH --array=1-{jobs}
-#SBATCH --ntasks=1
-#SBATCH --cpus-per-task=1
-#SBATCH --requeue
-#SBATCH --open-mode=append
-#SBATCH --signal=B:USR1@60
-# {trials} trials in {jobs} jobs of one thread. Submit with sbatch, with --partition, --time and --mem as your cluster
-# needs. All nodes must see the folder. Submitting it again trains only what is missing.
-
-# SIGTERM comes when Slurm itself requeues, preempts or cancels the job, SIGUSR1 a minute before its time is over. In both
-# cases the training is saved, and the next run resumes it.
-worker=
-waiting=yes
-requeue=no
-stop() {{
-    waiting=yes
-    [ -z "$worker" ] || kill -TERM "$worker" 2>/dev/null
-}}
-trap stop TERM
-trap 'requeue=yes; stop' USR1
-{command} "$SLURM_ARRAY_TASK_ID/{jobs}" &
-worker=$!
-while [ "$waiting" = yes ]; do
-    waiting=no
-    wait "$worker"
-    status=$?
-done
-if [ "$requeue" = yes ] && [ "$status" -eq 143 ]; then
-    scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID"
-fi
-exit "$status"
-"#
-    )
-}
-
-fn parallel(command: &str, trials: usize, jobs: usize) -> String {
-    format!(
-        r#"#!/bin/bash
-# {trials} trials in {jobs} jobs of one thread, one on each core. Further arguments go to GNU parallel, for example
-# --sshloginfile FILE for other machines, which must see the folder. A job that was killed is tried again. Running the
-# script again trains only what is missing.
-
-# After SIGTERM each training is saved, and the next run resumes it.
-seq {jobs} | exec parallel --quote -I '{{shard}}' --retries 3 --termseq TERM,60000,KILL,25 "$@" \
-    {command} '{{shard}}/{jobs}'
-"#
-    )
-}
-
-fn hyperqueue(command: &str, trials: usize, jobs: usize) -> String {
-    format!(
-        r#"#!/bin/bash
-#HQ --name decoupler-sweep
-#HQ --array 1-{jobs}
-#HQ --cpus 1
-# {trials} trials in {jobs} tasks of one thread. Save this as sweep.sh and submit it with: hq submit sweep.sh. All workers must
-# see the folder. HyperQueue restarts the tasks of a worker that is lost, and they resume their trainings. Submitting it
-# again trains only what is missing.
-
-exec {command} "$HQ_TASK_ID/{jobs}"
-"#
-    )
 }
 
 #[cfg(test)]

@@ -81,7 +81,7 @@ pub(crate) fn names(folder: &Path) -> BTreeSet<String> {
 
 /// Results in a folder, with the times of their files.
 pub(crate) fn results(folder: &Path) -> BTreeSet<(String, SystemTime)> {
-    let is_result = |name: &String| name.ends_with(".json") && !name.starts_with("sweep-");
+    let is_result = |name: &String| name.ends_with(".json");
     let names = names(folder).into_iter().filter(is_result);
     names
         .map(|name| {

@@ -23,7 +23,7 @@ fn merging_lists_missing_and_conflicting_trials() {
         whole,
         "the folders complement each other"
     );
-    let (output, message) = failure("sweep --merge runs --out table.csv", folder, 1);
+    let (output, message) = failure("sweep --merge runs --spec sweep.json --out table.csv", folder, 1);
     assert!(output.contains("missing: trial 2 (hidden 3, seed 7)\n"), "{output}");
     assert!(message.contains("1 missing, 0 conflicting"), "{message}");
     assert_eq!(fs::read_to_string(folder.join("table.csv")).unwrap().lines().count(), 6);
@@ -56,7 +56,7 @@ fn merging_lists_missing_and_conflicting_trials() {
         folder.join("others").join(id(10, 0)),
     )
     .unwrap();
-    let (output, message) = failure("sweep --merge others --out table.csv", folder, 1);
+    let (output, message) = failure("sweep --merge others --spec sweep.json --out table.csv", folder, 1);
     assert!(
         output.contains("checksum") && output.contains("its name belongs to another trial"),
         "{output}"
@@ -89,14 +89,9 @@ fn an_invalid_merge_is_refused() {
         ("--merge empty --out none/table.csv", 1, "does not exist"),
         ("--merge empty --out table.csv", 1, "no sweep in 'empty'"),
         ("--merge none --out table.csv", 1, "cannot read 'none'"),
-        (
-            "--merge empty --spec sweep.json --out table.csv",
-            2,
-            "cannot be used with",
-        ),
+        ("--merge empty --shard 1/2 --out table.csv", 2, "cannot be used with"),
         ("--out runs", 2, "--spec"),
         ("--spec sweep.json --out runs --shard 3/2", 2, "I/N"),
-        ("--spec sweep.json --out runs --jobs 2", 2, "--engine"),
         ("--spec sweep.json --out sweep.json", 1, "cannot create the folder"),
     ] {
         let (_, message) = failure(&format!("sweep {arguments}"), folder, status);

@@ -2,8 +2,6 @@
 
 pub(crate) mod driver;
 mod filling;
-#[cfg(target_os = "linux")]
-mod job_scripts;
 mod merging;
 mod recordings;
 mod specifications;

@@ -125,6 +125,6 @@ fn a_failed_trial_is_reported_and_does_not_stop_others() {
         message.ends_with("error: 1 of 2 trials failed, for the reasons above; the others are kept\n"),
         "{message}"
     );
-    let (said, _) = failure("sweep --merge runs --out table.csv", folder.path(), 1);
+    let (said, _) = failure("sweep --merge runs --spec sweep.json --out table.csv", folder.path(), 1);
     assert!(said.contains("missing: trial 1 (samples 10)"), "{said}");
 }

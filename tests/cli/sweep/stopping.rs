@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 #[cfg(target_os = "linux")]
 use tempfile::TempDir;
 
-use super::driver::{command, fill, folder_with, merged, names, results, six, spawn, wait_until};
+use super::driver::{command, failure, fill, folder_with, merged, names, results, six, spawn, wait_until};
 
 #[test]
 fn a_killed_sweep_keeps_finished_trials() {
@@ -67,14 +67,19 @@ fn two_programs_fill_one_folder() {
             .map(|report| report[field].as_u64().unwrap())
             .sum::<u64>()
     };
-    assert_eq!((sum("trained"), sum("present")), (6, 6), "no trial is trained twice");
-    assert_eq!(names(&folder.join("runs")).len(), 7, "six results and the plan");
+    assert_eq!(sum("trained"), 6, "no trial is trained twice");
+    assert_eq!(
+        sum("present") + sum("elsewhere"),
+        6,
+        "each leaves the others' trials to them"
+    );
+    assert_eq!(names(&folder.join("runs")).len(), 6, "the results");
 }
 
-/// The test acts as the other program: it holds the lock of the first missing trial. Once a later result exists, the
-/// program has skipped it.
+/// The test acts as the other program: it holds the lock of the first missing trial, as a program that is killed releases
+/// it.
 #[test]
-fn a_trial_of_a_program_that_ends_without_a_result_is_taken_over() {
+fn a_trial_of_another_program_is_left_to_it_until_it_ends() {
     let folder = folder_with(&json!({
         "train": {"array": "10x6_3x18", "samples": 100, "epochs": 8, "decoder": "network"},
         "axes": {"seed": [0, 1, 2]},
@@ -90,16 +95,16 @@ fn a_trial_of_a_program_that_ends_without_a_result_is_taken_over() {
     }
     let other = File::create(runs.join(format!("{first}.claim"))).unwrap();
     other.lock().unwrap();
-    let mut child = spawn(&mut command(
-        "sweep --spec sweep.json --out runs --threads 1 --json",
-        folder,
-    ));
-    wait_until("the second trial", || result(&second).exists());
-    assert!(!result(&first).exists(), "the lock is respected");
-    assert!(child.try_wait().unwrap().is_none(), "it waits");
+    let counts = |report: &Value| ["present", "trained", "elsewhere"].map(|field| report[field].as_u64().unwrap());
+    assert_eq!(counts(&fill("--out runs", folder)), [1, 1, 1], "the lock is respected");
+    assert!(result(&second).exists() && !result(&first).exists());
+    let (output, _) = failure("sweep --merge runs --out table.csv", folder, 1);
+    assert!(
+        output.contains(&format!("missing: trial {first} (begun, not finished)\n")),
+        "{output}"
+    );
     drop(other);
-    let report: Value = serde_json::from_slice(&child.wait_with_output().unwrap().stdout).unwrap();
-    assert_eq!((&report["present"], &report["trained"]), (&json!(1), &json!(2)));
+    assert_eq!(counts(&fill("--out runs", folder)), [2, 1, 0]);
     assert_eq!(merged("runs", folder), trials);
 }
 
@@ -145,7 +150,7 @@ fn an_interrupted_trial_is_resumed_bit_for_bit() {
         let runs = names(&folder.join("runs"));
         assert!(runs.iter().any(|name| name.ends_with(".checkpoint")), "{runs:?}");
         assert_eq!(fill("--out runs", folder)["trained"], 1);
-        assert_eq!(names(&folder.join("runs")).len(), 2, "the result and the plan");
+        assert_eq!(names(&folder.join("runs")).len(), 1, "the result");
         fill("--out whole", folder);
         let whole = merged("whole", folder);
         assert_eq!(merged("runs", folder), whole);

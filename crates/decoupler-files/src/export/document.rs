@@ -32,19 +32,16 @@ pub enum DocumentKind {
     RunList,
     /// A finished trial of `decoupler sweep`.
     Trial,
-    /// The trials of a specification of `decoupler sweep`.
-    SweepPlan,
 }
 
 impl DocumentKind {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 6] = [
         Self::Network,
         Self::Checkpoint,
         Self::Recipe,
         Self::Sensor,
         Self::RunList,
         Self::Trial,
-        Self::SweepPlan,
     ];
 
     /// Returns the kind of the file at `path`, determined by its beginning; `None` if it is of no kind or cannot be
@@ -71,7 +68,6 @@ impl DocumentKind {
             Self::Sensor => "decoupler sensor",
             Self::RunList => "decoupler run list",
             Self::Trial => "decoupler trial",
-            Self::SweepPlan => "decoupler sweep plan",
         }
     }
 
@@ -79,7 +75,7 @@ impl DocumentKind {
     pub(super) fn version(self) -> u64 {
         match self {
             Self::Network | Self::Checkpoint => 4,
-            Self::Recipe | Self::Sensor | Self::RunList | Self::Trial | Self::SweepPlan => 1,
+            Self::Recipe | Self::Sensor | Self::RunList | Self::Trial => 1,
         }
     }
 
@@ -101,7 +97,7 @@ impl DocumentKind {
             Self::Sensor => "correct it, or calibrate again",
             Self::Checkpoint => "copy it again, or start a new training",
             Self::RunList => "name the run or choose A and B again",
-            Self::Trial | Self::SweepPlan => "delete it and run the sweep again",
+            Self::Trial => "delete it and run the sweep again",
         }
     }
 
@@ -170,7 +166,6 @@ impl fmt::Display for DocumentKind {
             Self::Sensor => "sensor file",
             Self::RunList => "part of a run list",
             Self::Trial => "trial",
-            Self::SweepPlan => "sweep plan",
         })
     }
 }

@@ -67,8 +67,8 @@ pub use saved_problem::SavedProblem;
 pub use search_table::{describe_search, search_table};
 pub use sensor_file::SensorFile;
 pub use sweep::{
-    MergedSweep, PlanAxis, SweepFiles, SweepFolderError, SweepPlan, SweepRow, SweepTableFormat, Trial, TrialId,
-    TrialOptions, decoders_in_order, recording_options, sweep_specification, train_options,
+    MergedSweep, SweepFiles, SweepFolderError, SweepRow, SweepTableFormat, Trial, TrialId, TrialOptions,
+    decoders_in_order, recording_options, sweep_specification, train_options,
 };
 pub use table::{Cell, Table, TableColumn, TableForm};
 pub use tables::{

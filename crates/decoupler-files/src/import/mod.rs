@@ -57,7 +57,7 @@ pub use missing::{Condition, Missing};
 pub use plan::{Plan, PlannedSets, TestFiles};
 pub use positions::{PositionsError, holds_positions};
 pub use progress::{Progress, Watch};
-pub use recipe::{FileChecksum, FileSet, Joined, Recipe, Recorded, file_crc32, stored};
+pub use recipe::{FileChecksum, FileSet, Joined, Recipe, Recorded, file_crc32};
 pub use sentinel::Sentinel;
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
 pub use suggestion::{Meaning, suggested_plan, suggested_plan_in_order};

@@ -126,7 +126,7 @@ impl FileSet {
 
 /// Returns the path of a recording as stored in a file in `folder`: relative to the folder. A recording in the user's home
 /// is stored by name only if the folder is not in the home, so that no file reveals the home folder of its author.
-pub fn stored(path: &Path, folder: &Path) -> PathBuf {
+pub(super) fn stored(path: &Path, folder: &Path) -> PathBuf {
     let absolute = |path: &Path| std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| normal(&path));
     relative(&absolute(path), &absolute(folder), std::env::home_dir().as_deref())
 }

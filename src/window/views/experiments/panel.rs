@@ -274,17 +274,9 @@ pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsView) {
     let palette = Theme::of(ui).palette;
     let folder = experiments.shown_folder().filter(|_| experiments.running.is_none());
     let of_folder = folder.and_then(|folder| Some((folder.name(), folder.trials()?)));
-    if let Some((name, (finished, trials))) = of_folder {
-        let colour = if finished == trials {
-            palette.good
-        } else {
-            palette.accent
-        };
-        let text = format!(
-            "Sweep folder {name}: {finished} of {} finished",
-            counted(trials, "trial")
-        );
-        ui.horizontal_centered(|ui| state_ui(ui, colour, &text));
+    if let Some((name, finished)) = of_folder {
+        let text = format!("Sweep folder {name}: {} finished", counted(finished, "trial"));
+        ui.horizontal_centered(|ui| state_ui(ui, palette.good, &text));
         return;
     }
     let (colour, text) = match (&experiments.running, experiments.outcome()) {

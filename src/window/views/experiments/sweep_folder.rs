@@ -18,7 +18,7 @@ use crate::window::{
     theme::{Theme, semibold, space, type_size},
     widgets::{
         ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui, ghost_button, note_ui,
-        placeholder_ui, progress_bar_ui, section_heading_ui,
+        placeholder_ui, section_heading_ui,
     },
 };
 
@@ -119,10 +119,10 @@ impl OpenFolder {
         name.to_string_lossy().into_owned()
     }
 
-    /// Returns the numbers of finished and planned trials, once they are read.
-    pub(in crate::window::views::experiments) fn trials(&self) -> Option<(usize, usize)> {
+    /// Returns the number of finished trials, once they are read.
+    pub(in crate::window::views::experiments) fn trials(&self) -> Option<usize> {
         let table = self.table.as_ref()?.as_ref().ok()?;
-        Some((table.finished(), table.trials))
+        Some(table.rows.len())
     }
 }
 
@@ -174,8 +174,8 @@ pub(in crate::window::views::experiments) struct SweepTable {
     /// Number of headings that name options.
     pub(super) options: usize,
     pub(super) rows: Vec<Vec<SweepCell>>,
-    /// Number of trials, planned or present.
-    pub(super) trials: usize,
+    /// Number of trials begun and not finished.
+    pub(super) unfinished: usize,
     /// Problems with files of the folder.
     pub(super) problems: Vec<String>,
 }
@@ -230,20 +230,15 @@ impl SweepTable {
             headings: headings.collect(),
             options: options.len(),
             rows: merged.trials.iter().map(|row| cells(row, &options, &results)).collect(),
-            trials: merged.trials.len() + merged.missing.len() + merged.conflicting.len(),
+            unfinished: merged.missing.len(),
             problems,
         }
     }
-
-    /// Returns the number of finished trials.
-    pub(super) fn finished(&self) -> usize {
-        self.rows.len()
-    }
 }
 
-/// Returns the options that a plan varies, in its order, or those that differ between trials if there is no plan.
+/// Returns the options that differ between trials.
 fn varying(merged: &MergedSweep) -> Vec<String> {
-    let mut options = merged.axes.clone();
+    let mut options = Vec::new();
     let mut first: BTreeMap<&String, &Value> = BTreeMap::new();
     for (option, value) in merged.trials.iter().flat_map(|row| &row.options) {
         if *first.entry(option).or_insert(value) != value && !options.contains(option) {
@@ -321,12 +316,14 @@ pub(in crate::window::views::experiments) fn folder_card_ui(ui: &mut Ui, folder:
 }
 
 fn trials_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
-    let (finished, trials) = (table.finished(), table.trials);
-    let progress = format!("{finished} of {} finished", counted(trials, "trial"));
-    progress_bar_ui(ui, "Sweep folder", finished as f32 / trials.max(1) as f32, &progress);
-    if finished < trials {
-        dim_ui(ui, "New trials appear here automatically.");
-    }
+    let finished = counted(table.rows.len(), "trial");
+    dim_ui(
+        ui,
+        &format!(
+            "{finished} finished, {} begun. New trials appear here automatically.",
+            table.unfinished
+        ),
+    );
     ui.add_space(space(1));
     for problem in table.problems.iter().take(MAX_PROBLEMS) {
         note_ui(ui, problem);
@@ -335,7 +332,7 @@ fn trials_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
         let rest = table.problems.len() - MAX_PROBLEMS;
         note_ui(ui, &format!("and {} more", counted(rest, "problem")));
     }
-    if finished == 0 {
+    if table.rows.is_empty() {
         return placeholder_ui(ui, "No trial has finished yet.");
     }
     ui.allocate_ui(vec2(ui.available_width(), ui.available_height()), |ui| {
@@ -390,7 +387,7 @@ fn table_ui<'a>(ui: &mut Ui, table: &'a SweepTable, sort: &mut SortBy) {
 const SPECIFICATION: FileWords = FileWords {
     kind: "specification",
     description: "This sweep for the terminal, on one machine or many: decoupler sweep --spec FILE --out FOLDER trains it, \
-                  and --engine writes the job script of a cluster.",
+                  and --shard I/N a part of it.",
     extensions: &["json"],
 };
 

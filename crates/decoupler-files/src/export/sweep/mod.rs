@@ -1,12 +1,12 @@
-//! Files of the folder that a sweep fills: `TRIAL.json`, the result of a trial, and `sweep-PLAN.json`, the trials to be
-//! trained. Both are named by a hash of the options of their trials and never change, so any number of programs may
-//! write to one folder.
+//! Files of the folder that a sweep fills: `TRIAL.json`, the result of a trial, named by a hash of its options. It never
+//! changes, so any number of programs may write to one folder. `TRIAL.claim` is locked by the program that trains the trial.
 
-mod plan_file;
+mod options;
 mod row;
 mod trial_file;
 
 use std::{
+    ffi::OsStr,
     fs, io,
     path::{Path, PathBuf},
 };
@@ -18,19 +18,19 @@ use super::{AtomicFile, DocumentError, DocumentKind, WriteError, network_file::S
 use crate::machine::system_cause;
 
 pub use self::{
-    plan_file::{PlanAxis, SweepPlan},
     row::SweepRow,
     trial_file::{Trial, TrialOptions},
 };
-pub use plan_file::{decoders_in_order, recording_options, sweep_specification, train_options};
+pub use options::{decoders_in_order, recording_options, sweep_specification, train_options};
 pub use row::{MergedSweep, SweepFolderError, SweepTableFormat};
 pub use trial_file::TrialId;
 
-/// Trial and plan files of a folder.
+/// Files of the trials in a folder.
 #[derive(Debug, PartialEq, Eq)]
 pub struct SweepFiles {
     pub(crate) trials: Vec<PathBuf>,
-    pub(crate) plans: Vec<PathBuf>,
+    /// Claims on trials without a result.
+    pub(crate) unfinished: Vec<PathBuf>,
 }
 
 impl SweepFiles {
@@ -42,23 +42,23 @@ impl SweepFiles {
         };
         let mut files = Self {
             trials: Vec::new(),
-            plans: Vec::new(),
+            unfinished: Vec::new(),
         };
         for entry in fs::read_dir(folder).map_err(error)? {
             let path = entry.map_err(error)?.path();
-            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-            let Some(stem) = name.strip_suffix(".json") else {
+            let name = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
+            if !TrialId::is_written(name) {
                 continue;
-            };
-            let is_plan = stem.strip_prefix(plan_file::PREFIX).is_some_and(TrialId::is_written);
-            if TrialId::is_written(stem) {
-                files.trials.push(path);
-            } else if is_plan {
-                files.plans.push(path);
+            }
+            match path.extension().and_then(OsStr::to_str) {
+                Some("json") => files.trials.push(path),
+                // A program that was killed after its result leaves its claim next to it.
+                Some("claim") if !path.with_extension("json").exists() => files.unfinished.push(path),
+                _ => {}
             }
         }
         files.trials.sort_unstable();
-        files.plans.sort_unstable();
+        files.unfinished.sort_unstable();
         Ok(files)
     }
 }

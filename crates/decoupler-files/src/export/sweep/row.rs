@@ -12,7 +12,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use thiserror::Error;
 
-use super::{SweepFiles, SweepPlan, Trial, TrialId, TrialOptions};
+use super::{SweepFiles, Trial, TrialId, TrialOptions};
 pub use crate::export::DocumentError;
 
 /// Fields of a report that are times: they differ from run to run and are excluded from comparisons.
@@ -309,13 +309,10 @@ pub enum SweepFolderError {
 /// The trials of several folders.
 #[derive(Default, Serialize)]
 pub struct MergedSweep {
-    /// Options that plans of the folders vary, each once.
-    #[serde(skip)]
-    pub axes: Vec<String>,
     /// Identifies the options and results of all rows, without times: two merges with the same digest have the same
     /// results to the last bit.
     pub digest: String,
-    /// Trials that are planned in one of the folders and finished in none.
+    /// Trials that have no result. [`Self::read`] lists those begun in one of the folders: it does not know the others.
     pub missing: Vec<String>,
     /// Trials with the same options and different results, none of which is in the table.
     pub conflicting: Vec<String>,
@@ -323,6 +320,8 @@ pub struct MergedSweep {
     pub damaged: Vec<String>,
     /// Rows of the trials, in order.
     pub trials: Vec<SweepRow>,
+    #[serde(skip)]
+    finished: BTreeSet<TrialId>,
 }
 
 impl MergedSweep {
@@ -333,23 +332,18 @@ impl MergedSweep {
     pub fn read(folders: &[PathBuf]) -> Result<Self, SweepFolderError> {
         let mut merged = Self::default();
         let mut found: BTreeMap<String, Vec<Found>> = BTreeMap::new();
-        let mut finished = BTreeSet::new();
-        let mut plans = Vec::new();
+        let mut unfinished = BTreeSet::new();
         for folder in folders {
             let files = SweepFiles::list(folder)?;
-            if files.trials.is_empty() && files.plans.is_empty() {
+            if files.trials.is_empty() && files.unfinished.is_empty() {
                 return Err(SweepFolderError::NoSweep(folder.clone()));
             }
-            for path in files.plans {
-                match SweepPlan::load(&path) {
-                    Ok(plan) => plans.push(plan),
-                    Err(error) => merged.damaged.push(error.to_string()),
-                }
-            }
+            let names = files.unfinished.iter().filter_map(|path| path.file_stem()?.to_str());
+            unfinished.extend(names.filter_map(|name| name.parse::<TrialId>().ok()));
             for path in files.trials {
                 match Trial::load(&path) {
                     Ok(trial) => {
-                        finished.insert(trial.id());
+                        merged.finished.insert(trial.id());
                         let row = SweepRow::from(trial);
                         found.entry(row.key()).or_default().push(Found { path, row });
                     }
@@ -357,12 +351,10 @@ impl MergedSweep {
                 }
             }
         }
-        for axis in plans.iter().flat_map(|plan| &plan.axes) {
-            if !merged.axes.contains(&axis.option) {
-                merged.axes.push(axis.option.clone());
-            }
-        }
-        merged.missing = missing(&plans, &finished);
+        let unfinished = unfinished.difference(&merged.finished);
+        merged.missing = unfinished
+            .map(|id| format!("trial {id} (begun, not finished)"))
+            .collect();
         for same in found.into_values() {
             merged.add(same);
         }
@@ -390,7 +382,12 @@ impl MergedSweep {
         self.conflicting.push(files.join(" and "));
     }
 
-    /// Returns true if the table has every trial.
+    /// Returns true if one of the folders has a result of the trial.
+    pub fn has(&self, trial: TrialId) -> bool {
+        self.finished.contains(&trial)
+    }
+
+    /// Returns true if no trial is known to be missing from the table.
     pub fn is_whole(&self) -> bool {
         self.missing.is_empty() && self.conflicting.is_empty() && self.damaged.is_empty()
     }
@@ -406,20 +403,6 @@ impl Found {
     fn describe(&self) -> String {
         format!("'{}' ({})", Path::display(&self.path), self.row.program)
     }
-}
-
-/// Trials of `plans` that are not finished, each once.
-fn missing(plans: &[SweepPlan], finished: &BTreeSet<TrialId>) -> Vec<String> {
-    let mut listed = BTreeSet::new();
-    let mut missing = Vec::new();
-    for plan in plans {
-        for (position, id) in plan.trials.iter().enumerate() {
-            if !finished.contains(id) && listed.insert(id) {
-                missing.push(format!("trial {} ({})", position + 1, plan.describe(position)));
-            }
-        }
-    }
-    missing
 }
 
 #[cfg(test)]

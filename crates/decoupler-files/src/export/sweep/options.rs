@@ -1,5 +1,3 @@
-use std::path::Path;
-
 use decoupler_core::{
     dataset::{Division, Simulation},
     decoupling::DecoderKind,
@@ -9,113 +7,16 @@ use decoupler_core::{
     },
     scene::{NoisySets, RowModel, Rows},
     settings,
-    text::in_one_line,
     training::Method,
 };
-use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use thiserror::Error;
 
-use super::{TrialId, TrialOptions, load, save_new};
+use super::TrialOptions;
 use crate::{
-    export::{
-        DocumentError, DocumentKind, WriteError,
-        document::PROGRAM,
-        report::{CommandGap, train_command},
-    },
-    import::{FileChecksum, Plan},
+    export::report::{CommandGap, train_command},
+    import::Plan,
 };
-
-const KIND: DocumentKind = DocumentKind::SweepPlan;
-/// Beginning of the name of a plan file.
-pub(super) const PREFIX: &str = "sweep-";
-
-/// All trials of a specification, in its order, kept next to the results to identify missing ones.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SweepPlan {
-    /// Axes in the order of the specification; the last varies fastest.
-    pub axes: Vec<PlanAxis>,
-    /// Trials by position.
-    pub trials: Vec<TrialId>,
-    /// Files of recordings, with paths relative to the folder; none for simulated arrays.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub recordings: Vec<FileChecksum>,
-}
-
-/// An option that varies.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PlanAxis {
-    /// Option of the command that is varied.
-    pub option: String,
-    /// Its values, in order.
-    pub values: Vec<Value>,
-}
-
-impl SweepPlan {
-    /// Writes the plan to its file in `folder`, unless it is there.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub fn save_in(&self, folder: &Path) -> Result<(), WriteError> {
-        let trials: Vec<String> = self.trials.iter().map(ToString::to_string).collect();
-        let id = TrialId::of(&trials.join("\n"));
-        save_new(KIND, PROGRAM, self, &folder.join(format!("{PREFIX}{id}.json"))).map(drop)
-    }
-
-    /// Reads the file at `path`.
-    ///
-    /// # Errors
-    /// The file cannot be read, is of another kind or version, or is damaged.
-    pub(crate) fn load(path: &Path) -> Result<Self, DocumentError> {
-        let (_, plan): (_, Self) = load(KIND, path)?;
-        let combinations = plan
-            .axes
-            .iter()
-            .map(|axis| axis.values.len())
-            .try_fold(1, usize::checked_mul);
-        if combinations == Some(plan.trials.len()) {
-            Ok(plan)
-        } else {
-            let defect = "trials: their number is not that of the combinations of the axes' values".to_owned();
-            Err(KIND.damaged(path, defect))
-        }
-    }
-
-    /// Values of the axes at `position`, as in `hidden 8, seed 3`.
-    pub fn describe(&self, position: usize) -> String {
-        let mut rest = position;
-        let mut values: Vec<String> = Vec::new();
-        for PlanAxis {
-            option,
-            values: of_axis,
-        } in self.axes.iter().rev()
-        {
-            let count = of_axis.len().max(1);
-            if let Some(value) = of_axis.get(rest % count) {
-                values.push(format!("{option} {}", written(value)));
-            }
-            rest /= count;
-        }
-        values.reverse();
-        if values.is_empty() {
-            "the only trial".to_owned()
-        } else {
-            // Any text may be a value.
-            in_one_line(&values.join(", "))
-        }
-    }
-}
-
-/// A value without the quotes of JSON.
-fn written(value: &Value) -> String {
-    match value {
-        Value::String(text) => text.clone(),
-        Value::Array(values) => values.iter().map(written).collect::<Vec<_>>().join(" "),
-        other => other.to_string(),
-    }
-}
 
 /// Reasons why an experiment of the window cannot be run as a sweep in the terminal.
 #[derive(Debug, Error)]
@@ -317,34 +218,4 @@ fn method_settings(method: Method) -> Value {
         Some(format!("{}={value}", setting.word("-")))
     });
     pairs.collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_last_axis_varies_fastest() {
-        let axis = |option: &str, values: Value| PlanAxis {
-            option: option.to_owned(),
-            values: serde_json::from_value(values).unwrap(),
-        };
-        let plan = SweepPlan {
-            axes: vec![
-                axis("hidden", serde_json::json!([6, 8])),
-                axis("set", serde_json::json!(["mu=1", ["mu=2", "mu-decrease=0.5"], "mu=3"])),
-            ],
-            trials: Vec::new(),
-            recordings: Vec::new(),
-        };
-        let positions = [0, 1, 5].map(|position| plan.describe(position));
-        assert_eq!(
-            positions,
-            [
-                "hidden 6, set mu=1",
-                "hidden 6, set mu=2 mu-decrease=0.5",
-                "hidden 8, set mu=3"
-            ]
-        );
-    }
 }
