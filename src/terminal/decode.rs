@@ -8,7 +8,7 @@ use std::{
 use clap::Args;
 use decoupler_core::{
     calibration::check_presses,
-    dataset::{Dataset, DatasetError, Division, SplitBy},
+    dataset::{Dataset, Division, SplitBy},
     evaluation::{Errors, TestErrors, fine_tune},
     job::Job,
     network::{DecouplingNetwork, Networks},
@@ -83,7 +83,7 @@ impl Decode {
             }
             (input, _) => {
                 let standard_input = Path::new("-");
-                self.follow.run(input.as_deref().unwrap_or(standard_input), &file)
+                self.follow.run(input.as_deref().unwrap_or(standard_input), file)
             }
         }
     }
@@ -105,7 +105,7 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
     let mut written = AtomicFile::create(output)?;
     let refused = |source| WriteError::io(output, source);
     let mut has_heading = false;
-    let mut drift = DriftWarnings::new(file, false);
+    let mut drift = DriftWarnings::new(file);
     let mut values = Vec::new();
     let mut outside = OutsideTraining::new(&file.problem);
     let mut decoder = file.decoder();
@@ -256,17 +256,6 @@ fn coordinates_of_depths(set: Dataset, row_wires: &[usize], sensor: &SensorModel
     });
     let (readings, groups) = (set.readings().to_owned(), set.groups().to_vec());
     Dataset::new(readings, coordinates, Some(row_wires), groups).expect("the parts come from a valid set")
-}
-
-/// Number of row-wires that the network of `file` reads; 1 for a recording whose row-wires share a network.
-pub(super) fn rows_read(file: &NetworkFile) -> Result<usize, Failure> {
-    match &file.problem.sensor {
-        Some(simulation) => {
-            let rows = simulation.scene.rows.read(simulation.sensor.scale.rows());
-            Ok(rows.map_err(DatasetError::from)?.len())
-        }
-        None => Ok(file.network.values().len()),
-    }
 }
 
 /// Writes the header: the columns `kept` from the input, the targets of `rows` row-wires, each followed by the half-width

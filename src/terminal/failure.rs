@@ -16,8 +16,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError},
-    import::{Cure, ImportError, InputLineError, LineError, ReadError, SetupError},
-    live::{Source, SourceError},
+    import::{Cure, ImportError, ReadError, SetupError},
+    live::SessionError,
     machine::system_cause,
 };
 use thiserror::Error;
@@ -88,21 +88,7 @@ pub(super) enum Failure {
         is_kept: bool,
     },
     #[error(transparent)]
-    Source(SourceError),
-    #[error("cannot start reading: {}", system_cause(.0))]
-    Reader(io::Error),
-    #[error("{}", .input.lost(.source))]
-    Lost { input: Source, source: io::Error },
-    #[error("{0}: {1}")]
-    Line(Source, LineError),
-    #[error("{input}: line {line}: {source}")]
-    OtherColumns {
-        input: Source,
-        line: u64,
-        source: InputLineError,
-    },
-    #[error("{input}: no line could be decoded: {reason}")]
-    NothingDecoded { input: Source, reason: String },
+    Session(#[from] SessionError),
     #[error(transparent)]
     Sensor(SensorError),
     #[error("cannot create the folder '{}': {}", .path.display(), system_cause(.source))]

@@ -1,7 +1,7 @@
-//! Live decoding: lines are parsed and decoded as they arrive.
+//! Live decoding: lines are decoded as they arrive.
 
 use std::{
-    fmt,
+    fmt::Display,
     io::Write,
     path::Path,
     sync::{
@@ -12,21 +12,17 @@ use std::{
 };
 
 use clap::Args;
-use decoupler_core::{
-    dataset::{DatasetError, Place, Simulation},
-    live::{FaultEvent, WireCheck},
-    scene::Noise,
-};
+use decoupler_core::{live::FaultEvent, scene::Noise, text::counted};
 use decoupler_files::{
     export::NetworkFile,
-    import::{InputLine, InputLineError, InputLines, KeptCell, LineError, LineParser, ParsedLine},
-    live::{Keeping, Line, Lines, NextLine, Source},
+    live::{Note, Session, SessionEvent, SessionPlan, Source, SourcePlan, Unit, Unwatched, Watched},
 };
 
 use super::{
     failure::Failure,
-    follow_report::{Answers, Form, Report},
+    follow_answers::{Answers, Form},
     interruption::Graceful,
+    intervals::{note_drift, note_unmonitored},
     number,
     output::messages,
 };
@@ -56,8 +52,6 @@ pub(super) struct Follow {
 
 /// Timeout of waiting for a line, after which requests for a report and to stop are checked.
 const WAIT: Duration = Duration::from_millis(100);
-/// Minimum time between fault checks of frames from a device, so that no frame is dropped because of them.
-const BETWEEN_CHECKS: Duration = Duration::from_millis(10);
 
 impl Follow {
     /// Refuses arguments that only --follow uses.
@@ -73,52 +67,76 @@ impl Follow {
         }
     }
 
-    /// Passes every line of `source` to `take`, until the source ends or fails, or a request to stop. For a device, `kept`
-    /// lines are kept initially. Reports at the requested interval, on SIGUSR1, and at the end.
-    fn follow(
-        &self,
-        source: Source,
-        kept: usize,
-        mut take: impl FnMut(Line<'_>, &mut Report) -> Result<Kept, Failure>,
-    ) -> Result<(), Failure> {
+    /// Decodes `input` with the network of `file` until it ends, or until a request to stop. Reports at the requested interval,
+    /// on SIGUSR1, and at the end.
+    pub(super) fn run(&self, input: &Path, file: NetworkFile) -> Result<(), Failure> {
+        let noise = self.noise_of(&file)?;
+        let source = self.source(input)?;
+        let file = Arc::new(file);
+        note_unmonitored(&file);
         let asked = Arc::new(AtomicBool::new(false));
         // Without the signal there are still reports at intervals and at the end.
         #[cfg(unix)]
         let _ = signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&asked));
-        let opened = source.open().map_err(Failure::Source)?;
-        let spawned = Lines::spawn(opened, source.keeping(), source.begins_anywhere());
-        let mut lines = spawned.map_err(Failure::Reader)?;
-        lines.set_kept(kept);
+        let plan = SessionPlan {
+            network: Arc::clone(&file),
+            source: SourcePlan::Stream(source.clone()),
+            noise,
+            zero: None,
+            unit: Unit::Lines,
+        };
+        let Some(mut session) = Session::open(plan, &|| true)? else {
+            return Ok(());
+        };
+        warn_unwatched(&session);
         let graceful = Graceful::begin();
+        let mut answers = Answers::new(&file, self.format.unwrap_or_default());
         let mut report = Report::new(source);
         let every = self.report.map(Duration::from_secs_f64);
         let end = loop {
             if asked.swap(false, Ordering::SeqCst) || every.is_some_and(|every| report.is_due(every)) {
-                report.print(lines.dropped());
+                report.print(&session);
             }
             if graceful.is_end_requested() {
                 break Err(Failure::InterruptedFollow);
             }
-            let line = match lines.next(WAIT) {
-                NextLine::Line(line) => line,
-                NextLine::None => {
-                    report.waiting(lines.unended());
-                    continue;
+            let event = session.next(Instant::now(), WAIT);
+            for note in session.notes() {
+                print_note(&file, &note);
+            }
+            match event {
+                SessionEvent::Answer => {
+                    if let Err(error) = answers.write(&session) {
+                        break Err(Failure::Output(error));
+                    }
+                    session.count();
                 }
-                NextLine::End(Some(error)) => {
-                    let input = report.source().clone();
-                    break Err(Failure::Lost { input, source: error });
-                }
-                NextLine::End(None) => break report.end(),
-            };
-            match take(line, &mut report) {
-                Ok(Kept::AsBefore) => {}
-                Ok(Kept::Latest) => lines.set_kept(1),
-                Err(failure) => break Err(failure),
+                SessionEvent::Bad(reason) => report.bad(&reason, &session),
+                SessionEvent::Nothing => report.waiting(&session),
+                SessionEvent::End(end) => break end.map_err(Failure::from),
             }
         };
-        report.print(lines.dropped());
+        report.print(&session);
+        answers.warn();
         end
+    }
+
+    /// Noise assumed in fault detection.
+    fn noise_of(&self, file: &NetworkFile) -> Result<Noise, Failure> {
+        let Some(simulation) = &file.problem.sensor else {
+            let reason =
+                "fault detection needs a sensor model, which the network of a recording does not have; leave it out";
+            return match self.noise {
+                Some(_) => Err(wrong("--noise", reason)),
+                None => Ok(Noise::default()),
+            };
+        };
+        let mut scene = simulation.scene;
+        if let Some(relative) = self.noise {
+            scene.noise = Noise::relative(relative);
+            scene.check().map_err(|error| wrong("--noise", error))?;
+        }
+        Ok(scene.noise.in_test())
     }
 
     /// Source named by `input`, after a check of the other arguments.
@@ -132,318 +150,152 @@ impl Follow {
         }
         Ok(source)
     }
-
-    /// Decodes `input` with the network of `file` until it ends, or until Ctrl-C.
-    pub(super) fn run(&self, input: &Path, file: &NetworkFile) -> Result<(), Failure> {
-        let sensor = file.problem.sensor.as_ref();
-        if sensor.is_none() && self.noise.is_some() {
-            let reason =
-                "fault detection needs a sensor model, which the network of a recording does not have; leave it out";
-            return Err(wrong("--noise", reason));
-        }
-        let source = self.source(input)?;
-        let keeping = source.keeping();
-        let mut parser = Parser::new(file, keeping == Keeping::All)?;
-        let mut answers = Answers::new(file, self.format.unwrap_or_default())?;
-        let mut faults = match sensor {
-            Some(simulation) => Faults::new(simulation, self.noise)?,
-            None => Faults::none(),
-        };
-        let mut checked: Option<Instant> = None;
-        let input = source.clone();
-        let end = self.follow(source, answers.rows(), |Line { number, text, read_at }, report| {
-            let Some(text) = text else {
-                parser.count_bad();
-                report_too_long(number, report);
-                return Ok(Kept::AsBefore);
-            };
-            let (parsed, kept) = match parser.parse(number, text) {
-                Ok((ParsedLine::NoReadings, _)) => return Ok(Kept::AsBefore),
-                Ok(parsed) => parsed,
-                Err(error) if error.is_final() && !(input.begins_anywhere() && number == 1) => {
-                    return Err(error.failure(input.clone()));
-                }
-                Err(error) => {
-                    report.bad(&error);
-                    return Ok(Kept::AsBefore);
-                }
-            };
-            let is_whole = faults.take(number, parsed);
-            match answers.write(number, parsed, kept, faults.left_out()) {
-                Ok(true) => report.good(read_at.elapsed()),
-                Ok(false) => {
-                    report.bad(&format_args!(
-                        "line {number}: the readings are so far outside the training range that the network's \
-                         output is not a finite number"
-                    ));
-                    return Ok(Kept::AsBefore);
-                }
-                Err(error) => return Err(Failure::Output(error)),
-            }
-            let is_snapshot = matches!(parsed, ParsedLine::Snapshot(_));
-            let is_due = checked.is_none_or(|checked| checked.elapsed() >= BETWEEN_CHECKS);
-            if is_whole && (keeping == Keeping::All || is_due) {
-                faults.check(number);
-                checked = Some(Instant::now());
-            }
-            Ok(if is_snapshot { Kept::Latest } else { Kept::AsBefore })
-        });
-        answers.warn();
-        end
-    }
 }
 
-/// Lines of a device that are kept when older ones are dropped.
-enum Kept {
-    /// The same number as before.
-    AsBefore,
-    /// Only the latest line.
-    Latest,
-}
-
-fn report_too_long(number: u64, report: &mut Report) {
-    report.bad(&format_args!(
-        "line {number}: it is longer than {} bytes",
-        Lines::LONGEST
-    ));
-}
-
-fn wrong(argument: &str, reason: impl std::fmt::Display) -> Failure {
+fn wrong(argument: &str, reason: impl Display) -> Failure {
     Failure::Arguments(format!("{argument}: {reason}"))
 }
 
-/// Parser of the lines of an array or of a recording.
-pub(super) enum Parser {
-    /// Resistances, row by row or in whole snapshots.
-    Array(Box<LineParser>),
-    /// Columns named like the inputs.
-    Columns {
-        lines: Box<InputLines>,
-        /// True once it was reported that the time steps back.
-        has_stepped_back: bool,
-    },
-}
-
-/// Error in a line.
-pub(super) enum ParseError {
-    Array(LineError),
-    Columns { line: u64, source: InputLineError },
-}
-
-impl Parser {
-    /// Prepares to parse lines for the network of `file`. `is_complete` is true if no line of the input is lost.
-    pub(super) fn new(file: &NetworkFile, is_complete: bool) -> Result<Self, Failure> {
-        Ok(match &file.problem.sensor {
-            Some(simulation) => {
-                let parser = LineParser::new(simulation.sensor.scale, simulation.scene.rows, is_complete);
-                Self::Array(Box::new(parser.map_err(DatasetError::from)?))
-            }
-            None => Self::Columns {
-                lines: Box::new(file.input_lines()),
-                has_stepped_back: false,
-            },
-        })
-    }
-
-    /// Returns the parsed line and the cells that are copied to the output.
-    pub(super) fn parse(&mut self, line: u64, text: &[u8]) -> Result<(ParsedLine<'_>, &[KeptCell]), ParseError> {
-        match self {
-            Self::Array(parser) => {
-                let parsed = parser.parse(line, text).map_err(ParseError::Array)?;
-                Ok((parsed, &[]))
-            }
-            Self::Columns {
-                lines,
-                has_stepped_back,
-            } => match lines.parse(line, text) {
-                Ok(InputLine::NoReadings) => Ok((ParsedLine::NoReadings, &[])),
-                Ok(InputLine::Start { is_first }) => {
-                    if is_first {
-                        warn(&format!(
-                            "line {line}: the lines at the start give the means of derived columns and are not decoded"
-                        ));
-                    }
-                    Ok((ParsedLine::NoReadings, &[]))
-                }
-                Ok(InputLine::Readings {
-                    row_index,
-                    readings: readings_ohm,
-                    place,
-                    kept,
-                }) => {
-                    if matches!(place, Some(Place::AfterStepBack(_))) && !std::mem::replace(has_stepped_back, true) {
-                        warn(&format!(
-                            "line {line}: the time steps back: the history of readings restarts here and at every further \
-                             step back; send the lines in order of time"
-                        ));
-                    }
-                    let row_index = Some(row_index);
-                    let row = ParsedLine::Row {
-                        row_index,
-                        readings_ohm,
-                    };
-                    Ok((row, kept))
-                }
-                Err(source) => Err(ParseError::Columns { line, source }),
-            },
-        }
-    }
-
-    /// Counts a line that is too long to be parsed.
-    pub(super) fn count_bad(&mut self) {
-        if let Self::Array(parser) = self {
-            parser.count_bad();
-        }
-    }
-}
-
-impl ParseError {
-    /// Returns `true` if later lines cannot be decoded either.
-    pub(super) fn is_final(&self) -> bool {
-        match self {
-            Self::Array(error) => error.is_final(),
-            Self::Columns { source, .. } => source.is_final(),
-        }
-    }
-
-    /// Converts the error, at which the program stops, into a failure in the lines of `input`.
-    pub(super) fn failure(self, input: Source) -> Failure {
-        match self {
-            Self::Array(error) => Failure::Line(input, error),
-            Self::Columns { line, source } => Failure::OtherColumns { input, line, source },
-        }
-    }
-}
-
-impl fmt::Display for ParseError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Array(error) => error.fmt(f),
-            Self::Columns { line, source } => write!(f, "line {line}: {source}"),
-        }
-    }
-}
-
-/// Checks the frames composed of the lines for faults, and reports them.
-pub(super) struct Faults {
-    watch: Option<Watch>,
-    /// True once it was reported that lines without a row number are not checked.
-    is_reported: bool,
-}
-
-struct Watch {
-    check: WireCheck,
-    /// Latest readings of every row read: rows × M4.
-    frame_ohm: Vec<f64>,
-    /// True for rows with readings since the last check.
-    is_new: Vec<bool>,
-    columns: usize,
-}
-
-impl Faults {
-    pub(super) fn new(source: &Simulation, relative_noise: Option<f64>) -> Result<Self, Failure> {
-        let (sensor, mut scene) = (&source.sensor, source.scene);
-        if let Some(relative) = relative_noise {
-            scene.noise = Noise::relative(relative);
-            scene
-                .check()
-                .map_err(|error| Failure::Arguments(format!("--noise: {error}")))?;
-        }
-        let scale = sensor.scale;
-        let reason = if scene.noise.in_test().is_none() {
-            Some(
-                "fault detection needs the noise of the readings, and the network was trained without noise; give \
-                 --noise REL",
-            )
-        } else if !WireCheck::is_affordable(scale, &scene) {
-            Some("the array is too large")
-        } else {
-            None
-        };
-        if let Some(reason) = reason {
-            warn(&format!("wires are not checked for faults: {reason}"));
-            return Ok(Self {
-                watch: None,
-                is_reported: true,
-            });
-        }
-        let rows = scene.rows.read(scale.rows()).map_err(DatasetError::from)?;
-        Ok(Self {
-            watch: Some(Watch {
-                check: WireCheck::new(sensor, &scene, &rows).map_err(Failure::Sensor)?,
-                frame_ohm: vec![0.0; rows.len() * scale.columns()],
-                is_new: vec![false; rows.len()],
-                columns: scale.columns(),
-            }),
-            is_reported: false,
-        })
-    }
-
-    /// Checks nothing, for networks without a sensor model.
-    pub(super) fn none() -> Self {
-        Self {
-            watch: None,
-            is_reported: true,
-        }
-    }
-
-    /// Check that decodes without the wires of the reported fault, if any, with the latest readings of every row read.
-    pub(super) fn left_out(&mut self) -> Option<(&mut WireCheck, &[f64])> {
-        let watch = self.watch.as_mut()?;
-        Some((&mut watch.check, &watch.frame_ohm))
-    }
-
-    /// Stores the readings of a line; returns `true` if all rows have new readings since the last check.
-    pub(super) fn take(&mut self, line: u64, parsed: ParsedLine<'_>) -> bool {
-        let Some(watch) = &mut self.watch else { return false };
-        match parsed {
-            ParsedLine::Row {
-                row_index: Some(index),
-                readings_ohm,
-            } => {
-                watch.frame_ohm[index * watch.columns..][..watch.columns].copy_from_slice(readings_ohm);
-                watch.is_new[index] = true;
-            }
-            ParsedLine::Snapshot(readings_ohm) => {
-                watch.frame_ohm.copy_from_slice(readings_ohm);
-                watch.is_new.fill(true);
-            }
-            ParsedLine::Row { row_index: None, .. } if !self.is_reported => {
-                self.is_reported = true;
-                warn(&format!(
-                    "line {line}: wires are not checked for faults, because the line has no row number; add a column named \
-                     row, or send whole snapshots in one line"
-                ));
-            }
-            ParsedLine::Row { .. } | ParsedLine::NoReadings => {}
-        }
-        watch.is_new.iter().all(|is_new| *is_new)
-    }
-
-    /// Checks the latest readings, and reports changes.
-    pub(super) fn check(&mut self, line: u64) {
-        let Some(watch) = &mut self.watch else { return };
-        watch.is_new.fill(false);
-        match watch.check.check(&watch.frame_ohm) {
-            Some(fault @ FaultEvent::Named { .. }) => {
-                warn(&format!(
-                    "line {line}: {fault}; left out from here on; frames are decoded from the other readings \
-                     by the Gauss-Newton method"
-                ));
-            }
-            Some(FaultEvent::Unexplained) => warn(&format!(
-                "line {line}: the readings contradict Eq. (2), and no single-wire fault explains them: the answers may \
-                 be wrong; check the wiring, the geometry and the order of the rows"
-            )),
-            Some(FaultEvent::Recovered) => {
-                warn(&format!("line {line}: {}; all wires are used", FaultEvent::Recovered));
-            }
-            None => {}
-        }
-    }
-}
-
-fn warn(message: &str) {
+fn warn(message: &dyn Display) {
     // There is no one to report to if this fails.
     let _ = writeln!(messages(), "warning: {message}");
+}
+
+/// Reports why faults of the wires are not looked for, if they are not.
+fn warn_unwatched(session: &Session) {
+    let Some(Watched::Off(reason)) = session.array().map(|array| &array.watched) else {
+        return;
+    };
+    let reason = match reason {
+        Unwatched::NoNoise => {
+            "fault detection needs the noise of the readings, and the network was trained without noise; give --noise REL"
+        }
+        Unwatched::TooLarge => "the array is too large",
+    };
+    warn(&format_args!("wires are not checked for faults: {reason}"));
+}
+
+fn print_note(file: &NetworkFile, note: &Note) {
+    match note {
+        Note::Start(line) => warn(&format_args!(
+            "line {line}: the lines at the start give the means of derived columns and are not decoded"
+        )),
+        Note::StepBack(line) => warn(&format_args!(
+            "line {line}: the time steps back: the history of readings restarts here and at every further step back; \
+             send the lines in order of time"
+        )),
+        Note::NoRow(line) => warn(&format_args!(
+            "line {line}: wires are not checked for faults, because the line has no row number; add a column named row, \
+             or send whole snapshots in one line"
+        )),
+        Note::Fault(line, fault @ FaultEvent::Named { .. }) => warn(&format_args!(
+            "line {line}: {fault}; left out from here on; frames are decoded from the other readings by the Gauss-Newton \
+             method"
+        )),
+        Note::Fault(line, FaultEvent::Unexplained) => warn(&format_args!(
+            "line {line}: the readings contradict Eq. (2), and no single-wire fault explains them: the answers may be \
+             wrong; check the wiring, the geometry and the order of the rows"
+        )),
+        Note::Fault(line, FaultEvent::Recovered) => warn(&format_args!(
+            "line {line}: {}; all wires are used",
+            FaultEvent::Recovered
+        )),
+        Note::Drift(line, drift) => note_drift(file, *line, drift),
+        Note::RecordingEnded(..) => {}
+    }
+}
+
+/// Messages on standard error on the lines so far.
+struct Report {
+    source: Source,
+    begin: Instant,
+    last: Instant,
+    /// True once it was reported that no line ends.
+    has_warned_of_ends: bool,
+    /// Number of bad lines since the last message.
+    unreported: u64,
+    last_reported: Instant,
+}
+
+/// Number of bad lines that are reported individually; after them at most one per second.
+const MAX_REPORTED: u64 = 10;
+const REPORT_INTERVAL: Duration = Duration::from_secs(1);
+
+impl Report {
+    fn new(source: Source) -> Self {
+        let now = Instant::now();
+        Self {
+            source,
+            begin: now,
+            last: now,
+            has_warned_of_ends: false,
+            unreported: 0,
+            last_reported: now,
+        }
+    }
+
+    /// Reports a bad line, unless there are too many.
+    fn bad(&mut self, reason: &str, session: &Session) {
+        let bad = session.bad_lines();
+        if bad > MAX_REPORTED && self.last_reported.elapsed() < REPORT_INTERVAL {
+            self.unreported += 1;
+            return;
+        }
+        self.last_reported = Instant::now();
+        match std::mem::take(&mut self.unreported) {
+            0 => warn(&reason),
+            unreported => warn(&format_args!(
+                "{reason} ({unreported} other bad lines since the last message)"
+            )),
+        }
+        if let Source::Serial { baud, .. } = self.source
+            && bad == MAX_REPORTED
+            && session.latencies().count() == 0
+        {
+            warn(&format_args!(
+                "none of the first {MAX_REPORTED} lines is a frame: does the device send at {baud} baud?"
+            ));
+        }
+    }
+
+    /// Reports once that bytes arrive but no line ends.
+    fn waiting(&mut self, session: &Session) {
+        /// More than the time between two lines of any device.
+        const PATIENCE: Duration = Duration::from_secs(2);
+        if self.has_warned_of_ends || self.begin.elapsed() < PATIENCE {
+            return;
+        }
+        let has_lines = session.latencies().count() + session.bad_lines() > 0;
+        let unended = if has_lines { 0 } else { session.unended() };
+        if unended > 0 {
+            self.has_warned_of_ends = true;
+            warn(&format_args!(
+                "{unended} bytes have arrived, but no line has ended: does the sender end lines with LF or CR LF?"
+            ));
+        }
+    }
+
+    /// Returns `true` once per interval.
+    fn is_due(&mut self, every: Duration) -> bool {
+        let is_due = self.last.elapsed() >= every;
+        if is_due {
+            self.last = Instant::now();
+        }
+        is_due
+    }
+
+    /// Prints the counts and latencies so far.
+    fn print(&self, session: &Session) {
+        let (counts, latencies) = (session.counts(), session.latencies());
+        let (decoded, seconds) = (latencies.count(), self.begin.elapsed().as_secs_f64());
+        // There is no one to report to if this fails.
+        let _ = writeln!(
+            messages(),
+            "{} decoded in {seconds:.1} s ({:.0} per second), {} bad, {} dropped; {latencies}",
+            counted(decoded, "line"),
+            decoded as f64 / seconds.max(1e-9),
+            counts.bad,
+            counts.dropped
+        );
+    }
 }

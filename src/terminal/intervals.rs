@@ -6,8 +6,7 @@ use clap::ValueEnum;
 use decoupler_core::{
     evaluation::{Intervals, Run, RunError},
     job::Job,
-    live::{Drift, DriftMonitor},
-    problem::Channel,
+    live::{Drift, DriftMonitor, DriftReference},
 };
 use decoupler_files::{
     export::{NetworkFile, format_duration},
@@ -79,24 +78,48 @@ pub(super) fn note_unmonitored(file: &NetworkFile) {
     }
 }
 
-/// Monitor of the readings of a decoded input, which warns on standard error.
+/// Reports that a drift of a stream has begun or ended at this line.
+pub(super) fn note_drift(file: &NetworkFile, line: u64, drift: &Drift) {
+    if drift.has_ended {
+        note(&format!(
+            "line {line}: since line {}, the readings look like the training readings again",
+            drift.last + 1
+        ));
+    } else {
+        note(&warning(
+            file,
+            &format!("line {line} (since line {})", drift.first),
+            drift,
+        ));
+    }
+}
+
+fn warning(file: &NetworkFile, lines: &str, drift: &Drift) -> String {
+    let block = file.drift.as_ref().map_or(1, DriftReference::readings_per_block);
+    format!(
+        "warning: {lines}: the readings no longer look like the training readings ({}), and the prediction intervals do \
+         not hold: check the sensor and its connection, re-zero it, or train with recent samples; in readings like those \
+         of the training, a false alarm occurs on average once in {} lines or less often",
+        drift.describe(&file.problem.inputs),
+        DriftMonitor::BLOCKS_BETWEEN_FALSE_ALARMS * block as f64
+    )
+}
+
+/// Monitor of the readings of a decoded file, which warns on standard error at its end.
 pub(super) struct DriftWarnings<'a> {
     monitor: Option<DriftMonitor>,
-    inputs: &'a [Channel],
-    /// Warns at once, and not in [`Self::end`].
-    is_stream: bool,
+    file: &'a NetworkFile,
     lines: u64,
     ended: Vec<Drift>,
 }
 
 impl<'a> DriftWarnings<'a> {
-    /// Monitors the readings of a file or of a stream, or reports why they cannot be monitored.
-    pub(super) fn new(file: &'a NetworkFile, is_stream: bool) -> Self {
+    /// Monitors the readings of a file, or reports why they cannot be monitored.
+    pub(super) fn new(file: &'a NetworkFile) -> Self {
         note_unmonitored(file);
         Self {
             monitor: file.drift.clone().ok().map(DriftMonitor::new),
-            inputs: &file.problem.inputs,
-            is_stream,
+            file,
             lines: 0,
             ended: Vec::new(),
         }
@@ -106,21 +129,8 @@ impl<'a> DriftWarnings<'a> {
     pub(super) fn take(&mut self, line: u64, readings: &[f64]) {
         let Some(monitor) = &mut self.monitor else { return };
         self.lines += 1;
-        let Some(drift) = monitor.take(line, readings) else {
-            return;
-        };
-        match (self.is_stream, drift.has_ended) {
-            (true, false) => {
-                let lines = format!("line {line} (since line {})", drift.first);
-                note(&self.warning(&lines, &drift));
-            }
-            (true, true) => note(&format!(
-                "line {line}: since line {}, the readings look like the training readings again",
-                drift.last + 1
-            )),
-            (false, true) => self.ended.push(drift),
-            (false, false) => {}
-        }
+        self.ended
+            .extend(monitor.take(line, readings).filter(|drift| drift.has_ended));
     }
 
     /// Warns of the lines of a file whose readings drifted.
@@ -137,24 +147,11 @@ impl<'a> DriftWarnings<'a> {
         }
         let drifts = self.ended.iter().chain(monitor.drift());
         for drift in drifts.clone().take(MAX_LISTED) {
-            note(&self.warning(&format!("lines {} to {}", drift.first, drift.last), drift));
+            let lines = format!("lines {} to {}", drift.first, drift.last);
+            note(&warning(self.file, &lines, drift));
         }
         if let more @ 1.. = drifts.count().saturating_sub(MAX_LISTED) {
             note(&format!("warning: and {more} more such parts of the file"));
         }
-    }
-
-    fn warning(&self, lines: &str, drift: &Drift) -> String {
-        let block = self
-            .monitor
-            .as_ref()
-            .map_or(1, |monitor| monitor.reference().readings_per_block());
-        format!(
-            "warning: {lines}: the readings no longer look like the training readings ({}), and the prediction intervals do \
-             not hold: check the sensor and its connection, re-zero it, or train with recent samples; in readings like those \
-             of the training, a false alarm occurs on average once in {} lines or less often",
-            drift.describe(self.inputs),
-            DriftMonitor::BLOCKS_BETWEEN_FALSE_ALARMS * block as f64
-        )
     }
 }

@@ -15,7 +15,7 @@ mod failure;
 mod file_patterns;
 mod findings;
 mod follow;
-mod follow_report;
+mod follow_answers;
 mod import_arguments;
 mod inspect;
 mod interruption;

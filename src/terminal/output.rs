@@ -109,6 +109,7 @@ fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Rea
         torn_line,
         warnings,
         kept,
+        times_s: _,
     } = table;
     warn_if_torn(input, torn_line);
     for warning in warnings {

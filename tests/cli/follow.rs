@@ -11,7 +11,7 @@ use std::{
 use serialport::{SerialPort, TTYPort};
 use tempfile::TempDir;
 
-use crate::terminal::decoupler;
+use crate::{live, terminal::decoupler};
 
 const SMALL: &str = "--array 2x2_2x6 --samples 400 --validation-samples 0 --test-samples 10 --hidden 3 --epochs 5";
 
@@ -68,6 +68,27 @@ fn device_lines(folder: &TempDir) -> Vec<String> {
     let fields = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
     let line = |line: &str| fields(line)[1..8].join(",") + "\n";
     readings.lines().skip(1).map(line).collect()
+}
+
+#[test]
+fn frames_of_the_live_view_have_the_answers_of_decode() {
+    let folder = trained("--rows known");
+    let decoded = read(&folder, "decoded.csv");
+    let decoded = Vec::from_iter(decoded.lines().skip(1).map(|line| {
+        let fields = line.split(',').take(6);
+        Vec::from_iter(fields.map(|field| field.parse::<f64>().unwrap()))
+    }));
+    for answers in live::answers(&folder.path().join("n.json"), &folder.path().join("readings.csv")) {
+        assert_eq!(answers.len(), 20);
+        for (found, expected) in answers.iter().zip(decoded.chunks(2)) {
+            let pairs = found.iter().zip(expected.iter().flatten());
+            assert!(
+                pairs
+                    .into_iter()
+                    .all(|(found, expected)| (found - expected).abs() < 1e-9)
+            );
+        }
+    }
 }
 
 #[test]

@@ -15,6 +15,7 @@ mod files_as_they_are;
 #[cfg(unix)]
 mod follow;
 mod import;
+mod live;
 mod memory;
 mod own_export;
 mod own_trade;

@@ -4,7 +4,7 @@ use std::{collections::HashMap, fmt::Write, fs, path::Path};
 
 use tempfile::TempDir;
 
-use crate::{printed::json, terminal::decoupler};
+use crate::{live, printed::json, terminal::decoupler};
 
 const TRAIN: &str = "train --data press.csv --time t --inputs u --targets force --hidden 3 --starts 1 --epochs 60 \
                      --validation-fraction 0";
@@ -324,6 +324,15 @@ fn files_and_streams_are_decoded_with_the_past_of_training() {
                 (found - expected).abs() < 1e-12,
                 "{clock:?}, sample {line}: {found} and {expected}"
             );
+        }
+        for shown in live::answers(&folder.path().join("n.json"), &folder.path().join("press.csv")) {
+            assert_eq!(shown.len(), decoded.len(), "{clock:?}");
+            for (sample, (found, expected)) in shown.iter().zip(&decoded).enumerate() {
+                assert!(
+                    (found[0] - expected).abs() < 1e-12,
+                    "{clock:?}, sample {sample}: {found:?} and {expected}"
+                );
+            }
         }
     }
 }

@@ -20,6 +20,8 @@ pub struct InputTable {
     pub readings: Array2<f64>,
     /// Row-wire of each sample, from 0, if the recipe names a row-wire column and the file has it.
     pub row_wires: Option<Vec<usize>>,
+    /// Time of each sample in seconds, if the recipe names a time column and the file has it; NaN where it is missing.
+    pub times_s: Option<Vec<f64>>,
     /// Line of each sample, from 1.
     pub lines: Vec<u64>,
     /// Last line of a text file, if it is cut off and therefore left out.
@@ -339,6 +341,11 @@ impl Recipe {
                 Some(rows.iter().map(of).collect::<Result<_, _>>()?)
             }
         };
+        let times_s = self.time.as_ref().and_then(|name| {
+            let Column { cells, unit, .. } = &table.columns[names.find(name).ok()?.column];
+            let unit_s = super::selection::seconds(unit.as_deref().or_else(|| self.unit_of(name)))?;
+            Some(rows.iter().map(|&row| unit_s * cells.number(row)).collect())
+        });
         if let Some(memory) = &problem.memory {
             let groups = group.map(|column| Vec::from_iter(rows.iter().map(|&row| cells(column).group(row))));
             let times_s = time.map(|time| {
@@ -364,6 +371,7 @@ impl Recipe {
         Ok(InputTable {
             readings,
             row_wires,
+            times_s,
             lines: rows.iter().map(|&row| table.line(row)).collect(),
             torn_line: table.torn_line,
             warnings,

@@ -180,11 +180,24 @@ impl Recording {
     /// If there is no frame.
     pub fn at_rate(frames_ohm: Array3<f64>, frames_per_second: f64) -> Result<Self, RecordingError> {
         let frames = frames_ohm.len_of(Axis(0));
-        if frames == 0 {
+        let times_s = (0..frames).map(|frame| frame as f64 / frames_per_second);
+        Self::at_times(times_s.collect(), frames_ohm)
+    }
+
+    /// Creates a recording of frames (frames × rows × channels in ohm) at these times in seconds, in ascending order.
+    ///
+    /// # Errors
+    /// If there is no frame.
+    ///
+    /// # Panics
+    /// If there is not one time for each frame.
+    pub fn at_times(times_s: Vec<f64>, frames_ohm: Array3<f64>) -> Result<Self, RecordingError> {
+        assert_eq!(times_s.len(), frames_ohm.len_of(Axis(0)), "a time for each frame");
+        if times_s.is_empty() {
             return Err(RecordingError::Empty);
         }
         Ok(Self {
-            times_s: (0..frames).map(|frame| frame as f64 / frames_per_second).collect(),
+            times_s,
             frames_ohm,
             torn_line: None,
         })

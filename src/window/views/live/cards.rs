@@ -11,16 +11,12 @@ use decoupler_files::{
         surface::{Quantity, Surface, SurfaceFigure},
         zero_gains_figure,
     },
-    live::{ConverterEnd, Fault},
+    live::{ConverterEnd, Fault, SourcePlan, Watched},
 };
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
 use ndarray::Array2;
 
-use super::{
-    LiveView,
-    engine::{LiveFrame, SourcePlan, Watched},
-    source_form::SourceKind,
-};
+use super::{LiveView, engine::LiveFrame, source_form::SourceKind};
 use crate::window::{
     plotting::cells_ui,
     shared::{Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},

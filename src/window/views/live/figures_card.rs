@@ -2,7 +2,7 @@ use eframe::egui::{RichText, Ui};
 
 use super::{
     LiveView,
-    engine::{LiveFrame, Recorded, Watched},
+    engine::LiveFrame,
     tools::{save_recording, save_zero},
 };
 use crate::window::{
@@ -15,7 +15,10 @@ use decoupler_core::{
     live::{FaultEvent, FaultyWire, ZeroGains},
     text::counted,
 };
-use decoupler_files::export::{format_duration, format_number, format_percent};
+use decoupler_files::{
+    export::{format_duration, format_number, format_percent},
+    live::{Recorded, Watched},
+};
 
 /// Shows confidence, faults, the stream, the unloaded state and the recording.
 pub fn figures_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {

@@ -9,15 +9,11 @@ use std::{
 use decoupler_core::{dataset::Simulation, scene::Rows};
 use decoupler_files::{
     export::{NetworkFile, format_percent},
-    live::{Fault, Motion, Source},
+    live::{Fault, Motion, Source, SourcePlan},
 };
 use eframe::egui::{ComboBox, TextEdit, Ui, vec2};
 
-use super::{
-    LiveView,
-    engine::{Command, SourcePlan},
-    tools::LiveFile,
-};
+use super::{LiveView, engine::Command, tools::LiveFile};
 use crate::window::{
     job::{Background, Wake},
     shared::{Effect, RunList, Shared},
@@ -244,7 +240,7 @@ impl SourceForm {
             if has_sensor {
                 "Frames without a column time_s are replayed at 50 per second."
             } else {
-                "Samples are replayed at 50 per second."
+                "Samples are replayed at their times or, without a time column, at 50 per second."
             },
         );
     }

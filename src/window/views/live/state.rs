@@ -7,12 +7,15 @@ use std::{
     },
 };
 
-use decoupler_core::live::ZeroGains;
-use decoupler_files::export::{NetworkFile, atomic_write};
+use decoupler_core::{live::ZeroGains, scene::Noise};
+use decoupler_files::{
+    export::{NetworkFile, atomic_write},
+    live::{Recorded, SessionPlan, SourcePlan, Unit},
+};
 
 use super::{
     cards::{DropScale, FaultForm},
-    engine::{Command, LiveEvent, LivePlan, LiveShown, Recorded, SourcePlan, run},
+    engine::{Command, LiveEvent, LivePlan, LiveShown, run},
     source_form::{NetworkChoice, SourceForm, SourceKind},
 };
 use crate::window::{
@@ -110,15 +113,15 @@ impl LiveView {
             if self.source.kind == SourceKind::Simulated {
                 return Err(NOTHING_TO_SIMULATE.to_owned());
             }
-            let plan = LivePlan {
+            let session = SessionPlan {
                 network: Arc::clone(network),
-                simulation: None,
                 source: self.source.plan(None, at_s)?,
-                noise: 0.0,
+                noise: Noise::default(),
                 zero: None,
-                recordings: PathBuf::new(),
+                unit: Unit::Frames,
             };
-            return Ok((name.to_owned(), plan));
+            let recordings = PathBuf::new();
+            return Ok((name.to_owned(), LivePlan { session, recordings }));
         };
         let scale = simulation.sensor.scale;
         let read = simulation.scene.rows.read(scale.rows()).unwrap_or_default();
@@ -126,18 +129,21 @@ impl LiveView {
             .fault
             .fault(scale)
             .filter(|_| self.fault.problem(scale, &read).is_none());
-        let plan = LivePlan {
+        let session = SessionPlan {
+            network: Arc::clone(network),
             source: self.source.plan(fault, at_s)?,
-            noise: self.source.noise(&simulation),
+            noise: Noise {
+                relative: self.source.noise(&simulation),
+                ..simulation.scene.noise.in_test()
+            },
             zero: self
                 .zero
                 .clone()
                 .filter(|zero| zero.is_sound(read.len(), scale.columns())),
-            recordings: folder(shared).join("recordings"),
-            network: Arc::clone(network),
-            simulation: Some(simulation),
+            unit: Unit::Frames,
         };
-        Ok((name.to_owned(), plan))
+        let recordings = folder(shared).join("recordings");
+        Ok((name.to_owned(), LivePlan { session, recordings }))
     }
 
     /// Returns true if the network is that of an array, whose sensor model simulates, re-zeroes and finds faults.
@@ -182,7 +188,10 @@ impl LiveView {
 
     /// Returns true if a stream has ended by itself and is still the chosen source.
     pub fn can_retry(&self, shared: &Shared) -> bool {
-        let is_same = |ended: &SourcePlan| self.plan(shared, 0.0).is_ok_and(|(_, plan)| plan.source == *ended);
+        let is_same = |ended: &SourcePlan| {
+            self.plan(shared, 0.0)
+                .is_ok_and(|(_, plan)| plan.session.source == *ended)
+        };
         self.running.is_none() && self.ended.as_ref().is_some_and(is_same)
     }
 
@@ -199,7 +208,7 @@ impl LiveView {
         let Ok((network, mut plan)) = self.plan(shared, replay.map_or(0.0, |replay| replay.at_s)) else {
             return;
         };
-        if let (SourcePlan::Replay { is_playing, .. }, Some(replay)) = (&mut plan.source, replay) {
+        if let (SourcePlan::Replay { is_playing, .. }, Some(replay)) = (&mut plan.session.source, replay) {
             *is_playing = replay.is_playing;
         } else {
             self.shown = LiveShown::default();
@@ -209,7 +218,7 @@ impl LiveView {
 
     fn begin(&mut self, network: String, plan: LivePlan) {
         self.keep_recording();
-        self.zero.clone_from(&plan.zero);
+        self.zero.clone_from(&plan.session.zero);
         self.shows_zero &= self.zero.is_some();
         self.zero_problem = None;
         self.drops = DropScale::default();
@@ -218,8 +227,8 @@ impl LiveView {
         let (commands, incoming) = channel();
         self.running = Some(Running {
             network,
-            source: plan.source.clone(),
-            asked: plan.source.clone(),
+            source: plan.session.source.clone(),
+            asked: plan.session.source.clone(),
             commands,
         });
         self.job.start(

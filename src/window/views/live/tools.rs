@@ -11,13 +11,14 @@ use decoupler_core::{live::ZeroGains, problem::Channel};
 use decoupler_files::{
     export::{Cell, Table, TableColumn, WriteError, atomic_write},
     figure::Figure,
+    live::Recorded,
 };
 use eframe::egui::{Align, Button, Key, Label, Layout, Modifiers, RichText, Slider, Ui, WidgetInfo};
 
 use super::{
     LiveView,
     cards::{figure_of, surface_figure},
-    engine::{Command, LiveTargets, Recorded},
+    engine::{Command, LiveTargets},
     targets_card,
 };
 use crate::window::{
@@ -213,11 +214,12 @@ pub fn live_exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a
 
 const VALUES: FileWords = FileWords {
     kind: "decoded values",
-    description: "The displayed decoded values with their times, in full precision, as CSV.",
+    description: "The decoded values with their times, in full precision, as CSV: all so far of a recording, and the last 20 s of a \
+                  stream.",
     extensions: &["csv"],
 };
 
-/// Returns the exports of the displayed values of a network of a recording.
+/// Returns the exports of the values of a network of a recording.
 fn target_exports<'a>(targets: &'a LiveTargets, shared: &'a Shared) -> Vec<Export<'a>> {
     let chart = Ok(move || Figure::from(targets_card::chart(targets)));
     let mut exports: Vec<Export<'a>> = picture_exports("Decoded values", "live-values".to_owned(), chart).collect();
@@ -241,7 +243,7 @@ fn values_table(targets: &LiveTargets) -> Table {
             .chain(names)
             .map(TableColumn::field)
             .collect(),
-        rows: targets.history.iter().map(row).collect(),
+        rows: targets.all.all().iter().map(row).collect(),
     }
 }
 

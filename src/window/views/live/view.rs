@@ -3,7 +3,6 @@ use eframe::egui::{RichText, Sense, Ui};
 use super::{
     LiveView,
     cards::{invitation_ui, readings_ui, surfaces_ui},
-    engine::{SourcePlan, Watched},
     figures_card::figures_ui,
     source_form,
     targets_card::targets_ui,
@@ -15,6 +14,7 @@ use crate::window::{
     widgets::{card_ui, scrolled_ui, state_ui},
 };
 use decoupler_core::{live::FaultEvent, text::counted};
+use decoupler_files::live::{SourcePlan, Watched};
 
 impl View for LiveView {
     fn name(&self) -> &'static str {

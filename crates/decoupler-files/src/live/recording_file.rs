@@ -4,8 +4,19 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::message::Recorded;
-use decoupler_files::{live::Recorder, machine::system_cause};
+use super::Recorder;
+use crate::machine::system_cause;
+
+/// A finished recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recorded {
+    /// Its file.
+    pub path: PathBuf,
+    /// Number of frames.
+    pub frames: u64,
+    /// Time from the first to the last frame, in seconds.
+    pub seconds: f64,
+}
 
 /// A recording in progress: every frame is written to the file as soon as it arrives.
 #[derive(Debug)]
@@ -104,7 +115,7 @@ mod tests {
     use std::io::BufReader;
 
     use super::*;
-    use decoupler_files::live::Recording;
+    use crate::live::Recording;
 
     #[test]
     fn each_recording_has_its_own_file_that_is_complete_after_every_frame() {
