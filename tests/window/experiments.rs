@@ -316,7 +316,7 @@ fn a_sweep_of_the_window_is_trained_by_the_terminal_and_shown_as_it_grows() {
         let run = &document["run"];
         let of = |option: &str| run["options"][option].to_string();
         let z = decoupler_files::export::format_number(run["report"]["errors"]["z_percent"].as_f64());
-        let shown = format!("hidden {}, samples 40, seed {}, Z %: {z}", of("hidden"), of("seed"));
+        let shown = format!("hidden {}, seed {}, Z %: {z}", of("hidden"), of("seed"));
         assert!(driver.has(&shown), "{shown} is not among {:#?}", driver.texts());
     }
     fs::write(home.path().join("trials").join(format!("{}.json", "0".repeat(32))), "{").unwrap();

@@ -1,7 +1,7 @@
 //! A folder that `decoupler sweep` fills, on this machine or on others, and the growing table of its trials.
 
 use std::{
-    collections::BTreeMap,
+    collections::BTreeSet,
     path::{Path, PathBuf},
     sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel},
     time::{Duration, Instant},
@@ -238,14 +238,12 @@ impl SweepTable {
 
 /// Returns the options that differ between trials.
 fn varying(merged: &MergedSweep) -> Vec<String> {
-    let mut options = Vec::new();
-    let mut first: BTreeMap<&String, &Value> = BTreeMap::new();
-    for (option, value) in merged.trials.iter().flat_map(|row| &row.options) {
-        if *first.entry(option).or_insert(value) != value && !options.contains(option) {
-            options.push(option.clone());
-        }
-    }
-    options
+    let names: BTreeSet<&String> = merged.trials.iter().flat_map(|row| row.options.keys()).collect();
+    let differs = |name: &&String| {
+        let mut values = merged.trials.iter().map(|row| row.options.get(*name));
+        values.next().is_some_and(|first| values.any(|value| value != first))
+    };
+    names.into_iter().filter(differs).cloned().collect()
 }
 
 fn cells(row: &SweepRow, options: &[String], results: &[ResultColumn]) -> Vec<SweepCell> {
