@@ -2,6 +2,8 @@
 
 use ndarray::ArrayView1;
 
+use super::student_quantile;
+
 /// Median of values, which must not be empty.
 pub(crate) fn median(values: Vec<f64>) -> f64 {
     quantile(&values, 0.5)
@@ -47,6 +49,33 @@ pub(crate) fn correlation_time(mut series: Vec<f64>) -> f64 {
         time = time.max(length * mean_square(&series) / variance);
     }
     time
+}
+
+/// Standard error of the mean of a few values.
+pub(crate) fn standard_error(values: &[f64]) -> f64 {
+    let freedom = (values.len() as f64 - 1.0).max(1.0);
+    (ArrayView1::from(values).var(0.0) / freedom).sqrt()
+}
+
+/// Returns `true` if the mean of the values is significantly above 0 (Student's t, one-sided, with this probability of an
+/// error).
+pub(crate) fn is_positive_mean(values: &[f64], error: f64) -> bool {
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    mean > student_quantile(2.0 * error, values.len() as f64 - 1.0) * standard_error(values)
+}
+
+/// Returns `true` if the means of two sets of values differ significantly (Student's t, 95 %).
+pub(crate) fn means_differ(sets: [Vec<f64>; 2]) -> bool {
+    let [one, other] = sets.each_ref().map(|values| values.len() as f64);
+    if one.min(other) < 2.0 {
+        return false;
+    }
+    let freedom = one + other - 2.0;
+    let views = sets.each_ref().map(ArrayView1::from);
+    let squares = one * views[0].var(0.0) + other * views[1].var(0.0);
+    let standard_error = (squares / freedom * (1.0 / one + 1.0 / other)).sqrt();
+    let [one, other] = views.map(|values| values.mean().unwrap_or(0.0));
+    (one - other).abs() > student_quantile(0.05, freedom) * standard_error
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
 use super::Intervals;
-use crate::{evaluation::recorded::Evidence, numerics::quantile};
+use crate::numerics::{Evidence, quantile};
 
 /// Returns the conformal quantile of `scores` and the effective number of samples m; `None` if there are too few.
 ///

@@ -4,7 +4,10 @@ use super::{
     Coverage, Intervals,
     conformal::{conformal_quantile, expected_shares},
 };
-use crate::{dataset::Folds, evaluation::recorded::Evidence, numerics::quantile};
+use crate::{
+    dataset::Folds,
+    numerics::{Evidence, quantile},
+};
 
 /// Half-width of the interval of one target.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
