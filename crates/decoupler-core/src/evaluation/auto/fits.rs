@@ -138,9 +138,8 @@ impl Search<'_> {
         for (with, ridge) in past {
             let (answers, _) = with.ridge(&judge, with.quantity(quantity))?;
             let is_better = judge.is_clearly_better(&answers, &of_plain, tried) || self.fixed.memory.is_some();
-            let (error, _) = judge.error(&answers);
-            if is_better && error < least {
-                (least, best) = (error, Some((with, ridge)));
+            if is_better && self.error(ridge) < least {
+                (least, best) = (self.error(ridge), Some((with, ridge)));
             }
         }
         Ok(best)
