@@ -414,7 +414,10 @@ fn options_that_need_targets_are_refused_without_them() {
             "inspect --data r.csv --inputs a --targets x --test-data r.csv",
             "leave the test files out",
         ),
-        ("inspect --data r.csv --inputs a --targets x --folds 999", "999 folds"),
+        (
+            "inspect --data r.csv --inputs a --targets x --folds 9",
+            "analysed in five folds",
+        ),
         (
             "inspect --data r.csv --inputs a --targets x --test-fraction 0.3",
             "--test-fraction: a recording is analysed by cross-validation",
