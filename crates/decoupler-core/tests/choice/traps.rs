@@ -84,7 +84,7 @@ fn channels_that_wake_in_a_later_session_are_left_out() {
     let errors = relative_errors(&run.decouple_test(), &second.targets);
     assert!(errors.iter().all(|error| *error < 0.1), "{errors:?}");
 
-    // Where they are kept, readings far outside are limited; without limits, errors are dozens of times the spread.
+    // Where they are kept, readings far outside are limited; without limits, errors are several times the spread.
     let choice = first.choose(BUDGET_S);
     let run = trained(&choice, &first, &second);
     let errors = relative_errors(&run.decouple_test(), &second.targets);
