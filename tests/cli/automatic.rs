@@ -96,7 +96,9 @@ fn a_column_that_looks_like_a_group_is_proposed_once() {
         row => format!("{},{line}\n", row / 60),
     });
     let rows: String = rows.collect();
-    ["trials.csv", "others.csv"].map(|file| fs::write(folder.path().join(file), &rows).unwrap());
+    for file in ["trials.csv", "others.csv"] {
+        fs::write(folder.path().join(file), &rows).unwrap();
+    }
     let found = |options: &str| {
         let arguments = format!("{TRAIN} trials.csv --test-data others.csv {options} --json");
         let report = json(&arguments, folder.path());
