@@ -107,8 +107,7 @@ impl Recording {
             &base,
             &fixed,
             &samples,
-            budget_s,
-            MemoryBudget::UNLIMITED,
+            (budget_s, MemoryBudget::UNLIMITED),
             &job,
             &mut |_| (),
         )

@@ -198,3 +198,18 @@ fn intervals_after_drift_between_sessions_hold_in_new_sessions() {
     let mean = shares.iter().sum::<f64>() / shares.len() as f64;
     assert!((0.84..0.97).contains(&mean), "{shares:?}");
 }
+
+/// A scan whose lines follow a ramp, with readings that know nothing of it: means of the mean of the other lines are far off at
+/// both ends, so that anything that wanders slowly, such as an average of noise, seems better.
+#[test]
+fn averages_of_noise_are_no_memory_of_a_scan() {
+    for seed in 0..6 {
+        let scan = Array2::from_shape_fn((1280, 2), |(sample, axis)| match axis {
+            0 => (sample % 40) as f64,
+            _ => (sample / 40) as f64,
+        });
+        let readings = normals((1280, 8), &mut generator(200 + seed));
+        let choice = Recording::of_time(readings, scan).choose(0.2);
+        assert!(choice.memory.is_empty(), "{seed}: {:?}", choice.record);
+    }
+}
