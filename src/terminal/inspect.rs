@@ -302,8 +302,7 @@ impl RecordingReport {
 
 /// Warnings of the import.
 pub(super) fn import_warnings(recordings: &Recordings) -> Vec<String> {
-    let all = once(&recordings.training).chain(&recordings.test);
-    all.flat_map(|recording| recording.warnings.iter().cloned()).collect()
+    Recording::warnings_of(once(&recordings.training).chain(&recordings.test))
 }
 
 pub(super) fn files<'a>(recordings: impl Iterator<Item = &'a Recording>) -> Vec<FileFound> {
