@@ -90,7 +90,8 @@ fn a_sensor_off_by_5_percent_is_recovered_within_the_stated_intervals() {
             SensorParameter::NodePitch,
             SensorParameter::ColumnNodeX,
         ] {
-            let fitted = calibration.parameter(parameter);
+            let mut fitted = calibration.parameters.iter();
+            let fitted = fitted.find(|fitted| fitted.parameter == parameter).unwrap();
             assert!(fitted.half_width.is_some(), "seed {seed}: {fitted}");
         }
         assert!(

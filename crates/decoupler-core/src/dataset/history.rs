@@ -362,7 +362,7 @@ mod tests {
         }
         assert_eq!(expected[[5, 1]], expected[[5, 0]], "it starts again after the gap");
         assert_ne!(expected[[6, 1]], expected[[6, 0]]);
-        stream.restart();
+        let mut stream = MemoryStream::new(&memory, 1).unwrap();
         assert_eq!(stream.step(only, &[5.0], None).0, [5.0; 3]);
     }
 }

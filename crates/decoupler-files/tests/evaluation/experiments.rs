@@ -194,7 +194,7 @@ fn cancelling_keeps_finished_trials() {
             threads(1),
             || asked.fetch_add(1, Ordering::Relaxed) >= asked_at_most,
             |one| {
-                assert_eq!((one.trials, one.experiment), (9, 0));
+                assert_eq!(one.experiment, 0);
                 finished += 1;
                 assert_eq!(one.done, finished);
                 results.record(one.cell, one.outcome);
