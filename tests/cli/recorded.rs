@@ -55,7 +55,7 @@ fn each_target_is_judged_with_an_interval() {
         warnings.contains("d repeats a") && warnings.contains("e is 7 in every sample"),
         "{warnings}"
     );
-    let text = String::from_utf8(decoupler(&format!("{INSPECT}"), folder.path()).stdout).unwrap();
+    let text = String::from_utf8(decoupler(INSPECT, folder.path()).stdout).unwrap();
     for expected in [
         "The readings determine x (R² 0.99",
         "Ridge and kernel ridge regression explain almost nothing of y",

@@ -25,8 +25,7 @@ fn frames_equal_rows_bit_for_bit() {
         let (channels, outputs) = (decoder.channels(), decoder.outputs());
         let mut whole = vec![0.0; test.row_count() * outputs];
         let mut row_by_row = whole.clone();
-        for frame in 0..frames.len() {
-            let readings = &frames[frame];
+        for (frame, readings) in frames.iter().enumerate() {
             decoder.decode(readings, &mut whole).unwrap();
             let solved = decoder.take_solved_rows();
             let rows = readings
