@@ -86,7 +86,7 @@ pub(super) fn fill(
                         drop(writeln!(
                             messages(),
                             "warning: {trial}: {failure}; the other trials continue"
-                        ))
+                        ));
                     });
                 }
             }
