@@ -61,7 +61,6 @@ impl PressedRow {
 
 /// Reason why a sensor cannot be calibrated.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum CalibrationError {
     /// The nominal sensor is impossible.
     #[error(transparent)]
@@ -119,7 +118,6 @@ impl CalibrationError {
 /// Only differences of coordinates matter, so the x of the first row-wire is the origin and stays, and the y of the first
 /// column-wire cancels: rows are centred over the column-wires.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[non_exhaustive]
 pub enum SensorParameter {
     /// Distance of the undeformed row-wires above the column-wires.
     Height,

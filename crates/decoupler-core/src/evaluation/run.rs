@@ -319,7 +319,6 @@ fn defect_of(start: &StartTrainer, is_chosen: bool) -> Option<String> {
 
 /// Error in preparing a run, an experiment of many runs, or the analysis of a scene.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum RunError {
     /// A number is out of range.
     #[error("{what}: {count} is not possible, give from {} to {}", .allowed.start(), .allowed.end())]

@@ -19,7 +19,6 @@ use thiserror::Error;
 /// estimated.
 #[derive(Clone, Debug, PartialEq, Error, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-#[non_exhaustive]
 pub enum LiveError {
     /// No input varies.
     #[error("every input is constant in the training samples")]

@@ -18,15 +18,14 @@ pub(crate) use quantity::ChannelNoise;
 pub use quantity::{Domain, Quantity};
 pub use scaling::MinMax;
 pub(crate) use scaling::{MARGIN, Whitening};
-pub(crate) use tanh::{exp, tanh, tanh_single};
-pub use tanh::{tanh_in_place, tanh_in_place_single};
+pub(crate) use tanh::{exp, tanh};
+pub use tanh::{tanh_in_place, tanh_single};
 
 use ndarray::ArrayView2;
 use thiserror::Error;
 
 /// Error in fitting a decoder, or in fitting or reading a scaling or a network.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum NetworkError {
     /// There are no samples.
     #[error("there are no samples to scale")]

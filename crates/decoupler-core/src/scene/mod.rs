@@ -40,7 +40,6 @@ pub struct Scene {
 
 /// Invalid scene.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum SceneError {
     /// The largest compression is out of range.
     #[error("the largest compression is {} %: it must be above 0 and below 100 % of the height", short(100.0 * .0))]

@@ -18,7 +18,6 @@ pub use map::SurfaceMap;
 
 /// Error in the coordinates of the nodes.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
 pub enum SurfaceError {
     /// An axis has no coordinates.
     #[error("a surface needs at least one {axis} coordinate, and none was given")]

@@ -148,6 +148,34 @@ fn a_network_no_better_than_ridge_is_reported_as_such() {
 }
 
 #[test]
+fn a_remark_shows_on_which_side_of_ridge_an_error_is() {
+    let set = set(400, 2, 9, |c, rng| c[0] + normal(rng));
+    let folds = Folds::by(&set, 2, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
+    let mut validated = CrossValidated::on_folds(&settings(), &set, folds, &Job::UNINTERRUPTED).unwrap();
+    let errors = Array2::from_shape_fn((400, 1), |(sample, _)| if sample % 3 == 0 { 1.0 } else { -1.0 });
+    for (ratio, expected) in [
+        (
+            0.9996,
+            "the network is little better than ridge for y (error 0.9996 (0.9996 to 0.9996) times ridge's)",
+        ),
+        (
+            1.004,
+            "the network is no better than ridge for y (error 1.00 (1.00 to 1.00) times ridge's)",
+        ),
+    ] {
+        validated.linear = &set.targets() + &errors;
+        validated.network = &set.targets() + &(&errors * ratio);
+        let remarks = ridge_remarks(&set, &validated, SplitBy::Time, &[Channel::new("y", None)]);
+        assert!(remarks[0].starts_with(expected), "{remarks:?}");
+    }
+    validated.network = &set.targets() + &(&errors * 0.7);
+    assert_eq!(
+        ridge_remarks(&set, &validated, SplitBy::Time, &[Channel::new("y", None)]),
+        [""; 0]
+    );
+}
+
+#[test]
 fn folds_of_every_rule_are_checked_and_seeded() {
     let set = set(120, 3, 9, |c, rng| c[0] - c[2] + 0.1 * normal(rng));
     for by in SplitBy::ALL {

@@ -57,6 +57,8 @@ enum Work {
     Doubles(PerRow<Padded<f64>>),
     Singles(PerRow<Padded<f32>>),
     Placement(PerRow<Placement>),
+    /// A division whose dividend is the difference of these nodes.
+    OfDifference(NodeId, NodeId),
     /// Not at all: no node takes its values.
     Skipped,
     /// Scratch for the shares of a blend.
@@ -80,9 +82,11 @@ impl ProgramDecoder {
             let taken = match (&node.operation, work) {
                 (Operation::Affine { of, biases, .. }, Work::Placement(_)) => vec![*of, *biases],
                 (Operation::Affine { of, .. } | Operation::SquaredDistances { of, .. }, _) => vec![*of],
+                (Operation::Divide(_, divisor), Work::OfDifference(one, other)) => vec![*one, *other, *divisor],
                 (operation, _) => operation.operands(),
             };
-            let places = &mut taken_in[usize::from(work.is_single(node))];
+            let is_single = work.is_single(node) && !matches!(work, Work::OfDifference(..));
+            let places = &mut taken_in[usize::from(is_single)];
             taken.iter().for_each(|id| places[id.index()] = true);
         }
         let [in_double, in_single] = taken_in;
@@ -378,6 +382,14 @@ impl Work {
                 Precision::Double => Self::Doubles(tables(points).map(Padded::of_points)),
                 Precision::Single => Self::Singles(tables(points).map(Padded::of_points)),
             },
+            Operation::Divide(dividend, _) => match program.node(*dividend) {
+                Node {
+                    operation: Operation::Subtract(one, other),
+                    precision: Precision::Double,
+                    ..
+                } if program.uses(*dividend) == 1 => Self::OfDifference(*one, *other),
+                _ => Self::Plain,
+            },
             Operation::Blend { logits, .. } => Self::Blend(vec![0.0; program.node(*logits).size]),
             Operation::History { of, memory } => {
                 let stream = MemoryStream::new(memory, program.node(*of).size);
@@ -510,6 +522,10 @@ impl Rows<'_> {
         let all = |id: &NodeId| self.values::<T>(&before[id.index()]);
         let of_rows = self.indices.iter().copied().enumerate();
         match (&node.operation, work) {
+            (Operation::Divide(_, divisor), Work::OfDifference(one, other)) => {
+                let operands = [one, other, divisor].map(|id| self.values::<f64>(&before[id.index()]));
+                kernel::subtract_and_divide(operands, results);
+            }
             (Operation::Subtract(one, other), _) => {
                 kernel::pairs(all(one), all(other), results, |one, other| one - other);
             }

@@ -78,6 +78,14 @@ pub(super) fn pairs<T: Real>(one: &[T], other: &[T], results: &mut [T], function
     }
 }
 
+/// Writes (one − other) / divisor, with the difference in double precision.
+#[inline(always)]
+pub(super) fn subtract_and_divide<T: Real>([one, other, divisor]: [&[f64]; 3], results: &mut [T]) {
+    for (((result, one), other), &divisor) in results.iter_mut().zip(one).zip(other).zip(divisor) {
+        *result = T::of(one - other) / T::of(divisor);
+    }
+}
+
 /// Writes the nearest values within limits; NaN passes through.
 #[inline(always)]
 pub(super) fn clip<T: Real>(values: &[T], [low, high]: [&[T]; 2], results: &mut [T]) {

@@ -46,9 +46,9 @@ impl Findings {
             memory: Some(given.answers[0].0.memory.clone()),
             ..fixed.clone()
         };
-        let of_rule = |by| compare_fits(settings, &fixed, &AutoSamples { by, ..*samples }, job);
-        let random = of_rule(SplitBy::Random)?;
-        let honest = if samples.by == by { None } else { Some(of_rule(by)?) };
+        let compare = |by| compare_fits(settings, &fixed, &AutoSamples { by, ..*samples }, job);
+        let of_rule = |by| (by != samples.by).then(|| compare(by)).transpose();
+        let others = [of_rule(by)?, of_rule(SplitBy::Random)?];
         let mut r2 = [const { Vec::new() }; 2];
         // The best comes last.
         for (tried, answers) in given.answers.iter().rev() {
@@ -61,7 +61,7 @@ impl Findings {
         });
         Ok(Self {
             targets: targets.collect(),
-            comparison: SplitComparison::of(set, by, [honest.as_ref().unwrap_or(&given), &random]),
+            comparison: SplitComparison::of(set, by, others.each_ref().map(|fits| fits.as_ref().unwrap_or(&given))),
             record: given.record,
         })
     }

@@ -19,6 +19,7 @@ use crate::{
     dataset::{Dataset, SplitBy},
     numerics::Evidence,
     problem::Channel,
+    text::format_below_one,
 };
 pub use determination::{Determinacy, Determination, Undetermined};
 pub use extrapolation::extrapolation;
@@ -46,10 +47,8 @@ fn compare(set: &Dataset, by: SplitBy, answers: [ArrayView2<'_, f64>; 2]) -> Vec
         let ratio = totals[1] / totals[0];
         let spread = evidence.variance(&((other - one * ratio) / totals[0]));
         let rmse = totals.map(|total| (total / set.samples() as f64).sqrt());
-        (
-            rmse,
-            Interval::of_ratio(ratio, spread).map(|ratio| ratio.map(f64::sqrt)),
-        )
+        let ratio = Interval::of_ratio(ratio, spread).map(|ratio| ratio.map(f64::sqrt));
+        (rmse, ratio)
     };
     (0..set.outputs()).map(of_target).collect()
 }
@@ -61,9 +60,11 @@ pub fn ridge_remarks(set: &Dataset, validated: &CrossValidated, by: SplitBy, tar
     let remark = |(target, (_, ratio)): (&Channel, ([f64; 2], Option<Interval>))| {
         let Interval { value, low, high } = ratio.filter(|ratio| ratio.high >= 1.0 || ratio.value > 0.95)?;
         let better = if high < 1.0 { "little better" } else { "no better" };
+        // On which side of 1 the interval ends.
+        let [value, low, high] = [value, low, high].map(|ratio| format_below_one(ratio, 2));
         // The error does not show whether a nonlinear relation is absent, or this training has missed it.
         Some(format!(
-            "the network is {better} than ridge for {} (error {value:.3} ({low:.3} to {high:.3}) times ridge's): with these \
+            "the network is {better} than ridge for {} (error {value} ({low} to {high}) times ridge's): with these \
              settings, use ridge",
             target.name
         ))
