@@ -121,7 +121,8 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
             let text = bits.map_or(String::new(), |bits| bits.to_string());
             Some(Field::text(text, bits, |text| {
                 let bits = text.parse().ok().filter(|bits| (1..=Noise::MAX_BITS).contains(bits));
-                bits.map(Some).ok_or(format!("give a whole number from 1 to {}", Noise::MAX_BITS))
+                bits.map(Some)
+                    .ok_or(format!("give a whole number from 1 to {}", Noise::MAX_BITS))
             }))
         },
     ),
@@ -160,13 +161,9 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
         "Validation samples, which select the best weights and end the training; 0 for none.",
         |run| Some(Field::Count(&mut run.simulation_mut()?.validation_samples)),
     ),
-    option(
-        Part::Network,
-        ("hidden", "N", "12"),
-        HIDDEN,
-        "Hidden nodes.",
-        |run| Some(Field::Count(&mut run.hidden)),
-    ),
+    option(Part::Network, ("hidden", "N", "12"), HIDDEN, "Hidden nodes.", |run| {
+        Some(Field::Count(&mut run.hidden))
+    }),
     option(
         Part::Network,
         ("starts", "N", "1"),
@@ -211,7 +208,11 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
     ),
     option(
         Part::Training,
-        ("epochs", "N", "1000; for a recording 300, or 2000 with a method that follows gradients (scg, rp, gd…)"),
+        (
+            "epochs",
+            "N",
+            "1000; for a recording 300, or 2000 with a method that follows gradients (scg, rp, gd…)",
+        ),
         STOPPING[0].kind,
         STOPPING[0].help,
         |run| (STOPPING[0].field)(&mut run.training.stopping),
@@ -232,7 +233,11 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
     ),
     option(
         Part::Training,
-        ("max fail", "N", "6; 100 for a recording with a method that follows gradients"),
+        (
+            "max fail",
+            "N",
+            "6; 100 for a recording with a method that follows gradients",
+        ),
         STOPPING[3].kind,
         STOPPING[3].help,
         |run| (STOPPING[3].field)(&mut run.training.stopping),
