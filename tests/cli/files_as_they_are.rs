@@ -77,13 +77,13 @@ fn test_samples_outside_the_training_range_are_reported() {
     let report = json(&format!("{data} {TRAIN}"), folder.path());
     let share = report["test_outside_training"].as_f64().unwrap();
     assert!((0.6..0.9).contains(&share), "{share}");
-    assert!(warnings(&report).contains("targets force in "), "{report}");
+    assert!(warnings(&report).contains("(force in "), "{report}");
     let inside = json(
         &format!("train --data press_1.csv --test-data press_2.csv {TRAIN}"),
         folder.path(),
     );
     assert!(inside["test_outside_training"].as_f64().unwrap() < 0.1, "{inside}");
-    assert!(!warnings(&inside).contains("targets force in "), "{inside}");
+    assert!(!warnings(&inside).contains("(force in "), "{inside}");
 }
 
 #[test]

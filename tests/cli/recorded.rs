@@ -55,7 +55,7 @@ fn each_target_is_judged_with_an_interval() {
         warnings.contains("d repeats a") && warnings.contains("e is 7 in every sample"),
         "{warnings}"
     );
-    let text = String::from_utf8(decoupler(&format!("{INSPECT}"), folder.path()).stdout).unwrap();
+    let text = String::from_utf8(decoupler(INSPECT, folder.path()).stdout).unwrap();
     for expected in [
         "The readings determine x (R² 0.99",
         "Ridge and kernel ridge regression explain almost nothing of y",
@@ -414,7 +414,10 @@ fn options_that_need_targets_are_refused_without_them() {
             "inspect --data r.csv --inputs a --targets x --test-data r.csv",
             "leave the test files out",
         ),
-        ("inspect --data r.csv --inputs a --targets x --folds 999", "999 folds"),
+        (
+            "inspect --data r.csv --inputs a --targets x --folds 9",
+            "analysed in five folds",
+        ),
         (
             "inspect --data r.csv --inputs a --targets x --test-fraction 0.3",
             "--test-fraction: a recording is analysed by cross-validation",

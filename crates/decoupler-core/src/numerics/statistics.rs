@@ -14,17 +14,43 @@ pub(crate) fn median(values: Vec<f64>) -> f64 {
 pub(crate) fn quantile(values: &[f64], level: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
-    let place = (level * sorted.len() as f64 - 0.5).clamp(0.0, (sorted.len() - 1) as f64);
+    interpolated(&sorted, level * sorted.len() as f64 - 0.5)
+}
+
+/// Returns the value at this place among sorted values, counted from 0, linear between them and the nearest beyond them.
+pub(crate) fn interpolated(sorted: &[f64], place: f64) -> f64 {
+    let place = place.clamp(0.0, (sorted.len() - 1) as f64);
     let (below, share) = (place as usize, place.fract());
     let above = (below + 1).min(sorted.len() - 1);
     sorted[below] + share * (sorted[above] - sorted[below])
 }
 
+/// Returns the mean as that of the deviations from the first value, so that a large offset does not hide small
+/// differences; NaN without values.
+pub(crate) fn mean(values: ArrayView1<'_, f64>) -> f64 {
+    let first = values.first().copied().unwrap_or(f64::NAN);
+    first
+        + values
+            .iter()
+            .map(|value| (value - first) / values.len() as f64)
+            .sum::<f64>()
+}
+
+/// Returns the root mean square of finite nonnegative values, without overflow.
+pub(crate) fn root_mean_square(values: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
+    let count = values.len().max(1) as f64;
+    let largest = values.clone().fold(0.0, f64::max);
+    let relative: f64 = values.map(|value| (value / largest).powi(2)).sum();
+    if largest > 0.0 {
+        largest * (relative / count).sqrt()
+    } else {
+        0.0
+    }
+}
+
 /// Autocorrelation of a series at this lag; `None` if all values are equal.
 pub(crate) fn autocorrelation(values: ArrayView1<'_, f64>, lag: usize) -> Option<f64> {
-    let first = *values.first()?;
-    // As the mean of deviations, so that a large offset does not hide small changes.
-    let mean = first + values.iter().map(|value| value - first).sum::<f64>() / values.len() as f64;
+    let mean = mean(values);
     let variance: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     let pairs = values.iter().zip(values.iter().skip(lag));
     let products: f64 = pairs.map(|(one, next)| (one - mean) * (next - mean)).sum();

@@ -77,18 +77,18 @@ fn sentence_on_random_split(set: &Dataset) -> String {
     found.comparison.sentence(0, "y")
 }
 
-/// About one in a hundred sets may seem to change by chance: at most 5 of 100 with a probability of 0.9995.
+/// About one in a hundred sets may seem to change by chance: at most 3 of 30 with a probability of 0.9998.
 #[test]
 fn independent_samples_are_not_said_to_change_over_time() {
-    let claims = (0..100).filter(|seed| {
-        let samples = 60 + 3 * *seed as usize;
+    let claims = (0..30).filter(|seed| {
+        let samples = 60 + 6 * *seed as usize;
         let set = set(samples, 3, 100 + seed, |c, rng| {
             c[0] - 0.5 * c[1] * c[2] + 0.3 * normal(rng)
         });
         sentence_on_random_split(&set).contains("optimistic")
     });
     let claims = claims.count();
-    assert!(claims <= 5, "{claims} of 100");
+    assert!(claims <= 3, "{claims} of 30");
 }
 
 #[test]
@@ -115,8 +115,8 @@ fn a_relation_that_drifts_is_said_to_change_over_time() {
 /// value has the variance 2.
 #[test]
 fn what_the_readings_determine_is_found_for_linear_and_curved_relations() {
-    let linear = set(2000, 4, 5, |c, rng| 2.0 * c[0] + 0.5 * c[1] + 0.5 * normal(rng));
-    let curved = set(2000, 2, 6, |c, rng| 0.5 * c[0] + 0.5 * c[1] * c[1] + 0.5 * normal(rng));
+    let linear = set(500, 4, 5, |c, rng| 2.0 * c[0] + 0.5 * c[1] + 0.5 * normal(rng));
+    let curved = set(500, 2, 6, |c, rng| 0.5 * c[0] + 0.5 * c[1] * c[1] + 0.5 * normal(rng));
     for (set, by_ridge, by_best) in [(&linear, 1.0 - 0.25 / 4.5, 1.0 - 0.25 / 4.5), (&curved, 0.25, 0.75)] {
         let found = findings(set, SplitBy::Time, &Job::UNINTERRUPTED).unwrap();
         let target = &found.targets[0];
@@ -124,7 +124,7 @@ fn what_the_readings_determine_is_found_for_linear_and_curved_relations() {
             (target.ridge.unwrap().r2, by_ridge),
             (target.best().unwrap().0.r2, by_best),
         ] {
-            assert!((r2.value - expected).abs() < 0.03, "{r2:?} instead of {expected}");
+            assert!((r2.value - expected).abs() < 0.06, "{r2:?} instead of {expected}");
             assert!(r2.low < expected && expected < r2.high, "{r2:?} instead of {expected}");
         }
     }

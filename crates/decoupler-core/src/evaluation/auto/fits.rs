@@ -37,8 +37,8 @@ impl Search<'_> {
                 past.extend(ridge.map(|ridge| (with, ridge)));
             }
         }
-        self.find_leaks(&members, &past);
-        if let Some((with, ridge)) = self.clearly_best(&features, quantity, past)? {
+        let unexplained = self.find_leaks(&members, &past);
+        if let Some((with, ridge)) = self.clearly_best(&features, (quantity, &unexplained), past)? {
             members = self.with_ridge(&with, ridge)?;
             features = with;
         }
@@ -103,15 +103,18 @@ impl Search<'_> {
         left.fold(f64::INFINITY, f64::min)
     }
 
-    /// Finds targets that a memory predicts and the readings of the moment do not.
-    fn find_leaks(&mut self, now: &[usize], past: &[(Features, usize)]) {
-        for target in self.judge.counted() {
+    /// Finds targets that the readings of the moment hardly explain, and records those of them that a memory predicts.
+    fn find_leaks(&mut self, now: &[usize], past: &[(Features, usize)]) -> Vec<usize> {
+        let mut unexplained = self.judge.counted();
+        unexplained.retain(|target| self.least(*target, now.iter().copied()) > LEAK[0]);
+        for &target in &unexplained {
             let now = self.least(target, now.iter().copied());
             let then = self.least(target, past.iter().map(|(_, ridge)| *ridge));
-            if now > LEAK[0] && then < LEAK[1] {
+            if then < LEAK[1] {
                 self.record.leaks.push((target, [1.0 - now, 1.0 - then]));
             }
         }
+        unexplained
     }
 
     /// Returns the features with the lowest error of ridge regression among those that are clearly better than the readings of the
@@ -119,7 +122,7 @@ impl Search<'_> {
     fn clearly_best(
         &self,
         plain: &Features,
-        quantity: Quantity,
+        (quantity, unexplained): (Quantity, &[usize]),
         past: Vec<(Features, usize)>,
     ) -> Result<Option<(Features, usize)>, RunError> {
         if past.is_empty() {
@@ -127,20 +130,16 @@ impl Search<'_> {
         }
         // Ridge regression takes little time, and more folds show more clearly whether a memory is better.
         let mut judge = Judge::new(self.samples, 2 * Judge::FOLDS, self.base.seed)?;
-        // A memory must not win by what may be a leak.
-        self.record
-            .leaks
-            .iter()
-            .for_each(|(target, _)| judge.variances[*target] = 0.0);
+        // A memory must not win by what may be a leak, or by averages of noise that follow the order of recording.
+        unexplained.iter().for_each(|target| judge.variances[*target] = 0.0);
         let (of_plain, _) = plain.ridge(&judge, quantity)?;
         let (tried, mut best) = (past.len(), None);
         let mut least = f64::INFINITY;
         for (with, ridge) in past {
             let (answers, _) = with.ridge(&judge, with.quantity(quantity))?;
             let is_better = judge.is_clearly_better(&answers, &of_plain, tried) || self.fixed.memory.is_some();
-            let (error, _) = judge.error(&answers);
-            if is_better && error < least {
-                (least, best) = (error, Some((with, ridge)));
+            if is_better && self.error(ridge) < least {
+                (least, best) = (self.error(ridge), Some((with, ridge)));
             }
         }
         Ok(best)

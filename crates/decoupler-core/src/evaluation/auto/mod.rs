@@ -3,9 +3,10 @@
 //!
 //! Candidates are the training mean, ridge regression, kernel ridge regression and networks, also networks on what ridge
 //! regression leaves. All are judged by their held-out answers in the same folds, a network at the lowest point of its error over
-//! epochs, which is also when its training will stop. The answer is the convex combination of the best of each family, for
-//! each target by non-negative least squares on the held-out answers (stacking: Breiman 1996, doi:10.1007/BF00117832); in the
-//! folds it is never worse than one of them. The network is trained in any case.
+//! epochs, which is also when its training will stop. The answer is the convex combination of the fits, the three best networks
+//! and one on what ridge regression leaves, for each target by non-negative least squares on the held-out answers (stacking:
+//! Breiman 1996, doi:10.1007/BF00117832); in the folds it is never worse than one of them. The best network is trained in any
+//! case.
 //!
 //! A memory is tried only on readings with times, or on request, and is taken only if it is clearly better in paired
 //! comparisons: on samples in an order that the targets follow, such as a scan, it learns that order. Channels that are

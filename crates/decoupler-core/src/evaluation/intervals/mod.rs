@@ -1,4 +1,3 @@
-mod conformal;
 mod half_width;
 
 use std::time::Duration;

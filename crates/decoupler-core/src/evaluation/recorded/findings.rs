@@ -54,11 +54,10 @@ impl Findings {
         for (tried, answers) in given.answers.iter().rev() {
             r2[usize::from(tried.model != TriedModel::Ridge)] = Determination::measure(set, answers.view(), samples.by);
         }
-        let [ridge, kernel] = r2.map(Vec::into_iter);
-        let mut kernel = kernel.map(Result::ok);
+        let [ridge, mut kernel] = r2.map(Vec::into_iter);
         let targets = ridge.map(|ridge| TargetFindings {
             ridge,
-            kernel: kernel.next().flatten(),
+            kernel: kernel.next().and_then(Result::ok),
         });
         Ok(Self {
             targets: targets.collect(),

@@ -90,8 +90,11 @@ fn single_change(values: ArrayView1<'_, f64>, groups: &[usize], by: SplitBy) -> 
     let [first, last] = stretches.into_iter().min_by_key(|[first, last]| last - first)?;
     let is_held_out_at_once = match by {
         SplitBy::Time => ((last - first) as f64) < FOLD * values.len() as f64,
-        SplitBy::Group => groups[first..=last].iter().all(|group| *group == groups[first]),
-        SplitBy::Random => false,
+        // The folds of a single group are in time.
+        SplitBy::Group if groups.iter().any(|group| *group != groups[0]) => {
+            groups[first..=last].iter().all(|group| *group == groups[first])
+        }
+        SplitBy::Group | SplitBy::Random => false,
     };
     is_held_out_at_once.then_some([first, last])
 }

@@ -54,6 +54,8 @@ pub enum UnderWay {
 pub enum StudyEvent {
     /// Progress of reading a file.
     Reading(Progress),
+    /// The files are read.
+    Read,
     /// Findings on the recording.
     Found(Box<RecordingFindings>),
     /// The result of a cross-validation.
@@ -120,6 +122,7 @@ impl RecordingStudy {
         while let Some(event) = self.job.next_event() {
             match event {
                 StudyEvent::Reading(progress) => self.reading = Some(progress),
+                StudyEvent::Read => self.reading = None,
                 StudyEvent::Found(found) => self.found = Some(found),
                 StudyEvent::Validated(validated) => self.validated = Some(validated),
                 StudyEvent::Ended(ended) => {
@@ -189,6 +192,7 @@ pub fn work(setup: Setup, work: UnderWay, folds: usize, report: &Report<StudyEve
         return Ok(());
     }
     let recording = recording.map_err(|error| error.to_string())?;
+    report.send(StudyEvent::Read);
     match work {
         UnderWay::Findings => find(setup, &plan, recording, report),
         UnderWay::CrossValidation => validate(setup, &plan, &recording, folds, report),
