@@ -23,13 +23,12 @@ mod intervals;
 mod output;
 mod reproduce;
 mod samples;
-mod scene_arguments;
+mod settings_arguments;
 mod sweep;
 mod trade;
 mod trade_report;
 mod train;
 mod train_report;
-mod training_arguments;
 
 pub use decoupler_files::export::exit_leaving_nothing;
 

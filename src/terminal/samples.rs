@@ -8,11 +8,10 @@ use std::{
 
 use clap::Args;
 use decoupler_core::{
-    dataset::{Dataset, DatasetError, LARGEST_SAMPLES, Seed, Simulation, Stream},
+    dataset::{Dataset, DatasetError, LARGEST_SAMPLES, Simulation, Stream},
     decoupling::{Decoder, Precision, decode_set},
     evaluation::{DecoderSet, Run, RunError, RunSets, RunSettings, TrainingSize, Workload, error_remarks},
     job::Job,
-    sensor::{ArrayScale, SensorModel},
 };
 use decoupler_files::{
     export::{
@@ -27,8 +26,7 @@ use super::{
     count,
     failure::Failure,
     output::{messages, progress_bar},
-    scene_arguments::SceneArguments,
-    seed,
+    settings_arguments::{OfSimulate, SettingsArguments},
 };
 
 /// Draws or reads the samples of `setup`.
@@ -120,22 +118,16 @@ const BLOCK_BYTES: usize = 64 << 20;
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Simulate {
-    /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns
-    #[arg(long, value_name = "SCALE", default_value = "10x10_5x30")]
-    array: ArrayScale,
     /// Samples, rounded up to whole snapshots
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = count(1..=LARGEST_SAMPLES))]
     samples: usize,
-    /// Seed of all random numbers
-    #[arg(long, default_value_t = 0, value_parser = seed)]
-    seed: u64,
     /// Fault of a wire or of the electronics to simulate: open-row:ROW or open-column:COLUMN (broken at the connector, or
     /// with @NODE before that node), short-columns:COLUMN-COLUMN, gain:COLUMN=REL (gain error of an
     /// amplifier), stuck:COLUMN=low|high (a converter at an end of its range)
     #[arg(long, value_name = "FAULT")]
     fault: Option<Fault>,
     #[command(flatten)]
-    scene: SceneArguments,
+    scene: SettingsArguments<OfSimulate>,
     /// File to write instead of standard output
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -158,17 +150,14 @@ impl Simulate {
     }
 
     fn write(&self, writer: &mut dyn Write, refused: impl Fn(std::io::Error) -> Failure) -> Result<(), Failure> {
-        let mut settings = self.scene.settings()?;
-        if let Some(simulation) = settings.simulation_mut() {
-            simulation.sensor = SensorModel::new(self.array);
-        }
-        settings.seed = Seed(self.seed);
+        let settings = self.scene.settings(None)?;
         let (Simulation { sensor, scene, .. }, seed) = (settings.drawn()?, settings.seed);
-        let rows = scene.rows.read(self.array.rows()).map_err(DatasetError::from)?;
+        let array = sensor.scale;
+        let rows = scene.rows.read(array.rows()).map_err(DatasetError::from)?;
         let faulty = match self.fault {
             Some(fault) => {
                 fault
-                    .check(self.array, &rows)
+                    .check(array, &rows)
                     .map_err(|error| Failure::Arguments(format!("--fault: {error}")))?;
                 Some(FaultySensor::new(sensor, scene.noise.in_test(), fault).map_err(Failure::Sensor)?)
             }
@@ -177,8 +166,8 @@ impl Simulate {
         let mut decoder = self.decoder(&settings)?;
         let (mut rng, mut noise_rng) = (seed.rng(Stream::Test), seed.rng(Stream::TestNoise));
         let snapshots = self.samples.div_ceil(rows.len());
-        write_samples_header(self.array, decoder.is_some(), writer).map_err(&refused)?;
-        let numbers = rows.len() * (self.array.columns() + self.array.coordinates_per_row());
+        write_samples_header(array, decoder.is_some(), writer).map_err(&refused)?;
+        let numbers = rows.len() * (array.columns() + array.coordinates_per_row());
         let block = (BLOCK_BYTES / (size_of::<f64>() * numbers)).clamp(1, BLOCK);
         for first in (0..snapshots).step_by(block) {
             let samples = block.min(snapshots - first) * rows.len();
@@ -200,7 +189,6 @@ impl Simulate {
 
     /// The given decoder with trained networks; none if none is given.
     fn decoder(&self, settings: &RunSettings) -> Result<Option<Box<dyn Decoder>>, Failure> {
-        self.scene.check_one_noise()?;
         let kind = match self.scene.decoder[..] {
             [] => return Ok(None),
             [kind] => kind,

@@ -2,17 +2,16 @@
 
 use clap::Args;
 use decoupler_core::{
-    dataset::{Dataset, LARGEST_SAMPLES, Seed, Simulation},
+    dataset::{Dataset, Seed, Simulation},
     decoupling::DecoderKind,
     evaluation::{Preset, RunError, RunSets, RunSettings, TradeOffPoint, Workload, measure_trade_off},
     job::Job,
     network::LARGEST_HIDDEN,
     scene::Noise,
-    sensor::{ArrayScale, SensorModel},
-    training::{Method, StoppingRules},
+    training::Method,
 };
 use decoupler_files::{
-    export::report::train_command,
+    export::report::{changed_options, train_command},
     import::{Plan, Recordings, Setup, SetupSets},
 };
 
@@ -24,10 +23,8 @@ use super::{
     number,
     output::progress_bar,
     samples::{announce_workload, following, working_folder},
-    scene_arguments::SceneArguments,
-    seed,
+    settings_arguments::{OfTrade, SettingsArguments},
     trade_report::{Limits, MeasuredLevel, PointTraining, RecordedSource, TradeOff, TradeSource},
-    training_arguments::{method, refuse_with_recordings},
 };
 
 /// Measure speed against accuracy of every decoder
@@ -40,30 +37,18 @@ use super::{
 #[command(allow_negative_numbers = true)]
 pub(super) struct Trade {
     #[command(flatten)]
-    scene: SceneArguments,
+    scene: SettingsArguments<OfTrade>,
     #[command(flatten)]
     import: ImportArguments,
-    /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns [default: 10x10_5x30]
-    #[arg(long, value_name = "SCALE")]
-    array: Option<ArrayScale>,
+    /// Noise of each reading (standard deviation), relative to the reading [default: 0,1e-4,1e-3,1e-2]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = number)]
+    noise: Vec<f64>,
     /// Hidden nodes of the networks
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "6,12", value_parser = count(1..=LARGEST_HIDDEN))]
     hidden: Vec<usize>,
     /// Training methods of the networks for a recording [default: br]; a simulated array uses those of its presets
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = method())]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = Method::named)]
     method: Vec<Method>,
-    /// Maximum number of epochs [default: those of the preset; 300 for a recording]
-    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MAX_EPOCHS))]
-    epochs: Option<usize>,
-    /// Training samples [default: those of the preset]
-    #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
-    samples: Option<usize>,
-    /// Test samples, on which the errors are measured [default: 100]
-    #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
-    test_samples: Option<usize>,
-    /// Seed of all random numbers
-    #[arg(long, default_value_t = 0, value_parser = seed)]
-    seed: u64,
     /// Also print the fastest decoder whose error is at most this many percent: of z, or of the ranges of a recording's
     /// targets
     #[arg(long, value_name = "PERCENT", value_parser = number)]
@@ -99,7 +84,7 @@ impl Trade {
     pub(super) fn run(self) -> Result<(), Failure> {
         let cases = self.cases()?;
         let mut trade_off = TradeOff {
-            source: TradeSource::Array(self.array.unwrap_or_default()),
+            source: TradeSource::Array(self.scene.settings_at(Preset::default(), 0.0)?.drawn()?.sensor.scale),
             levels: Vec::new(),
         };
         let bar = progress_bar(self.json, cases.len(), "{bar:30} {pos} of {len}, {msg}, {elapsed}");
@@ -177,7 +162,7 @@ impl Trade {
             let message = "--folds: the decoders are measured on the test samples; leave it out";
             return Err(Failure::Arguments(message.to_owned()));
         }
-        match self.import.given(self.scene.columns())? {
+        match self.import.given(&self.scene.columns())? {
             Some(plan) => self.cases_of_recording(&plan),
             None => self.cases_of_array(),
         }
@@ -188,7 +173,7 @@ impl Trade {
             let message = "--method: the presets name the methods of a simulated array; leave it out, or give --data";
             return Err(Failure::Arguments(message.to_owned()));
         }
-        let noises = match &self.scene.noise[..] {
+        let noises = match &self.noise[..] {
             [] => vec![0.0, 1e-4, 1e-3, 1e-2],
             given => given.to_vec(),
         };
@@ -200,7 +185,7 @@ impl Trade {
         let mut cases = Vec::new();
         for &noise in &noises {
             for &preset in &presets {
-                let settings = self.settings(preset, noise)?;
+                let settings = self.scene.settings_at(preset, noise)?;
                 // The work is nearly independent of the noise.
                 if noise == noises[0] {
                     announce_workload(&Workload::of_trade_off(&settings, &self.hidden, &decoders)?)?;
@@ -216,28 +201,12 @@ impl Trade {
         Ok(cases)
     }
 
-    fn settings(&self, preset: Preset, noise: f64) -> Result<RunSettings, Failure> {
-        let mut settings = self.scene.settings_at(preset, Some(noise))?;
-        if let Some(simulation) = settings.simulation_mut() {
-            simulation.sensor = SensorModel::new(self.array.unwrap_or_default());
-            simulation.samples = self.samples.unwrap_or(simulation.samples);
-            simulation.test_samples = self.test_samples.unwrap_or(simulation.test_samples);
-        }
-        settings.seed = Seed(self.seed);
-        let stopping = &mut settings.training.stopping;
-        stopping.epochs = self.epochs.unwrap_or(stopping.epochs);
-        Ok(settings)
-    }
-
     fn cases_of_recording(&self, plan: &Plan) -> Result<Vec<Case>, Failure> {
-        let mut settings = self.scene.recorded(plan.import.row_wire.is_some())?;
-        refuse_with_recordings([
-            self.array.is_some(),
-            self.samples.is_some(),
-            self.test_samples.is_some(),
-            false,
-        ])?;
-        settings.seed = Seed(self.seed);
+        if !self.noise.is_empty() {
+            let message = "--noise: a recording (--data) has its own noise; leave it out";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
+        let settings = self.scene.recorded(plan.import.row_wire.is_some())?;
         let default = settings.training.method;
         let mut decoders = self.scene.decoders();
         decoders.retain(|kind| !kind.needs_sensor());
@@ -248,9 +217,11 @@ impl Trade {
         };
         let case = |(number, method): (usize, &Method)| {
             let mut settings = settings;
+            let stopping = settings.training.stopping;
             settings.choose_method(*method);
-            let stopping = &mut settings.training.stopping;
-            stopping.epochs = self.epochs.unwrap_or(stopping.epochs);
+            if self.scene.value("epochs").is_some() {
+                settings.training.stopping.epochs = stopping.epochs;
+            }
             let mut plan = plan.clone();
             if !self.import.holds_out() {
                 plan.division.validation_fraction = settings.validation_fraction();
@@ -329,33 +300,16 @@ fn on_array(point: &TradeOffPoint, simulation: &Simulation) -> String {
     };
     let array = simulation.sensor.scale.to_string().replace('×', "x");
     let mut command = format!("decoupler train --preset {preset} --array {array}");
-    let mut add = |name: &str, value: &dyn Fn(&Simulation, &RunSettings) -> String| {
-        let value_of_point = value(simulation, &point.settings);
-        if value_of_point != value(&simulation_of_preset, &settings_of_preset) {
-            command += &format!(" --{name} {value_of_point}");
-        }
+    let base = RunSettings {
+        source: simulation_of_preset.into(),
+        ..settings_of_preset
     };
-    add("rows", &|simulation, _| simulation.scene.rows.to_string());
-    add("axes", &|simulation, _| simulation.scene.movement.to_string());
-    add("loading", &|simulation, _| simulation.scene.loading.to_string());
-    add("inputs", &|_, settings| settings.inputs.quantity.to_string());
-    add("scaling", &|_, settings| settings.inputs.scaling.to_string());
-    add("noise", &|simulation, _| {
-        format!("{:e}", simulation.scene.noise.relative)
-    });
-    add("noise-ohm", &|simulation, _| {
-        format!("{:e}", simulation.scene.noise.additive_ohm)
-    });
-    add("drift", &|simulation, _| format!("{:e}", simulation.scene.noise.drift));
-    add("adc-bits", &|simulation, _| {
-        simulation.scene.noise.converter_bits.unwrap_or(0).to_string()
-    });
-    add("noise-in", &|simulation, _| {
-        format!("{:?}", simulation.scene.noise.sets).to_lowercase()
-    });
-    add("samples", &|simulation, _| simulation.samples.to_string());
-    add("epochs", &|_, settings| settings.training.stopping.epochs.to_string());
-    add("seed", &|_, settings| settings.seed.to_string());
+    for (word, value) in changed_options(&point.settings, &base) {
+        // The array is named in any case, and hidden nodes below.
+        if !["array", "hidden"].contains(&&*word) {
+            command += &format!(" --{word} {value}");
+        }
+    }
     if let Some(hidden) = point.hidden() {
         command += &format!(" --hidden {hidden}");
     }

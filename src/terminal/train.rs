@@ -14,8 +14,8 @@ use super::{
     intervals::{WhenCalibrated, calibrate, note_unmonitored},
     output::{messages, progress_bar},
     samples::{announce, announce_recording, following, sets, working_folder},
+    settings_arguments::TrainingArguments,
     train_report::Trained,
-    training_arguments::TrainingArguments,
 };
 use decoupler_core::{
     decoupling::DecoderKind,
@@ -152,7 +152,7 @@ impl Train {
 
     /// Setup of a new run.
     fn setup(&self) -> Result<Setup, Failure> {
-        let source = self.import.source(self.training.scene.columns())?;
+        let source = self.import.source(&self.training.scene.columns())?;
         let setup = self.training.setup(source, self.import.holds_out())?;
         let mut settings = *setup.settings();
         if let (Some(path), Some(simulation)) = (&self.sensor, settings.simulation_mut()) {
@@ -189,7 +189,7 @@ impl Train {
         let fixed = AutoFixed {
             memory,
             tries_memory,
-            ..self.training.fixed(setup.settings())
+            ..self.training.fixed(setup.settings())?
         };
         let chosen = setup.choose(
             &fixed,

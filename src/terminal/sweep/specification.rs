@@ -21,7 +21,7 @@ use crate::terminal::{
     failure::{Failure, MAX_TRIALS, SpecificationError},
     import_arguments::ImportArguments,
     one_line,
-    training_arguments::TrainingArguments,
+    settings_arguments::TrainingArguments,
 };
 
 /// Maximum size of a specification file in bytes.
@@ -308,7 +308,7 @@ impl TrialArguments {
                 return Err(Failure::Arguments(message.to_owned()));
             }
             Some(recording) => Some(RecipeSource::Recording(self.import.divided(recording.clone())?)),
-            None => self.import.source(columns)?,
+            None => self.import.source(&columns)?,
         };
         let holds_out =
             self.import.holds_out() || recording.is_some_and(|plan| plan.division.validation_fraction > 0.0);
@@ -483,20 +483,20 @@ mod tests {
         let mut train = TrainOptions::new();
         let defaults = {
             let arguments = train.parse(&[]).unwrap().training;
-            train_options(&arguments.settings().unwrap(), &arguments.scene.decoders())
+            train_options(&arguments.settings(None).unwrap(), &arguments.scene.decoders())
         };
         for (option, value, with) in cases {
             let words: Vec<_> = [format!("--{option}={value}"), with.to_owned()].into();
             let words: Vec<_> = words.into_iter().filter(|word| !word.is_empty()).collect();
             let arguments = train.parse(&words).unwrap().training;
             let (settings, decoders) = (
-                arguments.settings().unwrap(),
+                arguments.settings(None).unwrap(),
                 decoders_in_order(&arguments.scene.decoders()),
             );
             let options = train_options(&settings, &decoders);
             assert_ne!(options, defaults, "{option}");
             let back = read_back(&options);
-            assert_eq!(back.settings().unwrap(), settings, "{option}");
+            assert_eq!(back.settings(None).unwrap(), settings, "{option}");
             assert_eq!(decoders_in_order(&back.scene.decoders()), decoders, "{option}");
         }
         let training = TrainingArguments::augment_args(Command::new("train"));

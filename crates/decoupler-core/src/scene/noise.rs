@@ -5,7 +5,10 @@ use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
 use super::SceneError;
-use crate::sensor::{RelativeNoise, SensorError, SensorModel};
+use crate::{
+    sensor::{RelativeNoise, SensorError, SensorModel},
+    text::Named,
+};
 
 /// Noise of the readings: Gaussian noise and the rounding of the converter.
 ///
@@ -38,6 +41,19 @@ pub enum NoisySets {
     Training,
     /// Test only: a network trained on noise-free readings is tested with noise.
     Test,
+}
+
+impl Named for NoisySets {
+    const WHAT: &'static str = "a choice of sets";
+    const ALL: &'static [Self] = &[Self::Both, Self::Training, Self::Test];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Both => "both",
+            Self::Training => "training",
+            Self::Test => "test",
+        }
+    }
 }
 
 /// Largest additive noise for which the squares of readings remain finite.

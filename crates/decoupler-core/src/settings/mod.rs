@@ -8,5 +8,5 @@ mod training;
 pub use method::{Damping, Method, RegularizationSettings};
 pub use rows::{Field, Kind, Setting, SettingError, Value};
 use training::METHOD;
-pub(crate) use training::MIN_MU;
 pub use training::{EPOCHS, StoppingRules, TrainingSettings};
+pub(crate) use training::{MIN_MU, STOPPING};

@@ -85,7 +85,7 @@ const COUNT: Kind = Kind::Integer(1, StoppingRules::MAX_EPOCHS as u64);
 const NOT_NEGATIVE: Kind = Kind::Number(0.0, f64::MAX);
 
 /// Rows of the rules that end a training.
-static STOPPING: &[Setting<StoppingRules>] = &[
+pub(crate) const STOPPING: [Setting<StoppingRules>; 4] = [
     EPOCHS,
     Setting::new(
         "goal",

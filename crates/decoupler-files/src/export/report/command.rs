@@ -5,8 +5,8 @@ use std::{fmt, path::Path};
 use crate::import::{DialectChoice, FileSet, Plan, Recipe, Setup};
 use decoupler_core::{
     dataset::{Division, Simulation, Span, SplitBy},
-    evaluation::RunSettings,
-    scene::{Loading, Movement, NoisySets, RowModel, Scene},
+    evaluation::{RUN_OPTIONS, RunSettings},
+    scene::{Loading, Movement, RowModel, Scene},
     sensor::SensorModel,
 };
 
@@ -28,33 +28,50 @@ impl fmt::Display for CommandGap {
 pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, CommandGap> {
     let settings = setup.settings();
     let mut command = Command("decoupler train".to_owned());
-    let default = match (settings.simulation(), setup.plan()) {
+    let mut usual = match (settings.simulation(), setup.plan()) {
         (Some(simulation), _) => {
-            let default = RunSettings::default();
             check_simulation(simulation)?;
-            command.simulation(simulation, settings, &default);
-            command.option("hidden", settings.hidden, default.hidden);
-            default
+            RunSettings::default()
         }
         (None, Some(plan)) => {
-            let default = RunSettings::measured(RowModel::Shared);
+            let usual = RunSettings::measured(RowModel::Shared);
             check([(
-                settings.inputs.quantity != default.inputs.quantity,
+                settings.inputs.quantity != usual.inputs.quantity,
                 "the quantity of the inputs",
             )])?;
             check_plan(plan, recipe)?;
             command.recording(plan, recipe, settings.validation_fraction());
-            if settings.source.row_model() == RowModel::Each {
-                command.add("rows", "known");
-            }
-            command.option("scaling", settings.inputs.scaling, default.inputs.scaling);
+            // Without it, settings are chosen.
             command.add("hidden", settings.hidden);
-            default
+            RunSettings {
+                hidden: settings.hidden,
+                ..usual
+            }
         }
         (None, None) => return Err(CommandGap(vec!["samples in memory"])),
     };
-    command.training(settings, &default);
+    let method = settings.training.method;
+    if method.short_name() != usual.training.method.short_name() {
+        command.add("method", method.short_name());
+        usual.choose_method(method.with_defaults());
+    }
+    for setting in method.settings() {
+        let [value, usual] = [method, usual.training.method].map(|method| setting.number(&method).unwrap_or(f64::NAN));
+        if value.to_bits() != usual.to_bits() {
+            command.add("set", format!("{}={value}", setting.word("-")));
+        }
+    }
+    changed_options(settings, &usual).for_each(|(word, value)| command.add(&word, value));
     Ok(command.0)
+}
+
+/// Options, with their values, in which `settings` differ from `usual`, except those of the method.
+pub fn changed_options(settings: &RunSettings, usual: &RunSettings) -> impl Iterator<Item = (String, String)> {
+    RUN_OPTIONS.iter().filter_map(|option| {
+        let setting = &option.setting;
+        let (value, usual) = (setting.get(settings)?, setting.get(usual));
+        (Some(&value) != usual.as_ref()).then(|| (setting.word("-"), value.to_string()))
+    })
 }
 
 /// Quotes a word for a POSIX shell.
@@ -116,43 +133,6 @@ struct Command(String);
 impl Command {
     fn add(&mut self, name: &str, value: impl fmt::Display) {
         self.0 += &format!(" --{name} {}", quoted(Path::new(&value.to_string())));
-    }
-
-    /// Adds an option unless it has its usual value.
-    fn option<T: PartialEq + fmt::Display>(&mut self, name: &str, value: T, usual: T) {
-        if value != usual {
-            self.add(name, value);
-        }
-    }
-
-    /// Adds the options of a simulated array.
-    fn simulation(&mut self, source: &Simulation, settings: &RunSettings, default: &RunSettings) {
-        let usual = &Simulation::default();
-        let (scene, noise) = (&source.scene, &source.scene.noise);
-        let array = |sensor: &SensorModel| sensor.scale.to_string().replace('×', "x");
-        self.option("array", array(&source.sensor), array(&usual.sensor));
-        self.option("rows", scene.rows, usual.scene.rows);
-        self.option("axes", scene.movement, usual.scene.movement);
-        self.option("loading", scene.loading, usual.scene.loading);
-        self.option("noise", noise.relative, 0.0);
-        self.option("noise-ohm", noise.additive_ohm, 0.0);
-        self.option("adc-bits", noise.converter_bits.unwrap_or(0), 0);
-        self.option("drift", noise.drift, 0.0);
-        let sets = match noise.sets {
-            NoisySets::Both => "both",
-            NoisySets::Training => "training",
-            NoisySets::Test => "test",
-        };
-        self.option("noise-in", sets, "both");
-        self.option("inputs", settings.inputs.quantity, default.inputs.quantity);
-        self.option("scaling", settings.inputs.scaling, default.inputs.scaling);
-        self.option("samples", source.samples, usual.samples);
-        self.option(
-            "validation-samples",
-            source.validation_samples,
-            usual.validation_samples,
-        );
-        self.option("test-samples", source.test_samples, usual.test_samples);
     }
 
     /// Adds the files of a recording, the meanings of their columns and the division of the samples, of which
@@ -255,35 +235,6 @@ impl Command {
         header.iter().for_each(|header| self.add("header", header));
         encoding.iter().for_each(|encoding| self.add("encoding", encoding));
         skip_lines.iter().for_each(|lines| self.add("skip-lines", lines));
-    }
-
-    /// Adds the options of the network and its training.
-    fn training(&mut self, settings: &RunSettings, default: &RunSettings) {
-        self.option("starts", settings.starts, default.starts);
-        self.option("begin", settings.initialization, default.initialization);
-        self.option("combine", settings.combine, default.combine);
-        let (method, usual_method) = (settings.training.method, default.training.method);
-        self.option("method", method.short_name(), usual_method.short_name());
-        // The default method of recordings has different settings.
-        let usual = if method.short_name() == usual_method.short_name() {
-            usual_method
-        } else {
-            method.with_defaults()
-        };
-        for setting in method.settings() {
-            let [value, usual] = [method, usual].map(|method| setting.number(&method).unwrap_or(f64::NAN));
-            if value.to_bits() != usual.to_bits() {
-                self.add("set", format!("{}={value}", setting.word("-")));
-            }
-        }
-        let mut usual = *default;
-        usual.choose_method(settings.training.method);
-        let (rules, usual) = (settings.training.stopping, usual.training.stopping);
-        self.option("epochs", rules.epochs, usual.epochs);
-        self.option("goal", rules.goal_mse, usual.goal_mse);
-        self.option("max-fail", rules.max_fail, usual.max_fail);
-        self.option("min-gradient", rules.min_gradient, usual.min_gradient);
-        self.option("seed", settings.seed.0, default.seed.0);
     }
 }
 

@@ -8,5 +8,5 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
-pub use command::{CommandGap, quoted, train_command};
+pub use command::{CommandGap, changed_options, quoted, train_command};
 pub use contents::RunReport;

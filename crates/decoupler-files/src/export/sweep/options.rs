@@ -1,11 +1,10 @@
 use decoupler_core::{
-    dataset::{Division, Simulation},
+    dataset::Division,
     decoupling::DecoderKind,
     evaluation::{
-        Combination, Initialization, RunSettings,
+        RUN_OPTIONS, RunOption, RunSettings,
         experiments::{Axis, AxisKind, Experiment},
     },
-    scene::{NoisySets, RowModel, Rows},
     settings,
     training::Method,
 };
@@ -111,41 +110,26 @@ pub fn decoders_in_order(decoders: &[DecoderKind]) -> Vec<DecoderKind> {
 /// Returns the options for exactly these settings and decoders, with every default written out: the same trial has the
 /// same options however it was specified. Options of a recording name no files.
 pub fn train_options(settings: &RunSettings, decoders: &[DecoderKind]) -> TrialOptions {
-    let training = &settings.training;
-    let rules = &training.stopping;
-    let mut options = TrialOptions::from([
-        ("scaling".to_owned(), text(&settings.inputs.scaling)),
-        ("decoder".to_owned(), decoders.iter().map(ToString::to_string).collect()),
-        ("hidden".to_owned(), Value::from(settings.hidden)),
-        ("starts".to_owned(), Value::from(settings.starts)),
-        ("method".to_owned(), Value::from(training.method.short_name())),
-        ("set".to_owned(), method_settings(training.method)),
-        ("epochs".to_owned(), Value::from(rules.epochs)),
-        ("goal".to_owned(), number(rules.goal_mse)),
-        ("max-fail".to_owned(), Value::from(rules.max_fail)),
-        ("min-gradient".to_owned(), number(rules.min_gradient)),
-        ("seed".to_owned(), Value::from(settings.seed.0)),
-    ]);
-    // Left out at their defaults, so that trials keep the names they had before these options existed.
-    if settings.combine != Combination::default() {
-        options.insert("combine".to_owned(), text(&settings.combine));
-    }
-    if settings.initialization != Initialization::default() {
-        options.insert("begin".to_owned(), text(&settings.initialization));
-    }
-    match settings.simulation() {
-        Some(source) => {
-            options.insert("inputs".to_owned(), text(&settings.inputs.quantity));
-            options.extend(simulation_options(source));
-        }
-        None => {
-            let rows = match settings.source.row_model() {
-                RowModel::Shared => Rows::All,
-                RowModel::Each => Rows::Known,
-            };
-            options.insert("rows".to_owned(), text(&rows));
-        }
-    }
+    let defaults = RunSettings::default();
+    let option = |option: &RunOption| {
+        let setting = &option.setting;
+        let value = setting.get(settings)?;
+        // Left out at their defaults, so that trials keep the names they had before these options existed.
+        let is_left_out = ["combine", "begin", "adc bits"].contains(&setting.name) && setting.get(&defaults)? == value;
+        let value = match &value {
+            settings::Value::Number(value) => number(*value),
+            settings::Value::Integer(value) => Value::from(*value),
+            // As a number, which it is.
+            settings::Value::Text(bits) if setting.name == "adc bits" => {
+                bits.parse::<u64>().map_or(Value::Null, Value::from)
+            }
+            settings::Value::Text(text) => Value::from(text.as_str()),
+        };
+        (!is_left_out).then(|| (setting.word("-"), value))
+    };
+    let mut options = TrialOptions::from_iter(RUN_OPTIONS.iter().filter_map(option));
+    options.insert("decoder".to_owned(), decoders.iter().map(ToString::to_string).collect());
+    options.insert("set".to_owned(), method_settings(settings.training.method));
     options
 }
 
@@ -175,32 +159,6 @@ pub fn recording_options(plan: &Plan, crc32: &[String]) -> TrialOptions {
         options.insert("test".to_owned(), serde_json::to_value(test).unwrap_or_default());
     }
     options
-}
-
-fn simulation_options(source: &Simulation) -> TrialOptions {
-    let scene = &source.scene;
-    let noise = &scene.noise;
-    let noisy_sets = match noise.sets {
-        NoisySets::Both => "both",
-        NoisySets::Training => "training",
-        NoisySets::Test => "test",
-    };
-    let options = [
-        ("array", Value::from(source.sensor.scale.to_string().replace('×', "x"))),
-        ("rows", text(&scene.rows)),
-        ("axes", text(&scene.movement)),
-        ("loading", text(&scene.loading)),
-        ("noise", number(noise.relative)),
-        ("noise-ohm", number(noise.additive_ohm)),
-        ("drift", number(noise.drift)),
-        ("noise-in", Value::from(noisy_sets)),
-        ("samples", Value::from(source.samples)),
-        ("test-samples", Value::from(source.test_samples)),
-        ("validation-samples", Value::from(source.validation_samples)),
-    ];
-    let bits = noise.converter_bits.map(|bits| ("adc-bits", Value::from(bits)));
-    let named = options.into_iter().chain(bits);
-    named.map(|(option, value)| (option.to_owned(), value)).collect()
 }
 
 /// Negative zero is written as zero.

@@ -1,0 +1,292 @@
+//! The table of settings of a run. Options of the terminal, checks of what is resumed, and printed commands are loops over it.
+
+use super::{MAX_STARTS, RunSettings, Source};
+use crate::{
+    dataset::{LARGEST_SAMPLES, Simulation},
+    network::LARGEST_HIDDEN,
+    scene::{Noise, RowModel, Rows},
+    sensor::{ArrayScale, SensorError, SensorModel},
+    settings::{Field, Kind, Method, STOPPING, Setting},
+};
+
+/// A setting of a run, as it is offered. Its option, or keyword, is the name with dashes, or underscores, for its spaces.
+#[derive(Clone, Copy, Debug)]
+pub struct RunOption {
+    /// Part of the settings to which it belongs.
+    pub part: Part,
+    /// Form of the value, for help.
+    pub form: &'static str,
+    /// Default in words; empty where it follows from a preset.
+    pub default: &'static str,
+    /// The row: explanation, allowed values, access.
+    pub setting: Setting<RunSettings>,
+}
+
+/// Part of the settings of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Sensor and numbers of samples of a simulated array.
+    Array,
+    /// Scene of a simulated array, and inputs of the network.
+    Scene,
+    /// Network.
+    Network,
+    /// Method and the rules that end a training, which may change when it is resumed.
+    Training,
+    /// What is drawn at random.
+    Random,
+}
+
+const SAMPLES: Kind = Kind::Integer(1, LARGEST_SAMPLES as u64);
+const NOISE: Kind = Kind::Number(0.0, f64::MAX);
+const HIDDEN: Kind = Kind::Integer(1, LARGEST_HIDDEN as u64);
+const STARTS: Kind = Kind::Integer(1, MAX_STARTS as u64);
+
+/// Settings of a run except those of its method, in the order in which they are offered and set.
+pub static RUN_OPTIONS: [RunOption; 24] = [
+    option(
+        Part::Array,
+        ("array", "SCALE", "10x10_5x30"),
+        Kind::Text,
+        "Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns.",
+        |run| {
+            let sensor = &mut run.simulation_mut()?.sensor;
+            let parse = |text: &str| Ok::<_, SensorError>(SensorModel::new(text.parse::<ArrayScale>()?));
+            Some(Field::text(sensor.scale.to_string().replace('×', "x"), sensor, parse))
+        },
+    ),
+    option(
+        Part::Scene,
+        ("rows", "all|known|N", ""),
+        Kind::Text,
+        "all: one network for every row; known: one network per row; N: only row N.",
+        rows,
+    ),
+    option(
+        Part::Scene,
+        ("axes", "z|xyz", ""),
+        Kind::Choice,
+        "Axes along which nodes move.",
+        |run| Some(Field::named(&mut run.simulation_mut()?.scene.movement)),
+    ),
+    option(
+        Part::Scene,
+        ("loading", "random|smooth:MM|indenter", ""),
+        Kind::Text,
+        "Loading: random nodes, a smooth random field with this correlation length, or an indenter (:sphere, :flat-punch, \
+         :cylinder, :edge).",
+        |run| {
+            let loading = &mut run.simulation_mut()?.scene.loading;
+            Some(Field::text(loading.to_string(), loading, str::parse))
+        },
+    ),
+    option(
+        Part::Scene,
+        ("inputs", "resistance|conductance|log", ""),
+        Kind::Choice,
+        "Quantity that the network reads; for a recording the columns, separated by commas.",
+        |run| {
+            run.simulation()?;
+            Some(Field::named(&mut run.inputs.quantity))
+        },
+    ),
+    option(
+        Part::Scene,
+        ("scaling", "minmax|whiten", ""),
+        Kind::Choice,
+        "Scaling of the inputs: each to its range, or whitened principal components.",
+        |run| Some(Field::named(&mut run.inputs.scaling)),
+    ),
+    option(
+        Part::Scene,
+        ("noise", "REL", "0"),
+        NOISE,
+        "Noise of each reading (standard deviation), relative to the reading.",
+        |run| Some(Field::Number(&mut noise(run)?.relative)),
+    ),
+    option(
+        Part::Scene,
+        ("noise ohm", "OHM", "0"),
+        NOISE,
+        "Noise of each reading (standard deviation) in ohm.",
+        |run| Some(Field::Number(&mut noise(run)?.additive_ohm)),
+    ),
+    option(
+        Part::Scene,
+        ("adc bits", "N", "no rounding"),
+        Kind::Text,
+        "Resolution of the analogue-to-digital converter, in bits.",
+        |run| {
+            let bits = &mut noise(run)?.converter_bits;
+            let text = bits.map_or(String::new(), |bits| bits.to_string());
+            Some(Field::text(text, bits, |text| {
+                let bits = text.parse().ok().filter(|bits| (1..=Noise::MAX_BITS).contains(bits));
+                bits.map(Some)
+                    .ok_or(format!("give a whole number from 1 to {}", Noise::MAX_BITS))
+            }))
+        },
+    ),
+    option(
+        Part::Scene,
+        ("drift", "REL", "0"),
+        NOISE,
+        "Gain error shared by all readings of a snapshot, e.g. from temperature (standard deviation, relative).",
+        |run| Some(Field::Number(&mut noise(run)?.drift)),
+    ),
+    option(
+        Part::Scene,
+        ("noise in", "both|training|test", "both"),
+        Kind::Choice,
+        "Samples to which noise is added.",
+        |run| Some(Field::named(&mut noise(run)?.sets)),
+    ),
+    option(
+        Part::Array,
+        ("samples", "N", "1000"),
+        SAMPLES,
+        "Training samples; this and the next two are rounded up to whole snapshots of all rows.",
+        |run| Some(Field::Count(&mut run.simulation_mut()?.samples)),
+    ),
+    option(
+        Part::Array,
+        ("test samples", "N", "100"),
+        SAMPLES,
+        "Test samples, on which the printed errors are measured.",
+        |run| Some(Field::Count(&mut run.simulation_mut()?.test_samples)),
+    ),
+    option(
+        Part::Array,
+        ("validation samples", "N", "200"),
+        Kind::Integer(0, LARGEST_SAMPLES as u64),
+        "Validation samples, which select the best weights and end the training; 0 for none.",
+        |run| Some(Field::Count(&mut run.simulation_mut()?.validation_samples)),
+    ),
+    option(Part::Network, ("hidden", "N", "12"), HIDDEN, "Hidden nodes.", |run| {
+        Some(Field::Count(&mut run.hidden))
+    }),
+    option(
+        Part::Network,
+        ("starts", "N", "1"),
+        STARTS,
+        "Number of trainings from different random weights, which --combine makes one network.",
+        |run| Some(Field::Count(&mut run.starts)),
+    ),
+    option(
+        Part::Network,
+        ("combine", "best|mean", "best"),
+        Kind::Choice,
+        "How several starts become one network: best keeps the one with the lowest validation error, mean averages their \
+         answers.",
+        |run| Some(Field::named(&mut run.combine)),
+    ),
+    option(
+        Part::Network,
+        ("begin", "random|ridge", "random"),
+        Kind::Choice,
+        "Weights with which a training begins: random, or ridge regression with random weights added.",
+        |run| Some(Field::named(&mut run.initialization)),
+    ),
+    option(
+        Part::Training,
+        ("method", "METHOD", "lm; br for a recording"),
+        Kind::Choice,
+        "Training method.",
+        |run| {
+            let current = run.training.method.short_name();
+            Some(Field::Text(
+                current.to_owned(),
+                Box::new(move |text| {
+                    let method = Method::named(text).map_err(|error| error.to_string())?;
+                    // The current settings of the method are those that suit the samples.
+                    if method.short_name() != current {
+                        run.choose_method(method);
+                    }
+                    Ok(())
+                }),
+            ))
+        },
+    ),
+    option(
+        Part::Training,
+        (
+            "epochs",
+            "N",
+            "1000; for a recording 300, or 2000 with a method that follows gradients (scg, rp, gd…)",
+        ),
+        STOPPING[0].kind,
+        STOPPING[0].help,
+        |run| (STOPPING[0].field)(&mut run.training.stopping),
+    ),
+    option(
+        Part::Training,
+        ("goal", "MSE", "0"),
+        STOPPING[1].kind,
+        STOPPING[1].help,
+        |run| (STOPPING[1].field)(&mut run.training.stopping),
+    ),
+    option(
+        Part::Training,
+        ("min gradient", "LENGTH", "1e-7"),
+        STOPPING[2].kind,
+        STOPPING[2].help,
+        |run| (STOPPING[2].field)(&mut run.training.stopping),
+    ),
+    option(
+        Part::Training,
+        (
+            "max fail",
+            "N",
+            "6; 100 for a recording with a method that follows gradients",
+        ),
+        STOPPING[3].kind,
+        STOPPING[3].help,
+        |run| (STOPPING[3].field)(&mut run.training.stopping),
+    ),
+    option(
+        Part::Random,
+        ("seed", "N", "0"),
+        Kind::Integer(0, u64::MAX),
+        "Seed of all random numbers.",
+        |run| Some(Field::Integer(&mut run.seed.0)),
+    ),
+];
+
+const fn option(
+    part: Part,
+    (name, form, default): (&'static str, &'static str, &'static str),
+    kind: Kind,
+    help: &'static str,
+    field: fn(&mut RunSettings) -> Option<Field<'_>>,
+) -> RunOption {
+    RunOption {
+        part,
+        form,
+        default,
+        setting: Setting::new(name, kind, help, field),
+    }
+}
+
+fn noise(run: &mut RunSettings) -> Option<&mut Noise> {
+    Some(&mut run.simulation_mut()?.scene.noise)
+}
+
+/// Rows that are read; of a recording, one network for all or one for each.
+fn rows(run: &mut RunSettings) -> Option<Field<'_>> {
+    match &mut run.source {
+        Source::Simulated(Simulation { scene, .. }) => {
+            Some(Field::text(scene.rows.to_string(), &mut scene.rows, str::parse))
+        }
+        Source::Measured { rows } => {
+            let text = match rows {
+                RowModel::Shared => Rows::All,
+                RowModel::Each => Rows::Known,
+            };
+            Some(Field::text(text.to_string(), rows, |text| match text.parse() {
+                Ok(Rows::All) => Ok(RowModel::Shared),
+                Ok(Rows::Known) => Ok(RowModel::Each),
+                Ok(Rows::One(_)) => Err("choose one row of a recording with --where, for example \"row=3\"".to_owned()),
+                Err(error) => Err(error.to_string()),
+            }))
+        }
+    }
+}
