@@ -9,9 +9,11 @@ use super::{
     camera::{OrbitCamera, PlotBox, Projection},
     cut::{Edge, GAP, SHORTEST_AXIS, TICK},
     drawing::Labels,
-    nodes::{Bounds, Ink, Line},
 };
-use crate::figure::axis::{multiples, round_steps, tick_text};
+use crate::figure::{
+    axis::{multiples, round_steps, tick_text},
+    drawing::{Bounds, Ink, Measure, Shape, Stroke},
+};
 
 /// A laid-out box.
 pub(super) struct BoxAxes<'a> {
@@ -25,7 +27,7 @@ impl<'a> BoxAxes<'a> {
     /// Fits the box and its labels into `card`; `z_range` is the range of the z axis; the box extends slightly beyond
     /// it.
     pub(super) fn new(
-        measure: &'a dyn Fn(&str) -> Vec2,
+        measure: Measure<'a>,
         card: Bounds,
         plot_box: PlotBox,
         camera: OrbitCamera,
@@ -58,7 +60,7 @@ impl<'a> BoxAxes<'a> {
     }
 
     fn lay_out(
-        measure: &'a dyn Fn(&str) -> Vec2,
+        measure: Measure<'a>,
         plot_box: PlotBox,
         camera: OrbitCamera,
         target: Bounds,
@@ -123,12 +125,12 @@ impl<'a> BoxAxes<'a> {
     }
 
     /// Returns everything behind the surface.
-    pub(super) fn lines(&self) -> Vec<Line> {
+    pub(super) fn lines(&self) -> Vec<Shape> {
         let plot_box = self.projection.plot_box;
         let mut lines = Vec::new();
         let mut segment = |from: DVec3, to: DVec3, ink: Ink| {
             let [from, to] = [from, to].map(|place| self.projection.point(place));
-            lines.push(Line { from, to, ink });
+            lines.push(Shape::line(from, to, ink, 1.0));
         };
         let (low, high) = (plot_box.min_mm, plot_box.max_mm);
         let back = plot_box.corner_mm(self.back[0], self.back[1], 0);
@@ -161,12 +163,7 @@ impl<'a> BoxAxes<'a> {
         for edge in &self.edges {
             for &value in &edge.ticks {
                 let from = edge.point(&self.projection, value);
-                let to = from + edge.away * TICK;
-                lines.push(Line {
-                    from,
-                    to,
-                    ink: Ink::Edge,
-                });
+                lines.push(Shape::line(from, from + edge.away * TICK, Ink::Edge, 1.0));
             }
         }
         lines
@@ -184,13 +181,7 @@ pub(super) struct PlanAxes<'a> {
 
 impl<'a> PlanAxes<'a> {
     /// Fits the rectangle `min_mm..max_mm` and its labels into `card`.
-    pub(super) fn new(
-        measure: &'a dyn Fn(&str) -> Vec2,
-        card: Bounds,
-        min_mm: DVec2,
-        max_mm: DVec2,
-        names: [&str; 2],
-    ) -> Self {
+    pub(super) fn new(measure: Measure<'a>, card: Bounds, min_mm: DVec2, max_mm: DVec2, names: [&str; 2]) -> Self {
         let labels = Labels::new(measure);
         let size_mm = max_mm - min_mm;
         let line = labels.size("0").y;
@@ -257,33 +248,18 @@ impl<'a> PlanAxes<'a> {
     }
 
     /// The outline with its ticks.
-    pub(super) fn lines(&self) -> Vec<Line> {
-        let line = |from: Vec2, to: Vec2| Line {
-            from,
-            to,
-            ink: Ink::Edge,
-        };
+    pub(super) fn lines(&self) -> Vec<Shape> {
         // Drawn around the outermost cells, not over them.
-        let Bounds { min, max } = self.frame.grown(0.5);
-        let (right_top, left_bottom) = (Vec2::new(max.x, min.y), Vec2::new(min.x, max.y));
-        let outline = [
-            line(min, right_top),
-            line(right_top, max),
-            line(max, left_bottom),
-            line(left_bottom, min),
-        ];
+        let outline = self.frame.grown(0.5).outline(Stroke::new(Ink::Edge, 1.0));
         let ticks = self.marks([1.0; 2]).into_iter();
-        outline
-            .into_iter()
-            .chain(ticks.map(|(from, away, _)| line(from, from + away * TICK)))
-            .collect()
+        let ticks = ticks.map(|(from, away, _)| Shape::line(from, from + away * TICK, Ink::Edge, 1.0));
+        std::iter::once(outline).chain(ticks).collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::surface::nodes::Text;
 
     #[test]
     fn labels_do_not_overlap_or_leave_the_card() {
@@ -303,12 +279,12 @@ mod tests {
                     let names = ["x (mm)", "y (mm)", "error (mm)"];
                     let axes = BoxAxes::new(&measure, card, plot_box, camera, &(4.0..=5.0), names);
                     let covered = axes.projection.bounds().size() / size;
-                    let texts = axes.labels.into_texts();
+                    let texts: Vec<Bounds> = axes.labels.bounds_of_each().collect();
                     assert!(texts.len() >= 5, "{camera:?}");
-                    for (index, Text { bounds, .. }) in texts.iter().enumerate() {
+                    for (index, bounds) in texts.iter().enumerate() {
                         let beyond = (card.min - bounds.min).max(bounds.max - card.max).max_element();
                         assert!(beyond < 4.0, "{bounds:?} of {card:?}, {camera:?}");
-                        let overlaps = |other: &Text| other.bounds.intersects(bounds);
+                        let overlaps = |other: &Bounds| other.intersects(bounds);
                         assert!(!texts[..index].iter().any(overlaps), "{camera:?}");
                     }
                     assert!(covered.max_element() > 0.5, "{covered} of {size:?}");

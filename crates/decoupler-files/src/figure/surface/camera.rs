@@ -3,7 +3,8 @@
 use glam::{DVec2, DVec3, Mat4, Vec2, Vec3, camera::rh};
 use serde::{Deserialize, Serialize};
 
-use super::{box_axes::PlanAxes, nodes::Bounds};
+use super::box_axes::PlanAxes;
+use crate::figure::drawing::Bounds;
 
 const RADIANS_PER_POINT: f32 = 0.008;
 const RADIANS_PER_KEY: f32 = 0.1;

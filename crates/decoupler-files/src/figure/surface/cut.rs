@@ -4,7 +4,7 @@
 use std::ops::RangeInclusive;
 
 use decoupler_core::surface::Grid;
-use glam::{DVec2, DVec3, Vec2};
+use glam::{DVec3, Vec2};
 
 use super::{
     Surface,
@@ -12,7 +12,11 @@ use super::{
     drawing::Labels,
     field::Field,
 };
-use crate::figure::axis::{multiples, round_steps, tick_text};
+use crate::figure::{
+    Hue,
+    axis::{multiples, round_steps, tick_text},
+    drawing::{Ink, Shape, Stroke},
+};
 
 /// A corner of a cut polygon: its place, and its share of each corner of the cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -291,16 +295,22 @@ impl Section {
         points.collect()
     }
 
-    /// Returns the curve on the screen, along the surface as it is drawn: in several pieces if it has gaps or is
-    /// clipped at the box of the axes.
-    pub fn pieces(&self, surface: &Surface, sight: &Sight) -> Vec<Vec<DVec2>> {
+    /// Returns the curve along the surface as it is drawn: in several pieces if it has gaps or is clipped at the box of the
+    /// axes.
+    pub fn shapes(&self, surface: &Surface, sight: &Sight) -> Vec<Shape> {
         let field = Field::new(surface);
         let curve = self.curve_mm(field.grid, field.values);
         let drawn: Vec<Option<DVec3>> = curve.into_iter().map(|place| field.drawn_at(place)).collect();
         let pieces = drawn.split(Option::is_none).filter(|piece| piece.len() > 1);
-        pieces
-            .map(|piece| piece.iter().flatten().map(|place| sight.point(*place)).collect())
-            .collect()
+        let shapes = pieces.flat_map(|piece| {
+            let points: Vec<Vec2> = piece.iter().flatten().map(|at| sight.point(*at).as_vec2()).collect();
+            let strokes = [
+                Stroke::new(Ink::Ground.at(0.7), 3.5),
+                Stroke::new(Ink::Hue(Hue::Orange), 1.8),
+            ];
+            strokes.map(|stroke| Shape::Line(points.clone(), stroke))
+        });
+        shapes.collect()
     }
 }
 
@@ -329,7 +339,8 @@ mod tests {
     use glam::Vec2;
 
     use super::*;
-    use crate::figure::surface::{Bounds, Card, Drawing, OrbitCamera, Quantity, Surface, ViewMode};
+    use crate::figure::drawing::Bounds;
+    use crate::figure::surface::{Card, Drawing, OrbitCamera, Quantity, Surface, ViewMode};
 
     fn area(polygon: &[CutCorner]) -> f64 {
         let flat = |at: usize| polygon[at % polygon.len()].place.truncate();

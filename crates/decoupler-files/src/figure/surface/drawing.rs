@@ -9,9 +9,12 @@ use super::{
     camera::{OrbitCamera, PlotBox, Projection, Sight},
     field::Field,
     mesh::Mesh,
-    nodes::{Bounds, Dots, Line, Text},
+    nodes::Dots,
 };
-use crate::figure::colour_map::ColourMap;
+use crate::figure::{
+    colour_map::ColourMap,
+    drawing::{Align, Bounds, Ink, Measure, Shape},
+};
 
 /// Usual size of the labels of a box, in points.
 const LABELS: Vec2 = Vec2::new(72.0, 56.0);
@@ -23,7 +26,7 @@ pub struct Card<'a> {
     /// The space to fill.
     pub bounds: Bounds,
     /// Returns the size of a text.
-    pub measure: &'a dyn Fn(&str) -> Vec2,
+    pub measure: Measure<'a>,
     /// The colours of the values.
     pub colours: &'a ColourMap,
 }
@@ -31,10 +34,8 @@ pub struct Card<'a> {
 /// A laid-out surface, in the order of painting.
 #[derive(Clone, Debug)]
 pub struct Drawing {
-    /// The frame with its ticks.
-    pub lines: Vec<Line>,
-    /// Numbers and names of the axes.
-    pub texts: Vec<Text>,
+    /// The frame with its ticks, numbers and names.
+    pub frame: Vec<Shape>,
     /// The surface.
     pub mesh: Mesh,
     /// The nodes.
@@ -53,7 +54,7 @@ impl Surface {
         let names = ["x (mm)", "y (mm)", &*value_name];
         let (min_mm, max_mm) = field.box_mm();
         let inner = card.bounds.grown(-EDGE);
-        let (lines, labels, (mesh, dots), sight) = match self.mode {
+        let (mut frame, labels, (mesh, dots), sight) = match self.mode {
             ViewMode::ThreeD => {
                 let [width, height] = (card.bounds.size() - LABELS).max(Vec2::ONE).into();
                 let plot_box = PlotBox::new(min_mm, max_mm, height / width);
@@ -70,10 +71,10 @@ impl Surface {
                 (axes.lines(), axes.labels, painted, sight)
             }
         };
+        frame.extend(labels.shapes());
         Drawing {
             note: note(mesh.has_plateau, dots.beyond()),
-            lines,
-            texts: labels.into_texts(),
+            frame,
             mesh,
             dots,
             sight,
@@ -133,12 +134,12 @@ const CLEARANCE: f32 = 4.0;
 
 /// The labels of one plot, in the order in which they were placed.
 pub(super) struct Labels<'a> {
-    measure: &'a dyn Fn(&str) -> Vec2,
-    placed: Vec<Text>,
+    measure: Measure<'a>,
+    placed: Vec<(Bounds, String)>,
 }
 
 impl<'a> Labels<'a> {
-    pub(super) fn new(measure: &'a dyn Fn(&str) -> Vec2) -> Self {
+    pub(super) fn new(measure: Measure<'a>) -> Self {
         Self {
             measure,
             placed: Vec::new(),
@@ -159,12 +160,11 @@ impl<'a> Labels<'a> {
         let mut slid = 0.0;
         while slid <= slide {
             let bounds = Bounds::centred(anchor + away * (gap + reach + slid), size);
-            let is_free = |other: &Text| !other.bounds.grown(CLEARANCE).intersects(&bounds);
-            if self.placed.iter().all(is_free) {
-                self.placed.push(Text {
-                    bounds,
-                    text: text.to_owned(),
-                });
+            if self
+                .bounds_of_each()
+                .all(|other| !other.grown(CLEARANCE).intersects(&bounds))
+            {
+                self.placed.push((bounds, text.to_owned()));
                 return true;
             }
             slid += 4.0;
@@ -172,13 +172,17 @@ impl<'a> Labels<'a> {
         false
     }
 
-    /// Returns the bounding rectangle of all labels.
-    pub(super) fn bounds(&self) -> Bounds {
-        let all = self.placed.iter().map(|label| label.bounds);
-        all.fold(Bounds::NOTHING, Bounds::union)
+    pub(super) fn bounds_of_each(&self) -> impl Iterator<Item = Bounds> {
+        self.placed.iter().map(|(bounds, _)| *bounds)
     }
 
-    pub(super) fn into_texts(self) -> Vec<Text> {
-        self.placed
+    /// Returns the bounding rectangle of all labels.
+    pub(super) fn bounds(&self) -> Bounds {
+        self.bounds_of_each().fold(Bounds::NOTHING, Bounds::union)
+    }
+
+    fn shapes(self) -> impl Iterator<Item = Shape> {
+        let texts = self.placed.into_iter();
+        texts.map(|(bounds, text)| Shape::text(bounds.middle(), Align::Middle, Ink::Label, text))
     }
 }

@@ -13,6 +13,7 @@ use super::{
 use crate::figure::{
     axis::{multiples, step_for},
     colour_map::{ColourMap, Rgb, is_light},
+    drawing::{Ink, Shape},
 };
 
 const CONTOUR_LEVELS: usize = 10;
@@ -198,6 +199,23 @@ impl Mesh {
             .map(|(start, end)| (&self.cells[start[0]..end[0]], &self.lines[start[1]..end[1]]))
     }
 
+    /// Returns the cells, each in the mean colour of its corners, and the contour lines, from far to near.
+    pub fn shapes(&self) -> impl Iterator<Item = Shape> {
+        let cell = |cell: &u32| {
+            let corners = self.corners(*cell).map(|corner| self.vertices[corner]);
+            let part = |part: usize| corners.iter().map(|corner| u16::from(corner.colour[part])).sum::<u16>() / 4;
+            let colour = Ink::Rgb([0, 1, 2].map(|at| part(at) as u8));
+            let opacity = corners.iter().map(|corner| corner.opacity).sum::<f32>() / 4.0;
+            Shape::Area(corners.map(|corner| corner.at).into(), colour.at(opacity))
+        };
+        let line = |line: &ContourLine| {
+            let ink = if line.is_black { Ink::BLACK } else { Ink::WHITE };
+            Shape::line(line.from, line.to, ink.at(line.opacity), 1.0)
+        };
+        let strips = self.strips();
+        strips.flat_map(move |(cells, lines)| cells.iter().map(cell).chain(lines.iter().map(line)))
+    }
+
     /// Number of cells and of contour lines.
     pub fn counts(&self) -> [usize; 2] {
         [self.cells.len(), self.lines.len()]
@@ -294,8 +312,9 @@ mod tests {
     use decoupler_core::surface::SurfaceMap;
 
     use super::*;
+    use crate::figure::drawing::Bounds;
     use crate::figure::surface::{
-        Bounds, OrbitCamera, Quantity, Surface, ViewMode,
+        OrbitCamera, Quantity, Surface, ViewMode,
         camera::{PlotBox, Projection},
     };
 

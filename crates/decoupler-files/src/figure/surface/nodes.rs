@@ -1,10 +1,13 @@
-//! The nodes as dots on the surface, picking of nodes with the pointer, and the shapes of a drawing. Lengths are
-//! points, y counts downwards.
+//! The nodes as dots on the surface, and picking of nodes with the pointer.
 
 use decoupler_core::surface::Grid;
 use glam::{DVec3, Vec2};
 
 use super::{drawing::Projector, field::Field};
+use crate::figure::{
+    Hue,
+    drawing::{Bounds, Ink, Shape},
+};
 
 /// Distance within which the pointer selects a node, in points.
 const REACH: f32 = 10.0;
@@ -72,47 +75,36 @@ impl Dots {
         self.dots.get(node).copied().flatten().map(|dot| dot.at)
     }
 
-    /// Returns the discs in the order of painting, with rings around the nodes `lit` and a mark around one node.
-    pub fn discs<'a>(&'a self, marked: Option<usize>, lit: &'a [usize]) -> impl Iterator<Item = Disc> + 'a {
-        let radius = self.radius();
-        let drawn = self.dots.iter().flatten().filter(move |_| radius > 0.0);
-        let dots = drawn.flat_map(move |dot| {
-            let opacity = if dot.is_hidden { HIDDEN_OPACITY } else { 1.0 };
-            let ink = if dot.is_beyond { Ink::Warning } else { Ink::Node };
-            [(Ink::Rim, radius + 0.75, 0.45 * opacity), (ink, radius, opacity)].map(|(ink, radius, opacity)| Disc {
-                at: dot.at,
-                radius,
-                ring: None,
-                ink,
-                opacity,
-            })
-        });
-        let lit = lit.iter().filter_map(|&node| self.position(node));
-        let rings = lit.flat_map(|at| {
-            [(Ink::Ground, 2.5, 0.8), (Ink::Accent, 1.5, 1.0)].map(|(ink, width, opacity)| Disc {
-                at,
-                radius: 4.5,
-                ring: Some(width),
-                ink,
-                opacity,
-            })
-        });
-        let marked = marked.and_then(|node| self.position(node)).into_iter();
-        let mark = marked.flat_map(|at| {
-            [
-                (Ink::Accent, 3.0, None, 1.0),
-                (Ink::Ground, 6.5, Some(3.5), 0.8),
-                (Ink::Text, 6.5, Some(1.5), 1.0),
-            ]
-            .map(|(ink, radius, ring, opacity)| Disc {
+    /// Returns the dots in the order of painting, with rings around the nodes `lit` and a mark around one node.
+    pub fn shapes(&self, marked: Option<usize>, lit: &[usize]) -> Vec<Shape> {
+        let mut shapes = Vec::new();
+        let mut circle = |at, radius, ring, ink: Ink, opacity| {
+            let colour = ink.at(opacity);
+            shapes.push(Shape::Circle {
                 at,
                 radius,
                 ring,
-                ink,
-                opacity,
-            })
-        });
-        dots.chain(rings).chain(mark)
+                colour,
+            });
+        };
+        let (accent, warning) = (Ink::Hue(Hue::Blue), Ink::Hue(Hue::Orange));
+        let radius = self.radius();
+        for dot in self.dots.iter().flatten().filter(|_| radius > 0.0) {
+            let opacity = if dot.is_hidden { HIDDEN_OPACITY } else { 1.0 };
+            let ink = if dot.is_beyond { warning } else { Ink::WHITE };
+            circle(dot.at, radius + 0.75, None, Ink::BLACK, 0.45 * opacity);
+            circle(dot.at, radius, None, ink, opacity);
+        }
+        for at in lit.iter().filter_map(|&node| self.position(node)) {
+            circle(at, 4.5, Some(2.5), Ink::Ground, 0.8);
+            circle(at, 4.5, Some(1.5), accent, 1.0);
+        }
+        if let Some(at) = marked.and_then(|node| self.position(node)) {
+            circle(at, 3.0, None, accent, 1.0);
+            circle(at, 6.5, Some(3.5), Ink::Ground, 0.8);
+            circle(at, 6.5, Some(1.5), Ink::Hue(Hue::Ink), 1.0);
+        }
+        shapes
     }
 
     /// Dots shrink if there are many of them, and disappear if they would cover the surface.
@@ -161,124 +153,6 @@ fn line_of_sight(node: DVec3, sight: DVec3, grid: &Grid) -> impl Iterator<Item =
     (3..)
         .map(move |count| node + sight * (step * f64::from(count)))
         .map_while(move |place| Some((place, grid.index(cell(x_mm, place.x)?, cell(y_mm, place.y)?))))
-}
-
-/// Role of a colour, which each renderer resolves by its palette.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Ink {
-    /// Grid lines.
-    Grid,
-    /// Outlines and ticks.
-    Edge,
-    /// Numbers and names of axes.
-    Label,
-    /// The colour of text.
-    Text,
-    /// The background of the card.
-    Ground,
-    /// A node.
-    Node,
-    /// The dark rim of a node.
-    Rim,
-    /// A node beyond the axes.
-    Warning,
-    /// The node that is marked.
-    Accent,
-}
-
-/// A straight line, one point wide.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line {
-    /// First end.
-    pub from: Vec2,
-    /// Second end.
-    pub to: Vec2,
-    /// Its colour.
-    pub ink: Ink,
-}
-
-/// A line of text.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Text {
-    /// The rectangle in whose middle the text is.
-    pub bounds: Bounds,
-    /// The text.
-    pub text: String,
-}
-
-/// A filled circle or a ring.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Disc {
-    /// Its centre.
-    pub at: Vec2,
-    /// Its radius; of a ring, in the middle of its line.
-    pub radius: f32,
-    /// Width of the line of a ring; `None` for a filled disc.
-    pub ring: Option<f32>,
-    /// Its colour.
-    pub ink: Ink,
-    /// 1 is opaque.
-    pub opacity: f32,
-}
-
-/// A rectangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// Its upper left corner.
-    pub min: Vec2,
-    /// Its lower right corner.
-    pub max: Vec2,
-}
-
-impl Bounds {
-    /// An empty rectangle.
-    pub(super) const NOTHING: Self = Self {
-        min: Vec2::INFINITY,
-        max: Vec2::NEG_INFINITY,
-    };
-
-    pub(super) fn centred(middle: Vec2, size: Vec2) -> Self {
-        Self {
-            min: middle - 0.5 * size,
-            max: middle + 0.5 * size,
-        }
-    }
-
-    /// Returns the bounding rectangle of all points.
-    pub(super) fn of(points: impl IntoIterator<Item = Vec2>) -> Self {
-        points.into_iter().fold(Self::NOTHING, |bounds, point| Self {
-            min: bounds.min.min(point),
-            max: bounds.max.max(point),
-        })
-    }
-
-    pub(super) fn union(self, other: Self) -> Self {
-        Self {
-            min: self.min.min(other.min),
-            max: self.max.max(other.max),
-        }
-    }
-
-    pub(super) fn grown(self, by: f32) -> Self {
-        Self {
-            min: self.min - by,
-            max: self.max + by,
-        }
-    }
-
-    pub(super) fn intersects(&self, other: &Self) -> bool {
-        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
-    }
-
-    /// Width and height.
-    pub fn size(&self) -> Vec2 {
-        self.max - self.min
-    }
-
-    /// The centre.
-    pub fn middle(&self) -> Vec2 {
-        0.5 * (self.min + self.max)
-    }
 }
 
 #[cfg(test)]

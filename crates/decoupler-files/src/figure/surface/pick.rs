@@ -120,8 +120,8 @@ mod tests {
 
     use super::*;
     use crate::figure::{
-        SequentialMap,
-        surface::{Bounds, Card, OrbitCamera, Quantity, Sight, ViewMode},
+        Bounds, SequentialMap,
+        surface::{Card, OrbitCamera, Quantity, Sight, ViewMode},
     };
     use decoupler_core::surface::SurfaceMap;
 
