@@ -117,8 +117,8 @@ fn mesh(drawn: &surface::Mesh) -> Mesh {
         mesh.colored_vertex(to_egui(vertex.at), colour);
     }
     for (cells, lines) in drawn.strips() {
-        for &cell in cells {
-            let [a, b, c, d] = drawn.corners(cell).map(|corner| corner as u32);
+        for cell in cells {
+            let [a, b, c, d] = cell.map(|corner| corner as u32);
             mesh.add_triangle(a, b, c);
             mesh.add_triangle(a, c, d);
         }

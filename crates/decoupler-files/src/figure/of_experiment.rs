@@ -320,7 +320,11 @@ mod tests {
                 .collect::<Vec<_>>()
         };
         let hidden = plots_of(PaperTable::HiddenNodes);
-        assert_eq!(keys(&hidden), ["published"], "there are no other results yet");
+        assert_eq!(
+            keys(&hidden),
+            ["published", "Eq. (12)"],
+            "there are no other results yet"
+        );
         assert_eq!(hidden.plots[0].series[0].points[3], PlotPoint::from([12.0, 2.28]));
         let repeats = plots_of(PaperTable::CrossValidation);
         assert_eq!(keys(&repeats), ["1000 samples", "100 samples"]);

@@ -123,10 +123,7 @@ fn a_steep_surface_ends_along_the_ends_of_the_axis() {
     let mut area = 0.0;
     let (mut left, mut right) = (f64::MAX, f64::MIN);
     for cell in drawing.mesh.strips().flat_map(|(cells, _)| cells) {
-        let corners = drawing
-            .mesh
-            .corners(*cell)
-            .map(|corner| drawing.mesh.vertices[corner].at.as_dvec2());
+        let corners = cell.map(|corner| drawing.mesh.vertices[corner].at.as_dvec2());
         for corner in corners {
             let x_mm = (corner.x - f64::from(x_at(0))) / points_per_mm;
             (left, right) = (left.min(x_mm), right.max(x_mm));
@@ -178,7 +175,7 @@ fn beyond_the_axis_a_surface_is_a_marked_plateau_and_a_map_has_no_holes() {
         let cells = drawing.mesh.strips().flat_map(|(cells, _)| cells);
         // Corners beyond the grid belong to cut cells.
         let corners = cells
-            .flat_map(|cell| drawing.mesh.corners(*cell))
+            .flat_map(|cell| *cell)
             .filter(|corner| surface.values.get(*corner).is_some_and(|height| *height > 5.08 + 1e-12));
         let across = grid.y_mm().len();
         let off_the_edge = corners.map(|corner| {

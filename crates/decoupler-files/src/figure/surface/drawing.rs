@@ -1,12 +1,12 @@
 //! A surface laid out in a card, ready to be painted, and the placing of labels without overlap.
 
 use decoupler_core::text::counted;
-use glam::{DVec3, Vec2};
+use glam::Vec2;
 
 use super::{
     Surface, ViewMode,
-    box_axes::{BoxAxes, PlanAxes},
-    camera::{OrbitCamera, PlotBox, Projection, Sight},
+    box_axes::Axes,
+    camera::{OrbitCamera, PlotBox, Sight},
     field::Field,
     mesh::Mesh,
     nodes::Dots,
@@ -54,24 +54,21 @@ impl Surface {
         let names = ["x (mm)", "y (mm)", &*value_name];
         let (min_mm, max_mm) = field.box_mm();
         let inner = card.bounds.grown(-EDGE);
-        let (mut frame, labels, (mesh, dots), sight) = match self.mode {
+        let (plot_box, camera) = match self.mode {
             ViewMode::ThreeD => {
                 let [width, height] = (card.bounds.size() - LABELS).max(Vec2::ONE).into();
-                let plot_box = PlotBox::new(min_mm, max_mm, height / width);
-                let axes = BoxAxes::new(card.measure, inner, plot_box, camera, &field.range, names);
-                let painted = self.paint(&field, &Projector::Space(&axes.projection), card);
-                let sight = Sight::of_projection(&axes.projection);
-                (axes.lines(), axes.labels, painted, sight)
+                (PlotBox::new(min_mm, max_mm, height / width), Some(camera))
             }
-            ViewMode::Top => {
-                let names = [names[0], names[1]];
-                let axes = PlanAxes::new(card.measure, inner, min_mm.truncate(), max_mm.truncate(), names);
-                let painted = self.paint(&field, &Projector::Plan(&axes), card);
-                let sight = Sight::of_plan(&axes);
-                (axes.lines(), axes.labels, painted, sight)
-            }
+            ViewMode::Top => (PlotBox::flat(min_mm, max_mm), None),
         };
-        frame.extend(labels.shapes());
+        let axes = Axes::new(card.measure, inner, plot_box, camera, &field.range, names);
+        let sight = axes.sight;
+        let (mesh, dots) = match field.values.is_empty() {
+            true => Default::default(),
+            false => (Mesh::new(&field, &sight, card.colours), Dots::new(self, &field, &sight)),
+        };
+        let mut frame = axes.lines();
+        frame.extend(axes.labels.shapes());
         Drawing {
             note: note(mesh.has_plateau, dots.beyond()),
             frame,
@@ -79,16 +76,6 @@ impl Surface {
             dots,
             sight,
         }
-    }
-
-    fn paint(&self, field: &Field<'_>, stage: &Projector<'_>, card: &Card<'_>) -> (Mesh, Dots) {
-        if field.values.is_empty() {
-            return <(Mesh, Dots)>::default();
-        }
-        (
-            Mesh::new(field, stage, card.colours),
-            Dots::new(&self.nodes, field, stage),
-        )
     }
 }
 
@@ -100,32 +87,6 @@ fn note(has_plateau: bool, nodes: usize) -> Option<String> {
         (true, _) => Some(format!("Beyond the axes: hatched, {}", counted(nodes, "node"))),
         (false, 1) => Some("1 node beyond the axes is drawn at their edge".to_owned()),
         (false, _) => Some(format!("{nodes} nodes beyond the axes are drawn at their edge")),
-    }
-}
-
-/// Mapping of places to points on the screen.
-pub(super) enum Projector<'a> {
-    /// In space, lit.
-    Space(&'a Projection),
-    /// From above.
-    Plan(&'a PlanAxes<'a>),
-}
-
-impl Projector<'_> {
-    /// Returns the position on the screen of a place with a value.
-    pub(super) fn point(&self, place: DVec3) -> Vec2 {
-        match self {
-            Self::Space(projection) => projection.point(place),
-            Self::Plan(plan) => plan.point(place.truncate()),
-        }
-    }
-
-    /// Returns the place of the eye, for a picture in space.
-    pub(super) fn eye_mm(&self) -> Option<DVec3> {
-        match self {
-            Self::Space(projection) => Some(projection.plot_box.place_mm(projection.eye)),
-            Self::Plan(_) => None,
-        }
     }
 }
 

@@ -3,7 +3,7 @@
 //! A [`SurfaceFigure`] describes a picture of surfaces. Each [`Surface`] of it lays itself out in a [`Card`] as a
 //! [`Drawing`]: shapes and a mesh in the order of painting. A renderer only has to paint them.
 //!
-//! `camera` maps millimetres to points on the screen and back; `box_axes` lays out the frame with its ticks, and `drawing`
+//! `camera` maps millimetres to points on the screen and back; `box_axes` lays out the axes with their ticks, and `drawing`
 //! places the labels. `field` is the surface on its grid and `mesh` the same with contour lines, from far to near; `cut`
 //! cuts it at the ends of the value axis and along a wire. `nodes` are the dots on it, and `pick` finds the place on the
 //! surface under a point of the screen.
@@ -17,7 +17,7 @@ mod mesh;
 mod nodes;
 mod pick;
 
-pub use camera::{AboveSight, EyeSight, OrbitCamera, Ray, Sight};
+pub use camera::{OrbitCamera, Ray, Sight};
 pub use cut::{Section, SectionLine};
 pub use drawing::{Card, Drawing};
 pub use field::{ColourScale, Quantity};

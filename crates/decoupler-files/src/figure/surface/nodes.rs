@@ -1,9 +1,12 @@
 //! The nodes as dots on the surface, and picking of nodes with the pointer.
 
-use decoupler_core::surface::Grid;
 use glam::{DVec3, Vec2};
 
-use super::{drawing::Projector, field::Field};
+use super::{
+    Surface,
+    camera::{Ray, Sight},
+    field::Field,
+};
 use crate::figure::{
     Hue,
     drawing::{Bounds, Ink, Shape},
@@ -32,24 +35,24 @@ pub struct Dots {
 }
 
 impl Dots {
-    pub(super) fn new(nodes: &[DVec3], field: &Field<'_>, stage: &Projector<'_>) -> Self {
+    pub(super) fn new(surface: &Surface, field: &Field<'_>, sight: &Sight) -> Self {
         let (low, high) = field.box_mm();
         let dot = |node: &DVec3| {
             node.is_finite().then(|| {
                 let within = node.clamp(low, high);
-                let is_beyond = match stage {
-                    Projector::Space(_) => within != *node,
-                    Projector::Plan(_) => within.truncate() != node.truncate(),
+                let is_beyond = match sight.is_above {
+                    false => within != *node,
+                    true => within.truncate() != node.truncate(),
                 };
                 Dot {
-                    at: stage.point(within),
-                    is_hidden: is_hidden(within, field, stage),
+                    at: sight.drawn(within),
+                    is_hidden: !sight.is_above && is_hidden(within, surface, field, sight),
                     is_beyond,
                 }
             })
         };
         Self {
-            dots: nodes.iter().map(dot).collect(),
+            dots: surface.nodes.iter().map(dot).collect(),
         }
     }
 
@@ -119,40 +122,13 @@ impl Dots {
     }
 }
 
-/// Walks from the node towards the eye and checks whether the surface rises above the line of sight.
-fn is_hidden(node: DVec3, field: &Field<'_>, stage: &Projector<'_>) -> bool {
-    let Projector::Space(projection) = stage else {
-        return false;
-    };
-    let plot_box = projection.plot_box;
-    let (low, high) = (plot_box.min_mm.z, plot_box.max_mm.z);
-    let sight = plot_box.place_mm(projection.eye) - node;
-    // A tolerance keeps nodes on a crest visible although the grid is coarser than the surface.
-    let tolerance = 0.01 * (high - low);
-    line_of_sight(node, sight, field.grid)
-        .take_while(|(place, _)| place.z <= high)
-        .any(|(place, point)| {
-            // A gap hides nothing.
-            let value = field.values[point];
-            value.is_finite() && value.min(high) > place.z + tolerance
-        })
-}
-
-/// Places from a little off `node` towards the eye, as long as they lie over the grid; each with the grid point before
-/// it.
-fn line_of_sight(node: DVec3, sight: DVec3, grid: &Grid) -> impl Iterator<Item = (DVec3, usize)> {
-    let (x_mm, y_mm) = (grid.x_mm(), grid.y_mm());
-    // Half a cell along the axis on which cells are crossed faster: for arrays of any shape, the number of steps to the
-    // edge is proportional to the number of points.
-    let cells = |sight_mm: f64, points_mm: &[f64]| sight_mm.abs() / (points_mm[1] - points_mm[0]);
-    let step = 0.5 / cells(sight.x, x_mm).max(cells(sight.y, y_mm)).max(0.5);
-    let cell = |points: &[f64], at: f64| {
-        let upper = points.partition_point(|point| *point < at);
-        (upper > 0 && upper < points.len()).then(|| upper - 1)
-    };
-    (3..)
-        .map(move |count| node + sight * (step * f64::from(count)))
-        .map_while(move |place| Some((place, grid.index(cell(x_mm, place.x)?, cell(y_mm, place.y)?))))
+/// Returns true if the surface is in the line of sight from the eye to a node.
+fn is_hidden(node: DVec3, surface: &Surface, field: &Field<'_>, sight: &Sight) -> bool {
+    let shown = field.shown();
+    // From a little above: nodes on a crest stay visible although the grid is coarser than the surface.
+    let from_mm = node + DVec3::Z * (0.01 * (shown.end() - shown.start()));
+    let direction = sight.eye_mm() - from_mm;
+    surface.pick(&Ray { from_mm, direction }).is_some()
 }
 
 #[cfg(test)]
@@ -164,39 +140,8 @@ mod tests {
     use super::*;
     use crate::figure::{
         SequentialMap,
-        surface::{
-            OrbitCamera, Quantity, Surface, ViewMode,
-            camera::{PlotBox, Projection},
-        },
+        surface::{OrbitCamera, Quantity, ViewMode, camera::PlotBox},
     };
-
-    #[test]
-    fn a_stretched_array_takes_no_more_steps_than_a_square_one() {
-        for (row_pitch_mm, node_pitch_mm) in [(1.0, 2.0), (1e6, 1.0), (1.0, 1e6), (1e-6, 1.0), (1.0, 1e-6)] {
-            let nodes = |pitch: f64| -> Vec<f64> { (0..10).map(|node| pitch * f64::from(node)).collect() };
-            let map = SurfaceMap::new(&nodes(row_pitch_mm), &nodes(node_pitch_mm)).unwrap();
-            let grid = map.grid();
-            let points = grid.x_mm().len() + grid.y_mm().len();
-            let corner = DVec3::new(grid.x_mm()[1], grid.y_mm()[1], 0.0);
-            let far = DVec3::new(grid.x_mm()[points / 2 - 2], grid.y_mm()[points / 2 - 2], 0.0);
-            // Eyes beyond the far corner, far out along either side, and almost above.
-            for sight in [
-                far - corner,
-                (far - corner) * 1e3,
-                (far - corner).with_y(0.0),
-                DVec3::new(0.0, 0.0, 1.0),
-            ] {
-                let steps = line_of_sight(corner, sight, grid)
-                    .take_while(|(place, _)| place.z <= 1.0)
-                    .take(100_000)
-                    .count();
-                assert!(
-                    steps <= 2 * points,
-                    "{steps} steps over {points} points, pitches {row_pitch_mm} and {node_pitch_mm}, sight {sight}"
-                );
-            }
-        }
-    }
 
     #[test]
     fn a_gap_hides_no_node() {
@@ -224,8 +169,8 @@ mod tests {
             let field = Field::new(&surface);
             let (min_mm, max_mm) = field.box_mm();
             let screen = Bounds::of([Vec2::ZERO, Vec2::splat(400.0)]);
-            let projection = Projection::fit(PlotBox::new(min_mm, max_mm, 1.0), camera, screen);
-            is_hidden(DVec3::new(1.0, 1.0, 4.2), &field, &Projector::Space(&projection))
+            let sight = Sight::fit(PlotBox::new(min_mm, max_mm, 1.0), Some(camera), screen);
+            is_hidden(DVec3::new(1.0, 1.0, 4.2), &surface, &field, &sight)
         };
         assert!(hidden(5.0), "walls around it hide it");
         assert!(!hidden(f64::NAN), "nothing does");
