@@ -57,7 +57,7 @@ pub struct PlotPoint {
     pub item: Option<usize>,
 }
 
-/// A marked stretch of the x axis; listed in the legend.
+/// A marked stretch of the x axis; listed in the legend if it has a name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Span {
     /// Meaning.
@@ -266,23 +266,14 @@ impl Plot {
 
     /// Returns the entries of the legend with their looks.
     pub fn keys(&self) -> Vec<(&str, Look)> {
-        let of_series = self
-            .series
-            .iter()
-            .filter(|series| !series.points.is_empty())
-            .map(|series| (series.key.as_deref(), series.look));
-        let of_lines = self
-            .lines
-            .iter()
-            .map(|line| (line.key.as_deref(), Look::line(line.hue, line.style)));
-        let of_spans = self.spans.iter().map(|span| (Some(&*span.name), Look::area(span.hue)));
-        let mut keys: Vec<(&str, Look)> = Vec::new();
-        for (key, look) in of_series.chain(of_lines).chain(of_spans) {
-            if let Some(key) = key.filter(|key| keys.iter().all(|(other, _)| other != key)) {
-                keys.push((key, look));
-            }
-        }
-        keys
+        let series = self.series.iter().filter(|series| !series.points.is_empty());
+        let of_series = series.map(|series| (series.key.as_deref(), series.look));
+        let lines = self.lines.iter();
+        let of_lines = lines.map(|line| (line.key.as_deref(), Look::line(line.hue, line.style)));
+        let spans = self.spans.iter();
+        let of_spans = spans.map(|span| (Some(&*span.name), Look::area(span.hue)));
+        let keys = of_series.chain(of_lines).chain(of_spans);
+        each_once(keys.filter_map(|(key, look)| Some((key.filter(|key| !key.is_empty())?, look))))
     }
 
     /// Lays out the labels of points and of vertical lines in `frame`, where `at` gives the point of a place; those without
@@ -392,13 +383,7 @@ impl From<Plot> for PlotFigure {
 impl PlotFigure {
     /// Returns the entries of the legends of all plots, each once.
     pub fn keys(&self) -> Vec<(&str, Look)> {
-        let mut keys: Vec<(&str, Look)> = Vec::new();
-        for key in self.plots.iter().flat_map(Plot::keys) {
-            if keys.iter().all(|(other, _)| *other != key.0) {
-                keys.push(key);
-            }
-        }
-        keys
+        each_once(self.plots.iter().flat_map(Plot::keys))
     }
 
     /// Returns the figure with a halo around the points of one of these items, and around `others`.
@@ -416,6 +401,17 @@ impl PlotFigure {
         }
         self
     }
+}
+
+/// Returns the first of the entries with each name.
+fn each_once<'a>(entries: impl Iterator<Item = (&'a str, Look)>) -> Vec<(&'a str, Look)> {
+    let mut keys: Vec<(&str, Look)> = Vec::new();
+    for key in entries {
+        if keys.iter().all(|(other, _)| *other != key.0) {
+            keys.push(key);
+        }
+    }
+    keys
 }
 
 /// Maximum number of dots drawn for one cloud; more would not be visible.

@@ -180,7 +180,7 @@ fn axes(plot: &Plot, area: Bounds, at: impl Fn([f64; 2]) -> Vec2) -> Vec<Shape> 
     }
     let below = Vec2::new(area.middle().x, area.max.y + 33.0);
     texts.push(Shape::text(below, Align::Middle, TEXT_INK, &*plot.x.name));
-    let beside = Vec2::new(area.min.x - 16.0 - widest, area.middle().y);
+    let beside = Vec2::new(area.min.x - 19.0 - widest, area.middle().y);
     texts.push(Shape::upright(beside, TEXT_INK, &*plot.y.name));
     edges.push(area.outline(Stroke::new(DIM, 1.0)));
     grid.into_iter().chain(edges).chain(texts).collect()

@@ -64,8 +64,6 @@ impl Mesh {
         let eye_mm = sight.eye_mm();
         let rows = far_to_near(y_mm, eye_mm.y);
         let levels = contour_levels(&field.range);
-        let is_black = |value: f64| is_light(map.at(field.share(value)));
-        let inks: Vec<bool> = levels.iter().map(|level| is_black(*level)).collect();
         let mut lineless = Vec::new();
         for ix in far_to_near(x_mm, eye_mm.x) {
             let mut strip = Vec::with_capacity(rows.len());
@@ -78,12 +76,10 @@ impl Mesh {
                 strip.push((ix, iy));
             }
             // Lines are painted one strip late; the next strip would cover half of their width otherwise.
-            mesh.hatch(&lineless, field, sight, is_black);
-            mesh.end_strip(&lineless, field, sight, (&levels, &inks));
+            mesh.end_strip(&lineless, field, sight, (&levels, map));
             lineless = strip;
         }
-        mesh.hatch(&lineless, field, sight, is_black);
-        mesh.end_strip(&lineless, field, sight, (&levels, &inks));
+        mesh.end_strip(&lineless, field, sight, (&levels, map));
         mesh
     }
 
@@ -106,59 +102,36 @@ impl Mesh {
         }
     }
 
-    /// Appends the marks of parts beyond the box in `cells`.
-    fn hatch(&mut self, cells: &[(usize, usize)], field: &Field<'_>, sight: &Sight, is_black: impl Fn(f64) -> bool) {
-        let is_beyond =
-            |cell: &&(usize, usize)| matches!(field.part(cell.0, cell.1), CellPart::Cut | CellPart::Plateau);
-        for &(ix, iy) in cells.iter().filter(is_beyond) {
-            plateau_marks(field, ix, iy, |ends| {
-                let [from, to] = ends.map(|place| sight.drawn(place));
-                self.has_plateau = true;
-                self.lines.push(ContourLine {
-                    from,
-                    to,
-                    is_black: is_black(ends[0].z),
-                    opacity: HATCH_OPACITY,
-                });
-            });
-        }
-    }
-
-    /// Appends the contour lines in `cells` and ends the strip.
+    /// Appends the lines in `cells` and ends the strip: contour lines at `levels`, and marks of parts beyond the box.
     fn end_strip(
         &mut self,
         cells: &[(usize, usize)],
         field: &Field<'_>,
         sight: &Sight,
-        (levels, inks): (&[f64], &[bool]),
+        (levels, map): (&[f64], &ColourMap),
     ) {
-        for &(ix, iy) in cells {
-            let corners = field.corners(ix, iy);
-            let values = corners.map(|corner| field.values[corner]);
-            let (low, high) = values
-                .iter()
-                .fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(*v), high.max(*v)));
-            if high <= low {
-                continue;
+        let line = |ends: [DVec3; 2], opacity| {
+            let [from, to] = ends.map(|place| sight.drawn(place));
+            ContourLine {
+                from,
+                to,
+                is_black: is_light(map.at(field.share(ends[0].z))),
+                opacity,
             }
-            let [a, b, c, d] = corners.map(|corner| self.vertices[corner]);
-            let opacity = CONTOUR_OPACITY * a.opacity.min(c.opacity);
-            let is_cut = field.part(ix, iy) == CellPart::Cut;
-            let (places, corners_mm) = ([a.at, b.at, c.at, d.at], field.corners_mm(ix, iy));
-            // A cut cell has corners that are not drawn at their places.
-            let point = |(a, b, part): (usize, usize, f32)| match is_cut {
-                true => sight.drawn(corners_mm[a].lerp(corners_mm[b], f64::from(part))),
-                false => places[a].lerp(places[b], part),
-            };
-            for (&level, &is_black) in levels.iter().zip(inks).filter(|(level, _)| (low..high).contains(level)) {
+        };
+        for &(ix, iy) in cells {
+            let contours = self.lines.len();
+            plateau_marks(field, ix, iy, |ends| self.lines.push(line(ends, HATCH_OPACITY)));
+            self.has_plateau |= self.lines.len() > contours;
+            let corners_mm = field.corners_mm(ix, iy);
+            let values = corners_mm.map(|corner| corner.z);
+            let ends = |(low, high): (f64, f64), value: &f64| (low.min(*value), high.max(*value));
+            let (low, high) = values.iter().fold((f64::MAX, f64::MIN), ends);
+            let [a, _, c, _] = field.corners(ix, iy).map(|corner| self.vertices[corner].opacity);
+            for &level in levels.iter().filter(|level| (low..high).contains(level)) {
                 cross_cell(values, level, |ends| {
-                    let [from, to] = ends.map(point);
-                    self.lines.push(ContourLine {
-                        from,
-                        to,
-                        is_black,
-                        opacity,
-                    });
+                    let ends = ends.map(|(a, b, part)| corners_mm[a].lerp(corners_mm[b], f64::from(part)));
+                    self.lines.push(line(ends, CONTOUR_OPACITY * a.min(c)));
                 });
             }
         }
