@@ -1,18 +1,17 @@
-//! Plots drawn by `egui_plot`, with its axes, grid, legend, zoom and tooltips, in places of the axes: a logarithmic axis is
+//! Plots drawn by `egui_plot`, with its axes, grid, zoom and tooltips, in places of the axes: a logarithmic axis is
 //! linear in the logarithm.
 
 use decoupler_files::figure::{Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PlotFigure, Series, TickRule};
 use eframe::egui::{
-    Color32, FontId, Id, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, TextStyle, Ui, UiBuilder, Vec2,
-    WidgetInfo, accesskit::Role,
+    Color32, FontId, Id, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, Ui, UiBuilder, Vec2, WidgetInfo,
+    accesskit::Role,
 };
 use egui_plot::{
-    AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, Corner, GridInput, GridMark, HLine, HoverPosition, Legend,
-    Line, LineStyle as DrawnStyle, MarkerShape, PlotPoint as Place, PlotPoints, PlotTransform, PlotUi, Points, Span,
-    VLine,
+    AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, GridInput, GridMark, HLine, HoverPosition, Line,
+    LineStyle as DrawnStyle, MarkerShape, PlotPoint as Place, PlotPoints, PlotTransform, PlotUi, Points, Span, VLine,
 };
 
-use super::paint::{bounds, hue_colour, measure, paint_over, to_glam};
+use super::paint::{bounds, hue_colour, measure, paint, paint_over, to_glam};
 use crate::window::{
     theme::{Palette, Theme, semibold, space, type_size},
     widgets::{dim_ui, focus_ring_ui},
@@ -86,12 +85,14 @@ pub fn titled_plots_ui(ui: &mut Ui, title: &str, figure: &PlotFigure) {
     plots_ui(ui, title, figure, Pointer::Moves);
 }
 
-/// Minimum width of the notes next to a square plot.
+/// Minimum width of the legend and the notes next to a square plot.
 const NOTES_WIDTH: f32 = space(36);
 
-/// Draws the plots side by side in the remaining space, and the notes: next to a square plot if there is room, else above.
+/// Draws the plots side by side in the remaining space, and the legend and the notes: next to a square plot if there is room,
+/// else above.
 pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Pointer) -> Vec<DrawnPlot<'a>> {
-    let notes_ui = |ui: &mut Ui| {
+    let head_ui = |ui: &mut Ui| {
+        legend_ui(ui, figure);
         for note in &figure.notes {
             dim_ui(ui, note);
         }
@@ -100,7 +101,7 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Poin
     let left_by_square = ui.available_width() - ui.available_height() - 2.0 * space(3);
     let are_notes_beside = is_square && left_by_square >= NOTES_WIDTH;
     if !are_notes_beside {
-        notes_ui(ui);
+        head_ui(ui);
     }
     let whole = ui.available_rect_before_wrap();
     let count = figure.plots.len().max(1) as f32;
@@ -115,9 +116,7 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Poin
     };
     let plots = figure.plots.iter().enumerate().map(|(index, plot)| {
         let mut slot = ui.new_child(UiBuilder::new().max_rect(slot(index)));
-        // A legend that another plot shows already is not repeated.
-        let has_legend = index == 0 || plot.keys() != figure.plots[index - 1].keys();
-        let (transform, response) = plot_ui(&mut slot, Id::unique((id, index)), plot, pointer, has_legend);
+        let (transform, response) = plot_ui(&mut slot, Id::unique((id, index)), plot, pointer);
         let mut drawn = DrawnPlot {
             plot,
             has_pointer: response.contains_pointer(),
@@ -132,14 +131,36 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Poin
     let plots = plots.collect();
     if are_notes_beside {
         let place = whole.with_min_x(slot(1).left()).with_min_y(whole.top() + space(4));
-        notes_ui(&mut ui.new_child(UiBuilder::new().max_rect(place)));
+        head_ui(&mut ui.new_child(UiBuilder::new().max_rect(place)));
     }
     ui.allocate_rect(whole, Sense::hover());
     plots
 }
 
+/// Draws the entries of the legend side by side, in as many rows as needed; outside the plots, where they cover nothing.
+fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
+    let palette = &Theme::of(ui).palette;
+    let keys = figure.keys();
+    if keys.is_empty() {
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = space(1);
+        for (name, look) in keys {
+            let (place, _) = ui.allocate_exact_size(Vec2::splat(space(4)), Sense::hover());
+            paint(
+                ui.painter(),
+                palette,
+                &look.sample(to_glam(place.left_center()), place.width()),
+            );
+            ui.label(RichText::new(name).size(type_size().note).color(palette.dim));
+            ui.add_space(space(2));
+        }
+    });
+}
+
 /// Draws the plot over the space of `ui`; `id` distinguishes it from others in the window.
-fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer, has_legend: bool) -> (PlotTransform, Response) {
+fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform, Response) {
     let palette = Theme::of(ui).palette;
     let [x, y] = plot.ranges();
     let space = ui.available_size();
@@ -180,10 +201,6 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer, has_legend: bool)
     if plot.has_equal_scales {
         shown = shown.data_aspect(1.0);
     }
-    if has_legend {
-        let legend = Legend::default().position(emptiest_corner(plot));
-        shown = shown.legend(legend.follow_insertion_order(true).text_style(TextStyle::Small));
-    }
     let shown = shown.show(ui, |plot_ui| {
         lines_behind(plot_ui, plot, &palette);
         for series in &plot.series {
@@ -203,28 +220,6 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer, has_legend: bool)
     let labels = plot.lay_out_labels(bounds(frame), at, &|text| measure(ui.painter(), text));
     paint_over(ui, frame, &labels);
     (shown.transform, shown.response)
-}
-
-/// Returns the corner of the plot with the fewest points.
-fn emptiest_corner(plot: &Plot) -> Corner {
-    let ranges = plot.ranges();
-    let share = |axis: usize, place: f64| decoupler_files::figure::share(place, &ranges[axis]);
-    let corners = [
-        (Corner::RightTop, 1.0, 1.0),
-        (Corner::LeftTop, 0.0, 1.0),
-        (Corner::RightBottom, 1.0, 0.0),
-        (Corner::LeftBottom, 0.0, 0.0),
-    ];
-    let crowd = |(_, x, y): &(Corner, f64, f64)| {
-        let places = plot.series.iter().flat_map(|series| plot.placed(series));
-        places
-            .filter(|(_, place)| (share(0, place[0]) - x).abs() < 0.3 && (share(1, place[1]) - y).abs() < 0.4)
-            .count()
-    };
-    corners
-        .into_iter()
-        .min_by_key(crowd)
-        .map_or(Corner::RightTop, |(corner, ..)| corner)
 }
 
 /// Returns the visible ticks.
@@ -259,7 +254,7 @@ fn stroke(hue: Hue, style: LineStyle, palette: &Palette) -> (Stroke, DrawnStyle)
     }
 }
 
-/// Draws spans and reference lines. Items with one name have one entry in the legend, those without a name none.
+/// Draws spans and reference lines.
 fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
     for span in &plot.spans {
         if let [Some(from), Some(to)] = [span.range.start(), span.range.end()].map(|end| plot.x.place(*end)) {
@@ -270,7 +265,7 @@ fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
     }
     for line in &plot.lines {
         let (stroke, style) = stroke(line.hue, line.style, palette);
-        let name = line.key.as_deref().unwrap_or_default();
+        let name = &*line.name;
         match line.at {
             LineAt::X(value) => {
                 if let Some(place) = plot.x.place(value) {
@@ -287,7 +282,7 @@ fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
 }
 
 fn draw_series(plot_ui: &mut PlotUi<'_>, plot: &Plot, series: &Series, palette: &Palette) {
-    let name = series.key.as_deref().unwrap_or_default();
+    let name = &*series.name;
     let colour = hue_colour(series.look.hue, palette);
     let [x_range, y_range] = plot.ranges();
     let (width, height) = (x_range.end() - x_range.start(), y_range.end() - y_range.start());

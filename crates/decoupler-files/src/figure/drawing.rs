@@ -6,7 +6,7 @@ use std::ops::RangeInclusive;
 use glam::Vec2;
 
 use super::{
-    Hue,
+    Hue, LineStyle, Look, Marker,
     axis::{PlotAxis, share},
     colour_map::{ColourMap, Rgb},
 };
@@ -240,6 +240,62 @@ impl Bounds {
     pub fn outline(&self, stroke: Stroke) -> Shape {
         let [a, b, c, d] = self.corners();
         Shape::Line(vec![a, b, c, d, a], stroke)
+    }
+}
+
+impl LineStyle {
+    /// Returns the stroke of a line in this style.
+    pub(crate) fn stroke(self, hue: Hue) -> Stroke {
+        let (width, opacity, dashes) = match self {
+            Self::Solid => (1.5, 1.0, None),
+            Self::Dashed => (1.4, 1.0, Some([4.0, 3.0])),
+            Self::Dotted => (1.4, 1.0, Some([1.4, 2.5])),
+            Self::Fine => (0.8, 0.55, None),
+        };
+        Stroke {
+            colour: Ink::Hue(hue).at(opacity),
+            width,
+            dashes,
+        }
+    }
+}
+
+impl Look {
+    /// Returns the symbol at a point.
+    pub(crate) fn mark(self, at: Vec2) -> Option<Shape> {
+        let colour = Colour::from(self.hue);
+        let edge = Stroke::new(colour, 1.4);
+        let circle = |radius, ring| {
+            Some(Shape::Circle {
+                at,
+                radius,
+                ring,
+                colour,
+            })
+        };
+        let diamond = [[0.0, -4.4], [4.4, 0.0], [0.0, 4.4], [-4.4, 0.0]].map(|corner| at + Vec2::from(corner));
+        match self.marker? {
+            Marker::Dot => circle(1.25, None),
+            Marker::Disc => circle(2.9, None),
+            Marker::Ring => circle(2.9, Some(1.4)),
+            Marker::Halo => circle(6.3, Some(1.4)),
+            Marker::Square => Some(Bounds::of_size(at - 3.6, Vec2::splat(7.2)).outline(edge)),
+            Marker::Diamond => Some(Shape::Area(diamond.into(), colour)),
+            Marker::HollowDiamond => Some(Shape::Line([&diamond[..], &diamond[..1]].concat(), edge)),
+        }
+    }
+
+    /// Returns the sample in a legend, from its left end.
+    pub fn sample(self, left: Vec2, width: f32) -> Vec<Shape> {
+        let right = left + Vec2::new(width, 0.0);
+        let line = self
+            .line
+            .map(|style| Shape::Line(vec![left, right], style.stroke(self.hue)));
+        let is_area = self.line.is_none() && self.marker.is_none();
+        let area = is_area.then(|| Bounds::of_size(left - Vec2::new(0.0, 4.0), Vec2::new(width, 8.0)));
+        let area = area.map(|area| area.area(Ink::Hue(self.hue).at(0.3)));
+        let mark = self.mark(0.5 * (left + right));
+        line.into_iter().chain(area).chain(mark).collect()
     }
 }
 

@@ -110,9 +110,10 @@ impl HeatMap {
         let are_numbers = self.columns.iter().all(|name| name.parse::<f64>().is_ok());
         let is_upright = column_name + GAP > pitch && !are_numbers;
         let below = if is_upright { column_name } else { line } + line + 2.0 * GAP;
-        let bottom = (area.max.y - below).max(area.min.y + 1.0);
+        let bottom = (area.max.y - below).max(area.min.y + line);
         let grid = Bounds {
-            min: Vec2::new(left, area.min.y),
+            // The uppermost number of the scale is centred on its end.
+            min: Vec2::new(left, area.min.y + 0.5 * line),
             max: Vec2::new(right, bottom),
         };
         let cell = grid.size() / Vec2::new(columns.max(1) as f32, rows.max(1) as f32);

@@ -69,7 +69,11 @@ pub fn loss_figure(history: &[EpochRecord], stages: &[Stage], best_epoch: usize)
         bounded(PlotAxis::logarithmic(MSE), at_start),
         series.into_iter().filter(|curve| !curve.points.is_empty()).collect(),
     )
-    .with_lines(stage_lines(stages).into_iter().chain([best.labelled("best weights")]))
+    .with_lines(
+        stage_lines(stages)
+            .into_iter()
+            .chain([best.listed(Some("best weights"))]),
+    )
     .into()
 }
 
@@ -276,7 +280,7 @@ mod tests {
     fn without_held_out_samples_there_is_no_curve_and_no_key() {
         let figure = loss_figure(&[epoch(0, 1.0, 0)], &[], 0);
         let keys: Vec<&str> = figure.keys().into_iter().map(|(key, _)| key).collect();
-        assert_eq!(keys, ["training"]);
+        assert_eq!(keys, ["training", "best weights"]);
         assert_eq!(figure.plots[0].series.len(), 1);
     }
 

@@ -119,7 +119,7 @@ fn histogram(pairs: &[(f64, f64)], chosen: Option<usize>, axis: &str, counted: &
         PlotAxis::linear(format!("{counted} of the test set")).including([0.0]),
         series,
     )
-    .with_lines([no_error.labelled("no error")])
+    .with_lines([no_error])
     .into()
 }
 

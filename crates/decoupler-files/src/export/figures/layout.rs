@@ -9,8 +9,8 @@ use super::{
     svg::{Canvas, PAGE_WIDTH, TEXT, measure},
 };
 use crate::figure::{
-    Align, Bounds, Colour, ColourMap, Figure, HeatMap, Hue, Ink, LineAt, LineStyle, Look, Marker, Plot, PlotAxis,
-    PlotFigure, Rgb, SequentialMap, Shape, Stroke, share,
+    Align, Bounds, ColourMap, Figure, HeatMap, Hue, Ink, LineAt, Plot, PlotAxis, PlotFigure, Rgb, SequentialMap, Shape,
+    Stroke, share,
     surface::{Card, ColourScale, Quantity, Surface, SurfaceFigure},
 };
 
@@ -52,7 +52,7 @@ fn draw_plots(figure: &PlotFigure) -> Picture {
         if at.x > LEFT && at.x + SAMPLE + text > width {
             at = Vec2::new(LEFT, at.y + LINE);
         }
-        shapes.extend(sample(look, at, SAMPLE));
+        shapes.extend(look.sample(at, SAMPLE));
         shapes.push(Shape::text(
             at + Vec2::new(SAMPLE + 5.0, 0.0),
             Align::Start,
@@ -125,13 +125,13 @@ fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
             LineAt::X(x) => x_at(x).map(|x| [Vec2::new(x, area.min.y), Vec2::new(x, area.max.y)]),
             LineAt::Y(y) => y_at(y).map(|y| [Vec2::new(area.min.x, y), Vec2::new(area.max.x, y)]),
         };
-        shapes.extend(ends.map(|ends| Shape::Line(ends.into(), stroke(line.hue, line.style))));
+        shapes.extend(ends.map(|ends| Shape::Line(ends.into(), line.style.stroke(line.hue))));
     }
     for series in &plot.series {
         if let Some(style) = series.look.line {
             let stretches = plot.stretches(series).into_iter();
             let stretches = stretches.map(|places| places.into_iter().map(at).collect());
-            shapes.extend(stretches.map(|points| Shape::Line(points, stroke(series.look.hue, style))));
+            shapes.extend(stretches.map(|points| Shape::Line(points, style.stroke(series.look.hue))));
         }
         for (point, place) in plot.placed(series) {
             let Some(ends) = point.bar else { continue };
@@ -141,9 +141,7 @@ fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
             let lines = [[low, high], [low - cap, low + cap], [high - cap, high + cap]];
             shapes.extend(lines.map(|ends| Shape::Line(ends.into(), stroke)));
         }
-        let marks = plot
-            .placed(series)
-            .filter_map(|(_, place)| mark(series.look, at(place)));
+        let marks = plot.placed(series).filter_map(|(_, place)| series.look.mark(at(place)));
         shapes.extend(marks);
     }
     shapes.extend(plot.lay_out_labels(area, at, &measure));
@@ -184,57 +182,6 @@ fn axes(plot: &Plot, area: Bounds, at: impl Fn([f64; 2]) -> Vec2) -> Vec<Shape> 
     texts.push(Shape::upright(beside, TEXT_INK, &*plot.y.name));
     edges.push(area.outline(Stroke::new(DIM, 1.0)));
     grid.into_iter().chain(edges).chain(texts).collect()
-}
-
-fn stroke(hue: Hue, style: LineStyle) -> Stroke {
-    let (width, opacity, dashes) = match style {
-        LineStyle::Solid => (1.5, 1.0, None),
-        LineStyle::Dashed => (1.4, 1.0, Some([4.0, 3.0])),
-        LineStyle::Dotted => (1.4, 1.0, Some([1.4, 2.5])),
-        LineStyle::Fine => (0.8, 0.55, None),
-    };
-    Stroke {
-        colour: Ink::Hue(hue).at(opacity),
-        width,
-        dashes,
-    }
-}
-
-/// The symbol of a series at a point.
-fn mark(look: Look, at: Vec2) -> Option<Shape> {
-    let colour = Colour::from(look.hue);
-    let edge = Stroke::new(colour, 1.4);
-    let circle = |radius, ring| {
-        Some(Shape::Circle {
-            at,
-            radius,
-            ring,
-            colour,
-        })
-    };
-    let diamond = [[0.0, -4.4], [4.4, 0.0], [0.0, 4.4], [-4.4, 0.0]].map(|corner| at + Vec2::from(corner));
-    match look.marker? {
-        Marker::Dot => circle(1.25, None),
-        Marker::Disc => circle(2.9, None),
-        Marker::Ring => circle(2.9, Some(1.4)),
-        Marker::Halo => circle(6.3, Some(1.4)),
-        Marker::Square => Some(Bounds::of_size(at - 3.6, Vec2::splat(7.2)).outline(edge)),
-        Marker::Diamond => Some(Shape::Area(diamond.into(), colour)),
-        Marker::HollowDiamond => Some(Shape::Line([&diamond[..], &diamond[..1]].concat(), edge)),
-    }
-}
-
-/// The look of a series in the legend, from its left end to its right end.
-fn sample(look: Look, left: Vec2, width: f32) -> Vec<Shape> {
-    let right = left + Vec2::new(width, 0.0);
-    let line = look
-        .line
-        .map(|style| Shape::Line(vec![left, right], stroke(look.hue, style)));
-    let is_area = look.line.is_none() && look.marker.is_none();
-    let area = is_area.then(|| Bounds::of_size(left - Vec2::new(0.0, 4.0), Vec2::new(width, 8.0)));
-    let area = area.map(|area| area.area(Ink::Hue(look.hue).at(0.3)));
-    let mark = mark(look, 0.5 * (left + right));
-    line.into_iter().chain(area).chain(mark).collect()
 }
 
 fn draw_map(map: &HeatMap) -> Picture {
