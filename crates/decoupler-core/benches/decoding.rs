@@ -17,7 +17,7 @@ use decoupler_core::{
     dataset::{Dataset, Seed, Stream},
     decoupling::{Decoder, DecoderKind, Estimator, NewtonDecoder, Precision, ProgramDecoder},
     evaluation::{DecoderSet, RunSettings},
-    network::{InputChoice, Quantity, ScalingChoice, tanh_in_place, tanh_in_place_single},
+    network::{InputChoice, Quantity, ScalingChoice, tanh_in_place, tanh_single},
     scene::{Noise, RowModel, Rows, Scene},
     sensor::{ArrayScale, SensorModel},
 };
@@ -30,6 +30,14 @@ use untrained::untrained_networks;
 type Work<'a> = (String, Box<dyn FnMut() + 'a>);
 
 /// Nanoseconds of each piece of work: medians of blocks, measured in turns.
+fn tanh_in_place_single(values: &mut [f32]) {
+    pulp::Arch::new().dispatch(|| {
+        for value in &mut *values {
+            *value = tanh_single(*value);
+        }
+    });
+}
+
 fn medians_ns(works: &mut [Work<'_>]) -> Vec<f64> {
     const TURNS: usize = 15;
     const BLOCK_NS: f64 = 2e6;
@@ -135,7 +143,7 @@ fn print_scale(scale: ArrayScale) {
     let rows: Vec<usize> = (0..scale.rows()).collect();
     let mut rng = Seed(0).rng(Stream::Training);
     let training = Dataset::simulate(&model, &scene, 300 * scale.rows(), &mut rng).unwrap();
-    let frame = training.frames().unwrap().frame(0).to_vec();
+    let frame = training.frames().unwrap().swap_remove(0);
     let kinds = [
         ("mean", DecoderKind::Mean),
         ("ridge", DecoderKind::Ridge),

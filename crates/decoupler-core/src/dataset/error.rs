@@ -5,7 +5,6 @@ use crate::{scene::SceneError, sensor::SensorError, text::format_number};
 
 /// Error in a set of samples, in drawing it, in its division or frames, or in a memory of the past.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum DatasetError {
     /// The number of samples to draw is out of range.
     #[error("{0} samples: give from 1 to {LARGEST_SAMPLES}")]

@@ -30,7 +30,6 @@ impl Default for SensorModel {
 
 /// Error of the array scale, the geometry or the resistance model.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum SensorError {
     /// The text does not have the form `M1×M2_M3×M4`.
     #[error("'{0}' is not an array scale: write M1xM2_M3xM4, for example 10x10_5x30")]

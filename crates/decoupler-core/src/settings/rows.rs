@@ -90,7 +90,6 @@ impl Display for Value {
 
 /// Error for an invalid setting.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum SettingError {
     /// A setting is out of its range.
     #[error("{name} is {}: it must be from {} to {}", short(*.value), short(*.range.start()), short(*.range.end()))]
@@ -198,9 +197,7 @@ impl<S: Clone> Setting<S> {
         }
         Ok(())
     }
-}
 
-impl<S> Setting<S> {
     /// Creates a row.
     pub const fn new(
         name: &'static str,

@@ -28,7 +28,6 @@ pub struct ExampleSets {
 
 /// Reason why a training cannot begin or be resumed.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
 pub enum TrainingError {
     /// A setting is out of range.
     #[error(transparent)]
