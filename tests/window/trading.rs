@@ -200,8 +200,8 @@ fn measurements_are_saved_as_table_and_figures() {
     let svg = fs::read_to_string(folder.path().join("charts.svg")).unwrap();
     for text in [
         ">Newton<",
-        ">best preset<",
-        ">hollow: 32 bits<",
+        "diamonds: best preset",
+        "hollow: 32 bits",
         "time to decode a frame (µs)",
         "training time (s)",
         "Z error (%)",

@@ -1,11 +1,13 @@
 //! Figures on the screen, drawn from the same description as printed figures. Independent of the views.
+//!
+//! `plot` hands plots to `egui_plot`; `paint` paints the shapes of which everything else is made, such as heat maps.
 
 mod heat_map;
+mod paint;
 mod plot;
-mod plot_figure;
 #[cfg(test)]
 mod tests;
 
-pub use heat_map::{CellPointed, cells_ui, heat_map_ui, hue_colour};
-pub use plot::{legend_ui, legend_width};
-pub use plot_figure::{DrawnPlot, Pointer, StripChart, legend_behind_ui, plots_ui, strip_ui, titled_plots_ui};
+pub use heat_map::{CellPointed, cells_ui, heat_map_ui};
+pub use paint::{bounds, hue_colour, measure, paint, to_egui, to_glam};
+pub use plot::{DrawnPlot, Pointer, plots_ui, titled_plots_ui};

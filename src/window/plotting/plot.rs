@@ -1,43 +1,166 @@
-//! Plots drawn with `egui_plot`, in axis coordinates: a logarithmic axis is linear in the logarithm.
-//!
-//! Labels at vertical reference lines.
+//! Plots drawn by `egui_plot`, with its axes, grid, zoom and tooltips, in places of the axes: a logarithmic axis is
+//! linear in the logarithm.
 
-use std::ops::RangeInclusive;
-
-use decoupler_files::figure::{
-    Hue, Key, LineAt, LineStyle, Look, Marker, Plot, PlotAxis, PointLabel, Series, along, place_labels,
-};
+use decoupler_files::figure::{Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PlotFigure, Series, TickRule};
 use eframe::egui::{
-    Color32, CornerRadius, FontId, Id, Pos2, Rangef, Rect, Response, RichText, Sense, Shape, Stroke, StrokeKind, Ui,
-    Vec2, WidgetInfo, accesskit::Role, pos2, vec2,
+    Color32, FontId, Id, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, Ui, UiBuilder, Vec2, WidgetInfo,
+    accesskit::Role,
 };
 use egui_plot::{
     AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, GridInput, GridMark, HLine, HoverPosition, Line,
     LineStyle as DrawnStyle, MarkerShape, PlotPoint as Place, PlotPoints, PlotTransform, PlotUi, Points, Span, VLine,
 };
-use glam::DVec2;
 
-use super::{
-    heat_map::{hue_colour, per_pixel},
-    plot_figure::Pointer,
-};
+use super::paint::{bounds, hue_colour, measure, paint, paint_over, to_glam};
 use crate::window::{
-    theme::{Palette, Theme, space, type_size},
-    widgets::focus_ring_ui,
+    theme::{Palette, Theme, semibold, space, type_size},
+    widgets::{dim_ui, focus_ring_ui},
 };
 
 /// Opacity of a shaded span of an axis.
 const SPAN_TINT: f32 = 0.12;
-/// Width of the number at a tick with its margin, in points.
-const NUMBER_WIDTH: f64 = 50.0;
-const NUMBER_HEIGHT: f64 = 16.0;
+/// Room for the number at a tick, in points.
+const NUMBER: [f64; 2] = [50.0, 16.0];
 /// Minimum distance of grid lines, in points; the plot derives its scale from it.
 const MIN_GRID: f32 = 8.0;
 /// Points of a stepped line that are closer than this fraction of an axis are merged: a sharp turn would draw a spike.
 const COINCIDENT: f64 = 5e-4;
 
+/// Response of a plot to the pointer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pointer {
+    /// The pointer pans and zooms the plot and shows the tooltip of a point.
+    Moves,
+    /// The points and bars respond to the pointer.
+    Picks,
+}
+
+/// Plot drawn on the screen.
+pub struct DrawnPlot<'a> {
+    /// Plot that is drawn.
+    pub plot: &'a Plot,
+    /// True while the pointer is over it.
+    pub has_pointer: bool,
+    /// Index of the item under the pointer.
+    pub hovered: Option<usize>,
+    /// Index of the item that was clicked in this frame.
+    pub clicked: Option<usize>,
+    transform: PlotTransform,
+}
+
+impl DrawnPlot<'_> {
+    /// Returns the position of a point on the screen; `None` if it cannot be shown on an axis.
+    pub fn position(&self, x: f64, y: f64) -> Option<Pos2> {
+        let [x, y] = self.plot.place(x, y)?;
+        Some(self.transform.position_from_point(&Place::new(x, y)))
+    }
+
+    /// Returns the item at a screen position: the bar there, or the nearest point within reach.
+    fn item_at(&self, at: Pos2) -> Option<usize> {
+        /// Maximum distance between the pointer and a point.
+        const REACH: f32 = 12.0;
+        let value = self.transform.value_from_position(at);
+        let mut nearest: Option<(f32, usize)> = None;
+        for series in &self.plot.series {
+            for (point, [x, y]) in self.plot.placed(series) {
+                let Some(item) = point.item else { continue };
+                let distance = match series.bar_width {
+                    // Even a low bar is hit anywhere above its base.
+                    Some(width) if (x - value.x).abs() <= 0.5 * width => 0.0,
+                    Some(_) => continue,
+                    None => self.transform.position_from_point(&Place::new(x, y)).distance(at),
+                };
+                if distance <= REACH && nearest.is_none_or(|(least, _)| distance < least) {
+                    nearest = Some((distance, item));
+                }
+            }
+        }
+        nearest.map(|(_, item)| item)
+    }
+}
+
+/// Draws a title and the plots.
+pub fn titled_plots_ui(ui: &mut Ui, title: &str, figure: &PlotFigure) {
+    ui.label(RichText::new(title).font(semibold(type_size().title)));
+    plots_ui(ui, title, figure, Pointer::Moves);
+}
+
+/// Minimum width of the legend and the notes next to a square plot.
+const NOTES_WIDTH: f32 = space(36);
+
+/// Draws the plots side by side in the remaining space, and the legend and the notes: next to a square plot if there is room,
+/// else above.
+pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Pointer) -> Vec<DrawnPlot<'a>> {
+    let head_ui = |ui: &mut Ui| {
+        legend_ui(ui, figure);
+        for note in &figure.notes {
+            dim_ui(ui, note);
+        }
+    };
+    let is_square = matches!(&figure.plots[..], [plot] if plot.has_equal_scales);
+    let left_by_square = ui.available_width() - ui.available_height() - 2.0 * space(3);
+    let are_notes_beside = is_square && left_by_square >= NOTES_WIDTH;
+    if !are_notes_beside {
+        head_ui(ui);
+    }
+    let whole = ui.available_rect_before_wrap();
+    let count = figure.plots.len().max(1) as f32;
+    let mut width = (whole.width() - (count - 1.0) * space(3)) / count;
+    if is_square {
+        // Apart from the numbers at the axes.
+        width = width.min(whole.height() + space(3));
+    }
+    let slot = |index: usize| {
+        let left = whole.left() + (width + space(3)) * index as f32;
+        Rect::from_min_size([left, whole.top()].into(), Vec2::new(width, whole.height()))
+    };
+    let plots = figure.plots.iter().enumerate().map(|(index, plot)| {
+        let mut slot = ui.new_child(UiBuilder::new().max_rect(slot(index)));
+        let (transform, response) = plot_ui(&mut slot, Id::unique((id, index)), plot, pointer);
+        let mut drawn = DrawnPlot {
+            plot,
+            has_pointer: response.contains_pointer(),
+            hovered: None,
+            clicked: None,
+            transform,
+        };
+        drawn.hovered = response.hover_pos().and_then(|at| drawn.item_at(at));
+        drawn.clicked = drawn.hovered.filter(|_| response.clicked());
+        drawn
+    });
+    let plots = plots.collect();
+    if are_notes_beside {
+        let place = whole.with_min_x(slot(1).left()).with_min_y(whole.top() + space(4));
+        head_ui(&mut ui.new_child(UiBuilder::new().max_rect(place)));
+    }
+    ui.allocate_rect(whole, Sense::hover());
+    plots
+}
+
+/// Draws the entries of the legend side by side, in as many rows as needed; outside the plots, where they cover nothing.
+fn legend_ui(ui: &mut Ui, figure: &PlotFigure) {
+    let palette = &Theme::of(ui).palette;
+    let keys = figure.keys();
+    if keys.is_empty() {
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = space(1);
+        for (name, look) in keys {
+            let (place, _) = ui.allocate_exact_size(Vec2::splat(space(4)), Sense::hover());
+            paint(
+                ui.painter(),
+                palette,
+                &look.sample(to_glam(place.left_center()), place.width()),
+            );
+            ui.label(RichText::new(name).size(type_size().note).color(palette.dim));
+            ui.add_space(space(2));
+        }
+    });
+}
+
 /// Draws the plot over the space of `ui`; `id` distinguishes it from others in the window.
-pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform, Response) {
+fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform, Response) {
     let palette = Theme::of(ui).palette;
     let [x, y] = plot.ranges();
     let space = ui.available_size();
@@ -52,14 +175,15 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (Pl
             .tick_label_font(FontId::proportional(type_size().small))
     };
     let may_move = pointer == Pointer::Moves;
-    let shown = egui_plot::Plot::new(id)
+    let mut shown = egui_plot::Plot::new(id)
         .id(id)
         .width(space.x)
         .height(space.y)
         .custom_x_axes(vec![axis_hints(AxisHints::new_x(), &plot.x, 24.0)])
         .custom_y_axes(vec![axis_hints(AxisHints::new_y(), &plot.y, 12.0)])
-        .x_grid_spacer(|input| marks(&plot.x, &input, NUMBER_WIDTH))
-        .y_grid_spacer(|input| marks(&plot.y, &input, NUMBER_HEIGHT))
+        .show_axes([true, plot.y.ticks != TickRule::Nothing])
+        .x_grid_spacer(|input| marks(&plot.x, &input, NUMBER[0]))
+        .y_grid_spacer(|input| marks(&plot.y, &input, NUMBER[1]))
         .grid_spacing(Rangef::new(MIN_GRID, 300.0))
         .show_background(false)
         .grid_color(palette.line)
@@ -74,21 +198,13 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (Pl
         .include_x(*x.end())
         .include_y(*y.start())
         .include_y(*y.end());
-    let shown = if plot.has_equal_scales {
-        shown.data_aspect(1.0)
-    } else {
-        shown
-    };
+    if plot.has_equal_scales {
+        shown = shown.data_aspect(1.0);
+    }
     let shown = shown.show(ui, |plot_ui| {
         lines_behind(plot_ui, plot, &palette);
-        let transform = *plot_ui.transform();
-        let pixels = f64::from(transform.frame().width() * plot_ui.ctx().pixels_per_point());
-        let extent = Extent {
-            ranges: [&x, &y],
-            column: transform.bounds().width() / pixels,
-        };
         for series in &plot.series {
-            draw_series(plot_ui, plot, series, extent, &palette);
+            draw_series(plot_ui, plot, series, &palette);
         }
     });
     shown.response.widget_info(|| {
@@ -99,8 +215,10 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (Pl
     ui.ctx()
         .accesskit_node_builder(shown.response.id, |node| node.set_description(plot.summary()));
     focus_ring_ui(ui, &shown.response);
-    labels_ui(ui, plot, &shown.transform, id);
-    point_labels_ui(ui, plot, &shown.transform);
+    let frame = *shown.transform.frame();
+    let at = |[x, y]: [f64; 2]| to_glam(shown.transform.position_from_point(&Place::new(x, y)));
+    let labels = plot.lay_out_labels(bounds(frame), at, &|text| measure(ui.painter(), text));
+    paint_over(ui, frame, &labels);
     (shown.transform, shown.response)
 }
 
@@ -116,17 +234,13 @@ fn marks(axis: &PlotAxis, input: &GridInput, number: f64) -> Vec<GridMark> {
 
 /// Returns the tooltip of the point under the pointer.
 fn tooltip_at(plot: &Plot, position: &HoverPosition<'_>) -> Option<String> {
-    let HoverPosition::NearDataPoint {
-        plot_name, position, ..
-    } = position
-    else {
+    let HoverPosition::NearDataPoint { position, .. } = position else {
         return None;
     };
-    // Items are named by the number of their series.
-    let series = plot.series.get(plot_name.parse::<usize>().ok()?)?;
+    let series = plot.series.iter().filter(|series| series.bar_width.is_none());
+    let points = series.flat_map(|series| plot.placed(series).map(move |(point, place)| (series, point, place)));
     let distance = |[x, y]: [f64; 2]| (x - position.x).abs() + (y - position.y).abs();
-    let placed = plot.placed(series);
-    let (point, _) = placed.min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
+    let (series, point, _) = points.min_by(|a, b| distance(a.2).total_cmp(&distance(b.2)))?;
     Some(plot.words(series, point))
 }
 
@@ -149,9 +263,9 @@ fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
             plot_ui.span(drawn.border_color(Color32::TRANSPARENT));
         }
     }
-    for (number, line) in plot.lines.iter().enumerate() {
+    for line in &plot.lines {
         let (stroke, style) = stroke(line.hue, line.style, palette);
-        let name = format!("{} {number}", line.name);
+        let name = &*line.name;
         match line.at {
             LineAt::X(value) => {
                 if let Some(place) = plot.x.place(value) {
@@ -167,304 +281,51 @@ fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
     }
 }
 
-/// Ranges of the axes, and the width of a column of pixels on the x axis.
-#[derive(Clone, Copy)]
-struct Extent<'a> {
-    ranges: [&'a RangeInclusive<f64>; 2],
-    column: f64,
-}
-
-fn draw_series(
-    plot_ui: &mut PlotUi<'_>,
-    plot: &Plot,
-    series: &Series,
-    Extent { ranges, column }: Extent<'_>,
-    palette: &Palette,
-) {
-    // The tooltip is looked up by this number.
-    let number = plot.series.iter().position(|other| std::ptr::eq(other, series));
-    let name = number.unwrap_or_default().to_string();
+fn draw_series(plot_ui: &mut PlotUi<'_>, plot: &Plot, series: &Series, palette: &Palette) {
+    let name = &*series.name;
     let colour = hue_colour(series.look.hue, palette);
-    let width = |range: &RangeInclusive<f64>| range.end() - range.start();
+    let [x_range, y_range] = plot.ranges();
+    let (width, height) = (x_range.end() - x_range.start(), y_range.end() - y_range.start());
     if let Some(bar_width) = series.bar_width {
-        let placed: Vec<_> = plot.placed(series).collect();
-        let bars = placed.iter().map(|(_, [x, y])| Bar::new(*x, *y).width(bar_width));
-        let tooltips: Vec<(f64, String)> = placed
-            .iter()
-            .map(|(point, [x, _])| (*x, plot.words(series, point)))
-            .collect();
-        let chart = BarChart::new(&*name, bars.collect()).color(colour);
-        plot_ui.bar_chart(chart.element_formatter(Box::new(move |bar, _| {
-            let tooltip = tooltips.iter().find(|(x, _)| *x == bar.argument);
-            tooltip.map(|(_, text)| text.clone()).unwrap_or_default()
-        })));
+        let placed = plot.placed(series);
+        let bars = placed.map(|(point, [x, y])| Bar::new(x, y).width(bar_width).name(plot.words(series, point)));
+        let chart = BarChart::new(name, bars.collect()).color(colour);
+        plot_ui.bar_chart(chart.element_formatter(Box::new(|bar, _| bar.name.clone())));
     }
     if let Some(style) = series.look.line {
         let (stroke, style) = stroke(series.look.hue, style, palette);
-        let places = series.points.iter().map(|point| plot.place(point.x, point.y));
-        let places: Vec<Option<[f64; 2]>> = places.collect();
-        // A missing point leaves a gap.
-        for (part, stretch) in places
-            .split(Option::is_none)
-            .filter(|stretch| stretch.len() > 1)
-            .enumerate()
-        {
-            let mut stretch: Vec<[f64; 2]> = stretch.iter().copied().flatten().collect();
+        for mut stretch in plot.stretches(series) {
             let is_stepped = stretch.windows(2).any(|ends| ends[0][0] == ends[1][0]);
             if is_stepped {
-                let near = |a: f64, b: f64, range| (a - b).abs() < COINCIDENT * width(range);
-                stretch.dedup_by(|a, b| near(a[0], b[0], ranges[0]) && near(a[1], b[1], ranges[1]));
+                let near = |a: f64, b: f64, extent: f64| (a - b).abs() < COINCIDENT * extent;
+                stretch.dedup_by(|a, b| near(a[0], b[0], width) && near(a[1], b[1], height));
             }
-            let is_ascending = stretch.windows(2).all(|ends| ends[0][0] <= ends[1][0]);
-            if is_ascending && !is_stepped {
-                stretch = per_pixel(stretch, column);
-            }
-            let line = Line::new(&*name, PlotPoints::from(stretch)).id((&name, part));
+            let line = Line::new(name, PlotPoints::from(stretch));
             // A band would turn steps into slopes.
             plot_ui.line(line.stroke(stroke).style(style).allow_band(!is_stepped));
         }
     }
     let bars = plot.placed(series).filter_map(|(point, [x, y])| {
-        let [low, high] = plot.bar_ends(point.bar?, ranges[1]);
-        let spread = BoxSpread::new(low, y, y, y, high);
-        let bar = BoxElem::new(x, spread)
-            .box_width(0.0)
-            .whisker_width(0.01 * width(ranges[0]));
+        let [low, high] = plot.bar_ends(point.bar?, &y_range);
+        let bar = BoxElem::new(x, BoxSpread::new(low, y, y, y, high));
+        let bar = bar.box_width(0.0).whisker_width(0.01 * width);
         Some(bar.fill(colour).stroke(Stroke::new(1.2, colour.gamma_multiply(0.7))))
     });
     let bars: Vec<BoxElem> = bars.collect();
     if !bars.is_empty() {
-        plot_ui.box_plot(
-            BoxPlot::new(&*name, bars)
-                .id((&name, "bars"))
-                .color(colour)
-                .allow_hover(false),
-        );
+        plot_ui.box_plot(BoxPlot::new(name, bars).color(colour).allow_hover(false));
     }
-    let Some(marker) = series.look.marker else { return };
-    let (shape, is_filled, radius) = match marker {
-        Marker::Dot => (MarkerShape::Circle, true, 1.6),
-        Marker::Disc => (MarkerShape::Circle, true, 3.2),
-        Marker::Ring => (MarkerShape::Circle, false, 3.6),
-        Marker::Halo => (MarkerShape::Circle, false, 9.0),
-        Marker::Square => (MarkerShape::Square, false, 4.5),
-        Marker::Diamond => (MarkerShape::Diamond, true, 5.0),
-        Marker::HollowDiamond => (MarkerShape::Diamond, false, 5.0),
-    };
-    let places: Vec<[f64; 2]> = plot.placed(series).map(|(_, place)| place).collect();
-    let points = Points::new(&*name, places)
-        .id((&name, "points"))
-        .shape(shape)
-        .filled(is_filled);
-    plot_ui.points(points.radius(radius).color(colour));
-}
-
-/// Draws the labels of points.
-fn point_labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform) {
-    let palette = Theme::of(ui).palette;
-    let frame = *transform.frame();
-    let painter = ui.painter().with_clip_rect(frame);
-    // Most plots have no labels.
-    if !plot.has_point_labels() {
-        return;
-    }
-    let (mut labels, mut galleys, mut marks) = (Vec::new(), Vec::new(), Vec::new());
-    let position = |[x, y]: [f64; 2]| {
-        let at = transform.position_from_point(&Place::new(x, y));
-        DVec2::new(f64::from(at.x), f64::from(at.y))
-    };
-    for series in &plot.series {
-        if series.look.line.is_some() {
-            let line: Vec<DVec2> = plot.placed(series).map(|(_, place)| position(place)).collect();
-            marks.extend(along(&line));
-        }
-        for (point, place) in plot.placed(series).filter(|_| series.look.marker.is_some()) {
-            let at = position(place);
-            marks.push(at);
-            let Some(label) = &point.label else { continue };
-            let font = FontId::proportional(type_size().small);
-            let galley = painter.layout_no_wrap(label.clone(), font, palette.text);
-            let size = DVec2::new(f64::from(galley.size().x), f64::from(galley.size().y));
-            labels.push(PointLabel { at, size });
-            galleys.push(galley);
-        }
-    }
-    let [low, high] = [frame.min, frame.max].map(|corner| DVec2::new(f64::from(corner.x), f64::from(corner.y)));
-    for (corner, galley) in place_labels(&labels, &marks, (low, high)).into_iter().zip(galleys) {
-        if let Some(corner) = corner {
-            painter.galley(pos2(corner.x as f32, corner.y as f32), galley, palette.text);
-        }
-    }
-}
-
-/// Draws the label of each vertical reference line at one of its ends, with the full name of the line as a tooltip.
-pub(super) fn labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform, id: Id) {
-    let palette = Theme::of(ui).palette;
-    let frame = *transform.frame();
-    let painter = ui.painter().with_clip_rect(frame);
-    if plot.lines.iter().all(|line| line.label.is_none()) {
-        return;
-    }
-    let placed = plot.series.iter().flat_map(|series| plot.placed(series));
-    let points: Vec<Pos2> = placed
-        .map(|(_, [x, y])| transform.position_from_point(&Place::new(x, y)))
-        .collect();
-    for (number, line) in plot.lines.iter().enumerate() {
-        let (Some(label), LineAt::X(value)) = (&line.label, line.at) else {
-            continue;
-        };
-        let Some(place) = plot.x.place(value) else { continue };
-        let x = transform.position_from_point(&Place::new(place, 0.0)).x;
-        if !frame.x_range().contains(x) {
-            continue;
-        }
-        let font = FontId::proportional(type_size().small);
-        let galley = painter.layout_no_wrap(label.clone(), font, palette.text);
-        let rect = label_place(x, galley.size(), frame, &points);
-        painter.galley(rect.min, galley, palette.text);
-        let response = ui.interact(rect, id.with(("line", number)), Sense::hover());
-        response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &line.name));
-        response.on_hover_text(&line.name);
-    }
-}
-
-/// Returns the place of the label of a vertical line: to the right of its upper end if it fits there and covers no point,
-/// else at the other end or side.
-fn label_place(x: f32, size: Vec2, frame: Rect, points: &[Pos2]) -> Rect {
-    let (right, left) = (x + space(1), x - space(1) - size.x);
-    let (top, bottom) = (frame.top() + 1.0, frame.bottom() - 1.0 - size.y);
-    let places = [(right, top), (left, top), (right, bottom), (left, bottom)];
-    let places = places.map(|(x, y)| Rect::from_min_size(pos2(x, y), size));
-    let fits = |rect: &&Rect| frame.x_range().contains(rect.left()) && frame.x_range().contains(rect.right());
-    // Markers extend beyond their points.
-    let is_free = |rect: &&Rect| !points.iter().any(|point| rect.expand(space(2)).contains(*point));
-    let mut fitting = places.iter().filter(fits);
-    let free = fitting.clone().find(is_free);
-    *free.or(fitting.next()).unwrap_or(&places[0])
-}
-
-const SAMPLE_WIDTH: f32 = space(4);
-
-/// Returns the width of a key with the space after it, in points.
-fn key_width(ui: &Ui, key: &Key) -> f32 {
-    let font = FontId::proportional(type_size().note);
-    let name = ui
-        .painter()
-        .layout_no_wrap(key.name.clone(), font, Color32::PLACEHOLDER);
-    SAMPLE_WIDTH + space(1) + name.size().x + space(3)
-}
-
-/// Returns the width of [`legend_ui`] in one row, in points.
-pub fn legend_width(ui: &Ui, keys: &[Key]) -> f32 {
-    keys.iter().map(|key| key_width(ui, key)).sum()
-}
-
-/// Draws the keys side by side, in as many rows as needed; outside the plot, where they cover nothing.
-pub fn legend_ui(ui: &mut Ui, keys: &[Key]) {
-    let available = ui.available_width();
-    let mut rows: Vec<Vec<&Key>> = Vec::new();
-    let mut taken = f32::INFINITY;
-    for key in keys {
-        let width = key_width(ui, key);
-        if taken + width > available {
-            rows.push(Vec::new());
-            taken = 0.0;
-        }
-        taken += width;
-        rows.last_mut().expect("a row was just begun").push(key);
-    }
-    for row in rows {
-        ui.horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = space(1);
-            for key in row {
-                let (sample, _) = ui.allocate_exact_size(Vec2::new(SAMPLE_WIDTH, space(4)), Sense::hover());
-                paint_sample(ui, key.look, sample);
-                ui.label(
-                    RichText::new(&key.name)
-                        .size(type_size().note)
-                        .color(Theme::of(ui).palette.dim),
-                );
-                ui.add_space(space(2));
-            }
-        });
-    }
-}
-
-fn paint_sample(ui: &Ui, look: Look, sample: Rect) {
-    let colour = hue_colour(look.hue, &Theme::of(ui).palette);
-    let (painter, middle) = (ui.painter(), sample.center());
-    let ends = [Pos2::new(sample.left(), middle.y), Pos2::new(sample.right(), middle.y)];
-    let dashes = |dash: f32, gap: f32| Shape::dashed_line(&ends, Stroke::new(1.8, colour), dash, gap);
-    match look.line {
-        Some(LineStyle::Solid) => {
-            painter.line_segment(ends, Stroke::new(1.8, colour));
-        }
-        Some(LineStyle::Fine) => {
-            painter.line_segment(ends, Stroke::new(1.0, colour));
-        }
-        Some(LineStyle::Dashed) => {
-            painter.extend(dashes(3.5, 2.5));
-        }
-        Some(LineStyle::Dotted) => {
-            painter.extend(dashes(1.5, 1.5));
-        }
-        None => {}
-    }
-    if look.line.is_none() && look.marker.is_none() {
-        // A shaded area, as pale as behind the curves, with an edge.
-        let area = sample.shrink2(vec2(0.0, space(1)));
-        let (fill, edge) = (colour.gamma_multiply(0.3), Stroke::new(1.0, colour.gamma_multiply(0.6)));
-        painter.rect(area, CornerRadius::ZERO, fill, edge, StrokeKind::Inside);
-        return;
-    }
-    let hollow = Stroke::new(1.2, colour);
-    let diamond =
-        |radius: f32| [(0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)].map(|(x, y)| middle + radius * vec2(x, y));
-    match look.marker {
-        Some(Marker::Dot) => painter.circle_filled(middle, 1.6, colour),
-        Some(Marker::Disc) => painter.circle_filled(middle, 3.0, colour),
-        Some(Marker::Ring) => painter.circle_stroke(middle, 3.4, hollow),
-        Some(Marker::Halo) => painter.circle_stroke(middle, 6.0, hollow),
-        Some(Marker::Square) => {
-            let square = Rect::from_center_size(middle, Vec2::splat(7.0));
-            painter.rect_stroke(square, CornerRadius::ZERO, hollow, StrokeKind::Inside)
-        }
-        Some(Marker::Diamond) => painter.add(Shape::convex_polygon(diamond(4.4).into(), colour, Stroke::NONE)),
-        Some(Marker::HollowDiamond) => painter.add(Shape::closed_line(diamond(4.4).into(), hollow)),
+    let (shape, is_filled, radius) = match series.look.marker {
+        Some(Marker::Dot) => (MarkerShape::Circle, true, 1.6),
+        Some(Marker::Disc) => (MarkerShape::Circle, true, 3.2),
+        Some(Marker::Ring) => (MarkerShape::Circle, false, 3.6),
+        Some(Marker::Halo) => (MarkerShape::Circle, false, 9.0),
+        Some(Marker::Square) => (MarkerShape::Square, false, 4.5),
+        Some(Marker::Diamond) => (MarkerShape::Diamond, true, 5.0),
+        Some(Marker::HollowDiamond) => (MarkerShape::Diamond, false, 5.0),
         None => return,
     };
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn labels_of_lines_avoid_points() {
-        let frame = Rect::from_min_max(pos2(100.0, 50.0), pos2(500.0, 250.0));
-        let size = Vec2::new(40.0, 12.0);
-        let place = |x: f32, points: &[Pos2]| label_place(x, size, frame, points);
-        assert_eq!(
-            place(200.0, &[]).min,
-            pos2(204.0, 51.0),
-            "to the right of the upper end"
-        );
-        assert_eq!(place(480.0, &[]).right(), 476.0, "no room on the right");
-        let point = pos2(220.0, 56.0);
-        assert_eq!(place(200.0, &[point]).right(), 196.0, "a point on the right");
-        let below = place(110.0, &[pos2(130.0, 56.0)]);
-        assert_eq!(
-            (below.left(), below.bottom()),
-            (114.0, 249.0),
-            "no room on the left either"
-        );
-        let everywhere: Vec<Pos2> = (0..400)
-            .map(|at| pos2(100.0 + (at % 20) as f32 * 20.0, 50.0 + (at / 20) as f32 * 10.0))
-            .collect();
-        assert_eq!(
-            place(200.0, &everywhere).min,
-            pos2(204.0, 51.0),
-            "the first place if every place covers a point"
-        );
-    }
+    let places: Vec<[f64; 2]> = plot.placed(series).map(|(_, place)| place).collect();
+    let points = Points::new(name, places).shape(shape).filled(is_filled);
+    plot_ui.points(points.radius(radius).color(colour));
 }

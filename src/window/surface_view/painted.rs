@@ -6,17 +6,19 @@ use std::sync::Arc;
 
 use decoupler_files::{
     export::format_number,
-    figure::surface::{
-        self, Bounds, Card, ColourScale, Disc, Dots, Ink, Line, OrbitCamera, Section, Sight, Surface, Text, ViewMode,
+    figure::{
+        Shape,
+        surface::{self, Card, ColourScale, Dots, OrbitCamera, Section, Sight, Surface, ViewMode},
     },
 };
 use eframe::egui::{
-    self, Color32, FontId, Mesh, Painter, Pos2, Rect, Response, Sense, Shape, Stroke, StrokeKind, Ui, WidgetInfo, pos2,
-    vec2,
+    self, Color32, Mesh, Painter, Pos2, Rect, Response, Sense, Stroke, StrokeKind, Ui, WidgetInfo, vec2,
 };
-use glam::Vec2;
 
-use crate::window::theme::{Palette, Theme, rgb, type_size};
+use crate::window::{
+    plotting::{bounds, measure, paint, to_egui},
+    theme::{Palette, Theme, rgb},
+};
 
 /// Nodes that are marked or highlighted.
 #[derive(Clone, Copy)]
@@ -32,8 +34,7 @@ pub(super) struct Painted {
     rect: Rect,
     pixels_per_point: f32,
     is_dark: bool,
-    lines: Vec<Line>,
-    texts: Vec<Text>,
+    frame: Vec<Shape>,
     mesh: Arc<Mesh>,
     pub(super) dots: Dots,
     pub(super) sight: Sight,
@@ -75,8 +76,7 @@ impl Painted {
             rect,
             pixels_per_point: ui.pixels_per_point(),
             is_dark: theme.is_dark,
-            lines: drawing.lines,
-            texts: drawing.texts,
+            frame: drawing.frame,
             mesh: Arc::new(mesh(&drawing.mesh)),
             dots: drawing.dots,
             sight: drawing.sight,
@@ -93,56 +93,13 @@ impl Painted {
         section: Option<&Section>,
         highlights: Highlights<'_>,
     ) {
-        paint_frame(painter, palette, &self.lines, &self.texts);
-        painter.add(Shape::Mesh(Arc::clone(&self.mesh)));
-        for piece in section
-            .map(|section| section.pieces(&self.surface, &self.sight))
-            .unwrap_or_default()
-        {
-            let points: Vec<Pos2> = piece.iter().map(|at| to_egui(at.as_vec2())).collect();
-            for (width, colour) in [(3.5, palette.panel.gamma_multiply(0.7)), (1.8, palette.warning)] {
-                painter.add(Shape::line(points.clone(), Stroke::new(width, colour)));
-            }
+        paint(painter, palette, &self.frame);
+        painter.add(egui::Shape::Mesh(Arc::clone(&self.mesh)));
+        if let Some(section) = section {
+            paint(painter, palette, &section.shapes(&self.surface, &self.sight));
         }
-        for Disc {
-            at,
-            radius,
-            ring,
-            ink,
-            opacity,
-        } in self.dots.discs(highlights.marked, highlights.lit)
-        {
-            let (at, colour) = (to_egui(at), colour(ink, palette).gamma_multiply(opacity));
-            match ring {
-                Some(width) => painter.circle_stroke(at, radius, Stroke::new(width, colour)),
-                None => painter.circle_filled(at, radius, colour),
-            };
-        }
+        paint(painter, palette, &self.dots.shapes(highlights.marked, highlights.lit));
     }
-}
-
-/// Paints lines, and texts at whole pixels, to keep small text crisp.
-pub(super) fn paint_frame(painter: &Painter, palette: &Palette, lines: &[Line], texts: &[Text]) {
-    for line in lines {
-        let ends = [line.from, line.to].map(to_egui);
-        painter.line_segment(ends, Stroke::new(1.0, colour(line.ink, palette)));
-    }
-    let pixel = painter.pixels_per_point();
-    for Text { bounds, text } in texts {
-        let corner = to_egui((bounds.min * pixel).round() / pixel);
-        let galley = painter.layout_no_wrap(text.clone(), label_font(), palette.dim);
-        painter.galley(corner, galley, palette.dim);
-    }
-}
-
-/// Returns the size of a label.
-pub(super) fn measure(painter: &Painter, text: &str) -> Vec2 {
-    let galley = painter.layout_no_wrap(text.to_owned(), label_font(), Color32::WHITE);
-    Vec2::new(galley.size().x, galley.size().y)
-}
-
-fn label_font() -> FontId {
-    FontId::proportional(type_size().small)
 }
 
 fn mesh(drawn: &surface::Mesh) -> Mesh {
@@ -160,8 +117,8 @@ fn mesh(drawn: &surface::Mesh) -> Mesh {
         mesh.colored_vertex(to_egui(vertex.at), colour);
     }
     for (cells, lines) in drawn.strips() {
-        for &cell in cells {
-            let [a, b, c, d] = drawn.corners(cell).map(|corner| corner as u32);
+        for cell in cells {
+            let [a, b, c, d] = cell.map(|corner| corner as u32);
             mesh.add_triangle(a, b, c);
             mesh.add_triangle(a, c, d);
         }
@@ -172,35 +129,6 @@ fn mesh(drawn: &surface::Mesh) -> Mesh {
         }
     }
     mesh
-}
-
-fn colour(ink: Ink, palette: &Palette) -> Color32 {
-    match ink {
-        Ink::Grid => palette.line,
-        Ink::Edge => palette.line.lerp_to_gamma(palette.dim, 0.45),
-        Ink::Label => palette.dim,
-        Ink::Text => palette.text,
-        Ink::Ground => palette.panel,
-        Ink::Node => Color32::WHITE,
-        Ink::Rim => Color32::BLACK,
-        Ink::Warning => palette.warning,
-        Ink::Accent => palette.accent,
-    }
-}
-
-pub(super) fn bounds(rect: Rect) -> Bounds {
-    Bounds {
-        min: to_glam(rect.min),
-        max: to_glam(rect.max),
-    }
-}
-
-pub(super) fn to_egui(point: Vec2) -> Pos2 {
-    Pos2::new(point.x, point.y)
-}
-
-pub(super) fn to_glam(point: Pos2) -> Vec2 {
-    Vec2::new(point.x, point.y)
 }
 
 /// Half the width over which the edge of a line fades out, in points.
@@ -228,8 +156,6 @@ pub(super) fn add_line(mesh: &mut Mesh, from: Pos2, to: Pos2, colour: Color32) {
         mesh.add_triangle(strip + 2, strip + 1, strip + 3);
     }
 }
-
-const STRIPS: usize = 128;
 
 /// Colour scale next to one or more surfaces: a vertical bar with ticks.
 #[derive(Clone, Debug)]
@@ -269,28 +195,9 @@ impl ColourBar<'_> {
                 .rect_stroke(rect, corner, Stroke::new(1.0, colour), StrokeKind::Inside);
         }
         let painter = ui.painter_at(rect);
-        let Some(drawing) = self.scale.lay_out(bounds(rect), &|text| measure(&painter, text)) else {
-            return response;
-        };
-        let bar = Rect::from_min_max(to_egui(drawing.bar.min), to_egui(drawing.bar.max));
         let map = self.theme.colours(&self.scale.quantity, self.scale.colours);
-        let mut mesh = Mesh::default();
-        for strip in 0..=STRIPS {
-            let part = strip as f32 / STRIPS as f32;
-            let y = bar.bottom() - part * bar.height();
-            mesh.colored_vertex(pos2(bar.left(), y), rgb(map.at(part)));
-            mesh.colored_vertex(pos2(bar.right(), y), rgb(map.at(part)));
-            if strip > 0 {
-                let at = 2 * strip as u32;
-                mesh.add_triangle(at - 2, at - 1, at);
-                mesh.add_triangle(at - 1, at, at + 1);
-            }
-        }
-        painter.add(mesh);
-        let palette = &self.theme.palette;
-        let stroke = Stroke::new(1.0, palette.line.lerp_to_gamma(palette.dim, 0.45));
-        painter.rect_stroke(bar, 0.0, stroke, StrokeKind::Outside);
-        paint_frame(&painter, palette, &drawing.lines, &drawing.texts);
+        let shapes = self.scale.lay_out(bounds(rect), map, &|text| measure(&painter, text));
+        paint(&painter, &self.theme.palette, &shapes);
         response
     }
 }

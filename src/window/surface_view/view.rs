@@ -5,8 +5,11 @@ use eframe::egui::{
     StrokeKind, Tooltip, Ui, Vec2, WidgetInfo,
 };
 
-use super::painted::{Highlights, Painted, to_egui, to_glam};
-use crate::window::theme::{Theme, type_size};
+use super::painted::{Highlights, Painted};
+use crate::window::{
+    plotting::{to_egui, to_glam},
+    theme::{Theme, type_size},
+};
 use decoupler_files::{
     export::format_number,
     figure::{

@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use super::{
     tables::{Heading, NoHeading},
-    unfinished::{Unfinished, folder_of},
+    unfinished::{UnfinishedFile, folder_of},
 };
 use crate::machine::{ReadingBudget, system_cause};
 
@@ -62,62 +62,56 @@ impl WriteError {
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
-    writer: BufWriter<Sink>,
+    writer: BufWriter<File>,
+    /// The temporary file and its target; `None` for a pipe or device, which cannot be replaced by renaming.
+    unfinished: Option<(UnfinishedFile, PathBuf)>,
 }
 
-#[derive(Debug)]
-enum Sink {
-    /// A temporary file that will be renamed to this target.
-    Temporary(Unfinished, PathBuf),
-    /// A pipe or device, which cannot be replaced by renaming.
-    Through(File),
-}
-
-/// Kind of file that a path leads to.
-enum Place {
-    /// A file, new or old, in an existing folder.
-    File {
-        target: PathBuf,
-        folder: PathBuf,
-        permissions: Option<Permissions>,
-    },
-    /// A pipe or device.
-    Special,
+/// The file that a path leads to, new or old, in an existing folder.
+struct Place {
+    target: PathBuf,
+    folder: PathBuf,
+    permissions: Option<Permissions>,
 }
 
 impl Place {
-    fn of(path: &Path) -> Result<Self, WriteError> {
+    /// Returns the place of a file; `None` for a pipe or device.
+    fn of(path: &Path) -> Result<Option<Self>, WriteError> {
         let is_folder = path.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator);
         if is_folder || path.is_dir() {
             return Err(WriteError::Folder(path.to_owned()));
         }
         let folder = existing_folder(path, path)?;
         let error = |source| WriteError::io(path, source);
-        match fs::metadata(path) {
-            Ok(old) if !old.is_file() => Ok(Self::Special),
-            Ok(old) if old.permissions().readonly() => Err(WriteError::ReadOnly(path.to_owned())),
-            Ok(old) => {
-                // The target of a link is replaced, not the link itself.
-                let target = fs::canonicalize(path).map_err(error)?;
-                let folder = target.parent().unwrap_or(&folder).to_owned();
-                let permissions = Some(old.permissions());
-                Ok(Self::File {
-                    target,
-                    folder,
-                    permissions,
-                })
-            }
+        let old = match fs::metadata(path) {
+            Ok(old) => old,
             Err(missing) if missing.kind() == ErrorKind::NotFound => {
                 let target = link_target(path);
                 let folder = existing_folder(path, &target)?;
-                Ok(Self::File {
+                let permissions = None;
+                return Ok(Some(Self {
                     target,
                     folder,
-                    permissions: None,
-                })
+                    permissions,
+                }));
             }
-            Err(source) => Err(error(source)),
+            Err(source) => return Err(error(source)),
+        };
+        if !old.is_file() {
+            return Ok(None);
         }
+        if old.permissions().readonly() {
+            return Err(WriteError::ReadOnly(path.to_owned()));
+        }
+        // The target of a link is replaced, not the link itself.
+        let target = fs::canonicalize(path).map_err(error)?;
+        let folder = target.parent().unwrap_or(&folder).to_owned();
+        let permissions = Some(old.permissions());
+        Ok(Some(Self {
+            target,
+            folder,
+            permissions,
+        }))
     }
 }
 
@@ -149,24 +143,22 @@ impl AtomicFile {
     /// # Errors
     /// The path cannot be written.
     pub fn create(path: &Path) -> Result<Self, WriteError> {
-        let error = |source| WriteError::io(path, source);
-        let sink = match Place::of(path)? {
-            Place::Special => Sink::Through(File::options().write(true).open(path).map_err(error)?),
-            Place::File {
-                target,
-                folder,
-                permissions,
-            } => {
-                let file = Unfinished::begin(&folder).map_err(error)?;
-                if let Some(permissions) = permissions {
-                    file.as_file().set_permissions(permissions).map_err(error)?;
-                }
-                Sink::Temporary(file, target)
+        let place = Place::of(path)?;
+        let created = || {
+            let Some(place) = place else {
+                return Ok((File::options().write(true).open(path)?, None));
+            };
+            let unfinished = UnfinishedFile::begin(&place.folder)?;
+            if let Some(permissions) = place.permissions {
+                unfinished.as_file().set_permissions(permissions)?;
             }
+            Ok((unfinished.as_file().try_clone()?, Some((unfinished, place.target))))
         };
+        let (file, unfinished) = created().map_err(|source| WriteError::io(path, source))?;
         Ok(Self {
             path: path.to_owned(),
-            writer: BufWriter::new(sink),
+            writer: BufWriter::new(file),
+            unfinished,
         })
     }
 
@@ -175,7 +167,7 @@ impl AtomicFile {
     /// # Errors
     /// Any error of the operating system; a file that was there before is then unchanged.
     pub fn commit(self) -> Result<(), WriteError> {
-        self.finish(Unfinished::persist)
+        self.finish(true)
     }
 
     /// As [`Self::commit`], but never replaces a file, not even one that another program has just written.
@@ -183,18 +175,20 @@ impl AtomicFile {
     /// # Errors
     /// Any error of the operating system: [`ErrorKind::AlreadyExists`] if there is such a file.
     pub(super) fn commit_new(self) -> Result<(), WriteError> {
-        self.finish(Unfinished::persist_new)
+        self.finish(false)
     }
 
-    fn finish(self, persist: fn(Unfinished, &Path) -> io::Result<()>) -> Result<(), WriteError> {
-        let error = |source| WriteError::io(&self.path, source);
-        match self.writer.into_inner().map_err(|e| error(e.into_error()))? {
-            Sink::Through(_) => Ok(()),
-            Sink::Temporary(file, target) => {
-                file.as_file().sync_all().map_err(error)?;
-                persist(file, &target).map_err(error)
-            }
-        }
+    fn finish(self, may_replace: bool) -> Result<(), WriteError> {
+        let finished = || {
+            let file = self.writer.into_inner().map_err(io::IntoInnerError::into_error)?;
+            let Some((unfinished, target)) = self.unfinished else {
+                return Ok(());
+            };
+            file.sync_all()?;
+            drop(file);
+            unfinished.persist(&target, may_replace)
+        };
+        finished().map_err(|source| WriteError::io(&self.path, source))
     }
 }
 
@@ -205,22 +199,6 @@ impl Write for AtomicFile {
 
     fn flush(&mut self) -> io::Result<()> {
         self.writer.flush()
-    }
-}
-
-impl Write for Sink {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Self::Temporary(file, _) => file.as_file().write(bytes),
-            Self::Through(file) => file.write(bytes),
-        }
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Self::Temporary(file, _) => file.as_file().flush(),
-            Self::Through(file) => file.flush(),
-        }
     }
 }
 
@@ -241,8 +219,8 @@ pub fn atomic_write(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     match Place::of(path)? {
         // Opening and closing a pipe would signal the end of the file to its reader.
-        Place::Special => Ok(()),
-        Place::File { .. } => AtomicFile::create(path).map(drop),
+        None => Ok(()),
+        Some(_) => AtomicFile::create(path).map(drop),
     }
 }
 

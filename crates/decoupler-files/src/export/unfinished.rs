@@ -7,7 +7,7 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
-use tempfile::{NamedTempFile, PersistError};
+use tempfile::{Builder, NamedTempFile, TempDir};
 
 const PREFIX: &str = ".decoupler-";
 const SUFFIX: &str = ".part";
@@ -24,13 +24,18 @@ fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 /// Folders in which this program has removed the unfinished files of killed programs.
 static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// An unfinished file, removed when dropped. It is locked while in use; an unlocked one was left by a program that was
-/// killed.
+/// An unfinished file or folder, removed when dropped. It is locked while in use; an unlocked one was left by a program that
+/// was killed. Windows cannot lock folders, so none is swept there.
 #[derive(Debug)]
-pub(super) struct Unfinished {
-    file: NamedTempFile,
+pub(super) struct Unfinished<T> {
+    item: T,
     listed: Listed,
+    /// Open while it is in use.
+    lock: Option<File>,
 }
+
+pub(super) type UnfinishedFile = Unfinished<NamedTempFile>;
+pub(super) type UnfinishedFolder = Unfinished<TempDir>;
 
 /// An entry of [`ALL`], removed when dropped.
 #[derive(Debug)]
@@ -42,53 +47,70 @@ impl Drop for Listed {
     }
 }
 
-impl Unfinished {
-    /// Creates a temporary file in `folder` with the default permissions (0666 minus the umask). The first call for a
-    /// folder removes files left there by killed programs.
-    pub(super) fn begin(folder: &Path) -> io::Result<Self> {
-        sweep_once(folder);
-        let mut builder = tempfile::Builder::new();
+impl<T: AsRef<Path>> Unfinished<T> {
+    /// Creates it in `parent` with the permissions `mode` minus the umask. The first call for a parent removes what killed
+    /// programs left there.
+    fn create(parent: &Path, mode: u32, create: impl Fn(&Builder<'_, '_>) -> io::Result<T>) -> io::Result<Self> {
+        sweep_once(parent);
+        let mut builder = Builder::new();
         builder.prefix(PREFIX).suffix(SUFFIX);
         #[cfg(unix)]
-        {
-            use std::{fs::Permissions, os::unix::fs::PermissionsExt};
-            builder.permissions(Permissions::from_mode(0o666));
-        }
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode));
         let mut all = all();
-        let file = not_swept(|| {
-            let file = builder.tempfile_in(folder).map_err(plain)?;
+        let (item, lock) = not_swept(|| {
+            let item = create(&builder).map_err(plain)?;
             // Some file systems have no locks; nothing is swept there.
-            let _ = file.as_file().lock();
-            Ok(file.path().try_exists()?.then_some(file))
+            let lock = File::open(&item).ok();
+            let _ = lock.as_ref().map(File::lock);
+            Ok(item.as_ref().try_exists()?.then_some((item, lock)))
         })?;
-        all.insert(file.path().to_owned());
-        let listed = Listed(file.path().to_owned());
-        Ok(Self { file, listed })
+        all.insert(item.as_ref().to_owned());
+        let listed = Listed(item.as_ref().to_owned());
+        Ok(Self { item, listed, lock })
+    }
+}
+
+impl UnfinishedFile {
+    /// Creates a temporary file in `folder`.
+    pub(super) fn begin(folder: &Path) -> io::Result<Self> {
+        Self::create(folder, 0o666, |builder| builder.tempfile_in(folder))
     }
 
     pub(super) fn as_file(&self) -> &File {
-        self.file.as_file()
+        self.item.as_file()
     }
 
-    /// Renames it to `target`, replacing a file there.
-    pub(super) fn persist(self, target: &Path) -> io::Result<()> {
-        self.persist_by(target, NamedTempFile::persist)
-    }
-
-    /// Renames it to `target`, which must not exist.
-    pub(super) fn persist_new(self, target: &Path) -> io::Result<()> {
-        self.persist_by(target, NamedTempFile::persist_noclobber)
-    }
-
-    fn persist_by(
-        self,
-        target: &Path,
-        persist: fn(NamedTempFile, PathBuf) -> Result<File, PersistError>,
-    ) -> io::Result<()> {
-        let Self { file, listed } = self;
-        let persisted = persist(file, target.to_owned());
-        drop(listed);
+    /// Renames it to `target`; if there is a file already, replaces it or fails.
+    pub(super) fn persist(self, target: &Path, may_replace: bool) -> io::Result<()> {
+        let Self { item, listed, lock } = self;
+        let persisted = match may_replace {
+            true => item.persist(target),
+            false => item.persist_noclobber(target),
+        };
+        drop((listed, lock));
         persisted.map_err(|error| error.error)?;
+        sync_folder(folder_of(target));
+        Ok(())
+    }
+}
+
+impl UnfinishedFolder {
+    /// Creates a temporary folder in `parent`.
+    pub(super) fn begin(parent: &Path) -> io::Result<Self> {
+        Self::create(parent, 0o777, |builder| builder.tempdir_in(parent))
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        self.item.path()
+    }
+
+    /// Renames it to `target`, which must be missing or an empty folder.
+    pub(super) fn persist(self, target: &Path) -> io::Result<()> {
+        let Self { item, listed, lock } = self;
+        fs::rename(item.path(), target)?;
+        // Its temporary name no longer exists.
+        let _ = item.keep();
+        drop((listed, lock));
         sync_folder(folder_of(target));
         Ok(())
     }
@@ -111,55 +133,6 @@ fn not_swept<T>(mut create: impl FnMut() -> io::Result<Option<T>>) -> io::Result
 /// Returns the system's error: the default one contains the temporary name, which the user does not know.
 fn plain(error: io::Error) -> io::Error {
     error.raw_os_error().map_or(error, io::Error::from_raw_os_error)
-}
-
-/// An unfinished folder, removed when dropped, and locked like [`Unfinished`]. Windows cannot lock folders, so none is
-/// swept there.
-#[derive(Debug)]
-pub(super) struct UnfinishedFolder {
-    folder: tempfile::TempDir,
-    listed: Listed,
-    /// Open while the folder is in use.
-    lock: Option<File>,
-}
-
-impl UnfinishedFolder {
-    /// Creates a temporary folder in `parent` with the default permissions (0777 minus the umask). The first call for a
-    /// parent removes what killed programs left there.
-    pub(super) fn begin(parent: &Path) -> io::Result<Self> {
-        sweep_once(parent);
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(PREFIX).suffix(SUFFIX);
-        #[cfg(unix)]
-        {
-            use std::{fs::Permissions, os::unix::fs::PermissionsExt};
-            builder.permissions(Permissions::from_mode(0o777));
-        }
-        let mut all = all();
-        let (folder, lock) = not_swept(|| {
-            let folder = builder.tempdir_in(parent).map_err(plain)?;
-            let lock = locked_folder(folder.path());
-            Ok(folder.path().try_exists()?.then_some((folder, lock)))
-        })?;
-        all.insert(folder.path().to_owned());
-        let listed = Listed(folder.path().to_owned());
-        Ok(Self { folder, listed, lock })
-    }
-
-    pub(super) fn path(&self) -> &Path {
-        self.folder.path()
-    }
-
-    /// Renames it to `target`, which must be missing or an empty folder.
-    pub(super) fn persist(self, target: &Path) -> io::Result<()> {
-        let Self { folder, listed, lock } = self;
-        fs::rename(folder.path(), target)?;
-        // Its temporary name no longer exists.
-        let _ = folder.keep();
-        drop((listed, lock));
-        sync_folder(folder_of(target));
-        Ok(())
-    }
 }
 
 /// Opens and locks a folder that is not in use.
@@ -285,8 +258,8 @@ mod tests {
         sweep(home.path());
         assert!(at_work.path().join("half").exists());
         // As a killed program leaves it: neither removed nor locked.
-        let UnfinishedFolder { folder, lock, .. } = at_work;
-        let left = folder.keep();
+        let Unfinished { item, lock, .. } = at_work;
+        let left = item.keep();
         drop(lock);
         sweep(home.path());
         assert!(!left.exists());

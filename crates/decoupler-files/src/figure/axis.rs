@@ -29,6 +29,8 @@ pub enum TickRule {
     Every(f64),
     /// The values 0, 1, 2 … with these names.
     Names(Vec<String>),
+    /// No values: the axis is not drawn.
+    Nothing,
 }
 
 /// An axis of a plot. A *place* is a position along it: the value itself, or its decimal logarithm.
@@ -163,6 +165,10 @@ impl PlotAxis {
             (TickRule::Round, AxisScale::Linear) => multiples_of(step_for(range, parts)),
             (TickRule::Round, AxisScale::Logarithmic) => logarithmic_ticks(range, apart, parts),
             (TickRule::Whole, _) => multiples_of(step_for(range, parts).max(1.0)),
+            (TickRule::Nothing, _) => Ticks {
+                places: Vec::new(),
+                step: 1.0,
+            },
             (TickRule::Every(step), _) => multiples_of(step * (apart / step).ceil().max(1.0)),
             (TickRule::Names(names), _) => {
                 // The width is that of a number of six characters.

@@ -1,11 +1,14 @@
 //! Figures as values: the contents of a picture, independent of how it is drawn.
 //!
 //! A [`Figure`] is described once by a function that knows the data, such as [`loss_figure`]. The window draws it with
-//! its theme and shows its texts under the pointer; [`crate::export::figures`] draws it as SVG and PNG. Values that are
-//! not finite are left out.
+//! its theme and shows its texts under the pointer; [`crate::export::figures`] draws it as SVG and PNG. Surfaces, heat
+//! maps and colour scales are laid out here, as [`Shape`]s that both paint; plots are laid out by `egui_plot` on the
+//! screen. Values that are not finite are left out.
 
 mod axis;
 mod colour_map;
+mod drawing;
+mod heat_map;
 mod of_epochs;
 mod of_errors;
 mod of_experiment;
@@ -18,8 +21,10 @@ mod plot;
 mod summary;
 pub mod surface;
 
-pub use axis::{AxisScale, PlotAxis, TickRule, Ticks, multiples, share, step_for, tick_text};
-pub use colour_map::{ColourMap, HeatMap, Rgb, SequentialMap, is_light};
+pub use axis::{AxisScale, PlotAxis, TickRule, Ticks, share, tick_text};
+pub use colour_map::{ColourMap, Rgb, SequentialMap, is_light};
+pub use drawing::{Align, Bounds, Colour, Ink, Measure, Shape, Stroke};
+pub use heat_map::{HeatMap, HeatMapDrawing};
 pub use of_epochs::{EpochOutline, compared_losses_figure, loss_figure, training_state_figure};
 pub use of_errors::{
     ErrorBins, RegressionLine, error_histogram_figure, pair_sample, regression_figure, target_histogram_figure,
@@ -28,12 +33,12 @@ pub use of_errors::{
 pub use of_experiment::experiment_figure;
 pub use of_live::{readings_figure, targets_over_time_figure, zero_gains_figure};
 pub use of_recorded::{TargetSurface, hysteresis_figure, position_error_map};
-pub use of_sample::{node_figure, pair_address, sample_figure, singular_values_figure, z_pairs_mm};
+pub use of_sample::{node_figure, pair_address, sample_figure, singular_values_figure, starts_figure, z_pairs_mm};
 pub use of_section::{SectionNodes, section_figure};
 pub use of_trade_off::{
     TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure, training_time,
 };
-pub use plot::{LineAt, Plot, PlotFigure, PlotPoint, PointLabel, ReferenceLine, Series, Span, along, place_labels};
+pub use plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, Span};
 
 use decoupler_core::decoupling::DecoderKind;
 use surface::SurfaceFigure;
@@ -181,23 +186,6 @@ impl Look {
             line: None,
             marker: None,
         }
-    }
-}
-
-/// Entry of a legend.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Key {
-    /// Meaning of the sample.
-    pub name: String,
-    /// The sample.
-    pub look: Look,
-}
-
-impl Key {
-    /// A key of this name.
-    pub fn new(name: impl Into<String>, look: Look) -> Self {
-        let name = name.into();
-        Self { name, look }
     }
 }
 

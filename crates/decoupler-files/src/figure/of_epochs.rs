@@ -1,11 +1,12 @@
 //! Figures of a training over its epochs.
 
+use std::borrow::Cow;
+
 use decoupler_core::training::{EpochRecord, Stage};
 
 use super::{
-    Hue, Key, LineStyle, Look,
+    Hue, LineStyle, Look,
     axis::{PlotAxis, TickRule},
-    colour_map::{STRETCHES, extremes, outline},
     plot::{LineAt, Plot, PlotFigure, ReferenceLine, Series},
 };
 
@@ -21,10 +22,11 @@ const MSE: &str = "mse (scaled)";
 type OfEpoch = fn(&EpochRecord) -> Option<f64>;
 
 /// The curve of a quantity over the epochs.
-fn curve(name: impl Into<String>, look: Look, history: &[EpochRecord], of: OfEpoch) -> Series {
-    let kept = outline(history, of).into_iter().map(|place| &history[place]);
-    let points = kept.filter_map(|epoch| Some([epoch.epoch as f64, of(epoch)?]));
-    Series::new(name, look, points)
+fn curve(name: impl Into<String>, hue: Hue, style: LineStyle, history: &[EpochRecord], of: OfEpoch) -> Series {
+    let points = history
+        .iter()
+        .filter_map(|epoch| Some([epoch.epoch as f64, of(epoch)?]));
+    Series::new(name, Look::line(hue, style), points)
 }
 
 /// Limits a logarithmic axis: values far above the initial one are drawn at the upper edge.
@@ -43,10 +45,8 @@ fn stage_lines(stages: &[Stage]) -> Vec<ReferenceLine> {
         // The next method continues from the last weights of the previous one.
         let changed = stage.first_epoch.saturating_sub(1);
         let name = format!("{} from epoch {changed}", stage.method.name());
-        ReferenceLine {
-            label: Some(stage.method.short_name().to_owned()),
-            ..ReferenceLine::new(name, LineAt::X(changed as f64), Hue::Grey, LineStyle::Fine)
-        }
+        let line = ReferenceLine::new(name, LineAt::X(changed as f64), Hue::Grey, LineStyle::Fine);
+        line.labelled(stage.method.short_name())
     });
     changes.collect()
 }
@@ -59,87 +59,77 @@ pub fn loss_figure(history: &[EpochRecord], stages: &[Stage], best_epoch: usize)
         ("validation", Hue::Green, |epoch| epoch.validation_mse),
         ("test", Hue::Orange, |epoch| epoch.test_mse),
     ];
-    let series = curves.map(|(name, hue, of)| curve(name, Look::line(hue, LineStyle::Solid), history, of));
-    let series: Vec<Series> = series.into_iter().filter(|curve| !curve.points.is_empty()).collect();
-    let best = "best weights";
-    let keys = series.iter().map(|series| Key::new(&series.name, series.look));
-    let keys = keys.chain([Key::new(best, Look::line(Hue::Grey, LineStyle::Dashed))]);
-    let y = bounded(
-        PlotAxis::logarithmic(MSE),
-        history.first().map(|start| start.training_mse),
-    );
-    let best = ReferenceLine::new(
-        format!("{best}, epoch {best_epoch}"),
-        LineAt::X(best_epoch as f64),
-        Hue::Grey,
-        LineStyle::Dashed,
-    );
-    PlotFigure {
-        keys: keys.collect(),
-        plots: vec![Plot {
-            lines: stage_lines(stages).into_iter().chain([best]).collect(),
-            ..Plot::new(PlotAxis::linear("epoch"), y, series)
-        }],
-        notes: Vec::new(),
-    }
+    let at_start = history.first().map(|start| start.training_mse);
+    let history = &*outlined(history);
+    let series = curves.map(|(name, hue, of)| curve(name, hue, LineStyle::Solid, history, of));
+    let name = format!("best weights, epoch {best_epoch}");
+    let best = ReferenceLine::new(name, LineAt::X(best_epoch as f64), Hue::Grey, LineStyle::Dashed);
+    Plot::new(
+        PlotAxis::linear("epoch"),
+        bounded(PlotAxis::logarithmic(MSE), at_start),
+        series.into_iter().filter(|curve| !curve.points.is_empty()).collect(),
+    )
+    .with_lines(
+        stage_lines(stages)
+            .into_iter()
+            .chain([best.listed(Some("best weights"))]),
+    )
+    .into()
 }
 
 /// Length of the gradient, damping or learning rate, and validation failures against epoch.
 pub fn training_state_figure(history: &[EpochRecord], stages: &[Stage]) -> PlotFigure {
-    let parameter = parameter_name(stages);
     let gradient = bounded(
         PlotAxis::logarithmic("gradient"),
         history.first().map(|start| start.gradient_norm),
     );
-    let failures = "validation failures";
-    let plot = |y: PlotAxis, series: Series| Plot {
-        lines: stage_lines(stages),
-        ..Plot::new(PlotAxis::linear("epoch"), y, vec![series])
+    let history = &*outlined(history);
+    let parameter = PlotAxis::logarithmic(parameter_name(stages)).limited(PARAMETERS);
+    // A little more than from 0 to 1: lines do not coincide with the frame.
+    let failures = PlotAxis::linear("validation failures")
+        .including([-0.1, 1.1])
+        .ticked(TickRule::Whole);
+    let plot = |y: PlotAxis, series: Series| {
+        let name = y.name.clone();
+        let series = Series { name, ..series };
+        Plot::new(PlotAxis::linear("epoch"), y, vec![series.listed(None)]).with_lines(stage_lines(stages))
     };
-    let look = |hue| Look::line(hue, LineStyle::Solid);
+    let solid = LineStyle::Solid;
     PlotFigure {
         plots: vec![
             plot(
                 gradient,
-                curve("gradient", look(Hue::Blue), history, |epoch| Some(epoch.gradient_norm)),
+                curve("", Hue::Blue, solid, history, |epoch| Some(epoch.gradient_norm)),
             ),
             plot(
-                PlotAxis::logarithmic(parameter).limited(PARAMETERS),
-                curve(parameter, look(Hue::Orange), history, |epoch| Some(epoch.parameter)),
+                parameter,
+                curve("", Hue::Orange, solid, history, |epoch| Some(epoch.parameter)),
             ),
             plot(
-                // A little more than from 0 to 1: lines do not coincide with the frame.
-                PlotAxis::linear(failures)
-                    .including([-0.1, 1.1])
-                    .ticked(TickRule::Whole),
-                Series::new(failures, look(Hue::Green), failure_steps(history)),
+                failures,
+                Series::new("", Look::line(Hue::Green, solid), failure_steps(history)),
             ),
         ],
-        ..PlotFigure::default()
+        notes: Vec::new(),
     }
 }
 
 /// Training and test error against epoch of two runs, by their names, in one plot.
 pub fn compared_losses_figure(runs: [Option<(&str, &[EpochRecord])>; 2]) -> PlotFigure {
+    let curves: [(&str, LineStyle, OfEpoch); 2] = [
+        ("training", LineStyle::Dashed, |epoch| Some(epoch.training_mse)),
+        ("test", LineStyle::Solid, |epoch| epoch.test_mse),
+    ];
     let mut series = Vec::new();
-    let present = runs.into_iter().zip([Hue::Blue, Hue::Orange]);
-    for ((name, history), hue) in present.filter_map(|(run, hue)| Some((run?, hue))) {
-        let curves: [(&str, LineStyle, OfEpoch); 2] = [
-            ("training", LineStyle::Dashed, |epoch| Some(epoch.training_mse)),
-            ("test", LineStyle::Solid, |epoch| epoch.test_mse),
-        ];
-        let curves =
-            curves.map(|(error, style, of)| curve(format!("{name}, {error}"), Look::line(hue, style), history, of));
-        series.extend(curves.into_iter().filter(|curve| !curve.points.is_empty()));
+    for (run, hue) in runs.into_iter().zip([Hue::Blue, Hue::Orange]) {
+        let Some((name, history)) = run else { continue };
+        let history = &*outlined(history);
+        let of_run = curves.map(|(error, style, of)| curve(format!("{name}, {error}"), hue, style, history, of));
+        series.extend(of_run.into_iter().filter(|curve| !curve.points.is_empty()));
     }
-    PlotFigure {
-        keys: series
-            .iter()
-            .map(|series| Key::new(&series.name, series.look))
-            .collect(),
-        plots: vec![Plot::new(PlotAxis::linear("epoch"), PlotAxis::logarithmic(MSE), series)],
-        notes: Vec::new(),
-    }
+    let mut figure: PlotFigure = Plot::new(PlotAxis::linear("epoch"), PlotAxis::logarithmic(MSE), series).into();
+    figure.notes = vec!["Dashed: training; solid: test.".to_owned()];
+    figure
 }
 
 /// Returns the name of [`EpochRecord::parameter`] in all methods of a training.
@@ -156,8 +146,7 @@ fn parameter_name(stages: &[Stage]) -> &'static str {
 /// Validation failures are constant from one epoch to the next: returns `[epoch, failures]` at both ends of each step.
 fn failure_steps(history: &[EpochRecord]) -> Vec<[f64; 2]> {
     let mut points: Vec<[f64; 2]> = Vec::new();
-    let of = |epoch: &EpochRecord| Some(epoch.validation_failures as f64);
-    for epoch in outline(history, of).into_iter().map(|place| &history[place]) {
+    for epoch in history {
         let (at, failures) = (epoch.epoch as f64, epoch.validation_failures as f64);
         if let Some(&[_, before]) = points.last().filter(|[_, before]| *before != failures) {
             points.push([at, before]);
@@ -168,7 +157,7 @@ fn failure_steps(history: &[EpochRecord]) -> Vec<[f64; 2]> {
 }
 
 /// Quantities whose extremes are kept.
-const QUANTITIES: [fn(&EpochRecord) -> Option<f64>; 6] = [
+const QUANTITIES: [OfEpoch; 6] = [
     |epoch| Some(epoch.training_mse),
     |epoch| epoch.validation_mse,
     |epoch| epoch.test_mse,
@@ -177,17 +166,16 @@ const QUANTITIES: [fn(&EpochRecord) -> Option<f64>; 6] = [
     |epoch| Some(epoch.validation_failures as f64),
 ];
 
-/// The epochs of a training that its curves need: for each stretch, those at which a quantity has its minimum or
-/// maximum. Memory is bounded for trainings of any length, and adding an epoch takes constant time.
+/// Number of stretches into which a long training is divided: about one for each pixel of a chart.
+const STRETCHES: usize = 1024;
+/// Number of epochs above which a training is reduced to the extremes of its stretches, which are at most half as many.
+const MAX_EPOCHS: usize = 40 * STRETCHES;
+
+/// The epochs of a training that its curves need: of a long one, those at which a quantity has its minimum or maximum
+/// within a stretch, and the first of them without a finite value. Memory is bounded for trainings of any length.
 #[derive(Clone, Debug, Default)]
 pub struct EpochOutline {
-    /// Epochs of all stretches in order; the last stretch is still open.
     kept: Vec<EpochRecord>,
-    /// Start of each stretch in `kept`.
-    begins: Vec<usize>,
-    /// Number of epochs in a stretch, and in the open one so far.
-    stretch: usize,
-    open: usize,
 }
 
 impl EpochOutline {
@@ -200,18 +188,18 @@ impl EpochOutline {
     /// dropped.
     pub fn extend(&mut self, epochs: &[EpochRecord]) {
         if let Some(first) = epochs.first() {
-            self.forget_from(first.epoch);
+            let before = self.kept.partition_point(|record| record.epoch < first.epoch);
+            self.kept.truncate(before);
         }
-        for epoch in epochs {
-            if self.begins.is_empty() || self.open == self.stretch {
-                self.begin();
-            }
-            self.kept.push(*epoch);
-            self.open += 1;
-            let from = self.begins.last().copied().unwrap_or(0);
-            // Reduced whenever it has doubled, so each epoch is processed only a few times.
-            if self.kept.len() - from > 4 * QUANTITIES.len() {
-                self.reduce(from);
+        for epochs in epochs.chunks(MAX_EPOCHS / 2) {
+            self.kept.extend_from_slice(epochs);
+            if self.kept.len() > MAX_EPOCHS {
+                let epochs = self.kept.last().map_or(0, |last| last.epoch);
+                let width = epochs / STRETCHES + 1;
+                let stretches = self
+                    .kept
+                    .chunk_by(|one, other| one.epoch / width == other.epoch / width);
+                self.kept = stretches.flat_map(extremes).collect();
             }
         }
     }
@@ -220,55 +208,37 @@ impl EpochOutline {
     pub fn records(&self) -> &[EpochRecord] {
         &self.kept
     }
+}
 
-    /// Begins a new stretch; if there are too many, merges pairs of them first.
-    fn begin(&mut self) {
-        if let Some(&from) = self.begins.last() {
-            self.reduce(from);
-        }
-        self.stretch = self.stretch.max(1);
-        if self.begins.len() == 2 * STRETCHES {
-            self.stretch *= 2;
-            let whole = std::mem::take(&mut self.kept);
-            let begins = std::mem::take(&mut self.begins);
-            for pair in begins.chunks(2) {
-                let from = self.kept.len();
-                self.begins.push(from);
-                let next = begins.partition_point(|begin| *begin <= pair[pair.len() - 1]);
-                let end = begins.get(next).copied().unwrap_or(whole.len());
-                self.kept.extend_from_slice(&whole[pair[0]..end]);
-                self.reduce(from);
-            }
-        }
-        self.begins.push(self.kept.len());
-        self.open = 0;
+/// Returns the epochs of a history that are drawn.
+fn outlined(history: &[EpochRecord]) -> Cow<'_, [EpochRecord]> {
+    if history.len() <= MAX_EPOCHS {
+        return history.into();
     }
+    let mut outline = EpochOutline::new();
+    outline.extend(history);
+    outline.kept.into()
+}
 
-    /// Reduces the last stretch, which begins at `from`, to its ends and extremes.
-    fn reduce(&mut self, from: usize) {
-        let last = &self.kept[from..];
-        let mut extreme = Vec::with_capacity(3 * QUANTITIES.len());
-        // Both ends are kept: the curve begins and ends where it did.
-        extreme.extend([0, last.len().saturating_sub(1)]);
-        for of in QUANTITIES {
-            extremes(last, of, |place| extreme.push(place));
-        }
-        extreme.sort_unstable();
-        extreme.dedup();
-        let reduced: Vec<EpochRecord> = extreme.iter().filter_map(|&place| last.get(place).copied()).collect();
-        self.kept.truncate(from);
-        self.kept.extend(reduced);
+/// Returns both ends of a stretch, and the epochs at which a quantity has its minimum or maximum or is first missing.
+fn extremes(stretch: &[EpochRecord]) -> Vec<EpochRecord> {
+    let mut places = vec![0, stretch.len() - 1];
+    for of in QUANTITIES {
+        let value = |place: usize| of(&stretch[place]).filter(|value| value.is_finite());
+        let (with, without): (Vec<usize>, Vec<usize>) = (0..stretch.len()).partition(|&place| value(place).is_some());
+        let by_value = |one: &usize, other: &usize| {
+            let [one, other] = [*one, *other].map(|place| value(place).unwrap_or(0.0));
+            one.total_cmp(&other)
+        };
+        let ends = [
+            with.iter().copied().min_by(by_value),
+            with.iter().copied().max_by(by_value),
+        ];
+        places.extend(ends.into_iter().flatten().chain(without.first().copied()));
     }
-
-    fn forget_from(&mut self, epoch: usize) {
-        if self.kept.last().is_none_or(|last| last.epoch < epoch) {
-            return;
-        }
-        let kept = self.kept.partition_point(|record| record.epoch < epoch);
-        self.kept.truncate(kept);
-        self.begins.retain(|begin| *begin < kept);
-        self.open = self.begins.last().map_or(0, |begin| kept - begin);
-    }
+    places.sort_unstable();
+    places.dedup();
+    places.into_iter().map(|place| stretch[place]).collect()
 }
 
 #[cfg(test)]
@@ -309,7 +279,7 @@ mod tests {
     #[test]
     fn without_held_out_samples_there_is_no_curve_and_no_key() {
         let figure = loss_figure(&[epoch(0, 1.0, 0)], &[], 0);
-        let keys: Vec<&str> = figure.keys.iter().map(|key| &*key.name).collect();
+        let keys: Vec<&str> = figure.keys().into_iter().map(|(key, _)| key).collect();
         assert_eq!(keys, ["training", "best weights"]);
         assert_eq!(figure.plots[0].series.len(), 1);
     }

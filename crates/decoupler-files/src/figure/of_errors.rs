@@ -5,7 +5,7 @@ use decoupler_core::{dataset::Dataset, problem::Channel, text::format_number};
 use ndarray::Array2;
 
 use super::{
-    Hue, Key, LineStyle, Look, Marker,
+    Hue, LineStyle, Look, Marker,
     axis::PlotAxis,
     plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, thinned_places},
 };
@@ -99,35 +99,28 @@ pub fn target_histogram_figure(pairs: &[(f64, f64)], chosen: Option<usize>, targ
 fn histogram(pairs: &[(f64, f64)], chosen: Option<usize>, axis: &str, counted: &str) -> PlotFigure {
     let bins = ErrorBins::new(pairs);
     let counts = bins.counts(pairs);
-    let bars = |name: &str, hue: Hue, is_shown: &dyn Fn(usize) -> bool| Series {
-        bar_width: Some(0.92 * bins.width),
-        points: (0..BINS)
-            .filter(|&bin| is_shown(bin))
-            .map(|bin| PlotPoint {
-                item: Some(bin),
-                ..PlotPoint::from([bins.width * (bin as f64 - (BINS / 2) as f64), counts[bin] as f64])
-            })
-            .collect(),
-        ..Series::new(name, Look::area(hue), [])
+    let bars = |name: &str, hue: Hue, is_shown: &dyn Fn(usize) -> bool| {
+        let points = (0..BINS).filter(|&bin| is_shown(bin)).map(|bin| {
+            let middle = bins.width * (bin as f64 - (BINS / 2) as f64);
+            PlotPoint::from([middle, counts[bin] as f64]).of_item(bin)
+        });
+        Series {
+            bar_width: Some(0.92 * bins.width),
+            ..Series::new(name, Look::area(hue), points).listed(None)
+        }
     };
     let mut series = vec![bars(counted, Hue::Blue, &|bin| Some(bin) != chosen)];
     if let Some(chosen) = chosen {
         series.push(bars(&format!("chosen {counted}"), Hue::Orange, &|bin| bin == chosen));
     }
-    let plot = Plot::new(
+    let no_error = ReferenceLine::new("no error", LineAt::X(0.0), Hue::Grey, LineStyle::Dashed);
+    Plot::new(
         PlotAxis::linear(axis),
         PlotAxis::linear(format!("{counted} of the test set")).including([0.0]),
         series,
-    );
-    let no_error = ReferenceLine::new("no error", LineAt::X(0.0), Hue::Grey, LineStyle::Dashed);
-    PlotFigure {
-        keys: vec![Key::new("no error", Look::line(no_error.hue, no_error.style))],
-        plots: vec![Plot {
-            lines: vec![no_error],
-            ..plot
-        }],
-        notes: Vec::new(),
-    }
+    )
+    .with_lines([no_error])
+    .into()
 }
 
 /// Least-squares line through pairs of actual and decoded values, and the range of the actual ones. A regression figure
@@ -216,20 +209,14 @@ fn regression(
 ) -> PlotFigure {
     let dots = thinned_places(count).map(|place| {
         let (actual, decoded) = pair(place);
-        PlotPoint {
-            item: Some(place),
-            ..PlotPoint::from([actual, decoded])
-        }
+        PlotPoint::from([actual, decoded]).of_item(place)
     });
     let line = |name: &str, look: Look, of: &dyn Fn(f64) -> f64| {
         let ends = fitted.ends.into_iter().flatten();
         Series::new(name, look, ends.map(|actual| [actual, of(actual)]))
     };
     let mut series = vec![
-        Series {
-            points: dots.collect(),
-            ..Series::new(what, Look::marker(Hue::Blue, Marker::Dot), [])
-        },
+        Series::new(what, Look::marker(Hue::Blue, Marker::Dot), dots),
         line("equal", Look::line(Hue::Ink, LineStyle::Dashed), &|actual| actual),
     ];
     let mut notes = Vec::new();
@@ -254,10 +241,6 @@ fn regression(
 /// One plot of `series` with equal scales: decoded values, called `answer`, against actual values of the quantity `title`.
 pub(super) fn decoded_against_actual(title: &str, answer: &str, series: Vec<Series>, notes: Vec<String>) -> PlotFigure {
     PlotFigure {
-        keys: series
-            .iter()
-            .map(|series| Key::new(&series.name, series.look))
-            .collect(),
         plots: vec![Plot {
             has_equal_scales: true,
             ..Plot::new(
@@ -346,7 +329,7 @@ mod tests {
         assert_eq!(fit(&[(1.0, 2.0), (1.0, 3.0)]), None);
         assert_eq!(fit(&[]), None);
         assert_eq!(
-            regression_figure(&[(1.0, 2.0), (1.0, 3.0)]).keys.len(),
+            regression_figure(&[(1.0, 2.0), (1.0, 3.0)]).keys().len(),
             2,
             "no fitted line"
         );

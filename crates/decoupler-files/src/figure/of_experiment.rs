@@ -3,9 +3,10 @@
 use ndarray::Array2;
 
 use super::{
-    Hue, Key, LineStyle, Look, Marker,
+    Hue, LineStyle, Look, Marker,
     axis::{PlotAxis, TickRule},
-    colour_map::{HeatMap, SequentialMap},
+    colour_map::SequentialMap,
+    heat_map::HeatMap,
     plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, Span},
 };
 use crate::figure::Figure;
@@ -86,55 +87,47 @@ fn position(axis: &Axis, index: usize, cell: &Cell) -> f64 {
     }
 }
 
+/// A point at the median of a figure, with a bar from the smallest to the largest.
+fn median_point(x: f64, figure: &Measured) -> Option<PlotPoint> {
+    let Measured { median, min, max, .. } = figure;
+    Some(PlotPoint {
+        bar: min.zip(*max).map(|(least, largest)| [least, largest]),
+        ..PlotPoint::from([x, (*median)?])
+    })
+}
+
 fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
     let axis = &results.experiment.axis;
     let is_number = axis.kind == AxisKind::Hidden;
-    let mut cells: Vec<(f64, &Cell)> = results
-        .cells
-        .iter()
-        .enumerate()
-        .map(|(index, cell)| (position(axis, index, cell), cell))
-        .collect();
+    let cells = results.cells.iter().enumerate();
+    let mut cells: Vec<(f64, &Cell)> = cells.map(|(index, cell)| (position(axis, index, cell), cell)).collect();
     cells.sort_by(|one, other| one.0.total_cmp(&other.0));
     let points = |value: fn(&Cell) -> Option<f64>| {
         let points = cells.iter().filter_map(move |(x, cell)| Some([*x, value(cell)?]));
         points.collect::<Vec<_>>()
     };
     // Categories are not joined by lines.
-    let joined = |look: Look| if is_number { look.joined() } else { look };
+    let ours_look = match is_number {
+        true => Look::marker(Hue::Blue, Marker::Disc).joined(),
+        false => Look::marker(Hue::Blue, Marker::Disc),
+    };
     let reference = match is_number {
         true => Look::line(Hue::Grey, LineStyle::Dashed),
         false => Look::marker(Hue::Grey, Marker::Ring),
     };
-    let ours = cells.iter().filter_map(|(x, cell)| {
-        let Measured { median, min, max, .. } = cell.percent();
-        Some(PlotPoint {
-            bar: min.zip(max).map(|(least, largest)| [least, largest]),
-            ..PlotPoint::from([*x, median?])
-        })
-    });
     let published = Look {
         line: is_number.then_some(LineStyle::Fine),
         ..Look::marker(Hue::Ink, Marker::Square)
     };
+    let linear = match results.experiment.recording {
+        None => "linear map",
+        Some(_) => "ridge",
+    };
+    let ours = cells.iter().filter_map(|(x, cell)| median_point(*x, &cell.percent()));
     let mut series = vec![
-        Series::new(
-            match results.experiment.recording {
-                None => "linear map",
-                Some(_) => "ridge",
-            },
-            reference,
-            points(Cell::linear_percent),
-        ),
+        Series::new(linear, reference, points(Cell::linear_percent)),
         Series::new("published", published, points(|cell| cell.percent().published)),
-        Series {
-            points: ours.collect(),
-            ..Series::new(
-                "ours: median, smallest to largest",
-                joined(Look::marker(Hue::Blue, Marker::Disc)),
-                [],
-            )
-        },
+        Series::new("ours: median, smallest to largest", ours_look, ours),
     ];
     series.retain(|series| !series.points.is_empty());
     let x = PlotAxis::linear(axis.kind.name());
@@ -144,50 +137,33 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
             .ticked(TickRule::Names(labels(axis)))
             .including([-0.5, axis.values.len() as f64 - 0.5]),
     };
-    let keys = series
-        .iter()
-        .rev()
-        .map(|series| Key::new(&series.name, series.look))
-        .collect();
-    let r2 = r2_plot(x.clone(), &cells, joined(Look::marker(Hue::Blue, Marker::Disc)));
+    let r2 = r2_plot(x.clone(), &cells, ours_look);
     let mut plot = Plot::new(x, PlotAxis::linear(error_axis(results)).including([0.0, 1.0]), series);
     if let Some(problem) = results.problem.as_ref().filter(|_| is_number) {
         // The suggestions of Eq. (12) and (13).
         let (root, logarithm) = suggested_hidden(problem.feature_count(), problem.targets.len());
-        let (fewest, most) = (*root.start() as f64, *root.end() as f64);
-        let (hue, style) = (Hue::Orange, LineStyle::Solid);
         plot.spans.push(Span {
             name: "Eq. (12)".to_owned(),
-            hue,
-            range: fewest..=most,
+            hue: Hue::Orange,
+            range: *root.start() as f64..=*root.end() as f64,
         });
         let at = LineAt::X(logarithm as f64);
-        plot.lines.push(ReferenceLine {
-            label: Some("Eq. (13)".to_owned()),
-            ..ReferenceLine::new("Eq. (13)", at, hue, style)
-        });
+        let line = ReferenceLine::new("Eq. (13)", at, Hue::Orange, LineStyle::Solid);
+        plot.lines.push(line.labelled("Eq. (13)"));
     }
     PlotFigure {
         plots: std::iter::once(plot).chain(r2).collect(),
-        keys,
         notes: Vec::new(),
     }
 }
 
 /// R² of the networks along the axis; `None` for the nodes of an array.
 fn r2_plot(x: PlotAxis, cells: &[(f64, &Cell)], look: Look) -> Option<Plot> {
-    let points = cells.iter().map(|(x, cell)| {
-        let r2 = cell.error(ErrorMeasure::R2)?;
-        Some(r2.median.map(|median| PlotPoint {
-            bar: r2.min.zip(r2.max).map(|(least, largest)| [least, largest]),
-            ..PlotPoint::from([*x, median])
-        }))
-    });
-    let points: Vec<_> = points.collect::<Option<_>>()?;
-    let series = Series {
-        points: points.into_iter().flatten().collect(),
-        ..Series::new("R²", look, [])
-    };
+    let points = cells
+        .iter()
+        .map(|(x, cell)| Some(median_point(*x, &cell.error(ErrorMeasure::R2)?)));
+    let points: Vec<Option<PlotPoint>> = points.collect::<Option<_>>()?;
+    let series = Series::new("R²", look, points.into_iter().flatten()).listed(None);
     Some(Plot::new(x, PlotAxis::linear("R²").including([1.0]), vec![series]))
 }
 
@@ -230,40 +206,33 @@ fn repeats(results: &ExperimentResults) -> PlotFigure {
             let look = Look::marker(*hue, Marker::Disc);
             Series::new(name, look, trial_points(experiment, cell, measured))
         });
-        let mut plot = Plot::new(x.ticked(TickRule::Whole), y, series.collect());
         let lines = of_cells().filter_map(|(cell, (name, hue))| {
             let at = LineAt::Y(published(cell)?);
-            Some(ReferenceLine::new(
-                format!("{name}, published"),
-                at,
-                *hue,
-                LineStyle::Dashed,
-            ))
+            let line = ReferenceLine::new(format!("{name}, published"), at, *hue, LineStyle::Dashed);
+            Some(line.listed(Some(name)))
         });
-        plot.lines = lines.collect();
-        plot
+        Plot::new(x.ticked(TickRule::Whole), y, series.collect()).with_lines(lines)
     });
-    let keys = cells
-        .iter()
-        .map(|(name, hue)| Key::new(name, Look::marker(*hue, Marker::Disc)));
-    let published = Key::new("published", Look::line(Hue::Ink, LineStyle::Dashed));
-    let is_published = plots.iter().any(|plot| !plot.lines.is_empty());
-    let keys = keys.chain(is_published.then_some(published)).collect();
     let is_zero = |cell: &Cell| {
         cell.error(ErrorMeasure::YPercent)
             .is_some_and(|y| y.median == Some(0.0))
     };
-    let note = "Y is constant: its error is 0 and lies below the axis.";
+    let notes = [
+        (
+            plots.iter().any(|plot| !plot.lines.is_empty()),
+            "Dashed lines: published.",
+        ),
+        (
+            results.cells.iter().any(is_zero),
+            "Y is constant: its error is 0 and lies below the axis.",
+        ),
+    ];
+    let notes = notes
+        .into_iter()
+        .filter_map(|(applies, note)| applies.then(|| note.to_owned()));
     PlotFigure {
         plots: plots.into(),
-        keys,
-        notes: results
-            .cells
-            .iter()
-            .any(is_zero)
-            .then(|| note.to_owned())
-            .into_iter()
-            .collect(),
+        notes: notes.collect(),
     }
 }
 
@@ -343,12 +312,23 @@ mod tests {
 
     #[test]
     fn published_figures_are_shown_before_any_run() {
-        let keys = |figure: &PlotFigure| figure.keys.iter().map(|key| key.name.clone()).collect::<Vec<_>>();
+        let keys = |figure: &PlotFigure| {
+            figure
+                .keys()
+                .into_iter()
+                .map(|(key, _)| key.to_owned())
+                .collect::<Vec<_>>()
+        };
         let hidden = plots_of(PaperTable::HiddenNodes);
-        assert_eq!(keys(&hidden), ["published"], "there are no other results yet");
+        assert_eq!(
+            keys(&hidden),
+            ["published", "Eq. (12)"],
+            "there are no other results yet"
+        );
         assert_eq!(hidden.plots[0].series[0].points[3], PlotPoint::from([12.0, 2.28]));
         let repeats = plots_of(PaperTable::CrossValidation);
-        assert_eq!(keys(&repeats), ["1000 samples", "100 samples", "published"]);
+        assert_eq!(keys(&repeats), ["1000 samples", "100 samples"]);
+        assert_eq!(repeats.notes, ["Dashed lines: published."]);
         let published = |plot: &Plot| plot.lines.iter().map(|line| line.at).collect::<Vec<_>>();
         assert_eq!(published(&repeats.plots[0]), [LineAt::Y(2.01), LineAt::Y(3.35)]);
         let arrays = plots_of(PaperTable::ArrayScales);

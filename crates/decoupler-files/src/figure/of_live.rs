@@ -6,9 +6,10 @@ use decoupler_core::{evaluation::Intervals, problem::Channel};
 use ndarray::Array2;
 
 use super::{
-    Hue, Key, LineStyle, Look,
+    Hue, LineStyle, Look,
     axis::PlotAxis,
-    colour_map::{HeatMap, SequentialMap},
+    colour_map::SequentialMap,
+    heat_map::HeatMap,
     plot::{Plot, PlotFigure, Series},
 };
 
@@ -40,7 +41,8 @@ pub fn targets_over_time_figure(
     };
     let series = |target: usize| {
         let points = history.iter().map(|(time_s, values)| [*time_s, values[target]]);
-        Series::new(targets[target].name.clone(), look(target), points)
+        let series = Series::new(targets[target].name.clone(), look(target), points);
+        series.listed(has_names.then(|| targets[target].title()).as_deref())
     };
     let limit = |target: usize, sign: f64| {
         let intervals = intervals.filter(|intervals| has_names && intervals.half_width(target, 0.0).is_some())?;
@@ -51,7 +53,7 @@ pub fn targets_over_time_figure(
         let side = if sign < 0.0 { "lower" } else { "upper" };
         let name = format!("{}, {side} limit of the 90 % interval", targets[target].name);
         let look = Look::line(HUES[target % HUES.len()], LineStyle::Fine);
-        Some(Series::new(name, look, points))
+        Some(Series::new(name, look, points).listed(None))
     };
     let limits = |target: usize| [-1.0, 1.0].into_iter().filter_map(move |sign| limit(target, sign));
     let plot = |unit: &Option<String>| {
@@ -66,12 +68,8 @@ pub fn targets_over_time_figure(
             of_unit.clone().map(series).chain(of_unit.flat_map(limits)).collect(),
         )
     };
-    let keys = (0..targets.len()).filter(|_| has_names);
     PlotFigure {
         plots: units.into_iter().map(plot).collect(),
-        keys: keys
-            .map(|target| Key::new(targets[target].title(), look(target)))
-            .collect(),
         notes: Vec::new(),
     }
 }
@@ -124,7 +122,7 @@ mod tests {
         );
         let last = &figure.plots[0].series[1].points[1];
         assert_eq!([last.x, last.y], [0.5, 6.0]);
-        assert_eq!(figure.keys.len(), 3);
+        assert_eq!(figure.keys().len(), 3);
     }
 
     #[test]

@@ -15,10 +15,11 @@ use ndarray::{Array2, ArrayView2};
 use super::{
     Hue, LineStyle, Look,
     axis::{PlotAxis, step_for, tick_text},
-    colour_map::{HeatMap, SequentialMap},
+    colour_map::SequentialMap,
+    heat_map::HeatMap,
     of_errors::decoded_against_actual,
     plot::{Plot, PlotFigure, Series},
-    surface::{Quantity, Surface, ViewMode},
+    surface::{Quantity, Surface},
 };
 
 /// Mean decoded against actual values of `target` while it rises and while it falls, with the line on which they would be
@@ -240,20 +241,9 @@ impl TargetSurface {
     }
 
     fn surface(&self, title: &str, of_targets: &[f64], quantity: Quantity, range: RangeInclusive<f64>) -> Surface {
-        let values = Vec::from_iter(self.values(of_targets));
-        let nodes = self.nodes.iter().zip(&values);
-        Surface {
-            title: title.to_owned(),
-            map: Arc::clone(&self.map),
-            values: self.map.evaluate(&values).into(),
-            nodes: nodes
-                .map(|(node, &value)| DVec3::new(node.x_mm, node.y_mm, value))
-                .collect(),
-            quantity,
-            range,
-            mode: ViewMode::default(),
-            colours: SequentialMap::default(),
-        }
+        let nodes = self.nodes.iter().zip(self.values(of_targets));
+        let nodes = nodes.map(|(node, value)| DVec3::new(node.x_mm, node.y_mm, value));
+        Surface::through(title, &self.map, nodes.collect::<Vec<_>>(), quantity, range)
     }
 }
 

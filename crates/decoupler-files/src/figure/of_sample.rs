@@ -1,15 +1,19 @@
 //! Figures of all targets of one sample, of the singular values of each row, and of decoupled next to actual nodes.
 
 use decoupler_core::{
-    dataset::Dataset, evaluation::NodeAddress, identifiability::Identifiability, problem::Channel, text::format_number,
+    dataset::Dataset,
+    evaluation::{NodeAddress, Spread},
+    identifiability::Identifiability,
+    problem::Channel,
+    text::format_number,
 };
 use glam::DVec3;
 use ndarray::Array2;
 
 use super::{
-    Hue, Key, LineStyle, Look, Marker,
+    Hue, LineStyle, Look, Marker,
     axis::{PlotAxis, TickRule},
-    plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series},
+    plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, Span},
 };
 
 /// Maximum number of targets whose names fit below the axis.
@@ -32,51 +36,31 @@ pub fn sample_figure(targets: &[Channel], actual: &[f64], decoded: &[f64], range
     let first = if has_names { 0.0 } else { 1.0 };
     let series = |name: &str, look: Look, values: &[f64]| {
         let points = values.iter().enumerate().map(|(target, &value)| {
-            let unit = targets[target]
-                .unit
-                .as_ref()
-                .map_or_else(String::new, |unit| format!(" {unit}"));
+            let Channel { name: of, unit, .. } = &targets[target];
+            let unit = unit.as_ref().map_or_else(String::new, |unit| format!(" {unit}"));
             PlotPoint {
-                note: Some(format!(
-                    "{}\n{name}: {}{unit}",
-                    targets[target].name,
-                    format_number(value)
-                )),
-                item: Some(target),
-                ..PlotPoint::from([first + target as f64, place(target, value)])
+                note: Some(format!("{of}\n{name}: {}{unit}", format_number(value))),
+                ..PlotPoint::from([first + target as f64, place(target, value)]).of_item(target)
             }
         });
-        Series {
-            points: points.collect(),
-            ..Series::new(name, look, [])
-        }
+        Series::new(name, look, points)
     };
-    let series = vec![
-        series("actual", Look::marker(Hue::Grey, Marker::Square), actual),
-        series("decoded", Look::marker(Hue::Blue, Marker::Disc), decoded),
-    ];
     let y = match targets.first().and_then(|target| target.unit.as_ref()) {
         _ if !has_one_unit => "% of the target's range".to_owned(),
         Some(unit) => format!("value ({unit})"),
         None => "value".to_owned(),
     };
-    let x = PlotAxis::linear("target");
-    let x = if has_names {
-        x.ticked(TickRule::Names(
-            targets.iter().map(|target| target.name.clone()).collect(),
-        ))
-    } else {
-        x.ticked(TickRule::Whole)
+    let ticks = match has_names {
+        true => TickRule::Names(targets.iter().map(|target| target.name.clone()).collect()),
+        false => TickRule::Whole,
     };
     let ends = [first - 0.5, first + targets.len() as f64 - 0.5];
-    PlotFigure {
-        keys: series
-            .iter()
-            .map(|series| Key::new(&series.name, series.look))
-            .collect(),
-        plots: vec![Plot::new(x.including(ends), PlotAxis::linear(y), series)],
-        notes: Vec::new(),
-    }
+    let x = PlotAxis::linear("target").ticked(ticks).including(ends);
+    let series = vec![
+        series("actual", Look::marker(Hue::Grey, Marker::Square), actual),
+        series("decoded", Look::marker(Hue::Blue, Marker::Disc), decoded),
+    ];
+    Plot::new(x, PlotAxis::linear(y), series).into()
 }
 
 /// Values below the largest by this factor are rounding errors.
@@ -85,36 +69,26 @@ const ROUNDING: f64 = 1e-16;
 /// Singular values of every row, from the best-seen deformation pattern to the worst. `worst` is the index of the row
 /// drawn strongest; noise hides the patterns whose value is below `hidden_below_per_mm`, 0 without noise.
 pub fn singular_values_figure(rows: &[Identifiability], worst: usize, hidden_below_per_mm: f64) -> PlotFigure {
-    let strong = Look::marker(Hue::Blue, Marker::Disc).joined();
     let pale = Look::line(Hue::Grey, LineStyle::Fine);
     let others = rows.iter().enumerate().filter(|(index, _)| *index != worst);
-    let others = others.map(|(_, row)| Series::new(format!("row {}", row.row + 1), pale, numbered(row)));
-    let strongest = rows.get(worst).map(|row| {
-        let name = format!("row {}, worst", row.row + 1);
-        Series::new(name, strong, numbered(row))
+    let others = others.map(|(_, row)| {
+        let series = Series::new(format!("row {}", row.row + 1), pale, numbered(row));
+        series.listed(Some("other rows"))
     });
-    let series: Vec<Series> = others.chain(strongest).collect();
-    let mut keys = vec![Key::new("worst row", strong)];
-    if rows.len() > 1 {
-        keys.push(Key::new("other rows", pale));
-    }
-    let mut lines = Vec::new();
-    if hidden_below_per_mm > 0.0 {
-        let (name, hue, style) = ("noise hides values below", Hue::Orange, LineStyle::Dashed);
-        lines.push(ReferenceLine::new(name, LineAt::Y(hidden_below_per_mm), hue, style));
-        keys.push(Key::new(name, Look::line(hue, style)));
-    }
+    let strongest = rows.get(worst).map(|row| {
+        let look = Look::marker(Hue::Blue, Marker::Disc).joined();
+        let series = Series::new(format!("row {}, worst", row.row + 1), look, numbered(row));
+        series.listed(Some("worst row"))
+    });
+    let series = others.chain(strongest).collect();
+    let noise = (hidden_below_per_mm > 0.0).then(|| {
+        let at = LineAt::Y(hidden_below_per_mm);
+        ReferenceLine::new("noise hides values below", at, Hue::Orange, LineStyle::Dashed)
+    });
     let unknowns = rows.get(worst).map_or(1, Identifiability::unknowns);
     let x = PlotAxis::linear("deformation pattern, best seen first").including([0.5, unknowns as f64 + 0.5]);
     let y = PlotAxis::logarithmic("singular value of ∂ ln R/∂u (1/mm)");
-    PlotFigure {
-        plots: vec![Plot {
-            lines,
-            ..Plot::new(x.ticked(TickRule::Whole), y, series)
-        }],
-        keys,
-        notes: Vec::new(),
-    }
+    Plot::new(x.ticked(TickRule::Whole), y, series).with_lines(noise).into()
 }
 
 /// Number of each pattern from 1, and its value, without rounding errors.
@@ -164,48 +138,68 @@ pub fn node_figure(
     spread_mm: Option<&[f64]>,
     nodes_per_row: usize,
 ) -> PlotFigure {
-    let numbered = |nodes_mm: &[DVec3]| -> Vec<[f64; 2]> {
-        let numbered = nodes_mm.iter().enumerate();
-        numbered
-            .map(|(node, position)| [(node + 1) as f64, position.z])
-            .collect()
+    let nodes_per_row = nodes_per_row.max(1);
+    let series = |name: &str, look: Look, nodes_mm: &[DVec3], spread_mm: &[f64]| {
+        let points = nodes_mm.iter().enumerate().map(|(node, place)| {
+            let (row, of_row) = (node / nodes_per_row + 1, node % nodes_per_row + 1);
+            let spread = spread_mm.get(node);
+            let more = spread.map_or_else(String::new, |spread| format!(" ± {} mm", format_number(*spread)));
+            PlotPoint {
+                bar: spread.map(|spread| [place.z - spread, place.z + spread]),
+                note: Some(format!(
+                    "Row {row}, node {of_row}\n{name} z: {} mm{more}",
+                    format_number(place.z)
+                )),
+                ..PlotPoint::from([(node + 1) as f64, place.z]).of_item(node)
+            }
+        });
+        Series::new(name, look, points)
     };
-    let actual = Series::new("actual", Look::marker(Hue::Grey, Marker::Square), numbered(actual_mm));
-    let decoupled = decoupled_mm.map(|decoupled_mm| {
+    let actual = series("actual", Look::marker(Hue::Grey, Marker::Square), actual_mm, &[]);
+    let decoupled = decoupled_mm.map(|nodes_mm| {
         let look = Look::marker(Hue::Blue, Marker::Disc);
-        let mut series = Series::new("decoupled", look, numbered(decoupled_mm));
-        for (point, spread) in series.points.iter_mut().zip(spread_mm.unwrap_or_default()) {
-            point.bar = Some([point.y - spread, point.y + spread]);
-        }
-        series
+        series("decoupled", look, nodes_mm, spread_mm.unwrap_or_default())
     });
-    let mut series = vec![actual];
-    series.extend(decoupled);
-    for series in &mut series {
-        for (node, point) in series.points.iter_mut().enumerate() {
-            point.note = Some(node_words(&series.name, point, node, nodes_per_row.max(1)));
-            point.item = Some(node);
-        }
-    }
     // A tick at the last node of a row.
-    let x = PlotAxis::linear("node, row by row").ticked(TickRule::Every(nodes_per_row.max(1) as f64));
-    PlotFigure {
-        keys: series
-            .iter()
-            .map(|series| Key::new(&series.name, series.look))
-            .collect(),
-        plots: vec![Plot::new(x, PlotAxis::linear("z (mm)"), series)],
-        notes: Vec::new(),
-    }
+    let x = PlotAxis::linear("node, row by row").ticked(TickRule::Every(nodes_per_row as f64));
+    let series = std::iter::once(actual).chain(decoupled).collect();
+    Plot::new(x, PlotAxis::linear("z (mm)"), series).into()
 }
 
-fn node_words(name: &str, point: &PlotPoint, node: usize, nodes_per_row: usize) -> String {
-    let (row, of_row) = (node / nodes_per_row + 1, node % nodes_per_row + 1);
-    let mut words = format!("Row {row}, node {of_row}\n{name} z: {} mm", format_number(point.y));
-    if let Some([low, high]) = point.bar {
-        words += &format!(" ± {} mm", format_number(0.5 * (high - low)));
+/// Results of several starts of a training, as dots over `axis`: the start `kept` is highlighted, and a box reaches from the
+/// lower to the upper quartile, with a line at the median. Starts without a result have no dot.
+pub fn starts_figure(axis: &str, results: &[Option<f64>], kept: usize, spread: &Spread) -> PlotFigure {
+    let dots = |name: &str, hue: Hue, is_shown: &dyn Fn(usize) -> bool| {
+        let shown = results.iter().enumerate().filter(|(start, _)| is_shown(*start));
+        let points = shown.filter_map(|(start, result)| {
+            let result = (*result)?;
+            // Three heights separate the dots of similar values.
+            Some(PlotPoint {
+                note: Some(format!("Start {}: {}", start + 1, format_number(result))),
+                ..PlotPoint::from([result, (start % 3) as f64])
+            })
+        });
+        Series::new(name, Look::marker(hue, Marker::Disc), points).listed(None)
+    };
+    let series = vec![
+        dots("other starts", Hue::Grey, &|start| start != kept),
+        dots("kept start", Hue::Blue, &|start| start == kept),
+    ];
+    let y = PlotAxis::linear("starts")
+        .ticked(TickRule::Nothing)
+        .including([-1.0, 3.0]);
+    let median = ReferenceLine::new("median", LineAt::X(spread.median), Hue::Grey, LineStyle::Solid).listed(None);
+    let plot = Plot::new(PlotAxis::linear(axis), y, series).with_lines([median]);
+    let quartiles = Span {
+        name: String::new(),
+        hue: Hue::Grey,
+        range: spread.lower_quartile..=spread.upper_quartile,
+    };
+    Plot {
+        spans: vec![quartiles],
+        ..plot
     }
-    words
+    .into()
 }
 
 #[cfg(test)]
@@ -266,8 +260,8 @@ mod tests {
         assert_eq!((row.unknowns(), points.len()), (6, 4));
         assert_eq!(points[0], [1.0, row.singular_values_per_mm[0]]);
         let quiet = singular_values_figure(std::slice::from_ref(&row), 0, 0.0);
-        assert_eq!((quiet.keys.len(), quiet.plots[0].lines.len()), (1, 0));
-        assert_eq!(singular_values_figure(&[row.clone(), row], 1, 0.1).keys.len(), 3);
+        assert_eq!((quiet.keys().len(), quiet.plots[0].lines.len()), (1, 0));
+        assert_eq!(singular_values_figure(&[row.clone(), row], 1, 0.1).keys().len(), 3);
         assert!(singular_values_figure(&[], 0, 0.0).plots[0].series.is_empty());
     }
 
@@ -319,7 +313,7 @@ mod tests {
             Some("Row 2, node 1\ndecoupled z: 5.00 mm ± 0.300 mm")
         );
         assert_eq!(
-            node_figure(&actual, None, None, 1).keys.len(),
+            node_figure(&actual, None, None, 1).keys().len(),
             1,
             "nothing decoupled yet"
         );

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use glam::DVec3;
 
 use super::{
-    Hue, Key, LineStyle, Look, Marker,
+    Hue, LineStyle, Look, Marker,
     axis::PlotAxis,
     plot::{Plot, PlotFigure, PlotPoint, Series, Span},
     surface::{Section, SectionLine},
@@ -63,44 +63,26 @@ pub fn section_figure(
                 of_row + 1,
                 format_number(at.z)
             )),
-            item: Some(node),
-            ..PlotPoint::from([place(at), at.z])
+            ..PlotPoint::from([place(at), at.z]).of_item(node)
         });
-        Some(Series {
-            points: points.collect(),
-            ..Series::new(format!("{name} nodes"), Look::marker(look.hue, marker), [])
-        })
+        let series = Series::new(format!("{name} nodes"), Look::marker(look.hue, marker), points);
+        Some(series.listed(None))
     });
-    let nodes: Vec<Series> = nodes.collect();
-    let has_nodes = !nodes.is_empty();
-    let keys = looks.into_iter().zip(&curves).map(|((name, look, marker), _)| {
-        let marker = has_nodes.then_some(marker);
-        Key::new(name, Look { marker, ..look })
-    });
-    let spans = if curves.is_empty() {
-        Vec::new()
-    } else {
-        beyond(section.line, map)
+    let name = section.line.name();
+    let (spans, notes) = match curves.is_empty() {
+        false => (beyond(section.line, map), Vec::new()),
+        true => {
+            let note = "lies beyond the nodes: there is no surface above it.";
+            (Vec::new(), vec![format!("{} {note}", capitalised(&name))])
+        }
     };
-    let extrapolated = spans.first().map(|span| Key::new(&span.name, Look::area(span.hue)));
-    let notes = if curves.is_empty() {
-        vec![format!(
-            "{} lies beyond the nodes: there is no surface above it.",
-            capitalised(&section.line.name())
-        )]
-    } else {
-        Vec::new()
-    };
+    let plot = Plot::new(
+        PlotAxis::linear(format!("{axis} along {name} (mm)")),
+        PlotAxis::linear("z (mm)").including([*heights_mm.start(), *heights_mm.end()]),
+        curves.iter().cloned().chain(nodes).collect(),
+    );
     PlotFigure {
-        keys: keys.chain(extrapolated).collect(),
-        plots: vec![Plot {
-            spans,
-            ..Plot::new(
-                PlotAxis::linear(format!("{axis} along {} (mm)", section.line.name())),
-                PlotAxis::linear("z (mm)").including([*heights_mm.start(), *heights_mm.end()]),
-                curves.into_iter().chain(nodes).collect(),
-            )
-        }],
+        plots: vec![Plot { spans, ..plot }],
         notes,
     }
 }
@@ -198,7 +180,7 @@ mod tests {
         assert_eq!(along.plots[0].series.len(), 2);
         assert_eq!(along.plots[0].x.name, "x along column-wire 4 (mm)");
         let outside = figure(SectionLine::ColumnWire(11), 12.0);
-        assert!(outside.plots[0].series.is_empty() && outside.keys.is_empty());
+        assert!(outside.plots[0].series.is_empty() && outside.keys().is_empty());
         assert_eq!(
             outside.notes,
             ["Column-wire 12 lies beyond the nodes: there is no surface above it."]

@@ -5,11 +5,11 @@ use std::time::Duration;
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
     evaluation::{Preset, TradeOffPoint, fastest_under, most_accurate_under, pareto_front},
-    text::{format_duration, format_number, format_percent},
+    text::{capitalised, format_duration, format_number, format_percent},
 };
 
 use super::{
-    Hue, Key, LineStyle, Look, Marker,
+    Hue, LineStyle, Look, Marker,
     axis::PlotAxis,
     plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series},
 };
@@ -89,68 +89,29 @@ impl TradeOffLevel {
     }
 }
 
-const FRONT: Look = Look {
-    hue: Hue::Grey,
-    line: Some(LineStyle::Solid),
-    marker: None,
-};
-const MODEL_BASED: Look = Look {
-    hue: Hue::Ink,
-    line: Some(LineStyle::Dashed),
-    marker: None,
-};
-const LIMIT: Look = Look {
-    hue: Hue::Blue,
-    line: Some(LineStyle::Dotted),
-    marker: None,
-};
-const ANSWER: Look = Look {
-    hue: Hue::Blue,
-    line: None,
-    marker: Some(Marker::Halo),
-};
-
 /// The points at one level of noise, one plot for each cost: colours show the decoder, discs and diamonds the preset,
 /// and hollow marks 32 bits. Also shows the Pareto front with the names of its points, the model-based error, and the
 /// answers to the two questions with their limits.
 pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotFigure {
-    let plots: Vec<Plot> = TradeOffCost::ALL.map(|cost| plot(level, limits, cost)).into();
-    let mut keys = Vec::new();
-    for kind in DecoderKind::ALL {
-        let is_there = level.points.iter().any(|point| point.report.kind == kind);
-        let look = Look::marker(Hue::of_decoder(kind), Marker::Disc);
-        keys.extend(is_there.then(|| Key::new(kind.name(Precision::Double), look)));
-    }
-    for preset in Preset::ALL {
-        let look = Look::marker(Hue::Ink, marker(Some(preset), Precision::Double));
-        let is_there = level.points.iter().any(|point| point.preset == Some(preset));
-        keys.extend(is_there.then(|| Key::new(format!("{preset} preset"), look)));
-    }
-    let mut points = level.points.iter();
-    if points.any(|point| point.report.precision == Precision::Single) {
-        keys.push(Key::new("hollow: 32 bits", Look::marker(Hue::Ink, Marker::Ring)));
-    }
-    let has = |look: Look| {
-        let mut series = plots.iter().flat_map(|plot| &plot.series);
-        let mut lines = plots.iter().flat_map(|plot| &plot.lines);
-        series.any(|series| series.look == look && !series.points.is_empty())
-            || lines.any(|line| (line.hue, Some(line.style)) == (look.hue, look.line))
-    };
+    let has = |is_so: &dyn Fn(&TradeOffPoint) -> bool| level.points.iter().any(is_so);
     let marks = [
-        ("Pareto front", FRONT),
-        ("model-based", MODEL_BASED),
-        ("limits asked for", LIMIT),
+        (has(&|point| point.preset == Some(Preset::Paper)), "discs: paper preset"),
+        (
+            has(&|point| point.preset == Some(Preset::Best)),
+            "diamonds: best preset",
+        ),
+        (
+            has(&|point| point.report.precision == Precision::Single),
+            "hollow: 32 bits",
+        ),
     ];
-    keys.extend(
-        marks
-            .into_iter()
-            .filter(|(_, look)| has(*look))
-            .map(|(name, look)| Key::new(name, look)),
-    );
+    let marks = marks
+        .into_iter()
+        .filter_map(|(is_there, mark)| is_there.then_some(mark));
+    let note = capitalised(&Vec::from_iter(marks).join(", "));
     PlotFigure {
-        plots,
-        keys,
-        notes: Vec::new(),
+        plots: TradeOffCost::ALL.map(|cost| plot(level, limits, cost)).into(),
+        notes: (!note.is_empty()).then(|| format!("{note}.")).into_iter().collect(),
     }
 }
 
@@ -168,8 +129,9 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         let (x, y) = cost.of(point);
         [x, y]
     };
-    let mut series = vec![Series::new("Pareto front", FRONT, front(level, cost))];
     let is_on_front = level.front(cost);
+    let front = Look::line(Hue::Grey, LineStyle::Solid);
+    let mut series = vec![Series::new("Pareto front", front, self::front(level, cost))];
     for kind in DecoderKind::ALL {
         for &precision in kind.precisions() {
             for preset in Preset::ALL.into_iter().map(Some).chain([None]) {
@@ -187,10 +149,8 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
                     Some(preset) => format!("{}, {preset} preset", kind.name(precision)),
                     None => kind.name(precision).to_owned(),
                 };
-                series.push(Series {
-                    points: points.collect(),
-                    ..Series::new(name, look, [])
-                });
+                let of_kind = Series::new(name, look, points);
+                series.push(of_kind.listed(Some(kind.name(Precision::Double))));
             }
         }
     }
@@ -202,16 +162,13 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         let Some(answer) = answer.and_then(|answer| level.points.get(answer)) else {
             continue;
         };
-        // The questions are about decoding.
-        let label = (cost == TradeOffCost::Decoding).then(|| name.clone());
         let point = PlotPoint {
-            label,
+            // The questions are about decoding.
+            label: (cost == TradeOffCost::Decoding).then(|| name.clone()),
             ..PlotPoint::from(at(answer))
         };
-        series.push(Series {
-            points: vec![point],
-            ..Series::new(name, ANSWER, [])
-        });
+        let look = Look::marker(Hue::Blue, Marker::Halo);
+        series.push(Series::new(name, look, [point]).listed(None));
     }
     series.retain(|series| !series.points.is_empty());
     let mut plot = Plot::new(
@@ -226,32 +183,31 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
     let model_based = level.points.first().and_then(|point| point.model_based);
     let model_based = model_based.filter(|errors| !errors.is_rounding());
     if let Some(percent) = model_based.and_then(|errors| errors.z_percent) {
-        plot.lines.push(line("model-based", LineAt::Y(percent), MODEL_BASED));
+        let at = LineAt::Y(percent);
+        let line = ReferenceLine::new("model-based", at, Hue::Ink, LineStyle::Dashed);
+        plot.lines.push(line);
     }
     // The limits apply to decoding and are shown if they are within the range of the points.
-    let places: Vec<[f64; 2]> = level
-        .points
-        .iter()
-        .map(at)
-        .filter(|[x, y]| plot.place(*x, *y).is_some())
-        .collect();
+    let places = level.points.iter().map(at);
+    let places: Vec<[f64; 2]> = places.filter(|[x, y]| plot.place(*x, *y).is_some()).collect();
     let is_among = |limit: f64, axis: usize| {
         places.iter().any(|place| place[axis] <= limit) && places.iter().any(|place| place[axis] >= limit)
     };
-    if cost == TradeOffCost::Decoding {
-        if is_among(limits.microseconds, 0) {
-            plot.lines
-                .push(line("longest time", LineAt::X(limits.microseconds), LIMIT));
-        }
-        if is_among(limits.percent, 1) {
-            plot.lines.push(line("largest error", LineAt::Y(limits.percent), LIMIT));
+    let limit_lines = [
+        (
+            is_among(limits.microseconds, 0),
+            "longest time",
+            LineAt::X(limits.microseconds),
+        ),
+        (is_among(limits.percent, 1), "largest error", LineAt::Y(limits.percent)),
+    ];
+    for (is_shown, name, at) in limit_lines {
+        if is_shown && cost == TradeOffCost::Decoding {
+            let line = ReferenceLine::new(name, at, Hue::Blue, LineStyle::Dotted);
+            plot.lines.push(line.listed(Some("limits asked for")));
         }
     }
     plot
-}
-
-fn line(name: &str, at: LineAt, look: Look) -> ReferenceLine {
-    ReferenceLine::new(name, at, look.hue, look.line.unwrap_or(LineStyle::Solid))
 }
 
 /// Returns the line through the points that no other point beats.

@@ -1,8 +1,12 @@
 use std::ops::RangeInclusive;
 
-use glam::DVec2;
+use glam::Vec2;
 
-use super::{Hue, Key, LineStyle, Look, Marker, axis::PlotAxis};
+use super::{
+    Hue, LineStyle, Look, Marker,
+    axis::PlotAxis,
+    drawing::{Align, Bounds, Ink, Measure, Shape},
+};
 
 /// A plot of series of points: curves, scatter, bars.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +30,8 @@ pub struct Plot {
 pub struct Series {
     /// Name, shown with the values of a point.
     pub name: String,
+    /// Name in the legend, common to all series that are listed as one; `None` if it is not listed.
+    pub key: Option<String>,
     /// Appearance.
     pub look: Look,
     /// Width of a bar from 0 to each point, for histograms.
@@ -51,7 +57,7 @@ pub struct PlotPoint {
     pub item: Option<usize>,
 }
 
-/// A marked stretch of the x axis.
+/// A marked stretch of the x axis; listed in the legend if it has a name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Span {
     /// Meaning.
@@ -74,8 +80,10 @@ pub enum LineAt {
 /// A line across the whole plot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReferenceLine {
-    /// Meaning, shown under the pointer.
+    /// Meaning.
     pub name: String,
+    /// Name in the legend; `None` if it is not listed.
+    pub key: Option<String>,
     /// Position.
     pub at: LineAt,
     /// Colour.
@@ -96,27 +104,70 @@ impl From<[f64; 2]> for PlotPoint {
     }
 }
 
-impl Series {
-    /// A series of plain points.
-    pub fn new(name: impl Into<String>, look: Look, points: impl IntoIterator<Item = [f64; 2]>) -> Self {
+impl PlotPoint {
+    /// The point of an item that other figures share.
+    #[must_use]
+    pub fn of_item(self, item: usize) -> Self {
         Self {
-            name: name.into(),
+            item: Some(item),
+            ..self
+        }
+    }
+}
+
+impl Series {
+    /// A series of points, listed in the legend by its name.
+    pub fn new<P: Into<PlotPoint>>(name: impl Into<String>, look: Look, points: impl IntoIterator<Item = P>) -> Self {
+        let name = name.into();
+        Self {
+            key: Some(name.clone()),
+            name,
             look,
             bar_width: None,
-            points: points.into_iter().map(PlotPoint::from).collect(),
+            points: points.into_iter().map(Into::into).collect(),
+        }
+    }
+
+    /// The series with this name in the legend, or none.
+    #[must_use]
+    pub fn listed(self, key: Option<&str>) -> Self {
+        Self {
+            key: key.map(str::to_owned),
+            ..self
         }
     }
 }
 
 impl ReferenceLine {
-    /// A line without a label.
+    /// A line without a label, listed in the legend by its name.
     pub fn new(name: impl Into<String>, at: LineAt, hue: Hue, style: LineStyle) -> Self {
+        let name = name.into();
         Self {
-            name: name.into(),
+            key: Some(name.clone()),
+            name,
             at,
             hue,
             style,
             label: None,
+        }
+    }
+
+    /// The line with this name in the legend, or none.
+    #[must_use]
+    pub fn listed(self, key: Option<&str>) -> Self {
+        Self {
+            key: key.map(str::to_owned),
+            ..self
+        }
+    }
+
+    /// The line with a label instead of an entry in the legend.
+    #[must_use]
+    pub fn labelled(self, label: &str) -> Self {
+        Self {
+            key: None,
+            label: Some(label.to_owned()),
+            ..self
         }
     }
 }
@@ -134,21 +185,34 @@ impl Plot {
         }
     }
 
+    /// The plot with these reference lines.
+    #[must_use]
+    pub fn with_lines(self, lines: impl IntoIterator<Item = ReferenceLine>) -> Self {
+        Self {
+            lines: lines.into_iter().collect(),
+            ..self
+        }
+    }
+
     /// Returns the place of a point on both axes; `None` if one of the axes has no place for it.
     pub fn place(&self, x: f64, y: f64) -> Option<[f64; 2]> {
         Some([self.x.place(x)?, self.y.place(y)?])
-    }
-
-    /// Returns true if any point has a label.
-    pub fn has_point_labels(&self) -> bool {
-        let mut points = self.series.iter().flat_map(|series| &series.points);
-        points.any(|point| point.label.is_some())
     }
 
     /// Returns the points of a series that have a place, with their places.
     pub fn placed<'a>(&self, series: &'a Series) -> impl Iterator<Item = (&'a PlotPoint, [f64; 2])> {
         let points = series.points.iter();
         points.filter_map(|point| Some((point, self.place(point.x, point.y)?)))
+    }
+
+    /// Returns the stretches of the line of a series: a missing point leaves a gap.
+    pub fn stretches(&self, series: &Series) -> Vec<Vec<[f64; 2]>> {
+        let places = series.points.iter().map(|point| self.place(point.x, point.y));
+        let places: Vec<Option<[f64; 2]>> = places.collect();
+        let stretches = places.split(Option::is_none).filter(|stretch| stretch.len() > 1);
+        stretches
+            .map(|stretch| stretch.iter().copied().flatten().collect())
+            .collect()
     }
 
     /// Returns the places of the ends of an error bar. Values without a place on a logarithmic axis are below its lower
@@ -159,36 +223,27 @@ impl Plot {
 
     /// Returns the ranges of places in view on both axes.
     pub fn ranges(&self) -> [RangeInclusive<f64>; 2] {
-        let placed = || {
-            self.series
-                .iter()
-                .flat_map(|series| self.placed(series).map(move |point| (series, point)))
-        };
-        let lines = |is_x: bool| {
-            self.lines.iter().filter_map(move |line| match line.at {
-                LineAt::X(x) if is_x => Some(x),
-                LineAt::Y(y) if !is_x => Some(y),
-                _ => None,
-            })
-        };
-        let x_values = placed().flat_map(|(series, (point, _))| {
-            let half = 0.5 * series.bar_width.unwrap_or(0.0);
-            [point.x - half, point.x + half]
-        });
-        let spans = self
-            .spans
-            .iter()
-            .flat_map(|span| [*span.range.start(), *span.range.end()]);
-        let x_values = x_values.chain(spans).chain(lines(true));
-        let y_values = placed().flat_map(|(series, (point, _))| {
-            let foot = series.bar_width.map(|_| 0.0);
-            std::iter::once(point.y)
-                .chain(point.bar.into_iter().flatten())
-                .chain(foot)
-        });
-        let y_values = y_values.chain(lines(false));
-        let x = self.x.range(x_values.filter_map(|value| self.x.place(value)));
-        let y = self.y.range(y_values.filter_map(|value| self.y.place(value)));
+        let (mut xs, mut ys) = (Vec::new(), Vec::new());
+        for series in &self.series {
+            for (point, _) in self.placed(series) {
+                let half = 0.5 * series.bar_width.unwrap_or(0.0);
+                xs.extend([point.x - half, point.x + half]);
+                ys.push(point.y);
+                ys.extend(point.bar.into_iter().flatten());
+                ys.extend(series.bar_width.map(|_| 0.0));
+            }
+        }
+        for span in &self.spans {
+            xs.extend([*span.range.start(), *span.range.end()]);
+        }
+        for line in &self.lines {
+            match line.at {
+                LineAt::X(x) => xs.push(x),
+                LineAt::Y(y) => ys.push(y),
+            }
+        }
+        let x = self.x.range(xs.into_iter().filter_map(|value| self.x.place(value)));
+        let y = self.y.range(ys.into_iter().filter_map(|value| self.y.place(value)));
         if self.has_equal_scales {
             let both = x.start().min(*y.start())..=x.end().max(*y.end());
             return [both.clone(), both];
@@ -208,87 +263,129 @@ impl Plot {
         }
         words
     }
+
+    /// Returns the entries of the legend with their looks.
+    pub fn keys(&self) -> Vec<(&str, Look)> {
+        let series = self.series.iter().filter(|series| !series.points.is_empty());
+        let of_series = series.map(|series| (series.key.as_deref(), series.look));
+        let lines = self.lines.iter();
+        let of_lines = lines.map(|line| (line.key.as_deref(), Look::line(line.hue, line.style)));
+        let spans = self.spans.iter();
+        let of_spans = spans.map(|span| (Some(&*span.name), Look::area(span.hue)));
+        let keys = of_series.chain(of_lines).chain(of_spans);
+        each_once(keys.filter_map(|(key, look)| Some((key.filter(|key| !key.is_empty())?, look))))
+    }
+
+    /// Lays out the labels of points and of vertical lines in `frame`, where `at` gives the point of a place; those without
+    /// room are left out.
+    pub fn lay_out_labels(&self, frame: Bounds, at: impl Fn([f64; 2]) -> Vec2, measure: Measure<'_>) -> Vec<Shape> {
+        let mut labels: Vec<(Vec2, &str)> = Vec::new();
+        for line in &self.lines {
+            if let (LineAt::X(x), Some(label)) = (line.at, &line.label)
+                && let Some(x) = self.x.place(x)
+            {
+                labels.push((Vec2::new(at([x, 0.0]).x, frame.min.y), label));
+            }
+        }
+        for series in &self.series {
+            let labelled = self.placed(series);
+            labels.extend(labelled.filter_map(|(point, place)| Some((at(place), point.label.as_deref()?))));
+        }
+        // Most plots have none.
+        if labels.is_empty() {
+            return Vec::new();
+        }
+        let mut marks = Vec::new();
+        for series in &self.series {
+            let points: Vec<Vec2> = self.placed(series).map(|(_, place)| at(place)).collect();
+            match series.look.line {
+                Some(_) => marks.extend(along(&points)),
+                None => marks.extend(points),
+            }
+        }
+        let sizes: Vec<(Vec2, Vec2)> = labels.iter().map(|(at, label)| (*at, measure(label))).collect();
+        let placed = place_labels(&sizes, &marks, frame).into_iter().zip(labels);
+        placed
+            .filter_map(|(bounds, (_, label))| {
+                let left = Vec2::new(bounds?.min.x, bounds?.middle().y);
+                Some(Shape::text(left, Align::Start, Ink::Label, label))
+            })
+            .collect()
+    }
 }
 
 /// Room between a mark and its label.
-const GAP: f64 = 5.0;
-
-/// A label to be placed at a point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PointLabel {
-    /// Position of the point.
-    pub at: DVec2,
-    /// Width and height of the label.
-    pub size: DVec2,
-}
+const GAP: f32 = 5.0;
 
 /// Returns places along a line, which labels should avoid.
-pub fn along(line: &[DVec2]) -> impl Iterator<Item = DVec2> {
-    const STEP: f64 = 4.0;
+fn along(line: &[Vec2]) -> impl Iterator<Item = Vec2> {
+    const STEP: f32 = 4.0;
     line.windows(2).flat_map(|ends| {
         let (from, to) = (ends[0], ends[1]);
         let steps = (from.distance(to) / STEP).ceil().clamp(1.0, 1000.0);
-        (0..=steps as usize).map(move |step| from.lerp(to, step as f64 / steps))
+        (0..=steps as usize).map(move |step| from.lerp(to, step as f32 / steps))
     })
 }
 
-/// Returns the upper left corner of each label next to its point, clear of the other labels and, if possible, of
-/// `marks`, the places of everything else that is drawn; `None` if there is no room between `low` and `high`, the
-/// corners of the plot.
+/// Returns the rectangle of each label, given by its point and its size: next to the point, clear of the other labels and, if
+/// possible, of `marks`, the places of everything else that is drawn; `None` if there is no room in `frame`.
 ///
 /// Labels are placed in order, each at its best free place, so earlier ones are shown where points are crowded.
-pub fn place_labels(labels: &[PointLabel], marks: &[DVec2], (low, high): (DVec2, DVec2)) -> Vec<Option<DVec2>> {
-    let mut placed: Vec<(DVec2, DVec2)> = Vec::new();
-    let mut place = |label: &PointLabel| {
-        let PointLabel { at, size } = *label;
-        let [right, left] = [at.x + GAP, at.x - GAP - size.x];
-        let [above, below] = [at.y - GAP - size.y, at.y + GAP];
-        let middle = at - 0.5 * size;
-        let corners = [
-            DVec2::new(right, above),
-            DVec2::new(right, middle.y),
-            DVec2::new(right, below),
-            DVec2::new(left, above),
-            DVec2::new(left, middle.y),
-            DVec2::new(left, below),
-            DVec2::new(middle.x, above),
-            DVec2::new(middle.x, below),
-        ];
-        let is_free = |corner: &DVec2| {
-            let end = *corner + size;
-            let is_within = corner.cmpge(low).all() && end.cmple(high).all();
-            is_within && placed.iter().all(|&(from, to)| !overlap((*corner, end), (from, to)))
+fn place_labels(labels: &[(Vec2, Vec2)], marks: &[Vec2], frame: Bounds) -> Vec<Option<Bounds>> {
+    /// To the right of the point if possible, else to the left, above or below.
+    const SIDES: [[f32; 2]; 8] = [
+        [1.0, -1.0],
+        [1.0, 0.0],
+        [1.0, 1.0],
+        [-1.0, -1.0],
+        [-1.0, 0.0],
+        [-1.0, 1.0],
+        [0.0, -1.0],
+        [0.0, 1.0],
+    ];
+    let mut placed: Vec<Bounds> = Vec::new();
+    let mut place = |&(at, size): &(Vec2, Vec2)| {
+        let places = SIDES.map(|side| {
+            let side = Vec2::from(side);
+            Bounds::centred(at + side * (GAP + 0.5 * size), size)
+        });
+        let is_free = |bounds: &Bounds| {
+            frame.contains(bounds.min)
+                && frame.contains(bounds.max)
+                && placed.iter().all(|other| !other.grown(-1e-3).intersects(bounds))
         };
-        let covered = |corner: &DVec2| {
-            let (from, to) = (*corner - 2.0, *corner + size + 2.0);
-            marks
-                .iter()
-                .filter(|mark| mark.cmpge(from).all() && mark.cmple(to).all())
-                .count()
-        };
-        let best = corners.into_iter().filter(is_free).min_by_key(covered)?;
-        placed.push((best, best + size));
+        let covered = |bounds: &Bounds| marks.iter().filter(|mark| bounds.grown(2.0).contains(**mark)).count();
+        let best = places.into_iter().filter(is_free).min_by_key(covered)?;
+        placed.push(best);
         Some(best)
     };
     labels.iter().map(&mut place).collect()
 }
 
-fn overlap(one: (DVec2, DVec2), other: (DVec2, DVec2)) -> bool {
-    one.0.cmplt(other.1).all() && other.0.cmplt(one.1).all()
-}
-
-/// Plots side by side with one legend.
+/// Plots side by side.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlotFigure {
     /// From left to right.
     pub plots: Vec<Plot>,
-    /// The legend, above the plots.
-    pub keys: Vec<Key>,
-    /// Sentences about the figure, below the legend.
+    /// Sentences about the figure.
     pub notes: Vec<String>,
 }
 
+impl From<Plot> for PlotFigure {
+    fn from(plot: Plot) -> Self {
+        Self {
+            plots: vec![plot],
+            notes: Vec::new(),
+        }
+    }
+}
+
 impl PlotFigure {
+    /// Returns the entries of the legends of all plots, each once.
+    pub fn keys(&self) -> Vec<(&str, Look)> {
+        each_once(self.plots.iter().flat_map(Plot::keys))
+    }
+
     /// Returns the figure with a halo around the points of one of these items, and around `others`.
     #[must_use]
     pub fn lighting(mut self, is_lit: impl Fn(usize) -> bool, others: &[[f64; 2]]) -> Self {
@@ -299,14 +396,22 @@ impl PlotFigure {
             let points: Vec<PlotPoint> = lit.chain(others.iter().copied().map(PlotPoint::from)).collect();
             if !points.is_empty() {
                 let look = Look::marker(Hue::Ink, Marker::Halo);
-                plot.series.push(Series {
-                    points,
-                    ..Series::new("lit", look, [])
-                });
+                plot.series.push(Series::new("lit", look, points).listed(None));
             }
         }
         self
     }
+}
+
+/// Returns the first of the entries with each name.
+fn each_once<'a>(entries: impl Iterator<Item = (&'a str, Look)>) -> Vec<(&'a str, Look)> {
+    let mut keys: Vec<(&str, Look)> = Vec::new();
+    for key in entries {
+        if keys.iter().all(|(other, _)| *other != key.0) {
+            keys.push(key);
+        }
+    }
+    keys
 }
 
 /// Maximum number of dots drawn for one cloud; more would not be visible.
@@ -367,54 +472,75 @@ mod tests {
         assert_eq!(x, y);
     }
 
-    const FRAME: (DVec2, DVec2) = (DVec2::ZERO, DVec2::new(200.0, 100.0));
-    const SIZE: DVec2 = DVec2::new(60.0, 12.0);
+    const FRAME: Bounds = Bounds {
+        min: Vec2::ZERO,
+        max: Vec2::new(200.0, 100.0),
+    };
+    const SIZE: Vec2 = Vec2::new(60.0, 12.0);
 
-    fn placed(points: &[[f64; 2]]) -> Vec<Option<DVec2>> {
-        let marks: Vec<DVec2> = points.iter().map(|&point| point.into()).collect();
-        let labels: Vec<PointLabel> = marks.iter().map(|&at| PointLabel { at, size: SIZE }).collect();
+    fn placed(points: &[[f32; 2]]) -> Vec<Option<Bounds>> {
+        let marks: Vec<Vec2> = points.iter().map(|&point| point.into()).collect();
+        let labels: Vec<(Vec2, Vec2)> = marks.iter().map(|&at| (at, SIZE)).collect();
         place_labels(&labels, &marks, FRAME)
     }
 
     #[test]
     fn labels_are_in_the_plot_and_clear_of_each_other_and_of_marks() {
         let points = [[10.0, 50.0], [12.0, 54.0], [190.0, 95.0], [198.0, 4.0], [100.0, 50.0]];
-        let corners: Vec<DVec2> = placed(&points).into_iter().map(Option::unwrap).collect();
-        for (index, &corner) in corners.iter().enumerate() {
-            assert!(
-                corner.cmpge(FRAME.0).all() && (corner + SIZE).cmple(FRAME.1).all(),
-                "{corner}"
-            );
-            for &other in &corners[..index] {
-                assert!(
-                    !overlap((corner, corner + SIZE), (other, other + SIZE)),
-                    "{corner} {other}"
-                );
+        let labels: Vec<Bounds> = placed(&points).into_iter().map(Option::unwrap).collect();
+        for (index, label) in labels.iter().enumerate() {
+            assert!(FRAME.contains(label.min) && FRAME.contains(label.max), "{label:?}");
+            assert_eq!(label.size(), SIZE);
+            for other in &labels[..index] {
+                assert!(!other.grown(-1e-3).intersects(label), "{label:?} {other:?}");
             }
             for &point in &points {
-                let mark = DVec2::from(point);
-                assert!(
-                    !overlap((corner, corner + SIZE), (mark - 1.0, mark + 1.0)),
-                    "{corner} {mark}"
-                );
+                assert!(!label.grown(1.0).contains(point.into()), "{label:?} {point:?}");
             }
         }
     }
 
     #[test]
     fn a_label_keeps_clear_of_a_line_through_its_point() {
-        let (at, line) = (DVec2::new(100.0, 6.0), [DVec2::new(20.0, 6.0), DVec2::new(180.0, 6.0)]);
-        let marks: Vec<DVec2> = along(&line).collect();
+        let (at, line) = (Vec2::new(100.0, 6.0), [Vec2::new(20.0, 6.0), Vec2::new(180.0, 6.0)]);
+        let marks: Vec<Vec2> = along(&line).collect();
         assert_eq!((marks[0], *marks.last().unwrap()), (line[0], line[1]));
-        let corner = place_labels(&[PointLabel { at, size: SIZE }], &marks, FRAME)[0].unwrap();
-        assert!(corner.y > 6.0, "below, because there is no room above: {corner}");
+        let label = place_labels(&[(at, SIZE)], &marks, FRAME)[0].unwrap();
+        assert!(label.min.y > 6.0, "below, because there is no room above: {label:?}");
     }
 
     #[test]
     fn a_label_without_room_is_left_out() {
         let crowd = vec![[100.0, 50.0]; 30];
-        let corners = placed(&crowd);
-        assert!(corners[0].is_some() && corners[29].is_none());
+        let labels = placed(&crowd);
+        assert!(labels[0].is_some() && labels[29].is_none());
+    }
+
+    #[test]
+    fn a_legend_lists_series_that_look_alike_once() {
+        let series = |name: &str, key| Series::new(name, Look::area(Hue::Blue), [[0.0, 1.0]]).listed(key);
+        let plot = Plot::new(
+            PlotAxis::linear(""),
+            PlotAxis::linear(""),
+            vec![
+                series("row 1", Some("rows")),
+                series("row 2", Some("rows")),
+                series("lit", None),
+            ],
+        );
+        let line = ReferenceLine::new("limit", LineAt::Y(1.0), Hue::Grey, LineStyle::Dashed);
+        let plot = plot.with_lines([line.clone(), line.labelled("here")]);
+        let figure = PlotFigure {
+            plots: vec![plot.clone(), plot],
+            notes: Vec::new(),
+        };
+        assert_eq!(
+            figure.keys(),
+            [
+                ("rows", Look::area(Hue::Blue)),
+                ("limit", Look::line(Hue::Grey, LineStyle::Dashed))
+            ]
+        );
     }
 
     #[test]

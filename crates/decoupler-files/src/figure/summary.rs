@@ -2,8 +2,8 @@
 
 use super::{
     LineStyle,
-    axis::{AxisScale, PlotAxis},
-    colour_map::HeatMap,
+    axis::{AxisScale, PlotAxis, TickRule},
+    heat_map::HeatMap,
     plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
     surface::{Quantity, Surface},
 };
@@ -54,7 +54,12 @@ impl Plot {
             Some((*least?, *largest?))
         };
         let ((lowest, highest), (leftmost, rightmost)) = (of(|point| point.y)?, of(|point| point.x)?);
-        let at = |point: &PlotPoint| format!("{} at {}", self.y.value_text(point.y), self.x.value_text(point.x));
+        // An axis without values only keeps the points apart.
+        let has_values = self.y.ticks != TickRule::Nothing;
+        let at = |point: &PlotPoint| match has_values {
+            true => format!("{} at {}", self.y.value_text(point.y), self.x.value_text(point.x)),
+            false => self.x.value_text(point.x),
+        };
         let name = &series.name;
         Some(if series.bar_width.is_some() {
             format!("{}, the highest {}", counted(points.len(), "bar"), at(highest))
@@ -69,14 +74,14 @@ impl Plot {
         } else if points.len() == 1 {
             format!("{name}: {}", at(first))
         } else {
-            let range =
-                |axis: &PlotAxis, low: f64, high: f64| format!("{} to {}", axis.value_text(low), axis.value_text(high));
+            let range = |axis: &PlotAxis, low: f64, high: f64| {
+                format!(", {} {} to {}", axis.name, axis.value_text(low), axis.value_text(high))
+            };
+            let heights = has_values.then(|| range(&self.y, lowest.y, highest.y));
             format!(
-                "{} of {name}, {} {}, {} {}",
+                "{} of {name}{}{}",
                 counted(points.len(), "point"),
-                self.y.name,
-                range(&self.y, lowest.y, highest.y),
-                self.x.name,
+                heights.unwrap_or_default(),
                 range(&self.x, leftmost.x, rightmost.x)
             )
         })

@@ -8,7 +8,7 @@ use decoupler_core::{
 use decoupler_files::{
     export::figures::{Picture, PictureFormat},
     figure::{
-        Figure, HeatMap, Hue, Key, Look, Marker, Plot, PlotAxis, PlotFigure, SequentialMap, Series, TradeOffLevel,
+        Figure, HeatMap, Hue, Look, Marker, Plot, PlotAxis, PlotFigure, SequentialMap, Series, TradeOffLevel,
         TradeOffLimits, node_figure, trade_off_figure,
     },
     import::Setup,
@@ -24,13 +24,8 @@ fn scatter(marker: Marker, values: &[(f64, f64)]) -> Series {
 }
 
 fn plot(y: PlotAxis, series: Vec<Series>) -> Picture {
-    let keys = series.iter().map(|series| Key::new(&series.name, series.look));
-    let figure = PlotFigure {
-        keys: keys.collect(),
-        plots: vec![Plot::new(PlotAxis::linear("across"), y, series)],
-        notes: Vec::new(),
-    };
-    Figure::from(figure).draw()
+    let plot = Plot::new(PlotAxis::linear("across"), y, series);
+    Figure::from(PlotFigure::from(plot)).draw()
 }
 
 fn count(picture: &Picture, what: &str) -> usize {
@@ -53,6 +48,17 @@ fn discs(picture: &Picture) -> Vec<[f64; 2]> {
     elements(picture, "circle", |circle| {
         ["cx", "cy"].map(|name| number(circle, name))
     })
+}
+
+/// The lines of this width, each with its points as they are written.
+fn lines(picture: &Picture, width: &str) -> Vec<Vec<String>> {
+    let of_path = |path: Node<'_, '_>| {
+        let is_wanted = path.attribute("stroke-width") == Some(width);
+        let lines = path.attribute("d").unwrap_or_default().split('M').skip(1);
+        let lines = lines.filter(|_| is_wanted);
+        Vec::from_iter(lines.map(|line| line.split(' ').map(str::to_owned).collect()))
+    };
+    elements(picture, "path", of_path).concat()
 }
 
 fn texts(picture: &Picture) -> Vec<String> {
@@ -117,19 +123,9 @@ fn node_plots_have_a_square_and_a_disc_for_each_node_and_optional_bars() {
         assert!(texts(&plain).iter().any(|text| text == name), "{name}");
     }
     // Below the bars the axis reaches further down, so its ticks may be others.
-    let lines = |picture: &Picture| {
-        let is_bar = |line: Node<'_, '_>| line.attribute("stroke-width") == Some("0.8");
-        elements(picture, "polyline", is_bar)
-            .into_iter()
-            .filter(|is_bar| *is_bar)
-            .count()
-    };
+    let bars = |picture: &Picture| lines(picture, "1.1").len();
     let with_bars = draw(Some(&[0.1, 0.2, 0.3]));
-    assert_eq!(
-        (lines(&plain), lines(&with_bars)),
-        (0, 3 * 3),
-        "a line and two ends each"
-    );
+    assert_eq!((bars(&plain), bars(&with_bars)), (0, 3 * 3), "a line and two ends each");
 }
 
 #[test]
@@ -186,13 +182,8 @@ fn colours_of_a_heat_map_are_logarithmic_on_request() {
     };
     let cells = |map: HeatMap| -> Vec<String> {
         let svg = Figure::from(map).draw().svg().to_owned();
-        let fills = svg.split("<rect").skip(1).filter(|rect| rect.contains("fill=\"#"));
-        let fill = |rect: &str| rect.split("fill=\"").nth(1).unwrap()[..7].to_owned();
-        fills
-            .map(fill)
-            .skip_while(|colour| colour == "#ffffff")
-            .take(3)
-            .collect()
+        let fills = svg.split("<path color=\"").skip(1);
+        fills.take(3).map(|path| path[..7].to_owned()).collect()
     };
     let even = cells(map([1.0, 2.0, 3.0], PlotAxis::linear("")));
     let decades = cells(map([0.001, 0.1, 10.0], PlotAxis::logarithmic("")));
@@ -280,21 +271,18 @@ fn hollow_marks_of_the_trade_off_mean_32_bits_and_nothing_else() {
     let picture = Figure::from(figure).draw();
     let rings = elements(&picture, "circle", |circle| circle.attribute("fill") == Some("none"));
     let hollow_discs = rings.iter().filter(|is_hollow| **is_hollow).count();
-    let is_closed = |line: Node<'_, '_>| {
-        let points: Vec<&str> = line.attribute("points").unwrap().split(' ').collect();
-        points.first() == points.last()
-    };
-    let closed = elements(&picture, "polyline", is_closed)
+    let closed = lines(&picture, "1.4")
         .into_iter()
-        .filter(|is_closed| *is_closed);
-    let frames = 2;
-    let hollow_diamonds = closed.count() - frames;
-    // Each in both plots, and one in the legend for both.
-    assert_eq!((hollow_discs, hollow_diamonds), (2 + 1, 2));
-    let filled_marks = (rings.len() - hollow_discs) + elements(&picture, "polygon", |_| ()).len();
-    // In the legend each decoder and each preset has one.
-    assert_eq!(filled_marks, 2 * filled + 2 + 2);
-    for name in ["Ridge", "Network", "paper preset", "best preset", "hollow: 32 bits"] {
+        .filter(|line| line.first() == line.last());
+    // Each in both plots.
+    assert_eq!((hollow_discs, closed.count()), (2, 2), "discs and diamonds");
+    let areas = elements(&picture, "path", |path| path.attribute("color").is_some());
+    let diamonds = areas.into_iter().filter(|is_area| *is_area).count();
+    let filled_marks = (rings.len() - hollow_discs) + diamonds;
+    // In the legend each decoder has one.
+    assert_eq!(filled_marks, 2 * filled + 2);
+    let note = "Discs: paper preset, diamonds: best preset, hollow: 32 bits.";
+    for name in ["Ridge", "Network", note] {
         assert!(
             texts(&picture).iter().any(|text| text == name),
             "{name}: {:?}",

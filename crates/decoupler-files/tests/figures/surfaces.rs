@@ -6,13 +6,12 @@ use decoupler_core::surface::SurfaceMap;
 use decoupler_files::{
     export::figures::Picture,
     figure::{
-        Figure, SequentialMap,
-        surface::{
-            Bounds, Card, Drawing, Line, OrbitCamera, Quantity, Section, SectionLine, Surface, SurfaceFigure, ViewMode,
-        },
+        Bounds, Figure, SequentialMap, Shape,
+        surface::{Card, Drawing, OrbitCamera, Quantity, Section, SectionLine, Surface, SurfaceFigure, ViewMode},
     },
 };
 use glam::{DVec3, Vec2};
+use resvg::usvg::roxmltree::Document;
 
 fn draw(figure: &SurfaceFigure) -> Picture {
     Figure::from(figure.clone()).draw()
@@ -124,10 +123,7 @@ fn a_steep_surface_ends_along_the_ends_of_the_axis() {
     let mut area = 0.0;
     let (mut left, mut right) = (f64::MAX, f64::MIN);
     for cell in drawing.mesh.strips().flat_map(|(cells, _)| cells) {
-        let corners = drawing
-            .mesh
-            .corners(*cell)
-            .map(|corner| drawing.mesh.vertices[corner].at.as_dvec2());
+        let corners = cell.map(|corner| drawing.mesh.vertices[corner].at.as_dvec2());
         for corner in corners {
             let x_mm = (corner.x - f64::from(x_at(0))) / points_per_mm;
             (left, right) = (left.min(x_mm), right.max(x_mm));
@@ -179,7 +175,7 @@ fn beyond_the_axis_a_surface_is_a_marked_plateau_and_a_map_has_no_holes() {
         let cells = drawing.mesh.strips().flat_map(|(cells, _)| cells);
         // Corners beyond the grid belong to cut cells.
         let corners = cells
-            .flat_map(|cell| drawing.mesh.corners(*cell))
+            .flat_map(|cell| *cell)
             .filter(|corner| surface.values.get(*corner).is_some_and(|height| *height > 5.08 + 1e-12));
         let across = grid.y_mm().len();
         let off_the_edge = corners.map(|corner| {
@@ -211,7 +207,7 @@ fn from_above_x_runs_to_the_right_and_y_upwards_at_one_scale() {
 #[test]
 fn the_camera_turns_only_surfaces_in_space() {
     let turned = OrbitCamera::default().dragged(60.0, 20.0);
-    let lines = |surface: &Surface, camera| -> Vec<Line> { lay_out(surface, camera).lines };
+    let lines = |surface: &Surface, camera| -> Vec<Shape> { lay_out(surface, camera).frame };
     for (surface, is_turned) in [(dent(""), true), (from_above(dent("")), false)] {
         assert_eq!(
             lines(&surface, turned) != lines(&surface, OrbitCamera::default()),
@@ -258,10 +254,13 @@ fn scales_are_made_common_by_quantity() {
 /// Fills of the cells of a picture, the most frequent first.
 fn fills(picture: &Picture) -> Vec<String> {
     let mut counts = std::collections::BTreeMap::new();
-    for line in picture.svg().lines().filter(|line| line.starts_with("<path color")) {
-        *counts
-            .entry(line.split("color=\"").nth(1).unwrap()[..7].to_owned())
-            .or_insert(0) += 1;
+    let document = Document::parse(picture.svg()).unwrap();
+    let cards = document.descendants().filter(|node| node.has_attribute("clip-path"));
+    let cells = cards
+        .flat_map(|card| card.descendants())
+        .filter(|node| node.has_tag_name("path"));
+    for fill in cells.filter_map(|cell| cell.attribute("color")) {
+        *counts.entry(fill.to_owned()).or_insert(0) += 1;
     }
     let mut fills: Vec<_> = counts.into_iter().collect();
     fills.sort_by_key(|(_, count)| std::cmp::Reverse(*count));

@@ -19,7 +19,7 @@ use super::{
     sweep_folder::folder_card_ui,
 };
 use crate::window::{
-    plotting::{CellPointed, Pointer, heat_map_ui, legend_ui, plots_ui},
+    plotting::{CellPointed, Pointer, heat_map_ui, plots_ui},
     shared::{Effect, Export, Matter, Notice, Offers, Shared, Unfinished, View},
     theme::{Theme, semibold, space, type_size},
     widgets::{
@@ -178,7 +178,6 @@ fn picture_ui(
             sweep_ui(ui, outcome, &map, look, shared, effects);
         }
         Figure::Plots(plots) => {
-            legend_ui(ui, &plots.keys);
             plots_ui(ui, topic.name(), plots, Pointer::Moves);
         }
         // Experiments have no surfaces.

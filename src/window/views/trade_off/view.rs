@@ -22,7 +22,6 @@ use super::{
     state::TradeOffEvent,
 };
 use crate::window::{
-    plotting::legend_ui,
     shared::{
         Effect, Export, FileWords, Matter, Notice, Offers, Shared, SourceKind, Unfinished, View, copy_exports,
         csv_export, picture_exports, sentence,
@@ -161,7 +160,6 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
             return;
         }
         let figure = trade_off_figure(level, &look.limits);
-        legend_ui(ui, &figure.keys);
         asked = charts_ui(ui, level, &figure, &mut look.marked, can_load, source);
     });
     let choices_width = (0.4 * lower.width()).clamp(space(76), space(105));

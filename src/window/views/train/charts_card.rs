@@ -12,7 +12,7 @@ use super::{
     view::TrainView,
 };
 use crate::window::{
-    plotting::{Pointer, cells_ui, legend_behind_ui, legend_ui, plots_ui},
+    plotting::{Pointer, cells_ui, plots_ui},
     shared::{Effect, Offers, Phase, Shared, SourceKind, target_choice_ui},
     test_view::Positions,
     theme::{Theme, space},
@@ -48,41 +48,20 @@ pub fn charts_card_ui(
         view.tab = BottomTab::default();
     }
     let chart = chart(view, shared);
-    let keys = match &chart {
-        Some(Chart::Plots(figure)) => &figure.keys[..],
-        _ => &[],
-    };
     let before = (view.tab, view.has_error_bars, view.target);
     let has_choice = has_choice(view, shared);
-    let has_room = ui.horizontal(|ui| {
-        view.tab = tabs_ui(ui, "Charts", &tabs, view.tab).unwrap_or(view.tab);
-        // The choice takes the legend's place.
-        !has_choice && legend_behind_ui(ui, keys)
-    });
-    let has_room = if has_choice {
-        ui.horizontal(|ui| {
-            match shared.recorded_test() {
-                None => error_bars_ui(ui, &mut view.has_error_bars),
-                Some(test) => {
-                    target_choice_ui(
-                        ui,
-                        "Target",
-                        "target of the charts",
-                        &test.problem.targets,
-                        &mut view.target,
-                    );
-                }
+    view.tab = tabs_ui(ui, "Charts", &tabs, view.tab).unwrap_or(view.tab);
+    if has_choice {
+        match shared.recorded_test() {
+            None => error_bars_ui(ui, &mut view.has_error_bars),
+            Some(test) => {
+                let targets = &test.problem.targets;
+                target_choice_ui(ui, "Target", "target of the charts", targets, &mut view.target);
             }
-            legend_behind_ui(ui, keys)
-        })
-    } else {
-        has_room
-    };
+        }
+    }
     if let (BottomTab::Section, Some(test)) = (view.tab, shared.test()) {
         section_bar_ui(ui, &mut view.section, test);
-    }
-    if !has_room.inner && !keys.is_empty() {
-        legend_ui(ui, keys);
     }
     match &chart {
         Some(Chart::Plots(figure)) => plots_of_view_ui(ui, before.0, figure, view, shared),

@@ -18,13 +18,13 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{Cell, Table, TableColumn, describe_search, format_duration, format_number},
-    figure::frame_time,
+    figure::{frame_time, starts_figure},
 };
-use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::{Align, Layout, RichText, Ui, Vec2, WidgetInfo, accesskit::Role};
 
 use crate::window::{
     glossary,
-    plotting::{StripChart, strip_ui},
+    plotting::{Pointer, plots_ui},
     shared::{
         DecoderSource, Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence,
     },
@@ -391,16 +391,9 @@ pub fn spread_ui(ui: &mut Ui, problem: &Problem, combine: Combination, starts: &
     let spread = Spread::of(percents.iter().copied().flatten());
     let of_test = problem.test_percent_name();
     if let Some(spread) = spread {
-        strip_ui(
-            ui,
-            &StripChart {
-                label: &format!("Spread of {of_test}"),
-                axis: of_test,
-                values: &percents,
-                marked: best,
-                spread,
-            },
-        );
+        let figure = starts_figure(of_test, &percents, best, &spread);
+        let size = Vec2::new(ui.available_width(), space(22));
+        ui.allocate_ui(size, |ui| plots_ui(ui, "spread of the starts", &figure, Pointer::Picks));
     }
     let is_held_out = starts.iter().all(|start| start.validation_mse.is_some());
     let error = if is_held_out { "validation mse" } else { "training mse" };

@@ -17,7 +17,7 @@ use super::{
     view::TrainView,
 };
 use crate::window::{
-    plotting::{Pointer, legend_behind_ui, legend_ui, plots_ui},
+    plotting::{Pointer, plots_ui},
     shared::{Effect, Look, Phase, RightCard, Shared, SourceKind, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
     test_view::{HeightScale, Positions, TestView},
@@ -346,15 +346,11 @@ pub fn sample_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
         return;
     };
     let figure = with_lit_targets(figure, view, shared);
-    let has_room = ui.horizontal(|ui| {
+    ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         let title = format!("Test sample {}", view.snapshot + 1);
         ui.label(RichText::new(title).font(semibold(type_size().title)));
-        legend_behind_ui(ui, &figure.keys)
     });
-    if !has_room.inner {
-        legend_ui(ui, &figure.keys);
-    }
     if let Some(Positions::NoSurface(reason)) = shared.recorded_test().map(|test| &test.positions) {
         dim_ui(
             ui,

@@ -1,5 +1,4 @@
 //! Finished figures as SVG, as PNG, and in an HTML page that follows the reader's dark theme.
-//! Colours in print are dark enough for paper.
 
 use std::{
     io,
@@ -10,19 +9,18 @@ use std::{
 use resvg::{tiny_skia, usvg};
 use thiserror::Error;
 
-use super::{canvas::number, plot::PAGE_WIDTH};
-pub(super) use crate::figure::Rgb;
+use super::svg::escaped;
 use crate::{
     export::{WriteError, atomic_write},
-    figure::Hue,
+    figure::{Hue, Ink, Rgb},
 };
 
 /// A finished figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     svg: String,
-    /// Width and height in points.
-    size: [f64; 2],
+    /// Width as a share of that of the page.
+    share: f32,
 }
 
 /// File format of a figure.
@@ -76,13 +74,8 @@ impl PictureFormat {
 const DOTS_PER_INCH: f32 = 300.0;
 
 impl Picture {
-    pub(super) fn new(svg: String, size: [f64; 2]) -> Self {
-        Self { svg, size }
-    }
-
-    /// Width and height in points.
-    pub(super) fn size(&self) -> [f64; 2] {
-        self.size
+    pub(super) fn new(svg: String, share: f32) -> Self {
+        Self { svg, share }
     }
 
     /// The figure as SVG. Its text names the program's font and common substitutes.
@@ -161,32 +154,56 @@ fn fonts() -> Arc<usvg::fontdb::Database> {
     Arc::clone(FONTS.get_or_init(load))
 }
 
-/// Colours in print, and their replacements on a dark background.
-fn pairs() -> [(Rgb, Rgb); 11] {
+/// The roles of colours, each in print and on a dark background.
+fn pairs() -> [(Ink, Rgb); 12] {
     [
-        ([0xff; 3], [0x1b, 0x1e, 0x24]),
-        (INK, [0xe7, 0xea, 0xf0]),
-        (DIM, [0x98, 0xa2, 0xb3]),
-        (GRID, [0x2c, 0x32, 0x3c]),
-        (MISSING, [0x24, 0x29, 0x32]),
-        (rgb(Hue::Blue), [0x5b, 0x9d, 0xff]),
-        (rgb(Hue::Red), [0xf0, 0x6a, 0x6a]),
-        (rgb(Hue::Green), [0x4c, 0xc3, 0x8a]),
-        (rgb(Hue::Orange), [0xf0, 0xa8, 0x3c]),
-        (rgb(Hue::Violet), [0xb5, 0x8a, 0xe6]),
-        (rgb(Hue::Cyan), [0x4f, 0xc3, 0xd9]),
+        (Ink::Ground, [0x1b, 0x1e, 0x24]),
+        (Ink::Hue(Hue::Ink), [0xe7, 0xea, 0xf0]),
+        (Ink::Hue(Hue::Grey), [0x98, 0xa2, 0xb3]),
+        (Ink::Grid, [0x2c, 0x32, 0x3c]),
+        (Ink::Edge, [0x5b, 0x64, 0x72]),
+        (Ink::Missing, [0x24, 0x29, 0x32]),
+        (Ink::Hue(Hue::Blue), [0x5b, 0x9d, 0xff]),
+        (Ink::Hue(Hue::Red), [0xf0, 0x6a, 0x6a]),
+        (Ink::Hue(Hue::Green), [0x4c, 0xc3, 0x8a]),
+        (Ink::Hue(Hue::Orange), [0xf0, 0xa8, 0x3c]),
+        (Ink::Hue(Hue::Violet), [0xb5, 0x8a, 0xe6]),
+        (Ink::Hue(Hue::Cyan), [0x4f, 0xc3, 0xd9]),
     ]
+}
+
+/// Returns a colour in print, dark enough for paper.
+pub(super) fn rgb(ink: Ink) -> Rgb {
+    const INK: Rgb = [0x1b, 0x24, 0x30];
+    match ink {
+        Ink::Hue(Hue::Blue) => [0x1f, 0x6f, 0xeb],
+        Ink::Hue(Hue::Red) => [0xc6, 0x2f, 0x2f],
+        Ink::Hue(Hue::Green) => [0x1a, 0x7f, 0x4b],
+        Ink::Hue(Hue::Orange) => [0xa8, 0x64, 0x00],
+        Ink::Hue(Hue::Violet) => [0x7a, 0x3e, 0xb1],
+        Ink::Hue(Hue::Cyan) => [0x0b, 0x76, 0x8c],
+        Ink::Hue(Hue::Grey) => [0x5b, 0x64, 0x72],
+        Ink::Hue(Hue::Ink) | Ink::Label => INK,
+        Ink::Grid => [0xe3, 0xe7, 0xee],
+        Ink::Edge => [0xa2, 0xa9, 0xb4],
+        Ink::Ground => [0xff; 3],
+        Ink::Missing => [0xf3, 0xf5, 0xf8],
+        Ink::Rgb(colour) => colour,
+    }
 }
 
 /// Style rules that show the figures of a page on a dark background if the reader prefers a dark theme.
 pub(crate) fn dark_style() -> String {
     let hex = |[red, green, blue]: Rgb| format!("#{red:02x}{green:02x}{blue:02x}");
-    let rules = pairs().map(|(print, dark)| {
-        let (print, dark) = (hex(print), hex(dark));
-        // White dots mark nodes on any background.
-        let of_circles = if print == "#ffffff" { ":not(circle)" } else { "" };
+    let rules = pairs().map(|(ink, dark)| {
+        let (print, dark) = (hex(rgb(ink)), hex(dark));
+        // White dots mark nodes, and white cells errors of zero, on any background.
+        let (of_circles, areas) = match ink {
+            Ink::Ground => (":not(circle)", String::new()),
+            _ => ("", format!("  svg [color=\"{print}\"] {{ color: {dark}; }}\n")),
+        };
         format!(
-            "  svg [fill=\"{print}\"]{of_circles} {{ fill: {dark}; }}\n  svg [stroke=\"{print}\"] {{ stroke: {dark}; }}\n"
+            "  svg [fill=\"{print}\"]{of_circles} {{ fill: {dark}; }}\n  svg [stroke=\"{print}\"] {{ stroke: {dark}; }}\n{areas}"
         )
     });
     format!(
@@ -199,45 +216,15 @@ impl Picture {
     /// Returns the figure for an HTML page, with the same share of the page width as in print, without external
     /// references, and with ids that are unique to `place`. `label` is its description for screen readers.
     pub(crate) fn inline_svg(&self, place: usize, label: &str) -> String {
-        let label = super::canvas::escaped(label).replace('"', "&quot;");
-        let [width, height] = self.size();
-        let share = number(100.0 * width / PAGE_WIDTH);
-        let [width, height] = [width, height].map(number);
-        let own = format!("xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}pt\" height=\"{height}pt\"");
-        let here = format!("role=\"img\" aria-label=\"{label}\" width=\"{share}%\"");
-        self.svg()
-            .replacen(&own, &here, 1)
+        let label = escaped(label).replace('"', "&quot;");
+        let rest = self.svg.find("viewBox").unwrap_or_default();
+        let share = 100.0 * self.share;
+        let inline = format!(
+            "<svg role=\"img\" aria-label=\"{label}\" width=\"{share:.1}%\" {}",
+            &self.svg[rest..]
+        );
+        inline
             .replace("id=\"c", &format!("id=\"f{place}c"))
             .replace("url(#c", &format!("url(#f{place}c"))
     }
-}
-
-pub(super) const INK: Rgb = [0x1b, 0x24, 0x30];
-pub(super) const DIM: Rgb = [0x5b, 0x64, 0x72];
-pub(super) const GRID: Rgb = [0xe3, 0xe7, 0xee];
-pub(super) const MISSING: Rgb = [0xf3, 0xf5, 0xf8];
-
-/// A hue in print.
-pub(super) fn rgb(hue: Hue) -> Rgb {
-    match hue {
-        Hue::Blue => [0x1f, 0x6f, 0xeb],
-        Hue::Red => [0xc6, 0x2f, 0x2f],
-        Hue::Green => [0x1a, 0x7f, 0x4b],
-        Hue::Orange => [0xa8, 0x64, 0x00],
-        Hue::Violet => [0x7a, 0x3e, 0xb1],
-        Hue::Cyan => [0x0b, 0x76, 0x8c],
-        Hue::Grey => DIM,
-        Hue::Ink => INK,
-    }
-}
-
-/// Returns a paler colour: 0 leaves it unchanged, 1 is white.
-pub(super) fn pale(colour: Rgb, paler: f64) -> Rgb {
-    colour.map(|part| (f64::from(part) + paler * (255.0 - f64::from(part))).round() as u8)
-}
-
-/// Ink on light colours, white on dark ones.
-pub(super) fn contrast([red, green, blue]: Rgb) -> Rgb {
-    let luma = 0.299 * f64::from(red) + 0.587 * f64::from(green) + 0.114 * f64::from(blue);
-    if luma > 120.0 { INK } else { [255; 3] }
 }

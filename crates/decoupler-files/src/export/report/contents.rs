@@ -13,14 +13,15 @@ use decoupler_core::{
 
 use super::{
     command::train_command,
+    html::{Block, Tone, document},
     pictures::pictures,
     settings::{recording_facts, settings_facts},
 };
 use crate::{
     export::{
         Cell, NetworkFile, Table, TableColumn, WriteError, atomic_write, decoder_table, describe_determinacy,
-        describe_search, describe_worse_than_ridge, document::PROGRAM, error_table, figures::dark_style,
-        format_duration, format_percent, search_table, unfinished::folder_of,
+        describe_search, describe_worse_than_ridge, document::PROGRAM, error_table, format_duration, format_percent,
+        search_table, unfinished::folder_of,
     },
     import::{Plan, Setup},
 };
@@ -58,82 +59,77 @@ impl RunReport<'_> {
     /// # Panics
     /// If the test set does not belong to the run.
     pub fn html(&self, folder: &Path) -> String {
+        document(&self.title(), &self.blocks(folder))
+    }
+
+    fn blocks(&self, folder: &Path) -> Vec<Block> {
         let Self { file, decoders, .. } = *self;
         let setup = self.setup(folder);
+        let is_array = setup.plan().is_none();
         let answers = file.decoder().answers_to(self.test);
         let loops = setup.plan().map_or_else(Vec::new, |plan| {
             HysteresisLoop::of_test(self.test, answers.view(), plan.test_order())
         });
-        let title = self.title();
-        let mut html = Html::default();
-        html.element("h1", "", &title);
-        html.element("p", "dim", &self.summary());
-        for remark in self.remarks(&setup, &answers) {
-            html.element("p", "warning", &remark);
-        }
-        html.section("Errors on the test set", |html| {
-            let mut tables = file.error_table();
-            ErrorTable::add_loops(&mut tables, &loops);
-            html.table(&error_table(&tables), "network");
-            let text = match setup.plan() {
-                None => {
-                    "Means of |error|, in percent of the coordinate as in the paper, in mm, or in percent of the stroke. \
-                     The model-based decoder knows the equations, the noise, and mean and covariance of the loading; \
-                     training mean and linear map are what a network has to beat."
-                }
-                Some(_) => {
-                    "RMSE, MAE and worst are in the unit of the target. R² is the share of the target's variance that the \
-                     answers explain: 1 is exact, 0 is no better than the mean. Training mean and ridge regression are what \
-                     a network has to beat."
-                }
-            };
-            html.element("p", "dim", text);
-        });
+        let mut blocks = vec![Block::dim(self.summary())];
+        let remarks = self.remarks(&setup, &answers).into_iter();
+        blocks.extend(remarks.map(|remark| Block::Text(Tone::Warning, remark)));
+        let mut tables = file.error_table();
+        ErrorTable::add_loops(&mut tables, &loops);
+        blocks.extend([
+            Block::Heading("Errors on the test set"),
+            Block::Table(error_table(&tables), "network"),
+            Block::dim(if is_array {
+                "Means of |error|, in percent of the coordinate as in the paper, in mm, or in percent of the stroke. \
+                 The model-based decoder knows the equations, the noise, and mean and covariance of the loading; \
+                 training mean and linear map are what a network has to beat."
+            } else {
+                "RMSE, MAE and worst are in the unit of the target. R² is the share of the target's variance that the \
+                 answers explain: 1 is exact, 0 is no better than the mean. Training mean and ridge regression are what \
+                 a network has to beat."
+            }),
+        ]);
         if !decoders.is_empty() {
-            html.section("Decoders", |html| {
-                let model_based = file.scores.baselines.model_based.as_ref();
-                html.table(&decoder_table(&file.problem, decoders, model_based), "Network");
-                let text = match setup.plan() {
-                    None => {
-                        "The residual is the rms relative difference between the readings and those of the decoded \
-                         deformation; it needs no ground truth. Times are those of a frame on one thread."
-                    }
-                    Some(_) => {
-                        "Times are those of a frame on one thread. All decoders were fitted to the same samples."
-                    }
-                };
-                html.element("p", "dim", text);
-            });
+            let model_based = file.scores.baselines.model_based.as_ref();
+            blocks.extend([
+                Block::Heading("Decoders"),
+                Block::Table(decoder_table(&file.problem, decoders, model_based), "Network"),
+                Block::dim(if is_array {
+                    "The residual is the rms relative difference between the readings and those of the decoded \
+                     deformation; it needs no ground truth. Times are those of a frame on one thread."
+                } else {
+                    "Times are those of a frame on one thread. All decoders were fitted to the same samples."
+                }),
+            ]);
         }
-        html.section("Figures", |html| {
-            for (number, (caption, figure)) in pictures(file, self.test, &answers, &loops).into_iter().enumerate() {
-                html.figure(&caption, &figure.draw().inline_svg(number, &caption));
-            }
-        });
+        blocks.push(Block::Heading("Figures"));
+        let pictures = pictures(file, self.test, &answers, &loops).into_iter();
+        blocks.extend(pictures.map(|(caption, figure)| Block::Figure(caption, Box::new(figure))));
         if file.training.starts.len() > 1 {
-            html.section("Starts", |html| html.table(&self.starts_table(), ""));
+            blocks.extend([Block::Heading("Starts"), Block::Table(self.starts_table(), "")]);
         }
         if let Some(search) = file.recorded.as_ref().and_then(|recorded| recorded.search.as_ref()) {
-            html.section("Choice of settings", |html| {
-                html.element("p", "dim", &format!("{}.", describe_search(search)));
-                html.table(&search_table(search), "");
-            });
+            blocks.extend([
+                Block::Heading("Choice of settings"),
+                Block::dim(format!("{}.", describe_search(search))),
+                Block::Table(search_table(search), ""),
+            ]);
         }
-        html.section("Settings", |html| {
-            match (setup.settings().simulation(), &file.recorded) {
-                (Some(simulation), _) => {
-                    html.facts(&settings_facts(file, simulation));
-                    for note in simulation.sensor.scale.note().iter().map(String::as_str) {
-                        html.element("p", "dim", note);
-                    }
-                    html.element("p", "dim", Geometry::ASSUMPTION);
-                }
-                (None, Some(recorded)) => html.facts(&recording_facts(file, &recorded.relative_to(folder), self.test)),
-                (None, None) => {}
+        blocks.push(Block::Heading("Settings"));
+        match (setup.settings().simulation(), &file.recorded) {
+            (Some(simulation), _) => {
+                blocks.push(Block::Facts(settings_facts(file, simulation)));
+                blocks.extend(simulation.sensor.scale.note().map(Block::dim));
+                blocks.push(Block::dim(Geometry::ASSUMPTION));
             }
-        });
-        html.section("Repeating this run", |html| self.repeat(&setup, html));
-        html.finish(&title, &format!("{}{}", include_str!("style.css"), dark_style()))
+            (None, Some(recorded)) => {
+                let recorded = recorded.relative_to(folder);
+                blocks.push(Block::Facts(recording_facts(file, &recorded, self.test)));
+            }
+            (None, None) => {}
+        }
+        blocks.push(Block::Heading("Repeating this run"));
+        blocks.extend(self.repeat(&setup));
+        blocks
     }
 
     /// Setup of the run, with paths for a file in `folder`.
@@ -271,8 +267,8 @@ impl RunReport<'_> {
         table
     }
 
-    /// Adds the terminal command that repeats the run, and its limitations.
-    fn repeat(&self, setup: &Setup, html: &mut Html) {
+    /// Returns the terminal command that repeats the run, and its limitations.
+    fn repeat(&self, setup: &Setup) -> Vec<Block> {
         let training = &self.file.training;
         let mut settings = *setup.settings();
         if let Some(first) = training.stages.first() {
@@ -282,43 +278,39 @@ impl RunReport<'_> {
         if is_cut_short {
             settings.training.stopping.epochs = training.epochs().max(1);
         }
-        match train_command(&setup.with_settings(settings), None) {
+        let plain = |text: String| Block::Text(Tone::Plain, text);
+        let mut blocks = match train_command(&setup.with_settings(settings), None) {
             Ok(command) => {
                 let place = match setup.plan() {
                     None => "In a terminal",
                     Some(_) => "In a terminal, in the folder of this report",
                 };
                 let text = format!("{place}, the same version of the program gives the same network with:");
-                html.element("p", "", &text);
-                html.element("pre", "", &command);
+                vec![plain(text), Block::Command(command)]
             }
-            Err(gap) => {
-                let text = format!(
-                    "No command repeats this run: {gap}. It can be repeated in the window with the settings above."
-                );
-                html.element("p", "", &text);
-            }
-        }
+            Err(gap) => vec![plain(format!(
+                "No command repeats this run: {gap}. It can be repeated in the window with the settings above."
+            ))],
+        };
         if let Some(second) = training.stages.get(1) {
             let text = format!(
                 "This trains with the first method only; the run changed its method at epoch {}. A checkpoint resumed with \
                  --method continues with another.",
                 second.first_epoch
             );
-            html.element("p", "warning", &text);
+            blocks.push(Block::Text(Tone::Warning, text));
         } else if is_cut_short {
-            html.element(
-                "p",
-                "dim",
-                "The run was stopped early; the command stops at the same epoch.",
-            );
+            let text = "The run was stopped early; the command stops at the same epoch.";
+            blocks.push(Block::dim(text));
         }
         let program = &self.file.program;
-        let mut text = format!("Report by {PROGRAM}");
-        if program != PROGRAM {
-            text += &format!("; the network was saved by {program}");
-        }
-        html.element("p", "dim", &format!("{text}."));
+        let saved = if program == PROGRAM {
+            String::new()
+        } else {
+            format!("; the network was saved by {program}")
+        };
+        blocks.push(Block::dim(format!("Report by {PROGRAM}{saved}.")));
+        blocks
     }
 }
 
@@ -327,107 +319,4 @@ fn sentence(text: &str) -> String {
     let mut letters = text.trim_end_matches('.').chars();
     let first = letters.next().into_iter().flat_map(char::to_uppercase);
     first.chain(letters).chain(['.']).collect()
-}
-
-/// Builder of an HTML document. Elements are closed as in XML, which lets XML parsers read it too.
-#[derive(Default)]
-pub(super) struct Html {
-    text: String,
-}
-
-impl Html {
-    /// Adds an element that contains only text.
-    pub fn element(&mut self, name: &str, class: &str, text: &str) {
-        let class = attribute("class", class);
-        self.text += &format!("<{name}{class}>{}</{name}>\n", escaped(text));
-    }
-
-    /// Adds a section with this heading.
-    pub fn section(&mut self, heading: &str, fill: impl FnOnce(&mut Self)) {
-        self.text += "<section>\n";
-        self.element("h2", "", heading);
-        fill(self);
-        self.text += "</section>\n";
-    }
-
-    /// Adds a table. Rows with the name `own` in the first or second column are highlighted.
-    pub fn table(&mut self, table: &Table, own: &str) {
-        self.text += "<div class=\"scrolled\"><table>\n<thead><tr>";
-        for column in &table.columns {
-            self.text += &format!("<th scope=\"col\">{}</th>", escaped(&column.title()));
-        }
-        self.text += "</tr></thead>\n<tbody>\n";
-        for row in &table.rows {
-            let cells: Vec<String> = row.iter().map(|cell| cell.rounded()).collect();
-            self.row(
-                &cells,
-                if cells.iter().take(2).any(|name| name == own) {
-                    "own"
-                } else {
-                    ""
-                },
-            );
-        }
-        self.text += "</tbody></table></div>\n";
-    }
-
-    /// Adds a table of names and values.
-    pub fn facts(&mut self, facts: &[(&str, String)]) {
-        self.text += "<div class=\"scrolled\"><table class=\"settings\"><tbody>\n";
-        for (name, value) in facts {
-            self.row(&[(*name).to_owned(), value.clone()], "");
-        }
-        self.text += "</tbody></table></div>\n";
-    }
-
-    fn row(&mut self, cells: &[String], class: &str) {
-        self.text += &format!("<tr{}>", attribute("class", class));
-        for cell in cells {
-            self.text += &format!("<td>{}</td>", escaped(cell));
-        }
-        self.text += "</tr>\n";
-    }
-
-    /// Adds a picture; `svg` is inserted unchanged.
-    pub fn figure(&mut self, caption: &str, svg: &str) {
-        self.text += &format!(
-            "<figure>\n{svg}<figcaption>{}</figcaption></figure>\n",
-            escaped(caption)
-        );
-    }
-
-    /// Returns the whole document.
-    pub fn finish(self, title: &str, style: &str) -> String {
-        let (title, body) = (escaped(title), self.text);
-        format!(
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>{title}</title>\n\
-             <style>\n{style}</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n"
-        )
-    }
-}
-
-fn attribute(name: &str, value: &str) -> String {
-    if value.is_empty() {
-        String::new()
-    } else {
-        format!(" {name}=\"{}\"", escaped(value))
-    }
-}
-
-/// Escapes the special characters of HTML and leaves out control characters, which it does not allow.
-pub(super) fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for letter in text.chars() {
-        match letter {
-            '&' => escaped += "&amp;",
-            '<' => escaped += "&lt;",
-            '>' => escaped += "&gt;",
-            '"' => escaped += "&quot;",
-            '\n' | '\t' => escaped.push(letter),
-            letter if letter.is_control() => {}
-            letter => escaped.push(letter),
-        }
-    }
-    escaped
 }

@@ -2,6 +2,7 @@
 
 mod command;
 mod contents;
+mod html;
 mod pictures;
 mod settings;
 

@@ -1,16 +1,14 @@
 //! The figures of a report.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 use ndarray::{Array2, ArrayView2};
 
 use crate::{
     export::NetworkFile,
     figure::{
-        Figure, RegressionLine, SequentialMap, TargetSurface, error_histogram_figure, hysteresis_figure, loss_figure,
+        Figure, RegressionLine, TargetSurface, error_histogram_figure, hysteresis_figure, loss_figure,
         regression_figure,
-        surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode},
+        surface::{Quantity, Surface, SurfaceFigure, ViewMode},
         target_histogram_figure, target_pairs, target_regression_figure, training_state_figure, z_pairs_mm,
     },
 };
@@ -119,22 +117,12 @@ fn target_surfaces(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) ->
     let sample = Some(worst.worst_sample).filter(|&sample| sample < test.samples())?;
     let values = |rows: ArrayView2<'_, f64>| rows.row(sample).to_vec();
     let surfaces = surface.surfaces(&values(targets), &values(answers.view()), range);
-    let top = |surface: Surface| Surface {
-        mode: ViewMode::Top,
-        ..surface
-    };
     let name = &problem.targets[surface.nodes()[node].target].name;
     let caption = format!(
         "Sample {} of the test set, which has the largest error of all targets with a position ({name}, marked).",
         sample + 1
     );
-    let figure = SurfaceFigure {
-        surfaces: surfaces.map(top).into(),
-        camera: OrbitCamera::default(),
-        marked_node: Some(node),
-        ..SurfaceFigure::default()
-    };
-    Some((caption, figure.into()))
+    Some((caption, from_above(surfaces, node)))
 }
 
 /// Actual and decoupled surface of the snapshot of `worst`, which is marked, and the error; `None` where no surface can be
@@ -151,37 +139,14 @@ fn array_surfaces(
     let map = SurfaceMap::shared(&x_mm, &y_mm).ok()?;
     let snapshots = test.snapshots();
     let samples = snapshots.get(worst.snapshot)?;
-    let nodes_of = |row: ndarray::ArrayView1<'_, f64>| -> Vec<DVec3> {
-        let coordinates = row.to_vec();
-        coordinates.chunks_exact(3).map(DVec3::from_slice).collect()
+    let nodes = |coordinates_mm: ArrayView2<'_, f64>| -> Vec<DVec3> {
+        let rows = samples.iter().map(|&sample| coordinates_mm.row(sample).to_vec());
+        rows.flat_map(|row| row.chunks_exact(3).map(DVec3::from_slice).collect::<Vec<_>>())
+            .collect()
     };
-    let targets = test.targets();
-    let actual: Vec<DVec3> = samples
-        .iter()
-        .flat_map(|&sample| nodes_of(targets.row(sample)))
-        .collect();
-    let decoupled: Vec<DVec3> = samples
-        .iter()
-        .flat_map(|&sample| nodes_of(decoupled_mm.row(sample)))
-        .collect();
-    let error: Vec<DVec3> = actual
-        .iter()
-        .zip(&decoupled)
-        .map(|(a, d)| a.with_z(d.z - a.z))
-        .collect();
-    let surface = |title: &str, nodes: Vec<DVec3>, quantity, range| {
-        let z_mm: Vec<f64> = nodes.iter().map(|node| node.z).collect();
-        Surface {
-            title: title.to_owned(),
-            map: Arc::clone(&map),
-            values: map.evaluate(&z_mm).into(),
-            nodes: nodes.into(),
-            quantity,
-            range,
-            mode: ViewMode::Top,
-            colours: SequentialMap::default(),
-        }
-    };
+    let (actual, decoupled) = (nodes(test.targets()), nodes(decoupled_mm.view()));
+    let pairs = actual.iter().zip(&decoupled);
+    let error: Vec<DVec3> = pairs.map(|(a, d)| a.with_z(d.z - a.z)).collect();
     let heights = geometry.height_mm - source.stroke_mm()..=geometry.height_mm;
     let errors_mm = error.iter().map(|node| node.z.abs()).filter(|z| z.is_finite());
     // Errors below a nanometre are not distinguished by colour.
@@ -193,15 +158,29 @@ fn array_surfaces(
         worst.row + 1,
         worst.node + 1
     );
-    let figure = SurfaceFigure {
-        surfaces: vec![
-            surface("Actual", actual, Quantity::Height, heights.clone()),
-            surface("Decoupled", decoupled, Quantity::Height, heights),
-            surface("Error", error, Quantity::Error, -largest_mm..=largest_mm),
-        ],
-        camera: OrbitCamera::default(),
-        marked_node: Some(place * scale.nodes_per_row() + worst.node),
+    let surfaces = [
+        ("Actual", actual, Quantity::Height, heights.clone()),
+        ("Decoupled", decoupled, Quantity::Height, heights),
+        ("Error", error, Quantity::Error, -largest_mm..=largest_mm),
+    ];
+    let surfaces =
+        surfaces.map(|(title, nodes, quantity, range)| Surface::through(title, &map, nodes, quantity, range));
+    Some((
+        caption,
+        from_above(surfaces, place * scale.nodes_per_row() + worst.node),
+    ))
+}
+
+/// The surfaces from above, with one node marked.
+fn from_above(surfaces: [Surface; 3], marked: usize) -> Figure {
+    let surfaces = surfaces.map(|surface| Surface {
+        mode: ViewMode::Top,
+        ..surface
+    });
+    SurfaceFigure {
+        surfaces: surfaces.into(),
+        marked_node: Some(marked),
         ..SurfaceFigure::default()
-    };
-    Some((caption, figure.into()))
+    }
+    .into()
 }

@@ -1,5 +1,7 @@
 //! The settings of a run as text.
 
+use std::fmt::Display;
+
 use crate::{
     export::{NetworkFile, format_number},
     import::{Plan, Recorded},
@@ -12,67 +14,92 @@ use decoupler_core::{
     text::counted,
 };
 
+/// Names and values of settings.
+#[derive(Default)]
+struct Facts(Vec<(&'static str, String)>);
+
+impl Facts {
+    fn add(&mut self, name: &'static str, value: impl Display) {
+        self.0.push((name, value.to_string()));
+    }
+
+    /// Adds the settings of the network and its training.
+    fn add_training(&mut self, file: &NetworkFile) {
+        let settings = &file.settings;
+        let rules = settings.training.stopping;
+        self.add("Hidden nodes", settings.hidden);
+        self.add("Weights", file.network.weights());
+        for (number, stage) in file.training.stages.iter().enumerate() {
+            match number {
+                0 => self.add("Method", stage.method),
+                _ => self.add(
+                    "Method",
+                    format_args!("from epoch {}: {}", stage.first_epoch, stage.method),
+                ),
+            }
+        }
+        match settings.combine {
+            Combination::Best => self.add("Starts", settings.starts),
+            Combination::Mean => self.add("Starts", format_args!("{}, whose mean is the network", settings.starts)),
+        }
+        let ends = format_args!(
+            "after {}, at a training error of {:?}, a gradient below {:?}, or {}",
+            counted(rules.epochs, "epoch"),
+            rules.goal_mse,
+            rules.min_gradient,
+            counted(rules.max_fail, "validation failure")
+        );
+        self.add("Ends", ends);
+    }
+}
+
 /// Names and values of all settings.
 pub(super) fn settings_facts(file: &NetworkFile, source: &Simulation) -> Vec<(&'static str, String)> {
-    let settings = &file.settings;
-    let inputs = &settings.inputs;
+    let inputs = &file.settings.inputs;
     let (geometry, scene) = (&source.sensor.geometry, &source.scene);
-    let mut facts = vec![
-        ("Array", source.sensor.scale.to_string()),
-        ("Height", format!("{} mm", geometry.height_mm)),
-        (
-            "Row-wires",
-            format!("from x = {} mm, {} mm apart", geometry.row_x0_mm, geometry.row_pitch_mm),
-        ),
-        ("Nodes of a row-wire", format!("{} mm apart", geometry.node_pitch_mm)),
-        (
-            "Column-wires",
-            format!(
-                "from y = {} mm, {} mm apart",
-                geometry.column_y0_mm, geometry.column_pitch_mm
-            ),
-        ),
-        (
-            "Nodes of a column-wire",
-            format!(
-                "from x = {} mm, {} mm apart",
-                geometry.column_node_x0_mm, geometry.column_node_pitch_mm
-            ),
-        ),
-        (
-            "Resistance of the rubber",
-            format!("{} ohm/mm", source.sensor.resistivity_ohm_per_mm),
-        ),
-        ("Rows", scene.rows.to_string()),
-        (
-            "Moving axes",
-            match scene.movement {
-                Movement::Z => "z".to_owned(),
-                Movement::Xyz { largest_shift_mm } => format!("x, y, z; sideways by up to {largest_shift_mm} mm"),
-            },
-        ),
-        ("Loading", loading_words(&scene.loading)),
-        (
-            "Largest compression",
-            format!(
-                "{} % of the height, {} mm",
-                format_number(100.0 * scene.largest_compression),
-                format_number(source.stroke_mm())
-            ),
-        ),
-        ("Noise", noise_words(&scene.noise)),
-        ("Inputs", format!("{} ({})", inputs.quantity, inputs.scaling)),
-    ];
-    facts.extend(training_facts(file));
-    facts.push((
-        "Samples",
-        format!(
-            "{} for training, {} for validation, {} for test, each rounded up to whole snapshots",
-            source.samples, source.validation_samples, source.test_samples
-        ),
-    ));
-    facts.push(("Seed", file.settings.seed.to_string()));
-    facts
+    let mut facts = Facts::default();
+    facts.add("Array", source.sensor.scale);
+    facts.add("Height", format_args!("{} mm", geometry.height_mm));
+    let wires = |axis: &str, from_mm: f64, apart_mm: f64| format!("from {axis} = {from_mm} mm, {apart_mm} mm apart");
+    facts.add("Row-wires", wires("x", geometry.row_x0_mm, geometry.row_pitch_mm));
+    facts.add(
+        "Nodes of a row-wire",
+        format_args!("{} mm apart", geometry.node_pitch_mm),
+    );
+    facts.add(
+        "Column-wires",
+        wires("y", geometry.column_y0_mm, geometry.column_pitch_mm),
+    );
+    let nodes = wires("x", geometry.column_node_x0_mm, geometry.column_node_pitch_mm);
+    facts.add("Nodes of a column-wire", nodes);
+    let rubber = source.sensor.resistivity_ohm_per_mm;
+    facts.add("Resistance of the rubber", format_args!("{rubber} ohm/mm"));
+    facts.add("Rows", scene.rows);
+    match scene.movement {
+        Movement::Z => facts.add("Moving axes", "z"),
+        Movement::Xyz { largest_shift_mm } => {
+            facts.add(
+                "Moving axes",
+                format_args!("x, y, z; sideways by up to {largest_shift_mm} mm"),
+            );
+        }
+    }
+    facts.add("Loading", loading_words(&scene.loading));
+    let [percent, mm] = [100.0 * scene.largest_compression, source.stroke_mm()].map(format_number);
+    facts.add(
+        "Largest compression",
+        format_args!("{percent} % of the height, {mm} mm"),
+    );
+    facts.add("Noise", noise_words(&scene.noise));
+    facts.add("Inputs", format_args!("{} ({})", inputs.quantity, inputs.scaling));
+    facts.add_training(file);
+    let samples = format_args!(
+        "{} for training, {} for validation, {} for test, each rounded up to whole snapshots",
+        source.samples, source.validation_samples, source.test_samples
+    );
+    facts.add("Samples", samples);
+    facts.add("Seed", file.settings.seed);
+    facts.0
 }
 
 /// Names and values of the settings of a run on a recording.
@@ -83,98 +110,61 @@ pub(super) fn recording_facts(file: &NetworkFile, recorded: &Recorded, test: &Da
         division,
     } = &recorded.plan;
     let names = |channels: &[Channel]| Vec::from_iter(channels.iter().map(Channel::title)).join(", ");
-    let mut facts = vec![("Recording", import.data.display().to_string())];
-    for joined in &import.join {
-        facts.push(("Joined file", joined.file.display().to_string()));
-    }
-    for set in &import.append {
-        facts.push(("Appended", set.data.display().to_string()));
-    }
-    if let Some(time) = &import.time {
-        facts.push(("Time", time.clone()));
-    }
-    if let Some(group) = &import.group {
-        facts.push(("Group", group.clone()));
-    }
-    for derived in &import.derive {
-        facts.push(("Derived column", derived.to_string()));
-    }
-    for condition in &import.conditions {
-        facts.push(("Rows used", condition.to_string()));
-    }
-    facts.push(("Readings", names(&file.problem.inputs)));
-    if let Some(memory) = &file.problem.memory {
-        facts.push(("Memory", memory.to_string()));
-    }
-    facts.push(("Targets", names(&file.problem.targets)));
+    let mut facts = Facts::default();
+    facts.add("Recording", import.data.display());
+    import
+        .join
+        .iter()
+        .for_each(|joined| facts.add("Joined file", joined.file.display()));
+    import
+        .append
+        .iter()
+        .for_each(|set| facts.add("Appended", set.data.display()));
+    import.time.iter().for_each(|time| facts.add("Time", time));
+    import.group.iter().for_each(|group| facts.add("Group", group));
+    import
+        .derive
+        .iter()
+        .for_each(|derived| facts.add("Derived column", derived));
+    import
+        .conditions
+        .iter()
+        .for_each(|condition| facts.add("Rows used", condition));
+    facts.add("Readings", names(&file.problem.inputs));
+    file.problem
+        .memory
+        .iter()
+        .for_each(|memory| facts.add("Memory", memory));
+    facts.add("Targets", names(&file.problem.targets));
     let samples = counted(test.samples(), "test sample");
-    facts.push((
-        "Split",
-        match tests {
-            Some(tests) => format!("{samples} of {}", tests.data.display()),
-            None => format!(
-                "by {}, {} % for the test: {samples}",
-                division.by,
-                format_number(100.0 * division.test_fraction)
-            ),
-        },
-    ));
-    facts.push((
-        "Validation",
-        match division.validation_fraction {
-            0.0 => "nothing held out".to_owned(),
-            fraction => format!("{} % of the other samples", format_number(100.0 * fraction)),
-        },
-    ));
-    let inputs = file.settings.inputs;
-    facts.push(("Inputs", format!("{} ({})", inputs.quantity, inputs.scaling)));
-    facts.push((
-        "Row-wires",
-        match (&file.row_wires, file.settings.source.row_model()) {
-            (None, _) => "not known".to_owned(),
-            (Some(rows), RowModel::Each) => format!("{}, a network for each", rows.len()),
-            (Some(rows), RowModel::Shared) => format!("{}, one network for all", rows.len()),
-        },
-    ));
-    facts.extend(training_facts(file));
-    facts.push(("Seed", file.settings.seed.to_string()));
-    facts
-}
-
-/// Names and values of the settings of the network and its training.
-fn training_facts(file: &NetworkFile) -> Vec<(&'static str, String)> {
-    let rules = file.settings.training.stopping;
-    let mut facts = vec![
-        ("Hidden nodes", file.settings.hidden.to_string()),
-        ("Weights", file.network.weights().to_string()),
-    ];
-    for (number, stage) in file.training.stages.iter().enumerate() {
-        let from = match number {
-            0 => String::new(),
-            _ => format!("from epoch {}: ", stage.first_epoch),
-        };
-        facts.push(("Method", format!("{from}{}", stage.method)));
+    let percent = |fraction: f64| format_number(100.0 * fraction);
+    match tests {
+        Some(tests) => facts.add("Split", format_args!("{samples} of {}", tests.data.display())),
+        None => {
+            let held_out = percent(division.test_fraction);
+            facts.add(
+                "Split",
+                format_args!("by {}, {held_out} % for the test: {samples}", division.by),
+            );
+        }
     }
-    facts.extend([
-        (
-            "Starts",
-            match file.settings.combine {
-                Combination::Best => file.settings.starts.to_string(),
-                Combination::Mean => format!("{}, whose mean is the network", file.settings.starts),
-            },
+    match division.validation_fraction {
+        0.0 => facts.add("Validation", "nothing held out"),
+        fraction => facts.add(
+            "Validation",
+            format_args!("{} % of the other samples", percent(fraction)),
         ),
-        (
-            "Ends",
-            format!(
-                "after {}, at a training error of {:?}, a gradient below {:?}, or {}",
-                counted(rules.epochs, "epoch"),
-                rules.goal_mse,
-                rules.min_gradient,
-                counted(rules.max_fail, "validation failure")
-            ),
-        ),
-    ]);
-    facts
+    }
+    let inputs = file.settings.inputs;
+    facts.add("Inputs", format_args!("{} ({})", inputs.quantity, inputs.scaling));
+    match (&file.row_wires, file.settings.source.row_model()) {
+        (None, _) => facts.add("Row-wires", "not known"),
+        (Some(rows), RowModel::Each) => facts.add("Row-wires", format_args!("{}, a network for each", rows.len())),
+        (Some(rows), RowModel::Shared) => facts.add("Row-wires", format_args!("{}, one network for all", rows.len())),
+    }
+    facts.add_training(file);
+    facts.add("Seed", file.settings.seed);
+    facts.0
 }
 
 fn loading_words(loading: &Loading) -> String {

@@ -1,9 +1,9 @@
 //! A camera that orbits the plot, and the projection from millimetres to points on the screen and back.
 
-use glam::{DVec2, DVec3, Mat4, Vec2, Vec3, camera::rh};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{box_axes::PlanAxes, nodes::Bounds};
+use crate::figure::drawing::Bounds;
 
 const RADIANS_PER_POINT: f32 = 0.008;
 const RADIANS_PER_KEY: f32 = 0.1;
@@ -166,41 +166,22 @@ impl<'a> Shade<'a> {
     }
 }
 
-/// The line of sight through each point of a laid-out surface: the inverse of how it is drawn, in double precision.
+/// The mapping of places in millimetres to points on the screen and back: in perspective from the eye of the camera, or from
+/// straight above.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sight {
-    /// From the eye of the camera.
-    Eye(EyeSight),
-    /// From straight above.
-    Above(AboveSight),
-}
-
-/// Sight in perspective.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EyeSight {
-    /// The middle of the box, where the eye looks.
-    middle_mm: DVec3,
-    /// Box units per millimetre.
-    per_mm: DVec3,
-    /// The eye, in box units around that middle.
-    eye: DVec3,
+pub struct Sight {
+    pub(super) plot_box: PlotBox,
+    /// The eye in box units, at the middle of the box if it is straight above.
+    pub(super) eye: DVec3,
+    pub(super) is_above: bool,
     /// Unit vectors in box units: away from the eye, to the right and up on the screen.
     forward: DVec3,
     right: DVec3,
     up: DVec3,
-    /// Points on the screen of a tangent of 1.
+    /// Points on the screen of a tangent of 1, or of a box unit from above.
     points: f64,
     /// The point on the screen where the eye looks.
     offset: DVec2,
-}
-
-/// Sight from above, x to the right and y upwards.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AboveSight {
-    /// A place and its point on the screen.
-    corner_mm: DVec2,
-    corner: DVec2,
-    points_per_mm: f64,
 }
 
 /// A line of sight, in millimetres.
@@ -212,69 +193,89 @@ pub struct Ray {
     pub direction: DVec3,
 }
 
+/// Distance of the eye in half diagonals of the box: a mild perspective.
+const EYE_DISTANCE: f64 = 4.0;
+
 impl Sight {
-    pub(super) fn of_projection(projection: &Projection) -> Self {
-        let (plot_box, eye) = (&projection.plot_box, projection.eye.as_dvec3());
-        // The camera never looks straight down, so its right-hand side is defined.
-        let forward = -eye.normalize();
-        let right = forward.cross(DVec3::Z).normalize();
-        let (points, offset) = projection.points_and_offset();
-        Self::Eye(EyeSight {
-            middle_mm: plot_box.middle_mm,
-            per_mm: plot_box.per_mm,
-            eye,
-            forward,
-            right,
-            up: right.cross(forward),
-            points,
-            offset,
+    /// Fits the box into `target`: at zoom 1 its corners just touch it from any angle. Without a camera it is seen from above.
+    pub(super) fn fit(plot_box: PlotBox, camera: Option<OrbitCamera>, target: Bounds) -> Self {
+        let mut sight = Self {
+            plot_box,
+            eye: DVec3::ZERO,
+            is_above: camera.is_none(),
+            forward: DVec3::NEG_Z,
+            right: DVec3::X,
+            up: DVec3::Y,
+            points: 1.0,
+            offset: DVec2::ZERO,
+        };
+        let OrbitCamera { zoom, pan, .. } = camera.unwrap_or_default();
+        if let Some(camera) = camera {
+            let sides = (plot_box.max_mm - plot_box.min_mm) * plot_box.per_mm;
+            sight.eye = camera.towards_eye().as_dvec3() * (EYE_DISTANCE * 0.5 * sides.length());
+            // The camera never looks straight down, so its right-hand side is defined.
+            sight.forward = -sight.eye.normalize();
+            sight.right = sight.forward.cross(DVec3::Z).normalize();
+            sight.up = sight.right.cross(sight.forward);
+        }
+        let [raw_min, raw_max] = sight.corners();
+        let size = target.size().as_dvec2();
+        sight.points = (size / (raw_max - raw_min)).min_element().max(0.0) * f64::from(zoom);
+        let pan = DVec2::new(f64::from(pan[0]), f64::from(pan[1])) * size;
+        sight.offset = target.middle().as_dvec2() + pan - 0.5 * (raw_min + raw_max) * sight.points;
+        sight
+    }
+
+    /// Least and largest coordinates on the screen of the corners of the box.
+    fn corners(&self) -> [DVec2; 2] {
+        let corners =
+            (0..8).map(|corner| self.point(self.plot_box.corner_mm(corner & 1, (corner >> 1) & 1, corner >> 2)));
+        corners.fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[min, max], at| {
+            [min.min(at), max.max(at)]
         })
     }
 
-    pub(super) fn of_plan(plan: &PlanAxes<'_>) -> Self {
-        let (corner_mm, corner, points_per_mm) = plan.corner();
-        Self::Above(AboveSight {
-            corner_mm,
-            corner: corner.as_dvec2(),
-            points_per_mm,
-        })
+    /// The rectangle that the box covers.
+    pub(super) fn bounds(&self) -> Bounds {
+        let [min, max] = self.corners().map(|corner| corner.as_vec2());
+        Bounds { min, max }
     }
 
     /// Returns the point on the screen of a place.
     pub fn point(&self, place_mm: DVec3) -> DVec2 {
-        match self {
-            Self::Eye(sight) => {
-                let apart = (place_mm - sight.middle_mm) * sight.per_mm - sight.eye;
-                let depth = apart.dot(sight.forward);
-                let (right, up) = (apart.dot(sight.right) / depth, apart.dot(sight.up) / depth);
-                sight.offset + DVec2::new(right, -up) * sight.points
-            }
-            Self::Above(sight) => {
-                let apart = (place_mm.truncate() - sight.corner_mm) * sight.points_per_mm;
-                sight.corner + DVec2::new(apart.x, -apart.y)
-            }
+        let apart = (place_mm - self.plot_box.middle_mm) * self.plot_box.per_mm - self.eye;
+        let depth = if self.is_above { 1.0 } else { apart.dot(self.forward) };
+        let (right, up) = (apart.dot(self.right) / depth, apart.dot(self.up) / depth);
+        self.offset + DVec2::new(right, -up) * self.points
+    }
+
+    /// As [`Self::point`], for what is painted.
+    pub(super) fn drawn(&self, place_mm: DVec3) -> Vec2 {
+        self.point(place_mm).as_vec2()
+    }
+
+    /// The place of the eye.
+    pub(super) fn eye_mm(&self) -> DVec3 {
+        match self.is_above {
+            true => DVec3::INFINITY,
+            false => self.plot_box.middle_mm + self.eye / self.plot_box.per_mm,
         }
     }
 
     /// Returns the line of sight through a point on the screen.
     pub fn ray(&self, at: DVec2) -> Ray {
-        match self {
-            Self::Eye(sight) => {
-                let tangents = (at - sight.offset) / sight.points;
-                let direction = sight.forward + sight.right * tangents.x - sight.up * tangents.y;
-                Ray {
-                    from_mm: sight.middle_mm + sight.eye / sight.per_mm,
-                    direction: direction / sight.per_mm,
-                }
-            }
-            Self::Above(sight) => {
-                let apart = (at - sight.corner) / sight.points_per_mm;
-                let place = sight.corner_mm + DVec2::new(apart.x, -apart.y);
-                Ray {
-                    from_mm: place.extend(0.0),
-                    direction: DVec3::NEG_Z,
-                }
-            }
+        let PlotBox { middle_mm, per_mm, .. } = self.plot_box;
+        let tangents = (at - self.offset) / self.points;
+        let across = self.right * tangents.x - self.up * tangents.y;
+        if self.is_above {
+            return Ray {
+                from_mm: (middle_mm + across / per_mm).with_z(0.0),
+                direction: self.forward,
+            };
+        }
+        Ray {
+            from_mm: self.eye_mm(),
+            direction: (self.forward + across) / per_mm,
         }
     }
 
@@ -287,19 +288,18 @@ impl Sight {
         if along.length() * stroke_mm < SHORTEST_POINTS {
             return None;
         }
-        let Self::Eye(sight) = self else { return None };
         // The point moved onto the image of the line, which is straight, and back from there into space: the place on the
         // line whose tangents are those of the point, a(z) / b(z) with both linear in z.
         let image = foot + along * ((at - foot).dot(along) / along.length_squared());
-        let tangents = (image - sight.offset) / sight.points;
+        let tangents = (image - self.offset) / self.points;
         let axis = if along.x.abs() > along.y.abs() {
-            sight.right - sight.forward * tangents.x
+            self.right - self.forward * tangents.x
         } else {
-            sight.up + sight.forward * tangents.y
+            self.up + self.forward * tangents.y
         };
-        let apart = (foot_mm - sight.middle_mm) * sight.per_mm - sight.eye;
-        let per_mm = sight.per_mm.z * axis.z;
-        let height_mm = foot_mm.z - apart.dot(axis) / per_mm;
+        let PlotBox { middle_mm, per_mm, .. } = self.plot_box;
+        let apart = (foot_mm - middle_mm) * per_mm - self.eye;
+        let height_mm = foot_mm.z - apart.dot(axis) / (per_mm.z * axis.z);
         Some(height_mm).filter(|height_mm| height_mm.is_finite())
     }
 }
@@ -316,54 +316,47 @@ impl Ray {
     }
 }
 
-/// Distance of the eye in half diagonals of the box: a mild perspective.
-const EYE_DISTANCE: f32 = 4.0;
 /// Minimum ratio of the box's horizontal sides; longer arrays are drawn shortened.
-const MIN_SIDE: f32 = 0.3;
-/// Angle of view, in radians; the view is scaled to fit in any case.
-const VIEW: f32 = 0.5;
+const MIN_SIDE: f64 = 0.3;
 /// Heights of the box in units of its longer horizontal side: within these, the picture gets the shape of its card.
-const HEIGHT: std::ops::RangeInclusive<f32> = 0.4..=1.35;
+const HEIGHT: std::ops::RangeInclusive<f64> = 0.4..=1.35;
 
 /// The box of the axes: millimetres on three axes, and its shape in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PlotBox {
     pub(super) min_mm: DVec3,
     pub(super) max_mm: DVec3,
-    /// Sides in box units; the longer horizontal side is 1.
-    sides: Vec3,
-    /// Box units per millimetre.
+    /// Box units per millimetre; in space, the longer horizontal side is 1.
     pub(super) per_mm: DVec3,
     pub(super) middle_mm: DVec3,
 }
 
 impl PlotBox {
+    /// A box with one scale on all axes, to be seen from above.
+    pub(super) fn flat(min_mm: DVec3, max_mm: DVec3) -> Self {
+        Self {
+            min_mm,
+            max_mm,
+            per_mm: DVec3::ONE,
+            middle_mm: 0.5 * (min_mm + max_mm),
+        }
+    }
+
     /// A box whose height, at the camera's start, gives the picture the ratio of height to width `tall_per_wide`: x and
     /// y keep their proportions, z is exaggerated.
     pub(super) fn new(min_mm: DVec3, max_mm: DVec3, tall_per_wide: f32) -> Self {
-        let size = (max_mm - min_mm).as_vec3();
+        let size = max_mm - min_mm;
         let longer = size.x.max(size.y);
-        let (a, b) = ((size.x / longer).max(MIN_SIDE), (size.y / longer).max(MIN_SIDE));
-        let of_height = |height: f32| {
-            let sides = Vec3::new(a, b, height);
-            let per_mm = sides.as_dvec3() / (max_mm - min_mm);
-            Self {
-                min_mm,
-                max_mm,
-                sides,
-                per_mm,
-                middle_mm: 0.5 * (min_mm + max_mm),
-            }
+        let of_height = |height: f64| Self {
+            per_mm: DVec3::new((size.x / longer).max(MIN_SIDE), (size.y / longer).max(MIN_SIDE), height) / size,
+            ..Self::flat(min_mm, max_mm)
         };
         // The ratio increases with the height, so bisection finds the height.
         let (mut low, mut high) = (*HEIGHT.start(), *HEIGHT.end());
-        let unbounded = Bounds {
-            min: Vec2::ZERO,
-            max: Vec2::ONE,
-        };
+        let unbounded = Bounds::of_size(Vec2::ZERO, Vec2::ONE);
         for _ in 0..12 {
             let height = 0.5 * (low + high);
-            let seen = Projection::fit(of_height(height), OrbitCamera::default(), unbounded)
+            let seen = Sight::fit(of_height(height), Some(OrbitCamera::default()), unbounded)
                 .bounds()
                 .size();
             if seen.y / seen.x < tall_per_wide {
@@ -380,79 +373,10 @@ impl PlotBox {
         ((place_mm - self.middle_mm) * self.per_mm).as_vec3()
     }
 
-    /// Millimetres of a place in box units.
-    pub(super) fn place_mm(&self, unit: Vec3) -> DVec3 {
-        self.middle_mm + unit.as_dvec3() / self.per_mm
-    }
-
     /// A corner; each part 0 or 1.
     pub(super) fn corner_mm(&self, x: usize, y: usize, z: usize) -> DVec3 {
-        let pick = |from: f64, to: f64, end: usize| if end == 0 { from } else { to };
-        DVec3::new(
-            pick(self.min_mm.x, self.max_mm.x, x),
-            pick(self.min_mm.y, self.max_mm.y, y),
-            pick(self.min_mm.z, self.max_mm.z, z),
-        )
-    }
-
-    fn corners(&self) -> impl Iterator<Item = DVec3> + '_ {
-        (0..8).map(|i| self.corner_mm(i & 1, (i >> 1) & 1, i >> 2))
-    }
-}
-
-/// A box seen by a camera, fitted into a rectangle.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Projection {
-    pub(super) plot_box: PlotBox,
-    /// The eye in box units.
-    pub(super) eye: Vec3,
-    matrix: Mat4,
-    scale: f32,
-    offset: Vec2,
-}
-
-impl Projection {
-    /// At zoom 1 the eight corners just touch `target` at any angles.
-    pub(super) fn fit(plot_box: PlotBox, camera: OrbitCamera, target: Bounds) -> Self {
-        let distance = EYE_DISTANCE * 0.5 * plot_box.sides.length();
-        let eye = camera.towards_eye() * distance;
-        let view = rh::view::look_at_mat4(eye, Vec3::ZERO, Vec3::Z);
-        let lens = rh::proj::opengl::perspective(VIEW, 1.0, 0.05 * distance, 4.0 * distance);
-        let mut fitted = Self {
-            plot_box,
-            eye,
-            matrix: lens * view,
-            scale: 1.0,
-            offset: Vec2::ZERO,
-        };
-        let raw = Bounds::of(plot_box.corners().map(|corner| fitted.point(corner)));
-        let ratio = target.size() / raw.size();
-        fitted.scale = ratio.x.min(ratio.y).max(0.0) * camera.zoom;
-        let pan = Vec2::from(camera.pan) * target.size();
-        fitted.offset = target.middle() + pan - raw.middle() * fitted.scale;
-        fitted
-    }
-
-    /// Returns the position of a place on the screen.
-    pub(super) fn point(&self, place_mm: DVec3) -> Vec2 {
-        self.point_of_unit(self.plot_box.unit(place_mm))
-    }
-
-    /// Returns the position on the screen of a place in box units.
-    pub(super) fn point_of_unit(&self, unit: Vec3) -> Vec2 {
-        let seen = self.matrix.project_point3(unit);
-        Vec2::new(seen.x, -seen.y) * self.scale + self.offset
-    }
-
-    /// Points on the screen of a tangent of 1, and the point where the eye looks.
-    pub(super) fn points_and_offset(&self) -> (f64, DVec2) {
-        let per_tangent = 1.0 / (0.5 * f64::from(VIEW)).tan();
-        (per_tangent * f64::from(self.scale), self.offset.as_dvec2())
-    }
-
-    /// The rectangle that the box covers.
-    pub(super) fn bounds(&self) -> Bounds {
-        Bounds::of(self.plot_box.corners().map(|corner| self.point(corner)))
+        let ends = [self.min_mm, self.max_mm];
+        DVec3::new(ends[x].x, ends[y].y, ends[z].z)
     }
 }
 
@@ -517,7 +441,7 @@ mod tests {
         let plot_box = PlotBox::new(DVec3::new(7.5, 5.5, 4.0), DVec3::new(17.5, 25.5, 5.0), 470.0 / 300.0);
         for step in 0..60 {
             let camera = OrbitCamera::default().dragged(13.0 * step as f32, 3.0 * step as f32 - 60.0);
-            let bounds = Projection::fit(plot_box, camera, target).bounds();
+            let bounds = Sight::fit(plot_box, Some(camera), target).bounds();
             let slack = target.size() - bounds.size();
             assert!(
                 slack.min_element().abs() < 0.1 && slack.max_element() > -0.1,
@@ -525,12 +449,5 @@ mod tests {
             );
             assert!((bounds.middle() - target.middle()).length() < 0.1);
         }
-    }
-
-    #[test]
-    fn units_and_millimetres_are_inverse() {
-        let plot_box = PlotBox::new(DVec3::ZERO, DVec3::new(10.0, 20.0, 1.0), 1.0);
-        let place = DVec3::new(3.0, 17.0, 0.2);
-        assert!((plot_box.place_mm(plot_box.unit(place)) - place).length() < 1e-5);
     }
 }

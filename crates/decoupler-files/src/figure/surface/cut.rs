@@ -1,18 +1,14 @@
 //! Cuts of a surface: at the ends of the value axis, with the marks (rim and hatching) of a plateau there; along
-//! contour lines (marching squares); and along a wire. Also one axis of the box around a surface, with its ticks.
-
-use std::ops::RangeInclusive;
+//! contour lines (marching squares); and along a wire.
 
 use decoupler_core::surface::Grid;
-use glam::{DVec2, DVec3, Vec2};
+use glam::{DVec3, Vec2};
 
-use super::{
-    Surface,
-    camera::{Projection, Sight},
-    drawing::Labels,
-    field::Field,
+use super::{Surface, camera::Sight, field::Field};
+use crate::figure::{
+    Hue,
+    drawing::{Ink, Shape, Stroke},
 };
-use crate::figure::axis::{multiples, round_steps, tick_text};
 
 /// A corner of a cut polygon: its place, and its share of each corner of the cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,83 +103,6 @@ pub(super) fn cross_cell(values: [f64; 4], level: f64, mut draw: impl FnMut([(us
             }
         }
         _ => {}
-    }
-}
-
-/// Length of a tick, in points.
-pub(super) const TICK: f32 = 4.0;
-/// Room between a tick and its number, in points.
-pub(super) const GAP: f32 = 3.0;
-/// Axes seen end-on have no ticks.
-pub(super) const SHORTEST_AXIS: f32 = 36.0;
-
-/// One axis as drawn: an edge of the box with its ticks.
-pub(super) struct Edge {
-    pub(super) axis: usize,
-    from_mm: DVec3,
-    pub(super) away: Vec2,
-    pub(super) ticks: Vec<f64>,
-    pub(super) step: f64,
-}
-
-impl Edge {
-    pub(super) fn new(
-        projection: &Projection,
-        axis: usize,
-        from_mm: DVec3,
-        range: RangeInclusive<f64>,
-        labels: &Labels<'_>,
-    ) -> Self {
-        let mut edge = Self {
-            axis,
-            from_mm,
-            away: Vec2::ZERO,
-            ticks: Vec::new(),
-            step: 1.0,
-        };
-        let (start, end) = (
-            edge.point(projection, *range.start()),
-            edge.point(projection, *range.end()),
-        );
-        let along = (end - start).normalize_or_zero();
-        let middle = projection.bounds().middle();
-        let across = Vec2::new(along.y, -along.x);
-        edge.away = if across.dot(start + 0.5 * (end - start) - middle) < 0.0 {
-            -across
-        } else {
-            across
-        };
-        let length = (end - start).length();
-        let width = range.end() - range.start();
-        if length < SHORTEST_AXIS || width.is_nan() || width <= 0.0 {
-            return edge;
-        }
-        // In perspective, the far end of an edge is shorter than the average.
-        let points_per_mm = 0.8 * f64::from(length) / width;
-        edge.step = round_steps(width / 12.0)
-            .find(|&step| {
-                let widest = [range.start(), range.end()].map(|&value| labels.size(&tick_text(value, step)));
-                let size = widest[0].max(widest[1]);
-                let apart = ((size.x + 8.0) / along.x.abs().max(1e-3)).min((size.y + 5.0) / along.y.abs().max(1e-3));
-                step * points_per_mm >= f64::from(apart.max(20.0))
-            })
-            .unwrap_or(width);
-        edge.ticks = multiples(&range, edge.step);
-        edge
-    }
-
-    pub(super) fn point(&self, projection: &Projection, value: f64) -> Vec2 {
-        let mut place_mm = self.from_mm;
-        place_mm[self.axis] = value;
-        projection.point(place_mm)
-    }
-
-    pub(super) fn length(&self, projection: &Projection) -> f32 {
-        let (low, high) = (
-            projection.plot_box.min_mm[self.axis],
-            projection.plot_box.max_mm[self.axis],
-        );
-        (self.point(projection, high) - self.point(projection, low)).length()
     }
 }
 
@@ -291,16 +210,22 @@ impl Section {
         points.collect()
     }
 
-    /// Returns the curve on the screen, along the surface as it is drawn: in several pieces if it has gaps or is
-    /// clipped at the box of the axes.
-    pub fn pieces(&self, surface: &Surface, sight: &Sight) -> Vec<Vec<DVec2>> {
+    /// Returns the curve along the surface as it is drawn: in several pieces if it has gaps or is clipped at the box of the
+    /// axes.
+    pub fn shapes(&self, surface: &Surface, sight: &Sight) -> Vec<Shape> {
         let field = Field::new(surface);
         let curve = self.curve_mm(field.grid, field.values);
         let drawn: Vec<Option<DVec3>> = curve.into_iter().map(|place| field.drawn_at(place)).collect();
         let pieces = drawn.split(Option::is_none).filter(|piece| piece.len() > 1);
-        pieces
-            .map(|piece| piece.iter().flatten().map(|place| sight.point(*place)).collect())
-            .collect()
+        let shapes = pieces.flat_map(|piece| {
+            let points: Vec<Vec2> = piece.iter().flatten().map(|at| sight.drawn(*at)).collect();
+            let strokes = [
+                Stroke::new(Ink::Ground.at(0.7), 3.5),
+                Stroke::new(Ink::Hue(Hue::Orange), 1.8),
+            ];
+            strokes.map(|stroke| Shape::Line(points.clone(), stroke))
+        });
+        shapes.collect()
     }
 }
 
@@ -329,7 +254,8 @@ mod tests {
     use glam::Vec2;
 
     use super::*;
-    use crate::figure::surface::{Bounds, Card, Drawing, OrbitCamera, Quantity, Surface, ViewMode};
+    use crate::figure::drawing::Bounds;
+    use crate::figure::surface::{Card, Drawing, OrbitCamera, Quantity, Surface, ViewMode};
 
     fn area(polygon: &[CutCorner]) -> f64 {
         let flat = |at: usize| polygon[at % polygon.len()].place.truncate();
@@ -441,8 +367,8 @@ mod tests {
             let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| (to - from).perp_dot(place - from));
             sides.iter().all(|side| *side >= 0.0) || sides.iter().all(|side| *side <= 0.0)
         };
-        mesh.strips().flat_map(|(cells, _)| cells).any(|&cell| {
-            let [a, b, c, d] = mesh.corners(cell).map(|corner| mesh.vertices[corner].at);
+        mesh.strips().flat_map(|(cells, _)| cells).any(|cell| {
+            let [a, b, c, d] = cell.map(|corner| mesh.vertices[corner].at);
             covers([a, b, c]) || covers([a, c, d])
         })
     }

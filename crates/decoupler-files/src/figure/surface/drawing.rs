@@ -1,17 +1,20 @@
 //! A surface laid out in a card, ready to be painted, and the placing of labels without overlap.
 
 use decoupler_core::text::counted;
-use glam::{DVec3, Vec2};
+use glam::Vec2;
 
 use super::{
     Surface, ViewMode,
-    box_axes::{BoxAxes, PlanAxes},
-    camera::{OrbitCamera, PlotBox, Projection, Sight},
+    box_axes::Axes,
+    camera::{OrbitCamera, PlotBox, Sight},
     field::Field,
     mesh::Mesh,
-    nodes::{Bounds, Dots, Line, Text},
+    nodes::Dots,
 };
-use crate::figure::colour_map::ColourMap;
+use crate::figure::{
+    colour_map::ColourMap,
+    drawing::{Align, Bounds, Ink, Measure, Shape},
+};
 
 /// Usual size of the labels of a box, in points.
 const LABELS: Vec2 = Vec2::new(72.0, 56.0);
@@ -23,7 +26,7 @@ pub struct Card<'a> {
     /// The space to fill.
     pub bounds: Bounds,
     /// Returns the size of a text.
-    pub measure: &'a dyn Fn(&str) -> Vec2,
+    pub measure: Measure<'a>,
     /// The colours of the values.
     pub colours: &'a ColourMap,
 }
@@ -31,10 +34,8 @@ pub struct Card<'a> {
 /// A laid-out surface, in the order of painting.
 #[derive(Clone, Debug)]
 pub struct Drawing {
-    /// The frame with its ticks.
-    pub lines: Vec<Line>,
-    /// Numbers and names of the axes.
-    pub texts: Vec<Text>,
+    /// The frame with its ticks, numbers and names.
+    pub frame: Vec<Shape>,
     /// The surface.
     pub mesh: Mesh,
     /// The nodes.
@@ -53,41 +54,28 @@ impl Surface {
         let names = ["x (mm)", "y (mm)", &*value_name];
         let (min_mm, max_mm) = field.box_mm();
         let inner = card.bounds.grown(-EDGE);
-        let (lines, labels, (mesh, dots), sight) = match self.mode {
+        let (plot_box, camera) = match self.mode {
             ViewMode::ThreeD => {
                 let [width, height] = (card.bounds.size() - LABELS).max(Vec2::ONE).into();
-                let plot_box = PlotBox::new(min_mm, max_mm, height / width);
-                let axes = BoxAxes::new(card.measure, inner, plot_box, camera, &field.range, names);
-                let painted = self.paint(&field, &Projector::Space(&axes.projection), card);
-                let sight = Sight::of_projection(&axes.projection);
-                (axes.lines(), axes.labels, painted, sight)
+                (PlotBox::new(min_mm, max_mm, height / width), Some(camera))
             }
-            ViewMode::Top => {
-                let names = [names[0], names[1]];
-                let axes = PlanAxes::new(card.measure, inner, min_mm.truncate(), max_mm.truncate(), names);
-                let painted = self.paint(&field, &Projector::Plan(&axes), card);
-                let sight = Sight::of_plan(&axes);
-                (axes.lines(), axes.labels, painted, sight)
-            }
+            ViewMode::Top => (PlotBox::flat(min_mm, max_mm), None),
         };
+        let axes = Axes::new(card.measure, inner, plot_box, camera, &field.range, names);
+        let sight = axes.sight;
+        let (mesh, dots) = match field.values.is_empty() {
+            true => Default::default(),
+            false => (Mesh::new(&field, &sight, card.colours), Dots::new(self, &field, &sight)),
+        };
+        let mut frame = axes.lines();
+        frame.extend(axes.labels.shapes());
         Drawing {
             note: note(mesh.has_plateau, dots.beyond()),
-            lines,
-            texts: labels.into_texts(),
+            frame,
             mesh,
             dots,
             sight,
         }
-    }
-
-    fn paint(&self, field: &Field<'_>, stage: &Projector<'_>, card: &Card<'_>) -> (Mesh, Dots) {
-        if field.values.is_empty() {
-            return <(Mesh, Dots)>::default();
-        }
-        (
-            Mesh::new(field, stage, card.colours),
-            Dots::new(&self.nodes, field, stage),
-        )
     }
 }
 
@@ -102,43 +90,17 @@ fn note(has_plateau: bool, nodes: usize) -> Option<String> {
     }
 }
 
-/// Mapping of places to points on the screen.
-pub(super) enum Projector<'a> {
-    /// In space, lit.
-    Space(&'a Projection),
-    /// From above.
-    Plan(&'a PlanAxes<'a>),
-}
-
-impl Projector<'_> {
-    /// Returns the position on the screen of a place with a value.
-    pub(super) fn point(&self, place: DVec3) -> Vec2 {
-        match self {
-            Self::Space(projection) => projection.point(place),
-            Self::Plan(plan) => plan.point(place.truncate()),
-        }
-    }
-
-    /// Returns the place of the eye, for a picture in space.
-    pub(super) fn eye_mm(&self) -> Option<DVec3> {
-        match self {
-            Self::Space(projection) => Some(projection.plot_box.place_mm(projection.eye)),
-            Self::Plan(_) => None,
-        }
-    }
-}
-
 /// Room kept free around every label, in points.
 const CLEARANCE: f32 = 4.0;
 
 /// The labels of one plot, in the order in which they were placed.
 pub(super) struct Labels<'a> {
-    measure: &'a dyn Fn(&str) -> Vec2,
-    placed: Vec<Text>,
+    measure: Measure<'a>,
+    placed: Vec<(Bounds, String)>,
 }
 
 impl<'a> Labels<'a> {
-    pub(super) fn new(measure: &'a dyn Fn(&str) -> Vec2) -> Self {
+    pub(super) fn new(measure: Measure<'a>) -> Self {
         Self {
             measure,
             placed: Vec::new(),
@@ -159,12 +121,11 @@ impl<'a> Labels<'a> {
         let mut slid = 0.0;
         while slid <= slide {
             let bounds = Bounds::centred(anchor + away * (gap + reach + slid), size);
-            let is_free = |other: &Text| !other.bounds.grown(CLEARANCE).intersects(&bounds);
-            if self.placed.iter().all(is_free) {
-                self.placed.push(Text {
-                    bounds,
-                    text: text.to_owned(),
-                });
+            if self
+                .bounds_of_each()
+                .all(|other| !other.grown(CLEARANCE).intersects(&bounds))
+            {
+                self.placed.push((bounds, text.to_owned()));
                 return true;
             }
             slid += 4.0;
@@ -172,13 +133,17 @@ impl<'a> Labels<'a> {
         false
     }
 
-    /// Returns the bounding rectangle of all labels.
-    pub(super) fn bounds(&self) -> Bounds {
-        let all = self.placed.iter().map(|label| label.bounds);
-        all.fold(Bounds::NOTHING, Bounds::union)
+    pub(super) fn bounds_of_each(&self) -> impl Iterator<Item = Bounds> {
+        self.placed.iter().map(|(bounds, _)| *bounds)
     }
 
-    pub(super) fn into_texts(self) -> Vec<Text> {
-        self.placed
+    /// Returns the bounding rectangle of all labels.
+    pub(super) fn bounds(&self) -> Bounds {
+        self.bounds_of_each().fold(Bounds::NOTHING, Bounds::union)
+    }
+
+    fn shapes(self) -> impl Iterator<Item = Shape> {
+        let texts = self.placed.into_iter();
+        texts.map(|(bounds, text)| Shape::text(bounds.middle(), Align::Middle, Ink::Label, text))
     }
 }

@@ -6,15 +6,11 @@ use std::{borrow::Cow, ops::RangeInclusive, sync::Arc};
 use decoupler_core::surface::{Grid, SurfaceMap};
 use glam::{DVec3, Vec2};
 
-use super::{
-    Surface, ViewMode,
-    cut::TICK,
-    drawing::Labels,
-    nodes::{Bounds, Ink, Line, Text},
-};
+use super::{Surface, ViewMode};
 use crate::figure::{
-    axis::{multiples, round_steps, tick_text},
-    colour_map::SequentialMap,
+    axis::PlotAxis,
+    colour_map::{ColourMap, SequentialMap},
+    drawing::{Bounds, Measure, Shape, lay_out_scale},
 };
 
 /// Room for overshoots of the surface above and below the range, as a fraction of it.
@@ -158,8 +154,6 @@ fn usable_range(range: &RangeInclusive<f64>) -> RangeInclusive<f64> {
     }
 }
 
-const BAR_WIDTH: f32 = 12.0;
-
 /// Scale of colours: a quantity and its range.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColourScale {
@@ -171,58 +165,18 @@ pub struct ColourScale {
     pub colours: SequentialMap,
 }
 
-/// A laid-out colour scale: a bar from the lowest value at the bottom to the highest at the top.
-#[derive(Clone, Debug)]
-pub struct ScaleDrawing {
-    /// The bar.
-    pub bar: Bounds,
-    /// Its ticks.
-    pub lines: Vec<Line>,
-    /// Numbers and name.
-    pub texts: Vec<Text>,
-}
-
 impl ColourScale {
     /// Width of the bar with its numbers, in points.
     pub const WIDTH: f32 = 64.0;
 
-    /// Lays the scale out in `area`; `None` if the area or the range is too small. `measure` returns the size of a
-    /// text.
-    pub fn lay_out(&self, area: Bounds, measure: &dyn Fn(&str) -> Vec2) -> Option<ScaleDrawing> {
-        let (low, high) = (*self.range.start(), *self.range.end());
-        let name = self.quantity.axis_name();
-        let line = measure(&name).y;
-        let left = area.min.x + 8.0;
-        let bar = Bounds {
-            min: Vec2::new(left, area.min.y + line + 12.0),
-            max: Vec2::new(left + BAR_WIDTH, area.max.y - line),
+    /// Lays the scale out in `area` in the colours of `map`; empty if the area or the range is too small.
+    pub fn lay_out(&self, area: Bounds, map: &ColourMap, measure: Measure<'_>) -> Vec<Shape> {
+        let axis = PlotAxis::linear(self.quantity.axis_name());
+        let inner = Bounds {
+            max: area.max - Vec2::new(0.0, 14.0),
+            ..area
         };
-        let height = bar.size().y;
-        if height < 20.0 || high.partial_cmp(&low) != Some(std::cmp::Ordering::Greater) || !(high - low).is_finite() {
-            return None;
-        }
-        let mut labels = Labels::new(measure);
-        let points_per_unit = f64::from(height) / (high - low);
-        let step = round_steps((high - low) / 10.0)
-            .find(|step| step * points_per_unit >= f64::from(line + 14.0))
-            .unwrap_or(high - low);
-        let mut lines = Vec::new();
-        for value in multiples(&self.range, step) {
-            let at = Vec2::new(bar.max.x, bar.max.y - ((value - low) * points_per_unit) as f32);
-            lines.push(Line {
-                from: at,
-                to: at + Vec2::new(TICK, 0.0),
-                ink: Ink::Edge,
-            });
-            labels.place_next_to(at, Vec2::X, TICK + 3.0, 0.0, &tick_text(value, step));
-        }
-        let name_at = Vec2::new(area.min.x + 4.0 + 0.5 * measure(&name).x, bar.min.y - 6.0);
-        labels.place_next_to(name_at, Vec2::NEG_Y, 2.0, 8.0, &name);
-        Some(ScaleDrawing {
-            bar,
-            lines,
-            texts: labels.into_texts(),
-        })
+        lay_out_scale(inner, &axis, &self.range, map, measure)
     }
 }
 

@@ -5,14 +5,14 @@ use std::ops::RangeInclusive;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::{
-    camera::Shade,
+    camera::{Shade, Sight},
     cut::{cross_cell, cut_cell, plateau_marks},
-    drawing::Projector,
     field::{CellPart, Field},
 };
 use crate::figure::{
     axis::{multiples, step_for},
     colour_map::{ColourMap, Rgb, is_light},
+    drawing::{Ink, Shape},
 };
 
 const CONTOUR_LEVELS: usize = 10;
@@ -38,15 +38,9 @@ pub struct ContourLine {
 pub struct Mesh {
     /// The grid points, `x points × y points`, followed by the corners of cells cut at the ends of the value axis.
     pub vertices: Vec<Vertex>,
-    /// Number of grid points.
-    points: u32,
-    /// Corners of the pieces of cut cells, going round; a triangle has its last one twice.
-    pieces: Vec<[u32; 4]>,
-    /// Number of points along y.
-    across: usize,
-    /// Cells in the order of painting: the index of the first corner, or the number of grid points plus the index of a
-    /// piece.
-    cells: Vec<u32>,
+    /// Corners of the cells and of the pieces of cut cells in the order of painting, each going round; a triangle has its
+    /// last one twice.
+    cells: Vec<[usize; 4]>,
     /// Contour lines in the order of painting.
     lines: Vec<ContourLine>,
     /// End of each strip of cells and of its lines.
@@ -57,145 +51,116 @@ pub struct Mesh {
 
 impl Mesh {
     /// The surface in the colours of `map`.
-    pub(super) fn new(field: &Field<'_>, stage: &Projector<'_>, map: &ColourMap) -> Self {
+    pub(super) fn new(field: &Field<'_>, sight: &Sight, map: &ColourMap) -> Self {
         let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
         let mut mesh = Self {
-            vertices: vertices(field, stage, map),
-            across: y_mm.len(),
+            vertices: vertices(field, sight, map),
             cells: Vec::with_capacity(x_mm.len() * y_mm.len()),
             ..Self::default()
         };
         if mesh.vertices.is_empty() {
             return mesh;
         }
-        mesh.points = mesh.vertices.len() as u32;
-        let eye_mm = stage.eye_mm().unwrap_or(DVec3::INFINITY);
+        let eye_mm = sight.eye_mm();
         let rows = far_to_near(y_mm, eye_mm.y);
         let levels = contour_levels(&field.range);
-        let is_black = |value: f64| is_light(map.at(field.share(value)));
-        let inks: Vec<bool> = levels.iter().map(|level| is_black(*level)).collect();
         let mut lineless = Vec::new();
         for ix in far_to_near(x_mm, eye_mm.x) {
             let mut strip = Vec::with_capacity(rows.len());
             for &iy in &rows {
                 match field.part(ix, iy) {
                     CellPart::Nothing => continue,
-                    CellPart::Whole | CellPart::Plateau => mesh.cells.push(field.grid.index(ix, iy) as u32),
-                    CellPart::Cut => mesh.cut(ix, iy, field, stage),
+                    CellPart::Whole | CellPart::Plateau => mesh.cells.push(field.corners(ix, iy)),
+                    CellPart::Cut => mesh.cut(ix, iy, field, sight),
                 }
                 strip.push((ix, iy));
             }
             // Lines are painted one strip late; the next strip would cover half of their width otherwise.
-            mesh.hatch(&lineless, field, stage, is_black);
-            mesh.end_strip(&lineless, field, stage, (&levels, &inks));
+            mesh.end_strip(&lineless, field, sight, (&levels, map));
             lineless = strip;
         }
-        mesh.hatch(&lineless, field, stage, is_black);
-        mesh.end_strip(&lineless, field, stage, (&levels, &inks));
+        mesh.end_strip(&lineless, field, sight, (&levels, map));
         mesh
     }
 
     /// Appends the part of a cell within the box.
-    fn cut(&mut self, ix: usize, iy: usize, field: &Field<'_>, stage: &Projector<'_>) {
+    fn cut(&mut self, ix: usize, iy: usize, field: &Field<'_>, sight: &Sight) {
         let of_cell = field.corners(ix, iy).map(|corner| self.vertices[corner]);
         let (low, high) = (*field.shown().start(), *field.shown().end());
         let keeps_plateau = field.keeps_plateau(ix, iy);
         for polygon in cut_cell(field.corners_mm(ix, iy), low, high, keeps_plateau) {
-            let first = self.vertices.len() as u32;
+            let first = self.vertices.len();
             self.vertices.extend(polygon.iter().map(|corner| Vertex {
-                at: stage.point(corner.place),
+                at: sight.drawn(corner.place),
                 ..mixed(&of_cell, corner.shares)
             }));
-            let last = polygon.len() as u32 - 1;
+            let last = polygon.len() - 1;
             for second in (1..last).step_by(2) {
-                self.cells.push(self.points + self.pieces.len() as u32);
-                let others = [second, second + 1, (second + 2).min(last)];
-                let [b, c, d] = others.map(|corner| first + corner);
-                self.pieces.push([first, b, c, d]);
+                let corners = [0, second, second + 1, (second + 2).min(last)];
+                self.cells.push(corners.map(|corner| first + corner));
             }
         }
     }
 
-    /// Appends the marks of parts beyond the box in `cells`.
-    fn hatch(
-        &mut self,
-        cells: &[(usize, usize)],
-        field: &Field<'_>,
-        stage: &Projector<'_>,
-        is_black: impl Fn(f64) -> bool,
-    ) {
-        let is_beyond =
-            |cell: &&(usize, usize)| matches!(field.part(cell.0, cell.1), CellPart::Cut | CellPart::Plateau);
-        for &(ix, iy) in cells.iter().filter(is_beyond) {
-            plateau_marks(field, ix, iy, |ends| {
-                let [from, to] = ends.map(|place| stage.point(place));
-                self.has_plateau = true;
-                self.lines.push(ContourLine {
-                    from,
-                    to,
-                    is_black: is_black(ends[0].z),
-                    opacity: HATCH_OPACITY,
-                });
-            });
-        }
-    }
-
-    /// Appends the contour lines in `cells` and ends the strip.
+    /// Appends the lines in `cells` and ends the strip: contour lines at `levels`, and marks of parts beyond the box.
     fn end_strip(
         &mut self,
         cells: &[(usize, usize)],
         field: &Field<'_>,
-        stage: &Projector<'_>,
-        (levels, inks): (&[f64], &[bool]),
+        sight: &Sight,
+        (levels, map): (&[f64], &ColourMap),
     ) {
-        for &(ix, iy) in cells {
-            let corners = field.corners(ix, iy);
-            let values = corners.map(|corner| field.values[corner]);
-            let (low, high) = values
-                .iter()
-                .fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(*v), high.max(*v)));
-            if high <= low {
-                continue;
+        let line = |ends: [DVec3; 2], opacity| {
+            let [from, to] = ends.map(|place| sight.drawn(place));
+            ContourLine {
+                from,
+                to,
+                is_black: is_light(map.at(field.share(ends[0].z))),
+                opacity,
             }
-            let [a, b, c, d] = corners.map(|corner| self.vertices[corner]);
-            let opacity = CONTOUR_OPACITY * a.opacity.min(c.opacity);
-            let is_cut = field.part(ix, iy) == CellPart::Cut;
-            let (places, corners_mm) = ([a.at, b.at, c.at, d.at], field.corners_mm(ix, iy));
-            // A cut cell has corners that are not drawn at their places.
-            let point = |(a, b, part): (usize, usize, f32)| match is_cut {
-                true => stage.point(corners_mm[a].lerp(corners_mm[b], f64::from(part))),
-                false => places[a].lerp(places[b], part),
-            };
-            for (&level, &is_black) in levels.iter().zip(inks).filter(|(level, _)| (low..high).contains(level)) {
+        };
+        for &(ix, iy) in cells {
+            let contours = self.lines.len();
+            plateau_marks(field, ix, iy, |ends| self.lines.push(line(ends, HATCH_OPACITY)));
+            self.has_plateau |= self.lines.len() > contours;
+            let corners_mm = field.corners_mm(ix, iy);
+            let values = corners_mm.map(|corner| corner.z);
+            let ends = |(low, high): (f64, f64), value: &f64| (low.min(*value), high.max(*value));
+            let (low, high) = values.iter().fold((f64::MAX, f64::MIN), ends);
+            let [a, _, c, _] = field.corners(ix, iy).map(|corner| self.vertices[corner].opacity);
+            for &level in levels.iter().filter(|level| (low..high).contains(level)) {
                 cross_cell(values, level, |ends| {
-                    let [from, to] = ends.map(point);
-                    self.lines.push(ContourLine {
-                        from,
-                        to,
-                        is_black,
-                        opacity,
-                    });
+                    let ends = ends.map(|(a, b, part)| corners_mm[a].lerp(corners_mm[b], f64::from(part)));
+                    self.lines.push(line(ends, CONTOUR_OPACITY * a.min(c)));
                 });
             }
         }
         self.strips.push([self.cells.len(), self.lines.len()]);
     }
 
-    /// Indices of the corners of a cell, going round it.
-    pub fn corners(&self, cell: u32) -> [usize; 4] {
-        if let Some(piece) = cell.checked_sub(self.points) {
-            return self.pieces[piece as usize].map(|corner| corner as usize);
-        }
-        let (a, b) = (cell as usize, cell as usize + self.across);
-        [a, b, b + 1, a + 1]
-    }
-
     /// Cells and contour lines from far to near: each slice of cells is followed by the lines drawn after it.
-    pub fn strips(&self) -> impl Iterator<Item = (&[u32], &[ContourLine])> {
+    pub fn strips(&self) -> impl Iterator<Item = (&[[usize; 4]], &[ContourLine])> {
         let starts = std::iter::once(&[0, 0]).chain(&self.strips);
         starts
             .zip(&self.strips)
             .map(|(start, end)| (&self.cells[start[0]..end[0]], &self.lines[start[1]..end[1]]))
+    }
+
+    /// Returns the cells, each in the mean colour of its corners, and the contour lines, from far to near.
+    pub fn shapes(&self) -> impl Iterator<Item = Shape> {
+        let cell = |cell: &[usize; 4]| {
+            let corners = cell.map(|corner| self.vertices[corner]);
+            let part = |part: usize| corners.iter().map(|corner| u16::from(corner.colour[part])).sum::<u16>() / 4;
+            let colour = Ink::Rgb([0, 1, 2].map(|at| part(at) as u8));
+            let opacity = corners.iter().map(|corner| corner.opacity).sum::<f32>() / 4.0;
+            Shape::Area(corners.map(|corner| corner.at).into(), colour.at(opacity))
+        };
+        let line = |line: &ContourLine| {
+            let ink = if line.is_black { Ink::BLACK } else { Ink::WHITE };
+            Shape::line(line.from, line.to, ink.at(line.opacity), 1.0)
+        };
+        let strips = self.strips();
+        strips.flat_map(move |(cells, lines)| cells.iter().map(cell).chain(lines.iter().map(line)))
     }
 
     /// Number of cells and of contour lines.
@@ -234,7 +199,7 @@ pub struct Vertex {
 }
 
 /// One vertex for every grid point, in their order.
-pub(super) fn vertices(field: &Field<'_>, stage: &Projector<'_>, map: &ColourMap) -> Vec<Vertex> {
+pub(super) fn vertices(field: &Field<'_>, sight: &Sight, map: &ColourMap) -> Vec<Vertex> {
     let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
     let across = y_mm.len();
     let places = field.values.iter().enumerate().map(|(index, &value)| {
@@ -253,22 +218,21 @@ pub(super) fn vertices(field: &Field<'_>, stage: &Projector<'_>, map: &ColourMap
             },
         }
     };
-    match stage {
-        Projector::Plan(plan) => places
-            .map(|(ix, iy, place)| vertex(ix, iy, plan.point(place.truncate()), place.z, 1.0))
-            .collect(),
-        Projector::Space(projection) => {
-            let plot_box = projection.plot_box;
-            let (low, high) = (plot_box.min_mm.z, plot_box.max_mm.z);
-            let in_box = |place: DVec3| plot_box.unit(place.with_z(place.z.clamp(low, high)));
-            let units: Vec<Vec3> = places.clone().map(|(_, _, place)| in_box(place)).collect();
-            let shade = Shade::new(&units, across, projection.eye);
-            let lit = places.zip(&units).map(|((ix, iy, place), unit)| {
-                vertex(ix, iy, projection.point_of_unit(*unit), place.z, shade.at(ix, iy))
-            });
-            lit.collect()
-        }
+    if sight.is_above {
+        return places
+            .map(|(ix, iy, place)| vertex(ix, iy, sight.drawn(place), place.z, 1.0))
+            .collect();
     }
+    let plot_box = sight.plot_box;
+    let in_box = |place: DVec3| place.with_z(place.z.clamp(plot_box.min_mm.z, plot_box.max_mm.z));
+    let units: Vec<Vec3> = places
+        .clone()
+        .map(|(_, _, place)| plot_box.unit(in_box(place)))
+        .collect();
+    let shade = Shade::new(&units, across, sight.eye.as_vec3());
+    places
+        .map(|(ix, iy, place)| vertex(ix, iy, sight.drawn(in_box(place)), place.z, shade.at(ix, iy)))
+        .collect()
 }
 
 /// Interpolates a vertex between others by its share of each.
@@ -294,10 +258,8 @@ mod tests {
     use decoupler_core::surface::SurfaceMap;
 
     use super::*;
-    use crate::figure::surface::{
-        Bounds, OrbitCamera, Quantity, Surface, ViewMode,
-        camera::{PlotBox, Projection},
-    };
+    use crate::figure::drawing::Bounds;
+    use crate::figure::surface::{OrbitCamera, Quantity, Surface, ViewMode, camera::PlotBox};
 
     /// Returns the distance from the eye to a triangle at a place on the screen; `None` outside it.
     fn distance_at(place: Vec2, corners: [(Vec2, f32); 3]) -> Option<f32> {
@@ -340,13 +302,13 @@ mod tests {
         let mut hidden = 0;
         for turn in 0..6 {
             let camera = OrbitCamera::default().dragged(140.0 * turn as f32, 12.0 * turn as f32 - 40.0);
-            let projection = Projection::fit(plot_box, camera, screen);
-            let mesh = Mesh::new(&field, &Projector::Space(&projection), colours);
+            let sight = Sight::fit(plot_box, Some(camera), screen);
+            let mesh = Mesh::new(&field, &sight, colours);
             let distance = |index: usize| {
                 let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
                 let z = field.values[index].clamp(min_mm.z, max_mm.z);
                 let place = DVec3::new(x_mm[index / y_mm.len()], y_mm[index % y_mm.len()], z);
-                plot_box.unit(place).distance(projection.eye)
+                plot_box.unit(place).distance(sight.eye.as_vec3())
             };
             let corners: Vec<(Vec2, f32)> = (0..field.values.len())
                 .map(|index| (mesh.vertices[index].at, distance(index)))
@@ -355,9 +317,9 @@ mod tests {
                 let place = Vec2::new(20.3 + 39.7 * (probe / 10) as f32, 20.7 + 39.1 * (probe % 10) as f32);
                 let cells = mesh.strips().flat_map(|(cells, _)| cells);
                 // Cells cut at the ends of the axis have additional corners.
-                let whole = cells.filter(|cell| (**cell as usize) < field.values.len());
-                let painted = whole.flat_map(|&cell| {
-                    let [a, b, c, d] = mesh.corners(cell).map(|corner| corners[corner]);
+                let whole = cells.filter(|cell| cell.iter().all(|corner| *corner < field.values.len()));
+                let painted = whole.flat_map(|cell| {
+                    let [a, b, c, d] = cell.map(|corner| corners[corner]);
                     [[a, b, c], [a, c, d]]
                         .into_iter()
                         .filter_map(|corners| distance_at(place, corners))

@@ -1,10 +1,9 @@
 //! Surfaces in space or from above.
 //!
 //! A [`SurfaceFigure`] describes a picture of surfaces. Each [`Surface`] of it lays itself out in a [`Card`] as a
-//! [`Drawing`]: lines, texts, discs and a mesh in the order of painting, with colours by role ([`Ink`]). A renderer
-//! only has to paint them.
+//! [`Drawing`]: shapes and a mesh in the order of painting. A renderer only has to paint them.
 //!
-//! `camera` maps millimetres to points on the screen and back; `box_axes` lays out the frame with its ticks, and `drawing`
+//! `camera` maps millimetres to points on the screen and back; `box_axes` lays out the axes with their ticks, and `drawing`
 //! places the labels. `field` is the surface on its grid and `mesh` the same with contour lines, from far to near; `cut`
 //! cuts it at the ends of the value axis and along a wire. `nodes` are the dots on it, and `pick` finds the place on the
 //! surface under a point of the screen.
@@ -18,12 +17,12 @@ mod mesh;
 mod nodes;
 mod pick;
 
-pub use camera::{AboveSight, EyeSight, OrbitCamera, Ray, Sight};
+pub use camera::{OrbitCamera, Ray, Sight};
 pub use cut::{Section, SectionLine};
 pub use drawing::{Card, Drawing};
-pub use field::{ColourScale, Quantity, ScaleDrawing};
+pub use field::{ColourScale, Quantity};
 pub use mesh::{ContourLine, Mesh, Vertex};
-pub use nodes::{Bounds, Disc, Dots, Ink, Line, Text};
+pub use nodes::Dots;
 
 use std::{ops::RangeInclusive, sync::Arc};
 
@@ -65,6 +64,28 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// The surface in space through `nodes`, which are those of `map` with their values.
+    pub fn through(
+        title: &str,
+        map: &Arc<SurfaceMap>,
+        nodes: impl Into<Arc<[DVec3]>>,
+        quantity: Quantity,
+        range: RangeInclusive<f64>,
+    ) -> Self {
+        let nodes = nodes.into();
+        let values: Vec<f64> = nodes.iter().map(|node| node.z).collect();
+        Self {
+            title: title.to_owned(),
+            map: Arc::clone(map),
+            values: map.evaluate(&values).into(),
+            nodes,
+            quantity,
+            range,
+            mode: ViewMode::default(),
+            colours: SequentialMap::default(),
+        }
+    }
+
     /// Colours of the values.
     pub fn scale(&self) -> ColourScale {
         ColourScale {

@@ -1,10 +1,16 @@
-//! The nodes as dots on the surface, picking of nodes with the pointer, and the shapes of a drawing. Lengths are
-//! points, y counts downwards.
+//! The nodes as dots on the surface, and picking of nodes with the pointer.
 
-use decoupler_core::surface::Grid;
 use glam::{DVec3, Vec2};
 
-use super::{drawing::Projector, field::Field};
+use super::{
+    Surface,
+    camera::{Ray, Sight},
+    field::Field,
+};
+use crate::figure::{
+    Hue,
+    drawing::{Bounds, Ink, Shape},
+};
 
 /// Distance within which the pointer selects a node, in points.
 const REACH: f32 = 10.0;
@@ -29,24 +35,24 @@ pub struct Dots {
 }
 
 impl Dots {
-    pub(super) fn new(nodes: &[DVec3], field: &Field<'_>, stage: &Projector<'_>) -> Self {
+    pub(super) fn new(surface: &Surface, field: &Field<'_>, sight: &Sight) -> Self {
         let (low, high) = field.box_mm();
         let dot = |node: &DVec3| {
             node.is_finite().then(|| {
                 let within = node.clamp(low, high);
-                let is_beyond = match stage {
-                    Projector::Space(_) => within != *node,
-                    Projector::Plan(_) => within.truncate() != node.truncate(),
+                let is_beyond = match sight.is_above {
+                    false => within != *node,
+                    true => within.truncate() != node.truncate(),
                 };
                 Dot {
-                    at: stage.point(within),
-                    is_hidden: is_hidden(within, field, stage),
+                    at: sight.drawn(within),
+                    is_hidden: !sight.is_above && is_hidden(within, surface, field, sight),
                     is_beyond,
                 }
             })
         };
         Self {
-            dots: nodes.iter().map(dot).collect(),
+            dots: surface.nodes.iter().map(dot).collect(),
         }
     }
 
@@ -72,47 +78,36 @@ impl Dots {
         self.dots.get(node).copied().flatten().map(|dot| dot.at)
     }
 
-    /// Returns the discs in the order of painting, with rings around the nodes `lit` and a mark around one node.
-    pub fn discs<'a>(&'a self, marked: Option<usize>, lit: &'a [usize]) -> impl Iterator<Item = Disc> + 'a {
-        let radius = self.radius();
-        let drawn = self.dots.iter().flatten().filter(move |_| radius > 0.0);
-        let dots = drawn.flat_map(move |dot| {
-            let opacity = if dot.is_hidden { HIDDEN_OPACITY } else { 1.0 };
-            let ink = if dot.is_beyond { Ink::Warning } else { Ink::Node };
-            [(Ink::Rim, radius + 0.75, 0.45 * opacity), (ink, radius, opacity)].map(|(ink, radius, opacity)| Disc {
-                at: dot.at,
-                radius,
-                ring: None,
-                ink,
-                opacity,
-            })
-        });
-        let lit = lit.iter().filter_map(|&node| self.position(node));
-        let rings = lit.flat_map(|at| {
-            [(Ink::Ground, 2.5, 0.8), (Ink::Accent, 1.5, 1.0)].map(|(ink, width, opacity)| Disc {
-                at,
-                radius: 4.5,
-                ring: Some(width),
-                ink,
-                opacity,
-            })
-        });
-        let marked = marked.and_then(|node| self.position(node)).into_iter();
-        let mark = marked.flat_map(|at| {
-            [
-                (Ink::Accent, 3.0, None, 1.0),
-                (Ink::Ground, 6.5, Some(3.5), 0.8),
-                (Ink::Text, 6.5, Some(1.5), 1.0),
-            ]
-            .map(|(ink, radius, ring, opacity)| Disc {
+    /// Returns the dots in the order of painting, with rings around the nodes `lit` and a mark around one node.
+    pub fn shapes(&self, marked: Option<usize>, lit: &[usize]) -> Vec<Shape> {
+        let mut shapes = Vec::new();
+        let mut circle = |at, radius, ring, ink: Ink, opacity| {
+            let colour = ink.at(opacity);
+            shapes.push(Shape::Circle {
                 at,
                 radius,
                 ring,
-                ink,
-                opacity,
-            })
-        });
-        dots.chain(rings).chain(mark)
+                colour,
+            });
+        };
+        let (accent, warning) = (Ink::Hue(Hue::Blue), Ink::Hue(Hue::Orange));
+        let radius = self.radius();
+        for dot in self.dots.iter().flatten().filter(|_| radius > 0.0) {
+            let opacity = if dot.is_hidden { HIDDEN_OPACITY } else { 1.0 };
+            let ink = if dot.is_beyond { warning } else { Ink::WHITE };
+            circle(dot.at, radius + 0.75, None, Ink::BLACK, 0.45 * opacity);
+            circle(dot.at, radius, None, ink, opacity);
+        }
+        for at in lit.iter().filter_map(|&node| self.position(node)) {
+            circle(at, 4.5, Some(2.5), Ink::Ground, 0.8);
+            circle(at, 4.5, Some(1.5), accent, 1.0);
+        }
+        if let Some(at) = marked.and_then(|node| self.position(node)) {
+            circle(at, 3.0, None, accent, 1.0);
+            circle(at, 6.5, Some(3.5), Ink::Ground, 0.8);
+            circle(at, 6.5, Some(1.5), Ink::Hue(Hue::Ink), 1.0);
+        }
+        shapes
     }
 
     /// Dots shrink if there are many of them, and disappear if they would cover the surface.
@@ -127,158 +122,13 @@ impl Dots {
     }
 }
 
-/// Walks from the node towards the eye and checks whether the surface rises above the line of sight.
-fn is_hidden(node: DVec3, field: &Field<'_>, stage: &Projector<'_>) -> bool {
-    let Projector::Space(projection) = stage else {
-        return false;
-    };
-    let plot_box = projection.plot_box;
-    let (low, high) = (plot_box.min_mm.z, plot_box.max_mm.z);
-    let sight = plot_box.place_mm(projection.eye) - node;
-    // A tolerance keeps nodes on a crest visible although the grid is coarser than the surface.
-    let tolerance = 0.01 * (high - low);
-    line_of_sight(node, sight, field.grid)
-        .take_while(|(place, _)| place.z <= high)
-        .any(|(place, point)| {
-            // A gap hides nothing.
-            let value = field.values[point];
-            value.is_finite() && value.min(high) > place.z + tolerance
-        })
-}
-
-/// Places from a little off `node` towards the eye, as long as they lie over the grid; each with the grid point before
-/// it.
-fn line_of_sight(node: DVec3, sight: DVec3, grid: &Grid) -> impl Iterator<Item = (DVec3, usize)> {
-    let (x_mm, y_mm) = (grid.x_mm(), grid.y_mm());
-    // Half a cell along the axis on which cells are crossed faster: for arrays of any shape, the number of steps to the
-    // edge is proportional to the number of points.
-    let cells = |sight_mm: f64, points_mm: &[f64]| sight_mm.abs() / (points_mm[1] - points_mm[0]);
-    let step = 0.5 / cells(sight.x, x_mm).max(cells(sight.y, y_mm)).max(0.5);
-    let cell = |points: &[f64], at: f64| {
-        let upper = points.partition_point(|point| *point < at);
-        (upper > 0 && upper < points.len()).then(|| upper - 1)
-    };
-    (3..)
-        .map(move |count| node + sight * (step * f64::from(count)))
-        .map_while(move |place| Some((place, grid.index(cell(x_mm, place.x)?, cell(y_mm, place.y)?))))
-}
-
-/// Role of a colour, which each renderer resolves by its palette.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Ink {
-    /// Grid lines.
-    Grid,
-    /// Outlines and ticks.
-    Edge,
-    /// Numbers and names of axes.
-    Label,
-    /// The colour of text.
-    Text,
-    /// The background of the card.
-    Ground,
-    /// A node.
-    Node,
-    /// The dark rim of a node.
-    Rim,
-    /// A node beyond the axes.
-    Warning,
-    /// The node that is marked.
-    Accent,
-}
-
-/// A straight line, one point wide.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line {
-    /// First end.
-    pub from: Vec2,
-    /// Second end.
-    pub to: Vec2,
-    /// Its colour.
-    pub ink: Ink,
-}
-
-/// A line of text.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Text {
-    /// The rectangle in whose middle the text is.
-    pub bounds: Bounds,
-    /// The text.
-    pub text: String,
-}
-
-/// A filled circle or a ring.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Disc {
-    /// Its centre.
-    pub at: Vec2,
-    /// Its radius; of a ring, in the middle of its line.
-    pub radius: f32,
-    /// Width of the line of a ring; `None` for a filled disc.
-    pub ring: Option<f32>,
-    /// Its colour.
-    pub ink: Ink,
-    /// 1 is opaque.
-    pub opacity: f32,
-}
-
-/// A rectangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// Its upper left corner.
-    pub min: Vec2,
-    /// Its lower right corner.
-    pub max: Vec2,
-}
-
-impl Bounds {
-    /// An empty rectangle.
-    pub(super) const NOTHING: Self = Self {
-        min: Vec2::INFINITY,
-        max: Vec2::NEG_INFINITY,
-    };
-
-    pub(super) fn centred(middle: Vec2, size: Vec2) -> Self {
-        Self {
-            min: middle - 0.5 * size,
-            max: middle + 0.5 * size,
-        }
-    }
-
-    /// Returns the bounding rectangle of all points.
-    pub(super) fn of(points: impl IntoIterator<Item = Vec2>) -> Self {
-        points.into_iter().fold(Self::NOTHING, |bounds, point| Self {
-            min: bounds.min.min(point),
-            max: bounds.max.max(point),
-        })
-    }
-
-    pub(super) fn union(self, other: Self) -> Self {
-        Self {
-            min: self.min.min(other.min),
-            max: self.max.max(other.max),
-        }
-    }
-
-    pub(super) fn grown(self, by: f32) -> Self {
-        Self {
-            min: self.min - by,
-            max: self.max + by,
-        }
-    }
-
-    pub(super) fn intersects(&self, other: &Self) -> bool {
-        self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
-    }
-
-    /// Width and height.
-    pub fn size(&self) -> Vec2 {
-        self.max - self.min
-    }
-
-    /// The centre.
-    pub fn middle(&self) -> Vec2 {
-        0.5 * (self.min + self.max)
-    }
+/// Returns true if the surface is in the line of sight from the eye to a node.
+fn is_hidden(node: DVec3, surface: &Surface, field: &Field<'_>, sight: &Sight) -> bool {
+    let shown = field.shown();
+    // From a little above: nodes on a crest stay visible although the grid is coarser than the surface.
+    let from_mm = node + DVec3::Z * (0.01 * (shown.end() - shown.start()));
+    let direction = sight.eye_mm() - from_mm;
+    surface.pick(&Ray { from_mm, direction }).is_some()
 }
 
 #[cfg(test)]
@@ -290,39 +140,8 @@ mod tests {
     use super::*;
     use crate::figure::{
         SequentialMap,
-        surface::{
-            OrbitCamera, Quantity, Surface, ViewMode,
-            camera::{PlotBox, Projection},
-        },
+        surface::{OrbitCamera, Quantity, ViewMode, camera::PlotBox},
     };
-
-    #[test]
-    fn a_stretched_array_takes_no_more_steps_than_a_square_one() {
-        for (row_pitch_mm, node_pitch_mm) in [(1.0, 2.0), (1e6, 1.0), (1.0, 1e6), (1e-6, 1.0), (1.0, 1e-6)] {
-            let nodes = |pitch: f64| -> Vec<f64> { (0..10).map(|node| pitch * f64::from(node)).collect() };
-            let map = SurfaceMap::new(&nodes(row_pitch_mm), &nodes(node_pitch_mm)).unwrap();
-            let grid = map.grid();
-            let points = grid.x_mm().len() + grid.y_mm().len();
-            let corner = DVec3::new(grid.x_mm()[1], grid.y_mm()[1], 0.0);
-            let far = DVec3::new(grid.x_mm()[points / 2 - 2], grid.y_mm()[points / 2 - 2], 0.0);
-            // Eyes beyond the far corner, far out along either side, and almost above.
-            for sight in [
-                far - corner,
-                (far - corner) * 1e3,
-                (far - corner).with_y(0.0),
-                DVec3::new(0.0, 0.0, 1.0),
-            ] {
-                let steps = line_of_sight(corner, sight, grid)
-                    .take_while(|(place, _)| place.z <= 1.0)
-                    .take(100_000)
-                    .count();
-                assert!(
-                    steps <= 2 * points,
-                    "{steps} steps over {points} points, pitches {row_pitch_mm} and {node_pitch_mm}, sight {sight}"
-                );
-            }
-        }
-    }
 
     #[test]
     fn a_gap_hides_no_node() {
@@ -350,8 +169,8 @@ mod tests {
             let field = Field::new(&surface);
             let (min_mm, max_mm) = field.box_mm();
             let screen = Bounds::of([Vec2::ZERO, Vec2::splat(400.0)]);
-            let projection = Projection::fit(PlotBox::new(min_mm, max_mm, 1.0), camera, screen);
-            is_hidden(DVec3::new(1.0, 1.0, 4.2), &field, &Projector::Space(&projection))
+            let sight = Sight::fit(PlotBox::new(min_mm, max_mm, 1.0), Some(camera), screen);
+            is_hidden(DVec3::new(1.0, 1.0, 4.2), &surface, &field, &sight)
         };
         assert!(hidden(5.0), "walls around it hide it");
         assert!(!hidden(f64::NAN), "nothing does");

@@ -30,6 +30,15 @@ impl Surface {
                     .corners_mm(ix, iy)
                     .map(|corner| corner.with_z(corner.z.clamp(low, high))),
             };
+            // Most cells are well above or below the ray.
+            let heights = corners.map(|corner| corner.z.clamp(low, high));
+            let least = heights.into_iter().fold(f64::MAX, f64::min) - CRACK;
+            let most = heights.into_iter().fold(f64::MIN, f64::max) + CRACK;
+            let [here, there] = [pair[0], pair[1]].map(|share| ray.from_mm.z + ray.direction.z * share);
+            let is_vertical = ray.direction.truncate() == glam::DVec2::ZERO;
+            if !is_vertical && (here.max(there) < least || here.min(there) > most) {
+                return None;
+            }
             let [a, b, c, d] = corners;
             let met = [[a, b, c], [a, c, d]].map(|corners| share_at(ray, corners));
             let places = met
@@ -120,8 +129,8 @@ mod tests {
 
     use super::*;
     use crate::figure::{
-        SequentialMap,
-        surface::{Bounds, Card, OrbitCamera, Quantity, Sight, ViewMode},
+        Bounds, SequentialMap,
+        surface::{Card, OrbitCamera, Quantity, Sight, ViewMode},
     };
     use decoupler_core::surface::SurfaceMap;
 
