@@ -9,14 +9,13 @@ use decoupler_core::{
     calibration::CalibrationError,
     dataset::{DatasetError, SplitBy},
     evaluation::RunError,
-    scene::Rows,
     sensor::SensorError,
     text::counted,
     training::SettingError,
 };
 use decoupler_files::{
     export::{DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError},
-    import::{Cure, ImportError, InputLineError, LineError, ReadError, SetupError},
+    import::{Cure, ImportError, LineError, ReadError, SetupError},
     live::{Source, SourceError},
     machine::system_cause,
 };
@@ -95,12 +94,6 @@ pub(super) enum Failure {
     Lost { input: Source, source: io::Error },
     #[error("{0}: {1}")]
     Line(Source, LineError),
-    #[error("{input}: line {line}: {source}")]
-    OtherColumns {
-        input: Source,
-        line: u64,
-        source: InputLineError,
-    },
     #[error("{input}: no line could be decoded: {reason}")]
     NothingDecoded { input: Source, reason: String },
     #[error(transparent)]
@@ -117,13 +110,6 @@ pub(super) enum Failure {
     Open { path: PathBuf, source: io::Error },
     #[error("'{}': {source}", .path.display())]
     Resistances { path: PathBuf, source: ReadError },
-    #[error("'{}': line {line}: it belongs to row {row}, but the network reads only row {rows}", .path.display())]
-    OtherRow {
-        path: PathBuf,
-        line: u64,
-        row: usize,
-        rows: Rows,
-    },
     #[error("'{}': line {line}: there is no network for row {row}; train with samples of it", .path.display())]
     UnknownRow { path: PathBuf, line: u64, row: usize },
     #[error("'{}': it has no column '{column}' with the row number of each line, which is needed because each row has its own network; add it", .path.display())]

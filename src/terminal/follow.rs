@@ -1,7 +1,6 @@
 //! Live decoding: lines are parsed and decoded as they arrive.
 
 use std::{
-    fmt,
     io::Write,
     path::Path,
     sync::{
@@ -19,7 +18,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::NetworkFile,
-    import::{InputLine, InputLineError, InputLines, KeptCell, LineError, LineParser, ParsedLine},
+    import::{LineError, LineParser, ParsedLine},
     live::{Keeping, Line, Lines, NextLine, Source},
 };
 
@@ -157,11 +156,11 @@ impl Follow {
                 report_too_long(number, report);
                 return Ok(Kept::AsBefore);
             };
-            let (parsed, kept) = match parser.parse(number, text) {
-                Ok((ParsedLine::NoReadings, _)) => return Ok(Kept::AsBefore),
+            let parsed = match parser.parse(number, text) {
+                Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => return Ok(Kept::AsBefore),
                 Ok(parsed) => parsed,
                 Err(error) if error.is_final() && !(input.begins_anywhere() && number == 1) => {
-                    return Err(error.failure(input.clone()));
+                    return Err(Failure::Line(input.clone(), error));
                 }
                 Err(error) => {
                     report.bad(&error);
@@ -169,7 +168,7 @@ impl Follow {
                 }
             };
             let is_whole = faults.take(number, parsed);
-            match answers.write(number, parsed, kept, faults.left_out()) {
+            match answers.write(number, parsed, faults.left_out()) {
                 Ok(true) => report.good(read_at.elapsed()),
                 Ok(false) => {
                     report.bad(&format_args!(
@@ -212,115 +211,44 @@ fn wrong(argument: &str, reason: impl std::fmt::Display) -> Failure {
     Failure::Arguments(format!("{argument}: {reason}"))
 }
 
-/// Parser of the lines of an array or of a recording.
-pub(super) enum Parser {
-    /// Resistances, row by row or in whole snapshots.
-    Array(Box<LineParser>),
-    /// Columns named like the inputs.
-    Columns {
-        lines: Box<InputLines>,
-        /// True once it was reported that the time steps back.
-        has_stepped_back: bool,
-    },
-}
-
-/// Error in a line.
-pub(super) enum ParseError {
-    Array(LineError),
-    Columns { line: u64, source: InputLineError },
+/// Parser of the lines of an array or of a recording, which warns once.
+pub(super) struct Parser {
+    lines: LineParser,
+    /// True once it was reported that the time steps back.
+    has_stepped_back: bool,
 }
 
 impl Parser {
     /// Prepares to parse lines for the network of `file`. `is_complete` is true if no line of the input is lost.
     pub(super) fn new(file: &NetworkFile, is_complete: bool) -> Result<Self, Failure> {
-        Ok(match &file.problem.sensor {
-            Some(simulation) => {
-                let parser = LineParser::new(simulation.sensor.scale, simulation.scene.rows, is_complete);
-                Self::Array(Box::new(parser.map_err(DatasetError::from)?))
-            }
-            None => Self::Columns {
-                lines: Box::new(file.input_lines()),
-                has_stepped_back: false,
-            },
+        Ok(Self {
+            lines: file.line_parser(is_complete)?,
+            has_stepped_back: false,
         })
     }
 
-    /// Returns the parsed line and the cells that are copied to the output.
-    pub(super) fn parse(&mut self, line: u64, text: &[u8]) -> Result<(ParsedLine<'_>, &[KeptCell]), ParseError> {
-        match self {
-            Self::Array(parser) => {
-                let parsed = parser.parse(line, text).map_err(ParseError::Array)?;
-                Ok((parsed, &[]))
-            }
-            Self::Columns {
-                lines,
-                has_stepped_back,
-            } => match lines.parse(line, text) {
-                Ok(InputLine::NoReadings) => Ok((ParsedLine::NoReadings, &[])),
-                Ok(InputLine::Start { is_first }) => {
-                    if is_first {
-                        warn(&format!(
-                            "line {line}: the lines at the start give the means of derived columns and are not decoded"
-                        ));
-                    }
-                    Ok((ParsedLine::NoReadings, &[]))
-                }
-                Ok(InputLine::Readings {
-                    row_index,
-                    readings: readings_ohm,
-                    place,
-                    kept,
-                }) => {
-                    if matches!(place, Some(Place::AfterStepBack(_))) && !std::mem::replace(has_stepped_back, true) {
-                        warn(&format!(
-                            "line {line}: the time steps back: the history of readings restarts here and at every further \
-                             step back; send the lines in order of time"
-                        ));
-                    }
-                    let row_index = Some(row_index);
-                    let row = ParsedLine::Row {
-                        row_index,
-                        readings_ohm,
-                    };
-                    Ok((row, kept))
-                }
-                Err(source) => Err(ParseError::Columns { line, source }),
-            },
+    /// Returns the parsed line.
+    pub(super) fn parse(&mut self, line: u64, text: &[u8]) -> Result<ParsedLine<'_>, LineError> {
+        let parsed = self.lines.parse(line, text)?;
+        match parsed {
+            ParsedLine::Start { is_first: true } => warn(&format!(
+                "line {line}: the lines at the start give the means of derived columns and are not decoded"
+            )),
+            ParsedLine::Row {
+                place: Some(Place::AfterStepBack(_)),
+                ..
+            } if !std::mem::replace(&mut self.has_stepped_back, true) => warn(&format!(
+                "line {line}: the time steps back: the history of readings restarts here and at every further \
+                 step back; send the lines in order of time"
+            )),
+            _ => {}
         }
+        Ok(parsed)
     }
 
     /// Counts a line that is too long to be parsed.
     pub(super) fn count_bad(&mut self) {
-        if let Self::Array(parser) = self {
-            parser.count_bad();
-        }
-    }
-}
-
-impl ParseError {
-    /// Returns `true` if later lines cannot be decoded either.
-    pub(super) fn is_final(&self) -> bool {
-        match self {
-            Self::Array(error) => error.is_final(),
-            Self::Columns { source, .. } => source.is_final(),
-        }
-    }
-
-    /// Converts the error, at which the program stops, into a failure in the lines of `input`.
-    pub(super) fn failure(self, input: Source) -> Failure {
-        match self {
-            Self::Array(error) => Failure::Line(input, error),
-            Self::Columns { line, source } => Failure::OtherColumns { input, line, source },
-        }
-    }
-}
-
-impl fmt::Display for ParseError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Array(error) => error.fmt(f),
-            Self::Columns { line, source } => write!(f, "line {line}: {source}"),
-        }
+        self.lines.count_bad();
     }
 }
 
@@ -399,9 +327,10 @@ impl Faults {
         match parsed {
             ParsedLine::Row {
                 row_index: Some(index),
-                readings_ohm,
+                readings,
+                ..
             } => {
-                watch.frame_ohm[index * watch.columns..][..watch.columns].copy_from_slice(readings_ohm);
+                watch.frame_ohm[index * watch.columns..][..watch.columns].copy_from_slice(readings);
                 watch.is_new[index] = true;
             }
             ParsedLine::Snapshot(readings_ohm) => {
@@ -415,7 +344,7 @@ impl Faults {
                      row, or send whole snapshots in one line"
                 ));
             }
-            ParsedLine::Row { .. } | ParsedLine::NoReadings => {}
+            ParsedLine::Row { .. } | ParsedLine::Start { .. } | ParsedLine::NoReadings => {}
         }
         watch.is_new.iter().all(|is_new| *is_new)
     }

@@ -12,7 +12,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{NetworkFile, write_decoded},
-    import::{KeptCell, ParsedLine},
+    import::ParsedLine,
     live::{Latencies, Source},
 };
 use ndarray::ArrayView1;
@@ -201,22 +201,23 @@ impl<'a> Answers<'a> {
     }
 
     /// Decodes a line, using `left_out` with the latest readings of every row read if given, and writes and flushes the
-    /// answer after the cells `kept` from the line. Returns `false` if there is none.
+    /// answer after the cells kept from the line. Returns `false` if there is none.
     pub(super) fn write(
         &mut self,
         line: u64,
         parsed: ParsedLine<'_>,
-        kept: &[KeptCell],
         left_out: Option<(&mut WireCheck, &[f64])>,
     ) -> io::Result<bool> {
         let outputs = self.file.problem.targets.len();
-        let (first_row, readings) = match parsed {
-            ParsedLine::NoReadings => return Ok(true),
+        let (first_row, readings, kept) = match parsed {
+            ParsedLine::NoReadings | ParsedLine::Start { .. } => return Ok(true),
             ParsedLine::Row {
                 row_index,
-                readings_ohm,
-            } => (row_index, readings_ohm),
-            ParsedLine::Snapshot(readings) => (Some(0), readings),
+                readings,
+                kept,
+                ..
+            } => (row_index, readings, kept),
+            ParsedLine::Snapshot(readings) => (Some(0), readings, &[][..]),
         };
         let channels = self.decoder.channels();
         let rows = readings.len() / channels;

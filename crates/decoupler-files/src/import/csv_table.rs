@@ -13,7 +13,7 @@ use super::{
     format::{Cell, parse},
     progress::table_error,
     rows::Rows,
-    table::{Excess, Labels, Lines, column_called, name_and_unit, stem},
+    table::{Excess, Labels, Lines, column_called, excerpt, name_and_unit, stem},
     time_stamp::TimeStamp,
 };
 use crate::machine::ReadingBudget;
@@ -393,15 +393,5 @@ fn text_of(cell: &[u8], encoding: Encoding) -> String {
     match std::str::from_utf8(cell) {
         Ok(text) if encoding != Encoding::Latin1 => text.to_owned(),
         _ => cell.iter().copied().map(char::from).collect(),
-    }
-}
-
-/// Returns the text for a message: the first 40 characters, with control characters escaped.
-fn excerpt(text: &str) -> String {
-    let text: String = text.chars().take(40).collect();
-    if text.contains(char::is_control) {
-        text.escape_debug().to_string()
-    } else {
-        text
     }
 }

@@ -38,12 +38,15 @@ pub(super) enum Contents {
     Arrays(Format, ReadArrays),
     /// A zip archive: arrays, or sheets.
     Zip,
-    /// A file of Excel up to 2003.
-    OldExcel,
 }
 
 /// Beginnings of files that are not read, with what they are and what to do.
-const REFUSED: [(&[u8], &str, &str); 20] = [
+const REFUSED: [(&[u8], &str, &str); 21] = [
+    (
+        b"\xd0\xcf\x11\xe0",
+        "a file of Excel up to 2003",
+        "save it as .xlsx or CSV",
+    ),
     (
         b"\x89HDF\r\n\x1a\n",
         "an HDF5 file",
@@ -90,7 +93,7 @@ impl Format {
     pub const NAMES: &str = "CSV, Excel, .npy, .npz or .mat";
 
     /// Usual file extensions, those of text files first.
-    pub const EXTENSIONS: [&str; 10] = ["csv", "txt", "tsv", "dat", "npy", "npz", "mat", "xlsx", "xls", "ods"];
+    pub const EXTENSIONS: [&str; 9] = ["csv", "txt", "tsv", "dat", "npy", "npz", "mat", "xlsx", "ods"];
 
     /// Returns the files in `folder` with one of the usual extensions, sorted by name.
     ///
@@ -135,7 +138,6 @@ impl Contents {
                 Ok((vec![array], Vec::new()))
             }),
             [b'P', b'K', 3 | 5, ..] => Self::Zip,
-            [0xd0, 0xcf, 0x11, 0xe0, ..] => Self::OldExcel,
             _ if has_extension("mat") || beginning.starts_with(b"MATLAB") => {
                 Self::Arrays(Format::Matlab, |file, size, budget, watch| {
                     matlab::read(BufReader::new(Watched::new(file, size, watch)), budget)

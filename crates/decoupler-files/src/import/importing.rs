@@ -401,7 +401,6 @@ fn read_file(
     file.rewind()?;
     let (found, left_out, format) = match Contents::of(path, &start)? {
         Contents::Text => return csv_table::read(path, Watched::new(file, size, watch), reading, budget),
-        Contents::OldExcel => return Spreadsheet::Xls.read(path, file, reading, budget, watch),
         Contents::Zip => {
             let kind = Spreadsheet::of_zip(&file)?;
             file.rewind()?;

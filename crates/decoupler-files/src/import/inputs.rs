@@ -9,8 +9,10 @@ use ndarray::Array2;
 use thiserror::Error;
 
 use super::{
-    Column, Derived, ImportError, Recipe, Table, TableError, Watch, csv_table::named, derived::TimeColumn,
-    derived_stream::DerivedStream, table::name_and_unit,
+    Column, Derived, ImportError, Recipe, Table, TableError, Watch,
+    csv_table::named,
+    derived::{DerivedStream, TimeColumn},
+    table::name_and_unit,
 };
 
 /// Inputs of a network, read from a file.
@@ -42,43 +44,34 @@ pub struct KeptColumn {
 
 /// Columns of a table that contain the inputs of a network.
 #[derive(Clone, Debug, PartialEq)]
-pub struct InputColumns {
+pub(super) struct InputColumns {
     /// Column index of each input, in the order of the network.
-    pub inputs: Vec<usize>,
+    pub(super) inputs: Vec<usize>,
     /// Index of the row-wire column, if there is one.
-    pub row_wire: Option<usize>,
-    /// Time column, if there is one.
-    pub time: Option<InputTime>,
+    pub(super) row_wire: Option<usize>,
+    /// Index of the time column and the seconds in its unit, if there is one.
+    pub(super) time: Option<(usize, f64)>,
     /// Index of the group column, if a memory needs it and there is one.
-    pub group: Option<usize>,
+    pub(super) group: Option<usize>,
     /// Columns copied to the output, with their titles.
-    pub kept: Vec<(usize, String)>,
+    pub(super) kept: Vec<(usize, String)>,
     /// Number of columns of the table.
-    pub width: usize,
-}
-
-/// Time column of a table.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InputTime {
-    /// Index of the column.
-    pub column: usize,
-    /// Seconds in the unit of the column.
-    pub unit_s: f64,
+    pub(super) width: usize,
 }
 
 /// Names of the columns that contain no inputs of a network.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct OtherColumns {
+pub(super) struct OtherColumns {
     /// Column of row-wires.
-    pub row_wire: Option<String>,
+    pub(super) row_wire: Option<String>,
     /// Time column, which a memory and derived columns need.
-    pub time: Option<String>,
+    pub(super) time: Option<String>,
     /// Unit of the times, if the header does not give it.
-    pub time_unit: Option<String>,
+    pub(super) time_unit: Option<String>,
     /// Column of groups, which a memory needs.
-    pub group: Option<String>,
+    pub(super) group: Option<String>,
     /// Columns that say when or to what a sample belongs and are copied to the output.
-    pub kept: Vec<String>,
+    pub(super) kept: Vec<String>,
 }
 
 /// Reason why the columns of a table are not the inputs of a network.
@@ -103,11 +96,14 @@ pub enum InputError {
         /// Unit of the input.
         expected: String,
     },
+    /// Two columns have the name of an input.
+    #[error("there are two columns '{0}'; keep one")]
+    Twice(String),
     /// A derived column cannot be computed.
     #[error("{0}")]
     Derived(String),
     /// There is no header, and the number of columns is wrong.
-    #[error("{found} cells where {expected} are needed; give the inputs of the network in their order, or a header")]
+    #[error("{} where {expected} are needed, separated by commas; give the inputs of the network in their order, or a header", counted(*.found, "cell"))]
     Count {
         /// Number of columns.
         found: usize,
@@ -121,7 +117,7 @@ impl InputColumns {
     ///
     /// # Errors
     /// If an input has no column of its name, or a column with a different unit.
-    pub fn of_header(header: &[String], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
+    pub(super) fn of_header(header: &[String], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
         Self::find(&named(header, header.len()), inputs, others)
     }
 
@@ -154,7 +150,7 @@ impl InputColumns {
     ///
     /// # Errors
     /// If the number of columns is wrong.
-    pub fn unnamed(
+    pub(super) fn unnamed(
         width: usize,
         inputs: &[Channel],
         others: &OtherColumns,
@@ -170,19 +166,31 @@ impl InputColumns {
         if width != expected {
             return Err(InputError::Count { found: width, expected });
         }
-        Ok(Self {
-            inputs: (before..width).collect(),
-            row_wire: has_row_wire.then_some(0),
+        Ok(Self::in_order(inputs.len(), has_row_wire))
+    }
+
+    /// Returns the first `count` columns or, if the first has the row-wire, those after it.
+    pub(super) fn in_order(count: usize, begins_with_row_wire: bool) -> Self {
+        let before = usize::from(begins_with_row_wire);
+        Self {
+            inputs: (before..before + count).collect(),
+            row_wire: begins_with_row_wire.then_some(0),
             time: None,
             group: None,
             kept: Vec::new(),
-            width,
-        })
+            width: before + count,
+        }
+    }
+
+    /// Returns the first input that several cells of a header name.
+    pub(super) fn named_twice(header: &[String], inputs: &[Channel]) -> Option<String> {
+        let count = |input: &&Channel| header.iter().filter(|cell| name_and_unit(cell).0 == input.name).count();
+        Some(inputs.iter().find(|input| count(input) > 1)?.name.clone())
     }
 
     /// Returns `true` if the cells are a header: the names of all inputs, the names of some inputs among other texts, or only
     /// texts, as many as there are inputs. A single text is a header in the first line only: elsewhere it may be garbage.
-    pub fn is_header(cells: &[String], inputs: &[Channel], is_first_line: bool) -> bool {
+    pub(super) fn is_header(cells: &[String], inputs: &[Channel], is_first_line: bool) -> bool {
         let is_name = |cell: &String| inputs.iter().any(|input| input.name == name_and_unit(cell).0);
         let is_text = |cell: &&String| !cell.trim().is_empty() && cell.trim().parse::<f64>().is_err();
         let (names, texts) = (
@@ -195,7 +203,7 @@ impl InputColumns {
     }
 
     /// Returns `true` if the cells are a header with the names of all inputs.
-    pub fn has_all(cells: &[String], inputs: &[Channel]) -> bool {
+    pub(super) fn has_all(cells: &[String], inputs: &[Channel]) -> bool {
         Self::of_header(cells, inputs, &OtherColumns::default()).is_ok()
     }
 
@@ -207,7 +215,7 @@ impl InputColumns {
 
     /// Time of a line in seconds; `None` without a time.
     pub(super) fn time_s(&self, cells: &[f64]) -> Option<f64> {
-        let time_s = self.time.map(|time| time.unit_s * cells[time.column]);
+        let time_s = self.time.map(|(column, unit_s)| unit_s * cells[column]);
         time_s.filter(|time_s| time_s.is_finite())
     }
 
@@ -238,7 +246,7 @@ impl InputColumns {
         let time = other(&others.time).and_then(|column| {
             let unit = columns[column].unit.as_deref().or(others.time_unit.as_deref());
             let unit_s = super::selection::seconds(unit)?;
-            Some(InputTime { column, unit_s })
+            Some((column, unit_s))
         });
         let kept = others
             .kept
@@ -301,7 +309,7 @@ impl Recipe {
         let files = [file];
         // A memory cannot place a row without a time.
         let time = time.filter(|_| problem.memory.is_some());
-        let time_column = time.map(|time| time.column);
+        let time_column = time.map(|(column, _)| column);
         for &column in columns.iter().chain(&row_wire).chain(&time_column) {
             super::selection::not_a_number(&files, &names, ColumnId { file: 0, column })?;
         }
@@ -317,7 +325,7 @@ impl Recipe {
             }
         }
         let cells = |column: usize| &table.columns[column].cells;
-        let is_placed = |row: &usize| time.is_none_or(|time| !cells(time.column).is_missing(*row));
+        let is_placed = |row: &usize| time.is_none_or(|(column, _)| !cells(column).is_missing(*row));
         let rows = Vec::from_iter((0..table.rows).filter(is_placed));
         let mut warnings = Vec::new();
         if let Some(row) = (0..table.rows).find(|row| !is_placed(row)) {
@@ -341,8 +349,8 @@ impl Recipe {
         };
         if let Some(memory) = &problem.memory {
             let groups = group.map(|column| Vec::from_iter(rows.iter().map(|&row| cells(column).group(row))));
-            let times_s = time.map(|time| {
-                let times_s = rows.iter().map(|&row| time.unit_s * cells(time.column).number(row));
+            let times_s = time.map(|(column, unit_s)| {
+                let times_s = rows.iter().map(|&row| unit_s * cells(column).number(row));
                 times_s.collect()
             });
             let samples = (0..rows.len()).collect();
@@ -373,7 +381,7 @@ impl Recipe {
 
     /// Names of the columns that contain no inputs of a network of `problem`; times are used only by a memory and by derived
     /// columns.
-    pub fn other_columns(&self, problem: &Problem) -> OtherColumns {
+    pub(super) fn other_columns(&self, problem: &Problem) -> OtherColumns {
         let needs_time = problem.memory.is_some() || self.derive.iter().any(Derived::needs_time);
         let time = self.time.clone().filter(|_| needs_time);
         let kept = [&self.time, &self.group, &self.row_wire].into_iter().flatten();

@@ -4,8 +4,8 @@ use decoupler_core::dataset::{Division, SplitBy};
 
 use super::{
     ColumnKind, ColumnSummary, FileSet, Format, ImportError, InspectedFile, Joined, Plan, Recipe, TestFiles,
+    expression::Expression,
     inputs::{ColumnId, Names},
-    missing::Comparison,
     table::stem,
 };
 
@@ -387,14 +387,14 @@ pub(super) struct Meanings {
     pub(super) time: Option<ColumnId>,
     pub(super) group: Option<ColumnId>,
     pub(super) row_wire: Option<ColumnId>,
-    pub(super) comparisons: Vec<(ColumnId, Comparison)>,
+    pub(super) comparisons: Vec<(ColumnId, Expression<String>)>,
     pub(super) units: HashMap<ColumnId, String>,
 }
 
 impl Meanings {
     pub(super) fn of(recipe: &Recipe, names: &Names) -> Result<Self, ImportError> {
         let one = |name: &Option<String>| name.as_ref().map(|name| names.find(name)).transpose();
-        let comparisons = recipe.conditions.iter().flat_map(|condition| condition.comparisons());
+        let comparisons = recipe.conditions.iter().flat_map(|condition| &condition.comparisons);
         for missing in recipe.missing.iter().filter_map(|missing| missing.column.as_deref()) {
             names.find(missing)?;
         }

@@ -296,6 +296,16 @@ pub(super) fn name_and_unit(header: &str) -> (&str, Option<&str>) {
     (header, None)
 }
 
+/// Returns the text for a message: the first 40 characters, with control characters escaped.
+pub(super) fn excerpt(text: &str) -> String {
+    let text: String = text.chars().take(40).collect();
+    if text.contains(char::is_control) {
+        text.escape_debug().to_string()
+    } else {
+        text
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

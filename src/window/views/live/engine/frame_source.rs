@@ -227,7 +227,7 @@ impl StreamFrames {
         read: usize,
     ) -> Result<Self, String> {
         let keeping = source.keeping();
-        let parser = LineParser::new(scale, rows, keeping == Keeping::All).map_err(|error| error.to_string())?;
+        let parser = LineParser::of_array(scale, rows, keeping == Keeping::All).map_err(|error| error.to_string())?;
         Ok(Self {
             lines: SourceLines::new(source, opened, read)?,
             parser,
@@ -260,17 +260,16 @@ impl StreamFrames {
             }
         };
         let is_snapshot = match self.parser.parse(number, text) {
-            Ok(ParsedLine::NoReadings) => return Next::Nothing,
+            Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => return Next::Nothing,
             Ok(ParsedLine::Snapshot(readings_ohm)) => {
                 frame_ohm.copy_from_slice(readings_ohm);
                 true
             }
             Ok(ParsedLine::Row {
-                row_index,
-                readings_ohm,
+                row_index, readings, ..
             }) => {
                 let index = row_index.unwrap_or(0);
-                self.latest_ohm[index * self.columns..][..self.columns].copy_from_slice(readings_ohm);
+                self.latest_ohm[index * self.columns..][..self.columns].copy_from_slice(readings);
                 self.is_new[index] = true;
                 if !self.is_new.iter().all(|is_new| *is_new) {
                     return Next::Nothing;

@@ -191,18 +191,17 @@ fn read_lines(
     read: usize,
     tally: &mut Tally,
 ) -> Result<Recording, String> {
-    let mut parser = LineParser::new(scale, rows, true).map_err(|error| error.to_string())?;
+    let mut parser = LineParser::of_array(scale, rows, true).map_err(|error| error.to_string())?;
     let length = read * scale.columns();
     let mut all_ohm: Vec<f64> = Vec::new();
     let mut frame_ohm: Vec<f64> = Vec::with_capacity(length);
     for (line, number) in reader.split(b'\n').zip(1..) {
         let line = line.map_err(|error| system_cause(&error).to_string())?;
         match parser.parse(number, &line) {
-            Ok(ParsedLine::NoReadings) => {}
+            Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => {}
             Ok(ParsedLine::Snapshot(readings_ohm)) => all_ohm.extend_from_slice(readings_ohm),
             Ok(ParsedLine::Row {
-                row_index,
-                readings_ohm,
+                row_index, readings, ..
             }) => {
                 let index = row_index.unwrap_or(0);
                 if index * scale.columns() != frame_ohm.len() {
@@ -210,7 +209,7 @@ fn read_lines(
                 }
                 // Otherwise an earlier row is missing, and the frame is incomplete.
                 if index * scale.columns() == frame_ohm.len() {
-                    frame_ohm.extend_from_slice(readings_ohm);
+                    frame_ohm.extend_from_slice(readings);
                 }
                 if frame_ohm.len() == length {
                     all_ohm.append(&mut frame_ohm);
@@ -360,7 +359,7 @@ mod tests {
     fn headers_that_lack_a_resistance_are_refused() {
         let (refused, _) = read(b"time,r_1,r_2\n1,2,3\n4,5,6\n", Rows::Known);
         let message = refused.unwrap_err();
-        assert!(message.contains("line 1: there is no column r_3"), "{message}");
+        assert!(message.contains("line 1: there is no column 'r_3'"), "{message}");
     }
 
     #[test]

@@ -15,7 +15,7 @@ use decoupler_core::{
 use decoupler_files::{
     export::NetworkFile,
     figure::TargetSurface,
-    import::{InputLine, InputLines},
+    import::{LineParser, ParsedLine},
     live::{Recording, Source},
 };
 use ndarray::Array3;
@@ -205,7 +205,7 @@ pub(super) enum TargetSource {
 #[derive(Debug)]
 pub(super) struct TargetLines {
     lines: SourceLines,
-    parser: InputLines,
+    parser: LineParser,
 }
 
 impl TargetSource {
@@ -301,7 +301,7 @@ impl TargetLines {
         Ok(Self {
             // The latest sample of each row-wire.
             lines: SourceLines::new(source, opened, file.network.values().len())?,
-            parser: file.input_lines(),
+            parser: file.line_parser(false).map_err(|error| error.to_string())?,
         })
     }
 
@@ -322,18 +322,16 @@ impl TargetLines {
             Err(next) => return next,
         };
         match self.parser.parse(number, text) {
-            Ok(InputLine::NoReadings | InputLine::Start { .. }) => Next::Nothing,
-            Ok(InputLine::Readings {
+            Ok(ParsedLine::Row {
                 row_index, readings, ..
             }) => {
-                sample[0] = row_index as f64;
+                sample[0] = row_index.unwrap_or(0) as f64;
                 sample[1..].copy_from_slice(readings);
                 Next::Frame(arrived)
             }
-            Err(error) if error.is_final() && !is_fragment => {
-                Next::End(Err(self.lines.failed(&format!("line {number}: {error}"))))
-            }
-            Err(error) => Next::Bad(format!("line {number}: {error}")),
+            Ok(_) => Next::Nothing,
+            Err(error) if error.is_final() && !is_fragment => Next::End(Err(self.lines.failed(&error))),
+            Err(error) => Next::Bad(error.to_string()),
         }
     }
 }
