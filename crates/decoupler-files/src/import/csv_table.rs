@@ -4,7 +4,7 @@ use std::{
     path::Path,
 };
 
-use decoupler_core::text::{clean_name, original_name};
+use decoupler_core::text::{clean_name, counted, original_name};
 
 use super::{
     Cells, Column, Dialect, DialectChoice, Encoding, Fault, Format, Missing, Table, TableError,
@@ -12,7 +12,7 @@ use super::{
     dialect::utf8_of_utf16,
     format::{Cell, parse},
     progress::table_error,
-    rows::Rows,
+    rows::{Rows, commonest},
     table::{Excess, Labels, Lines, column_called, excerpt, name_and_unit, stem},
     time_stamp::TimeStamp,
 };
@@ -159,7 +159,7 @@ impl<'a> Body<'a> {
             return false;
         }
         let width = match (self.builders.len(), headers.len()) {
-            (0, 0) => commonest(self.first.iter().map(|(_, cells)| cells.len())),
+            (0, 0) => commonest(self.first.iter().map(|(_, cells)| cells.len())).0,
             (0, _) => return false,
             (width, _) => width,
         };
@@ -190,7 +190,7 @@ impl<'a> Body<'a> {
     fn begin(&mut self, headers: &[String]) -> Result<(), TableError> {
         let waiting = std::mem::take(&mut self.first);
         let width = match headers.len() {
-            0 => commonest(waiting.iter().map(|(_, cells)| cells.len())),
+            0 => commonest(waiting.iter().map(|(_, cells)| cells.len())).0,
             width => width,
         };
         let empty_end = self.dialect.trailing_separator && headers.last().is_none_or(String::is_empty);
@@ -245,24 +245,33 @@ impl<'a> Body<'a> {
         if self.rows == 0 {
             return Err(TableError::Empty);
         }
+        let mut notes = Vec::new();
+        if let Some(line) = self.torn_line {
+            notes.push(format!("line {line}, the last, is cut off and left out"));
+        }
+        for (excess, what) in [
+            (self.too_short, "fewer cells than there are columns, which are missing"),
+            (self.too_long, "more cells than there are columns, left out"),
+        ] {
+            if let Some(line) = excess.first_line {
+                notes.push(format!(
+                    "{} with {what}, the first on line {line}",
+                    counted(excess.rows, "row")
+                ));
+            }
+        }
         Ok(Table {
             variables: Vec::new(),
             stem: stem(path),
             columns: self.builders.into_iter().map(Builder::finish).collect(),
             rows: self.rows,
             format: Format::Text(self.dialect),
-            notes: self.torn_line.map(torn).into_iter().collect(),
+            notes,
             torn_line: self.torn_line,
             too_long: self.too_long,
-            too_short: self.too_short,
             lines: self.lines,
         })
     }
-}
-
-/// Returns the note on a last line that is cut off.
-fn torn(line: u64) -> String {
-    format!("line {line}, the last, is cut off and left out")
 }
 
 impl<'a> Builder<'a> {
@@ -379,13 +388,6 @@ fn name_apart(columns: &mut [Column]) {
             *count += 1;
         }
     }
-}
-
-fn commonest(widths: impl Iterator<Item = usize>) -> usize {
-    let mut widths: Vec<usize> = widths.collect();
-    widths.sort_unstable();
-    let runs = widths.chunk_by(|a, b| a == b);
-    runs.max_by_key(|run| run.len()).map_or(0, |run| run[0])
 }
 
 /// Returns the text of a cell. Invalid UTF-8 is read as Latin-1, which maps to the first 256 characters of Unicode.

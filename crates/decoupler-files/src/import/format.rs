@@ -1,14 +1,12 @@
-//! File formats of recordings. To add one, add a variant of [`Format`] here and a module that reads its arrays.
+//! File formats of recordings. To add one, add a variant of [`Format`] and of [`Contents`] here, and a module that reads its
+//! arrays.
 
 use std::{
-    fmt,
-    fs::File,
-    io::{self, BufReader},
+    fmt, io,
     path::{Path, PathBuf},
 };
 
-use super::{Decimal, Dialect, TableError, Watch, matlab, numpy, progress::Watched};
-use crate::machine::ReadingBudget;
+use super::{Decimal, Dialect, TableError};
 
 /// File format.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,8 +32,10 @@ pub enum Format {
 pub(super) enum Contents {
     /// Text.
     Text,
-    /// Arrays, with the function that reads them.
-    Arrays(Format, ReadArrays),
+    /// A NumPy array.
+    Npy,
+    /// Arrays of MATLAB.
+    Matlab,
     /// A zip archive: arrays, or sheets.
     Zip,
 }
@@ -84,10 +84,6 @@ const PICKLE: &str = "load it in Python and save the arrays with numpy.savez";
 const UNPACK: &str = "unpack it";
 const TABLE: &str = "give a table of numbers";
 
-/// Reads the arrays of a file of this size within a budget; returns them and the names of the items that are not arrays of
-/// numbers.
-type ReadArrays = fn(File, Option<u64>, &mut ReadingBudget, Watch<'_>) -> Result<(Vec<Array>, Vec<String>), TableError>;
-
 impl Format {
     /// Names of all formats, for messages and help.
     pub const NAMES: &str = "CSV, Excel, .npy, .npz or .mat";
@@ -129,20 +125,9 @@ impl Contents {
             return Err(TableError::OtherKind { what, cure });
         }
         Ok(match beginning {
-            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Self::Arrays(Format::Npy, |file, size, budget, watch| {
-                let array = numpy::read("", BufReader::new(Watched::new(file, size, watch)), budget);
-                let array = array.map_err(|error| match error {
-                    TableError::Array { reason, .. } => TableError::array("NumPy array", reason),
-                    error => error,
-                })?;
-                Ok((vec![array], Vec::new()))
-            }),
+            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Self::Npy,
             [b'P', b'K', 3 | 5, ..] => Self::Zip,
-            _ if has_extension("mat") || beginning.starts_with(b"MATLAB") => {
-                Self::Arrays(Format::Matlab, |file, size, budget, watch| {
-                    matlab::read(BufReader::new(Watched::new(file, size, watch)), budget)
-                })
-            }
+            _ if has_extension("mat") || beginning.starts_with(b"MATLAB") => Self::Matlab,
             _ => Self::Text,
         })
     }

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use decoupler_core::{
-    dataset::{History, RowOrder},
+    dataset::RowOrder,
     problem::{Channel, Problem},
     text::{clean_name, counted},
 };
@@ -12,6 +12,8 @@ use super::{
     Column, Derived, ImportError, Recipe, Table, TableError, Watch,
     csv_table::named,
     derived::{DerivedStream, TimeColumn},
+    selection::{Rows, order_note, seconds},
+    suggestion::Meanings,
     table::name_and_unit,
 };
 
@@ -245,7 +247,7 @@ impl InputColumns {
         let other = |name: &Option<String>| Some(names.find(name.as_ref()?).ok()?.column);
         let time = other(&others.time).and_then(|column| {
             let unit = columns[column].unit.as_deref().or(others.time_unit.as_deref());
-            let unit_s = super::selection::seconds(unit)?;
+            let unit_s = seconds(unit)?;
             Some((column, unit_s))
         });
         let kept = others
@@ -282,12 +284,11 @@ impl Recipe {
         watch: Watch<'_>,
     ) -> Result<InputTable, ImportError> {
         let (inputs, others) = (&problem.inputs, &self.other_columns(problem));
-        let file = (path.to_owned(), self.read(Path::new(""), 0, path, None, watch)?.1);
-        let table = &file.1;
+        let files = [(path.to_owned(), self.read(Path::new(""), 0, path, None, watch)?.1)];
+        let table = &files[0].1;
         if let Some(line) = table.too_long.first_line {
-            return Err(self.uneven(path, line));
+            return Err(TableError::Uneven { line }.in_file(path));
         }
-        let names = Names::of(&[table], &[]);
         // Derived columns have names.
         let has_header = table.has_header() || !self.derive.is_empty();
         let found = if has_header {
@@ -295,28 +296,37 @@ impl Recipe {
         } else {
             InputColumns::unnamed(table.columns.len(), inputs, others, has_row_wire)
         };
-        let InputColumns {
-            inputs: columns,
-            row_wire,
-            time,
-            group,
-            kept,
-            ..
-        } = found.map_err(|source| ImportError::Inputs {
-            path: path.to_owned(),
-            source,
-        })?;
-        let files = [file];
+        let found = found.map_err(|error| TableError::Inputs(error).in_file(path))?;
+        let id = |column: usize| ColumnId { file: 0, column };
         // A memory cannot place a row without a time.
-        let time = time.filter(|_| problem.memory.is_some());
-        let time_column = time.map(|(column, _)| column);
-        for &column in columns.iter().chain(&row_wire).chain(&time_column) {
-            super::selection::not_a_number(&files, &names, ColumnId { file: 0, column })?;
-        }
-        let table = &files[0].1;
-        for &column in columns.iter().chain(&row_wire) {
-            let cells = &table.columns[column].cells;
-            if let Some(row) = (0..table.rows).find(|&row| cells.is_missing(row)) {
+        let time = found
+            .time
+            .filter(|_| problem.memory.is_some())
+            .map(|(column, _)| id(column));
+        let given_unit = time.zip(others.time_unit.clone());
+        let meanings = Meanings {
+            inputs: found.inputs.iter().copied().map(id).collect(),
+            time,
+            group: found.group.map(id),
+            row_wire: found.row_wire.map(id),
+            units: given_unit
+                .into_iter()
+                .filter(|(id, _)| table.columns[id.column].unit.is_none())
+                .collect(),
+            ..Meanings::default()
+        };
+        let names = Names::of(&[table], &[]);
+        let rows = Rows {
+            recipe: self,
+            files: &files,
+            names: &names,
+            meanings: &meanings,
+            joins: &[],
+        };
+        rows.check_numbers()?;
+        let cells = |column: usize| &table.columns[column].cells;
+        for &column in found.inputs.iter().chain(&found.row_wire) {
+            if let Some(row) = (0..table.rows).find(|&row| cells(column).is_missing(row)) {
                 return Err(ImportError::MissingInput {
                     path: path.to_owned(),
                     line: table.line(row),
@@ -324,55 +334,40 @@ impl Recipe {
                 });
             }
         }
-        let cells = |column: usize| &table.columns[column].cells;
-        let is_placed = |row: &usize| time.is_none_or(|(column, _)| !cells(column).is_missing(*row));
-        let rows = Vec::from_iter((0..table.rows).filter(is_placed));
+        let is_placed = |row: &usize| time.is_none_or(|id| !cells(id.column).is_missing(*row));
+        let (placed, without_time): (Vec<usize>, Vec<usize>) = (0..table.rows).partition(is_placed);
         let mut warnings = Vec::new();
-        if let Some(row) = (0..table.rows).find(|row| !is_placed(row)) {
+        if let Some(&row) = without_time.first() {
+            let verb = if without_time.len() == 1 { "is" } else { "are" };
             warnings.push(format!(
-                "{} without a time, which the history of readings needs, {} left out; the first is line {}",
-                counted(table.rows - rows.len(), "line"),
-                if table.rows - rows.len() == 1 { "is" } else { "are" },
+                "{} without a time, which the history of readings needs, {verb} left out; the first is line {}",
+                counted(without_time.len(), "line"),
                 table.line(row)
             ));
         }
-        let mut readings = Array2::from_shape_fn((rows.len(), columns.len()), |(row, input)| {
-            cells(columns[input]).number(rows[row])
+        let mut readings = Array2::from_shape_fn((placed.len(), inputs.len()), |(row, input)| {
+            cells(found.inputs[input]).number(placed[row])
         });
-        let row_wires: Option<Vec<usize>> = match row_wire {
-            None => None,
-            Some(column) => {
-                let name = &table.columns[column].name;
-                let of = |&row: &usize| super::selection::row_wire(name, cells(column).number(row));
-                Some(rows.iter().map(of).collect::<Result<_, _>>()?)
-            }
-        };
         if let Some(memory) = &problem.memory {
-            let groups = group.map(|column| Vec::from_iter(rows.iter().map(|&row| cells(column).group(row))));
-            let times_s = time.map(|(column, unit_s)| {
-                let times_s = rows.iter().map(|&row| unit_s * cells(column).number(row));
-                times_s.collect()
-            });
-            let samples = (0..rows.len()).collect();
-            let history = History::new(readings, groups.as_deref(), row_wires.as_deref(), times_s, samples);
+            let history = rows.past(&placed, &placed)?.with_readings(readings);
             if let order @ (RowOrder::Restarts { first_row, .. } | RowOrder::Shuffled { first_row, .. }) =
                 history.order()
             {
-                warnings.extend(super::selection::order_note(order, table.line(rows[first_row])));
+                warnings.extend(order_note(order, table.line(placed[first_row])));
             }
             let features = history.features(memory);
             readings = features
                 .map_err(|error| ImportError::from(error).of_file(path))?
                 .into_owned();
         }
-        let kept = kept.into_iter().map(|(column, title)| {
-            let cells = rows.iter().map(|&row| cells(column).text(row)).collect();
-            KeptColumn { title, cells }
+        let kept = found.kept.iter().map(|(column, title)| KeptColumn {
+            title: title.clone(),
+            cells: placed.iter().map(|&row| cells(*column).text(row)).collect(),
         });
         Ok(InputTable {
             readings,
-            row_wires,
-            lines: rows.iter().map(|&row| table.line(row)).collect(),
+            row_wires: rows.row_wires(&placed)?,
+            lines: placed.iter().map(|&row| table.line(row)).collect(),
             torn_line: table.torn_line,
             warnings,
             kept: kept.collect(),
@@ -391,13 +386,6 @@ impl Recipe {
             group: self.group.clone().filter(|_| problem.memory.is_some()),
             time_unit: time.as_deref().and_then(|time| self.unit_of(time)).map(str::to_owned),
             time,
-        }
-    }
-
-    fn uneven(&self, path: &Path, line: u64) -> ImportError {
-        ImportError::File {
-            path: path.to_owned(),
-            source: TableError::Uneven { line },
         }
     }
 }

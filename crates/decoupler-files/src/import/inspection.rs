@@ -3,7 +3,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler_core::text::counted;
 use serde::Serialize;
 
 use super::{
@@ -136,18 +135,6 @@ impl Inspection {
         warnings.extend(sentinels);
         let rounded = columns.iter().filter(|column| column.is_rounding);
         warnings.extend(rounded.map(|column| rounding_warning(&column.name)));
-        if let Some(line) = table.too_short.first_line {
-            let rows = counted(table.too_short.rows, "row");
-            warnings.push(format!(
-                "{rows} with fewer cells than there are columns, the first on line {line}"
-            ));
-        }
-        if let Some(line) = table.too_long.first_line {
-            let rows = counted(table.too_long.rows, "row");
-            warnings.push(format!(
-                "left out: {rows} with more cells than there are columns, the first on line {line}"
-            ));
-        }
         Ok(Self {
             rows: table.rows,
             columns,

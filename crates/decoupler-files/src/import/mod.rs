@@ -41,7 +41,7 @@ mod table;
 mod time_stamp;
 
 pub use choosing::{ChoosingProgress, ChosenSetup};
-pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
+pub use dialect::{Decimal, Dialect, DialectChoice, Encoding, Separator};
 pub use error::{Cure, ImportError, TableError};
 pub use expression::{Condition, Derived, Missing};
 pub use format::Format;

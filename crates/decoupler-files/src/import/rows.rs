@@ -151,6 +151,15 @@ impl<R: Read> Rows<R> {
     }
 }
 
+/// Returns the most common number of cells of a row, and how often it occurs.
+pub(super) fn commonest(widths: impl Iterator<Item = usize>) -> (usize, usize) {
+    let mut widths: Vec<usize> = widths.collect();
+    widths.sort_unstable();
+    let runs = widths.chunk_by(|a, b| a == b);
+    runs.max_by_key(|run| run.len())
+        .map_or((0, 0), |run| (run[0], run.len()))
+}
+
 fn count_quotes(text: &[u8]) -> usize {
     text.iter().filter(|&&byte| byte == b'"').count()
 }

@@ -268,7 +268,6 @@ impl Rows<'_> {
                 format: table.format.clone(),
                 rows: table.rows,
                 columns: table.columns.len(),
-                too_short: table.too_short,
                 join: join.map(|partners| {
                     let mut is_used = vec![false; table.rows];
                     partners

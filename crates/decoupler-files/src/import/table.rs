@@ -25,8 +25,6 @@ pub struct Table {
     pub torn_line: Option<u64>,
     /// Rows that were left out because they have more cells than there are columns.
     pub too_long: Excess,
-    /// Rows that end before the last column; their other cells are missing.
-    pub too_short: Excess,
     pub(super) lines: Lines,
 }
 
