@@ -101,7 +101,18 @@ fn read_rows(
     if dialect.header && rows.advance()? {
         headers = rows.cells().map(|cell| text_of(cell, dialect.encoding)).collect();
     }
-    let mut body = Body::new(dialect, reading, budget);
+    let mut body = Body {
+        dialect,
+        reading,
+        budget,
+        first: Vec::new(),
+        builders: Vec::new(),
+        rows: 0,
+        lines: Lines::default(),
+        too_long: Excess::default(),
+        too_short: Excess::default(),
+        torn_line: None,
+    };
     while rows.advance()? {
         if body.is_torn(&rows, &headers) {
             body.torn_line = Some(rows.line());
@@ -137,21 +148,6 @@ struct Builder<'a> {
 }
 
 impl<'a> Body<'a> {
-    fn new(dialect: Dialect, reading: &'a Reading<'a>, budget: &'a mut ReadingBudget) -> Self {
-        Self {
-            dialect,
-            reading,
-            budget,
-            first: Vec::new(),
-            builders: Vec::new(),
-            rows: 0,
-            lines: Lines::default(),
-            too_long: Excess::default(),
-            too_short: Excess::default(),
-            torn_line: None,
-        }
-    }
-
     /// Returns `true` if the row is the last of a file that is cut off, as when the disk was full: it ends without a line
     /// break, before the last column or within its number.
     fn is_torn<R: Read>(&self, rows: &Rows<R>, headers: &[String]) -> bool {
@@ -197,11 +193,15 @@ impl<'a> Body<'a> {
         let width = width - usize::from(empty_end && width > 1);
         let columns = named(headers, width);
         let roles = self.reading.roles(&columns);
-        self.builders = columns
-            .into_iter()
-            .zip(roles)
-            .map(|(column, role)| Builder::new(column, role))
-            .collect();
+        let columns = columns.into_iter().zip(roles);
+        let builders = columns.map(|(column, role)| Builder {
+            missing: role.missing,
+            labels: role.has_labels.then(Labels::default),
+            numbers: Vec::new(),
+            has_numbers: false,
+            column,
+        });
+        self.builders = builders.collect();
         for (line, cells) in waiting {
             self.add(line, cells.len(), cells.iter().map(Vec::as_slice))?;
         }
@@ -274,17 +274,7 @@ impl<'a> Body<'a> {
     }
 }
 
-impl<'a> Builder<'a> {
-    fn new(column: Column, role: Role<'a>) -> Self {
-        Self {
-            missing: role.missing,
-            labels: role.has_labels.then(Labels::default),
-            numbers: Vec::new(),
-            has_numbers: false,
-            column,
-        }
-    }
-
+impl Builder<'_> {
     /// Adds a cell; returns the length of its text if that is a new label.
     fn push(&mut self, line: u64, cell: &[u8], dialect: &Dialect) -> Option<usize> {
         let found = parse(cell, dialect.decimal);

@@ -117,17 +117,14 @@ impl Contents {
     /// # Errors
     /// If it is a known kind of file that is not read.
     pub(super) fn of(path: &Path, beginning: &[u8]) -> Result<Self, TableError> {
-        let has_extension = |extension: &str| {
-            path.extension()
-                .is_some_and(|found| found.eq_ignore_ascii_case(extension))
-        };
+        let is_named = path.extension().is_some_and(|found| found.eq_ignore_ascii_case("mat"));
         if let Some((_, what, cure)) = REFUSED.iter().find(|(start, ..)| beginning.starts_with(start)) {
             return Err(TableError::OtherKind { what, cure });
         }
         Ok(match beginning {
             [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Self::Npy,
             [b'P', b'K', 3 | 5, ..] => Self::Zip,
-            _ if has_extension("mat") || beginning.starts_with(b"MATLAB") => Self::Matlab,
+            _ if is_named || beginning.starts_with(b"MATLAB") => Self::Matlab,
             _ => Self::Text,
         })
     }

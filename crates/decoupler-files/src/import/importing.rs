@@ -77,8 +77,8 @@ impl Recipe {
         for (number, (joined, stem)) in self.join.iter().zip(&stems).enumerate() {
             files.push(self.read(folder, number + 1, &joined.file, Some(stem), watch)?);
         }
-        let tables: Vec<&Table> = files.iter().map(|(_, table)| table).collect();
-        let names = Names::of(&tables, &stems);
+        let columns = Vec::from_iter(files.iter().map(|(_, table)| table.columns.as_slice()));
+        let names = Names::of(&columns, &stems);
         let meanings = Meanings::of(self, &names)?;
         let mut warnings = notes(&files);
         let used = |id: &ColumnId| meanings.inputs.contains(id) || meanings.targets.contains(id);
@@ -447,6 +447,8 @@ pub struct FileReport {
     pub rows: usize,
     /// Number of columns.
     pub columns: usize,
+    /// `true` if the file names its columns.
+    pub(super) has_names: bool,
     /// The join by time; `None` for the first file and for files joined row by row.
     pub join: Option<JoinReport>,
 }

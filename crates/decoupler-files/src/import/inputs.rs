@@ -9,7 +9,7 @@ use ndarray::Array2;
 use thiserror::Error;
 
 use super::{
-    Column, Derived, ImportError, Recipe, Table, TableError, Watch,
+    Column, Derived, ImportError, Recipe, TableError, Watch,
     csv_table::named,
     derived::{DerivedStream, TimeColumn},
     selection::{Rows, order_note, seconds},
@@ -222,7 +222,7 @@ impl InputColumns {
     }
 
     fn find(columns: &[Column], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
-        let names = Names::of_columns(&[columns], &[]);
+        let names = Names::of(&[columns], &[]);
         let mut found = Vec::with_capacity(inputs.len());
         for Channel { name, unit, .. } in inputs {
             let column = match names.find(name) {
@@ -315,7 +315,7 @@ impl Recipe {
                 .collect(),
             ..Meanings::default()
         };
-        let names = Names::of(&[table], &[]);
+        let names = Names::of(&[&table.columns], &[]);
         let rows = Rows {
             recipe: self,
             files: &files,
@@ -408,14 +408,8 @@ pub(super) struct Names {
 const FEW: usize = 24;
 
 impl Names {
-    /// Names the columns of the files; `stems` are the stems of the joined files.
-    pub(super) fn of(files: &[&Table], stems: &[String]) -> Self {
-        let columns: Vec<&[Column]> = files.iter().map(|table| table.columns.as_slice()).collect();
-        Self::of_columns(&columns, stems)
-    }
-
     /// Names the columns of each file; `stems` are the stems of the joined files.
-    pub(super) fn of_columns(files: &[&[Column]], stems: &[String]) -> Self {
+    pub(super) fn of(files: &[&[Column]], stems: &[String]) -> Self {
         let mut names = Vec::new();
         for (file, columns) in files.iter().enumerate() {
             for (index, column) in columns.iter().enumerate() {

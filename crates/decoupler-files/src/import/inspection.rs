@@ -124,7 +124,7 @@ impl Inspection {
         let mut columns: Vec<ColumnSummary> = table.columns.iter().map(ColumnSummary::of).collect();
         name_duplicates(table, &mut columns);
         let chosen = match time {
-            Some(name) => Some((super::inputs::Names::of(&[table], &[]).find(name)?.column, false)),
+            Some(name) => Some((Names::of(&[&table.columns], &[]).find(name)?.column, false)),
             None => guess_time(table, &columns).map(|column| (column, true)),
         };
         let time = chosen.and_then(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));
@@ -332,7 +332,10 @@ impl Recipe {
             }
             tables.push(table);
         }
-        let names = Names::of(&Vec::from_iter(&tables), &stems);
+        let names = Names::of(
+            &Vec::from_iter(tables.iter().map(|table| table.columns.as_slice())),
+            &stems,
+        );
         for (id, meaning) in self.meant(&names)? {
             inspected[id.file].meanings[id.column] = meaning;
         }

@@ -222,15 +222,10 @@ impl Recorded {
     pub(super) fn of(plan: Plan, sets: &PlannedSets, watch: Watch<'_>) -> Result<Self, ImportError> {
         let checksum = |path: &PathBuf| {
             // A pipe can be read only once, and is empty now.
-            let is_file = path.is_file();
-            let crc32 = if is_file {
-                file_crc32(path, watch)?
-            } else {
-                String::new()
-            };
+            let crc32 = path.is_file().then(|| file_crc32(path, watch)).transpose()?;
             Ok(FileChecksum {
                 path: path.clone(),
-                crc32,
+                crc32: crc32.unwrap_or_default(),
             })
         };
         let files = plan.files().map(checksum).collect::<Result<_, ImportError>>()?;

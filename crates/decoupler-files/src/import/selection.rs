@@ -1,7 +1,7 @@
 use std::{collections::HashMap, path::PathBuf};
 
 use super::{
-    Cells, Column, Dropped, FileReport, ImportError, JoinReport, Recipe, Table,
+    Cells, Column, Dropped, FileReport, Format, ImportError, JoinReport, Recipe, Table,
     inputs::{ColumnId, Names},
     join::Partners,
     suggestion::Meanings,
@@ -268,6 +268,7 @@ impl Rows<'_> {
                 format: table.format.clone(),
                 rows: table.rows,
                 columns: table.columns.len(),
+                has_names: table.has_header() && table.format != Format::Npy,
                 join: join.map(|partners| {
                     let mut is_used = vec![false; table.rows];
                     partners
