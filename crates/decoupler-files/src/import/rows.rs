@@ -13,6 +13,8 @@ const BUFFER: usize = 1 << 18;
 pub(crate) struct Rows<R> {
     source: BufReader<R>,
     fields: Fields,
+    /// Maximum length of a row in bytes, and of blank lines before it.
+    longest: usize,
     line_break: u8,
     text: Vec<u8>,
     /// `true` if the current row ends with a line break.
@@ -28,12 +30,18 @@ impl<R: Read> Rows<R> {
         Self {
             source: BufReader::with_capacity(BUFFER, source),
             fields: Fields::new(separator, MAX_CELLS),
+            longest: LONGEST_ROW,
             line_break: if has_carriage_returns { b'\r' } else { b'\n' },
             text: Vec::new(),
             is_ended: false,
             line: 0,
             lines: 0,
         }
+    }
+
+    /// Returns the rows with another maximum length in bytes.
+    pub(crate) fn limited(self, longest: usize) -> Self {
+        Self { longest, ..self }
     }
 
     /// Skips `lines` lines.
@@ -79,7 +87,7 @@ impl<R: Read> Rows<R> {
             // Spaces only: an empty cell between tabs is a cell.
             if self.text.iter().all(|byte| b" \r\n".contains(byte)) {
                 blank += self.text.len();
-                if blank > LONGEST_ROW {
+                if blank > self.longest {
                     return Err(self.endless());
                 }
                 continue;
@@ -103,13 +111,13 @@ impl<R: Read> Rows<R> {
     fn endless(&self) -> TableError {
         TableError::Endless {
             line: self.line,
-            limit: LONGEST_ROW,
+            limit: self.longest,
         }
     }
 
     /// Appends the next line to the text; returns `false` at the end.
     fn append_line(&mut self) -> Result<bool, TableError> {
-        let left = LONGEST_ROW.saturating_sub(self.text.len());
+        let left = self.longest.saturating_sub(self.text.len());
         let mut limited = (&mut self.source).take(left as u64 + 1);
         let read = limited
             .read_until(self.line_break, &mut self.text)

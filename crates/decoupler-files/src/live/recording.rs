@@ -3,7 +3,7 @@ use std::io::{self, Read, Write};
 use ndarray::{Array3, ArrayView2, Axis};
 use thiserror::Error;
 
-use crate::import::{LineError, LineParser, ParsedLine, ReadError, Rows, Separator};
+use crate::import::{LONGEST_LINE, LineError, LineParser, ParsedLine, ReadError, Rows, Separator};
 
 /// Writes frames with their times as CSV: one line per row-wire, with columns `time_s`, `row` (from 1) and `r_1` to
 /// `r_M4` in ohm. `decode` reads these files too. Every frame is flushed, so that the file ends with a complete line even
@@ -112,7 +112,7 @@ impl Recording {
     /// If the file cannot be read, is malformed, or has no complete frame.
     pub fn read(source: impl Read, rows: &[usize], array_rows: usize, channels: usize) -> Result<Self, RecordingError> {
         let mut parser = LineParser::of_numbered_rows(channels, rows.to_vec(), array_rows);
-        let mut texts = Rows::new(source, Separator::Comma, false);
+        let mut texts = Rows::new(source, Separator::Comma, false).limited(LONGEST_LINE);
         let (mut times_s, mut readings_ohm): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         let (mut lines, mut torn_line) = (0, None);
         while texts.next_text().map_err(ReadError::from)? {

@@ -313,17 +313,15 @@ impl LineParser {
                 InputColumns::is_header(&cells, &self.read, line == 1)
             };
             if is_header {
-                let found = self.find_columns(&cells);
+                let found = self.find_columns(&cells, cells.len());
                 found.map_err(|source| LineError::Header { line, source })?;
                 return Ok(Found::NoReadings);
             }
             if self.columns.is_none() {
+                // A comma may end the line.
                 let last = self.fields.iter(text).next_back();
-                if self.cells.len() > 1 && last.is_some_and(<[u8]>::is_empty) {
-                    // A comma ends the line.
-                    self.cells.pop();
-                }
-                let found = self.find_columns(&[]);
+                let has_comma = self.cells.len() > 1 && last.is_some_and(<[u8]>::is_empty);
+                let found = self.find_columns(&[], self.cells.len() - usize::from(has_comma));
                 found.map_err(|source| LineError::Unnamed { line, source })?;
                 self.read_stamp(text);
             }
@@ -484,9 +482,8 @@ impl LineParser {
         Ok(Some(index))
     }
 
-    /// Finds the inputs in the cells of a header; it is empty for lines without one.
-    fn find_columns(&mut self, header: &[String]) -> Result<(), InputError> {
-        let width = self.cells.len();
+    /// Finds the inputs in the cells of a header, or in lines of `width` cells without one.
+    fn find_columns(&mut self, header: &[String], width: usize) -> Result<(), InputError> {
         let mut is_snapshot = false;
         let has_rows = self.rows.is_some();
         let mut found_derived = None;
@@ -863,6 +860,7 @@ mod tests {
     #[test]
     fn garbage_before_the_first_frame_does_not_determine_the_layout() {
         let mut parser = parser(Rows::Known, false);
+        assert!(parser.parse(1, b"4,5,").is_err());
         assert!(parser.parse(1, b"5,6").is_err());
         assert!(parser.parse(2, b"boot ok").is_err());
         assert!(parser.parse(3, b"1,4,5,6").is_ok());

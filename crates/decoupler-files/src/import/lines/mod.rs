@@ -11,5 +11,5 @@ pub use line_error::{LineError, Needed, ReadError};
 pub use line_parser::{KeptCell, LineParser, ParsedLine};
 pub use readings_file::{Readings, ReadingsFile};
 
-/// Maximum length of a line of a stream: 1 MiB. A line of the largest array takes about 100 kB.
+/// Maximum length of a line of readings: 1 MiB. A line of the largest array takes about 100 kB.
 pub const LONGEST_LINE: usize = 1 << 20;

@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use super::{
     super::{Separator, TableError, rows::Rows},
-    LineParser, ParsedLine, ReadError,
+    LONGEST_LINE, LineParser, ParsedLine, ReadError,
 };
 
 /// File with the readings of an array, read block by block, so that a large file needs little memory.
@@ -30,7 +30,7 @@ impl<R: Read> ReadingsFile<R> {
     /// Reads the lines of `source` by `parser`.
     pub fn new(source: R, parser: LineParser) -> Self {
         Self {
-            rows: Rows::new(source, Separator::Comma, false),
+            rows: Rows::new(source, Separator::Comma, false).limited(LONGEST_LINE),
             parser,
             has_readings: false,
             torn_line: None,
