@@ -386,7 +386,7 @@ fn choose(
         by,
     };
     interruptible(py, |job| {
-        choose_settings(settings, fixed, &samples, budget_s, memory_budget(), job, &mut |_| ())
+        choose_settings(settings, fixed, &samples, (budget_s, memory_budget()), job, &mut |_| ())
     })?
     .map_err(value_error)
 }

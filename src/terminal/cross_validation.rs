@@ -9,22 +9,22 @@ use super::{
     failure::Failure,
     inspect::{FileFound, files, write_files, write_warnings},
     interruption::Graceful,
-    output::{messages, print, print_object, progress_bar},
+    output::{print, print_object},
     samples::{with_bar, working_folder},
     train::Train,
 };
 use decoupler_core::{
-    dataset::{Division, Folds, SplitBy, Stream},
+    dataset::{Folds, SplitBy, Stream},
     evaluation::{
-        CrossValidated, ErrorTable, Run, RunError, RunSets, RunSettings, Scores, TestErrors, TrainingSize, Workload,
-        recorded::{Determination, SplitComparison, channel_remarks, nonlinear_gains, ridge_remark},
+        CrossValidated, ErrorTable, RunSettings, Scores, TestErrors, TrainingSize, Workload,
+        recorded::{Determination, Findings, channel_remarks, ridge_remarks},
     },
     job::Job,
     problem::{Channel, Problem},
 };
 use decoupler_files::{
     export::{describe_determinacy, error_table},
-    import::{Dropped, Plan, Recording, Setup, SetupSets},
+    import::{Dropped, Plan, Recording, Setup},
     machine::memory_budget,
 };
 
@@ -75,84 +75,28 @@ impl Train {
         let assigned = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));
         let assigned = assigned.map_err(|error| Failure::Arguments(error.to_string()))?;
         let validated = CrossValidated::on_folds(settings, set, assigned, &Job::UNINTERRUPTED)?;
-        let (mut optimism, mut end) = (Vec::new(), Ok(()));
-        if by == SplitBy::Random {
-            let honest = SplitBy::honest(set);
-            let graceful = Graceful::begin();
-            announce_comparison(honest);
-            let is_cancelled = || graceful.is_end_requested();
-            match SplitComparison::complete(settings, set, folds, (by, &validated), &Job::new(&is_cancelled)) {
-                Ok(comparison) => optimism = sentences(&comparison, &recording.targets),
-                Err(RunError::Cancelled(_)) => end = Err(Failure::InterruptedComparison { by: honest }),
-                Err(error) => return Err(error.into()),
-            }
-        }
-        print_folds(plan, &recording, settings, &validated, optimism, self.json)?;
-        end
-    }
-
-    /// Measures how optimistic random test samples of a recording are for each target, by training again on a split by
-    /// group (by time without groups). Ctrl-C ends only this comparison.
-    pub(super) fn optimism(&self, run: &Run, sets: &SetupSets) -> Result<Vec<String>, Failure> {
-        let Some(recordings) = &sets.recordings else {
-            return Ok(Vec::new());
-        };
-        let plan = &recordings.recorded.plan;
-        if plan.division.by != SplitBy::Random || plan.test.is_some() {
-            return Ok(Vec::new());
-        }
-        let set = &recordings.training.set;
-        let by = SplitBy::honest(set);
-        let graceful = Graceful::begin();
-        announce_comparison(by);
-        let settings = *run.settings();
-        let honest = || -> Result<Run, RunError> {
-            let division = Division { by, ..plan.division };
-            let (split, test) = division.sets(set, None, settings.seed)?;
-            let sets = RunSets::new(split, test);
-            Run::with_baselines(settings, sets, None, &Job::UNINTERRUPTED)
-        };
-        let mut honest = match honest() {
-            Ok(honest) => honest,
-            Err(error) => {
-                return Ok(vec![format!(
-                    "a random split is optimistic when neighbouring rows are similar; by how much cannot be measured here: \
-                     split by {by}, {error}"
-                )]);
-            }
-        };
-        let bar = progress_bar(
-            self.json,
-            settings.training.stopping.epochs,
-            "{bar:30} second training for comparison",
-        );
-        while !graceful.is_end_requested() && honest.step().is_none() {
-            bar.inc(1);
-        }
-        bar.finish_and_clear();
-        if honest.stop_reason().is_none() {
-            return Err(Failure::InterruptedComparison { by });
-        }
-        let comparison = SplitComparison::of_runs(set, by, [&honest, run]).expect("a run without folds has baselines");
-        Ok(sentences(&comparison, &recordings.training.targets))
+        print_folds(plan, &recording, settings, &validated, self.json)
     }
 }
 
-/// Reports on standard error that the same settings are trained again.
-fn announce_comparison(by: SplitBy) {
-    // There is no one to report to if this fails.
-    let _ = writeln!(
-        messages(),
-        "training again on a split by {by}, to measure how optimistic random test samples are; Ctrl-C skips this"
-    );
-}
-
-/// Describes for each target how optimistic random test samples are.
-fn sentences(comparison: &SplitComparison, targets: &[Channel]) -> Vec<String> {
-    let targets = targets.iter().enumerate();
-    targets
-        .map(|(index, target)| comparison.sentence(index, &target.name))
-        .collect()
+/// Describes for each target how optimistic samples drawn at random are. Ctrl-C ends only this measurement.
+pub(super) fn optimism(recording: &Recording, settings: &RunSettings, by: SplitBy) -> Vec<String> {
+    if by != SplitBy::Random {
+        return Vec::new();
+    }
+    let graceful = Graceful::begin();
+    let is_cancelled = || graceful.is_end_requested();
+    match recording.findings(settings, by, &Job::new(&is_cancelled)) {
+        Ok(Findings { comparison, .. }) => {
+            let targets = recording.targets.iter().enumerate();
+            targets
+                .map(|(index, target)| comparison.sentence(index, &target.name))
+                .collect()
+        }
+        Err(error) => vec![format!(
+            "a random split is optimistic when neighbouring rows are similar; by how much cannot be measured here: {error}"
+        )],
+    }
 }
 
 /// Name of the decoder with the lowest error for each target.
@@ -172,34 +116,24 @@ fn better(problem: &Problem, scores: &Scores) -> Vec<&'static str> {
     (0..problem.targets.len()).map(best).collect()
 }
 
-/// Prints the report of a cross-validation; `optimism` has the warnings about random folds.
+/// Prints the report of a cross-validation.
 fn print_folds(
     plan: &Plan,
     recording: &Recording,
     settings: &RunSettings,
     validated: &CrossValidated,
-    optimism: Vec<String>,
     is_json: bool,
 ) -> Result<(), Failure> {
     let (set, problem, by) = (&recording.set, recording.problem(), plan.division.by);
     let channels = &problem.targets;
     let scores = validated.scores(set);
     let determined = Determination::measure(set, validated.network.view(), by);
-    let gains = nonlinear_gains(set, validated, by);
     let better = better(&problem, &scores);
     let mut warnings = recording.warnings.clone();
     warnings.extend(channel_remarks(set, by, &recording.inputs, channels));
-    warnings.extend(optimism);
+    warnings.extend(optimism(recording, settings, by));
     warnings.extend(describe_determinacy(channels, &determined, false));
-    let remarks = channels.iter().zip(gains);
-    warnings.extend(remarks.filter_map(|(channel, gain)| ridge_remark(gain?, &channel.name)));
-    let fallbacks = channels.iter().zip(&better).filter(|(_, better)| **better != NETWORK);
-    warnings.extend(fallbacks.map(|(channel, better)| {
-        format!(
-            "the held-out error of the {better} is lower than that of the network for {}",
-            channel.name
-        )
-    }));
+    warnings.extend(ridge_remarks(set, validated, by, channels));
     let report = Report {
         files: files(once(recording)),
         inputs: &recording.inputs,

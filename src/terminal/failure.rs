@@ -6,11 +6,7 @@ use std::{
 };
 
 use decoupler_core::{
-    calibration::CalibrationError,
-    dataset::{DatasetError, SplitBy},
-    evaluation::RunError,
-    sensor::SensorError,
-    text::counted,
+    calibration::CalibrationError, dataset::DatasetError, evaluation::RunError, sensor::SensorError, text::counted,
     training::SettingError,
 };
 use decoupler_files::{
@@ -58,10 +54,6 @@ pub(super) enum Failure {
     NoArray { path: PathBuf, reason: &'static str },
     #[error("{0}")]
     Interrupted(Interruption),
-    #[error(
-        "interrupted during the second training; the first is complete, but the optimism of its random test samples was not measured: use --split {by}"
-    )]
-    InterruptedComparison { by: SplitBy },
     #[error("interrupted after {done} of {trials} trials")]
     InterruptedTrials { done: usize, trials: usize },
     #[error("{place}: {cause}; only earlier results are printed")]
@@ -195,7 +187,6 @@ impl Failure {
             Self::Run(error) if is_argument_error(error) => 2,
             Self::Dataset(DatasetError::Count(_) | DatasetError::Scene(_)) => 2,
             Self::Interrupted(_)
-            | Self::InterruptedComparison { .. }
             | Self::InterruptedTrials { .. }
             | Self::InterruptedTrade { .. }
             | Self::InterruptedSweep { .. }

@@ -7,6 +7,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 
 use super::{
+    cross_validation::optimism as optimism_of,
     failure::{Failure, Interruption},
     import_arguments::ImportArguments,
     interruption::{CheckpointArguments, Graceful, save_if_due},
@@ -107,7 +108,7 @@ impl Train {
                 (run, sets)
             }
         };
-        let mut end = self.train(&mut run, self.checkpoint.checkpointing(sets.recorded()));
+        let end = self.train(&mut run, self.checkpoint.checkpointing(sets.recorded()));
         if end.is_ok() {
             calibrate(&mut run, &sets, self.intervals);
         }
@@ -120,10 +121,10 @@ impl Train {
         if !matches!(end, Err(Failure::Interrupted(_))) {
             measured = measure_decoders(&self.decoders(&run), &file, &sets, &mut decoders);
         }
-        if end.is_ok() {
-            match self.optimism(&run, &sets) {
-                Ok(sentences) => optimism = sentences,
-                Err(failure) => end = Err(failure),
+        if let Some(recordings) = sets.recordings.as_ref().filter(|_| end.is_ok()) {
+            let plan = &recordings.recorded.plan;
+            if plan.test.is_none() {
+                optimism = optimism_of(&recordings.training, run.settings(), plan.division.by);
             }
         }
         let defect = run.defect();

@@ -27,8 +27,10 @@ pub(super) struct TrainingArguments {
     /// (60 seconds of one core by default): the readings, their logarithms or reciprocals; with --time, no memory, or averages
     /// with time constants from a few samples to a tenth of the recording if they are clearly better; 2 to 64 hidden nodes;
     /// min-max scaling or whitening; lm or br, or scg with weight decay where inputs are too many for the samples; the number of
-    /// epochs, up to 400 (3000 of scg); weights that begin random or at ridge regression; and up to 5 networks. The answer is
-    /// the best convex combination of the training mean, ridge, kernel ridge and these networks. What else is given here is kept. It is the default for a recording if none of --hidden, --starts, --combine, --begin, --method, --set, --epochs, --goal, --max-fail and --min-gradient is given
+    /// epochs, up to 400 (3000 of scg); and weights that begin random or at ridge regression. The answer is the best convex
+    /// combination of the training mean, ridge, kernel ridge and up to four networks. What else is given here is kept. It is the
+    /// default for a recording if none of --hidden, --starts, --combine, --begin, --method, --set, --epochs, --goal, --max-fail
+    /// and --min-gradient is given
     /// [default: 12; auto for a recording]
     #[arg(long, value_name = "N|auto", value_parser = hidden_nodes)]
     hidden: Option<HiddenNodes>,

@@ -86,3 +86,26 @@ fn the_sample_recording_raises_no_warning() {
         );
     }
 }
+
+#[test]
+fn a_column_that_looks_like_a_group_is_proposed_once() {
+    let folder = creeping();
+    let text = fs::read_to_string(folder.path().join("press.csv")).unwrap();
+    let rows = text.lines().enumerate().map(|(row, line)| match row {
+        0 => format!("trial,{line}\n"),
+        row => format!("{},{line}\n", row / 60),
+    });
+    let rows: String = rows.collect();
+    for file in ["trials.csv", "others.csv"] {
+        fs::write(folder.path().join(file), &rows).unwrap();
+    }
+    let found = |options: &str| {
+        let arguments = format!("{TRAIN} trials.csv --test-data others.csv {options} --json");
+        let report = json(&arguments, folder.path());
+        let warnings = report["warnings"].as_array().unwrap().iter();
+        let proposals = warnings.filter(|warning| warning.as_str().unwrap().contains("trial looks like a group"));
+        proposals.count()
+    };
+    assert_eq!(found(""), 1);
+    assert_eq!(found("--group trial"), 0);
+}

@@ -63,6 +63,8 @@ fn networks_give_the_same_answers() {
     for (network, input, expected) in [
         ("array.json", "array.csv", "array.decoded.csv"),
         ("recording.json", "press.csv", "recording.decoded.csv"),
+        // Settings chosen from candidates with a setting that is no more.
+        ("automatic.json", "press.csv", "automatic.decoded.csv"),
     ] {
         let folder = files();
         success(

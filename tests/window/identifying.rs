@@ -5,10 +5,7 @@ use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
 use decoupler::window::{Analysis, Effect, Question, SourceKind};
 use decoupler_core::{
     dataset::{Folds, SplitBy, Stream},
-    evaluation::{
-        CrossValidated, RunSettings,
-        recorded::{Findings, FittedModel},
-    },
+    evaluation::{CrossValidated, RunSettings},
     identifiability::Identifiability,
     job::Job,
     sensor::{RelativeNoise, SensorModel},
@@ -204,9 +201,8 @@ fn open_recording() -> Opened {
     opened
 }
 
-/// Analyses the readings by ridge regression alone.
-fn analyse_by_ridge(driver: &mut Driver) {
-    driver.click_button("ridge");
+/// Analyses the readings.
+fn analyse(driver: &mut Driver) {
     driver.click_button("Analyse readings");
     driver.wait("the analysis", |driver| driver.says("folds by time; analysed in"));
     driver.settle();
@@ -219,19 +215,12 @@ fn the_analysis_of_a_recording_agrees_with_the_library() {
         setup,
         folder: _folder,
     } = open_recording();
-    analyse_by_ridge(&mut driver);
+    analyse(&mut driver);
     let plan = setup.plan().unwrap();
     let recording = plan
         .recording(Path::new(""), &mut |_| ControlFlow::Continue(()))
         .unwrap();
-    let found = Findings::measure(
-        setup.settings(),
-        &recording.set,
-        (plan.division.by, 5),
-        FittedModel::Ridge,
-        &|_| (),
-        (&Job::UNINTERRUPTED, &|| false),
-    );
+    let found = recording.findings(setup.settings(), plan.division.by, &Job::UNINTERRUPTED);
     let found = found.unwrap();
     let sentence = |text: &str| {
         let (first, rest) = text.split_at(1);
@@ -268,7 +257,7 @@ fn channels_of_a_recording_without_information_are_named() {
     let mut driver = Driver::open();
     driver.take_recording(&Setup::recording(*setup.settings(), plan));
     driver.click_button("Identifiability");
-    analyse_by_ridge(&mut driver);
+    analyse(&mut driver);
     for expected in ["u3 is 2.5 in every sample", "u2 repeats u1"] {
         assert!(driver.says(expected), "{expected} is not among {:#?}", driver.texts());
     }
@@ -282,7 +271,6 @@ fn a_cross_validation_of_a_recording_agrees_with_the_library() {
         folder: _folder,
     } = open_recording();
     driver.enter("Folds", "3");
-    driver.click("Compare with random folds");
     driver.click_button("Cross-validate");
     driver.wait("the folds", |driver| driver.says("3 folds by time"));
     driver.settle();
@@ -302,10 +290,7 @@ fn a_cross_validation_of_a_recording_agrees_with_the_library() {
             "{cell} is not among {shown:#?}"
         );
     }
-    assert!(
-        driver.says("The readings") && driver.says("optimistic"),
-        "what they determine, and how optimistic random folds are: {shown:#?}"
-    );
+    assert!(driver.says("The readings"), "what they determine: {shown:#?}");
 }
 
 #[test]
@@ -314,12 +299,12 @@ fn an_analysis_of_a_recording_can_be_cancelled_and_closing_asks_about_it() {
     opened.change(|settings| settings.training.stopping.epochs = 100_000);
     let driver = &mut opened.driver;
     driver.settle();
-    driver.click_button("Analyse readings");
-    driver.wait("the first part", |driver| driver.says("Cross-validation…"));
+    driver.click_button("Cross-validate");
+    driver.wait("the trainings", |driver| driver.says("Cross-validation…"));
     assert!(!driver.close(), "the analysis is not lost without a question");
     driver.harness().run_steps(2);
     assert!(
-        driver.has("Identifiability: Analysis") && driver.says("will be discarded"),
+        driver.has("Identifiability: Cross-validation") && driver.says("will be discarded"),
         "{:#?}",
         driver.texts()
     );

@@ -1,6 +1,10 @@
 //! Recordings as the source of a training: dropped, imported, trained on, saved, missing and relocated.
 
-use std::{fmt::Write as _, fs, path::Path};
+use std::{
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use decoupler::window::{Notice, Phase, SourceKind};
 use decoupler_core::{network::ScalingChoice, scene::RowModel};
@@ -87,7 +91,9 @@ fn from_the_first_start_a_dropped_file_is_an_onnx_network_after_three_clicks() {
     driver.type_into("File", &onnx.display().to_string());
     driver.click_button("Save");
     driver.wait("the file", |driver| driver.notice().is_some());
-    assert!(onnx.join("network.onnx").is_file(), "{:?}", driver.notice());
+    let files = fs::read_dir(&onnx).unwrap().map(|file| file.unwrap().path());
+    let is_onnx = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "onnx");
+    assert_eq!(files.filter(is_onnx).count(), 1, "{:?}", driver.notice());
 }
 
 #[test]

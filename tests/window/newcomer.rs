@@ -104,7 +104,7 @@ fn nouns_after_one_are_singular() {
 
 #[test]
 fn a_linear_map_that_beats_the_network_is_marked() {
-    const MARK: &str = "Better than the network.";
+    const MARK: &str = "Better than what is used.";
     let mut driver = Driver::open();
     driver.configure_small();
     driver.enter("Epochs", "1");

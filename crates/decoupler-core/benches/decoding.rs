@@ -135,7 +135,7 @@ fn print_scale(scale: ArrayScale) {
     let rows: Vec<usize> = (0..scale.rows()).collect();
     let mut rng = Seed(0).rng(Stream::Training);
     let training = Dataset::simulate(&model, &scene, 300 * scale.rows(), &mut rng).unwrap();
-    let frame = training.frames().unwrap().frame(0).to_vec();
+    let frame = training.frames().unwrap().swap_remove(0);
     let kinds = [
         ("mean", DecoderKind::Mean),
         ("ridge", DecoderKind::Ridge),

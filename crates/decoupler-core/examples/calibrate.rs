@@ -88,7 +88,11 @@ fn coverage(
     for seed in 0..SEEDS {
         let calibration = Calibration::fit(nominal, &recorded(60, seed)?)?;
         let holds = SensorParameter::ALL.map(|parameter| {
-            let (fitted, truth) = (calibration.parameter(parameter), parameter.of(real));
+            let mut fitted = calibration.parameters.iter();
+            let fitted = fitted
+                .find(|fitted| fitted.parameter == parameter)
+                .expect("all are fitted");
+            let truth = parameter.of(real);
             match fitted.half_width {
                 Some(half_width) => (fitted.value - truth).abs() <= half_width,
                 None => fitted.value == truth,

@@ -21,13 +21,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut run = Run::prepare(settings)?;
     while run.step().is_none() {}
     let frames = run.test().frames()?;
-    let mut coordinates_mm = vec![0.0; frames.rows() * run.test().outputs()];
+    let mut coordinates_mm = vec![0.0; run.test().row_count() * run.test().outputs()];
     let mut network = ProgramDecoder::new(run.network().program(Precision::Single));
-    network.decode(frames.frame(0), &mut coordinates_mm)?;
+    network.decode(&frames[0], &mut coordinates_mm)?;
     println!("network: node 1 of row-wire 1 is at z = {:.6} mm", coordinates_mm[2]);
-    let rows = Vec::from_iter(0..frames.rows());
+    let rows = Vec::from_iter(0..run.test().row_count());
     let mut newton = NewtonDecoder::new(&source.sensor, &source.scene, &rows)?;
-    newton.decode(frames.frame(0), &mut coordinates_mm)?;
+    newton.decode(&frames[0], &mut coordinates_mm)?;
     println!("Newton:  node 1 of row-wire 1 is at z = {:.6} mm", coordinates_mm[2]);
     Ok(())
 }

@@ -135,9 +135,7 @@ impl Identifiability {
         };
         (self.singular_values_per_mm.iter().map(remaining).sum::<f64>() / self.unknowns() as f64).sqrt()
     }
-}
 
-impl Identifiability {
     /// Rows whose undeformed readings differ by less count as identical even without noise.
     pub const SAME_ROWS: f64 = 1e-9;
 
@@ -173,9 +171,7 @@ impl Identifiability {
         }
         Ok(closest)
     }
-}
 
-impl Identifiability {
     /// Condition number from which a row is reported as ill-conditioned: readings exact to 16 digits then leave fewer than 6
     /// in the worst-determined pattern.
     pub const LARGEST_CONDITION: f64 = 1e10;

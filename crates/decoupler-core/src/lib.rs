@@ -116,10 +116,10 @@
 //! source.scene.rows = Rows::Known;
 //! let test = source.draw_test(Seed::default())?;
 //! let frames = test.frames()?;
-//! let rows = Vec::from_iter(0..frames.rows());
+//! let rows = Vec::from_iter(0..test.row_count());
 //! let mut newton = NewtonDecoder::new(&source.sensor, &source.scene, &rows)?;
-//! let mut coordinates_mm = vec![0.0; frames.rows() * newton.outputs()];
-//! newton.decode(frames.frame(0), &mut coordinates_mm)?;
+//! let mut coordinates_mm = vec![0.0; rows.len() * newton.outputs()];
+//! newton.decode(&frames[0], &mut coordinates_mm)?;
 //! assert!((coordinates_mm[2] - test.targets()[[0, 2]]).abs() < 1e-9);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -50,26 +50,6 @@ impl fmt::Display for MemoryBudget {
     }
 }
 
-/// Work per second on one thread.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Speed {
-    /// Multiplications in large matrix products.
-    pub(crate) multiplications: f64,
-    /// Pairs of a row-wire node and a column-wire node, in resistances.
-    pub(crate) node_pairs: f64,
-}
-
-impl Speed {
-    /// Returns the speed, which is measured on the first call in about 20 ms.
-    pub(crate) fn measured() -> Self {
-        static SPEED: OnceLock<Speed> = OnceLock::new();
-        *SPEED.get_or_init(|| Self {
-            multiplications: multiplications_per_second(),
-            node_pairs: node_pairs_per_second(),
-        })
-    }
-}
-
 /// Returns the best rate of a few repetitions, the first of which warms the caches.
 fn rate(work: f64, mut run: impl FnMut()) -> f64 {
     const REPETITIONS: usize = 4;
@@ -81,28 +61,38 @@ fn rate(work: f64, mut run: impl FnMut()) -> f64 {
     work / seconds.fold(f64::INFINITY, f64::min).max(1e-9)
 }
 
-fn multiplications_per_second() -> f64 {
+/// Returns the number of multiplications in large matrix products per second on one thread, which is measured on the first
+/// call in about 10 ms.
+pub(crate) fn multiplications_per_second() -> f64 {
     const SIZE: usize = 256;
-    let factor = Mat::from_fn(SIZE, SIZE, |row, column| (row * 7 + column * 3) as f64 * 1e-3);
-    let mut product = Mat::zeros(SIZE, SIZE);
-    rate(SIZE.pow(3) as f64, || {
-        matmul(product.as_mut(), Accum::Replace, &factor, &factor, 1.0, Par::Seq);
-        black_box(&product);
+    static SPEED: OnceLock<f64> = OnceLock::new();
+    *SPEED.get_or_init(|| {
+        let factor = Mat::from_fn(SIZE, SIZE, |row, column| (row * 7 + column * 3) as f64 * 1e-3);
+        let mut product = Mat::zeros(SIZE, SIZE);
+        rate(SIZE.pow(3) as f64, || {
+            matmul(product.as_mut(), Accum::Replace, &factor, &factor, 1.0, Par::Seq);
+            black_box(&product);
+        })
     })
 }
 
-fn node_pairs_per_second() -> f64 {
+/// Returns the number of pairs of a row-wire node and a column-wire node in resistances per second on one thread, which is
+/// measured on the first call in about 10 ms.
+pub(crate) fn node_pairs_per_second() -> f64 {
     const ROWS: usize = 200;
-    let sensor = SensorModel::new(ArrayScale::default());
-    let scale = sensor.scale;
-    let at_rest = vec![DVec3::ZERO; scale.nodes_per_row()];
-    let mut resistances_ohm = vec![0.0; scale.columns()];
-    rate(ROWS as f64 * node_pairs_per_row(&sensor), || {
-        for row in 0..ROWS {
-            // The default sensor has resistances at rest.
-            let _ = sensor.row_resistances_into(row % scale.rows(), &at_rest, &mut resistances_ohm);
-            black_box(&resistances_ohm);
-        }
+    static SPEED: OnceLock<f64> = OnceLock::new();
+    *SPEED.get_or_init(|| {
+        let sensor = SensorModel::new(ArrayScale::default());
+        let scale = sensor.scale;
+        let at_rest = vec![DVec3::ZERO; scale.nodes_per_row()];
+        let mut resistances_ohm = vec![0.0; scale.columns()];
+        rate(ROWS as f64 * node_pairs_per_row(&sensor), || {
+            for row in 0..ROWS {
+                // The default sensor has resistances at rest.
+                let _ = sensor.row_resistances_into(row % scale.rows(), &at_rest, &mut resistances_ohm);
+                black_box(&resistances_ohm);
+            }
+        })
     })
 }
 

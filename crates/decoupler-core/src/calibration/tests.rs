@@ -90,7 +90,8 @@ fn a_sensor_off_by_5_percent_is_recovered_within_the_stated_intervals() {
             SensorParameter::NodePitch,
             SensorParameter::ColumnNodeX,
         ] {
-            let fitted = calibration.parameter(parameter);
+            let mut fitted = calibration.parameters.iter();
+            let fitted = fitted.find(|fitted| fitted.parameter == parameter).unwrap();
             assert!(fitted.half_width.is_some(), "seed {seed}: {fitted}");
         }
         assert!(
@@ -133,9 +134,7 @@ fn parameters_undetermined_by_one_row_keep_their_nominal_values() {
     assert!(within >= 17, "{within} of 20");
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let samples = frames(&real(&mut rng), &[0], 20, 1e-3, &mut rng);
-    let pitch = Calibration::of_presses(&nominal(), &samples)
-        .unwrap()
-        .parameter(SensorParameter::RowPitch);
+    let pitch = Calibration::of_presses(&nominal(), &samples).unwrap().parameters[SensorParameter::RowPitch.index()];
     assert_eq!(
         pitch.to_string(),
         "row pitch: 1 mm, its nominal value: these readings do not determine it"
@@ -171,7 +170,7 @@ fn intervals_allow_for_deviating_wires() {
                 .for_each(|(ohm, factor)| *ohm *= factor);
         }
         let calibration = Calibration::of_presses(&nominal(), &samples).unwrap();
-        let half_width = calibration.parameter(SensorParameter::Height).half_width;
+        let half_width = calibration.parameters[SensorParameter::Height.index()].half_width;
         half_width.map_or(f64::INFINITY, |half_width| half_width / calibration.residual)
     };
     let (wide, narrow) = (half_width(0.01), half_width(0.0));

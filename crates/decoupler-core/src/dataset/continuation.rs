@@ -84,11 +84,6 @@ impl<S> Continuation<S> {
         (&mut continued.state, place)
     }
 
-    /// Drops all states.
-    pub fn restart(&mut self) {
-        self.states.clear();
-    }
-
     fn drop_oldest(&mut self) {
         let mut last_rows = Vec::from_iter(self.states.values().map(|state| state.last_row));
         let middle = last_rows.len() / 2;

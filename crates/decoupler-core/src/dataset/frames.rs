@@ -1,43 +1,16 @@
 use super::{Dataset, DatasetError};
 use crate::scene::RowModel;
 
-/// Whole frames, each with the readings of all row-wires at one moment: the input of a decoder.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Frames {
-    /// Snapshots × rows × channels.
-    readings: Vec<f64>,
-    count: usize,
-    rows: usize,
-}
-
-impl Frames {
-    /// Number of snapshots.
-    pub fn count(&self) -> usize {
-        self.count
-    }
-
-    /// Number of row-wires in a frame.
-    pub fn rows(&self) -> usize {
-        self.rows
-    }
-
-    /// Readings of one frame, row by row.
-    pub fn frame(&self, snapshot: usize) -> &[f64] {
-        let length = self.readings.len() / self.count;
-        &self.readings[snapshot * length..(snapshot + 1) * length]
-    }
-}
-
 impl Dataset {
-    /// Groups the samples into whole frames, in the order of [`Self::snapshots`], rows in ascending order.
+    /// Groups the readings into whole frames, each with those of all row-wires at one moment, row by row: the input of a
+    /// decoder. They are in the order of [`Self::snapshots`], rows in ascending order.
     ///
     /// # Errors
     /// If a snapshot lacks a row-wire, or has one twice.
-    pub fn frames(&self) -> Result<Frames, DatasetError> {
-        let (rows, snapshots) = (self.row_count(), self.snapshots());
-        let mut readings = Vec::with_capacity(self.samples() * self.channels());
-        for snapshot in &snapshots {
-            for row_index in 0..rows {
+    pub fn frames(&self) -> Result<Vec<Vec<f64>>, DatasetError> {
+        let frame = |snapshot: Vec<usize>| {
+            let mut readings = Vec::with_capacity(snapshot.len() * self.channels());
+            for row_index in 0..self.row_count() {
                 let of_row = snapshot.iter().filter(|&&sample| self.row_index(sample) == row_index);
                 let [&sample] = Vec::from_iter(of_row.clone())[..] else {
                     return Err(DatasetError::Incomplete {
@@ -48,12 +21,9 @@ impl Dataset {
                 };
                 readings.extend(self.sample_readings(sample));
             }
-        }
-        Ok(Frames {
-            readings,
-            count: snapshots.len(),
-            rows,
-        })
+            Ok(readings)
+        };
+        self.snapshots().into_iter().map(frame).collect()
     }
 }
 
@@ -88,12 +58,26 @@ impl<T> PerRow<T> {
         model: RowModel,
         mut fit: impl FnMut(&Dataset) -> Result<T, E>,
     ) -> Result<Self, E> {
+        Self::of_rows(model, training.row_count(), |row| match row {
+            Some(row_index) => fit(&training.of_row(row_index)),
+            None => fit(training),
+        })
+    }
+
+    /// Creates one value for all row-wires, or one for each of `rows` row-wires, whose index is passed to `create`.
+    ///
+    /// # Errors
+    /// If `create` fails.
+    pub(crate) fn of_rows<E>(
+        model: RowModel,
+        rows: usize,
+        mut create: impl FnMut(Option<usize>) -> Result<T, E>,
+    ) -> Result<Self, E> {
         match model {
-            RowModel::Shared => Ok(Self::shared(fit(training)?)),
-            RowModel::Each => {
-                let rows = (0..training.row_count()).map(|row_index| fit(&training.of_row(row_index)));
-                Ok(Self::each(rows.collect::<Result<_, _>>()?))
-            }
+            RowModel::Shared => create(None).map(Self::shared),
+            RowModel::Each => Ok(Self::each(
+                (0..rows).map(|row| create(Some(row))).collect::<Result<_, _>>()?,
+            )),
         }
     }
 
@@ -104,16 +88,6 @@ impl<T> PerRow<T> {
     #[inline]
     pub fn at(&self, row_index: usize) -> &T {
         &self.0[if self.0.len() == 1 { 0 } else { row_index }]
-    }
-
-    /// Returns the same value as [`Self::at`], mutably.
-    ///
-    /// # Panics
-    /// If there is one value per row-wire and no row-wire with this index.
-    #[inline]
-    pub fn at_mut(&mut self, row_index: usize) -> &mut T {
-        let index = if self.0.len() == 1 { 0 } else { row_index };
-        &mut self.0[index]
     }
 
     /// Returns the shared value, if there is only one.
@@ -151,15 +125,15 @@ mod tests {
     #[test]
     fn frames_follow_groups_and_row_wires_in_any_order() {
         let frames = set(Some(&[5, 3, 3, 5]), &[8, 8, 2, 2]).frames().unwrap();
-        assert_eq!((frames.count(), frames.rows()), (2, 2));
-        assert_eq!(frames.frame(0), [10.0, 11.0, 0.0, 1.0]);
-        assert_eq!(frames.frame(1), [20.0, 21.0, 30.0, 31.0]);
+        assert_eq!(frames.len(), 2);
+        assert_eq!(frames[0], [10.0, 11.0, 0.0, 1.0]);
+        assert_eq!(frames[1], [20.0, 21.0, 30.0, 31.0]);
     }
 
     #[test]
     fn without_row_wires_every_sample_is_a_frame() {
         let frames = set(None, &[0, 1, 2]).frames().unwrap();
-        assert_eq!((frames.count(), frames.rows()), (3, 1));
+        assert_eq!((frames.len(), frames[0].len()), (3, 2));
     }
 
     #[test]

@@ -1,11 +1,11 @@
 use std::collections::HashMap;
 
-use ndarray::{ArcArray2, Array2, ArrayView2, Axis};
+use ndarray::{ArcArray2, Array2, ArrayView1, Axis};
 
 use super::{
     DatasetError, Memory, Span,
     continuation::{Continuation, Place, RowOrder, Series, usual_interval_s},
-    memory::MemoryState,
+    memory::{MAX_STATE, MemoryState},
 };
 
 /// Everything that a sensor has read, including rows that are not samples because a target is missing: the past, from
@@ -87,26 +87,6 @@ impl History {
         self.times_s = times_s.map(|(times_s, more)| [&times_s, more].concat());
     }
 
-    /// Readings of all rows: rows × channels.
-    pub fn readings(&self) -> ArrayView2<'_, f64> {
-        self.readings.view()
-    }
-
-    /// Number of the stretch of each row, in which rows follow each other without a restart.
-    pub fn stretches(&self) -> Vec<usize> {
-        let mut rows = Continuation::new(self.interval_s, usize::MAX);
-        let (mut stretches, mut count) = (vec![0; self.series.len()], 0);
-        for row in self.sequence() {
-            let (stretch, place) = rows.next(self.series[row], self.time_s(row), || 0);
-            if !matches!(place, Place::After(_)) {
-                *stretch = count;
-                count += 1;
-            }
-            stretches[row] = *stretch;
-        }
-        stretches
-    }
-
     /// Time of each row in seconds, if known.
     pub fn times_s(&self) -> Option<&[f64]> {
         self.times_s.as_deref()
@@ -182,21 +162,18 @@ impl History {
             return Ok(self.of_samples(self.readings.clone()));
         }
         let (rows, channels) = self.readings.dim();
-        let mut state = MemoryState::new(&memory, channels)?;
-        let mut all = Array2::zeros((rows, state.features()));
         // One series after the other, so that one state is enough.
+        let mut stream = MemoryStream {
+            states: Continuation::new(memory.interval_s, 1),
+            ..MemoryStream::new(&memory, channels)?
+        };
+        let mut all = Array2::zeros((rows, stream.features.len()));
         let mut sequence = self.sequence();
         sequence.sort_by_key(|&row| self.series[row]);
-        let mut places = Continuation::new(memory.interval_s, 1);
         for row in sequence {
-            let ((), place) = places.next(self.series[row], self.time_s(row), || ());
-            let elapsed_s = state.elapsed_s(place);
             let readings = self.readings.row(row).to_vec();
-            let mut features = all.row_mut(row);
-            let features = features
-                .as_slice_mut()
-                .expect("a row of a standard array is contiguous");
-            state.step(&readings, elapsed_s, features);
+            let (features, _) = stream.step(self.series[row], &readings, self.time_s(row));
+            all.row_mut(row).assign(&ArrayView1::from(features));
         }
         Ok(self.of_samples(all.into_shared()))
     }
@@ -227,7 +204,7 @@ impl MemoryStream {
         let start = MemoryState::new(memory, channels)?;
         Ok(Self {
             features: vec![0.0; start.features()],
-            states: Continuation::new(memory.interval_s, start.states_that_fit()),
+            states: Continuation::new(memory.interval_s, MAX_STATE / start.constants.state().max(1)),
             start,
         })
     }
@@ -242,11 +219,6 @@ impl MemoryStream {
         state.step(readings, elapsed_s, &mut self.features);
         (&self.features, place)
     }
-
-    /// Forgets the past of all series.
-    pub fn restart(&mut self) {
-        self.states.restart();
-    }
 }
 
 #[cfg(test)]
@@ -260,11 +232,26 @@ mod tests {
         Array2::from_shape_fn((rows, 1), |(row, _)| row as f64)
     }
 
+    /// Number of the stretch of each row, in which rows follow each other without a restart.
+    fn stretches(history: &History) -> Vec<usize> {
+        let mut rows = Continuation::new(history.interval_s, usize::MAX);
+        let (mut stretches, mut count) = (vec![0; history.series.len()], 0);
+        for row in history.sequence() {
+            let (stretch, place) = rows.next(history.series[row], history.time_s(row), || 0);
+            if !matches!(place, Place::After(_)) {
+                *stretch = count;
+                count += 1;
+            }
+            stretches[row] = *stretch;
+        }
+        stretches
+    }
+
     #[test]
     fn a_stretch_ends_with_its_group_and_at_a_gap_in_time() {
         let times_s = vec![0.0, 0.1, 0.2, 0.3, 0.7, 6.3, 6.4, 6.5];
         let history = History::new(counting(8), None, None, Some(times_s), vec![0, 1, 4, 5, 6]);
-        assert_eq!(history.stretches(), [0, 0, 0, 0, 0, 1, 1, 1]);
+        assert_eq!(stretches(&history), [0, 0, 0, 0, 0, 1, 1, 1]);
         assert!((history.interval_s().unwrap() - 0.1).abs() < 1e-12);
         let features = history.features(&of_lags(&[1])).unwrap();
         assert_eq!(
@@ -275,14 +262,14 @@ mod tests {
         let groups = [4, 4, 7, 7, 4, 4];
         let history = History::new(counting(6), Some(&groups), None, None, vec![0, 1, 2, 3, 4, 5]);
         assert_eq!(
-            history.stretches(),
+            stretches(&history),
             [0, 0, 1, 1, 0, 0],
             "a group continues after another"
         );
         // Two sessions whose clocks both start at 0, sorted by time.
         let times_s = vec![0.0, 0.0, 0.1, 0.1, 0.2, 0.2];
         let history = History::new(counting(6), Some(&[0, 1, 0, 1, 0, 1]), None, Some(times_s), vec![5]);
-        assert_eq!(history.stretches(), [0, 1, 0, 1, 0, 1]);
+        assert_eq!(stretches(&history), [0, 1, 0, 1, 0, 1]);
         assert_eq!(history.features(&of_lags(&[1])).unwrap()[[0, 1]], 3.0);
     }
 
@@ -314,7 +301,7 @@ mod tests {
         let mut history = History::new(counting(4), None, None, times_s(0.0), vec![1, 3]);
         // The second file continues where the first ended, with the same clock.
         history.append(&History::new(counting(4), None, None, times_s(0.4), vec![0, 2]));
-        assert_eq!(history.stretches(), [0, 0, 0, 0, 1, 1, 1, 1]);
+        assert_eq!(stretches(&history), [0, 0, 0, 0, 1, 1, 1, 1]);
         assert_eq!(history.samples(), [1, 3, 4, 6]);
         let features = history.features(&of_lags(&[1])).unwrap();
         assert_eq!(features.column(1).to_vec(), [0.0, 2.0, 0.0, 1.0]);
@@ -375,7 +362,7 @@ mod tests {
         }
         assert_eq!(expected[[5, 1]], expected[[5, 0]], "it starts again after the gap");
         assert_ne!(expected[[6, 1]], expected[[6, 0]]);
-        stream.restart();
+        let mut stream = MemoryStream::new(&memory, 1).unwrap();
         assert_eq!(stream.step(only, &[5.0], None).0, [5.0; 3]);
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! Simulated samples are drawn as whole snapshots, with resistances as readings and the absolute coordinates of the
 //! row's nodes as targets; measured samples are built from their parts by [`Dataset::new`]. [`Division`]
-//! and [`Folds`] divide a set, and [`Frames`] groups it into whole frames. A [`Memory`] adds inputs from
+//! and [`Folds`] divide a set, and [`Dataset::frames`] groups it into whole frames. A [`Memory`] adds inputs from
 //! the past, which it takes from the [`History`] of a recording or from a [`MemoryStream`]; one rule decides in both
 //! which rows continue each other.
 
@@ -17,17 +17,15 @@ mod memory;
 mod samples;
 mod seed;
 mod simulation;
-mod span;
 
 pub use continuation::{GAP, Place, RowOrder, Series};
 pub(crate) use division::DividedSamples;
 pub use division::{Division, Split, SplitBy};
 pub use error::DatasetError;
 pub use folds::Folds;
-pub use frames::{Frames, PerRow};
+pub use frames::PerRow;
 pub use history::{History, MemoryStream};
-pub use memory::{LARGEST_LAG, Memory, MemoryConstants};
+pub use memory::{LARGEST_LAG, Memory, MemoryConstants, Span};
 pub use samples::{Dataset, LARGEST_SAMPLES};
 pub use seed::{Seed, Stream};
 pub use simulation::Simulation;
-pub use span::Span;

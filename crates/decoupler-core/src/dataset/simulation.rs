@@ -69,20 +69,7 @@ impl Dataset {
             return Err(DatasetError::Count(samples));
         }
         let read = scene.rows.read(model.scale.rows())?;
-        Self::draw(model, &scene.sampler(model), &read, samples.div_ceil(read.len()), rng)
-    }
-
-    /// Draws `snapshots` snapshots of row-wires `read`, at least one of each.
-    ///
-    /// # Errors
-    /// If the model has no resistance for a drawn deformation.
-    pub(crate) fn draw(
-        model: &SensorModel,
-        sampler: &DeformationSampler,
-        read: &[usize],
-        snapshots: usize,
-        rng: &mut impl Rng,
-    ) -> Result<Self, DatasetError> {
+        let (sampler, snapshots) = (DeformationSampler::new(scene, model), samples.div_ceil(read.len()));
         let samples = snapshots * read.len();
         let mut resistances_ohm = Array2::zeros((samples, model.scale.columns()));
         let mut coordinates_mm = Array2::zeros((samples, model.scale.coordinates_per_row()));

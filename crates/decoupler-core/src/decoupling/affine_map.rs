@@ -27,16 +27,9 @@ impl Program {
         let first = targets.row(0);
         let off = (&targets - &first).mean_axis(Axis(0));
         let mean = off.expect("a training set has samples") + first;
-        Self::constant(training.channels(), &mean.to_vec())
-    }
-
-    /// The same targets for all finite readings.
-    pub(super) fn constant(channels: usize, targets: &[f64]) -> Self {
-        let mut builder = Builder::new(channels);
-        let weights = Array2::zeros((channels, targets.len()));
-        let changes = builder.changes(Quantity::Raw, &vec![0.0; channels], Precision::Double);
-        let targets = builder.affine_of(&changes, weights, targets);
-        builder.finish(targets)
+        let mut map = Array2::zeros((training.channels() + 1, mean.len()));
+        map.row_mut(training.channels()).assign(&mean);
+        Self::of_map(&map, Quantity::Raw, &vec![0.0; training.channels()])
     }
 
     /// Fits an affine map to `training` by least squares, on `quantity` of the readings. Of the maps that fit equally well it

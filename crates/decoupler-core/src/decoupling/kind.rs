@@ -2,14 +2,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Decoder, NewtonDecoder, Program, ProgramDecoder};
-use crate::{
-    dataset::{Dataset, PerRow, Seed, Stream},
-    network::{InputChoice, NetworkError, Networks},
-    scene::{NoiseSource, RowModel, Scene},
-    sensor::SensorModel,
-    text::Named,
-};
+use crate::text::Named;
 
 /// Method of decoding the readings of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -150,77 +143,6 @@ impl fmt::Display for DecoderKind {
     /// Writes the name used in the terminal and in files.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(Named::name(*self))
-    }
-}
-
-/// Training samples and settings from which a decoder is fitted.
-#[derive(Clone, Copy)]
-pub(crate) struct FitProblem<'a> {
-    /// Training samples.
-    pub(crate) training: &'a Dataset,
-    /// Whether all row-wires share a decoder or each has its own.
-    pub(crate) row_model: RowModel,
-    /// Quantity and scaling of the inputs.
-    pub(crate) inputs: InputChoice,
-    /// Noise of the readings that the training samples lack.
-    pub(crate) unseen: NoiseSource,
-    /// The sensor and its scene, if they are known.
-    pub(crate) sensor: Option<(&'a SensorModel, &'a Scene)>,
-    /// Trained networks, if there are any.
-    pub(crate) networks: Option<&'a Networks>,
-    /// Precision in which networks compute.
-    pub(crate) precision: Precision,
-    /// Seed of random choices.
-    pub(crate) seed: Seed,
-}
-
-impl DecoderKind {
-    /// Fits a decoder of this kind; `None` if the problem lacks the networks or the sensor that it needs.
-    ///
-    /// # Errors
-    /// If samples cannot be scaled, or the sensor has no resistances at rest.
-    pub(crate) fn fit(self, problem: &FitProblem<'_>) -> Result<Option<Box<dyn Decoder>>, NetworkError> {
-        let FitProblem { inputs, unseen, .. } = *problem;
-        let mut rng = problem.seed.rng(Stream::Expectation);
-        match self {
-            Self::Mean => problem.of_samples(|set| Ok(Program::mean(set))),
-            Self::Ridge => problem.of_samples(|set| Program::ridge(set, inputs.quantity, unseen)),
-            Self::RadialBasis => problem.of_samples(|set| Program::radial_basis(set, inputs, unseen, &mut rng)),
-            Self::Fuzzy => problem.of_samples(|set| Program::fuzzy(set, inputs.quantity, unseen, &mut rng)),
-            Self::Network => Ok(problem.network(problem.precision)),
-            Self::Newton => problem.on_equations(|newton| newton),
-            Self::Polish => match problem.network(Precision::Double) {
-                Some(network) => problem.on_equations(|newton| newton.after(network, Self::POLISH_STEPS)),
-                None => Ok(None),
-            },
-        }
-    }
-}
-
-impl FitProblem<'_> {
-    /// Fits one program to the samples of all row-wires, or one for each.
-    fn of_samples(
-        &self,
-        fit: impl FnMut(&Dataset) -> Result<Program, NetworkError>,
-    ) -> Result<Option<Box<dyn Decoder>>, NetworkError> {
-        let programs = PerRow::fit(self.training, self.row_model, fit)?;
-        Ok(Some(Box::new(ProgramDecoder::new(Program::each(&programs)))))
-    }
-
-    fn network(&self, precision: Precision) -> Option<Box<dyn Decoder>> {
-        let program = self.networks?.program(precision);
-        Some(Box::new(ProgramDecoder::new(program)))
-    }
-
-    /// Creates a decoder for the rows that were read, and changes it; `None` without a sensor.
-    fn on_equations(
-        &self,
-        change: impl FnOnce(NewtonDecoder) -> NewtonDecoder,
-    ) -> Result<Option<Box<dyn Decoder>>, NetworkError> {
-        let Some(((model, scene), rows)) = self.sensor.zip(self.training.row_wires_read()) else {
-            return Ok(None);
-        };
-        Ok(Some(Box::new(change(NewtonDecoder::new(model, scene, rows)?))))
     }
 }
 

@@ -11,7 +11,6 @@
 //! readings, without ground truth.
 
 mod affine_map;
-mod combined;
 mod decoder;
 mod equations;
 mod kind;
@@ -22,14 +21,12 @@ mod ridge;
 mod standardised;
 mod takagi_sugeno;
 
-pub use combined::Combined;
 pub use decoder::{DecodeError, Decoder, SolvedRows, decode_set, resistance_residual};
 pub(crate) use equations::GaussianPrior;
 pub use equations::{Estimate, Estimator, LARGEST_ERROR, Solution};
-pub(crate) use kind::FitProblem;
 pub use kind::{DecoderKind, Precision};
 pub use newton::NewtonDecoder;
-pub use program::{Builder, Domain, Function, Node, NodeId, Operation, Program, ProgramDecoder};
+pub use program::{Builder, Combined, Domain, Function, Node, NodeId, Operation, Program, ProgramDecoder};
 pub(crate) use radial_basis::KernelShape;
 pub(crate) use ridge::Regression;
 pub(crate) use standardised::ridge;

@@ -1,4 +1,4 @@
-//! Radial-basis networks, fitted and compiled for fast decoding.
+//! Radial-basis networks and kernel ridge regression, fitted and compiled for fast decoding.
 
 use std::{borrow::Cow, ops::Range};
 
@@ -18,6 +18,15 @@ use crate::{
     scene::NoiseSource,
 };
 
+/// Maximum number of samples from which the kernel of a radial-basis network is chosen.
+const MAX_SEARCHED: usize = 800;
+
+/// Number of samples from which a kernel is chosen on given folds.
+const SHAPED: usize = 500;
+
+/// Number of centres of radial-basis networks in sets of more than four times as many samples.
+const SUBSET: usize = 1000;
+
 impl Program {
     /// Fits a radial-basis network (Broomhead and Lowe 1988) to a training set: Gaussians around centres in the scaled
     /// inputs, and a linear output layer with a constant, by kernel ridge regression. `unseen` is as in [`Inputs::fit`];
@@ -36,15 +45,11 @@ impl Program {
         rng: &mut impl Rng,
     ) -> Result<Self, NetworkError> {
         let training = with_noise(training, unseen, rng);
+        let searched = thinned(training.samples(), MAX_SEARCHED);
+        let folds = folds(&training.select(&searched));
         let scaled = Scaled::of(&training, choice)?;
-        let folds = |samples: &[usize]| folds(&training.select(samples));
-        let kernel = KernelRidge::fit(&scaled.x, &scaled.y, folds);
-        Ok(Self::of_kernel(
-            &scaled.inputs,
-            &scaled.scales,
-            &kernel,
-            &scaled.outputs,
-        ))
+        let (kernel, penalties) = scaled.choose(&searched, folds.as_ref(), 0.0);
+        Ok(scaled.program(kernel, &penalties, SUBSET))
     }
 
     /// As [`Self::radial_basis`], with a kernel whose shape is given: up to four times `subset` samples are all centres, of
@@ -55,48 +60,8 @@ impl Program {
     pub(crate) fn kernel(training: &Dataset, shape: &KernelShape, subset: usize) -> Result<Self, NetworkError> {
         let scaled = Scaled::of(training, shape.inputs)?;
         let penalty = |&target: &usize| shape.penalties[target];
-        let shape = KernelShape {
-            penalties: scaled.outputs.varying().iter().map(penalty).collect(),
-            ..*shape
-        };
-        let kernel = KernelRidge::of_shape(&scaled.x, &scaled.y, &shape, subset);
-        Ok(Self::of_kernel(
-            &scaled.inputs,
-            &scaled.scales,
-            &kernel,
-            &scaled.outputs,
-        ))
-    }
-
-    /// The network of a fitted kernel; the inputs are multiplied by `scales`.
-    fn of_kernel(inputs: &Inputs, scales: &Array1<f64>, kernel: &KernelRidge, outputs: &MinMax) -> Self {
-        let double = Precision::Double;
-        let KernelRidge {
-            centres,
-            sharpness,
-            linear,
-            coefficients,
-        } = kernel;
-        // Distances in units of the width: exp(−sharpness · |x − c|²).
-        let root = sharpness.sqrt();
-        let (channel_centres, to_inputs) = inputs.affine();
-        let to_inputs = &to_inputs.t() * &(scales * root);
-        let mut builder = Builder::new(channel_centres.len());
-        let zeros = vec![0.0; inputs.count()];
-        let changes = builder.changes(inputs.quantity(), &channel_centres, double);
-        let scaled = builder.affine_of(&changes, to_inputs, &zeros);
-        let distances = builder.squared_distances(scaled, &centres.t() * root, double);
-        let mut basis = builder.map(Function::Gaussian, distances, double);
-        let (weights, constants) = coefficients.view().split_at(Axis(0), centres.nrows());
-        let mut weights = weights.to_owned();
-        if *linear > 0.0 && *sharpness > 0.0 {
-            let slopes = centres.t().dot(&weights) * (linear / root);
-            weights.append(Axis(0), slopes.view()).expect("the same outputs");
-            basis = builder.concatenate(&[basis, scaled]);
-        }
-        let changes = builder.affine(basis, weights, &constants.row(0).to_vec(), double);
-        let targets = builder.restored(changes, outputs);
-        builder.finish(targets)
+        let penalties = Vec::from_iter(scaled.outputs.varying().iter().map(penalty));
+        Ok(scaled.program(shape.kernel, &penalties, subset))
     }
 }
 
@@ -128,23 +93,47 @@ impl Scaled {
             outputs,
         })
     }
+
+    /// Chooses a kernel, and the penalty of each output, on `folds` of some of the samples.
+    fn choose(&self, searched: &[usize], folds: Option<&Folds>, linear: f64) -> (Kernel, Vec<f64>) {
+        let [x, y] = [&self.x, &self.y].map(|of| of.select(Axis(0), searched));
+        Kernel::choose(&x, &y, folds, linear)
+    }
+
+    /// The network of a kernel fitted to the samples.
+    fn program(&self, kernel: Kernel, penalties: &[f64], subset: usize) -> Program {
+        let double = Precision::Double;
+        let (centres, mut weights, constants) = kernel.fit(&self.x, &self.y, penalties, subset);
+        // Distances in units of the width: exp(−sharpness · |x − c|²).
+        let root = kernel.sharpness.sqrt();
+        let (channel_centres, to_inputs) = self.inputs.affine();
+        let to_inputs = &to_inputs.t() * &(&self.scales * root);
+        let mut builder = Builder::new(channel_centres.len());
+        let zeros = vec![0.0; self.inputs.count()];
+        let changes = builder.changes(self.inputs.quantity(), &channel_centres, double);
+        let scaled = builder.affine_of(&changes, to_inputs, &zeros);
+        let distances = builder.squared_distances(scaled, &centres.t() * root, double);
+        let mut basis = builder.map(Function::Gaussian, distances, double);
+        if kernel.linear > 0.0 && kernel.sharpness > 0.0 {
+            let slopes = centres.t().dot(&weights) * (kernel.linear / root);
+            weights.append(Axis(0), slopes.view()).expect("the same outputs");
+            basis = builder.concatenate(&[basis, scaled]);
+        }
+        let changes = builder.affine(basis, weights, &constants.to_vec(), double);
+        let targets = builder.restored(changes, &self.outputs);
+        builder.finish(targets)
+    }
 }
 
-/// Kernel whose width and penalties were chosen by cross-validation.
+/// Kernel and penalties chosen by cross-validation.
 #[derive(Clone, Debug)]
 pub(crate) struct KernelShape {
     /// Quantity and scaling of the inputs.
     inputs: InputChoice,
-    /// 1 / (2 · width²).
-    sharpness: f64,
-    /// Factor of the linear kernel x · x′ that is added to the Gaussian; 0 for none.
-    linear: f64,
+    kernel: Kernel,
     /// Penalty of each target.
     penalties: Vec<f64>,
 }
-
-/// Number of samples from which the shape of a kernel is chosen on given folds.
-const SHAPED: usize = 500;
 
 impl KernelShape {
     /// Chooses width and penalties by the held-out errors in `folds` of `training`; with `is_linear`, a linear kernel is added
@@ -160,17 +149,19 @@ impl KernelShape {
     ) -> Result<Self, NetworkError> {
         let scaled = Scaled::of(training, inputs)?;
         let searched = thinned(training.samples(), SHAPED);
-        let [x, y] = [&scaled.x, &scaled.y].map(|of| of.select(Axis(0), &searched));
-        let linear = if is_linear { 10.0 / x.ncols().max(1) as f64 } else { 0.0 };
-        let (sharpness, chosen) = choose(&x, &y, folds.among(&searched).as_ref(), linear);
+        let linear = if is_linear {
+            10.0 / scaled.x.ncols().max(1) as f64
+        } else {
+            0.0
+        };
+        let (kernel, chosen) = scaled.choose(&searched, folds.among(&searched).as_ref(), linear);
         let mut penalties = vec![f64::INFINITY; training.outputs()];
         for (&target, penalty) in scaled.outputs.varying().iter().zip(chosen) {
             penalties[target] = penalty;
         }
         Ok(Self {
             inputs,
-            sharpness,
-            linear,
+            kernel,
             penalties,
         })
     }
@@ -205,30 +196,9 @@ pub(super) fn thinned(samples: usize, count: usize) -> Vec<usize> {
     (0..kept).map(|place| place * samples / kept).collect()
 }
 
-/// Kernel ridge regression with Gaussians of one width (Saunders, Gammerman and Vovk 1998), which is the mean of a
-/// Gaussian process (Rasmussen and Williams 2006, eq. 2.23).
-///
-/// With K the Gaussians of all pairs of samples, the coefficients are (K + penalty · 1)⁻¹ (y − ȳ). The width is common to
-/// all outputs, and each has its own penalty, both chosen by cross-validation.
-///
-/// Up to four times [`Self::SUBSET`] samples are all centres. Of more, [`Self::SUBSET`] are centres, and the coefficients
-/// minimise the penalised error on up to twenty times as many samples (subset of regressors, ibid., section 8.3.1).
-#[derive(Clone, Debug)]
-struct KernelRidge {
-    /// Centres × inputs.
-    centres: Array2<f64>,
-    /// 1 / (2 · width²).
-    sharpness: f64,
-    /// Factor of the linear kernel that is added to the Gaussian.
-    linear: f64,
-    /// Centres + 1 × outputs, the constant last.
-    coefficients: Array2<f64>,
-}
-
-/// Maximum number of samples from which width and penalties are chosen.
-const MAX_SEARCHED: usize = 800;
 /// Products of sharpness and total variance of the inputs that are compared, as powers of 2.
 const SHARPNESS_EXPONENTS: Range<f64> = -9.0..7.0;
+
 /// Exponent at which the search begins.
 const FIRST_EXPONENT: f64 = -1.0;
 
@@ -237,40 +207,75 @@ fn penalties() -> impl Iterator<Item = f64> {
     std::iter::once(f64::INFINITY).chain((0..=9).map(|place| 0.1_f64.powi(place)))
 }
 
-impl KernelRidge {
-    /// Number of centres in sets of more than four times as many samples.
-    const SUBSET: usize = 1000;
+/// Kernel of ridge regression: Gaussians of one width (Saunders, Gammerman and Vovk 1998), whose fit is the mean of a
+/// Gaussian process (Rasmussen and Williams 2006, eq. 2.23), to which a linear kernel may be added.
+///
+/// With K the kernel between all pairs of samples, the coefficients are (K + penalty · 1)⁻¹ (y − ȳ). The width is common to
+/// all outputs, and each has its own penalty, both chosen by cross-validation.
+#[derive(Clone, Copy, Debug)]
+struct Kernel {
+    /// 1 / (2 · width²).
+    sharpness: f64,
+    /// Factor of the linear kernel x · x′ that is added to the Gaussian; 0 for none.
+    linear: f64,
+}
 
-    /// Fits outputs `y` (samples × outputs) on inputs `x` (samples × inputs), which should have comparable scales; `folds`
-    /// divides some of the samples. There is at least one sample.
-    fn fit(x: &Array2<f64>, y: &Array2<f64>, folds: impl Fn(&[usize]) -> Option<Folds>) -> Self {
-        let searched = thinned(x.nrows(), MAX_SEARCHED);
-        let (of_x, of_y) = (x.select(Axis(0), &searched), y.select(Axis(0), &searched));
-        let (sharpness, penalties) = choose(&of_x, &of_y, folds(&searched).as_ref(), 0.0);
-        let shape = KernelShape {
-            inputs: InputChoice::default(),
-            sharpness,
-            linear: 0.0,
-            penalties,
+impl Kernel {
+    /// Chooses the sharpness, and the penalty of each output, by the error on held-out folds. The inputs `x` (samples ×
+    /// inputs) should have comparable scales.
+    fn choose(x: &Array2<f64>, y: &Array2<f64>, folds: Option<&Folds>, linear: f64) -> (Self, Vec<f64>) {
+        let variance = x.var_axis(Axis(0), 0.0).sum();
+        // Without variance, all Gaussians are 1.
+        let Some(folds) = folds.filter(|_| variance > 0.0) else {
+            let sharpness = 0.0;
+            return (Self { sharpness, linear }, vec![f64::INFINITY; y.ncols()]);
         };
-        Self::of_shape(x, y, &shape, Self::SUBSET)
+        let judge = |exponent: f64| {
+            let sharpness = exponent.exp2() / variance;
+            let kernel = Self { sharpness, linear };
+            let between = kernel.between(x, x);
+            let choice = Choice::new(penalties(), y.ncols(), Choice::PATIENCE, |penalty| {
+                let of_fold = |fold| held_out(&between, y, &folds.without(&[fold]), folds.test(fold), penalty);
+                (0..folds.count()).map(of_fold).collect()
+            });
+            let total = |output: usize| choice.squares.iter().map(|fold| fold[output]).sum::<f64>();
+            // The geometric mean over the outputs, whose errors have different sizes.
+            let score: f64 = (0..y.ncols())
+                .map(|output| total(output).max(f64::MIN_POSITIVE).ln())
+                .sum();
+            (score, (kernel, choice.levels))
+        };
+        let mut at = FIRST_EXPONENT;
+        let mut best = judge(at);
+        for step in [1.0, -1.0] {
+            while SHARPNESS_EXPONENTS.contains(&(at + step)) {
+                let next = judge(at + step);
+                if next.0 >= best.0 {
+                    break;
+                }
+                (best, at) = (next, at + step);
+            }
+        }
+        best.1
     }
 
-    /// Fits the coefficients of a kernel with this shape: of more than `4 · subset` samples, `subset` are centres, and the
-    /// coefficients minimise the error on `20 · subset`.
-    fn of_shape(x: &Array2<f64>, y: &Array2<f64>, shape: &KernelShape, subset: usize) -> Self {
+    /// Fits outputs `y` (samples × outputs) on inputs `x` (samples × inputs); there is at least one sample. Returns the
+    /// centres (centres × inputs), the coefficients (centres × outputs) and the constants.
+    ///
+    /// Up to `4 · subset` samples are all centres. Of more, `subset` are centres, and the coefficients minimise the penalised
+    /// error on up to `20 · subset` samples (subset of regressors, Rasmussen and Williams 2006, section 8.3.1).
+    fn fit(
+        self,
+        x: &Array2<f64>,
+        y: &Array2<f64>,
+        penalties: &[f64],
+        subset: usize,
+    ) -> (Array2<f64>, Array2<f64>, Array1<f64>) {
         let samples = x.nrows();
-        let KernelShape {
-            sharpness,
-            linear,
-            penalties,
-            ..
-        } = shape;
         let means = y.mean_axis(Axis(0)).expect("there are samples");
-        let kernel_of = |x: &Array2<f64>, centres: &Array2<f64>| kernel(x, centres, *sharpness, *linear);
         let (centres, gains) = if samples <= 4 * subset {
             let off = Mat::from_fn(samples, y.ncols(), |s, t| y[[s, t]] - means[t]);
-            let kernel = kernel_of(x, x);
+            let kernel = self.between(x, x);
             let gains = solve(penalties, &off, |penalty| {
                 let mut matrix = kernel.clone();
                 (0..samples).for_each(|sample| matrix[(sample, sample)] += penalty);
@@ -282,7 +287,7 @@ impl KernelRidge {
             let rows = thinned(samples, 20 * subset);
             let (mut gram, mut right) = (Mat::zeros(subset, subset), Mat::zeros(subset, y.ncols()));
             for chunk in rows.chunks(subset) {
-                let basis = kernel_of(&x.select(Axis(0), chunk), &centres);
+                let basis = self.between(&x.select(Axis(0), chunk), &centres);
                 gram += basis.transpose() * &basis;
                 right += basis.transpose() * Mat::from_fn(chunk.len(), y.ncols(), |s, t| y[[chunk[s], t]] - means[t]);
             }
@@ -291,7 +296,7 @@ impl KernelRidge {
                 .map(|centre| gram[(centre, centre)])
                 .fold(rows.len() as f64, f64::max);
             let rounding = f64::EPSILON * subset as f64 * largest;
-            let kernel = kernel_of(&centres, &centres);
+            let kernel = self.between(&centres, &centres);
             let gains = solve(penalties, &right, |penalty| {
                 let mut matrix = &gram + faer::Scale(penalty) * &kernel;
                 (0..subset).for_each(|centre| matrix[(centre, centre)] += rounding);
@@ -299,55 +304,20 @@ impl KernelRidge {
             });
             (centres, gains)
         };
-        let count = centres.nrows();
-        Self {
-            coefficients: Array2::from_shape_fn((count + 1, y.ncols()), |(row, output)| {
-                if row < count {
-                    gains[(row, output)]
-                } else {
-                    means[output]
-                }
-            }),
-            centres,
-            sharpness: *sharpness,
-            linear: *linear,
-        }
+        let gains = Array2::from_shape_fn((centres.nrows(), y.ncols()), |(row, output)| gains[(row, output)]);
+        (centres, gains, means)
     }
-}
 
-/// Chooses the sharpness, and the penalty of each output, by the error on held-out folds.
-fn choose(x: &Array2<f64>, y: &Array2<f64>, folds: Option<&Folds>, linear: f64) -> (f64, Vec<f64>) {
-    let variance = x.var_axis(Axis(0), 0.0).sum();
-    // Without variance, all Gaussians are 1.
-    let Some(folds) = folds.filter(|_| variance > 0.0) else {
-        return (0.0, vec![f64::INFINITY; y.ncols()]);
-    };
-    let judge = |exponent: f64| {
-        let sharpness = exponent.exp2() / variance;
-        let kernel = kernel(x, x, sharpness, linear);
-        let choice = Choice::new(penalties(), y.ncols(), Choice::PATIENCE, |penalty| {
-            let of_fold = |fold| held_out(&kernel, y, &folds.without(&[fold]), folds.test(fold), penalty);
-            (0..folds.count()).map(of_fold).collect()
-        });
-        let total = |output: usize| choice.squares.iter().map(|fold| fold[output]).sum::<f64>();
-        // The geometric mean over the outputs, whose errors have different sizes.
-        let score: f64 = (0..y.ncols())
-            .map(|output| total(output).max(f64::MIN_POSITIVE).ln())
-            .sum();
-        (score, (sharpness, choice.levels))
-    };
-    let mut at = FIRST_EXPONENT;
-    let mut best = judge(at);
-    for step in [1.0, -1.0] {
-        while SHARPNESS_EXPONENTS.contains(&(at + step)) {
-            let next = judge(at + step);
-            if next.0 >= best.0 {
-                break;
+    /// Gaussians between the rows of `x` and `centres`, plus their scalar products times the linear factor.
+    fn between(self, x: &Array2<f64>, centres: &Array2<f64>) -> Mat<f64> {
+        Mat::from_fn(x.nrows(), centres.nrows(), |i, j| {
+            let gaussian = (-self.sharpness * distance2(x.row(i), centres.row(j))).exp();
+            match self.linear {
+                0.0 => gaussian,
+                linear => gaussian + linear * x.row(i).dot(&centres.row(j)),
             }
-            (best, at) = (next, at + step);
-        }
+        })
     }
-    best.1
 }
 
 /// Sum of squared errors of each output on the samples `test` of a fit to the samples `training`; infinite if the kernel
@@ -394,17 +364,6 @@ fn solve(penalties: &[f64], right: &Mat<f64>, mut matrix: impl FnMut(f64) -> Mat
     gains
 }
 
-/// Gaussians between the rows of `x` and `centres`, plus their scalar products times `linear`.
-fn kernel(x: &Array2<f64>, centres: &Array2<f64>, sharpness: f64, linear: f64) -> Mat<f64> {
-    Mat::from_fn(x.nrows(), centres.nrows(), |i, j| {
-        let gaussian = (-sharpness * distance2(x.row(i), centres.row(j))).exp();
-        match linear {
-            0.0 => gaussian,
-            _ => gaussian + linear * x.row(i).dot(&centres.row(j)),
-        }
-    })
-}
-
 /// Squared Euclidean distance.
 #[inline]
 pub(super) fn distance2(a: ArrayView1<'_, f64>, b: ArrayView1<'_, f64>) -> f64 {
@@ -440,18 +399,11 @@ mod tests {
         };
         let mut rng = Seed(0).rng(Stream::Training);
         let set = Dataset::simulate(&model, &scene, 300, &mut rng).unwrap();
-        let inputs = Inputs::fit(InputChoice::BEST, set.readings(), NoiseSource::default()).unwrap();
-        let outputs = MinMax::fit(set.targets()).unwrap();
-        let (x, y) = (inputs.of(set.readings()), outputs.scale(set.targets()));
-        let kernel = KernelRidge::fit(&x, &y, |samples| folds(&set.select(samples)));
-        let program = Program::of_kernel(&inputs, &Array1::ones(x.ncols()), &kernel, &outputs);
-        let mut network = ProgramDecoder::new(program);
-        let KernelRidge {
-            centres,
-            sharpness,
-            coefficients,
-            ..
-        } = kernel;
+        let scaled = Scaled::of(&set, InputChoice::BEST).unwrap();
+        let (kernel, penalties) = scaled.choose(&Vec::from_iter(0..set.samples()), folds(&set).as_ref(), 0.0);
+        let mut network = ProgramDecoder::new(scaled.program(kernel, &penalties, SUBSET));
+        let (centres, coefficients, constants) = kernel.fit(&scaled.x, &scaled.y, &penalties, SUBSET);
+        let (inputs, outputs, x, sharpness) = (&scaled.inputs, &scaled.outputs, &scaled.x, kernel.sharpness);
         let (channel_centres, to_inputs) = inputs.affine();
         let ranges = outputs.middles_and_half_widths();
         let (mut ours_mm, mut plain_mm, mut moved_mm) = (0.0_f64, 0.0_f64, 0.0_f64);
@@ -469,9 +421,9 @@ mod tests {
                 let terms = row.iter().zip(&values).map(|(&weight, value)| exact(weight) * value);
                 terms.fold(exact(0.0), |sum, term| sum + term)
             };
-            let scaled = Vec::from_iter(to_inputs.rows().into_iter().map(dot));
+            let exact_inputs = Vec::from_iter(to_inputs.rows().into_iter().map(dot));
             let gaussians = Vec::from_iter(centres.rows().into_iter().map(|centre| {
-                let apart = centre.iter().zip(&scaled).map(|(&centre, x)| x - exact(centre));
+                let apart = centre.iter().zip(&exact_inputs).map(|(&centre, x)| x - exact(centre));
                 let squares = apart.fold(exact(0.0), |sum, apart| sum + &apart * &apart);
                 (-exact(sharpness) * squares).exp()
             }));
@@ -485,10 +437,10 @@ mod tests {
                 let (middle, half_width) = ranges[target];
                 let gains = coefficients.column(output);
                 let terms = gaussians.iter().zip(gains).map(|(value, &gain)| value * exact(gain));
-                let sum = terms.fold(exact(gains[300]), |sum, term| sum + term);
+                let sum = terms.fold(exact(constants[output]), |sum, term| sum + term);
                 let truth = (sum * exact(half_width) + exact(middle)).to_f64().value();
                 let sum: f64 = plain.iter().zip(gains).map(|(value, gain)| value * gain).sum();
-                let one_by_one = (sum + gains[300]) * half_width + middle;
+                let one_by_one = (sum + constants[output]) * half_width + middle;
                 ours_mm = ours_mm.max((answer[target] - truth).abs());
                 plain_mm = plain_mm.max((one_by_one - truth).abs());
                 moved_mm = moved_mm.max((answer[target] - moved[target]).abs());
@@ -521,17 +473,37 @@ mod tests {
         (x, y)
     }
 
-    fn fitted((x, y): &(Array2<f64>, Array2<f64>)) -> KernelRidge {
-        KernelRidge::fit(x, y, |samples| Some(Folds::consecutive(samples.len(), 5)))
+    /// A kernel fitted to samples.
+    struct Fit {
+        sharpness: f64,
+        centres: Array2<f64>,
+        gains: Array2<f64>,
+        constants: Array1<f64>,
     }
 
-    fn rmse(fit: &KernelRidge, (x, y): &(Array2<f64>, Array2<f64>)) -> Vec<f64> {
-        let count = fit.centres.nrows();
-        let basis = Array2::from_shape_fn((x.nrows(), count + 1), |(sample, centre)| match centre < count {
-            true => gaussian(x.row(sample), fit.centres.row(centre), fit.sharpness),
-            false => 1.0,
+    fn fitted_on((x, y): &(Array2<f64>, Array2<f64>), folds: usize) -> Fit {
+        let searched = thinned(x.nrows(), MAX_SEARCHED);
+        let [of_x, of_y] = [x, y].map(|of| of.select(Axis(0), &searched));
+        let folds = (searched.len() > 1).then(|| Folds::consecutive(searched.len(), folds));
+        let (kernel, penalties) = Kernel::choose(&of_x, &of_y, folds.as_ref(), 0.0);
+        let (centres, gains, constants) = kernel.fit(x, y, &penalties, SUBSET);
+        Fit {
+            sharpness: kernel.sharpness,
+            centres,
+            gains,
+            constants,
+        }
+    }
+
+    fn fitted(samples: &(Array2<f64>, Array2<f64>)) -> Fit {
+        fitted_on(samples, 5)
+    }
+
+    fn rmse(fit: &Fit, (x, y): &(Array2<f64>, Array2<f64>)) -> Vec<f64> {
+        let basis = Array2::from_shape_fn((x.nrows(), fit.centres.nrows()), |(sample, centre)| {
+            gaussian(x.row(sample), fit.centres.row(centre), fit.sharpness)
         });
-        let squares = (basis.dot(&fit.coefficients) - y).mapv(|error| error * error);
+        let squares = (basis.dot(&fit.gains) + &fit.constants - y).mapv(|error| error * error);
         squares.mean_axis(Axis(0)).unwrap().mapv(f64::sqrt).to_vec()
     }
 
@@ -541,11 +513,11 @@ mod tests {
         let (x, y) = wandering(120, 0.3, 1);
         let fit = fitted(&(x.clone(), y.clone()));
         for t in 0..2 {
-            let gains = fit.coefficients.column(t);
+            let gains = fit.gains.column(t);
             let rest: Vec<f64> = (0..120)
                 .map(|sample| {
                     let kernel = |other: usize| gaussian(x.row(sample), x.row(other), fit.sharpness);
-                    y[[sample, t]] - gains[120] - (0..120).map(|other| kernel(other) * gains[other]).sum::<f64>()
+                    y[[sample, t]] - fit.constants[t] - (0..120).map(|other| kernel(other) * gains[other]).sum::<f64>()
                 })
                 .collect();
             let square: f64 = gains.iter().take(120).map(|gain| gain * gain).sum();
@@ -571,8 +543,8 @@ mod tests {
 
     #[test]
     fn larger_sets_have_fewer_centres_and_are_as_accurate() {
-        let fit = fitted(&wandering(4 * KernelRidge::SUBSET + 1, 0.1, 7));
-        assert_eq!(fit.centres.nrows(), KernelRidge::SUBSET);
+        let fit = fitted(&wandering(4 * SUBSET + 1, 0.1, 7));
+        assert_eq!(fit.centres.nrows(), SUBSET);
         let error = rmse(&fit, &wandering(300, 0.0, 8))[0];
         assert!(error < 0.05, "{error}");
     }
@@ -581,9 +553,8 @@ mod tests {
     fn extreme_sets_are_finite() {
         let same = (Array2::ones((40, 3)), wandering(40, 0.1, 9).1);
         for (x, y) in [wandering(1, 0.1, 9), wandering(3, 0.1, 9), same] {
-            let folds = |samples: &[usize]| (samples.len() > 1).then(|| Folds::consecutive(samples.len(), 2));
-            let fit = KernelRidge::fit(&x, &y, folds);
-            assert!(fit.coefficients.iter().all(|value| value.is_finite()));
+            let fit = fitted_on(&(x, y), 2);
+            assert!(fit.gains.iter().chain(&fit.constants).all(|value| value.is_finite()));
         }
     }
 

@@ -250,42 +250,26 @@ impl Choice {
         patience: usize,
         mut squares: impl FnMut(f64) -> Vec<Vec<f64>>,
     ) -> Self {
-        /// The best of an output by now.
-        struct Best {
-            total: f64,
-            level: f64,
-            squares: Vec<f64>,
-            place: usize,
-        }
-        let mut best: Vec<Option<Best>> = (0..outputs).map(|_| None).collect();
-        let mut folds = 0;
+        let mut tried: Vec<(f64, Vec<Vec<f64>>)> = Vec::new();
+        // Place of the best level of each output by now.
+        let mut best = vec![0; outputs];
         for (place, level) in levels.enumerate() {
-            let squares = squares(level);
-            folds = squares.len();
+            tried.push((level, squares(level)));
             for (output, best) in best.iter_mut().enumerate() {
-                let squares: Vec<f64> = squares.iter().map(|fold| fold[output]).collect();
-                let total = squares.iter().sum();
-                if best.as_ref().is_none_or(|best| total < best.total) {
-                    *best = Some(Best {
-                        total,
-                        level,
-                        squares,
-                        place,
-                    });
+                let total = |place: usize| tried[place].1.iter().map(|fold| fold[output]).sum::<f64>();
+                if total(place) < total(*best) {
+                    *best = place;
                 }
             }
-            let is_past = |best: &Option<Best>| best.as_ref().is_some_and(|best| place - best.place >= patience);
             // Large penalties may be worse than the mean where smaller ones are better.
-            if place > patience.saturating_mul(2) && best.iter().all(is_past) {
+            if place > patience.saturating_mul(2) && best.iter().all(|best| place - best >= patience) {
                 break;
             }
         }
-        let best = Vec::from_iter(best.into_iter().flatten());
+        let of_fold = |fold: usize| Vec::from_iter((0..outputs).map(|output| tried[best[output]].1[fold][output]));
         Self {
-            levels: best.iter().map(|best| best.level).collect(),
-            squares: (0..folds)
-                .map(|fold| best.iter().map(|best| best.squares[fold]).collect())
-                .collect(),
+            levels: best.iter().map(|&best| tried[best].0).collect(),
+            squares: (0..tried[0].1.len()).map(of_fold).collect(),
         }
     }
 }

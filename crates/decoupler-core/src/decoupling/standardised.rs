@@ -6,6 +6,7 @@ use super::ridge::{Regression, Ridge};
 use crate::{
     dataset::{Dataset, DatasetError, Folds, Seed, SplitBy, Stream},
     network::NetworkError,
+    numerics::mean,
 };
 
 /// Centre and scale of each feature. A feature that is constant, or nearly so, has the scale 0: its deviations are
@@ -29,33 +30,28 @@ impl Standard {
     /// # Errors
     /// If there are no values, or they overflow.
     pub fn fit(values: ArrayView2<'_, f64>, of: impl Fn(f64) -> f64) -> Result<Self, NetworkError> {
-        let (samples, features) = values.dim();
-        if samples == 0 {
+        if values.nrows() == 0 {
             return Err(NetworkError::Empty);
         }
-        let first: Vec<f64> = values.row(0).iter().map(|&value| of(value)).collect();
-        let (mut shift, mut largest) = (vec![0.0; features], vec![0.0_f64; features]);
-        for row in values.rows() {
-            for (feature, &value) in row.iter().enumerate() {
-                let value = of(value);
-                shift[feature] += (value - first[feature]) / samples as f64;
-                largest[feature] = largest[feature].max(value.abs());
-            }
+        let (mut centre, mut deviations) = (Vec::new(), Vec::new());
+        for feature in values.columns() {
+            let feature = feature.mapv(&of);
+            let mean = mean(feature.view());
+            // Relative to the largest value, whose square may overflow.
+            let largest = feature.fold(0.0_f64, |largest, value| largest.max(value.abs()));
+            let off = feature.mapv(|value| (value - mean) / largest.max(f64::MIN_POSITIVE));
+            let relative = off
+                .mapv(|off| off * off / values.nrows() as f64)
+                .iter()
+                .sum::<f64>()
+                .sqrt();
+            centre.push(mean);
+            deviations.push(if relative <= Self::CONSTANT {
+                0.0
+            } else {
+                relative * largest
+            });
         }
-        let centre: Vec<f64> = first.iter().zip(&shift).map(|(first, shift)| first + shift).collect();
-        // Relative to the largest value, whose square may overflow.
-        let mut squares = vec![0.0; features];
-        for row in values.rows() {
-            for (feature, &value) in row.iter().enumerate() {
-                let off = (of(value) - centre[feature]) / largest[feature].max(f64::MIN_POSITIVE);
-                squares[feature] += off * off / samples as f64;
-            }
-        }
-        let deviation = |(square, largest): (&f64, &f64)| match square.sqrt() {
-            relative if relative > Self::CONSTANT => relative * largest,
-            _ => 0.0,
-        };
-        let deviations: Vec<f64> = squares.iter().zip(&largest).map(deviation).collect();
         let smallest = Self::SMALLEST * deviations.iter().copied().fold(0.0, f64::max);
         let scale = |&deviation: &f64| match deviation {
             0.0 => 0.0,
@@ -65,13 +61,8 @@ impl Standard {
             scale: deviations.iter().map(scale).collect(),
             centre,
         };
-        let all = standard
-            .centre
-            .iter()
-            .chain(&deviations)
-            .chain(&squares)
-            .chain(&standard.scale);
-        if all.copied().all(f64::is_finite) {
+        let mut all = standard.centre.iter().chain(&deviations).chain(&standard.scale);
+        if all.all(|value| value.is_finite()) {
             Ok(standard)
         } else {
             Err(NetworkError::NotConverged)

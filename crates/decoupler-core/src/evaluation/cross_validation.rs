@@ -57,16 +57,16 @@ pub struct CrossValidated {
 }
 
 /// Networks trained, with the number and time of their epochs.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Effort {
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Effort {
     /// Number of networks trained, each with all starts: 1, or one per fold.
-    pub(super) networks: usize,
+    pub networks: usize,
     /// Number of epochs, over all starts and folds.
-    pub(super) epochs: usize,
+    pub epochs: usize,
     /// Total time of the epochs.
-    pub(super) seconds: f64,
+    pub seconds: f64,
     /// Time of the fastest epoch, which is least affected by other load on the machine.
-    pub(super) min_epoch_seconds: f64,
+    pub min_epoch_seconds: Option<f64>,
 }
 
 impl CrossValidation {
@@ -165,17 +165,6 @@ impl CrossValidated {
     }
 }
 
-impl Default for Effort {
-    fn default() -> Self {
-        Self {
-            networks: 0,
-            epochs: 0,
-            seconds: 0.0,
-            min_epoch_seconds: f64::INFINITY,
-        }
-    }
-}
-
 impl Effort {
     /// Trains `run` to its end, unless the job is cancelled, and counts its effort.
     pub(super) fn train(&mut self, run: &mut Run, job: &Job<'_>) -> Result<(), Cancelled> {
@@ -185,7 +174,8 @@ impl Effort {
             let at_work = at_work.count() as f64;
             let begun = Instant::now();
             run.step();
-            self.min_epoch_seconds = self.min_epoch_seconds.min(begun.elapsed().as_secs_f64() / at_work);
+            let seconds = begun.elapsed().as_secs_f64() / at_work;
+            self.min_epoch_seconds = Some(self.min_epoch_seconds.map_or(seconds, |least| least.min(seconds)));
         }
         self.networks += 1;
         for trainer in run.trainers() {

@@ -10,9 +10,12 @@ use super::{
     table::frame_us,
 };
 use crate::{
-    dataset::Dataset,
-    decoupling::{Decoder, DecoderKind, FitProblem, Precision, SolvedRows, decode_set, resistance_residual},
-    network::Networks,
+    dataset::{Dataset, PerRow, Simulation, Stream},
+    decoupling::{
+        Decoder, DecoderKind, NewtonDecoder, Precision, Program, ProgramDecoder, SolvedRows, decode_set,
+        resistance_residual,
+    },
+    network::{InputChoice, NetworkError, Networks},
     problem::Problem,
     sensor::SensorModel,
 };
@@ -74,17 +77,49 @@ impl DecoderSet {
     /// # Errors
     /// If samples cannot be scaled, or the sensor has no resistances at rest.
     pub fn decoder(&self, kind: DecoderKind, precision: Precision) -> Result<Option<Box<dyn Decoder>>, RunError> {
-        let sensor = self.problem.sensor.as_ref();
-        Ok(kind.fit(&FitProblem {
-            training: &self.training,
-            row_model: self.settings.source.row_model(),
-            inputs: self.settings.inputs,
-            unseen: unseen_noise(sensor)?,
-            sensor: sensor.map(|simulation| (&simulation.sensor, &simulation.scene)),
-            networks: self.networks.as_ref(),
-            precision,
-            seed: self.settings.seed,
-        })?)
+        let InputChoice { quantity, .. } = self.settings.inputs;
+        let unseen = unseen_noise(self.problem.sensor.as_ref())?;
+        let mut rng = self.settings.seed.rng(Stream::Expectation);
+        let network = |precision| {
+            let program = self.networks.as_ref()?.program(precision);
+            Some(Box::new(ProgramDecoder::new(program)) as Box<dyn Decoder>)
+        };
+        match kind {
+            DecoderKind::Mean => self.of_samples(|set| Ok(Program::mean(set))),
+            DecoderKind::Ridge => self.of_samples(|set| Program::ridge(set, quantity, unseen)),
+            DecoderKind::RadialBasis => {
+                self.of_samples(|set| Program::radial_basis(set, self.settings.inputs, unseen, &mut rng))
+            }
+            DecoderKind::Fuzzy => self.of_samples(|set| Program::fuzzy(set, quantity, unseen, &mut rng)),
+            DecoderKind::Network => Ok(network(precision)),
+            DecoderKind::Newton => self.on_equations(|newton| newton),
+            DecoderKind::Polish => match network(Precision::Double) {
+                Some(network) => self.on_equations(|newton| newton.after(network, DecoderKind::POLISH_STEPS)),
+                None => Ok(None),
+            },
+        }
+    }
+
+    /// Fits one program to the samples of all row-wires, or one for each.
+    fn of_samples(
+        &self,
+        fit: impl FnMut(&Dataset) -> Result<Program, NetworkError>,
+    ) -> Result<Option<Box<dyn Decoder>>, RunError> {
+        let programs = PerRow::fit(&self.training, self.settings.source.row_model(), fit)?;
+        Ok(Some(Box::new(ProgramDecoder::new(Program::each(&programs)))))
+    }
+
+    /// Creates a decoder for the rows that were read, and changes it; `None` without a sensor.
+    fn on_equations(
+        &self,
+        change: impl FnOnce(NewtonDecoder) -> NewtonDecoder,
+    ) -> Result<Option<Box<dyn Decoder>>, RunError> {
+        let Some((Simulation { sensor, scene, .. }, rows)) =
+            self.problem.sensor.as_ref().zip(self.training.row_wires_read())
+        else {
+            return Ok(None);
+        };
+        Ok(Some(Box::new(change(NewtonDecoder::new(sensor, scene, rows)?))))
     }
 
     /// Fits the linear map of the error table.

@@ -2,7 +2,8 @@ use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use super::table::{ErrorMeasure, Figures};
-use crate::{dataset::Dataset, problem::Problem};
+pub(crate) use crate::numerics::mean;
+use crate::{dataset::Dataset, numerics::interpolated, problem::Problem};
 
 /// Errors of decoupled coordinates of the nodes in a test set.
 ///
@@ -261,17 +262,6 @@ impl TargetErrors {
     }
 }
 
-/// Returns the mean as that of the deviations from the first value, so that a large offset does not hide small
-/// differences; NaN without values.
-pub(crate) fn mean(values: ArrayView1<'_, f64>) -> f64 {
-    let first = values.first().copied().unwrap_or(f64::NAN);
-    first
-        + values
-            .iter()
-            .map(|value| (value - first) / values.len() as f64)
-            .sum::<f64>()
-}
-
 /// Returns the smallest and the largest value.
 pub(crate) fn extremes(values: ArrayView1<'_, f64>) -> (f64, f64) {
     values
@@ -309,12 +299,7 @@ impl Spread {
         let mut sorted: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
         let last = sorted.len().checked_sub(1)?;
-        let quantile = |share: f64| {
-            let place = share * last as f64;
-            let below = place.floor() as usize;
-            let (low, high) = (sorted[below], sorted[(below + 1).min(last)]);
-            low + (place - below as f64) * (high - low)
-        };
+        let quantile = |share: f64| interpolated(&sorted, share * last as f64);
         Some(Self {
             smallest: sorted[0],
             lower_quartile: quantile(0.25),

@@ -22,7 +22,10 @@ use crate::{
     scene::SceneError,
     sensor::SensorError,
     text::counted,
-    training::{Method, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingError, check_width},
+    training::{
+        Method, SettingError, StopReason, StoppingRules, Trainer, TrainerState, TrainingError, check_width,
+        for_each_part,
+    },
 };
 
 /// Run: its sets of samples, one training per start, and the errors of the best network.
@@ -60,15 +63,7 @@ impl Run {
     pub fn step(&mut self) -> Option<StopReason> {
         let begun = Instant::now();
         self.intervals = None;
-        match self.starts.as_mut_slice() {
-            // Stays on this thread, which saves a thread switch per epoch.
-            [only] => {
-                only.step();
-            }
-            all => all.par_iter_mut().for_each(|start| {
-                start.step();
-            }),
-        }
+        for_each_part(&mut self.starts, StartTrainer::step);
         self.wall_time = self.wall_time.map(|time| time.saturating_add(begun.elapsed()));
         self.stop_reason()
     }

@@ -1,11 +1,10 @@
 use std::time::Duration;
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::{
     network::Mlp,
-    training::{EpochRecord, Stage, StopReason, Trainer},
+    training::{EpochRecord, Stage, StopReason, Trainer, for_each_part},
 };
 
 /// Result of one start of a run.
@@ -85,23 +84,16 @@ impl StartTrainer {
         &self.rows
     }
 
-    /// Runs one epoch of every training that has not ended. Returns the reason for stopping once all have ended.
-    pub(super) fn step(&mut self) -> Option<StopReason> {
+    /// Runs one epoch of every training that has not ended.
+    pub(super) fn step(&mut self) {
         let next = |trainer: &Trainer| trainer.stop_reason().is_none().then(|| trainer.history().len());
         let first_new = self.rows.iter().filter_map(next).min();
-        match self.rows.as_mut_slice() {
-            // Stays on this thread, which saves a thread switch per epoch.
-            [only] => {
-                only.step();
-            }
-            all => all.par_iter_mut().for_each(|trainer| {
-                trainer.step();
-            }),
-        }
+        for_each_part(&mut self.rows, |trainer| {
+            trainer.step();
+        });
         if let Some(first_new) = first_new {
             self.extend_history(first_new);
         }
-        self.stop_reason()
     }
 
     fn extend_history(&mut self, from: usize) {

@@ -2,7 +2,7 @@ use std::{hint::black_box, time::Instant};
 
 use super::{Coverage, Errors, PublishedErrors, Scores, TargetErrors, TestErrors, recorded::HysteresisLoop};
 use crate::{
-    dataset::{Dataset, Frames},
+    dataset::Dataset,
     decoupling::{DecodeError, Decoder},
     numerics::median,
     problem::{Channel, Problem},
@@ -91,42 +91,33 @@ impl ErrorMeasure {
     ];
     pub(super) const OF_TARGETS: &[Self] = Self::OF_TARGETS_WITH_INTERVALS.split_at(5).0;
 
+    /// Name in files, heading, and fixed unit.
+    fn names(self) -> (&'static str, &'static str, &'static str) {
+        match self {
+            Self::ZPercent => ("z_percent", "Z", "%"),
+            Self::XPercent => ("x_percent", "X", "%"),
+            Self::YPercent => ("y_percent", "Y", "%"),
+            Self::ZMm => ("z_mm", "Z", "mm"),
+            Self::ZStrokePercent => ("z_full_scale_percent", "Z", "% of the stroke"),
+            Self::WorstMm => ("worst_mm", "worst node", "mm"),
+            Self::Rmse => ("rmse", "RMSE", ""),
+            Self::Mae => ("mae", "MAE", ""),
+            Self::R2 => ("r2", "R²", ""),
+            Self::Worst => ("worst", "worst", ""),
+            Self::RangePercent => ("percent_of_range", "MAE", "% of range"),
+            Self::CoveragePercent => ("coverage_percent", "in 90 % interval", "%"),
+            Self::HalfWidth => ("half_width", "90 % interval ±", ""),
+        }
+    }
+
     /// Name in files, such as `z_percent`.
     pub fn field(self) -> &'static str {
-        match self {
-            Self::ZPercent => "z_percent",
-            Self::XPercent => "x_percent",
-            Self::YPercent => "y_percent",
-            Self::ZMm => "z_mm",
-            Self::ZStrokePercent => "z_full_scale_percent",
-            Self::WorstMm => "worst_mm",
-            Self::Rmse => "rmse",
-            Self::Mae => "mae",
-            Self::R2 => "r2",
-            Self::Worst => "worst",
-            Self::RangePercent => "percent_of_range",
-            Self::CoveragePercent => "coverage_percent",
-            Self::HalfWidth => "half_width",
-        }
+        self.names().0
     }
 
     /// Returns the heading and the fixed unit; the unit is empty if it is the unit of the target.
     pub fn heading(self) -> (&'static str, &'static str) {
-        match self {
-            Self::ZPercent => ("Z", "%"),
-            Self::XPercent => ("X", "%"),
-            Self::YPercent => ("Y", "%"),
-            Self::ZMm => ("Z", "mm"),
-            Self::ZStrokePercent => ("Z", "% of the stroke"),
-            Self::WorstMm => ("worst node", "mm"),
-            Self::Rmse => ("RMSE", ""),
-            Self::Mae => ("MAE", ""),
-            Self::R2 => ("R²", ""),
-            Self::Worst => ("worst", ""),
-            Self::RangePercent => ("MAE", "% of range"),
-            Self::CoveragePercent => ("in 90 % interval", "%"),
-            Self::HalfWidth => ("90 % interval ±", ""),
-        }
+        (self.names().1, self.names().2)
     }
 
     /// Returns the definition in a sentence.
@@ -327,14 +318,14 @@ pub fn frame_us(decoder: &mut dyn Decoder, test: &Dataset) -> Result<f64, Decode
     const BLOCK_SECONDS: f64 = 100e-6;
     const MAX_SECONDS: f64 = 0.03;
     let frames = test.frames().ok();
-    let count = frames.as_ref().map_or(test.samples(), Frames::count);
+    let count = frames.as_ref().map_or(test.samples(), Vec::len);
     let mut places = (0..count).cycle();
     let mut answer = vec![0.0; test.row_count() * test.outputs()];
     let mut decode = |count: usize| -> Result<f64, DecodeError> {
         let begun = Instant::now();
         for place in places.by_ref().take(count) {
             match &frames {
-                Some(frames) => decoder.decode(black_box(frames.frame(place)), &mut answer)?,
+                Some(frames) => decoder.decode(black_box(&frames[place]), &mut answer)?,
                 None => {
                     let readings = black_box(test.sample_readings(place));
                     decoder.decode_row(test.row_index(place), readings, &mut answer[..test.outputs()])?;

@@ -4,7 +4,7 @@ use super::{RunError, RunSettings};
 use crate::{
     dataset::{Dataset, Simulation},
     decoupling::{DecoderKind, GaussianPrior},
-    machine::{MemoryBudget, Speed, node_pairs_per_row},
+    machine::{MemoryBudget, multiplications_per_second, node_pairs_per_row, node_pairs_per_second},
     network::{ScalingChoice, Shape},
     scene::{Movement, Rows},
     training::Method,
@@ -145,17 +145,17 @@ impl Workload {
     /// Time to draw the samples on one thread of this machine. The first call of this or another time measures its speed,
     /// which takes about 20 ms; large runs are faster with more threads.
     pub fn drawing_time(&self) -> Duration {
-        duration(self.node_pairs / Speed::measured().node_pairs)
+        duration(self.node_pairs / node_pairs_per_second())
     }
 
     /// Time per epoch on one thread of this machine.
     pub fn epoch_time(&self) -> Duration {
-        duration(self.epoch_multiplications / Speed::measured().multiplications)
+        duration(self.epoch_multiplications / multiplications_per_second())
     }
 
     /// Time of all epochs on one thread of this machine, if none of the other stopping rules ends the training.
     pub fn training_time(&self) -> Duration {
-        duration(self.multiplications() / Speed::measured().multiplications)
+        duration(self.multiplications() / multiplications_per_second())
     }
 
     /// Checks that the work fits into `memory`.

@@ -5,7 +5,10 @@ use ndarray::{ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
 use super::LiveError;
-use crate::{numerics::correlation_time, problem::Channel};
+use crate::{
+    numerics::{correlation_time, mean, root_mean_square},
+    problem::Channel,
+};
 
 /// Description of the training readings against which [`DriftMonitor`] compares later readings: the range over blocks of
 /// training readings of
@@ -278,16 +281,12 @@ impl DriftReference {
 /// Returns the mean of `readings` and the reciprocal of their standard deviation, which is 0 if they are constant; `None`
 /// if they are not finite.
 fn scale(readings: ArrayView1<'_, f64>) -> Option<(f64, f64)> {
-    let count = readings.len() as f64;
+    let mean = mean(readings);
     // Differences are exact in readings with a large offset, and 0 in constant ones.
-    let first = *readings.first()?;
-    let mean = first + readings.iter().map(|reading| (reading - first) / count).sum::<f64>();
-    let largest = readings.fold(0.0_f64, |largest, reading| largest.max((reading - mean).abs()));
-    let is_finite = readings.iter().all(|reading| reading.is_finite()) && mean.is_finite() && largest.is_finite();
-    let square = |reading: &f64| ((reading - mean) / largest).powi(2);
-    let deviation = largest * (readings.iter().map(square).sum::<f64>() / count).sqrt();
+    let deviation = root_mean_square(readings.iter().map(|reading| (reading - mean).abs()));
+    let is_finite = readings.iter().all(|reading| reading.is_finite()) && mean.is_finite() && deviation.is_finite();
     let inverse = deviation.recip();
-    // NaN if all differences are 0, and infinite if they are too small to divide by.
+    // Infinite if all differences are 0, or too small to divide by.
     let inverse = if inverse.is_finite() { inverse } else { 0.0 };
     is_finite.then_some((mean, inverse))
 }

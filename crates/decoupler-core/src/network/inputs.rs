@@ -3,11 +3,8 @@ use std::fmt;
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    ChannelNoise, MinMax, NetworkError, Quantity, Whitening,
-    quantity::{root_mean_square, rounding},
-};
-use crate::{scene::NoiseSource, sensor::RelativeNoise, text::Named};
+use super::{ChannelNoise, MinMax, NetworkError, Quantity, Whitening, quantity::rounding};
+use crate::{numerics::root_mean_square, scene::NoiseSource, sensor::RelativeNoise, text::Named};
 
 /// Choice of the input quantity and its scaling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

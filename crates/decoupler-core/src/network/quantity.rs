@@ -3,7 +3,7 @@ use std::fmt;
 use ndarray::{Array2, ArrayView1, ArrayView2, CowArray, Ix2};
 use serde::{Deserialize, Serialize};
 
-use crate::text::Named;
+use crate::{numerics::root_mean_square, text::Named};
 
 use super::NetworkError;
 
@@ -46,14 +46,18 @@ impl Quantity {
         }
     }
 
-    /// Returns `true` if the quantity is defined for a reading: any finite number if raw, otherwise a finite number
-    /// above 0.
+    /// Returns the readings for which the quantity is defined: any finite number if raw, otherwise a finite number above 0.
+    pub fn domain(self) -> Domain {
+        match self {
+            Self::Raw => Domain::Finite,
+            Self::Resistance | Self::Conductance | Self::LogResistance => Domain::Positive,
+        }
+    }
+
+    /// Returns `true` if the quantity is defined for a reading.
     #[inline(always)]
     pub fn accepts(self, reading: f64) -> bool {
-        match self {
-            Self::Raw => reading.is_finite(),
-            _ => (reading > 0.0) & (reading < f64::INFINITY),
-        }
+        self.domain().contains(reading)
     }
 
     /// Checks that the quantity is defined for all readings (samples × channels).
@@ -86,6 +90,27 @@ impl Quantity {
             Self::Conductance => three / (1.0 - three) / (3.0 * resistance_ohm),
             Self::LogResistance => -(-three).ln_1p() / 3.0,
         }
+    }
+}
+
+/// Numbers that are accepted as readings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Domain {
+    /// Any finite number.
+    Finite,
+    /// A finite number above 0.
+    Positive,
+}
+
+impl Domain {
+    /// `true` for numbers of the domain.
+    #[inline(always)]
+    pub fn contains(self, value: f64) -> bool {
+        let above = match self {
+            Self::Finite => f64::NEG_INFINITY,
+            Self::Positive => 0.0,
+        };
+        (value > above) & (value < f64::INFINITY)
     }
 }
 
@@ -147,18 +172,6 @@ fn step(channel: ArrayView1<'_, f64>) -> Option<f64> {
         (steps - steps.round()).abs() < TOLERANCE
     };
     (rounding < TOLERANCE * step && values.iter().all(is_whole)).then_some(step)
-}
-
-/// Returns the root mean square of finite nonnegative values, without overflow.
-pub(super) fn root_mean_square(values: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
-    let count = values.len().max(1) as f64;
-    let largest = values.clone().fold(0.0, f64::max);
-    let relative: f64 = values.map(|value| (value / largest).powi(2)).sum();
-    if largest > 0.0 {
-        largest * (relative / count).sqrt()
-    } else {
-        0.0
-    }
 }
 
 /// Errors of the values of each channel: standard deviations in the unit of the values.

@@ -41,25 +41,17 @@ pub(crate) fn tanh_single(x: f32) -> f32 {
     const ROUND: f32 = 12_582_912.0;
     /// Beyond 2|x| = 20 the result rounds to ±1.
     const SATURATED: f32 = 20.0;
-    /// 1/n! from n = 7 down to 2; the remainder is below 1e-8.
-    const INVERSE_FACTORIALS: [f32; 6] = [
-        1.0 / 5_040.0,
-        1.0 / 720.0,
-        1.0 / 120.0,
-        1.0 / 24.0,
-        1.0 / 6.0,
-        1.0 / 2.0,
-    ];
-
+    /// The remainder is below 1e-8.
+    const COEFFICIENTS: [f64; 6] = inverse_factorials();
     let twice = 2.0 * x.abs();
     // Written so that NaN passes through.
     let y = if twice > SATURATED { SATURATED } else { twice };
     let shifted = y * std::f32::consts::LOG2_E + ROUND;
     let k = shifted - ROUND;
     let r = (y - k * LN2_HIGH) - k * LN2_LOW;
-    let mut tail = INVERSE_FACTORIALS[0];
-    for coefficient in &INVERSE_FACTORIALS[1..] {
-        tail = tail * r + coefficient;
+    let mut tail = COEFFICIENTS[0] as f32;
+    for coefficient in &COEFFICIENTS[1..] {
+        tail = tail * r + *coefficient as f32;
     }
     let less_one = r + r * r * tail;
     let power = f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23));
@@ -89,31 +81,27 @@ pub(super) fn parts(x: f64) -> (f64, f64) {
     const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
     /// Adding 1.5·2⁵² leaves the nearest integer in the low bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
-    /// 1/n! from n = 13 down to 2.
-    const INVERSE_FACTORIALS: [f64; 12] = [
-        1.0 / 6_227_020_800.0,
-        1.0 / 479_001_600.0,
-        1.0 / 39_916_800.0,
-        1.0 / 3_628_800.0,
-        1.0 / 362_880.0,
-        1.0 / 40_320.0,
-        1.0 / 5_040.0,
-        1.0 / 720.0,
-        1.0 / 120.0,
-        1.0 / 24.0,
-        1.0 / 6.0,
-        1.0 / 2.0,
-    ];
-
+    const COEFFICIENTS: [f64; 12] = inverse_factorials();
     let shifted = x * std::f64::consts::LOG2_E + ROUND;
     let k = shifted - ROUND;
     let r = (x - k * LN2_HIGH) - k * LN2_LOW;
-    let mut tail = INVERSE_FACTORIALS[0];
-    for coefficient in &INVERSE_FACTORIALS[1..] {
+    let mut tail = COEFFICIENTS[0];
+    for coefficient in &COEFFICIENTS[1..] {
         tail = tail * r + coefficient;
     }
     let power = f64::from_bits((shifted.to_bits() << 52).wrapping_add(1023 << 52));
     (power, r + r * r * tail)
+}
+
+/// Returns 1/n! from n = N + 1 down to 2, the coefficients of eʳ.
+const fn inverse_factorials<const N: usize>() -> [f64; N] {
+    let (mut all, mut factorial, mut n) = ([0.0; N], 1.0, 2);
+    while n < N + 2 {
+        factorial *= n as f64;
+        all[N + 1 - n] = 1.0 / factorial;
+        n += 1;
+    }
+    all
 }
 
 #[cfg(test)]

@@ -130,14 +130,9 @@ impl Scene {
         self.largest_compression * geometry.height_mm
     }
 
-    /// Prepares to draw deformations of `model`.
-    pub(crate) fn sampler(&self, model: &SensorModel) -> DeformationSampler {
-        DeformationSampler::new(self, model)
-    }
-
     /// Draws a deformation of `model`.
     pub fn draw(&self, model: &SensorModel, rng: &mut impl Rng) -> Deformation {
-        self.sampler(model).draw(rng)
+        DeformationSampler::new(self, model).draw(rng)
     }
 
     /// Returns the number of unknowns of each row-wire: the coordinates that vary in the scene.
@@ -260,7 +255,7 @@ mod tests {
         let model = SensorModel::new(ArrayScale::default());
         for scene in scenes() {
             scene.check().unwrap();
-            let sampler = scene.sampler(&model);
+            let sampler = DeformationSampler::new(&scene, &model);
             let mut rng = Seed(0).rng(Stream::Training);
             let mut largest = glam::DVec3::ZERO;
             for _ in 0..200 {

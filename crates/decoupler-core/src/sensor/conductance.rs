@@ -57,24 +57,23 @@ impl RowConductance {
     /// # Panics
     /// If there are not M2 displacements.
     pub fn evaluate(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
-        assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
-        let at = (model, row, displacements_mm);
-        let (sums, derivatives) = (&mut self.sums[..], &mut self.derivatives[..]);
-        match (self.axes, self.is_refined) {
-            (Axes::Z, false) => sum_reciprocal_distances::<1, false>(at, sums, derivatives),
-            (Axes::Z, true) => sum_reciprocal_distances::<1, true>(at, sums, derivatives),
-            (Axes::Xyz, false) => sum_reciprocal_distances::<3, false>(at, sums, derivatives),
-            (Axes::Xyz, true) => sum_reciprocal_distances::<3, true>(at, sums, derivatives),
+        match self.axes {
+            Axes::Z => self.sum::<1>(model, row, displacements_mm),
+            Axes::Xyz => self.sum::<3>(model, row, displacements_mm),
         }
     }
 
     /// Evaluates only the sums, bit-identical to [`Self::evaluate`]; derivatives remain those of the last evaluation.
     pub(crate) fn evaluate_sums(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
+        self.sum::<0>(model, row, displacements_mm);
+    }
+
+    fn sum<const AXES: usize>(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
         assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
-        let at = (model, row, displacements_mm);
+        let (at, derivatives) = ((model, row, displacements_mm), &mut self.derivatives[..]);
         match self.is_refined {
-            false => sum_reciprocal_distances::<0, false>(at, &mut self.sums, &mut []),
-            true => sum_reciprocal_distances::<0, true>(at, &mut self.sums, &mut []),
+            false => sum_reciprocal_distances::<AXES, false>(at, &mut self.sums, derivatives),
+            true => sum_reciprocal_distances::<AXES, true>(at, &mut self.sums, derivatives),
         }
     }
 

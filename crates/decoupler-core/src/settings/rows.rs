@@ -198,9 +198,7 @@ impl<S: Clone> Setting<S> {
         }
         Ok(())
     }
-}
 
-impl<S> Setting<S> {
     /// Creates a row.
     pub const fn new(
         name: &'static str,

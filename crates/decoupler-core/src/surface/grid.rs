@@ -2,7 +2,7 @@ use std::ops::RangeInclusive;
 
 use glam::DVec2;
 
-use super::error::SurfaceError;
+use super::SurfaceError;
 
 /// A rectangular grid through the nodes of a lattice that extends half a pitch beyond them; for scattered nodes, a grid
 /// through the outermost of them.

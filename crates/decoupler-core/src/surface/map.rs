@@ -3,7 +3,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use glam::DVec2;
 
 use super::{
-    error::SurfaceError,
+    SurfaceError,
     grid::{Grid, GridAxis, SortedAxis},
     spline::{Point, Weights},
 };
@@ -117,11 +117,6 @@ impl SurfaceMap {
         self.beyond[self.grid.index(ix, iy)]
     }
 
-    /// Returns the number of nodes; for a lattice, rows × nodes per row.
-    pub fn node_count(&self) -> usize {
-        self.nodes
-    }
-
     /// Describes the interpolation between the nodes, which reproduces constants and planes:
     ///
     /// - a thin-plate spline, the biharmonic spline with a plane (Duchon 1977). MATLAB's `griddata(…, 'v4')`, used for the
@@ -146,7 +141,7 @@ impl SurfaceMap {
     /// scattered nodes there is no surface.
     ///
     /// # Panics
-    /// If `node_values` does not have [`Self::node_count`] entries.
+    /// If there is not one value for each node.
     pub fn evaluate(&self, node_values: &[f64]) -> Vec<f64> {
         assert_eq!(node_values.len(), self.nodes, "one value per node");
         // A missing value would affect the whole spline.

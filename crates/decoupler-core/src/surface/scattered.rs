@@ -6,7 +6,7 @@
 use glam::DVec2;
 
 use super::{
-    error::SurfaceError,
+    SurfaceError,
     grid::{CLOSEST_RELATIVE, Grid, GridAxis, check_coordinates},
     map::{MAX_SPLINE_NODES, SurfaceMap, affordable},
     spline::{Point, Weights},

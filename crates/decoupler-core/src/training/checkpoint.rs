@@ -38,11 +38,6 @@ pub struct TrainerState {
 const SAME_ERROR: f64 = 1e-6;
 
 impl TrainerState {
-    /// Returns the method and the stopping rules.
-    pub fn settings(&self) -> &TrainingSettings {
-        &self.settings
-    }
-
     /// Returns the records of all epochs so far.
     pub fn history(&self) -> &[EpochRecord] {
         &self.history

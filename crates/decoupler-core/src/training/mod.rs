@@ -24,5 +24,6 @@ pub use checkpoint::TrainerState;
 pub use ending::StopReason;
 pub use examples::Examples;
 use method::MethodState;
+pub(crate) use parallel::for_each_part;
 use trainer::Evaluation;
 pub use trainer::{EpochRecord, ExampleSets, Stage, Trainer, TrainingError, check_width};

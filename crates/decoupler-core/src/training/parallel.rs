@@ -48,7 +48,7 @@ pub(super) fn parts(blocks: usize, parts: usize) -> impl Iterator<Item = Range<u
 }
 
 /// Calls `work` for each part, on any thread.
-pub(super) fn for_each_part<P: Send>(parts: &mut [P], work: impl Fn(&mut P) + Sync + Send) {
+pub(crate) fn for_each_part<P: Send>(parts: &mut [P], work: impl Fn(&mut P) + Sync + Send) {
     match parts {
         // Bypasses the thread pool.
         [part] => work(part),

@@ -23,10 +23,9 @@ fn frames_equal_rows_bit_for_bit() {
     {
         let frames = test.frames().unwrap();
         let (channels, outputs) = (decoder.channels(), decoder.outputs());
-        let mut whole = vec![0.0; frames.rows() * outputs];
+        let mut whole = vec![0.0; test.row_count() * outputs];
         let mut row_by_row = whole.clone();
-        for frame in 0..frames.count() {
-            let readings = frames.frame(frame);
+        for (frame, readings) in frames.iter().enumerate() {
             decoder.decode(readings, &mut whole).unwrap();
             let solved = decoder.take_solved_rows();
             let rows = readings
@@ -53,9 +52,9 @@ fn sets_equal_frames_in_any_order_of_their_rows() {
         let frames = test.frames().unwrap();
         let outputs = decoder.outputs();
         let mut expected = vec![0.0; test.samples() * outputs];
-        let mut frame_targets = vec![0.0; frames.rows() * outputs];
+        let mut frame_targets = vec![0.0; test.row_count() * outputs];
         for (frame, samples) in test.snapshots().iter().enumerate() {
-            decoder.decode(frames.frame(frame), &mut frame_targets).unwrap();
+            decoder.decode(&frames[frame], &mut frame_targets).unwrap();
             for (&sample, targets) in samples.iter().zip(frame_targets.chunks_exact(outputs)) {
                 expected[sample * outputs..(sample + 1) * outputs].copy_from_slice(targets);
             }
@@ -87,7 +86,7 @@ fn invalid_readings_are_named() {
     {
         let frames = test.frames().unwrap();
         let (channels, outputs) = (decoder.channels(), decoder.outputs());
-        let mut targets = vec![0.0; frames.rows() * outputs];
+        let mut targets = vec![0.0; test.row_count() * outputs];
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -3.0, 0.0] {
             // The mean of the training set answers whatever the readings are, if they are numbers.
             let quantity = if kind == DecoderKind::Mean {
@@ -106,14 +105,14 @@ fn invalid_readings_are_named() {
                 }
                 None => assert!(!is_refused, "{name}, {value}"),
             };
-            let mut readings = frames.frame(0).to_vec();
+            let mut readings = frames[0].clone();
             readings[channels + 2] = value;
             check(decoder.decode(&readings, &mut targets), 1);
             check(
                 decoder.decode_row(1, &readings[channels..2 * channels], &mut targets[..outputs]),
                 0,
             );
-            let mut rows = frames.frame(0)[channels..2 * channels].repeat(3);
+            let mut rows = frames[0][channels..2 * channels].repeat(3);
             rows[2 * channels + 2] = value;
             check(decoder.decode_rows(&[1, 1, 1], &rows, &mut targets[..3 * outputs]), 2);
         }
@@ -132,19 +131,19 @@ fn decoding_does_not_allocate() {
     {
         let frames = test.frames().unwrap();
         let outputs = decoder.outputs();
-        let mut targets = vec![0.0; frames.rows() * outputs];
-        let order = Vec::from_iter((0..frames.rows()).rev());
+        let mut targets = vec![0.0; test.row_count() * outputs];
+        let order = Vec::from_iter((0..test.row_count()).rev());
         let solves = kind.needs_sensor();
         if solves && (name.contains("Shared") || name.contains("noisy")) {
             // The search for an unknown row-wire allocates, and so does the posterior.
             continue;
         }
         let mut work = || {
-            decoder.decode(frames.frame(1), &mut targets).unwrap();
+            decoder.decode(&frames[1], &mut targets).unwrap();
             // Solvers have buffers for frames only.
             if !solves {
-                decoder.decode_rows(&order, frames.frame(1), &mut targets).unwrap();
-                let first_row = &frames.frame(1)[..decoder.channels()];
+                decoder.decode_rows(&order, &frames[1], &mut targets).unwrap();
+                let first_row = &frames[1][..decoder.channels()];
                 decoder.decode_row(0, first_row, &mut targets[..outputs]).unwrap();
             }
         };

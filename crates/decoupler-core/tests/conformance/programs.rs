@@ -316,7 +316,7 @@ fn history_continues_in_its_group_and_row_wire_and_restarts_after_a_pause() {
         let found = step(group, time_s, row, reading);
         assert!((found - expected).abs() < 1e-14, "{why}: {found} {expected}");
     }
-    decoder.restart();
+    let mut decoder = ProgramDecoder::new(program.clone());
     let (mut found, mut states) = ([0.0], States::new());
     for reading in [1.0, 4.0, -2.0] {
         decoder.decode_row(0, &[reading], &mut found).unwrap();

@@ -65,7 +65,7 @@ fn frames_are_bit_identical_to_rows_with_the_same_status() {
                 ..Scene::default()
             };
             let set = noisy_set(&model, &scene, 1);
-            let mut readings = set.frames().unwrap().frame(0).to_vec();
+            let mut readings = set.frames().unwrap().swap_remove(0);
             wild_rows
                 .iter()
                 .for_each(|row| readings[row * channels + channels - 1] *= 40.0);
@@ -118,7 +118,7 @@ fn assert_set_equals_its_frames(model: &SensorModel, scene: &Scene) {
     let mut decoder = newton(model, scene);
     let mut frame_mm = vec![0.0; 3 * 6];
     for (snapshot, samples) in set.snapshots().iter().enumerate() {
-        decoder.decode(frames.frame(snapshot), &mut frame_mm).unwrap();
+        decoder.decode(&frames[snapshot], &mut frame_mm).unwrap();
         for (&sample, row_mm) in samples.iter().zip(frame_mm.chunks_exact(6)) {
             assert_eq!(bits(answers.row(sample).as_slice().unwrap()), bits(row_mm), "{sample}");
         }
@@ -136,7 +136,7 @@ fn invalid_readings_are_named() {
         };
         let set = noisy_set(&model, &scene, 200);
         for (row, channel, value) in [(6, 4, f64::NAN), (0, 0, 0.0), (3, 5, f64::INFINITY)] {
-            let mut readings = set.frames().unwrap().frame(0).to_vec();
+            let mut readings = set.frames().unwrap().swap_remove(0);
             readings[row * 6 + channel] = value;
             let decoders: [Box<dyn Decoder>; 2] = [
                 Box::new(newton(&model, &scene)),

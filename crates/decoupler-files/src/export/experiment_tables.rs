@@ -241,8 +241,8 @@ pub fn trials_table(results: &ExperimentResults) -> Table {
                 &format!("linear_{name}"),
                 trial.scores.baselines.linear.percent().into(),
             ),
-            field("epochs_run", trial.epochs.into()),
-            field("seconds", trial.seconds.into()),
+            field("epochs_run", trial.effort.epochs.into()),
+            field("seconds", trial.effort.seconds.into()),
         ]);
         fields
     }))

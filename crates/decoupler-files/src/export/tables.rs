@@ -6,8 +6,7 @@ use decoupler_core::{
         Coverage, DecoderReport, ErrorMeasure, ErrorRow, ErrorTable, Errors, HalfWidth, Intervals, Scores,
         TargetErrors, TestErrors,
         recorded::{
-            Determinacy, Determination, Findings, TargetFindings, Undetermined, channel_remarks, ridge_remark,
-            target_remarks,
+            Determinacy, Determination, Findings, TargetFindings, Undetermined, channel_remarks, target_remarks,
         },
     },
     problem::{Channel, Problem, TargetPosition},
@@ -319,11 +318,11 @@ pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
     })
 }
 
-/// Describes how much of a target the readings explain, judged by the better of network and ridge.
+/// Describes how much of a target the readings explain, judged by the better of ridge and kernel ridge regression.
 pub fn describe_target(name: &str, found: &TargetFindings) -> String {
     match found.best() {
-        Some((_, best)) if found.network.is_some() => best.sentence(name, "ridge regression and the network explain"),
-        Some((_, best)) => best.sentence(name, "ridge regression explains"),
+        Some((best, _)) if found.kernel.is_some() => best.sentence(name, "ridge and kernel ridge regression explain"),
+        Some((best, _)) => best.sentence(name, "ridge regression explains"),
         None => {
             let cause = found.ridge.err();
             let cause = cause.map_or_else(|| "nothing can be judged".to_owned(), |cause| cause.to_string());
@@ -368,13 +367,10 @@ pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
     warnings
 }
 
-/// Returns remarks on the channels and targets of a recording that is divided by `by`, and on the targets for which a
-/// network is no better than ridge.
+/// Returns remarks on the channels and targets of a recording that is divided by `by`, and on possible leaks.
 pub fn describe_warnings(recording: &Recording, by: SplitBy, findings: &Findings) -> Vec<String> {
     let mut warnings = channel_remarks(&recording.set, by, &recording.inputs, &recording.targets);
-    for (target, found) in recording.targets.iter().zip(&findings.targets) {
-        warnings.extend(found.gain.and_then(|gain| ridge_remark(gain, &target.name)));
-    }
+    warnings.extend(findings.record.leaks(&recording.targets));
     warnings
 }
 

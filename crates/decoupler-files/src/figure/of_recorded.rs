@@ -26,7 +26,7 @@ use super::{
 pub fn hysteresis_figure(found: &HysteresisLoop, target: &Channel) -> PlotFigure {
     let branch = |name: &str, hue, style, of: &dyn Fn(f64, f64, f64) -> f64| {
         let levels = found.levels.iter();
-        let points = levels.map(|level| [level.actual, of(level.actual, level.loading, level.unloading)]);
+        let points = levels.map(|&[actual, loading, unloading]| [actual, of(actual, loading, unloading)]);
         Series::new(name, Look::line(hue, style), points)
     };
     let named = |name: &str, rmse| format!("{name}, RMSE {}", format_number(rmse));

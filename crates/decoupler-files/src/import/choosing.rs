@@ -1,10 +1,11 @@
 use std::path::Path;
 
 use decoupler_core::{
-    dataset::Seed,
+    dataset::{Seed, SplitBy},
     evaluation::{
-        Intervals,
+        Intervals, RunSettings,
         auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, choose_settings, dead_channels},
+        recorded::Findings,
     },
     job::Job,
     scene::RowModel,
@@ -94,8 +95,7 @@ impl Setup {
                 self.settings(),
                 &fixed,
                 &samples,
-                budget_s,
-                memory_budget(),
+                (budget_s, memory_budget()),
                 job,
                 &mut on_trying,
             );
@@ -132,6 +132,27 @@ impl Setup {
             sets,
             choice,
         })
+    }
+}
+
+impl Recording {
+    /// Measures how well the readings determine the targets, by the rule that divides the samples.
+    ///
+    /// # Errors
+    /// If the samples cannot be divided, or the job is cancelled.
+    pub fn findings(&self, settings: &RunSettings, by: SplitBy, job: &Job<'_>) -> Result<Findings, SetupError> {
+        let raw = self.with_memory(None).map_err(ImportError::from)?;
+        let all = Vec::from_iter(0..raw.set.samples());
+        let samples = AutoSamples {
+            set: &raw.set,
+            past: Some((raw.history(), &all)),
+            by,
+        };
+        let fixed = AutoFixed {
+            memory: self.memory().cloned(),
+            ..AutoFixed::default()
+        };
+        Ok(Findings::measure(settings, &samples, &fixed, job)?)
     }
 }
 

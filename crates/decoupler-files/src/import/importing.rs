@@ -472,6 +472,18 @@ impl Recording {
         self.problem.clone()
     }
 
+    /// Returns the warnings of several recordings, such as for training and for testing, which often share them.
+    pub fn warnings_of<'a>(recordings: impl IntoIterator<Item = &'a Self>) -> Vec<String> {
+        let all = recordings.into_iter().flat_map(|recording| &recording.warnings);
+        let mut warnings = Vec::new();
+        for warning in all {
+            if !warnings.contains(warning) {
+                warnings.push(warning.clone());
+            }
+        }
+        warnings
+    }
+
     /// Memory whose features are the channels of the samples, with its usual interval.
     pub fn memory(&self) -> Option<&Memory> {
         self.problem.memory.as_ref()

@@ -41,7 +41,6 @@ fn agrees_with_splines_of_fifty_digits() {
     for case in cases {
         let map = SurfaceMap::scattered(&case.places_mm).unwrap();
         assert_eq!(map.interpolation(), THIN_PLATE);
-        assert_eq!(map.node_count(), case.places_mm.len());
         let values = map.evaluate(&case.node_values);
         let mut compared = 0;
         for (&point, &expected) in case.points_mm.iter().zip(&case.surface) {

@@ -6,7 +6,7 @@ use decoupler_core::{
     dataset::Dataset,
     evaluation::{Run, RunSettings},
     job::Job,
-    network::{DecouplingNetwork, Mlp},
+    network::{DecouplingNetwork, Mlp, Networks},
     scene::Rows,
     training::Method,
 };
@@ -88,7 +88,8 @@ proptest! {
         let mut file = TRAINED.clone();
         let network = TRAINED.network.at(0);
         let mlp = Mlp::from_weights(network.mlp().shape(), weights.clone());
-        *file.network.at_mut(0) = DecouplingNetwork::new(network.inputs().clone(), mlp, network.outputs().clone());
+        let network = DecouplingNetwork::new(network.inputs().clone(), mlp, network.outputs().clone());
+        file.network = Networks::shared(network);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("network.json");
         file.save(&path).unwrap();

@@ -373,7 +373,7 @@ fn bytes_of(trial: &Trial, hidden: usize, problem: Option<&Problem>) -> usize {
     });
     // Current weights, best weights, and about as many numbers again for the state of the method.
     let of_start = 4 * weights * size_of::<f64>();
-    trial.states.len() * of_start + trial.epochs * size_of::<EpochRecord>()
+    trial.states.len() * of_start + trial.effort.epochs * size_of::<EpochRecord>()
 }
 
 /// Event of the most recent experiment.

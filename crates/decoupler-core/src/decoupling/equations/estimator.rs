@@ -3,9 +3,8 @@ use std::ops::Range as Columns;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use super::{
-    Estimate, LARGEST_ERROR, Solution,
+    Estimate, LARGEST_ERROR, Misfits, ROUNDING, Solution,
     bounded::BoundedLeastSquares,
-    estimate::{Misfits, ROUNDING},
     lanes::Lanes,
     priors::Priors,
     reading_noise::ReadingNoise,
@@ -14,7 +13,7 @@ use super::{
     symmetry::Symmetry,
 };
 use crate::{
-    decoupling::{DecodeError, SolvedRows},
+    decoupling::DecodeError,
     scene::Scene,
     sensor::{SensorError, SensorModel},
 };
@@ -130,7 +129,12 @@ impl Estimator {
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
     ) -> Result<Estimate, DecodeError> {
-        self.solve_one(row, readings_ohm, coordinates_mm, None)
+        DecodeError::check(readings_ohm, readings_ohm.len())?;
+        let mut estimate = None;
+        self.solve_rows(&[row], readings_ohm, coordinates_mm, None, |found| {
+            estimate = Some(found);
+        });
+        Ok(estimate.expect("one estimate for each row"))
     }
 
     /// As [`Self::solve`], without the readings of these column-wires, which must be resistances but have no influence. If
@@ -154,61 +158,18 @@ impl Estimator {
         estimate
     }
 
-    /// As [`Self::solve`], in at most `steps` steps from the answer of another decoder in `coordinates_mm`, which is
-    /// replaced. Exact readings are polished without the prior.
-    ///
-    /// # Errors
-    /// If a reading is not a resistance.
-    ///
-    /// # Panics
-    /// If `row` is not one of the given rows.
-    pub fn polish(
-        &mut self,
-        row: usize,
-        readings_ohm: &[f64],
-        coordinates_mm: &mut [f64],
-        steps: usize,
-    ) -> Result<Estimate, DecodeError> {
-        self.solve_one(row, readings_ohm, coordinates_mm, Some(steps))
-    }
-
-    fn solve_one(
-        &mut self,
-        row: usize,
-        readings_ohm: &[f64],
-        coordinates_mm: &mut [f64],
-        steps: Option<usize>,
-    ) -> Result<Estimate, DecodeError> {
-        DecodeError::check(readings_ohm, readings_ohm.len())?;
-        let quick = self.in_lanes(&[row], readings_ohm, coordinates_mm, steps)[0];
-        Ok(quick.unwrap_or_else(|| self.solve_slowly(row, readings_ohm, coordinates_mm, steps)))
-    }
-
-    /// Estimates a row that plain steps did not solve.
-    fn solve_slowly(
-        &mut self,
-        row: usize,
-        readings_ohm: &[f64],
-        coordinates_mm: &mut [f64],
-        steps: Option<usize>,
-    ) -> Estimate {
-        match steps {
-            None => self.search(row, readings_ohm, coordinates_mm),
-            Some(steps) => self.refine(row, readings_ohm, coordinates_mm, steps),
-        }
-    }
-
-    /// Estimates rows from their valid readings (rows × M4), as [`Self::solve`] or, with `steps`, as [`Self::polish`];
-    /// writes coordinates (rows × 3·M2).
+    /// Estimates rows from their valid readings (rows × M4), as [`Self::solve`] or, with `steps`, in at most that many from
+    /// the answers of another decoder in `coordinates_mm` (rows × 3·M2), which are replaced; calls `take` with the estimate of
+    /// each. Exact readings are polished without the prior.
     pub(in crate::decoupling) fn solve_rows(
         &mut self,
         rows: &[usize],
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
         steps: Option<usize>,
-    ) -> SolvedRows {
+        mut take: impl FnMut(Estimate),
+    ) {
         let (readings, coordinates) = (self.problem.equations(), self.problem.coordinates());
-        let mut solved = SolvedRows::default();
         let blocks = rows
             .chunks(LANES)
             .zip(readings_ohm.chunks(LANES * readings))
@@ -218,11 +179,12 @@ impl Estimator {
             let rows = rows.iter().zip(readings_ohm.chunks_exact(readings));
             let rows = rows.zip(coordinates_mm.chunks_exact_mut(coordinates)).zip(quick);
             for (((&row, readings_ohm), coordinates_mm), quick) in rows {
-                let estimate = quick.unwrap_or_else(|| self.solve_slowly(row, readings_ohm, coordinates_mm, steps));
-                solved.count(estimate.solution);
+                take(quick.unwrap_or_else(|| match steps {
+                    None => self.search(row, readings_ohm, coordinates_mm),
+                    Some(steps) => self.refine(row, readings_ohm, coordinates_mm, steps),
+                }));
             }
         }
-        solved
     }
 
     /// Number of readings that count.
@@ -232,16 +194,6 @@ impl Estimator {
 
     fn is_redundant(&self) -> bool {
         self.problem.is_redundant(self.readings())
-    }
-
-    /// Estimates a row from its valid readings as if they were those of row-wire `row`, if plain steps solve it.
-    pub(in crate::decoupling) fn try_plainly(
-        &mut self,
-        row: usize,
-        readings_ohm: &[f64],
-        coordinates_mm: &mut [f64],
-    ) -> Option<Estimate> {
-        self.in_lanes(&[row], readings_ohm, coordinates_mm, None)[0]
     }
 
     /// Estimates a row from its valid readings as if they were those of row-wire `row`, from one start.
@@ -256,7 +208,9 @@ impl Estimator {
         self.start_from(coordinates_mm, 1)
     }
 
-    fn in_lanes(
+    /// Estimates rows from their valid readings (rows × M4) as if they were those of row-wires `rows`, where plain steps solve
+    /// them; `steps` is as for [`Self::solve_rows`].
+    pub(in crate::decoupling) fn in_lanes(
         &mut self,
         rows: &[usize],
         readings_ohm: &[f64],

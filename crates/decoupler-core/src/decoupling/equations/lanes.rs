@@ -1,8 +1,7 @@
 use std::sync::{Arc, OnceLock};
 
 use super::{
-    Estimate, LARGEST_ERROR, Solution,
-    estimate::Misfits,
+    Estimate, LARGEST_ERROR, Misfits, Solution,
     estimator::TOLERANCE,
     row_problem::{Range, RowProblem, ranges, smallest_gap_mm, wide_ranges},
     side_by_side::{LANES, SideBySide, write_normal_equations},

@@ -6,7 +6,7 @@ use rand::Rng;
 use super::row_problem::{Range, ranges};
 use crate::{
     dataset::{Seed, Stream},
-    scene::{Loading, Scene},
+    scene::{DeformationSampler, Loading, Scene},
     sensor::SensorModel,
 };
 
@@ -44,7 +44,7 @@ impl Priors {
     pub(super) fn of(&self, row: usize) -> &GaussianPrior {
         let of_rows = self.of_rows.get_or_init(|| {
             let mut rng = Seed(0).rng(Stream::Expectation);
-            GaussianPrior::of_rows(&self.model, &self.scene, &self.rows, SMALLEST_SPREAD, &mut rng)
+            GaussianPrior::of_rows(&self.model, &self.scene, &self.rows, &mut rng)
         });
         let place = match self.scene.loading {
             Loading::RandomNodes => Some(0),
@@ -112,20 +112,14 @@ impl GaussianPrior {
 
     /// Mean and covariance of each of `rows` in `scene`: those of the uniform distribution for nodes that move
     /// independently, estimated from draws for other loadings. No pattern gets a prior spread below
-    /// `smallest_spread`.
-    pub(crate) fn of_rows(
-        model: &SensorModel,
-        scene: &Scene,
-        rows: &[usize],
-        smallest_spread: f64,
-        rng: &mut impl Rng,
-    ) -> Vec<Self> {
+    /// [`SMALLEST_SPREAD`].
+    pub(crate) fn of_rows(model: &SensorModel, scene: &Scene, rows: &[usize], rng: &mut impl Rng) -> Vec<Self> {
         let ranges = ranges(model, scene);
         if scene.loading == Loading::RandomNodes {
             // The standard deviation of a uniform distribution is its width/√12.
             return vec![Self::independent(&ranges, 1.0 / 12.0_f64.sqrt()); rows.len()];
         }
-        let sampler = scene.sampler(model);
+        let sampler = DeformationSampler::new(scene, model);
         let axes = scene.movement.axes().indices();
         let mut moments = vec![Moments::new(ranges.len()); rows.len()];
         for _ in 0..DRAWS {
@@ -136,10 +130,7 @@ impl GaussianPrior {
                 moments.add(values.zip(&ranges).map(|(value, range)| value / range.width()));
             }
         }
-        moments
-            .into_iter()
-            .map(|moments| Self::of_moments(moments, smallest_spread))
-            .collect()
+        moments.into_iter().map(Self::of_moments).collect()
     }
 
     /// Approximate number of bytes that [`Self::of_rows`] needs.
@@ -152,12 +143,12 @@ impl GaussianPrior {
         entries.saturating_mul(size_of::<f64>() as u64)
     }
 
-    fn of_moments(moments: Moments, smallest_spread: f64) -> Self {
+    fn of_moments(moments: Moments) -> Self {
         let Moments { count, mean, products } = moments;
         let n = mean.len();
         let mut covariance = Mat::from_fn(n, n, |i, j| products[i * n + j] / count);
         for i in 0..n {
-            covariance[(i, i)] += smallest_spread * smallest_spread;
+            covariance[(i, i)] += SMALLEST_SPREAD * SMALLEST_SPREAD;
         }
         let factor = covariance.llt(Side::Lower);
         let factor = factor
@@ -202,7 +193,7 @@ mod tests {
             ..Scene::default()
         };
         let mut rng = Seed(0).rng(Stream::Expectation);
-        GaussianPrior::of_rows(&model, &scene, &[1], 1e-3, &mut rng).remove(0)
+        GaussianPrior::of_rows(&model, &scene, &[1], &mut rng).remove(0)
     }
 
     /// The prior of shifts is proportional to them, down to lengths whose squares underflow.

@@ -1,4 +1,4 @@
-use super::estimate::ROUNDING;
+use super::ROUNDING;
 use crate::scene::NoiseSource;
 
 /// Distribution of the readings of a row-wire about the model's resistances.

@@ -3,8 +3,6 @@
 #[cfg(test)]
 mod tests;
 
-use std::fmt;
-
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -26,15 +24,6 @@ pub struct NewtonDecoder {
     /// Row-wires of the rows that are being decoded.
     row_wires: Vec<usize>,
     solved: SolvedRows,
-}
-
-impl fmt::Debug for NewtonDecoder {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("NewtonDecoder")
-            .field("rows", &self.rows)
-            .field("solver", &self.solver)
-            .finish_non_exhaustive()
-    }
 }
 
 #[derive(Clone, Debug)]
@@ -92,9 +81,9 @@ impl Solver {
     /// Solves rows of these row-wires, or of those that explain their readings best if rows are not known.
     fn solve_rows(&mut self, row_wires: &mut [usize], readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> SolvedRows {
         let (channels, outputs) = (self.model.scale.columns(), self.trial_mm.len());
+        let mut solved = SolvedRows::default();
         match self.steps {
             None if !self.searched.is_empty() => {
-                let mut solved = SolvedRows::default();
                 let rows = readings_ohm
                     .chunks_exact(channels)
                     .zip(coordinates_mm.chunks_exact_mut(outputs));
@@ -110,8 +99,10 @@ impl Solver {
             }
             _ => {}
         }
+        let count = |found: Estimate| solved.count(found.solution);
         self.estimator
-            .solve_rows(row_wires, readings_ohm, coordinates_mm, self.steps)
+            .solve_rows(row_wires, readings_ohm, coordinates_mm, self.steps, count);
+        solved
     }
 
     /// The row-wire whose x is nearest to the mean x of an answer.
@@ -133,7 +124,7 @@ impl Solver {
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let is_exact = self.estimator.is_exact();
         for &(_, row) in &order {
-            let found = self.estimator.try_plainly(row, readings_ohm, coordinates_mm);
+            let found = self.estimator.in_lanes(&[row], readings_ohm, coordinates_mm, None)[0];
             if let Some(found) = found.filter(|found| found.solution != Solution::None) {
                 return found;
             }

@@ -27,9 +27,12 @@ pub struct Builder {
 impl Builder {
     /// Begins a program with the readings of a row, in double precision.
     pub fn new(channels: usize) -> Self {
-        let mut builder = Self { nodes: Vec::new() };
-        builder.push(Operation::Readings, channels, Precision::Double);
-        builder
+        let readings = Node {
+            operation: Operation::Readings,
+            size: channels,
+            precision: Precision::Double,
+        };
+        Self { nodes: vec![readings] }
     }
 
     /// The node of the readings.
@@ -46,15 +49,10 @@ impl Builder {
         }
     }
 
-    /// Number of values of a node.
-    pub fn size(&self, of: NodeId) -> usize {
-        self.nodes[of.0].size
-    }
-
-    fn push(&mut self, operation: Operation, size: usize, precision: Precision) -> NodeId {
+    fn push(&mut self, operation: Operation, precision: Precision) -> NodeId {
         self.nodes.push(Node {
+            size: operation.size(&self.nodes).expect("the sizes of the operands match"),
             operation,
-            size,
             precision,
         });
         NodeId(self.nodes.len() - 1)
@@ -62,9 +60,8 @@ impl Builder {
 
     /// Adds a table of constants, and the value to which it is padded when the programs of several row-wires are joined.
     fn table(&mut self, table: Array2<f64>, padding: f64, precision: Precision) -> NodeId {
-        let size = table.len();
         let tables = vec![table.as_standard_layout().into_owned()];
-        self.push(Operation::Select { tables, padding }, size, precision)
+        self.push(Operation::Select { tables, padding }, precision)
     }
 
     /// Adds a vector of constants.
@@ -74,7 +71,7 @@ impl Builder {
 
     /// Adds the check that values are in a domain.
     pub fn valid(&mut self, of: NodeId, domain: Domain) -> NodeId {
-        self.push(Operation::Valid { of, domain }, self.size(of), Precision::Double)
+        self.push(Operation::Valid { of, domain }, Precision::Double)
     }
 
     /// Adds a difference, value by value.
@@ -82,8 +79,7 @@ impl Builder {
     /// # Panics
     /// If the sizes differ.
     pub fn subtract(&mut self, one: NodeId, other: NodeId, precision: Precision) -> NodeId {
-        assert_eq!(self.size(one), self.size(other));
-        self.push(Operation::Subtract(one, other), self.size(one), precision)
+        self.push(Operation::Subtract(one, other), precision)
     }
 
     /// Adds a quotient, value by value.
@@ -91,13 +87,12 @@ impl Builder {
     /// # Panics
     /// If the sizes differ.
     pub fn divide(&mut self, one: NodeId, other: NodeId, precision: Precision) -> NodeId {
-        assert_eq!(self.size(one), self.size(other));
-        self.push(Operation::Divide(one, other), self.size(one), precision)
+        self.push(Operation::Divide(one, other), precision)
     }
 
     /// Adds a function of each value.
     pub fn map(&mut self, function: Function, of: NodeId, precision: Precision) -> NodeId {
-        self.push(Operation::Map(function, of), self.size(of), precision)
+        self.push(Operation::Map(function, of), precision)
     }
 
     /// Adds an affine map with these weights (inputs × outputs) and biases (outputs).
@@ -105,16 +100,9 @@ impl Builder {
     /// # Panics
     /// If the sizes do not match.
     pub fn affine(&mut self, of: NodeId, weights: Array2<f64>, biases: &[f64], precision: Precision) -> NodeId {
-        assert_eq!(weights.dim(), (self.size(of), biases.len()));
         let weights = self.table(weights, 0.0, precision);
         let biases = self.constants(biases, precision);
-        self.affine_by(of, weights, biases)
-    }
-
-    fn affine_by(&mut self, of: NodeId, weights: NodeId, biases: NodeId) -> NodeId {
-        let (size, precision) = (self.size(biases), self.nodes[weights.0].precision);
-        assert_eq!(self.size(weights), self.size(of) * size);
-        self.push(Operation::Affine { of, weights, biases }, size, precision)
+        self.push(Operation::Affine { of, weights, biases }, precision)
     }
 
     /// Adds the squared distances to `points` (inputs × points).
@@ -122,10 +110,8 @@ impl Builder {
     /// # Panics
     /// If the sizes do not match.
     pub fn squared_distances(&mut self, of: NodeId, points: Array2<f64>, precision: Precision) -> NodeId {
-        let (inputs, count) = points.dim();
-        assert_eq!(inputs, self.size(of));
         let points = self.table(points, 0.0, precision);
-        self.push(Operation::SquaredDistances { of, points }, count, precision)
+        self.push(Operation::SquaredDistances { of, points }, precision)
     }
 
     /// Adds the nearest values within limits.
@@ -133,15 +119,13 @@ impl Builder {
     /// # Panics
     /// If the sizes differ.
     pub fn clip(&mut self, of: NodeId, [low, high]: [&[f64]; 2], precision: Precision) -> NodeId {
-        assert_eq!([low.len(), high.len()], [self.size(of); 2]);
         let [low, high] = [low, high].map(|values| self.constants(values, precision));
-        self.push(Operation::Clip { of, low, high }, self.size(of), precision)
+        self.push(Operation::Clip { of, low, high }, precision)
     }
 
     /// Adds the values of all parts, one after the other.
     pub fn concatenate(&mut self, parts: &[NodeId]) -> NodeId {
-        let size = parts.iter().map(|&part| self.size(part)).sum();
-        self.push(Operation::Concatenate(parts.to_vec()), size, Precision::Double)
+        self.push(Operation::Concatenate(parts.to_vec()), Precision::Double)
     }
 
     /// Adds the mean of the vectors `of`, with the softmax of `logits` as shares.
@@ -149,20 +133,16 @@ impl Builder {
     /// # Panics
     /// If there are not as many vectors as logits.
     pub fn blend(&mut self, logits: NodeId, of: NodeId) -> NodeId {
-        let count = self.size(logits);
-        assert!(self.size(of).is_multiple_of(count));
-        self.push(
-            Operation::Blend { logits, of },
-            self.size(of) / count,
-            Precision::Double,
-        )
+        self.push(Operation::Blend { logits, of }, Precision::Double)
     }
 
-    /// Adds values with their past, for a memory that was checked.
+    /// Adds values with their past.
+    ///
+    /// # Panics
+    /// If the memory is invalid for this number of values.
     pub fn history(&mut self, of: NodeId, memory: &Memory) -> NodeId {
-        let size = memory.features(self.size(of));
         let memory = memory.clone();
-        self.push(Operation::History { of, memory }, size, Precision::Double)
+        self.push(Operation::History { of, memory }, Precision::Double)
     }
 
     /// Adds the number of values outside limits.
@@ -170,9 +150,8 @@ impl Builder {
     /// # Panics
     /// If the sizes differ.
     pub fn count_outside(&mut self, of: NodeId, [low, high]: [&[f64]; 2]) -> NodeId {
-        assert_eq!([low.len(), high.len()], [self.size(of); 2]);
         let [low, high] = [low, high].map(|values| self.constants(values, Precision::Double));
-        self.push(Operation::CountOutside { of, low, high }, 1, Precision::Double)
+        self.push(Operation::CountOutside { of, low, high }, Precision::Double)
     }
 
     /// Adds the changes of the readings from R₀, the readings whose `quantity` is `centre`, rounded to single precision. They
@@ -188,10 +167,6 @@ impl Builder {
     /// | conductance | (R − R₀)/R | −1/R₀ times the change |
     /// | logarithm | ln(1 + (R − R₀)/R₀), in double precision | the change |
     pub(crate) fn changes(&mut self, quantity: Quantity, centre: &[f64], precision: Precision) -> Changes {
-        let domain = match quantity {
-            Quantity::Raw => Domain::Finite,
-            Quantity::Resistance | Quantity::Conductance | Quantity::LogResistance => Domain::Positive,
-        };
         let (exact, centre): (Vec<f64>, Vec<f64>) = centre
             .iter()
             .map(|&value| {
@@ -206,7 +181,7 @@ impl Builder {
             Quantity::LogResistance => ((rounded - exact) / exact).ln_1p(),
         });
         let offsets = off.collect();
-        let readings = self.valid(self.readings(), domain);
+        let readings = self.valid(self.readings(), quantity.domain());
         let reference = self.constants(&centre, Precision::Double);
         let difference = self.subtract(readings, reference, Precision::Double);
         let mut slopes = vec![1.0; centre.len()];
@@ -251,9 +226,10 @@ impl Builder {
         for (mut weights, slope) in weights.rows_mut().into_iter().zip(&changes.slopes) {
             weights *= *slope;
         }
-        let weights = self.table(weights, 0.0, changes.precision);
-        let biases = self.table(row(&biases), padding, changes.precision);
-        self.affine_by(changes.node, weights, biases)
+        let (of, precision) = (changes.node, changes.precision);
+        let weights = self.table(weights, 0.0, precision);
+        let biases = self.table(row(&biases), padding, precision);
+        self.push(Operation::Affine { of, weights, biases }, precision)
     }
 
     /// Adds the targets for scaled ones: constant targets are restored.

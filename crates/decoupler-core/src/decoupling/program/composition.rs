@@ -1,13 +1,12 @@
 //! Programs made of other programs.
 
 use ndarray::{Array2, ArrayView1, Axis, Slice};
+use serde::{Deserialize, Serialize};
 
-use super::{Builder, Domain, Node, NodeId, Operation, Program};
+use super::{Builder, Node, NodeId, Operation, Program};
 use crate::{
-    dataset::PerRow,
-    decoupling::{Combined, Precision},
-    network::{DecouplingNetwork, MARGIN, Quantity},
-    problem::Problem,
+    decoupling::Precision,
+    network::{Networks, Quantity},
 };
 
 impl Program {
@@ -52,20 +51,6 @@ impl Program {
         builder.finish(targets)
     }
 
-    /// The program with its readings limited to these ranges, channel by channel, before anything is computed from them.
-    ///
-    /// # Panics
-    /// If there is not one range for each reading.
-    #[must_use]
-    pub fn clipped(&self, domain: Domain, limits: &[(f64, f64)]) -> Self {
-        let (low, high): (Vec<f64>, Vec<f64>) = limits.iter().copied().unzip();
-        let mut builder = Builder::new(self.channels());
-        let valid = builder.valid(builder.readings(), domain);
-        let clipped = builder.clip(valid, [&low, &high], Precision::Double);
-        let output = builder.include(self, clipped);
-        builder.finish(output)
-    }
-
     /// Describes the first defect of a program that comes from a file: operands that do not come before their node, or sizes
     /// and constants that do not match.
     pub fn defect(&self) -> Option<String> {
@@ -75,41 +60,50 @@ impl Program {
         }
         let index = self.nodes.iter().enumerate().position(|(index, node)| {
             let is_before = node.operation.operands().iter().all(|operand| operand.0 < index);
-            !is_before || self.size_of(&node.operation) != Some(node.size)
+            let is_sound = |tables: &[Array2<f64>]| tables.iter().flatten().all(|value| value.is_finite());
+            !is_before
+                || (index > 0 && node.operation.size(&self.nodes) != Some(node.size))
+                || matches!(&node.operation, Operation::Select { tables, .. } if !is_sound(tables))
         });
         index.map(|index| format!("its node {index} does not match the nodes before"))
     }
+}
 
-    /// Number of values of an operation on the nodes of this program; `None` if the sizes of its operands do not match, or a
-    /// constant is not finite.
-    fn size_of(&self, operation: &Operation) -> Option<usize> {
-        let size = |id: &NodeId| self.nodes[id.0].size;
+impl Operation {
+    /// Number of values of an operation on these nodes; `None` if the sizes of its operands do not match, or for readings,
+    /// whose number is given.
+    pub(super) fn size(&self, nodes: &[Node]) -> Option<usize> {
+        let size = |id: &NodeId| nodes[id.0].size;
         let same = |ids: &[NodeId]| ids.iter().all(|id| size(id) == size(&ids[0])).then(|| size(&ids[0]));
-        let is_constant = |id: &NodeId| matches!(self.nodes[id.0].operation, Operation::Select { .. });
-        match operation {
-            Operation::Readings => Some(self.nodes[0].size),
-            Operation::Select { tables, .. } => {
+        let table = |id: &NodeId| match &nodes[id.0].operation {
+            Self::Select { tables, .. } => tables.first(),
+            _ => None,
+        };
+        match self {
+            Self::Readings => None,
+            Self::Select { tables, .. } => {
                 let first = tables.first()?;
-                let is_sound = |table: &Array2<f64>| table.dim() == first.dim() && table.iter().all(|x| x.is_finite());
-                tables.iter().all(is_sound).then_some(first.len())
+                tables
+                    .iter()
+                    .all(|table| table.dim() == first.dim())
+                    .then_some(first.len())
             }
-            Operation::Valid { of, .. } | Operation::Map(_, of) => Some(size(of)),
-            Operation::Subtract(one, other) | Operation::Divide(one, other) => same(&[*one, *other]),
-            Operation::Affine { of, weights, biases } => {
-                (is_constant(weights) && is_constant(biases) && size(weights) == size(of) * size(biases))
-                    .then(|| size(biases))
+            Self::Valid { of, .. } | Self::Map(_, of) => Some(size(of)),
+            Self::Subtract(one, other) | Self::Divide(one, other) => same(&[*one, *other]),
+            Self::Affine { of, weights, biases } => {
+                (table(weights)?.dim() == (size(of), table(biases)?.len())).then(|| size(biases))
             }
-            Operation::SquaredDistances { of, points } => {
-                (is_constant(points) && size(of) > 0 && size(points).is_multiple_of(size(of)))
-                    .then(|| size(points) / size(of))
+            Self::SquaredDistances { of, points } => {
+                let (inputs, points) = table(points)?.dim();
+                (inputs == size(of)).then_some(points)
             }
-            Operation::Clip { of, low, high } => same(&[*of, *low, *high]),
-            Operation::CountOutside { of, low, high } => same(&[*of, *low, *high]).map(|_| 1),
-            Operation::Concatenate(parts) => Some(parts.iter().map(size).sum()),
-            Operation::Blend { logits, of } => {
+            Self::Clip { of, low, high } => same(&[*of, *low, *high]),
+            Self::CountOutside { of, low, high } => same(&[*of, *low, *high]).map(|_| 1),
+            Self::Concatenate(parts) => Some(parts.iter().map(size).sum()),
+            Self::Blend { logits, of } => {
                 (size(logits) > 0 && size(of).is_multiple_of(size(logits))).then(|| size(of) / size(logits))
             }
-            Operation::History { of, memory } => memory.check(size(of)).ok().map(|()| memory.features(size(of))),
+            Self::History { of, memory } => memory.check(size(of)).ok().map(|()| memory.features(size(of))),
         }
     }
 }
@@ -130,33 +124,53 @@ impl Builder {
     }
 }
 
-impl PerRow<DecouplingNetwork> {
-    /// The program that answers to the readings of `problem`: that of a combination with these networks, if there is one,
-    /// otherwise that of the networks. For a recording, readings are limited to their range in training, extended by a tenth.
+/// What a choice of settings answers with: for each target a convex combination of decoders that were fitted to the training
+/// samples, the network of the run among them. Its weights are those with the smallest held-out error.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Combined {
+    /// Weight of the network for each target.
+    pub network: Vec<f64>,
+    /// Other decoders, each with its weight for each target.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub others: Vec<(Program, Vec<f64>)>,
+    /// Share of the range of each reading in training by which it is extended before readings are limited to it.
+    pub margin: f64,
+}
+
+impl Combined {
+    /// The combination with this network as a program. Its readings are limited to their range in training, extended by a
+    /// margin.
     ///
     /// # Panics
-    /// As [`Self::program`], or if the combination has other readings or targets.
-    pub fn decoder_program(&self, problem: &Problem, combined: Option<&Combined>) -> Program {
-        match combined {
-            Some(combined) => combined.program(self),
-            None if problem.has_nodes() => self.program(Precision::Double),
-            None => self.clipped(MARGIN, |network| network.program(Precision::Double)),
-        }
+    /// If the network has other channels or targets.
+    pub(super) fn program(&self, networks: &Networks) -> Program {
+        let network = self.network.iter().any(|weight| *weight > 0.0);
+        let network = network.then(|| (networks.program(Precision::Double), self.network.clone()));
+        let parts = Vec::from_iter(network.into_iter().chain(self.others.iter().cloned()));
+        networks.clipped(self.margin, |_| Program::combination(&parts))
     }
 
-    /// Joins one program for each network, with the readings limited to their range in training, extended by `margin` of
-    /// it: outside, networks and maps extrapolate without bound. Those of networks whose range is not known are not limited.
-    pub(crate) fn clipped(&self, margin: f64, program: impl Fn(&DecouplingNetwork) -> Program) -> Program {
-        let limited = |network: &DecouplingNetwork| {
-            let (inputs, program) = (network.inputs(), program(network));
-            let Some(range) = inputs.range() else { return program };
-            let domain = match inputs.quantity() {
-                Quantity::Raw => Domain::Finite,
-                Quantity::Resistance | Quantity::Conductance | Quantity::LogResistance => Domain::Positive,
-            };
-            let limits = (0..range.channels()).map(|channel| range.limits_within(inputs.quantity(), channel, margin));
-            program.clipped(domain, &Vec::from_iter(limits))
+    /// Describes the first part that does not match this number of readings and targets, for files.
+    pub fn defect(&self, channels: usize, targets: usize) -> Option<String> {
+        let weights = || std::iter::once(&self.network).chain(self.others.iter().map(|(_, weights)| weights));
+        let is_sound = |weights: &Vec<f64>| {
+            weights.len() == targets && weights.iter().all(|weight| *weight >= 0.0 && weight.is_finite())
         };
-        Program::each(&self.map(limited))
+        if !(0.0..=10.0).contains(&self.margin) {
+            return Some("the margin must be from 0 to 10".to_owned());
+        }
+        let has_answer = weights().flatten().any(|weight| *weight > 0.0);
+        if !has_answer || !weights().all(is_sound) {
+            return Some("there must be one weight of at least 0 for each target".to_owned());
+        }
+        self.others.iter().find_map(|(program, _)| {
+            let sizes = (program.defect().is_none()).then(|| (program.channels(), program.outputs(), program.rows()));
+            (sizes != Some((channels, targets, 1))).then(|| {
+                program
+                    .defect()
+                    .unwrap_or("it has other readings or targets than the network".to_owned())
+            })
+        })
     }
 }

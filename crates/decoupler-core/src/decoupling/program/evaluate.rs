@@ -49,8 +49,6 @@ struct Values {
 enum Work {
     /// As the operation says, value by value.
     Plain,
-    /// The readings, or those that were checked.
-    Readings,
     /// Constants for all row-wires, which are repeated for each row of a chunk from the beginning.
     Shared(Vec<f64>),
     /// Constants of each row-wire, one after the other.
@@ -59,8 +57,6 @@ enum Work {
     Doubles(PerRow<Padded<f64>>),
     Singles(PerRow<Padded<f32>>),
     Placement(PerRow<Placement>),
-    /// A division whose dividend is the difference of these nodes.
-    OfDifference(NodeId, NodeId),
     /// Not at all: no node takes its values.
     Skipped,
     /// Scratch for the shares of a blend.
@@ -77,20 +73,19 @@ impl ProgramDecoder {
     /// Prepares a program for evaluation.
     pub fn new(program: Program) -> Self {
         let works: Vec<Work> = program.nodes().iter().map(|node| Work::of(node, &program)).collect();
-        // Precisions in which the values of each node are taken.
-        let (mut in_double, mut in_single) = (vec![false; works.len()], vec![false; works.len()]);
-        in_double[program.output().index()] = true;
+        // Nodes whose values are taken in double and in single precision.
+        let mut taken_in = [vec![false; works.len()], vec![false; works.len()]];
+        taken_in[0][program.output().index()] = true;
         for (node, work) in program.nodes().iter().zip(&works) {
             let taken = match (&node.operation, work) {
                 (Operation::Affine { of, biases, .. }, Work::Placement(_)) => vec![*of, *biases],
                 (Operation::Affine { of, .. } | Operation::SquaredDistances { of, .. }, _) => vec![*of],
-                (Operation::Divide(_, divisor), Work::OfDifference(one, other)) => vec![*one, *other, *divisor],
                 (operation, _) => operation.operands(),
             };
-            let is_single = work.is_single(node) && !matches!(work, Work::OfDifference(..));
-            let places = if is_single { &mut in_single } else { &mut in_double };
+            let places = &mut taken_in[usize::from(work.is_single(node))];
             taken.iter().for_each(|id| places[id.index()] = true);
         }
+        let [in_double, in_single] = taken_in;
         let is_taken = |place: usize| in_double[place] || in_single[place];
         let sizes = program.nodes().iter().enumerate();
         let widest = sizes
@@ -101,24 +96,15 @@ impl ProgramDecoder {
             // The last row of a table is written with its padding.
             let length = chunk * node.size + LANES;
             let is_single = work.is_single(node);
-            let is_read = matches!(work, Work::Readings);
             let zeros = |is_needed: bool| if is_taken(place) && is_needed { length } else { 0 };
             let mut values = Values {
-                doubles: vec![0.0; zeros(!is_read && (in_double[place] || !is_single))],
+                doubles: vec![0.0; zeros(in_double[place] || !is_single)],
                 singles: vec![0.0; zeros(in_single[place] || is_single)],
             };
             if let Work::Shared(constants) = &work {
-                let repeated = constants.iter().cycle().take(chunk * node.size);
-                values
-                    .doubles
-                    .iter_mut()
-                    .zip(repeated.clone())
-                    .for_each(|(to, &value)| *to = value);
-                values
-                    .singles
-                    .iter_mut()
-                    .zip(repeated)
-                    .for_each(|(to, &value)| *to = value as f32);
+                let repeated = Vec::from_iter(constants.iter().copied().cycle().take(chunk * node.size));
+                convert(&repeated, &mut values.doubles, |value| value);
+                convert(&repeated, &mut values.singles, |value| value as f32);
             }
             Prepared {
                 work: if is_taken(place) { work } else { Work::Skipped },
@@ -163,15 +149,6 @@ impl ProgramDecoder {
         decoded
     }
 
-    /// Forgets the past of all groups and row-wires.
-    pub fn restart(&mut self) {
-        for node in &mut self.nodes {
-            if let Work::History(stream) = &mut node.work {
-                stream.restart();
-            }
-        }
-    }
-
     /// Answers to all samples of a set, each with the index of its row-wire: samples × outputs. NaN where a reading cannot be
     /// decoded.
     ///
@@ -206,6 +183,129 @@ impl ProgramDecoder {
             targets = &mut targets[(row_index + 1) * outputs..];
         }
         answers
+    }
+
+    #[inline(always)]
+    fn evaluate_chunk(&mut self, rows: &Rows<'_>, targets: &mut [f64]) -> Result<(), DecodeError> {
+        let Self {
+            program,
+            nodes,
+            steps,
+            moment,
+            ..
+        } = self;
+        let output = program.output().index();
+        for &index in &*steps {
+            let node = &program.nodes()[index];
+            let (before, rest) = nodes.split_at_mut(index);
+            let Prepared { work, size, values } = &mut rest[0];
+            let size = *size;
+            if work.is_single(node) {
+                let is_computed = rows.compute::<f32>(node, work, before, &mut values.singles);
+                assert!(is_computed, "the operation is one of single precision");
+                convert(&values.singles, &mut values.doubles, f64::from);
+                continue;
+            }
+            // The last values are written where they are wanted, unless they have padding.
+            let has_padding = matches!(work, Work::Doubles(_));
+            let results = if index == output && !has_padding {
+                &mut *targets
+            } else {
+                &mut values.doubles[..]
+            };
+            let all = |id: &NodeId| rows.values::<f64>(&before[id.index()]);
+            let by_row = |id: &NodeId| rows.by_row::<f64>(&before[id.index()]);
+            let of_rows = rows.indices.iter().copied().enumerate();
+            match (&node.operation, work) {
+                (Operation::Readings, _) => results[..rows.readings.len()].copy_from_slice(rows.readings),
+                (_, Work::OfRow(constants)) => {
+                    if !rows.is_run {
+                        for (row, row_index) in of_rows {
+                            let (to, from) = (row * size..(row + 1) * size, row_index * size..(row_index + 1) * size);
+                            if !results.is_empty() {
+                                results[to.clone()].copy_from_slice(&constants.doubles[from.clone()]);
+                            }
+                            if !values.singles.is_empty() {
+                                values.singles[to].copy_from_slice(&constants.singles[from]);
+                            }
+                        }
+                    }
+                }
+                (Operation::Valid { of, domain }, _) => {
+                    let checked = all(of);
+                    // Invalid readings are rare: one vectorised pass finds whether there is any.
+                    if !kernel::are_valid(*domain, checked)
+                        && let Some(place) = checked.iter().position(|&value| !domain.contains(value))
+                    {
+                        return Err(DecodeError {
+                            row_index: place / size,
+                            channel: place % size,
+                            value: checked[place],
+                        });
+                    }
+                    results[..checked.len()].copy_from_slice(checked);
+                }
+                (Operation::Affine { of, biases, .. }, Work::Placement(placements)) => {
+                    let (of, biases) = (by_row(of), all(biases));
+                    results[..biases.len()].copy_from_slice(biases);
+                    for (row, row_index) in of_rows {
+                        placements
+                            .at(row_index)
+                            .apply(of(row), &mut results[row * size..(row + 1) * size]);
+                    }
+                }
+                (Operation::Concatenate(parts), _) => {
+                    let mut first = 0;
+                    for part in parts {
+                        let (part, of) = (before[part.index()].size, by_row(part));
+                        for (row, _) in of_rows.clone() {
+                            results[row * size + first..row * size + first + part].copy_from_slice(of(row));
+                        }
+                        first += part;
+                    }
+                }
+                (Operation::Blend { logits, of }, Work::Blend(shares)) => {
+                    let (logits, of) = (by_row(logits), by_row(of));
+                    for (row, _) in of_rows {
+                        kernel::blend(logits(row), of(row), shares, &mut results[row * size..(row + 1) * size]);
+                    }
+                }
+                (Operation::History { of, .. }, Work::History(stream)) => {
+                    let ((group, time_s), of) = (*moment, by_row(of));
+                    for (row, row_wire) in of_rows {
+                        let (past, _) = stream.step(Series { group, row_wire }, of(row), time_s);
+                        results[row * size..(row + 1) * size].copy_from_slice(past);
+                    }
+                }
+                (Operation::CountOutside { of, low, high }, _) => {
+                    let [of, low, high] = [of, low, high].map(by_row);
+                    for (row, _) in of_rows {
+                        let limits = low(row).iter().zip(high(row));
+                        let outside = limits
+                            .zip(of(row))
+                            .filter(|((low, high), value)| !(*low..=*high).contains(value));
+                        results[row] = outside.count() as f64;
+                    }
+                }
+                (_, work) => {
+                    let is_computed = rows.compute::<f64>(node, work, before, results);
+                    assert!(is_computed, "every operation is prepared as such");
+                }
+            }
+            if !matches!(rest[0].work, Work::OfRow(_)) {
+                let Values { doubles, singles } = &mut rest[0].values;
+                convert(doubles, singles, |value| value as f32);
+            }
+        }
+        let last = &nodes[output];
+        let is_elsewhere = matches!(
+            last.work,
+            Work::Shared(_) | Work::OfRow(_) | Work::Doubles(_) | Work::Singles(_)
+        );
+        if is_elsewhere || last.work.is_single(program.node(program.output())) {
+            targets.copy_from_slice(rows.values(last));
+        }
+        Ok(())
     }
 }
 
@@ -243,8 +343,6 @@ impl Work {
             _ => panic!("the tables of an operation are constants"),
         };
         match &node.operation {
-            Operation::Readings => Self::Readings,
-            Operation::Valid { of, .. } if matches!(program.node(*of).operation, Operation::Readings) => Self::Readings,
             Operation::Select { tables, .. } => {
                 let rounded = |&value: &f64| match node.precision {
                     Precision::Double => value,
@@ -280,14 +378,6 @@ impl Work {
                 Precision::Double => Self::Doubles(tables(points).map(Padded::of_points)),
                 Precision::Single => Self::Singles(tables(points).map(Padded::of_points)),
             },
-            Operation::Divide(dividend, _) => match program.node(*dividend) {
-                Node {
-                    operation: Operation::Subtract(one, other),
-                    precision: Precision::Double,
-                    ..
-                } if program.uses(*dividend) == 1 => Self::OfDifference(*one, *other),
-                _ => Self::Plain,
-            },
             Operation::Blend { logits, .. } => Self::Blend(vec![0.0; program.node(*logits).size]),
             Operation::History { of, memory } => {
                 let stream = MemoryStream::new(memory, program.node(*of).size);
@@ -312,9 +402,6 @@ trait Width: Real {
     /// The values in this precision.
     fn held(values: &Values) -> &[Self];
 
-    /// The values of a node that reads them.
-    fn read<'a>(readings: &'a [f64], converted: &'a Values) -> &'a [Self];
-
     /// Weights or points in this precision, if the node has any.
     fn tables(work: &Work) -> Option<&PerRow<Padded<Self>>>;
 }
@@ -323,11 +410,6 @@ impl Width for f64 {
     #[inline(always)]
     fn held(values: &Values) -> &[Self] {
         &values.doubles
-    }
-
-    #[inline(always)]
-    fn read<'a>(readings: &'a [f64], _: &'a Values) -> &'a [Self] {
-        readings
     }
 
     #[inline(always)]
@@ -343,11 +425,6 @@ impl Width for f32 {
     #[inline(always)]
     fn held(values: &Values) -> &[Self] {
         &values.singles
-    }
-
-    #[inline(always)]
-    fn read<'a>(_: &'a [f64], converted: &'a Values) -> &'a [Self] {
-        &converted.singles
     }
 
     #[inline(always)]
@@ -412,7 +489,6 @@ impl Rows<'_> {
     fn values<'a, T: Width>(&'a self, node: &'a Prepared) -> &'a [T] {
         let length = self.indices.len() * node.size;
         match &node.work {
-            Work::Readings => &T::read(self.readings, &node.values)[..length],
             Work::OfRow(constants) if self.is_run => {
                 let first = self.indices[0] * node.size;
                 &T::held(constants)[first..first + length]
@@ -434,10 +510,6 @@ impl Rows<'_> {
         let all = |id: &NodeId| self.values::<T>(&before[id.index()]);
         let of_rows = self.indices.iter().copied().enumerate();
         match (&node.operation, work) {
-            (Operation::Divide(_, divisor), Work::OfDifference(one, other)) => {
-                let operands = [one, other, divisor].map(|id| self.values::<f64>(&before[id.index()]));
-                kernel::subtract_and_divide(operands, results);
-            }
             (Operation::Subtract(one, other), _) => {
                 kernel::pairs(all(one), all(other), results, |one, other| one - other);
             }
@@ -462,134 +534,6 @@ impl Rows<'_> {
             _ => return false,
         }
         true
-    }
-}
-
-impl ProgramDecoder {
-    #[inline(always)]
-    fn evaluate_chunk(&mut self, rows: &Rows<'_>, targets: &mut [f64]) -> Result<(), DecodeError> {
-        let Self {
-            program,
-            nodes,
-            steps,
-            moment,
-            ..
-        } = self;
-        let output = program.output().index();
-        for &index in &*steps {
-            let node = &program.nodes()[index];
-            let (before, rest) = nodes.split_at_mut(index);
-            let Prepared { work, size, values } = &mut rest[0];
-            let size = *size;
-            if work.is_single(node) {
-                let is_computed = rows.compute::<f32>(node, work, before, &mut values.singles);
-                assert!(is_computed, "the operation is one of single precision");
-                convert(&values.singles, &mut values.doubles, f64::from);
-                continue;
-            }
-            // The last values are written where they are wanted, unless they have padding.
-            let has_padding = matches!(work, Work::Doubles(_));
-            let results = if index == output && !has_padding {
-                &mut *targets
-            } else {
-                &mut values.doubles[..]
-            };
-            let all = |id: &NodeId| rows.values::<f64>(&before[id.index()]);
-            let by_row = |id: &NodeId| rows.by_row::<f64>(&before[id.index()]);
-            let of_rows = rows.indices.iter().copied().enumerate();
-            match (&node.operation, work) {
-                (Operation::Readings, _) => convert(rows.readings, &mut values.singles, |value| value as f32),
-                (_, Work::OfRow(constants)) => {
-                    if !rows.is_run {
-                        for (row, row_index) in of_rows {
-                            let (to, from) = (row * size..(row + 1) * size, row_index * size..(row_index + 1) * size);
-                            if !results.is_empty() {
-                                results[to.clone()].copy_from_slice(&constants.doubles[from.clone()]);
-                            }
-                            if !values.singles.is_empty() {
-                                values.singles[to].copy_from_slice(&constants.singles[from]);
-                            }
-                        }
-                    }
-                }
-                (Operation::Valid { of, domain }, work) => {
-                    let checked = all(of);
-                    // Invalid readings are rare: one vectorised pass finds whether there is any.
-                    if !kernel::are_valid(*domain, checked)
-                        && let Some(place) = checked.iter().position(|&value| !domain.contains(value))
-                    {
-                        return Err(DecodeError {
-                            row_index: place / size,
-                            channel: place % size,
-                            value: checked[place],
-                        });
-                    }
-                    if !matches!(work, Work::Readings) {
-                        results[..checked.len()].copy_from_slice(checked);
-                    }
-                    convert(checked, &mut values.singles, |value| value as f32);
-                }
-                (Operation::Affine { of, biases, .. }, Work::Placement(placements)) => {
-                    let (of, biases) = (by_row(of), all(biases));
-                    results[..biases.len()].copy_from_slice(biases);
-                    for (row, row_index) in of_rows {
-                        placements
-                            .at(row_index)
-                            .apply(of(row), &mut results[row * size..(row + 1) * size]);
-                    }
-                }
-                (Operation::Concatenate(parts), _) => {
-                    let mut first = 0;
-                    for part in parts {
-                        let (part, of) = (before[part.index()].size, by_row(part));
-                        for (row, _) in of_rows.clone() {
-                            results[row * size + first..row * size + first + part].copy_from_slice(of(row));
-                        }
-                        first += part;
-                    }
-                }
-                (Operation::Blend { logits, of }, Work::Blend(shares)) => {
-                    let (logits, of) = (by_row(logits), by_row(of));
-                    for (row, _) in of_rows {
-                        kernel::blend(logits(row), of(row), shares, &mut results[row * size..(row + 1) * size]);
-                    }
-                }
-                (Operation::History { of, .. }, Work::History(stream)) => {
-                    let ((group, time_s), of) = (*moment, by_row(of));
-                    for (row, row_wire) in of_rows {
-                        let (past, _) = stream.step(Series { group, row_wire }, of(row), time_s);
-                        results[row * size..(row + 1) * size].copy_from_slice(past);
-                    }
-                }
-                (Operation::CountOutside { of, low, high }, _) => {
-                    let [of, low, high] = [of, low, high].map(by_row);
-                    for (row, _) in of_rows {
-                        let limits = low(row).iter().zip(high(row));
-                        let outside = limits
-                            .zip(of(row))
-                            .filter(|((low, high), value)| !(*low..=*high).contains(value));
-                        results[row] = outside.count() as f64;
-                    }
-                }
-                (_, work) => {
-                    let is_computed = rows.compute::<f64>(node, work, before, results);
-                    assert!(is_computed, "every operation is prepared as such");
-                }
-            }
-            if !matches!(rest[0].work, Work::Readings | Work::OfRow(_)) {
-                let Values { doubles, singles } = &mut rest[0].values;
-                convert(doubles, singles, |value| value as f32);
-            }
-        }
-        let last = &nodes[output];
-        let is_elsewhere = matches!(
-            last.work,
-            Work::Readings | Work::Shared(_) | Work::OfRow(_) | Work::Doubles(_) | Work::Singles(_)
-        );
-        if is_elsewhere || last.work.is_single(program.node(program.output())) {
-            targets.copy_from_slice(rows.values(last));
-        }
-        Ok(())
     }
 }
 

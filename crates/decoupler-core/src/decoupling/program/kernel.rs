@@ -1,37 +1,21 @@
 //! Arithmetic of programs, written so that it fills vector registers inside a SIMD-dispatched function.
-//!
-use std::ops::{Add, Div, Mul, Sub};
-
-use ndarray::Array2;
+use ndarray::{Array2, LinalgScalar};
 
 use super::{Domain, Function};
 use crate::network::{exp, tanh, tanh_single};
 
 /// Floating-point type of an operation.
-pub(super) trait Real:
-    Copy + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + 'static
-{
-    const ZERO: Self;
-
+pub(super) trait Real: LinalgScalar + Default + PartialOrd + Into<f64> {
     /// Rounds a double to the nearest value.
     fn of(value: f64) -> Self;
-
-    fn to_f64(self) -> f64;
 
     fn tanh(self) -> Self;
 }
 
 impl Real for f64 {
-    const ZERO: Self = 0.0;
-
     #[inline(always)]
     fn of(value: f64) -> Self {
         value
-    }
-
-    #[inline(always)]
-    fn to_f64(self) -> f64 {
-        self
     }
 
     #[inline(always)]
@@ -41,16 +25,9 @@ impl Real for f64 {
 }
 
 impl Real for f32 {
-    const ZERO: Self = 0.0;
-
     #[inline(always)]
     fn of(value: f64) -> Self {
         value as f32
-    }
-
-    #[inline(always)]
-    fn to_f64(self) -> f64 {
-        f64::from(self)
     }
 
     #[inline(always)]
@@ -89,7 +66,7 @@ pub(super) fn map<T: Real>(function: Function, values: &[T], results: &mut [T]) 
 #[inline(always)]
 fn each<T: Real>(values: &[T], results: &mut [T], function: impl Fn(f64) -> f64) {
     for (result, value) in results.iter_mut().zip(values) {
-        *result = T::of(function(value.to_f64()));
+        *result = T::of(function((*value).into()));
     }
 }
 
@@ -98,14 +75,6 @@ fn each<T: Real>(values: &[T], results: &mut [T], function: impl Fn(f64) -> f64)
 pub(super) fn pairs<T: Real>(one: &[T], other: &[T], results: &mut [T], function: impl Fn(T, T) -> T) {
     for ((result, &one), &other) in results.iter_mut().zip(one).zip(other) {
         *result = function(one, other);
-    }
-}
-
-/// Writes (one − other) / divisor, with the difference in double precision.
-#[inline(always)]
-pub(super) fn subtract_and_divide<T: Real>([one, other, divisor]: [&[f64]; 3], results: &mut [T]) {
-    for (((result, one), other), &divisor) in results.iter_mut().zip(one).zip(other).zip(divisor) {
-        *result = T::of(one - other) / T::of(divisor);
     }
 }
 
@@ -157,7 +126,7 @@ impl<T: Real> Padded<T> {
             let fitting = panels.iter().find(|&&panel| panel <= width - first);
             let end = first + fitting.copied().unwrap_or(LANES);
             for row in &rows {
-                values.extend((first..end).map(|column| row.get(column).map_or(T::ZERO, |&value| T::of(value))));
+                values.extend((first..end).map(|column| row.get(column).map_or(T::default(), |&value| T::of(value))));
             }
             first = end;
         }
@@ -196,7 +165,7 @@ impl<T: Real> Padded<T> {
             .panel::<B>(first)
             .split_last()
             .expect("the biases are the last row");
-        let (mut even, mut odd) = (*biases, [T::ZERO; B]);
+        let (mut even, mut odd) = (*biases, [T::default(); B]);
         let (pairs, last) = values.as_chunks::<2>();
         let (of_pairs, of_last) = weights.as_chunks::<2>();
         for (pair, [of_even, of_odd]) in pairs.iter().zip(of_pairs) {
@@ -232,7 +201,7 @@ impl<T: Real> Padded<T> {
     /// Writes the squared distances `first..first + B` and returns B.
     #[inline(always)]
     fn distances<const B: usize>(&self, values: &[T], first: usize, results: &mut [T]) -> usize {
-        let mut squares = [T::ZERO; B];
+        let mut squares = [T::default(); B];
         for (&value, points) in values.iter().zip(self.panel::<B>(first)) {
             for lane in 0..B {
                 let apart = value - points[lane];
@@ -281,14 +250,8 @@ impl Placement {
     /// Writes the outputs that are not constant.
     #[inline(always)]
     pub(super) fn apply(&self, values: &[f64], results: &mut [f64]) {
-        for &Term {
-            bias,
-            weight,
-            value,
-            output,
-        } in &self.0
-        {
-            results[output] = bias + weight * values[value];
+        for term in &self.0 {
+            results[term.output] = term.bias + term.weight * values[term.value];
         }
     }
 }

@@ -15,10 +15,12 @@ use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 pub use builder::Builder;
+pub use composition::Combined;
 pub use evaluate::ProgramDecoder;
 
 use super::Precision;
 use crate::dataset::{DatasetError, Memory, PerRow};
+pub use crate::network::Domain;
 
 /// A computation from the readings of a row to its targets.
 ///
@@ -137,27 +139,6 @@ pub enum Operation {
         /// Largest values.
         high: NodeId,
     },
-}
-
-/// Numbers that are accepted as readings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Domain {
-    /// Any finite number.
-    Finite,
-    /// A finite number above 0.
-    Positive,
-}
-
-impl Domain {
-    /// `true` for numbers of the domain.
-    #[inline(always)]
-    pub fn contains(self, value: f64) -> bool {
-        let above = match self {
-            Self::Finite => f64::NEG_INFINITY,
-            Self::Positive => 0.0,
-        };
-        (value > above) & (value < f64::INFINITY)
-    }
 }
 
 /// A function of one value.

@@ -2,11 +2,12 @@
 
 use ndarray::{Array2, ArrayView2, Axis, Slice};
 
-use super::{Builder, Function, NodeId, Program, ProgramDecoder};
+use super::{Builder, Combined, Function, NodeId, Program, ProgramDecoder};
 use crate::{
     dataset::{Dataset, PerRow},
     decoupling::Precision,
-    network::{DecouplingNetwork, Mlp, Quantity},
+    network::{DecouplingNetwork, MARGIN, Mlp, Quantity},
+    problem::Problem,
 };
 
 /// Rounding error of the sums of hidden nodes above which they are computed in double precision.
@@ -38,6 +39,36 @@ impl PerRow<DecouplingNetwork> {
     /// If the set has a different number of channels, or a row-wire without a network.
     pub fn decouple(&self, set: &Dataset) -> Array2<f64> {
         self.decoder().answers_to(set)
+    }
+
+    /// The program that answers to the readings of `problem`: that of a combination with these networks, if there is one,
+    /// otherwise that of the networks. For a recording, readings are limited to their range in training, extended by a tenth.
+    ///
+    /// # Panics
+    /// As [`Self::program`], or if the combination has other readings or targets.
+    pub fn decoder_program(&self, problem: &Problem, combined: Option<&Combined>) -> Program {
+        match combined {
+            Some(combined) => combined.program(self),
+            None if problem.has_nodes() => self.program(Precision::Double),
+            None => self.clipped(MARGIN, |network| network.program(Precision::Double)),
+        }
+    }
+
+    /// Joins one program for each network, with the readings limited to their range in training, extended by `margin` of
+    /// it: outside, networks and maps extrapolate without bound. Those of networks whose range is not known are not limited.
+    pub(crate) fn clipped(&self, margin: f64, program: impl Fn(&DecouplingNetwork) -> Program) -> Program {
+        let limited = |network: &DecouplingNetwork| {
+            let (inputs, program) = (network.inputs(), program(network));
+            let Some(range) = inputs.range() else { return program };
+            let limits = (0..range.channels()).map(|channel| range.limits_within(inputs.quantity(), channel, margin));
+            let (low, high): (Vec<f64>, Vec<f64>) = limits.unzip();
+            let mut builder = Builder::new(program.channels());
+            let valid = builder.valid(builder.readings(), inputs.quantity().domain());
+            let clipped = builder.clip(valid, [&low, &high], Precision::Double);
+            let output = builder.include(&program, clipped);
+            builder.finish(output)
+        };
+        Program::each(&self.map(limited))
     }
 }
 

@@ -27,14 +27,11 @@ pub(super) struct Features {
 impl Features {
     /// Returns the features of `memory`; `None` if they are not possible for the samples.
     pub(super) fn of(samples: &AutoSamples<'_>, memory: &Memory) -> Option<Self> {
-        let set = if memory.is_empty() {
-            samples.set.clone()
-        } else {
+        let (mut set, memory) = (samples.set.clone(), memory.clone());
+        if !memory.is_empty() {
             let (history, of_samples) = samples.past?;
-            let features = history.features(memory).ok()?;
-            samples.set.with_readings(features.select(Axis(0), of_samples))
-        };
-        let memory = memory.clone();
+            set = set.with_readings(history.features(&memory).ok()?.select(Axis(0), of_samples));
+        }
         Some(Self { memory, set })
     }
 
@@ -79,11 +76,7 @@ impl Features {
             .map(|folds| ridge(values.view(), self.set.targets(), folds));
         let fits = fits.collect::<Result<Vec<_>, _>>()?;
         let centre = values.mean_axis(Axis(0)).ok_or(NetworkError::Empty)?.to_vec();
-        let sum = fits
-            .iter()
-            .fold(Array2::zeros(fits[0].map.dim()), |sum, fit| sum + &fit.map);
-        let mean = sum / fits.len() as f64;
-        let mut maps = fits.iter().flat_map(|fit| &fit.held_out).chain([&mean]);
+        let mut maps = fits.iter().flat_map(|fit| &fit.held_out).chain([&fits[0].map]);
         self.fitted(judge, quantity, |_| {
             let map = maps.next().ok_or(NetworkError::Empty)?;
             Ok(Program::of_map(map, quantity, &centre))

@@ -14,9 +14,8 @@ use crate::{
     decoupling::{Program, ProgramDecoder},
     job::Job,
     machine::MemoryBudget,
-    network::Shape,
     scene::NoiseSource,
-    training::{StoppingRules, TrainingError},
+    training::StoppingRules,
 };
 
 /// Committees trained on all folds but one, for each fold, which advance together epoch by epoch: the epoch at which to
@@ -26,8 +25,6 @@ pub(super) struct FoldedTraining<'a> {
     parts: Vec<Part>,
     /// Epoch of the latest weights.
     pub(super) epoch: usize,
-    /// Number of multiplications of one epoch of all trainings, from the shapes alone.
-    pub(super) epoch_multiplications: f64,
     /// Epoch with the lowest error so far, the error, and the held-out answers; `None` if no epoch had finite answers.
     pub(super) best: Option<(usize, f64, Array2<f64>)>,
     /// Last epoch that lowered the error noticeably, and the error then.
@@ -44,16 +41,6 @@ struct Part {
     answers: Array2<f64>,
     /// Rows of the answers among all held-out answers.
     rows: Vec<usize>,
-}
-
-/// Returns the number of multiplications of an epoch of all starts on this many samples, and of their answers to `answered`
-/// others.
-pub(super) fn training_multiplications(settings: &RunSettings, shape: Shape, samples: usize, answered: usize) -> f64 {
-    /// Cost of the tanh of a hidden node, in multiplications.
-    const TANH: usize = 12;
-    let training = settings.training.method.epoch_multiplications(shape, samples);
-    let answers = answered * (shape.weights() + TANH * shape.hidden);
-    settings.starts as f64 * (training + answers as f64)
 }
 
 /// Returns ridge regression fitted to a set, and the set with what it leaves of the targets.
@@ -114,17 +101,8 @@ impl<'a> FoldedTraining<'a> {
             })
         });
         let parts: Vec<Part> = parts.collect::<Result<_, RunError>>()?;
-        if parts.iter().all(|part| part.run.is_none()) {
-            return Err(TrainingError::NothingVaries.into());
-        }
-        let of_part = |part: &Part| {
-            let Some((run, _)) = &part.run else { return 0.0 };
-            let first = &run.leader().rows()[0];
-            training_multiplications(settings, first.present().shape(), first.samples(), part.rows.len())
-        };
         Ok(Self {
             judge,
-            epoch_multiplications: parts.iter().map(of_part).sum(),
             parts,
             epoch: 0,
             best: None,

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     dataset::{Folds, Seed, SplitBy, Stream},
-    numerics::student_quantile,
+    numerics::{is_positive_mean, standard_error},
 };
 
 /// Folds of the training samples, by which all candidates are judged, and the targets that count.
@@ -58,6 +58,13 @@ impl Judge {
         self.truth.nrows() / self.repeats.len()
     }
 
+    /// Mean of the held-out answers to each sample.
+    pub(super) fn mean_of_repeats(&self, answers: &Array2<f64>) -> Array2<f64> {
+        let repeats = answers.axis_chunks_iter(Axis(0), self.samples());
+        let none = Array2::zeros((self.samples(), answers.ncols()));
+        repeats.fold(none, |sum, part| sum + part) / self.repeats.len() as f64
+    }
+
     /// Number of trainings of a candidate.
     pub(super) fn parts(&self) -> usize {
         self.repeats.iter().map(Folds::count).sum()
@@ -106,8 +113,10 @@ impl Judge {
         let counted = self.counted();
         let squares = counted.iter().map(|target| self.unexplained(*target, answers));
         let error = (squares.sum::<f64>() / counted.len().max(1) as f64).sqrt();
-        let spread = standard_error(&self.of_parts(answers));
-        (error, spread / (2.0 * error).max(f64::MIN_POSITIVE))
+        (
+            error,
+            standard_error(&self.of_parts(answers)) / (2.0 * error).max(f64::MIN_POSITIVE),
+        )
     }
 
     /// Share e/σ² of the variance of a target that held-out answers leave.
@@ -118,22 +127,11 @@ impl Judge {
     /// Returns `true` if `ours` are better than `theirs`, and than the mean, by a paired t-test of the logarithms of their errors
     /// in the folds, with 1 % for the first of `candidates` that is wrongly found better (Bonferroni).
     pub(super) fn is_clearly_better(&self, ours: &Array2<f64>, theirs: &Array2<f64>, candidates: usize) -> bool {
-        /// Fewer folds decide nothing.
-        const FEWEST: usize = 4;
         /// Largest error of what is worth the additional inputs, relative to the other and to the mean.
         const WORTH: f64 = 0.97;
         let pairs = self.of_parts(ours).into_iter().zip(self.of_parts(theirs));
         let gains = Vec::from_iter(pairs.map(|(ours, theirs)| (theirs / ours).ln()));
-        let mean = gains.iter().sum::<f64>() / gains.len() as f64;
         let error = self.error(ours).0;
-        gains.len() >= FEWEST
-            && error < WORTH * self.error(theirs).0.min(1.0)
-            && mean > student_quantile(0.02 / candidates as f64, gains.len() as f64 - 1.0) * standard_error(&gains)
+        error < WORTH * self.error(theirs).0.min(1.0) && is_positive_mean(&gains, 0.01 / candidates as f64)
     }
-}
-
-/// Standard error of the mean of a few values.
-fn standard_error(values: &[f64]) -> f64 {
-    let freedom = (values.len() as f64 - 1.0).max(1.0);
-    (ArrayView1::from(values).var(0.0) / freedom).sqrt()
 }

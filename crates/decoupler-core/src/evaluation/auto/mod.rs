@@ -3,9 +3,10 @@
 //!
 //! Candidates are the training mean, ridge regression, kernel ridge regression and networks, also networks on what ridge
 //! regression leaves. All are judged by their held-out answers in the same folds, a network at the lowest point of its error over
-//! epochs, which is also when its training will stop. The answer is the convex combination of the best of each family, for
-//! each target by non-negative least squares on the held-out answers (stacking: Breiman 1996, doi:10.1007/BF00117832); in the
-//! folds it is never worse than one of them. The network is trained in any case.
+//! epochs, which is also when its training will stop. The answer is the convex combination of the fits, the three best networks
+//! and one on what ridge regression leaves, for each target by non-negative least squares on the held-out answers (stacking:
+//! Breiman 1996, doi:10.1007/BF00117832); in the folds it is never worse than one of them. The best network is trained in any
+//! case.
 //!
 //! A memory is tried only on readings with times, or on request, and is taken only if it is clearly better in paired
 //! comparisons: on samples in an order that the targets follow, such as a scan, it learns that order. Channels that are
@@ -16,10 +17,11 @@
 
 mod channels;
 mod features;
+mod fits;
 mod folded_training;
 mod judge;
+mod networks;
 mod search;
-mod spans;
 #[cfg(test)]
 mod tests;
 
@@ -34,11 +36,12 @@ use crate::{
     decoupling::Combined,
     network::{InputChoice, Quantity, ScalingChoice},
     problem::Channel,
-    text::{format_below_one, format_percent},
+    text::format_below_one,
     training::Method,
 };
 pub use channels::dead_channels;
 pub use search::choose_settings;
+pub(crate) use search::{Fits, compare_fits};
 
 /// Time on one core that a choice and the training may take if nothing else is given, in seconds.
 pub const DEFAULT_BUDGET_S: f64 = 60.0;
@@ -57,13 +60,6 @@ pub struct AutoSamples<'a> {
     pub past: Option<(&'a History, &'a [usize])>,
     /// Rule by which folds are made: blocks of time, whole groups, or single samples.
     pub by: SplitBy,
-}
-
-impl AutoSamples<'_> {
-    /// Returns `true` if the times of the readings are known.
-    fn is_timed(&self) -> bool {
-        self.past.is_some_and(|(history, _)| history.times_s().is_some())
-    }
 }
 
 /// Settings given by the user, which are not searched.
@@ -111,7 +107,7 @@ pub struct AutoChoice {
 
 /// Everything that a search tried.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct AutoRecord {
     /// Budget in seconds of one core.
     pub budget_s: f64,
@@ -124,20 +120,15 @@ pub struct AutoRecord {
     /// Index of the network to be trained in `tried`.
     pub chosen: usize,
     /// Error of the combination, as [`Tried::error`]; `None` in files of version 0.1.0, whose choice is the network alone.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub combined: Option<f64>,
     /// Estimated time of the training on one core in seconds, which counts against the budget.
-    #[serde(default)]
     pub training_s: f64,
     /// Names of the channels that are left out.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<String>,
     /// Indices of the targets that nothing determines, which took no part in the choice.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub undetermined: Vec<usize>,
     /// Targets that a memory predicts and the readings of the moment do not: the index of each, and R² without and with
     /// memory.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub leaks: Vec<(usize, [f64; 2])>,
 }
 
@@ -258,8 +249,7 @@ impl AutoRecord {
         self.tried.iter().map(|tried| tried.seconds).sum()
     }
 
-    /// Remarks on what was found: channels that are left out, targets that are not determined or may leak, and the network if
-    /// it is no better than ridge regression.
+    /// Remarks on what was found: channels that are left out, targets that are not determined or may leak.
     pub fn remarks(&self, targets: &[Channel]) -> Vec<String> {
         let mut remarks = Vec::new();
         let name = |index: &usize| targets.get(*index).map_or("a target", |target| &target.name).to_owned();
@@ -277,32 +267,21 @@ impl AutoRecord {
                 names.join(", ")
             ));
         }
-        remarks.extend(self.leaks.iter().map(|(target, [now, past])| {
+        remarks.extend(self.leaks(targets));
+        remarks
+    }
+
+    /// Remarks on the targets that may leak.
+    pub fn leaks(&self, targets: &[Channel]) -> impl Iterator<Item = String> {
+        self.leaks.iter().map(|(target, [now, past])| {
             format!(
                 "possible leak: a memory predicts {} (R² {}), but the readings of the moment do not (R² {}). Either the order \
                  of recording gives it away, which does not help in use, or the sensor responds to changes only; give a memory \
                  if it is the latter",
-                name(target),
+                targets.get(*target).map_or("a target", |target| &target.name),
                 format_below_one(*past, 2),
                 format_below_one(*now, 2)
             )
-        }));
-        let best = |is_one: fn(&TriedModel) -> bool| {
-            let of_model = self.tried.iter().filter(|tried| is_one(&tried.model));
-            of_model.min_by(|one, other| one.error.total_cmp(&other.error))
-        };
-        let network = best(|model| matches!(model, TriedModel::Network { .. }));
-        if let (Some(network), Some(ridge)) = (network, best(|model| *model == TriedModel::Ridge))
-            && network.error >= ridge.error
-        {
-            remarks.push(format!(
-                "in cross-validation, the best network that was tried has an error of {} of the spread of the targets, and \
-                 ridge regression on {} one of {}",
-                format_percent(100.0 * network.error),
-                ridge.features(),
-                format_percent(100.0 * ridge.error)
-            ));
-        }
-        remarks
+        })
     }
 }

@@ -54,8 +54,7 @@ fn choose_for(
         &base,
         fixed,
         &samples,
-        budget_s,
-        MemoryBudget::UNLIMITED,
+        (budget_s, MemoryBudget::UNLIMITED),
         job,
         &mut |_| (),
     )
@@ -405,8 +404,7 @@ fn many_inputs_for_few_samples_get_weight_decay() {
         &base,
         &AutoFixed::default(),
         &samples,
-        4.0,
-        MemoryBudget::UNLIMITED,
+        (4.0, MemoryBudget::UNLIMITED),
         &Job::UNINTERRUPTED,
         &mut |_| (),
     )

@@ -4,14 +4,10 @@
 //! independent jobs, each on its own [`TrialSamples`]. [`run_experiments`] runs them on all cores and passes on each
 //! [`Trial`] as it finishes; [`ExperimentResults`] collects them and can be evaluated at any time.
 
-mod axis;
 mod experiment;
 mod results;
 mod runner;
-mod trial;
 
-pub use axis::{Axis, AxisKind};
-pub use experiment::{Cell, Experiment, ExperimentRecording, PaperTable};
+pub use experiment::{Axis, AxisKind, Cell, Experiment, ExperimentRecording, PaperTable};
 pub use results::{ExperimentResults, Figure};
-pub use runner::{Finished, run_experiments, worker_threads};
-pub use trial::{Trial, TrialSamples};
+pub use runner::{Finished, Trial, TrialSamples, run_experiments, worker_threads};

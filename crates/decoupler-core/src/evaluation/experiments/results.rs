@@ -61,22 +61,6 @@ impl ExperimentResults {
     }
 }
 
-impl Cell {
-    /// Returns `true` if every trial has finished or failed.
-    pub fn is_complete(&self) -> bool {
-        self.trials.len() + self.failures.len() == self.expected
-    }
-
-    /// Returns the trial with the median error in percent (the lower of two), as representative for the cell.
-    pub fn median_trial(&self) -> Option<&Trial> {
-        let percent = |trial: &Trial| trial.scores.network.percent();
-        let with_errors = self.trials.iter().filter_map(|trial| Some((percent(trial)?, trial)));
-        let mut trials = Vec::from_iter(with_errors);
-        trials.sort_by(|(one, _), (other, _)| one.total_cmp(other));
-        Some(trials.get(trials.len().checked_sub(1)? / 2)?.1)
-    }
-}
-
 /// Measured figure, with the published one for comparison.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figure {
@@ -92,8 +76,22 @@ pub struct Figure {
     pub values: Vec<Option<f64>>,
 }
 
-/// Figures for tables and files: medians unless stated otherwise, `None` if there is no such figure (yet).
+/// Figures for tables and files are medians unless stated otherwise, `None` if there is no such figure (yet).
 impl Cell {
+    /// Returns `true` if every trial has finished or failed.
+    pub fn is_complete(&self) -> bool {
+        self.trials.len() + self.failures.len() == self.expected
+    }
+
+    /// Returns the trial with the median error in percent (the lower of two), as representative for the cell.
+    pub fn median_trial(&self) -> Option<&Trial> {
+        let percent = |trial: &Trial| trial.scores.network.percent();
+        let with_errors = self.trials.iter().filter_map(|trial| Some((percent(trial)?, trial)));
+        let mut trials = Vec::from_iter(with_errors);
+        trials.sort_by(|(one, _), (other, _)| one.total_cmp(other));
+        Some(trials.get(trials.len().checked_sub(1)? / 2)?.1)
+    }
+
     /// Measures of the errors of the network, the first of which ranks the cells: of the nodes of an array, or over all
     /// targets of a recording.
     fn measures(&self) -> &'static [ErrorMeasure] {
@@ -157,17 +155,17 @@ impl Cell {
     /// Mean number of epochs per start.
     pub fn epochs_run(&self) -> Option<f64> {
         let starts = self.settings.starts;
-        self.median(|trial| Some(trial.epochs as f64 / (trial.networks * starts).max(1) as f64))
+        self.median(|trial| Some(trial.effort.epochs as f64 / (trial.effort.networks * starts).max(1) as f64))
     }
 
     /// Training time of a network in seconds, over all its starts.
     pub fn training_seconds(&self) -> Option<f64> {
-        self.median(|trial| Some(trial.seconds / trial.networks.max(1) as f64))
+        self.median(|trial| Some(trial.effort.seconds / trial.effort.networks.max(1) as f64))
     }
 
     /// Time of the fastest epoch in milliseconds, which is least affected by other load on the machine.
     pub fn epoch_ms(&self) -> Option<f64> {
-        let fastest = self.spread(|trial| Some(trial.min_epoch_seconds))?;
+        let fastest = self.spread(|trial| trial.effort.min_epoch_seconds)?;
         Some(1e3 * fastest.smallest)
     }
 }
@@ -177,7 +175,9 @@ mod tests {
     use super::*;
     use crate::{
         dataset::Seed,
-        evaluation::{Baselines, Errors, NodeAddress, Scores, TestErrors, experiments::PaperTable},
+        evaluation::{
+            Baselines, Errors, NodeAddress, Scores, TestErrors, cross_validation::Effort, experiments::PaperTable,
+        },
     };
 
     fn errors(z_percent: f64) -> TestErrors {
@@ -207,10 +207,12 @@ mod tests {
                 },
                 coverage: Vec::new(),
             },
-            networks: 1,
-            epochs: 10,
-            seconds: 10.0,
-            min_epoch_seconds: 1.0,
+            effort: Effort {
+                networks: 1,
+                epochs: 10,
+                seconds: 10.0,
+                min_epoch_seconds: Some(1.0),
+            },
             states: Vec::new(),
         }
     }

@@ -2,6 +2,7 @@ use std::{
     num::NonZero,
     panic::resume_unwind,
     sync::{
+        Arc,
         atomic::{AtomicUsize, Ordering},
         mpsc::channel,
     },
@@ -11,11 +12,16 @@ use std::{
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::{Cell, Experiment, Trial, TrialSamples};
+use super::{Cell, Experiment};
 use crate::{
-    dataset::Seed,
-    evaluation::{RunError, TrainingSize, Workload},
+    dataset::{Dataset, Division, Seed},
+    evaluation::{
+        Baselines, Run, RunError, RunSets, RunSettings, Scores, TrainingSize, Workload, cross_validation::Effort,
+    },
     job::Job,
+    machine::MemoryBudget,
+    problem::Problem,
+    training::TrainerState,
 };
 
 /// A finished trial.
@@ -29,8 +35,6 @@ pub struct Finished {
     pub outcome: Result<Trial, RunError>,
     /// Number of trials finished so far, over all experiments.
     pub done: usize,
-    /// Number of trials in all.
-    pub trials: usize,
     /// Estimated time for the remaining trials, from the time of the finished ones.
     pub time_left: Option<Duration>,
 }
@@ -110,7 +114,6 @@ pub fn run_experiments(
                     source: Box::new(source),
                 }),
                 done,
-                trials: planned.len(),
                 time_left: time_left((work, all_work), seconds, threads),
             });
         }
@@ -172,6 +175,118 @@ fn work(experiment: &Experiment, cell: &Cell, samples: &TrialSamples) -> f64 {
     };
     let of_training = size.map_or(1.0, |size| Workload::of(settings, size).multiplications());
     experiment.repeats_and_folds().1 as f64 * of_training
+}
+
+/// Result of one trial of a cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trial {
+    /// Seed of the trial.
+    pub seed: Seed,
+    /// Index of the repeat of a cross-validation, from 0.
+    pub repeat: usize,
+    /// Errors of the network, the training mean and the linear baseline on the test set; in a cross-validation, on all
+    /// samples, each decoupled by the models for which it was held out.
+    pub scores: Scores,
+    /// Epochs and time of the trainings.
+    pub effort: Effort,
+    /// Final state of every training, for [`Run::new`]; empty for a cross-validation, which has one network per
+    /// fold.
+    pub states: Vec<TrainerState>,
+}
+
+/// Samples of the trials of an experiment.
+#[derive(Clone, Debug)]
+pub enum TrialSamples {
+    /// Samples drawn by each trial from the model of its settings, within this memory.
+    Drawn(MemoryBudget),
+    /// Recorded samples, read once for all trials and divided by each.
+    Recorded {
+        /// All samples except those of the test files.
+        set: Arc<Dataset>,
+        /// Samples of the test files, if there are any.
+        test: Option<Arc<Dataset>>,
+        /// Description of the readings and targets.
+        problem: Arc<Problem>,
+        /// Memory that a trial may use.
+        memory: MemoryBudget,
+    },
+}
+
+impl TrialSamples {
+    /// Returns the sets of a trial with these settings and this division of recorded samples.
+    ///
+    /// # Errors
+    /// If the samples cannot be drawn or divided in this way.
+    ///
+    /// # Panics
+    /// If recorded samples have no division.
+    pub fn sets(
+        &self,
+        settings: &RunSettings,
+        division: Option<&Division>,
+        job: &Job<'_>,
+    ) -> Result<RunSets, RunError> {
+        match self {
+            Self::Drawn(memory) => RunSets::draw(settings, *memory, job),
+            Self::Recorded {
+                set,
+                test,
+                problem,
+                memory,
+            } => {
+                let division = division.expect("recorded samples have a division");
+                let (split, test) = division.sets(set, test.as_deref(), settings.seed)?;
+                Ok(RunSets {
+                    problem: Arc::clone(problem),
+                    memory: *memory,
+                    ..RunSets::new(split, test)
+                })
+            }
+        }
+    }
+}
+
+impl Trial {
+    /// Runs a trial of a cell with this seed; a cross-validation draws one set with it.
+    fn run(
+        experiment: &Experiment,
+        cell: &Cell,
+        (seed, repeat): (Seed, usize),
+        samples: &TrialSamples,
+        job: &Job<'_>,
+    ) -> Result<Self, RunError> {
+        job.check()?;
+        let settings = RunSettings { seed, ..cell.settings };
+        let (scores, effort, states) = if let Some(validation) = experiment.cross_validation {
+            let simulation = settings.drawn()?;
+            let set = simulation.draw_training(simulation.samples, seed)?;
+            let tested = simulation.draw_tested_folds(&set, seed)?;
+            let sets = (&set, tested.as_ref().unwrap_or(&set));
+            let validated = validation.run(&settings, sets, repeat, job)?;
+            let scores = validated.scores_of(&simulation.problem(), &set);
+            (scores, validated.effort, Vec::new())
+        } else {
+            let sets = samples.sets(&settings, cell.division.as_ref(), job)?;
+            let baselines = Baselines::fitted(&settings, &sets)?;
+            let mut run = Run::new(settings, sets, None, job)?;
+            let mut effort = Effort::default();
+            effort.train(&mut run, job)?;
+            let scores = Scores {
+                network: run.errors(),
+                network_alone: None,
+                baselines,
+                coverage: Vec::new(),
+            };
+            (scores, effort, run.states())
+        };
+        Ok(Self {
+            seed,
+            repeat,
+            scores,
+            effort,
+            states,
+        })
+    }
 }
 
 #[cfg(test)]

@@ -1,4 +1,3 @@
-mod conformal;
 mod half_width;
 
 use std::time::Duration;
@@ -6,7 +5,7 @@ use std::time::Duration;
 use ndarray::{ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-use super::{CrossValidated, Run, RunError, RunSettings, recorded::Evidence};
+use super::{CrossValidated, Run, RunError, RunSettings, recorded::evidence};
 use crate::{
     dataset::{Dataset, Folds, Seed, SplitBy, Stream},
     job::Job,
@@ -67,7 +66,7 @@ impl Intervals {
     /// If the shapes differ.
     pub fn calibrate(set: &Dataset, answers: ArrayView2<'_, f64>, by: SplitBy) -> Self {
         assert_eq!(set.targets().dim(), answers.dim());
-        let evidence = Evidence::of(set, by);
+        let evidence = evidence(set, by);
         let folds = by.folds_of(set, Self::FOLDS);
         let folds = Folds::by(set, folds, by, &mut Seed(0).rng(Stream::Split)).ok();
         let targets = set.targets();

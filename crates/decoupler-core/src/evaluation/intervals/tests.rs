@@ -1,7 +1,7 @@
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng, seq::SliceRandom};
 
-use super::{conformal::expected_shares, *};
+use super::{half_width::expected_shares, *};
 use crate::{evaluation::cross_validation::scatter, scene::standard_normal};
 
 /// Synthetic relation y = 2x with noise, whose intervals are known.

@@ -1,13 +1,11 @@
 use ndarray::{Array1, ArrayView1, ArrayView2};
 use thiserror::Error;
 
-use super::{Evidence, Interval, interval::SumVariance, scaled_deviations};
+use super::{Interval, evidence, scaled_deviations};
 use crate::{
     dataset::{Dataset, SplitBy},
-    evaluation::{
-        CrossValidated,
-        errors::{mean, varies},
-    },
+    evaluation::errors::{mean, varies},
+    numerics::{Evidence, SumVariance},
     text::format_below_one,
 };
 
@@ -37,7 +35,6 @@ pub enum Determinacy {
 
 /// Reason why R² of a target cannot be judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
 pub enum Undetermined {
     /// The target is constant.
     #[error("it is constant in the samples judged, so that their errors do not show how well its changes are decoded")]
@@ -73,7 +70,7 @@ impl Determination {
     /// If the shapes differ.
     pub fn measure(set: &Dataset, answers: ArrayView2<'_, f64>, by: SplitBy) -> Vec<Result<Self, Undetermined>> {
         assert_eq!(set.targets().dim(), answers.dim());
-        let evidence = Evidence::of(set, by);
+        let evidence = evidence(set, by);
         let targets = set.targets();
         let columns = targets.columns().into_iter().zip(answers.columns());
         columns
@@ -174,33 +171,6 @@ fn of_fits(evidence: &Evidence, off: &Array1<f64>, answers: &Array1<f64>) -> f64
     let slope = off.dot(answers) / squares;
     let cross = (off - answers * slope) * answers * 2.0 / variation;
     (1.0 - slope).clamp(0.0, 1.0) * evidence.variance(&cross).variance
-}
-
-/// Returns the ratio of the held-out RMSE of the network to that of ridge regression in a cross-validation of `set`, target
-/// by target; `None` if either has no error.
-///
-/// # Panics
-/// If the set is not the one that was cross-validated.
-pub fn nonlinear_gains(set: &Dataset, validated: &CrossValidated, by: SplitBy) -> Vec<Option<Interval>> {
-    Interval::of_rmse(set, [validated.network.view(), validated.linear.view()], by)
-}
-
-/// Returns a sentence on the target of this name if the network is no or little better than ridge: unless this ratio of
-/// their errors is a significant reduction by at least 5 %.
-pub fn ridge_remark(ratio: Interval, name: &str) -> Option<String> {
-    let Interval { value, low, high } = ratio;
-    (high >= 1.0 || value > 0.95).then(|| {
-        let better = if high < 1.0 { "little better" } else { "no better" };
-        // Enough decimals to show on which side of 1 the interval ends.
-        let differs = |decimals: &usize| format!("{high:.decimals$}") != format!("{:.decimals$}", 1.0);
-        let decimals = (2..6).find(differs).unwrap_or(2);
-        let [value, low, high] = [value, low, high].map(|ratio| format!("{ratio:.decimals$}"));
-        // The error does not show whether a nonlinear relation is absent, or this training has missed it.
-        format!(
-            "the network is {better} than ridge for {name} (error {value} ({low} to {high}) times ridge's): with these \
-             settings, use ridge"
-        )
-    })
 }
 
 #[cfg(test)]
@@ -554,22 +524,5 @@ mod tests {
             measure(&set, &broken, SplitBy::Time),
             Err(Undetermined::Unbounded { units: 100 })
         );
-    }
-
-    #[test]
-    fn the_remark_claims_no_cause_and_shows_whether_the_error_is_below_ridges() {
-        let remark = |value, low, high| ridge_remark(Interval { value, low, high }, "y");
-        let worse = remark(1.004, 0.98, 1.02).unwrap();
-        assert!(
-            worse.contains("no better than ridge for y (error 1.00 (0.98 to 1.02) times ridge's)"),
-            "{worse}"
-        );
-        assert!(worse.ends_with("with these settings, use ridge"), "{worse}");
-        let hardly = remark(0.996, 0.994, 0.9991).unwrap();
-        assert!(
-            hardly.contains("little better") && hardly.contains("0.996 (0.994 to 0.999) times ridge's)"),
-            "{hardly}"
-        );
-        assert_eq!(remark(0.7, 0.6, 0.8), None);
     }
 }

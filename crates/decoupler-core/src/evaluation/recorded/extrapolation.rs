@@ -1,7 +1,5 @@
 use std::cmp::Reverse;
 
-use ndarray::ArrayView2;
-
 use crate::{dataset::Dataset, evaluation::errors::extremes, problem::Channel};
 
 /// Fraction of the range by which a value may be outside it: the extremes of few training samples are exceeded slightly by
@@ -21,10 +19,11 @@ pub fn extrapolation(
     inputs: &[Channel],
     targets: &[Channel],
 ) -> (f64, Option<String>) {
-    let mut is_outside = vec![false; test.samples()];
-    let mut list = |kind: &str, channels: &[Channel], [training, test]: [ArrayView2<'_, f64>; 2]| {
-        let mut counts = Vec::new();
-        for ((channel, training), test) in channels.iter().zip(training.columns()).zip(test.columns()) {
+    let (mut is_outside, mut counts) = (vec![false; test.samples()], Vec::new());
+    let sets = [training, test].map(|set| [set.readings(), set.targets()]);
+    for (place, channels) in [inputs, targets].into_iter().enumerate() {
+        let columns = sets[0][place].columns().into_iter().zip(sets[1][place].columns());
+        for (channel, (training, test)) in channels.iter().zip(columns) {
             let (low, high) = extremes(training);
             let margin = MARGIN * (high - low);
             let range = low - margin..=high + margin;
@@ -34,29 +33,24 @@ pub fn extrapolation(
                 .filter(|(value, _)| !range.contains(value));
             counts.push((outside.map(|(_, is_outside)| *is_outside = true).count(), &channel.name));
         }
-        counts.retain(|(count, _)| *count > 0);
-        counts.sort_by_key(|(count, _)| Reverse(*count));
-        let named = counts.iter().take(NAMED);
-        let mut parts = Vec::from_iter(named.map(|(count, name)| format!("{name} in {count}")));
-        if counts.len() > NAMED {
-            parts.push(format!("{} others", counts.len() - NAMED));
-        }
-        (!parts.is_empty()).then(|| format!("{kind} {}", parts.join(", ")))
-    };
-    let listed = [
-        list("readings", inputs, [training.readings(), test.readings()]),
-        list("targets", targets, [training.targets(), test.targets()]),
-    ];
-    let (samples, outside) = (
-        test.samples(),
-        is_outside.into_iter().filter(|outside| *outside).count(),
+    }
+    counts.retain(|(count, _)| *count > 0);
+    counts.sort_by_key(|(count, _)| Reverse(*count));
+    let mut named = Vec::from_iter(
+        counts
+            .iter()
+            .take(NAMED)
+            .map(|(count, name)| format!("{name} in {count}")),
     );
+    named.extend((counts.len() > NAMED).then(|| format!("{} others", counts.len() - NAMED)));
+    let samples = test.samples();
+    let outside = is_outside.into_iter().filter(|outside| *outside).count();
     let share = outside as f64 / samples.max(1) as f64;
     let warning = format!(
         "{:.0} % of the test samples ({outside} of {samples}) are outside the range of the training samples by more than \
              a tenth of it ({}); readings are limited to that range, and the error within it may be smaller",
         100.0 * share,
-        Vec::from_iter(listed.into_iter().flatten()).join("; ")
+        named.join(", ")
     );
     (share, (share >= MIN_SHARE).then_some(warning))
 }
@@ -89,8 +83,7 @@ mod tests {
         assert_eq!(share, 0.75);
         let warning = warning.unwrap();
         assert!(
-            warning.contains("75 % of the test samples (3 of 4)")
-                && warning.contains("readings a in 2, b in 1; targets force in 2"),
+            warning.contains("75 % of the test samples (3 of 4)") && warning.contains("(a in 2, force in 2, b in 1)"),
             "{warning}"
         );
         let inside = extrapolation(&training, &training, &inputs, &targets);

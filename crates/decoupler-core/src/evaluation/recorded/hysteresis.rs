@@ -7,7 +7,7 @@ use crate::{
         TargetErrors,
         errors::{extremes, mean},
     },
-    numerics::student_quantile,
+    numerics::means_differ,
 };
 
 /// Errors of decoded values while a target rises (loading) and while it falls (unloading), and the hysteresis that is
@@ -34,19 +34,9 @@ pub struct HysteresisLoop {
     pub samples: [usize; 2],
     /// Largest difference of the branches, in percent of the range of the target.
     pub percent_of_range: f64,
-    /// Branches at increasing levels, where both have enough samples.
-    pub levels: Vec<LoopLevel>,
-}
-
-/// Mean decoded values at one level of a target.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct LoopLevel {
-    /// Middle of the level.
-    pub actual: f64,
-    /// Mean decoded value while loading, at the middle of the level.
-    pub loading: f64,
-    /// Mean decoded value while unloading.
-    pub unloading: f64,
+    /// Branches at increasing levels, where both have enough samples: the middle of the level, and the mean decoded values
+    /// while loading and while unloading, at the middle.
+    pub levels: Vec<[f64; 3]>,
 }
 
 /// Samples of each loading and of each unloading excursion, off its turning points.
@@ -100,57 +90,53 @@ impl HysteresisLoop {
         for stretch in samples.chunk_by(|&one, &next| stretches[one] == stretches[next]) {
             add_passages(&mut passages, actual, stretch, range);
         }
-        let count = |passages: &Passages| passages.iter().map(Vec::len).sum::<usize>();
-        let excursions = count(&passages);
+        let excursions = passages.iter().flatten().count();
         for branch in &mut passages {
             branch.retain(|samples| samples.len() >= Self::MIN_PASSAGE);
         }
-        if 2 * count(&passages) < excursions {
+        if 2 * passages.iter().flatten().count() < excursions {
             return None;
         }
-        let branches = passages.each_ref().map(|branch| branch.concat());
         let error = &decoded - &actual;
         let level_of = |sample: usize| {
             let level = ((actual[sample] - lowest) / range * Self::LEVELS as f64) as usize;
             level.min(Self::LEVELS - 1)
         };
         // Mean error of each branch at each level, which does not depend on where the samples are within the level.
-        let mut errors = vec![[Vec::new(), Vec::new()]; Self::LEVELS];
-        for (branch, samples) in branches.iter().enumerate() {
-            for &sample in samples {
-                errors[level_of(sample)][branch].push(error[sample]);
+        let means_of = |branch: &Vec<Vec<usize>>| {
+            let mut errors = vec![Vec::new(); Self::LEVELS];
+            for &sample in branch.iter().flatten() {
+                errors[level_of(sample)].push(error[sample]);
             }
-        }
-        let means = Vec::from_iter(errors.iter().map(|branches| {
-            let is_common = branches.iter().all(|errors| errors.len() >= Self::MIN_SAMPLES);
-            is_common.then(|| branches.each_ref().map(|errors| mean(errors.into())))
-        }));
-        // Mean distance of each excursion from the middle of the branches.
-        let distance = |&sample: &usize| {
-            let [loading, unloading] = means[level_of(sample)]?;
-            Some(error[sample] - 0.5 * (loading + unloading))
+            let of_level = |errors: Vec<f64>| (errors.len() >= Self::MIN_SAMPLES).then(|| mean((&errors).into()));
+            Vec::from_iter(errors.into_iter().map(of_level))
         };
-        let distances = passages.map(|branch| {
-            let distances = branch
-                .iter()
-                .map(|samples| Vec::from_iter(samples.iter().filter_map(distance)));
-            Vec::from_iter(distances.filter(|of| !of.is_empty()).map(|of| mean((&of).into())))
-        });
+        let [loading, unloading] = passages.each_ref().map(means_of);
+        let both = loading.into_iter().zip(unloading);
+        let means = Vec::from_iter(both.map(|(loading, unloading)| Some([loading?, unloading?])));
         let level = |(level, means): (usize, &Option<[f64; 2]>)| {
-            let [loading, unloading] = (*means)?;
             let actual = lowest + range * (level as f64 + 0.5) / Self::LEVELS as f64;
-            Some(LoopLevel {
-                actual,
-                loading: actual + loading,
-                unloading: actual + unloading,
-            })
+            means.map(|[loading, unloading]| [actual, actual + loading, actual + unloading])
         };
         let levels = Vec::from_iter(means.iter().enumerate().filter_map(level));
-        let apart = levels.iter().map(|level| (level.loading - level.unloading).abs());
+        let apart = levels.iter().map(|[_, loading, unloading]| (loading - unloading).abs());
         let percent_of_range = 100.0 * apart.fold(0.0, f64::max) / range;
-        if !differ(distances) || levels.len() < Self::MIN_LEVELS || percent_of_range < Self::MIN_PERCENT {
+        // Mean distance of each excursion from the middle of the branches.
+        let distance_of = |samples: &Vec<usize>| {
+            let distance = |&sample: &usize| {
+                let [loading, unloading] = means[level_of(sample)]?;
+                Some(error[sample] - 0.5 * (loading + unloading))
+            };
+            let distances = Vec::from_iter(samples.iter().filter_map(distance));
+            (!distances.is_empty()).then(|| mean((&distances).into()))
+        };
+        let distances = passages
+            .each_ref()
+            .map(|branch| Vec::from_iter(branch.iter().filter_map(distance_of)));
+        if !means_differ(distances) || levels.len() < Self::MIN_LEVELS || percent_of_range < Self::MIN_PERCENT {
             return None;
         }
+        let branches = passages.map(|branch| branch.concat());
         let [loading, unloading] = branches.each_ref().map(|samples| {
             let [actual, decoded] = [actual, decoded].map(|of| of.select(Axis(0), samples).insert_axis(Axis(1)));
             TargetErrors::measure(actual.view(), decoded.view()).remove(0)
@@ -172,20 +158,6 @@ impl HysteresisLoop {
             self.loading.rmse, self.unloading.rmse, self.percent_of_range
         )
     }
-}
-
-/// Returns `true` if the means of the values of two branches differ significantly.
-fn differ(branches: [Vec<f64>; 2]) -> bool {
-    let [loading, unloading] = branches.each_ref().map(|values| values.len() as f64);
-    if loading.min(unloading) < 2.0 {
-        return false;
-    }
-    let freedom = loading + unloading - 2.0;
-    let means = branches.each_ref().map(|values| mean(values.into()));
-    let pairs = branches.iter().zip(means);
-    let squares = pairs.flat_map(|(values, mean)| values.iter().map(move |value| (value - mean).powi(2)));
-    let standard_error = (squares.sum::<f64>() / freedom * (1.0 / loading + 1.0 / unloading)).sqrt();
-    (means[0] - means[1]).abs() > student_quantile(0.05, freedom) * standard_error
 }
 
 /// Adds the excursions of one stretch between the first and the last turning point that are certain.
@@ -267,13 +239,10 @@ mod tests {
             let expected = 20.0 * radius;
             assert!((found.percent_of_range - expected).abs() < 1e-9, "{found:?}");
             // In the middle of each excursion the play is used up: the error is the radius on either side.
-            let middle = found
-                .levels
-                .iter()
-                .find(|level| (level.actual - 7.25).abs() < 1e-9)
-                .unwrap();
-            assert!((middle.actual - middle.loading - radius).abs() < 1e-9, "{middle:?}");
-            assert!((middle.unloading - middle.actual - radius).abs() < 1e-9, "{middle:?}");
+            let mut levels = found.levels.iter();
+            let [actual, loading, unloading] = levels.find(|[actual, ..]| (actual - 7.25).abs() < 1e-9).unwrap();
+            assert!((actual - loading - radius).abs() < 1e-9, "{found:?}");
+            assert!((unloading - actual - radius).abs() < 1e-9, "{found:?}");
         }
     }
 

@@ -90,8 +90,11 @@ fn single_change(values: ArrayView1<'_, f64>, groups: &[usize], by: SplitBy) -> 
     let [first, last] = stretches.into_iter().min_by_key(|[first, last]| last - first)?;
     let is_held_out_at_once = match by {
         SplitBy::Time => ((last - first) as f64) < FOLD * values.len() as f64,
-        SplitBy::Group => groups[first..=last].iter().all(|group| *group == groups[first]),
-        SplitBy::Random => false,
+        // The folds of a single group are in time.
+        SplitBy::Group if groups.iter().any(|group| *group != groups[0]) => {
+            groups[first..=last].iter().all(|group| *group == groups[first])
+        }
+        SplitBy::Group | SplitBy::Random => false,
     };
     is_held_out_at_once.then_some([first, last])
 }
@@ -120,33 +123,26 @@ fn position_of_parallel(one: &Array1<f64>, others: &[Option<Array1<f64>>], dista
 fn saturation(name: &str, readings: ArrayView1<'_, f64>) -> Vec<String> {
     const MIN_SAMPLES: usize = 5;
     const MIN_SHARE: f64 = 0.01;
-    /// Minimum ratio to the number of samples at any of the neighbouring values.
+    /// Minimum ratio to the number of samples at any of the three neighbouring values.
     const MIN_RATIO: usize = 3;
     let mut sorted = readings.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let runs = Vec::from_iter(sorted.chunk_by(|one, other| one == other));
-    if runs.len() < 6 {
-        return Vec::new();
-    }
-    let last = runs.len() - 1;
-    let ends = [
-        ("smallest", runs[0], &runs[1..4]),
-        ("largest", runs[last], &runs[last - 3..last]),
-    ];
-    let remark = |(end, samples, next): (&str, &[f64], &[&[f64]])| {
-        let share = samples.len() as f64 / sorted.len() as f64;
-        let neighbours = next.iter().map(|run| run.len()).max().unwrap_or(0);
-        let is_saturated = samples.len() >= MIN_SAMPLES && share >= MIN_SHARE && samples.len() > MIN_RATIO * neighbours;
-        is_saturated.then(|| {
-            format!(
+    let mut runs = Vec::from_iter(sorted.chunk_by(|one, other| one == other));
+    let mut remarks = Vec::new();
+    for end in ["smallest", "largest"] {
+        let (count, share) = (runs[0].len(), runs[0].len() as f64 / sorted.len() as f64);
+        let is_largest = |next: &&[f64]| count > MIN_RATIO * next.len();
+        if runs.len() >= 6 && count >= MIN_SAMPLES && share >= MIN_SHARE && runs[1..4].iter().all(is_largest) {
+            remarks.push(format!(
                 "{name} is at its {end} value {} in {:.1} % of the samples: it is saturated there, or its range ends; give it \
                  a wider range",
-                short(samples[0]),
+                short(runs[0][0]),
                 100.0 * share
-            )
-        })
-    };
-    ends.into_iter().filter_map(remark).collect()
+            ));
+        }
+        runs.reverse();
+    }
+    remarks
 }
 
 #[cfg(test)]

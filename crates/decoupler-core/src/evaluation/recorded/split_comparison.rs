@@ -1,26 +1,22 @@
-use super::{
-    Interval,
-    interval::{Evidence, SumVariance, squared_errors},
-};
+use super::{Interval, compare};
 use crate::{
-    dataset::{Dataset, Folds, SplitBy, Stream},
-    evaluation::{CrossValidated, Run, RunError, RunSettings, Scores},
-    job::Job,
+    dataset::{Dataset, SplitBy},
+    evaluation::auto::{Fits, TriedModel},
     numerics::autocorrelation,
 };
 
-/// Held-out errors with the same settings and samples, for folds by group (by time without groups) and for random
-/// folds. The difference shows how optimistic a random split is.
+/// Held-out errors of the better of ridge and kernel ridge regression on the same samples, for folds by group (by time without groups) and for random folds. The
+/// difference shows how optimistic a random split is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SplitComparison {
     /// Rule of the folds that are not random.
     pub by: SplitBy,
-    /// Errors by that rule.
-    pub honest: Scores,
-    /// Errors on random folds.
-    pub random: Scores,
-    /// Ratio of the RMSE of the network on random folds to that by [`Self::by`] for each target, with its interval: below 1
-    /// if random folds are optimistic. `None` if it is not determined.
+    /// Model by that rule.
+    pub model: TriedModel,
+    /// RMSE for each target by that rule, and on random folds.
+    pub rmse: Vec<[f64; 2]>,
+    /// Ratio of the RMSE on random folds to that by [`Self::by`] for each target, with its interval: below 1 if random folds
+    /// are optimistic. `None` if it is not determined.
     pub ratios: Vec<Option<Interval>>,
     /// Correlation of each target between successive samples of the recording; `None` for a constant target.
     pub successive: Vec<Option<f64>>,
@@ -32,106 +28,51 @@ impl SplitComparison {
     /// Minimum correlation of successive targets for which neighbours are called alike.
     const MIN_CORRELATION: f64 = 0.5;
 
-    /// Compares random folds of `set` with folds by group if there are groups, otherwise by `by`, or by time if `by` is
-    /// random. `validated` is the cross-validation with `folds` folds by `by`. Takes up to 2 × folds trainings.
-    ///
-    /// # Errors
-    /// If the settings are invalid, or the job is cancelled.
-    pub fn complete(
-        settings: &RunSettings,
-        set: &Dataset,
-        folds: usize,
-        (by, validated): (SplitBy, &CrossValidated),
-        job: &Job<'_>,
-    ) -> Result<Self, RunError> {
-        let validate = |rule: SplitBy| -> Result<CrossValidated, RunError> {
-            if rule == by {
-                return Ok(validated.clone());
-            }
-            let folds = rule.folds_of(set, folds);
-            let folds = Folds::by(set, folds, rule, &mut settings.seed.rng(Stream::Split))?;
-            CrossValidated::on_folds(settings, set, folds, job)
-        };
-        let by = SplitBy::honest(set);
-        let (honest, random) = (validate(by)?, validate(SplitBy::Random)?);
-        let ratios = Interval::of_rmse(set, [random.network.view(), honest.network.view()], by);
-        Ok(Self::of(set, by, [honest.scores(set), random.scores(set)], ratios))
-    }
-
-    /// Compares the test errors of two runs on parts of `set`, split by `by` and at random; `None` if a run is of a single fold.
-    pub fn of_runs(set: &Dataset, by: SplitBy, runs: [&Run; 2]) -> Option<Self> {
-        let [honest, random] = runs;
-        let scores = [honest.scores()?, random.scores()?];
-        let tested = runs.map(|run| (run.test(), run.decouple_test()));
-        let ratio = |target| {
-            // Mean squared error, and the variance of its logarithm.
-            let [honest, random] = tested.each_ref().map(|(test, answers)| {
-                let squares = squared_errors(test, answers.view(), target);
-                let total = squares.iter().sum::<f64>();
-                let mean = total / squares.len() as f64;
-                (mean, Evidence::of(test, by).variance(&((squares - mean) / total)))
-            });
-            let ratio = random.0 / honest.0;
-            // The test samples differ, so that the variances of the logarithms add up.
-            let spread = SumVariance {
-                variance: ratio * ratio * (random.1.variance + honest.1.variance),
-                units: random.1.units.min(honest.1.units),
-            };
-            Some(Interval::of_ratio(ratio, spread)?.map(f64::sqrt))
-        };
-        Some(Self::of(set, by, scores, (0..set.outputs()).map(ratio).collect()))
-    }
-
-    fn of(set: &Dataset, by: SplitBy, [honest, random]: [Scores; 2], ratios: Vec<Option<Interval>>) -> Self {
+    /// Compares the better fit to `set` by the rule `by` with the better one on random folds.
+    pub(super) fn of(set: &Dataset, by: SplitBy, fits: [&Fits; 2]) -> Self {
         let targets = set.targets();
-        let successive = targets.columns().into_iter().map(|of| autocorrelation(of, 1));
+        let compared = compare(set, by, fits.map(|fits| fits.answers[0].1.view()));
+        let (rmse, ratios) = compared.into_iter().unzip();
         Self {
             by,
-            honest,
-            random,
+            model: fits[0].answers[0].0.model,
+            rmse,
             ratios,
-            successive: successive.collect(),
+            successive: targets.columns().into_iter().map(|of| autocorrelation(of, 1)).collect(),
         }
     }
 
     /// Returns a clause on the cause of the optimism, as far as it was measured: alike neighbours leak from the training into
     /// the test samples; otherwise, the relation of readings and target itself changes.
     fn cause(&self, target: usize) -> String {
-        let over = match self.by {
-            SplitBy::Group => "from group to group",
-            SplitBy::Time | SplitBy::Random => "over time, as with drift",
+        let Some(correlation) = self.successive[target] else {
+            return String::new();
         };
-        match self.successive[target] {
-            Some(correlation) if correlation >= Self::MIN_CORRELATION => {
-                format!(
-                    "; successive values of the target correlate by {correlation:.2}, so that random folds share them"
-                )
-            }
-            Some(correlation) => format!(
-                "; successive values of the target correlate by {correlation:.2} only, so that the relation of readings \
-                 and target seems to change {over}"
-            ),
-            None => String::new(),
-        }
+        let cause = match self.by {
+            _ if correlation >= Self::MIN_CORRELATION => "so that random folds share them",
+            SplitBy::Group => "so that the relation of readings and target seems to change from group to group",
+            _ => "so that the relation of readings and target seems to change over time, as with drift",
+        };
+        format!("; successive values of the target correlate by {correlation:.2}, {cause}")
     }
 
     /// Returns a sentence on the error that a random split would have reported for the target of this name.
     pub fn sentence(&self, target: usize, name: &str) -> String {
-        let [honest, random] = [&self.honest, &self.random].map(|scores| scores.network.targets()[target].rmse);
-        let by = self.by;
+        let [honest, random] = self.rmse[target];
+        let (by, model) = (self.by, self.model);
         match self.ratios[target] {
             Some(ratio) if ratio.high < 1.0 && ratio.value < 1.0 - Self::MIN_OPTIMISM => format!(
-                "a random split would report an RMSE of {random:.4} for {name}; split by {by} it is {honest:.4}: the random \
-                 split is optimistic by {:.0} %{}",
+                "a random split would report an RMSE of {random:.4} for {name} by {model}; split by {by} it is {honest:.4}: the \
+                 random split is optimistic by {:.0} %{}",
                 100.0 * (1.0 - ratio.value),
                 self.cause(target)
             ),
             None => format!(
-                "split at random, the RMSE of {name} is {random:.4}, and split by {by} {honest:.4}: too few independent \
-                 samples to judge the difference"
+                "split at random, the RMSE of {name} by {model} is {random:.4}, and split by {by} {honest:.4}: too few \
+                 independent samples to judge the difference"
             ),
             Some(_) => format!(
-                "no significant difference between a random split (RMSE {random:.4} for {name}) and a split by {by} \
+                "no significant difference between a random split (RMSE {random:.4} for {name} by {model}) and a split by {by} \
                  ({honest:.4})"
             ),
         }

@@ -2,7 +2,7 @@ use glam::{DVec2, DVec3};
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};
 
-use super::press::{Body, Press};
+use super::press::Press;
 use crate::{
     scene::{Deformation, SceneError},
     sensor::SensorModel,
@@ -165,7 +165,7 @@ impl Indenter {
             _ => between(0.0, largest_tilt_degrees).to_radians().tan(),
         };
         let radius_mm = radius_mm.map_or(0.0, |span| between(span.smallest, span.largest));
-        Press::new(self.body(radius_mm), place, depth_mm, direction, slope, self.spread_mm)
+        Press::new(*self, radius_mm, place, depth_mm, direction, slope)
     }
 
     /// Returns the deformation of the array when the upright indenter of middle size presses `depth_mm` deep at (x, y); a
@@ -188,16 +188,7 @@ impl Indenter {
 
     fn upright(&self, place_mm: DVec2, depth_mm: f64) -> Press {
         let radius_mm = (self.radius_mm_and_tilt_degrees().0).map_or(0.0, |span| 0.5 * (span.smallest + span.largest));
-        Press::new(self.body(radius_mm), place_mm, depth_mm, DVec2::Y, 0.0, self.spread_mm)
-    }
-
-    fn body(&self, radius_mm: f64) -> Body {
-        match self.shape {
-            IndenterShape::Sphere { .. } => Body::Sphere(radius_mm),
-            IndenterShape::FlatPunch { .. } => Body::FlatPunch(radius_mm),
-            IndenterShape::Cylinder { .. } => Body::Cylinder(radius_mm),
-            IndenterShape::Edge { .. } => Body::Edge,
-        }
+        Press::new(*self, radius_mm, place_mm, depth_mm, DVec2::Y, 0.0)
     }
 }
 

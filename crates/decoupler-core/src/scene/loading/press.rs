@@ -1,20 +1,14 @@
 use glam::DVec2;
 
-use crate::numerics::scaled_k0_k1;
-
-/// An indenter's body with its radius in millimetres.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Body {
-    Sphere(f64),
-    FlatPunch(f64),
-    Cylinder(f64),
-    Edge,
-}
+use super::IndenterShape::{Cylinder, Edge, FlatPunch, Sphere};
+use crate::{numerics::scaled_k0_k1, scene::Indenter};
 
 /// One press of an indenter, prepared for evaluation at many nodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Press {
-    body: Body,
+    indenter: Indenter,
+    /// Radius of the body, if its shape has one.
+    radius_mm: f64,
     /// The contact of a ball or a punch.
     contact: RoundContact,
     place: DVec2,
@@ -24,26 +18,25 @@ pub(super) struct Press {
     direction: DVec2,
     /// Increase of depth per millimetre along `direction`.
     slope: f64,
-    spread_mm: f64,
 }
 
 impl Press {
-    /// Presses `body` to a depth of `depth_mm` at `place`, inclined by `slope` along `direction`, on a surface of decay
-    /// length `spread_mm`.
-    pub(super) fn new(body: Body, place: DVec2, depth_mm: f64, direction: DVec2, slope: f64, spread_mm: f64) -> Self {
-        let contact_mm = match body {
-            Body::Sphere(radius_mm) => contact_radius_mm(radius_mm, depth_mm, spread_mm),
-            Body::FlatPunch(radius_mm) => radius_mm,
-            Body::Cylinder(_) | Body::Edge => 0.0,
+    /// Presses an indenter of radius `radius_mm`, if it has one, to a depth of `depth_mm` at `at`, inclined by `slope`
+    /// along `direction`.
+    pub(super) fn new(of: Indenter, radius_mm: f64, at: DVec2, depth_mm: f64, direction: DVec2, slope: f64) -> Self {
+        let contact_mm = match of.shape {
+            Sphere { .. } => contact_radius_mm(radius_mm, depth_mm, of.spread_mm),
+            FlatPunch { .. } => radius_mm,
+            Cylinder { .. } | Edge { .. } => 0.0,
         };
         Self {
-            body,
-            contact: RoundContact::new(contact_mm, spread_mm),
-            place,
+            indenter: of,
+            radius_mm,
+            contact: RoundContact::new(contact_mm, of.spread_mm),
+            place: at,
             depth_mm,
             direction,
             slope,
-            spread_mm,
         }
     }
 
@@ -53,49 +46,49 @@ impl Press {
         let (along, across) = (apart.dot(self.direction), apart.perp_dot(self.direction));
         let distance = apart.length();
         let contact_mm = self.contact.radius_mm;
-        match self.body {
-            Body::Sphere(radius_mm) => {
+        match self.indenter.shape {
+            Sphere { .. } => {
                 let inside = distance.min(contact_mm);
-                let at_body = self.depth_mm - inside * inside / (2.0 * radius_mm);
+                let at_body = self.depth_mm - inside * inside / (2.0 * self.radius_mm);
                 at_body * self.contact.share_at(distance)
             }
-            Body::FlatPunch(_) => {
+            FlatPunch { .. } => {
                 // Outside, the surface starts from the nearest point of the face.
                 let inside = (contact_mm / distance).min(1.0);
                 (self.depth_mm + self.slope * along * inside) * self.contact.share_at(distance)
             }
-            Body::Cylinder(radius_mm) => {
+            Cylinder { .. } => {
                 let depth_mm = self.depth_mm + self.slope * along;
                 if depth_mm <= 0.0 {
                     return 0.0;
                 }
                 // The parabola depth − distance²/(2 radius) up to the distance a where its slope equals that of the free
                 // surface, a/radius = depth(a)/spread, and the free surface beyond.
-                let inside = across.abs().min(self.half_width_mm(depth_mm, radius_mm));
-                let at_body = depth_mm - inside * inside / (2.0 * radius_mm);
-                at_body * (-(across.abs() - inside) / self.spread_mm).exp()
+                let inside = across.abs().min(self.half_width_mm(depth_mm));
+                let at_body = depth_mm - inside * inside / (2.0 * self.radius_mm);
+                at_body * (-(across.abs() - inside) / self.indenter.spread_mm).exp()
             }
-            Body::Edge => (self.depth_mm + self.slope * along) * (-across.max(0.0) / self.spread_mm).exp(),
+            Edge { .. } => (self.depth_mm + self.slope * along) * (-across.max(0.0) / self.indenter.spread_mm).exp(),
         }
     }
 
     /// Half the width of the contact of the upright body; see [`Indenter::contact_half_width_mm`](super::Indenter).
     pub(super) fn contact_half_width_mm(&self) -> f64 {
-        match self.body {
-            Body::Sphere(_) | Body::FlatPunch(_) => self.contact.radius_mm,
-            Body::Cylinder(radius_mm) => self.half_width_mm(self.depth_mm, radius_mm),
-            Body::Edge => f64::INFINITY,
+        match self.indenter.shape {
+            Sphere { .. } | FlatPunch { .. } => self.contact.radius_mm,
+            Cylinder { .. } => self.half_width_mm(self.depth_mm),
+            Edge { .. } => f64::INFINITY,
         }
     }
 
     /// Distance from its axis up to which a cylinder touches the surface.
-    fn half_width_mm(&self, depth_mm: f64, radius: f64) -> f64 {
+    fn half_width_mm(&self, depth_mm: f64) -> f64 {
         if depth_mm <= 0.0 {
             return 0.0;
         }
         // √(λ² + 2 radius·depth) − λ, in the unit √(2 radius·depth) so that a long λ neither cancels nor overflows.
-        let unit_mm = radius.sqrt() * (2.0 * depth_mm).sqrt();
-        let length = self.spread_mm / unit_mm;
+        let unit_mm = self.radius_mm.sqrt() * (2.0 * depth_mm).sqrt();
+        let length = self.indenter.spread_mm / unit_mm;
         unit_mm / (length + (1.0 + length * length).sqrt())
     }
 }
@@ -185,19 +178,25 @@ fn contact_radius_mm(ball_mm: f64, depth_mm: f64, decay_length_mm: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn press(body: Body, slope: f64) -> Press {
-        Press::new(body, DVec2::new(3.0, -1.0), 0.8, DVec2::X, slope, 2.0)
+    /// The indenter of this name, which leaves a decay length of 2 mm, with a radius.
+    fn body(name: &str, radius_mm: f64) -> (Indenter, f64) {
+        let indenter = Indenter::all().into_iter().find(|indenter| indenter.name() == name);
+        (indenter.unwrap(), radius_mm)
+    }
+
+    fn press((indenter, radius_mm): (Indenter, f64), slope: f64) -> Press {
+        Press::new(indenter, radius_mm, DVec2::new(3.0, -1.0), 0.8, DVec2::X, slope)
     }
 
     #[test]
     fn the_surface_follows_the_body_and_recovers() {
-        let sphere = press(Body::Sphere(4.0), 0.0);
+        let sphere = press(body("sphere", 4.0), 0.0);
         assert!((sphere.depth_at_mm(3.0, -1.0) - 0.8).abs() < 1e-15);
         assert!((sphere.depth_at_mm(3.5, -1.0) - (0.8 - 0.25 / 8.0)).abs() < 1e-15);
         assert!(sphere.depth_at_mm(30.0, -1.0) < 1e-4);
-        let punch = press(Body::FlatPunch(2.0), 0.0);
+        let punch = press(body("flat punch", 2.0), 0.0);
         assert!((punch.depth_at_mm(3.0, 0.9) - 0.8).abs() < 1e-15);
-        let edge = press(Body::Edge, 0.0);
+        let edge = press(body("edge", 0.0), 0.0);
         let (one, other) = (edge.depth_at_mm(3.0, 5.0), edge.depth_at_mm(3.0, -7.0));
         assert_eq!(one.max(other), 0.8);
         assert!((one.min(other) - 0.8 * (-3.0_f64).exp()).abs() < 1e-15);
@@ -207,10 +206,10 @@ mod tests {
     #[test]
     fn around_round_bodies_the_surface_is_axisymmetric() {
         // scipy.special.k0(3.5) / scipy.special.k0(1.5), SciPy 1.17.1.
-        let punch = press(Body::FlatPunch(3.0), 0.0);
+        let punch = press(body("flat punch", 3.0), 0.0);
         assert!((punch.depth_at_mm(3.0, 6.0) / 0.8 - 0.09166691889433545).abs() < 1e-15);
         // Contact radius by scipy.optimize.brentq, then its depth times k0(3 / 2) / k0(radius / 2).
-        let sphere = press(Body::Sphere(4.0), 0.0);
+        let sphere = press(body("sphere", 4.0), 0.0);
         assert!((sphere.depth_at_mm(3.0, 2.0) - 0.18187682811379735).abs() < 1e-14);
     }
 
@@ -218,13 +217,13 @@ mod tests {
     #[test]
     fn the_free_surface_obeys_the_equation_of_its_foundation() {
         let step = 1e-3;
-        for (body, curvature) in [
-            (Body::Sphere(4.0), 1.0),
-            (Body::FlatPunch(2.0), 1.0),
-            (Body::Cylinder(4.0), 0.0),
-            (Body::Edge, 0.0),
+        for (shape, curvature) in [
+            (body("sphere", 4.0), 1.0),
+            (body("flat punch", 2.0), 1.0),
+            (body("cylinder", 4.0), 0.0),
+            (body("edge", 0.0), 0.0),
         ] {
-            let press = press(body, 0.0);
+            let press = press(shape, 0.0);
             for distance in [2.5, 4.0, 7.0] {
                 let side = if press.depth_at_mm(3.0, 5.0) < 0.7 { 1.0 } else { -1.0 };
                 let depth = |r: f64| press.depth_at_mm(3.0, -1.0 + side * r);
@@ -232,14 +231,14 @@ mod tests {
                 let second = (before - 2.0 * at + after) / (step * step);
                 let first = (after - before) / (2.0 * step);
                 let residual = second + curvature * first / distance - at / 4.0;
-                assert!(residual.abs() < 1e-6 * at, "{body:?} {distance}: {residual} {at}");
+                assert!(residual.abs() < 1e-6 * at, "{shape:?} {distance}: {residual} {at}");
             }
         }
     }
 
     #[test]
     fn a_round_body_leaves_no_kink() {
-        let sphere = press(Body::Sphere(4.0), 0.0);
+        let sphere = press(body("sphere", 4.0), 0.0);
         let slope =
             |at: f64| (sphere.depth_at_mm(3.0 + at + 1e-6, -1.0) - sphere.depth_at_mm(3.0 + at - 1e-6, -1.0)) / 2e-6;
         let mut last = slope(0.01);
@@ -253,25 +252,33 @@ mod tests {
     /// The parabola of a cylinder ends where a/4 = (0.8 − a²/8)/λ, here with λ so long that √(λ² + 6.4) − λ cancels.
     #[test]
     fn extreme_sizes_give_depths_up_to_the_bodys() {
-        let cylinder = Press::new(Body::Cylinder(4.0), DVec2::ZERO, 0.8, DVec2::X, 0.0, 1e9);
+        let long = Indenter {
+            spread_mm: 1e9,
+            ..body("cylinder", 4.0).0
+        };
+        let cylinder = Press::new(long, 4.0, DVec2::ZERO, 0.8, DVec2::X, 0.0);
         let bent = 0.8 - cylinder.depth_at_mm(0.0, 1.6e-9);
         assert!((0.0..1e-15).contains(&bent), "{bent}");
         let sizes = [5e-324, 1e-300, 1e-9, 1.0, 1e9, 1e300, f64::MAX];
         for size in sizes {
-            for body in [
-                Body::Sphere(size),
-                Body::FlatPunch(size),
-                Body::Cylinder(size),
-                Body::Edge,
+            for shape in [
+                body("sphere", size),
+                body("flat punch", size),
+                body("cylinder", size),
+                body("edge", 0.0),
             ] {
                 for spread in sizes {
+                    let indenter = Indenter {
+                        spread_mm: spread,
+                        ..shape.0
+                    };
                     for depth in [0.0, 5e-324, 0.8] {
-                        let press = Press::new(body, DVec2::ZERO, depth, DVec2::X, 0.0, spread);
+                        let press = Press::new(indenter, shape.1, DVec2::ZERO, depth, DVec2::X, 0.0);
                         for distance in [0.0, 1e-300, 1e-9, 1.0, -7.0, 1e9, 1e150] {
                             let found = press.depth_at_mm(0.0, distance);
                             assert!(
                                 (0.0..=depth).contains(&found),
-                                "{body:?} {spread} {depth} {distance}: {found}"
+                                "{shape:?} {spread} {depth} {distance}: {found}"
                             );
                         }
                     }
@@ -282,10 +289,10 @@ mod tests {
 
     #[test]
     fn a_tilted_body_presses_deeper_along_its_tilt() {
-        for body in [Body::FlatPunch(2.0), Body::Cylinder(4.0), Body::Edge] {
-            let press = press(body, 0.1);
+        for shape in [body("flat punch", 2.0), body("cylinder", 4.0), body("edge", 0.0)] {
+            let press = press(shape, 0.1);
             let rise = press.depth_at_mm(4.0, -1.0) - press.depth_at_mm(2.0, -1.0);
-            assert!((rise - 0.2).abs() < 1e-12, "{body:?} {rise}");
+            assert!((rise - 0.2).abs() < 1e-12, "{shape:?} {rise}");
         }
     }
 

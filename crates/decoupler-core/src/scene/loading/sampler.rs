@@ -5,8 +5,8 @@ use rand::{Rng, RngExt};
 use super::Loading;
 use crate::{
     numerics::normal_cdf,
-    scene::{Deformation, Movement, Scene, standard_normal},
-    sensor::{ArrayScale, Geometry, SensorModel},
+    scene::{Deformation, Scene, standard_normal},
+    sensor::{ArrayScale, Axes, Geometry, SensorModel},
 };
 
 /// Draws deformations of one array in one scene; common quantities are computed once.
@@ -19,7 +19,8 @@ pub(crate) struct DeformationSampler {
 }
 
 impl DeformationSampler {
-    pub(in crate::scene) fn new(scene: &Scene, model: &SensorModel) -> Self {
+    /// Prepares to draw deformations of `model` in `scene`.
+    pub(crate) fn new(scene: &Scene, model: &SensorModel) -> Self {
         let field = match scene.loading {
             Loading::SmoothField { correlation_length_mm } => {
                 Some(SmoothField::new(model.scale, &model.geometry, correlation_length_mm))
@@ -36,10 +37,8 @@ impl DeformationSampler {
     /// Draws the deformation of the whole array at one moment.
     pub fn draw(&self, rng: &mut impl Rng) -> Deformation {
         let (scale, stroke_mm) = (self.model.scale, self.scene.stroke_mm(&self.model.geometry));
-        let (is_sideways, shift_mm) = match self.scene.movement {
-            Movement::Z => (false, 0.0),
-            Movement::Xyz { largest_shift_mm } => (true, largest_shift_mm),
-        };
+        let movement = self.scene.movement;
+        let (is_sideways, shift_mm) = (movement.axes() == Axes::Xyz, movement.largest_shift_mm());
         let shifted_mm = |uniform: f64| shift_mm * (2.0 * uniform - 1.0);
         match (self.scene.loading, &self.field) {
             (Loading::Indenter(indenter), _) => {

@@ -8,10 +8,7 @@ use decoupler_core::{
     dataset::{Folds, SplitBy, Stream},
     evaluation::{
         CrossValidated, ErrorTable, TrainingSize, Workload,
-        recorded::{
-            Determination, Findings, FittedModel, SplitComparison, StudyStep, channel_remarks, nonlinear_gains,
-            ridge_remark,
-        },
+        recorded::{Determination, Findings, channel_remarks, ridge_remarks},
     },
     job::Job,
     problem::Channel,
@@ -39,26 +36,15 @@ pub struct RecordingStudy {
     pub(super) found: Option<Box<RecordingFindings>>,
     /// Errors of the last cross-validation.
     pub(super) validated: Option<Box<FoldsResult>>,
-    /// Model of the analysis.
-    pub(super) model: FittedModel,
-    /// Extent of a cross-validation.
-    pub(super) choice: FoldsChoice,
-}
-
-/// Extent of a cross-validation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FoldsChoice {
-    /// Number of folds.
-    pub folds: usize,
-    /// True to repeat the cross-validation with random folds, which shows how optimistic they are.
-    pub compares_random: bool,
+    /// Number of folds of a cross-validation.
+    pub(super) folds: usize,
 }
 
 /// Work of the thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnderWay {
-    /// Findings, with the current step once the files are read.
-    Findings(Option<StudyStep>),
+    /// Findings.
+    Findings,
     /// A cross-validation.
     CrossValidation,
 }
@@ -68,8 +54,8 @@ pub enum UnderWay {
 pub enum StudyEvent {
     /// Progress of reading a file.
     Reading(Progress),
-    /// A step of the work has begun.
-    Began(StudyStep),
+    /// The files are read.
+    Read,
     /// Findings on the recording.
     Found(Box<RecordingFindings>),
     /// The result of a cross-validation.
@@ -87,11 +73,7 @@ impl RecordingStudy {
             reading: None,
             found: None,
             validated: None,
-            model: FittedModel::Network,
-            choice: FoldsChoice {
-                folds: 5,
-                compares_random: false,
-            },
+            folds: 5,
         }
     }
 
@@ -103,31 +85,28 @@ impl RecordingStudy {
     /// Returns the work under way.
     pub fn unfinished(&self) -> Option<Unfinished> {
         Some(match self.under_way? {
-            UnderWay::Findings(None) => Unfinished::discarded("Analysis", "the files are being read".to_owned()),
-            UnderWay::Findings(Some(stage)) => Unfinished::discarded("Analysis", stage.to_string()),
-            UnderWay::CrossValidation => {
-                Unfinished::discarded("Cross-validation", format!("{} folds", self.choice.folds))
-            }
+            UnderWay::Findings => Unfinished::discarded("Analysis", "it takes seconds".to_owned()),
+            UnderWay::CrossValidation => Unfinished::discarded("Cross-validation", format!("{} folds", self.folds)),
         })
     }
 
     /// Analyses the readings of the recording of `setup`.
     pub(super) fn analyse(&mut self, setup: Setup) {
         self.found = None;
-        self.start(UnderWay::Findings(None), setup, Task::Findings(self.model));
+        self.start(UnderWay::Findings, setup);
     }
 
     /// Cross-validates the recording of `setup`.
     pub(super) fn cross_validate(&mut self, setup: Setup) {
         self.validated = None;
-        self.start(UnderWay::CrossValidation, setup, Task::CrossValidation);
+        self.start(UnderWay::CrossValidation, setup);
     }
 
-    fn start(&mut self, under_way: UnderWay, setup: Setup, task: Task) {
+    fn start(&mut self, under_way: UnderWay, setup: Setup) {
         (self.under_way, self.reading) = (Some(under_way), None);
-        let choice = self.choice;
+        let folds = self.folds;
         self.job.start(
-            move |report| report.unless_cancelled(work(setup, &task, choice, report)),
+            move |report| report.unless_cancelled(work(setup, under_way, folds, report)),
             |ended| StudyEvent::Ended(ended.unwrap_or_else(|error| Err(error.to_string()))),
         );
     }
@@ -143,7 +122,7 @@ impl RecordingStudy {
         while let Some(event) = self.job.next_event() {
             match event {
                 StudyEvent::Reading(progress) => self.reading = Some(progress),
-                StudyEvent::Began(stage) => self.under_way = Some(UnderWay::Findings(Some(stage))),
+                StudyEvent::Read => self.reading = None,
                 StudyEvent::Found(found) => self.found = Some(found),
                 StudyEvent::Validated(validated) => self.validated = Some(validated),
                 StudyEvent::Ended(ended) => {
@@ -156,15 +135,6 @@ impl RecordingStudy {
             }
         }
     }
-}
-
-/// Work for the thread.
-#[derive(Clone, Debug)]
-pub enum Task {
-    /// Measure what the readings determine with this model.
-    Findings(FittedModel),
-    /// Cross-validate.
-    CrossValidation,
 }
 
 /// Findings on a recording, with the data that they were measured on.
@@ -201,11 +171,11 @@ pub struct FoldsResult {
     pub remarks: Vec<String>,
 }
 
-/// Does a task on the recording of `setup`; ends early if it is cancelled.
+/// Does the work on the recording of `setup`; ends early if it is cancelled.
 ///
 /// # Errors
 /// If the recording cannot be read, divided or trained on, with what to do.
-pub fn work(setup: Setup, task: &Task, choice: FoldsChoice, report: &Report<StudyEvent>) -> Result<(), String> {
+pub fn work(setup: Setup, work: UnderWay, folds: usize, report: &Report<StudyEvent>) -> Result<(), String> {
     let Some(plan) = setup.plan().cloned() else {
         return Err("This is not a recording.".to_owned());
     };
@@ -222,32 +192,23 @@ pub fn work(setup: Setup, task: &Task, choice: FoldsChoice, report: &Report<Stud
         return Ok(());
     }
     let recording = recording.map_err(|error| error.to_string())?;
-    match task {
-        Task::Findings(model) => find(setup, &plan, recording, *model, choice.folds, report),
-        Task::CrossValidation => validate(setup, &plan, &recording, choice, report),
+    report.send(StudyEvent::Read);
+    match work {
+        UnderWay::Findings => find(setup, &plan, recording, report),
+        UnderWay::CrossValidation => validate(setup, &plan, &recording, folds, report),
     }
 }
 
-fn find(
-    setup: Setup,
-    plan: &Plan,
-    recording: Recording,
-    model: FittedModel,
-    folds: usize,
-    report: &Report<StudyEvent>,
-) -> Result<(), String> {
+fn find(setup: Setup, plan: &Plan, recording: Recording, report: &Report<StudyEvent>) -> Result<(), String> {
     let begun = Instant::now();
-    let divided = (plan.division.by, folds);
-    let begin = |stage| report.send(StudyEvent::Began(stage));
     let is_cancelled = || report.is_cancelled();
-    let ends: (&Job<'_>, &dyn Fn() -> bool) = (&Job::new(&is_cancelled), &|| false);
-    let found = Findings::measure(setup.settings(), &recording.set, divided, model, &begin, ends);
+    let found = recording.findings(setup.settings(), plan.division.by, &Job::new(&is_cancelled));
     let findings = found.map_err(|error| error.to_string())?;
     report.send(StudyEvent::Found(Box::new(RecordingFindings {
         warnings: describe_warnings(&recording, plan.division.by, &findings),
+        folds: describe_folds(findings.record.folds, plan.division.by),
         findings,
         setup,
-        folds: describe_folds(folds, plan.division.by),
         samples: recording.set.samples(),
         targets: recording.targets,
         time: begun.elapsed(),
@@ -259,7 +220,7 @@ fn validate(
     setup: Setup,
     plan: &Plan,
     recording: &Recording,
-    FoldsChoice { folds, compares_random }: FoldsChoice,
+    folds: usize,
     report: &Report<StudyEvent>,
 ) -> Result<(), String> {
     let (settings, set, by) = (setup.settings(), &recording.set, plan.division.by);
@@ -272,14 +233,8 @@ fn validate(
     let assigned =
         Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split)).map_err(|error| error.to_string())?;
     let validated = CrossValidated::on_folds(settings, set, assigned, job).map_err(|error| error.to_string())?;
-    let comparison = if compares_random && by != SplitBy::Random {
-        let compared = SplitComparison::complete(settings, set, folds, (by, &validated), job);
-        Some(compared.map_err(|error| error.to_string())?)
-    } else {
-        None
-    };
     let determined = Determination::measure(set, validated.network.view(), by);
-    let gains = nonlinear_gains(set, &validated, by);
+    let scores = validated.scores(set);
     let mut remarks = channel_remarks(set, by, &recording.inputs, &recording.targets);
     for (target, channel) in recording.targets.iter().enumerate() {
         let name = &channel.name;
@@ -287,13 +242,12 @@ fn validate(
             Ok(determined) => determined.sentence(name, "the network explains"),
             Err(cause) => format!("{name}: {cause}"),
         });
-        remarks.extend(gains[target].and_then(|gain| ridge_remark(gain, name)));
-        remarks.extend(comparison.as_ref().map(|comparison| comparison.sentence(target, name)));
     }
+    remarks.extend(ridge_remarks(set, &validated, by, &recording.targets));
     report.send(StudyEvent::Validated(Box::new(FoldsResult {
         folds: describe_folds(folds, by),
         samples: set.samples(),
-        table: ErrorTable::of_scores(&recording.problem(), &validated.scores(set), None),
+        table: ErrorTable::of_scores(&recording.problem(), &scores, None),
         remarks,
         setup,
     })));

@@ -1,6 +1,6 @@
 //! The form, the results and the exports of the study of a recording.
 
-use decoupler_core::{evaluation::recorded::FittedModel, text::counted};
+use decoupler_core::text::counted;
 use decoupler_files::{
     export::{describe_target, error_table, format_below_one, format_duration},
     import::Setup,
@@ -9,16 +9,14 @@ use eframe::egui::{Key, Modifiers, RichText, Sense, Ui};
 
 use super::{
     RecordingStudy,
-    study::{FoldsChoice, FoldsResult, RecordingFindings, UnderWay},
+    study::{FoldsResult, RecordingFindings, UnderWay},
 };
 use crate::window::{
     shared::{Export, FileWords, Offers, Shared, copy_exports, csv_export, error_table_ui, sentence},
     theme::{Theme, space, type_size},
     widgets::{
-        card_ui, dim_ui, explained_options_ui,
-        fields::{capitalised, count_ui},
-        ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button, scrolled_ui, section_heading_ui,
-        state_ui, with_shortcut,
+        card_ui, dim_ui, fields::count_ui, ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button,
+        scrolled_ui, section_heading_ui, state_ui, with_shortcut,
     },
 };
 
@@ -148,17 +146,14 @@ pub fn findings_ui(ui: &mut Ui, found: &RecordingFindings) {
     let RecordingFindings { findings, targets, .. } = found;
     for (index, (target, of_target)) in targets.iter().zip(&findings.targets).enumerate() {
         ui.label(sentence(&describe_target(&target.name, of_target)));
-        let r2 = [("network", of_target.network), ("ridge", of_target.ridge.ok())];
-        let r2: Vec<String> = r2
-            .into_iter()
-            .filter_map(|(name, r2)| Some(format!("{name} {}", format_below_one(r2?.r2.value, 3))))
-            .collect();
-        if r2.len() > 1 {
-            dim_ui(ui, &format!("R² of the {}", r2.join(", of ")));
+        if let (Ok(ridge), Some(kernel)) = (of_target.ridge, of_target.kernel) {
+            let [ridge, kernel] = [ridge, kernel].map(|of| format_below_one(of.r2.value, 3));
+            dim_ui(
+                ui,
+                &format!("R² of ridge regression {ridge}, of kernel ridge regression {kernel}"),
+            );
         }
-        if let Some(comparison) = &findings.comparison {
-            dim_ui(ui, &sentence(&comparison.sentence(index, &target.name)));
-        }
+        dim_ui(ui, &sentence(&findings.comparison.sentence(index, &target.name)));
         ui.add_space(space(1));
     }
     for warning in &found.warnings {
@@ -197,20 +192,7 @@ pub fn study_exports(study: &RecordingStudy) -> Vec<Export<'_>> {
 /// Largest number of folds offered.
 const MAX_FOLDS: usize = 1000;
 
-const MODELS: [(FittedModel, &str, &str); 2] = [
-    (
-        FittedModel::Ridge,
-        "ridge",
-        "Ridge regression alone: takes seconds, but finds linear relations only.",
-    ),
-    (
-        FittedModel::Network,
-        "network",
-        "The network of these settings, compared with ridge regression: each fit is a training.",
-    ),
-];
-
-/// Shows model and folds of the analysis, and the buttons that start and cancel it.
+/// Shows the folds of a cross-validation, and the buttons that start and cancel it.
 pub fn form_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {
     scrolled_ui(ui, "recording study form", |ui| {
         section_heading_ui(ui, "Recording");
@@ -236,17 +218,8 @@ pub fn form_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {
 
 fn choices_ui(ui: &mut Ui, study: &mut RecordingStudy) {
     section_heading_ui(ui, "Cross-validation");
-    let FoldsChoice { folds, compares_random } = &mut study.choice;
-    let hint = "Number of parts. Each part is tested by models fitted to the other parts.";
-    count_ui(ui, "Folds", hint, folds, 2..=MAX_FOLDS);
-    let hint = "Repeats the cross-validation with random folds and reports how optimistic their errors are. It takes twice \
-                as long.";
-    ui.checkbox(compares_random, "Compare with random folds")
-        .on_hover_text(hint);
-    section_heading_ui(ui, "Model");
-    if let Some(model) = explained_options_ui(ui, "Fitted model", &MODELS, study.model, true) {
-        study.model = model;
-    }
+    let hint = "Number of parts. Each part is tested by networks trained on the other parts.";
+    count_ui(ui, "Folds", hint, &mut study.folds, 2..=MAX_FOLDS);
     ui.add_space(space(1));
 }
 
@@ -295,24 +268,18 @@ pub(super) fn progress(under_way: UnderWay, study: &RecordingStudy) -> String {
         _ => "Reading the files…".to_owned(),
     });
     match under_way {
-        UnderWay::Findings(None) => reading.unwrap_or_else(|| "Reading the files…".to_owned()),
-        UnderWay::Findings(Some(stage)) => format!("{}…", capitalised(&stage.to_string())),
+        UnderWay::Findings => reading.unwrap_or_else(|| "Analysis…".to_owned()),
         UnderWay::CrossValidation => "Cross-validation…".to_owned(),
     }
 }
 
-/// Describes the cost of the analysis.
+/// Describes the cost of the work.
 fn cost(study: &RecordingStudy, shared: &Shared) -> String {
-    let folds = study.choice.folds;
-    if study.model == FittedModel::Ridge {
-        return format!("The analysis trains no network with ridge alone; {folds} folds.");
-    }
-    // A cross-validation by the split and one at random, and one by group unless that is the split.
-    let [min, max] = [2, 3].map(|rounds| rounds * folds);
+    let folds = study.folds;
     let last = shared.result().and_then(|result| result.wall_time);
     let time = last.map_or_else(String::new, |last| {
-        let [min, max] = [min, max].map(|count| format_duration(last.saturating_mul(count as u32)));
-        format!("; the last training took {}, so {min} to {max}", format_duration(last))
+        let all = format_duration(last.saturating_mul(folds as u32));
+        format!("; the last training took {}, so {all}", format_duration(last))
     });
-    format!("The analysis takes {min} to {max} trainings with {folds} folds{time}.")
+    format!("The analysis takes seconds; a cross-validation takes {folds} trainings{time}.")
 }

@@ -453,9 +453,7 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
         .sets(Path::new(""), seed, &mut watch)
         .map_err(|error| in_window(&error))?;
     let recordings = || std::iter::once(&sets.recording).chain(&sets.test_recording);
-    let mut warnings: Vec<String> = recordings()
-        .flat_map(|recording| recording.warnings.iter().cloned())
-        .collect();
+    let mut warnings = Recording::warnings_of(recordings());
     let Recording {
         inputs, targets, set, ..
     } = &sets.recording;

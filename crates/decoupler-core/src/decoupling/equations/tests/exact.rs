@@ -1,5 +1,6 @@
 //! Rows with exact readings.
 
+use super::polish;
 use crate::{
     dataset::{Dataset, Seed, Stream},
     decoupling::{Estimator, LARGEST_ERROR, Solution, resistance_residual},
@@ -197,9 +198,7 @@ fn an_answer_is_polished_to_rounding_in_a_few_steps() {
             *z += 0.01 * (node as f64).sin();
         }
         let row = set.row_wire(sample).unwrap();
-        let report = newton
-            .polish(row, set.sample_readings(sample), &mut coordinates, 9)
-            .unwrap();
+        let report = polish(&mut newton, row, set.sample_readings(sample), &mut coordinates, 9);
         assert!(report.solution == Solution::Unique && report.steps <= 5, "{report:?}");
         for (ours, truth) in coordinates.iter().zip(truth) {
             assert!((ours - truth).abs() < 1e-9, "{sample}: {ours} {truth}");
@@ -222,7 +221,7 @@ fn the_residual_reported_is_that_of_the_answer() {
             let mut polished = Vec::from_iter(set.sample_targets(sample).iter().map(|mm| mm - 0.02));
             for (report, coordinates) in [
                 (newton.solve(row, &readings, &mut solved).unwrap(), &solved),
-                (newton.polish(row, &readings, &mut polished, steps).unwrap(), &polished),
+                (polish(&mut newton, row, &readings, &mut polished, steps), &polished),
             ] {
                 let residual = resistance_residual(&model, &readings, coordinates);
                 let apart = (report.residual - residual).abs();

@@ -1,12 +1,9 @@
 use std::f64::consts::PI;
 
-use ndarray::{Array1, ArrayView1, ArrayView2};
+use ndarray::{Array1, ArrayView1};
 use serde::Serialize;
 
-use crate::{
-    dataset::{Dataset, SplitBy},
-    numerics::{autocorrelation, student_quantile},
-};
+use super::{autocorrelation, student_quantile};
 
 /// Figure with its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -21,13 +18,13 @@ pub struct Interval {
 
 impl Interval {
     /// Minimum number of independent units for an interval.
-    pub(super) const FEWEST_UNITS: usize = 3;
+    pub(crate) const FEWEST_UNITS: usize = 3;
     /// Maximum factor between an end and the figure; beyond it, the figure is not determined.
     const MAX_FACTOR: f64 = 100.0;
 
     /// Returns the interval of a positive ratio with sampling variance `spread`: a Student's t interval in the
     /// logarithm, in which the ratio of two sums of squares is nearly normal. `None` if the ratio is not determined.
-    pub(super) fn of_ratio(ratio: f64, spread: SumVariance) -> Option<Self> {
+    pub(crate) fn of_ratio(ratio: f64, spread: SumVariance) -> Option<Self> {
         let reach = spread.reach() / ratio;
         // False for NaN.
         let is_determined = ratio.is_finite() && ratio > 0.0 && reach <= Self::MAX_FACTOR.ln();
@@ -38,23 +35,9 @@ impl Interval {
         })
     }
 
-    /// Returns the ratio of the RMSE of the first answers to that of the second for each target of `set`; `None` if it is not
-    /// determined.
-    pub(super) fn of_rmse(set: &Dataset, answers: [ArrayView2<'_, f64>; 2], by: SplitBy) -> Vec<Option<Self>> {
-        let evidence = Evidence::of(set, by);
-        let of_target = |target: usize| {
-            let [ours, theirs] = answers.map(|answers| squared_errors(set, answers, target));
-            let total = theirs.iter().sum::<f64>();
-            let ratio = ours.iter().sum::<f64>() / total;
-            let spread = evidence.variance(&((ours - theirs * ratio) / total));
-            Some(Self::of_ratio(ratio, spread)?.map(f64::sqrt))
-        };
-        (0..set.outputs()).map(of_target).collect()
-    }
-
     /// Returns the interval of a monotonic function of the figure.
     #[must_use]
-    pub(super) fn map(&self, function: impl Fn(f64) -> f64) -> Self {
+    pub(crate) fn map(&self, function: impl Fn(f64) -> f64) -> Self {
         let [value, low, high] = [self.value, self.low, self.high].map(function);
         Self {
             value,
@@ -62,11 +45,6 @@ impl Interval {
             high: low.max(high),
         }
     }
-}
-
-/// Returns the squared errors of answers (samples × targets) for one target of `set`.
-pub(super) fn squared_errors(set: &Dataset, answers: ArrayView2<'_, f64>, target: usize) -> Array1<f64> {
-    (&answers.column(target) - &set.targets().column(target)).powi(2)
 }
 
 /// Independent units in a set of samples: its groups, or stretches in the order of the samples.
@@ -83,11 +61,11 @@ pub(crate) enum Evidence {
 
 /// Variance of the sum of the influences of all samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct SumVariance {
+pub(crate) struct SumVariance {
     /// Estimated variance.
-    pub(super) variance: f64,
+    pub(crate) variance: f64,
     /// Number of independent groups or stretches, one more than the degrees of freedom of the estimate.
-    pub(super) units: usize,
+    pub(crate) units: usize,
 }
 
 impl SumVariance {
@@ -99,26 +77,18 @@ impl SumVariance {
     }
 
     /// Distance from the sum to the ends of its 95 % confidence interval.
-    pub(super) fn reach(self) -> f64 {
+    pub(crate) fn reach(self) -> f64 {
         student_quantile(0.05, self.units as f64 - 1.0) * self.variance.sqrt()
     }
 }
 
 impl Evidence {
-    /// Returns the groups of `set` if it is split by group, otherwise the order of its samples.
-    pub(crate) fn of(set: &Dataset, by: SplitBy) -> Self {
-        match by {
-            SplitBy::Group => Self::Groups(set.snapshots()),
-            SplitBy::Time | SplitBy::Random => Self::Order,
-        }
-    }
-
     /// Returns the variance of the sum of `influences`, which have a sum of 0.
     ///
     /// Groups are independent. So are samples in order if no autocorrelation is found; otherwise the variance is that
     /// of their projections on the slowest cosines (Lazarus, Lewis, Stock and Watson 2018,
     /// doi:10.1080/07350015.2018.1506926), with one degree of freedom each.
-    pub(super) fn variance(&self, influences: &Array1<f64>) -> SumVariance {
+    pub(crate) fn variance(&self, influences: &Array1<f64>) -> SumVariance {
         match self {
             Self::Groups(groups) => {
                 let sum = |group: &Vec<usize>| group.iter().map(|&sample| influences[sample]).sum();
