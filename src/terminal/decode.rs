@@ -20,8 +20,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        AtomicFile, NetworkFile, WriteError, check_writable, format_number, is_same, write_decoded,
-        write_decoded_header,
+        AtomicFile, NetworkFile, WriteError, check_writable, csv_cell, format_number, is_same, write_csv_row,
+        write_decoded, write_decoded_header,
     },
     machine::memory_budget,
 };
@@ -149,12 +149,7 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
 
 /// Writes a cell kept from the input, followed by a comma.
 pub(super) fn write_cell(cell: &str, out: &mut dyn Write) -> io::Result<()> {
-    let cell = inert(cell);
-    if cell.contains([',', '"', '\n', '\r']) {
-        write!(out, "\"{}\",", cell.replace('"', "\"\""))
-    } else {
-        write!(out, "{cell},")
-    }
+    write!(out, "{},", csv_cell(&inert(cell)))
 }
 
 /// Fills `values` with the answers, each followed by the half-width of its interval if the target has one.
@@ -279,9 +274,7 @@ pub(super) fn write_heading(file: &NetworkFile, kept: &[String], rows: usize, ou
     let names = kept
         .chain(titles.map(|target| inert(&target.title())))
         .chain(["readings_outside".to_owned(), "targets_outside".to_owned()]);
-    let mut writer = csv::Writer::from_writer(out);
-    writer.write_record(names).map_err(io::Error::other)?;
-    writer.flush()
+    write_csv_row(names, out)
 }
 
 /// Name of the column with the half-width of the 90 % interval of `target`.

@@ -6,8 +6,8 @@ use std::{
 };
 
 use decoupler_core::{
-    calibration::CalibrationError, dataset::DatasetError, evaluation::RunError, scene::Rows, sensor::SensorError,
-    text::counted, training::SettingError,
+    calibration::CalibrationError, dataset::DatasetError, evaluation::RunError, sensor::SensorError, text::counted,
+    training::SettingError,
 };
 use decoupler_files::{
     export::{DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError},
@@ -94,13 +94,6 @@ pub(super) enum Failure {
     Open { path: PathBuf, source: io::Error },
     #[error("'{}': {source}", .path.display())]
     Resistances { path: PathBuf, source: ReadError },
-    #[error("'{}': line {line}: it belongs to row {row}, but the network reads only row {rows}", .path.display())]
-    OtherRow {
-        path: PathBuf,
-        line: u64,
-        row: usize,
-        rows: Rows,
-    },
     #[error("'{}': line {line}: there is no network for row {row}; train with samples of it", .path.display())]
     UnknownRow { path: PathBuf, line: u64, row: usize },
     #[error("'{}': it has no column '{column}' with the row number of each line, which is needed because each row has its own network; add it", .path.display())]

@@ -2,19 +2,18 @@
 
 use std::{
     fs::File,
-    io::{self, BufReader, Stderr, Write, stderr, stdout},
+    io::{self, Stderr, Write, stderr, stdout},
     path::Path,
     time::Duration,
 };
 
 use decoupler_core::{
     dataset::{DatasetError, Simulation},
-    scene::RowModel,
     text::{is_unprintable, printable},
 };
 use decoupler_files::{
     export::NetworkFile,
-    import::{InputTable, KeptColumn, ReadError, Reading, Recipe, ResistanceReader},
+    import::{self, InputTable, KeptColumn, ReadingsFile, Recipe},
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use ndarray::Array2;
@@ -171,58 +170,27 @@ fn read_resistances(
         path: input.to_owned(),
         source,
     };
-    let (scale, rows) = (sensor.scale, scene.rows);
-    let reader = ResistanceReader::new(BufReader::new(opened), scale.columns()).map_err(unreadable)?;
-    let read = rows.read(scale.rows()).map_err(DatasetError::from)?;
-    let mut reader = match rows.model() {
-        RowModel::Shared => reader,
-        RowModel::Each => reader.with_row_wires(scale.rows()),
-    };
-    // The row-wire of each line by its position, if the file has no row numbers.
-    let mut turns = (0..read.len()).cycle();
-    let mut lines_in_turn = 0;
-    let mut is_empty = true;
-    while let Some(reading) = reader.read(BLOCK).map_err(unreadable)? {
-        is_empty = false;
-        let Reading {
-            resistances_ohm,
+    let read = scene.rows.read(sensor.scale.rows()).map_err(DatasetError::from)?;
+    let mut readings = ReadingsFile::new(opened, file.line_parser(false, true)?);
+    while let Some(block) = readings.read(BLOCK).map_err(unreadable)? {
+        let import::Readings {
+            values_ohm,
             lines,
-            row_wires,
-        } = reading;
-        let row_indices = match row_wires {
-            Some(row_wires) => {
-                let index = |(row_wire, &line): (usize, &u64)| {
-                    let index = read.iter().position(|other| *other == row_wire);
-                    index.ok_or_else(|| Failure::OtherRow {
-                        path: input.to_owned(),
-                        line,
-                        row: row_wire + 1,
-                        rows,
-                    })
-                };
-                row_wires.into_iter().zip(&lines).map(index).collect::<Result<_, _>>()?
-            }
-            _ if file.network.only().is_some() => vec![0; lines.len()],
-            None => {
-                lines_in_turn += lines.len();
-                turns.by_ref().take(lines.len()).collect()
-            }
-        };
+            row_indices,
+        } = block;
         take(Readings {
-            values: resistances_ohm,
+            values: values_ohm,
             lines,
             row_indices,
             kept: Vec::new(),
         })?;
     }
-    if is_empty {
-        return Err(unreadable(ReadError::Empty));
-    }
-    warn_if_torn(input, reader.torn_line());
-    if reader.torn_line().is_none() && !lines_in_turn.is_multiple_of(read.len()) {
+    warn_if_torn(input, readings.torn_line());
+    let lines = readings.lines_in_turn();
+    if readings.torn_line().is_none() && !lines.is_multiple_of(read.len()) {
         return Err(Failure::PartOfSnapshot {
             path: input.to_owned(),
-            lines: lines_in_turn,
+            lines,
             rows: read.len(),
         });
     }

@@ -237,7 +237,7 @@ fn files_that_cannot_be_decoded_leave_nothing() {
     let row = ["600"; 18].join(",");
     let cases = [
         ("an empty file", String::new(), "no rows"),
-        ("a short row", format!("{row}\n600,600\n"), "line 2: 2 columns where 18"),
+        ("a short row", format!("{row}\n600,600\n"), "line 2: 2 cells where 18"),
         (
             "a negative resistance",
             format!("{row}\n-{row}\n"),
@@ -248,7 +248,7 @@ fn files_that_cannot_be_decoded_leave_nothing() {
             format!("{}NaN{}\n", format!("{row}\n").repeat(3000), &row[3..]),
             "line 3001, column 1",
         ),
-        ("another array", "r_1,r_2\n1,2\n".to_owned(), "no column r_3"),
+        ("another array", "r_1,r_2\n1,2\n".to_owned(), "no column 'r_3'"),
     ];
     for (sentence, text, expected) in cases {
         fs::write(folder.join("input.csv"), text).unwrap();

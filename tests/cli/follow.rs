@@ -183,8 +183,8 @@ fn garbage_is_counted_reported_and_skipped() {
     assert_same(found.lines(), expected);
     let report = String::from_utf8(output.stderr).unwrap();
     for words in [
-        "warning: line 10: 1 column where 7",
-        "warning: line 20: 2 columns where 7",
+        "warning: line 10: 1 cell where 7",
+        "warning: line 20: 2 cells where 7",
         "warning: line 40, column 2: 'nan' is not a resistance",
         "warning: line 41: it is longer than 1048576 bytes",
         "36 lines decoded",
@@ -416,16 +416,16 @@ fn a_header_without_a_resistance_and_a_stream_without_a_frame_end_with_an_error(
     let readings = read(&folder, "readings.csv");
     let names = readings.lines().next().unwrap();
     for (text, words) in [
-        (readings.replacen("r_3", "volt", 1), "line 1: there is no column r_3"),
+        (readings.replacen("r_3", "volt", 1), "line 1: there is no column 'r_3'"),
         (
             "R1,R2,R3,R4,R5,R6\n1,2,3,4,5,6\n".to_owned(),
-            "line 1: there is no column r_1",
+            "line 1: there is no column 'r_1'",
         ),
         (String::new(), "no line could be decoded: it has no line of readings"),
         (format!("{names}\n"), "no line could be decoded"),
         (
             "hello\n1,2\n".to_owned(),
-            "no line could be decoded: line 1: 1 column where 6",
+            "no line could be decoded: line 1: 1 cell where 6",
         ),
     ] {
         fs::write(folder.path().join("bad.csv"), &text).unwrap();

@@ -4,11 +4,11 @@
 use std::{fs, ops::ControlFlow, path::Path};
 
 use decoupler_core::{
-    dataset::{Memory, MemoryStream, Span},
+    dataset::{Memory, Span},
     problem::{Channel, Problem},
 };
 use decoupler_files::{
-    import::{DialectChoice, Encoding, InputLine, InputLines, Recipe, Separator},
+    import::{DialectChoice, Encoding, LineParser, ParsedLine, Recipe, Separator},
     machine::limit_memory,
 };
 
@@ -50,23 +50,20 @@ const ROW_WIRES: [usize; 2] = [0, 2];
 fn check(bytes: &[u8], recipe: &Recipe, problem: &Problem, has_rows: bool, path: &Path) -> usize {
     limit_memory(0.25);
     let networks = if has_rows { ROW_WIRES.len() } else { 1 };
-    let memory = problem.memory.as_ref();
-    let memory = memory.map(|memory| MemoryStream::new(memory, problem.inputs.len()).unwrap());
     let row_wires = has_rows.then(|| ROW_WIRES.to_vec());
-    let mut lines = InputLines::new(problem.inputs.clone(), recipe.other_columns(problem), row_wires)
-        .with_derived(recipe.derive.clone())
-        .with_memory(memory);
+    let mut lines = LineParser::of_recording(problem, recipe, row_wires).unwrap();
     let text = || String::from_utf8_lossy(bytes);
     let mut found: Vec<Vec<f64>> = Vec::new();
     let mut is_faultless = true;
     for (line, number) in bytes.split(|&byte| byte == b'\n').zip(1..) {
         match lines.parse(number, line) {
-            Ok(InputLine::NoReadings) => {}
-            Ok(InputLine::Start { .. }) => is_faultless = false,
-            Ok(InputLine::Readings {
+            Ok(ParsedLine::NoReadings) => {}
+            Ok(ParsedLine::Start { .. }) => is_faultless = false,
+            Ok(ParsedLine::Snapshot(_)) => panic!("no array"),
+            Ok(ParsedLine::Row {
                 row_index, readings, ..
             }) => {
-                assert!(row_index < networks);
+                assert!(row_index.unwrap() < networks);
                 assert_eq!(readings.len(), problem.feature_count());
                 assert!(
                     readings.iter().all(|reading| reading.is_finite()),
@@ -77,7 +74,11 @@ fn check(bytes: &[u8], recipe: &Recipe, problem: &Problem, has_rows: bool, path:
             }
             Err(error) => {
                 is_faultless = false;
-                assert!(error.to_string().len() < 20_000, "{error}");
+                let message = error.to_string();
+                assert!(
+                    message.len() < 20_000 && message.contains(&format!("line {number}")),
+                    "{message}"
+                );
                 if error.is_final() {
                     break;
                 }

@@ -63,19 +63,18 @@ fn split(bytes: &[u8], rng: &mut impl Rng) -> Vec<(u64, Vec<u8>)> {
 
 /// Parses the lines; returns the number of frames or rows.
 fn check(lines: &[(u64, Vec<u8>)], rows: Rows, is_complete: bool) -> usize {
-    let mut parser = LineParser::new("2x1_1x3".parse().unwrap(), rows, is_complete).unwrap();
+    let mut parser = LineParser::of_array("2x1_1x3".parse().unwrap(), rows, is_complete).unwrap();
     let read = rows.read(ROWS).unwrap().len();
     let mut found = 0;
     for (number, text) in lines {
         let readings_ohm = match parser.parse(*number, text) {
-            Ok(ParsedLine::NoReadings) => continue,
+            Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => continue,
             Ok(ParsedLine::Row {
-                row_index,
-                readings_ohm,
+                row_index, readings, ..
             }) => {
                 assert!(row_index.is_none_or(|index| index < read));
-                assert_eq!(readings_ohm.len(), COLUMNS);
-                readings_ohm
+                assert_eq!(readings.len(), COLUMNS);
+                readings
             }
             Ok(ParsedLine::Snapshot(readings_ohm)) => {
                 assert_eq!(readings_ohm.len(), read * COLUMNS);

@@ -1,4 +1,5 @@
-use decoupler_files::import::ResistanceReader;
+use decoupler_core::scene::Rows;
+use decoupler_files::import::{LineParser, ReadingsFile};
 use rand::RngExt;
 
 use crate::{
@@ -6,22 +7,29 @@ use crate::{
     mutation::{for_each_seed, mutated},
 };
 
-const CHANNELS: usize = 3;
-
-/// Reads all of `bytes` in blocks of at most `max_rows` rows.
-fn check(bytes: &[u8], max_rows: usize) {
-    let Ok(reader) = ResistanceReader::new(bytes, CHANNELS) else {
-        return;
-    };
-    let mut reader = reader.with_row_wires(4);
-    let mut last_line = 0;
-    while let Ok(Some(block)) = reader.read(max_rows) {
-        assert!(block.lines.len() <= max_rows);
-        assert!(block.resistances_ohm.iter().all(|ohm| *ohm > 0.0 && ohm.is_finite()));
-        assert!(block.row_wires.iter().flatten().all(|row_wire| *row_wire < 4));
-        for line in block.lines {
-            assert!(line > last_line);
-            last_line = line;
+/// Reads all of `bytes` in blocks of at most `max_lines` lines, as readings of an array of four row-wires and three
+/// column-wires.
+fn check(bytes: &[u8], max_lines: usize) {
+    for rows in [Rows::All, Rows::Known, Rows::One(1)] {
+        let parser = LineParser::of_array("4x1_1x3".parse().unwrap(), rows, true).unwrap();
+        let mut file = ReadingsFile::new(bytes, parser);
+        let mut last_line = 0;
+        loop {
+            match file.read(max_lines) {
+                Ok(None) => break,
+                Ok(Some(block)) => {
+                    assert!(block.lines.len() <= 4 * max_lines);
+                    assert!(block.values_ohm.iter().all(|ohm| *ohm > 0.0 && ohm.is_finite()));
+                    assert!(block.row_indices.iter().all(|row| *row < 4));
+                    assert!(block.lines.is_sorted() && block.lines[0] > last_line);
+                    last_line = block.lines[block.lines.len() - 1];
+                }
+                Err(error) => {
+                    let message = error.to_string();
+                    assert!(message.len() < 1000 && !message.contains('\n'), "{message}");
+                    break;
+                }
+            }
         }
     }
 }
@@ -29,8 +37,8 @@ fn check(bytes: &[u8], max_rows: usize) {
 #[test]
 fn any_input() {
     replay!(|bytes: &[u8]| {
-        for max_rows in [1, 2, 100] {
-            check(bytes, max_rows);
+        for max_lines in [1, 2, 100] {
+            check(bytes, max_lines);
         }
         for_each_seed(100, |rng| check(&mutated(bytes, rng), rng.random_range(1..5)));
     });

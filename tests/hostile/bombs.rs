@@ -260,7 +260,7 @@ const BOMBS: [Bomb; 19] = [
             bytes[..8].copy_from_slice(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1");
             fs::write(path, bytes).unwrap();
         },
-        "save it again, or as CSV",
+        "a file of Excel up to 2003, which is not read; save it as .xlsx or CSV",
     ),
 ];
 

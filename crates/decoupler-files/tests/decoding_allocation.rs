@@ -45,7 +45,7 @@ fn a_line_is_parsed_and_monitored_without_allocating() {
     let mut source = Simulated::new(&model, &scene, Seed(0), 10.0).unwrap();
     let mut frame_ohm = vec![0.0; source.readings()];
     source.next_frame(&mut frame_ohm).unwrap();
-    let mut parser = LineParser::new(model.scale, scene.rows, true).unwrap();
+    let mut parser = LineParser::of_array(model.scale, scene.rows, true).unwrap();
     let mut check = WireCheck::new(&model, &scene, source.rows()).unwrap();
     let mut faulty = WireCheck::new(&model, &scene, source.rows()).unwrap();
     for _ in 0..8 {

@@ -70,7 +70,7 @@ pub use sweep::{
     MergedSweep, SweepFiles, SweepFolderError, SweepRow, SweepTableFormat, Trial, TrialId, TrialOptions,
     decoders_in_order, recording_options, sweep_specification, train_options,
 };
-pub use table::{Cell, Table, TableColumn, TableForm};
+pub use table::{Cell, Table, TableColumn, TableForm, csv_cell, write_csv_row};
 pub use tables::{
     decoder_table, describe_coverage, describe_determinacy, describe_half_widths, describe_positions, describe_samples,
     describe_target, describe_warnings, describe_worse_than_ridge, error_table, write_loss_curves,

@@ -1,13 +1,14 @@
 use std::{fmt::Display, io::Write as _, path::Path, sync::Arc, time::Duration};
 
 use decoupler_core::{
-    dataset::{Dataset, MemoryStream, Simulation},
+    dataset::{Dataset, DatasetError, Simulation},
     decoupling::{Combined, ProgramDecoder},
     evaluation::{ErrorTable, Intervals, Run, RunSettings, Scores, StartRecord, TestErrors},
     job::Job,
     live::{DriftReference, LiveError},
     network::{DecouplingNetwork, Networks},
     problem::{Problem, TargetPosition},
+    scene::Rows,
 };
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -19,7 +20,7 @@ use super::{
     document::PROGRAM,
     unfinished::folder_of,
 };
-use crate::import::{InputLines, OtherColumns, Recorded, Setup, SetupError};
+use crate::import::{LineParser, Recipe, Recorded, Setup, SetupError};
 
 const KIND: DocumentKind = DocumentKind::Network;
 
@@ -175,18 +176,24 @@ impl NetworkFile {
         ProgramDecoder::new(self.network.decoder_program(&self.problem, self.combined()))
     }
 
-    /// Returns a parser for lines with the inputs of a network that was trained on a recording.
-    pub fn input_lines(&self) -> InputLines {
-        let import = self.recorded.as_ref().map(|recorded| &recorded.plan.import);
-        let others = import.map_or_else(OtherColumns::default, |import| import.other_columns(&self.problem));
+    /// Returns a parser of lines with the readings of the network. `needs_rows` asks for the row-wire of each line of an array
+    /// even if one network serves all; `is_complete` means that the input is read from its beginning and no line is lost.
+    ///
+    /// # Errors
+    /// If the array does not have the row-wires of the scene, or the memory is invalid.
+    pub fn line_parser(&self, needs_rows: bool, is_complete: bool) -> Result<LineParser, DatasetError> {
+        if let Some(simulation) = &self.problem.sensor {
+            let rows = match simulation.scene.rows {
+                Rows::All if needs_rows => Rows::Known,
+                rows => rows,
+            };
+            return Ok(LineParser::of_array(simulation.sensor.scale, rows, is_complete)?);
+        }
+        let plain = Recipe::default();
+        let recipe = self.recorded.as_ref().map_or(&plain, |recorded| &recorded.plan.import);
         let has_rows = self.network.only().is_none();
         let row_wires = self.row_wires.clone().filter(|_| has_rows);
-        let memory = self.problem.memory.as_ref().map(|memory| {
-            MemoryStream::new(memory, self.problem.inputs.len()).expect("reading and writing check the memory")
-        });
-        let derive = import.map(|import| import.derive.clone()).unwrap_or_default();
-        let lines = InputLines::new(self.problem.inputs.clone(), others, row_wires);
-        lines.with_derived(derive).with_memory(memory)
+        LineParser::of_recording(&self.problem, recipe, row_wires)
     }
 
     /// Setup of the run.

@@ -102,7 +102,6 @@ pub(super) fn table(
         notes,
         torn_line: None,
         too_long: Excess::default(),
-        too_short: Excess::default(),
         lines: Lines::default(),
     })
 }

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use decoupler_core::{
-    dataset::{Memory, Seed, SplitBy},
+    dataset::{Seed, SplitBy},
     evaluation::{
         Intervals, RunSettings,
         auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, choose_settings, dead_channels},
@@ -12,7 +12,7 @@ use decoupler_core::{
 };
 
 use super::{
-    ImportError, Plan, PlannedSets, Progress, Recording, Setup, SetupError, SetupSets,
+    ImportError, Plan, Progress, Recording, Setup, SetupError, SetupSets,
     setup::{unless_cancelled, watch},
 };
 use crate::machine::memory_budget;
@@ -109,8 +109,14 @@ impl Setup {
             settings = choice.settings;
             plan.import.memory = Some(choice.memory.clone()).filter(|memory| !memory.is_empty());
         }
-        let memory = plan.import.memory.clone();
-        let planned = planned(&plan, &raw, test_recording.as_ref(), memory.as_ref(), settings.seed)?;
+        let recording = raw
+            .with_memory(plan.import.memory.as_ref())
+            .map_err(ImportError::from)?;
+        // Lags in seconds have as many samples as in training.
+        let memory = recording.memory();
+        let test_recording = test_recording.map(|test| test.with_memory(memory)).transpose();
+        let test_recording = test_recording.map_err(ImportError::from)?;
+        let planned = plan.planned(recording, test_recording, settings.seed)?;
         let read = SetupSets::of_plan(&plan, folder, planned, &mut watch(job, &mut |_| {}));
         let mut sets = unless_cancelled(job, read)?;
         if let (Some(recordings), Some(choice)) = (&mut sets.recordings, &choice) {
@@ -172,27 +178,4 @@ fn leave_out_dead(plan: &mut Plan, recording: &Recording, seed: Seed) -> Result<
         plan.import.inputs = kept;
     }
     Ok(left_out)
-}
-
-/// Divides the recordings with the features of `memory`.
-fn planned(
-    plan: &Plan,
-    raw: &Recording,
-    test: Option<&Recording>,
-    memory: Option<&Memory>,
-    seed: Seed,
-) -> Result<PlannedSets, ImportError> {
-    let recording = raw.with_memory(memory)?;
-    // Lags in seconds have as many samples as in training.
-    let test_recording = match test {
-        None => None,
-        Some(test) => Some(test.with_memory(recording.memory())?),
-    };
-    let (split, test) = plan.divide(&recording, test_recording.as_ref(), seed)?;
-    Ok(PlannedSets {
-        recording,
-        test_recording,
-        split,
-        test,
-    })
 }

@@ -4,7 +4,7 @@ use std::{
     path::Path,
 };
 
-use decoupler_core::text::{clean_name, original_name};
+use decoupler_core::text::{clean_name, counted, original_name};
 
 use super::{
     Cells, Column, Dialect, DialectChoice, Encoding, Fault, Format, Missing, Table, TableError,
@@ -12,8 +12,8 @@ use super::{
     dialect::utf8_of_utf16,
     format::{Cell, parse},
     progress::table_error,
-    rows::Rows,
-    table::{Excess, Labels, Lines, column_called, name_and_unit, stem},
+    rows::{Rows, commonest},
+    table::{Excess, Labels, Lines, column_called, excerpt, name_and_unit, stem},
     time_stamp::TimeStamp,
 };
 use crate::machine::ReadingBudget;
@@ -101,7 +101,18 @@ fn read_rows(
     if dialect.header && rows.advance()? {
         headers = rows.cells().map(|cell| text_of(cell, dialect.encoding)).collect();
     }
-    let mut body = Body::new(dialect, reading, budget);
+    let mut body = Body {
+        dialect,
+        reading,
+        budget,
+        first: Vec::new(),
+        builders: Vec::new(),
+        rows: 0,
+        lines: Lines::default(),
+        too_long: Excess::default(),
+        too_short: Excess::default(),
+        torn_line: None,
+    };
     while rows.advance()? {
         if body.is_torn(&rows, &headers) {
             body.torn_line = Some(rows.line());
@@ -137,21 +148,6 @@ struct Builder<'a> {
 }
 
 impl<'a> Body<'a> {
-    fn new(dialect: Dialect, reading: &'a Reading<'a>, budget: &'a mut ReadingBudget) -> Self {
-        Self {
-            dialect,
-            reading,
-            budget,
-            first: Vec::new(),
-            builders: Vec::new(),
-            rows: 0,
-            lines: Lines::default(),
-            too_long: Excess::default(),
-            too_short: Excess::default(),
-            torn_line: None,
-        }
-    }
-
     /// Returns `true` if the row is the last of a file that is cut off, as when the disk was full: it ends without a line
     /// break, before the last column or within its number.
     fn is_torn<R: Read>(&self, rows: &Rows<R>, headers: &[String]) -> bool {
@@ -159,7 +155,7 @@ impl<'a> Body<'a> {
             return false;
         }
         let width = match (self.builders.len(), headers.len()) {
-            (0, 0) => commonest(self.first.iter().map(|(_, cells)| cells.len())),
+            (0, 0) => commonest(self.first.iter().map(|(_, cells)| cells.len())).0,
             (0, _) => return false,
             (width, _) => width,
         };
@@ -190,18 +186,22 @@ impl<'a> Body<'a> {
     fn begin(&mut self, headers: &[String]) -> Result<(), TableError> {
         let waiting = std::mem::take(&mut self.first);
         let width = match headers.len() {
-            0 => commonest(waiting.iter().map(|(_, cells)| cells.len())),
+            0 => commonest(waiting.iter().map(|(_, cells)| cells.len())).0,
             width => width,
         };
         let empty_end = self.dialect.trailing_separator && headers.last().is_none_or(String::is_empty);
         let width = width - usize::from(empty_end && width > 1);
         let columns = named(headers, width);
         let roles = self.reading.roles(&columns);
-        self.builders = columns
-            .into_iter()
-            .zip(roles)
-            .map(|(column, role)| Builder::new(column, role))
-            .collect();
+        let columns = columns.into_iter().zip(roles);
+        let builders = columns.map(|(column, role)| Builder {
+            missing: role.missing,
+            labels: role.has_labels.then(Labels::default),
+            numbers: Vec::new(),
+            has_numbers: false,
+            column,
+        });
+        self.builders = builders.collect();
         for (line, cells) in waiting {
             self.add(line, cells.len(), cells.iter().map(Vec::as_slice))?;
         }
@@ -245,37 +245,36 @@ impl<'a> Body<'a> {
         if self.rows == 0 {
             return Err(TableError::Empty);
         }
+        let mut notes = Vec::new();
+        if let Some(line) = self.torn_line {
+            notes.push(format!("line {line}, the last, is cut off and left out"));
+        }
+        for (excess, what) in [
+            (self.too_short, "fewer cells than there are columns, which are missing"),
+            (self.too_long, "more cells than there are columns, left out"),
+        ] {
+            if let Some(line) = excess.first_line {
+                notes.push(format!(
+                    "{} with {what}, the first on line {line}",
+                    counted(excess.rows, "row")
+                ));
+            }
+        }
         Ok(Table {
             variables: Vec::new(),
             stem: stem(path),
             columns: self.builders.into_iter().map(Builder::finish).collect(),
             rows: self.rows,
             format: Format::Text(self.dialect),
-            notes: self.torn_line.map(torn).into_iter().collect(),
+            notes,
             torn_line: self.torn_line,
             too_long: self.too_long,
-            too_short: self.too_short,
             lines: self.lines,
         })
     }
 }
 
-/// Returns the note on a last line that is cut off.
-fn torn(line: u64) -> String {
-    format!("line {line}, the last, is cut off and left out")
-}
-
-impl<'a> Builder<'a> {
-    fn new(column: Column, role: Role<'a>) -> Self {
-        Self {
-            missing: role.missing,
-            labels: role.has_labels.then(Labels::default),
-            numbers: Vec::new(),
-            has_numbers: false,
-            column,
-        }
-    }
-
+impl Builder<'_> {
     /// Adds a cell; returns the length of its text if that is a new label.
     fn push(&mut self, line: u64, cell: &[u8], dialect: &Dialect) -> Option<usize> {
         let found = parse(cell, dialect.decimal);
@@ -381,27 +380,10 @@ fn name_apart(columns: &mut [Column]) {
     }
 }
 
-fn commonest(widths: impl Iterator<Item = usize>) -> usize {
-    let mut widths: Vec<usize> = widths.collect();
-    widths.sort_unstable();
-    let runs = widths.chunk_by(|a, b| a == b);
-    runs.max_by_key(|run| run.len()).map_or(0, |run| run[0])
-}
-
 /// Returns the text of a cell. Invalid UTF-8 is read as Latin-1, which maps to the first 256 characters of Unicode.
 fn text_of(cell: &[u8], encoding: Encoding) -> String {
     match std::str::from_utf8(cell) {
         Ok(text) if encoding != Encoding::Latin1 => text.to_owned(),
         _ => cell.iter().copied().map(char::from).collect(),
-    }
-}
-
-/// Returns the text for a message: the first 40 characters, with control characters escaped.
-fn excerpt(text: &str) -> String {
-    let text: String = text.chars().take(40).collect();
-    if text.contains(char::is_control) {
-        text.escape_debug().to_string()
-    } else {
-        text
     }
 }

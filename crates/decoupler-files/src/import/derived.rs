@@ -1,117 +1,99 @@
-//! Columns computed from others of the same file, in tables and in [streams](super::derived_stream).
+//! Derived columns of tables and of streams of lines: those of a stream equal those of a file with the same lines.
 
-use std::{fmt, str::FromStr};
+use decoupler_core::text::in_one_line;
 
-use decoupler_core::text::{in_one_line, is_unprintable};
-use serde::{Deserialize, Serialize};
+use super::{
+    Cells, Column, Derived, ImportError, Table,
+    expression::{Expression, Operand, Operator},
+    selection::seconds,
+    table::column_called,
+};
 
-use super::{Cells, Column, Faults, ImportError, Table, selection::seconds, table::column_called};
+/// Reasons why there is no mean at the start.
+const NOTHING_AT_START: &str = "no cell at the start is a number";
+const TOO_LONG: &str = "its start is too long for a stream; give fewer rows or seconds";
 
-/// Column computed from others of the same file: a difference, a ratio, or either with the mean at the start of the file.
-///
-/// Written as `d=c1-c2`, `q=c1/c2`, `r=c1/start(2s)` for the mean of the first two seconds, or `r=c1-start(100)` for that of
-/// the first 100 rows. Spaces around the operator are needed if a name contains `-` or `/`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
-pub struct Derived {
-    /// Name of the new column.
-    pub name: String,
-    /// Name of the first column.
-    pub column: String,
-    operator: Operator,
-    reference: Reference,
+/// Maximum number of cells of a stream that are kept until the start is over: 128 MB.
+const MAX_CELLS: usize = 1 << 24;
+
+/// Time column of a file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TimeColumn<'a> {
+    /// Name within the file.
+    pub(super) name: &'a str,
+    /// Unit given by the recipe instead of the header.
+    pub(super) given_unit: Option<&'a str>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Operator {
-    Minus,
-    Over,
-}
-
-/// What a column is compared with.
+/// Derived column with the places of its columns in a table or in the lines of a stream.
 #[derive(Clone, Debug, PartialEq)]
-enum Reference {
-    /// Another column, row by row.
-    Column(String),
-    /// Its own mean over the first rows.
-    Rows(usize),
-    /// Its own mean over the first seconds.
-    Seconds(f64),
+struct Located {
+    expression: Expression<usize>,
+    /// Place of the time column and the seconds in its unit, for a mean over seconds.
+    time: Option<(usize, f64)>,
 }
 
 impl Derived {
-    /// Returns the columns from which it is computed.
-    pub(super) fn columns(&self) -> impl Iterator<Item = &String> {
-        let other = match &self.reference {
-            Reference::Column(other) => Some(other),
-            Reference::Rows(_) | Reference::Seconds(_) => None,
-        };
-        std::iter::once(&self.column).chain(other)
-    }
-
-    /// Returns `true` if it needs a time column.
-    pub(super) fn needs_time(&self) -> bool {
-        matches!(self.reference, Reference::Seconds(_))
-    }
-
-    /// Finds its columns among `columns`; `None` if they have its name already or do not have its first column. `own` returns
-    /// the name of a column within the file, and `time` is the time column there.
+    /// Finds its columns among `columns`, and returns them with the new column; `None` if they have its name already or do not
+    /// have its first column. `own` returns the name of a column within the file, and `time` is the time column there.
     ///
     /// # Errors
     /// If the other column or the time column is missing, or the times have no unit of time.
-    pub(super) fn located(
+    fn located(
         &self,
         columns: &[Column],
         own: impl Fn(&str) -> Option<String>,
         time: Option<TimeColumn<'_>>,
-    ) -> Result<Option<LocatedDerived>, ImportError> {
+    ) -> Result<Option<(Located, Column)>, ImportError> {
         let find = |name: &str| column_called(columns, name);
-        let Some(column) = own(&self.column).and_then(|name| find(&name)) else {
+        let Some(column) = own(&self.expression.column).and_then(|name| find(&name)) else {
             return Ok(None);
         };
         let Some(name) = own(&self.name).filter(|name| find(name).is_none()) else {
             return Ok(None);
         };
-        let (reference, unit) = match &self.reference {
-            Reference::Column(other) => {
-                let found = own(other).and_then(|name| find(&name));
-                let other =
-                    found.ok_or_else(|| self.refused(format!("there is no column '{other}' in the same file")))?;
-                (LocatedReference::Column(other), &columns[other].unit)
+        let (mut other, mut unit_s) = (column, None);
+        let operand = match &self.expression.operand {
+            Operand::Column(name) => {
+                let found = own(name).and_then(|name| find(&name));
+                other = found.ok_or_else(|| self.refused(&format!("there is no column '{name}' in the same file")))?;
+                Operand::Column(other)
             }
-            Reference::Rows(rows) => (LocatedReference::Rows(*rows), &columns[column].unit),
-            Reference::Seconds(limit_s) => {
+            Operand::Rows(rows) => Operand::Rows(*rows),
+            Operand::Number(number) => Operand::Number(*number),
+            Operand::Seconds(limit_s) => {
                 let found = time.and_then(|time| Some((find(time.name)?, time.given_unit)));
-                let (time, given_unit) = found
-                    .ok_or_else(|| self.refused("seconds need the time column; give a number of rows".to_owned()))?;
+                let (time, given_unit) =
+                    found.ok_or_else(|| self.refused("seconds need the time column; give a number of rows"))?;
                 let of_stamps = columns[time].start.map(|_| "s");
-                let of_times = of_stamps.or(given_unit).or(columns[time].unit.as_deref());
-                let unit_s = seconds(of_times)
-                    .ok_or_else(|| self.refused(format!("'{}' has no unit of time", columns[time].name)))?;
-                let reference = LocatedReference::Seconds {
-                    time,
-                    unit_s,
-                    limit_s: *limit_s,
-                };
-                (reference, &columns[column].unit)
+                let unit = of_stamps.or(given_unit).or(columns[time].unit.as_deref());
+                let factor = seconds(unit)
+                    .ok_or_else(|| self.refused(&format!("'{}' has no unit of time", columns[time].name)))?;
+                unit_s = Some((time, factor));
+                Operand::Seconds(*limit_s)
             }
         };
-        let is_same_unit = columns[column].unit == *unit;
-        let unit = match self.operator {
-            Operator::Minus => columns[column].unit.clone().filter(|_| is_same_unit),
-            Operator::Over if is_same_unit => None,
-            Operator::Over => {
-                let units = columns[column].unit.as_ref().zip(unit.as_ref());
-                units.map(|(one, other)| format!("{one}/{other}"))
-            }
+        let units = [column, other].map(|place| columns[place].unit.as_deref());
+        let unit = match (self.expression.operator, units) {
+            (Operator::Over, [one, other]) if one == other => None,
+            (Operator::Over, [one, other]) => one.zip(other).map(|(one, other)| format!("{one}/{other}")),
+            (_, [one, other]) => one.filter(|_| one == other).map(str::to_owned),
         };
-        Ok(Some(LocatedDerived {
+        let expression = Expression {
+            column,
+            operator: self.expression.operator,
+            operand,
+        };
+        let new = Column {
             name,
             unit,
-            column,
-            operator: self.operator,
-            reference,
-        }))
+            ..Column::default()
+        };
+        let located = Located {
+            expression,
+            time: unit_s,
+        };
+        Ok(Some((located, new)))
     }
 
     /// Adds the column to a table, unless the table has its name already or does not have its first column; `own` and `time`
@@ -125,250 +107,189 @@ impl Derived {
         own: impl Fn(&str) -> Option<String>,
         time: Option<TimeColumn<'_>>,
     ) -> Result<(), ImportError> {
-        let Some(located) = self.located(&table.columns, own, time)? else {
+        let Some((mut located, new)) = self.located(&table.columns, own, time)? else {
             return Ok(());
         };
         for place in located.columns() {
             let column = &table.columns[place];
             match &column.cells {
                 Cells::Numbers(_) if column.faults.count > 0 => {
-                    return Err(self.refused(format!("'{}' has text", column.name)));
+                    return Err(self.refused(&format!("'{}' has text", column.name)));
                 }
                 Cells::Numbers(_) => {}
-                Cells::Labels { .. } => return Err(self.refused(format!("'{}' is the group", column.name))),
+                Cells::Labels { .. } => return Err(self.refused(&format!("'{}' is the group", column.name))),
             }
         }
         let cell = |row: usize, column: usize| table.columns[column].cells.number(row);
-        let mean = located.mean_at_start(table.rows, cell);
-        if mean.is_some_and(f64::is_nan) {
-            return Err(self.refused(NOTHING_AT_START.to_owned()));
+        if !located.take_start(table.rows, cell) {
+            return Err(self.refused(NOTHING_AT_START));
         }
-        let of_row = |row| located.value(|column| cell(row, column), mean);
+        let of_row = |row| located.value(|column| cell(row, column));
         let derived = Vec::from_iter((0..table.rows).map(of_row));
         table.columns.push(Column {
             missing: derived.iter().filter(|value| value.is_nan()).count(),
             cells: Cells::Numbers(derived),
-            faults: Faults::default(),
-            ..located.column_of()
+            ..new
         });
         Ok(())
     }
 
-    pub(super) fn refused(&self, reason: String) -> ImportError {
+    fn refused(&self, reason: &str) -> ImportError {
         ImportError::Derived {
             text: in_one_line(&self.to_string()),
-            reason: in_one_line(&reason),
+            reason: in_one_line(reason),
         }
     }
 }
 
-/// Reason why there is no mean at the start.
-pub(super) const NOTHING_AT_START: &str = "no cell at the start is a number";
-
-/// Time column of a file.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct TimeColumn<'a> {
-    /// Name within the file.
-    pub(super) name: &'a str,
-    /// Unit given by the recipe instead of the header.
-    pub(super) given_unit: Option<&'a str>,
-}
-
-/// Derived column with the places of its columns in a table or in the lines of a stream.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct LocatedDerived {
-    name: String,
-    unit: Option<String>,
-    column: usize,
-    operator: Operator,
-    reference: LocatedReference,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum LocatedReference {
-    Column(usize),
-    Rows(usize),
-    Seconds { time: usize, unit_s: f64, limit_s: f64 },
-}
-
-impl LocatedDerived {
-    /// Name and unit of the new column, without cells.
-    pub(super) fn column_of(&self) -> Column {
-        Column {
-            name: self.name.clone(),
-            unit: self.unit.clone(),
-            ..Column::default()
-        }
-    }
-
+impl Located {
     /// Places of the columns from which it is computed.
-    pub(super) fn columns(&self) -> impl Iterator<Item = usize> + use<> {
-        let other = match self.reference {
-            LocatedReference::Column(other) => Some(other),
-            LocatedReference::Seconds { time, .. } => Some(time),
-            LocatedReference::Rows(_) => None,
+    fn columns(&self) -> impl Iterator<Item = usize> + use<> {
+        let other = match self.expression.operand {
+            Operand::Column(other) => Some(other),
+            Operand::Seconds(_) => self.time.map(|(time, _)| time),
+            Operand::Rows(_) | Operand::Number(_) => None,
         };
-        std::iter::once(self.column).chain(other)
+        std::iter::once(self.expression.column).chain(other)
     }
 
     /// Returns `true` if `rows` rows are the whole start, or all of it and more; `cell` returns a cell by row and column.
-    pub(super) fn has_start(&self, rows: usize, cell: impl Fn(usize, usize) -> f64) -> bool {
-        match self.reference {
-            LocatedReference::Column(_) => true,
-            LocatedReference::Rows(needed) => rows >= needed,
-            LocatedReference::Seconds { time, unit_s, limit_s } => {
+    fn has_start(&self, rows: usize, cell: impl Fn(usize, usize) -> f64) -> bool {
+        match (&self.expression.operand, self.time) {
+            (Operand::Rows(needed), _) => rows >= *needed,
+            (Operand::Seconds(limit_s), Some((time, unit_s))) => {
                 let elapsed = |row| unit_s * (cell(row, time) - cell(0, time));
-                rows > 0 && elapsed(rows - 1) > limit_s
+                rows > 0 && elapsed(rows - 1) > *limit_s
             }
+            _ => true,
         }
     }
 
-    /// Mean of its first column at the start of `rows` rows, NaN if no cell there is a number; `None` if it needs none. `cell`
-    /// returns a cell by row and column.
-    pub(super) fn mean_at_start(&self, rows: usize, cell: impl Fn(usize, usize) -> f64) -> Option<f64> {
-        let mean = |start: &mut dyn Iterator<Item = usize>| {
-            let present = start.map(|row| cell(row, self.column)).filter(|value| !value.is_nan());
-            let (sum, count) = present.fold((0.0, 0_u32), |(sum, count), value| (sum + value, count + 1));
-            sum / f64::from(count)
+    /// Replaces a mean at the start of `rows` rows by its value; returns `false` if no cell there is a number. `cell` returns a
+    /// cell by row and column.
+    fn take_start(&mut self, rows: usize, cell: impl Fn(usize, usize) -> f64) -> bool {
+        let Self { expression, time } = &*self;
+        let first = time.map_or(f64::NAN, |(time, _)| {
+            (0..rows).map(|row| cell(row, time)).fold(f64::INFINITY, f64::min)
+        });
+        let is_at_start = |row: &usize| match (&expression.operand, *time) {
+            (Operand::Rows(limit), _) => row < limit,
+            (Operand::Seconds(limit_s), Some((time, unit_s))) => unit_s * (cell(*row, time) - first) <= *limit_s,
+            _ => false,
         };
-        match self.reference {
-            LocatedReference::Column(_) => None,
-            LocatedReference::Rows(limit) => Some(mean(&mut (0..rows.min(limit)))),
-            LocatedReference::Seconds { time, unit_s, limit_s } => {
-                let first = (0..rows).map(|row| cell(row, time)).fold(f64::INFINITY, f64::min);
-                let is_at_start = |row: &usize| unit_s * (cell(*row, time) - first) <= limit_s;
-                Some(mean(&mut (0..rows).filter(is_at_start)))
-            }
+        if matches!(expression.operand, Operand::Column(_) | Operand::Number(_)) {
+            return true;
         }
+        let start = (0..rows).filter(is_at_start);
+        let present = start
+            .map(|row| cell(row, expression.column))
+            .filter(|value| !value.is_nan());
+        let (sum, count) = present.fold((0.0, 0_u32), |(sum, count), value| (sum + value, count + 1));
+        self.expression.operand = Operand::Number(sum / f64::from(count));
+        count > 0
     }
 
-    /// Value in a row; NaN if there is none, such as for a quotient by zero. `cell` returns a cell of the row by column, and
-    /// `mean` is the mean at the start.
-    pub(super) fn value(&self, cell: impl Fn(usize) -> f64, mean: Option<f64>) -> f64 {
-        let reference = match self.reference {
-            LocatedReference::Column(other) => cell(other),
-            LocatedReference::Rows(_) | LocatedReference::Seconds { .. } => mean.unwrap_or(f64::NAN),
+    /// Value in a row; NaN if there is none, such as for a quotient by zero. `cell` returns a cell of the row by column.
+    fn value(&self, cell: impl Fn(usize) -> f64) -> f64 {
+        let operand = match self.expression.operand {
+            Operand::Column(other) => cell(other),
+            Operand::Number(number) => number,
+            Operand::Rows(_) | Operand::Seconds(_) => f64::NAN,
         };
-        let value = match self.operator {
-            Operator::Minus => cell(self.column) - reference,
-            Operator::Over => cell(self.column) / reference,
-        };
+        let value = self.expression.value(cell(self.expression.column), operand);
         if value.is_finite() { value } else { f64::NAN }
     }
 }
 
-impl FromStr for Derived {
-    type Err = ImportError;
+/// Derived columns of a stream. Means at the start are known only after the start, whose lines are kept until then.
+#[derive(Clone, Debug)]
+pub(super) struct DerivedStream {
+    /// The columns in the order in which they are computed: a later one may be computed from an earlier one.
+    columns: Vec<(Derived, Located)>,
+    /// Cells of the lines of the start; `None` after it.
+    start: Option<Vec<Vec<f64>>>,
+}
 
-    fn from_str(text: &str) -> Result<Self, ImportError> {
-        let refuse = |reason: &str| ImportError::Derived {
-            text: in_one_line(text),
-            reason: reason.to_owned(),
-        };
-        // Names of columns contain no other white space, and signs are found between spaces.
-        let spaced = text.replace(|c: char| c.is_whitespace() || is_unprintable(c), " ");
-        let (name, expression) = spaced.split_once('=').ok_or_else(|| refuse("it has no name"))?;
-        let apart = [(" - ", Operator::Minus), (" / ", Operator::Over)];
-        let close = [("-", Operator::Minus), ("/", Operator::Over)];
-        let at = |operators: [(&str, Operator); 2]| {
-            let found = operators.into_iter().filter_map(|(sign, operator)| {
-                let place = expression.find(sign)?;
-                Some((place, sign.len(), operator))
-            });
-            found.min_by_key(|(place, ..)| *place)
-        };
-        let (place, length, operator) = at(apart)
-            .or_else(|| at(close))
-            .ok_or_else(|| refuse("it has neither - nor /"))?;
-        let (column, reference) = (expression[..place].trim(), expression[place + length..].trim());
-        let reference = match reference.strip_prefix("start(").and_then(|rest| rest.strip_suffix(')')) {
-            None => Reference::Column(reference.to_owned()),
-            Some(span) => match span.trim().strip_suffix('s') {
-                Some(seconds) => {
-                    let seconds = seconds
-                        .trim()
-                        .parse()
-                        .ok()
-                        .filter(|seconds: &f64| seconds.is_finite() && *seconds > 0.0);
-                    Reference::Seconds(seconds.ok_or_else(|| refuse("start(…s) needs a number of seconds above 0"))?)
-                }
-                None => {
-                    let rows = span.trim().parse().ok().filter(|rows| *rows > 0);
-                    Reference::Rows(
-                        rows.ok_or_else(|| refuse("start(…) needs a number of rows, or seconds such as 2s"))?,
-                    )
-                }
-            },
-        };
-        let is_empty = |name: &str| name.trim().is_empty();
-        if is_empty(name) || is_empty(column) || matches!(&reference, Reference::Column(other) if other.is_empty()) {
-            return Err(refuse("a name is missing"));
+/// What a line is.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Progress {
+    /// Part of the start: its derived columns are not known yet.
+    Start {
+        /// `true` for the first line.
+        is_first: bool,
+    },
+    /// Complete. The lines of the start, with their derived columns, come with the first such line.
+    Complete(Vec<Vec<f64>>),
+}
+
+impl DerivedStream {
+    /// Finds the columns from which `derive` are computed, and adds the new ones to `columns`.
+    ///
+    /// # Errors
+    /// If a column is missing, or the times have no unit of time.
+    pub(super) fn new(
+        derive: &[Derived],
+        columns: &mut Vec<Column>,
+        time: Option<TimeColumn<'_>>,
+    ) -> Result<Self, ImportError> {
+        let mut located = Vec::new();
+        for derived in derive {
+            let found = derived.located(columns, |name| Some(name.trim().to_owned()), time)?;
+            if let Some((found, new)) = found {
+                columns.push(new);
+                located.push((derived.clone(), found));
+            }
         }
         Ok(Self {
-            name: name.trim().to_owned(),
-            column: column.to_owned(),
-            operator,
-            reference,
+            columns: located,
+            start: Some(Vec::new()),
         })
     }
-}
 
-impl TryFrom<String> for Derived {
-    type Error = ImportError;
-
-    fn try_from(text: String) -> Result<Self, ImportError> {
-        text.parse()
+    /// Columns of the stream from which the new ones are computed; `width` is the number of its columns.
+    pub(super) fn needed(&self, width: usize) -> impl Iterator<Item = usize> {
+        let columns = self.columns.iter().flat_map(|(_, column)| column.columns());
+        columns.filter(move |&column| column < width)
     }
-}
 
-impl From<Derived> for String {
-    fn from(derived: Derived) -> Self {
-        derived.to_string()
+    /// Name of a new column, by its place behind those of the stream.
+    pub(super) fn name(&self, place: usize) -> &str {
+        self.columns.get(place).map_or("", |(derived, _)| &derived.name)
     }
-}
 
-impl fmt::Display for Derived {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let sign = match self.operator {
-            Operator::Minus => "-",
-            Operator::Over => "/",
+    /// Adds the derived columns to the cells of the next line.
+    ///
+    /// # Errors
+    /// If no cell at the start is a number, or the start is too long.
+    pub(super) fn take(&mut self, cells: &mut Vec<f64>) -> Result<Progress, ImportError> {
+        let Some(mut lines) = self.start.take() else {
+            for (_, column) in &self.columns {
+                cells.push(column.value(|place| cells[place]));
+            }
+            return Ok(Progress::Complete(Vec::new()));
         };
-        write!(f, "{}={} {sign} ", self.name, self.column)?;
-        match &self.reference {
-            Reference::Column(other) => f.write_str(other),
-            Reference::Rows(rows) => write!(f, "start({rows})"),
-            Reference::Seconds(seconds) => write!(f, "start({seconds}s)"),
+        lines.push(cells.clone());
+        // Times of derived columns do not exist: a span is over by the cells of the stream.
+        let cell = |row: usize, place: usize| lines[row].get(place).copied().unwrap_or(f64::NAN);
+        let mut columns = self.columns.iter();
+        if let Some((derived, _)) = columns.find(|(_, column)| !column.has_start(lines.len(), cell)) {
+            if lines.len().saturating_mul(cells.len()) > MAX_CELLS {
+                return Err(derived.refused(TOO_LONG));
+            }
+            let is_first = lines.len() == 1;
+            self.start = Some(lines);
+            return Ok(Progress::Start { is_first });
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn derived_columns_are_read_and_written() {
-        for (text, written) in [
-            ("d=c1-c2", "d=c1 - c2"),
-            (" r = c1 / start( 2.5s ) ", "r=c1 / start(2.5s)"),
-            ("p=flow-rate - start(100)", "p=flow-rate - start(100)"),
-            ("q=states.c2/states.c3", "q=states.c2 / states.c3"),
-            ("r = c1\r -\t - c2", "r=c1 - - c2"),
-        ] {
-            let derived: Derived = text.parse().unwrap();
-            assert_eq!(derived.to_string(), written);
-            assert_eq!(written.parse::<Derived>().unwrap(), derived);
+        for (derived, column) in &mut self.columns {
+            if !column.take_start(lines.len(), |row, place| lines[row][place]) {
+                return Err(derived.refused(NOTHING_AT_START));
+            }
+            for line in &mut lines {
+                let value = column.value(|place| line[place]);
+                line.push(value);
+            }
         }
-        for (text, reason) in [
-            ("c1-c2", "it has no name"),
-            ("d=c1", "neither - nor /"),
-            ("d=c1-", "a name is missing"),
-            ("=c1-c2", "a name is missing"),
-            ("d=c1-start(0)", "a number of rows"),
-            ("d=c1-start(-2s)", "a number of seconds above 0"),
-        ] {
-            let error = text.parse::<Derived>().unwrap_err().to_string();
-            assert!(error.contains(reason), "{text}: {error}");
-        }
+        *cells = lines.pop().unwrap_or_default();
+        Ok(Progress::Complete(lines))
     }
 }

@@ -1,8 +1,10 @@
+use decoupler_core::text::Named;
+
 use super::{
     Decimal, Dialect, DialectChoice, Encoding, Separator, TableError,
     dialect::utf8_of_utf16,
     format::{Cell, parse},
-    rows::Rows,
+    rows::{Rows, commonest},
     time_stamp::TimeStamp,
 };
 
@@ -95,11 +97,7 @@ struct Score {
 
 impl Score {
     fn of(rows: &[Vec<Cell>]) -> Self {
-        let mut widths: Vec<usize> = rows.iter().map(Vec::len).collect();
-        widths.sort_unstable();
-        let runs = widths.chunk_by(|a, b| a == b);
-        let commonest = runs.max_by_key(|run| run.len());
-        let (width, count) = commonest.map_or((0, 0), |run| (run[0], run.len()));
+        let (width, count) = commonest(rows.iter().map(Vec::len));
         let body = rows
             .iter()
             .skip(usize::from(rows.len() > 1))
@@ -210,9 +208,7 @@ fn sep_line(text: &[u8], line_break: u8) -> Option<Separator> {
     if !name.eq_ignore_ascii_case(b"sep=") {
         return None;
     }
-    Separator::ALL
-        .into_iter()
-        .find(|separator| character == [separator.byte()])
+    Separator::of_character(character)
 }
 
 fn rest_after(text: &[u8], line_break: u8, lines: usize) -> &[u8] {

@@ -1,10 +1,9 @@
 use std::{fmt, io::Read, str::FromStr};
 
-use decoupler_core::text::counted;
+use decoupler_core::text::{Named, UnknownName, counted};
 use encoding_rs::{UTF_16BE, UTF_16LE};
 use encoding_rs_io::DecodeReaderBytesBuilder;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 /// Character between the cells of a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -95,19 +94,23 @@ pub struct DialectChoice {
     pub skip_lines: Option<usize>,
 }
 
-/// Error for a text that is not a valid choice.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("'{text}' is not a {what}: give {choices}")]
-pub struct DialectError {
-    text: String,
-    what: &'static str,
-    choices: &'static str,
+impl Named for Separator {
+    const WHAT: &'static str = "a separator";
+    /// In the order in which they are tried.
+    const ALL: &'static [Self] = &[Self::Comma, Self::Semicolon, Self::Tab, Self::Bar, Self::Space];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Comma => "comma",
+            Self::Semicolon => "semicolon",
+            Self::Tab => "tab",
+            Self::Bar => "bar",
+            Self::Space => "space",
+        }
+    }
 }
 
 impl Separator {
-    /// All separators, in the order in which they are tried.
-    pub const ALL: [Self; 5] = [Self::Comma, Self::Semicolon, Self::Tab, Self::Bar, Self::Space];
-
     /// The character.
     pub(super) fn byte(self) -> u8 {
         match self {
@@ -118,87 +121,90 @@ impl Separator {
             Self::Space => b' ',
         }
     }
+
+    /// Returns the separator with this character.
+    pub(super) fn of_character(character: &[u8]) -> Option<Self> {
+        Self::ALL
+            .iter()
+            .copied()
+            .find(|separator| character == [separator.byte()])
+    }
 }
 
 impl fmt::Display for Separator {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Comma => "comma",
-            Self::Semicolon => "semicolon",
-            Self::Tab => "tab",
-            Self::Bar => "bar",
-            Self::Space => "space",
-        })
+        f.pad(self.name())
     }
 }
 
 impl FromStr for Separator {
-    type Err = DialectError;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, DialectError> {
-        let found = Self::ALL.into_iter().find(|separator| {
-            let character = char::from(separator.byte()).to_string();
-            text == character
-                || text.eq_ignore_ascii_case(&separator.to_string())
-                || (text == "\\t" && *separator == Self::Tab)
-        });
-        found.ok_or_else(|| DialectError {
-            text: text.to_owned(),
-            what: "separator",
-            choices: "comma, semicolon, tab, bar or space, or the character",
-        })
+    /// Returns the separator of this name, or with this character.
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        match Self::of_character(text.replace("\\t", "\t").as_bytes()) {
+            Some(separator) => Ok(separator),
+            None => Self::parse(&text.to_lowercase()),
+        }
+    }
+}
+
+impl Named for Decimal {
+    const WHAT: &'static str = "a decimal separator";
+    const ALL: &'static [Self] = &[Self::Point, Self::Comma];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Point => "point",
+            Self::Comma => "comma",
+        }
     }
 }
 
 impl fmt::Display for Decimal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Point => "point",
-            Self::Comma => "comma",
-        })
+        f.pad(self.name())
     }
 }
 
 impl FromStr for Decimal {
-    type Err = DialectError;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, DialectError> {
+    /// Returns the separator of this name, or with this character.
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
         match text {
-            "point" | "." => Ok(Self::Point),
-            "comma" | "," => Ok(Self::Comma),
-            _ => Err(DialectError {
-                text: text.to_owned(),
-                what: "decimal separator",
-                choices: "point or comma",
-            }),
+            "." => Ok(Self::Point),
+            "," => Ok(Self::Comma),
+            _ => Self::parse(text),
+        }
+    }
+}
+
+impl Named for Encoding {
+    const WHAT: &'static str = "an encoding";
+    const ALL: &'static [Self] = &[Self::Utf8, Self::Latin1, Self::Utf16Le, Self::Utf16Be];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Utf8 => "utf-8",
+            Self::Latin1 => "latin-1",
+            Self::Utf16Le => "utf-16le",
+            Self::Utf16Be => "utf-16be",
         }
     }
 }
 
 impl fmt::Display for Encoding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Utf8 => "utf-8",
-            Self::Latin1 => "latin-1",
-            Self::Utf16Le => "utf-16le",
-            Self::Utf16Be => "utf-16be",
-        })
+        f.pad(self.name())
     }
 }
 
 impl FromStr for Encoding {
-    type Err = DialectError;
+    type Err = UnknownName;
 
-    fn from_str(text: &str) -> Result<Self, DialectError> {
-        let all = [Self::Utf8, Self::Latin1, Self::Utf16Le, Self::Utf16Be];
-        let found = all
-            .into_iter()
-            .find(|encoding| text.eq_ignore_ascii_case(&encoding.to_string()));
-        found.ok_or_else(|| DialectError {
-            text: text.to_owned(),
-            what: "encoding",
-            choices: "utf-8, latin-1, utf-16le or utf-16be",
-        })
+    fn from_str(text: &str) -> Result<Self, UnknownName> {
+        Self::parse(&text.to_lowercase())
     }
 }
 

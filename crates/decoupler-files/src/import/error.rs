@@ -82,14 +82,6 @@ pub enum ImportError {
         /// What is wrong with it and with further cells of this column, as a phrase.
         reason: String,
     },
-    /// The columns of a file are not the inputs of a network.
-    #[error("'{}': {source}", .path.display())]
-    Inputs {
-        /// The file.
-        path: PathBuf,
-        /// Error in its columns.
-        source: InputError,
-    },
     /// A reading that a network needs is missing.
     #[error("'{}': line {line}: {name} is missing; a network needs all of its inputs, so leave the line out", .path.display())]
     MissingInput {
@@ -164,14 +156,6 @@ pub enum ImportError {
         name: String,
         /// First invalid value.
         value: f64,
-    },
-    /// A file of positions cannot be used.
-    #[error("'{}': {source}", .path.display())]
-    Positions {
-        /// The file.
-        path: PathBuf,
-        /// Error in its contents.
-        source: PositionsError,
     },
     /// The unit of the times is not a unit of time.
     #[error(
@@ -289,6 +273,12 @@ pub enum TableError {
     /// Reading it needs too much memory.
     #[error(transparent)]
     OverBudget(#[from] OverBudget),
+    /// The columns are not the inputs of a network.
+    #[error(transparent)]
+    Inputs(#[from] InputError),
+    /// It is no table of positions of the targets.
+    #[error(transparent)]
+    Positions(#[from] PositionsError),
     /// The contents do not match a checksum or a length stated in the file.
     #[error("{what} is damaged: {reason}")]
     Damaged {
@@ -308,6 +298,16 @@ pub enum TableError {
 }
 
 impl TableError {
+    /// Returns the error with the file in which it is.
+    pub(super) fn in_file(self, path: &Path) -> ImportError {
+        let path = path.to_owned();
+        match self {
+            Self::Io(source) => ImportError::Read { path, source },
+            Self::Cancelled => ImportError::Cancelled,
+            source => ImportError::File { path, source },
+        }
+    }
+
     pub(super) fn damaged(what: impl Into<String>, reason: impl Into<String>) -> Self {
         Self::Damaged {
             what: in_one_line(&what.into()),

@@ -1,14 +1,12 @@
-//! File formats of recordings. To add one, add a variant of [`Format`] here and a module that reads its arrays.
+//! File formats of recordings. To add one, add a variant of [`Format`] and of [`Contents`] here, and a module that reads its
+//! arrays.
 
 use std::{
-    fmt,
-    fs::File,
-    io::{self, BufReader},
+    fmt, io,
     path::{Path, PathBuf},
 };
 
-use super::{Decimal, Dialect, TableError, Watch, matlab, numpy, progress::Watched};
-use crate::machine::ReadingBudget;
+use super::{Decimal, Dialect, TableError};
 
 /// File format.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,16 +32,21 @@ pub enum Format {
 pub(super) enum Contents {
     /// Text.
     Text,
-    /// Arrays, with the function that reads them.
-    Arrays(Format, ReadArrays),
+    /// A NumPy array.
+    Npy,
+    /// Arrays of MATLAB.
+    Matlab,
     /// A zip archive: arrays, or sheets.
     Zip,
-    /// A file of Excel up to 2003.
-    OldExcel,
 }
 
 /// Beginnings of files that are not read, with what they are and what to do.
-const REFUSED: [(&[u8], &str, &str); 20] = [
+const REFUSED: [(&[u8], &str, &str); 21] = [
+    (
+        b"\xd0\xcf\x11\xe0",
+        "a file of Excel up to 2003",
+        "save it as .xlsx or CSV",
+    ),
     (
         b"\x89HDF\r\n\x1a\n",
         "an HDF5 file",
@@ -81,16 +84,12 @@ const PICKLE: &str = "load it in Python and save the arrays with numpy.savez";
 const UNPACK: &str = "unpack it";
 const TABLE: &str = "give a table of numbers";
 
-/// Reads the arrays of a file of this size within a budget; returns them and the names of the items that are not arrays of
-/// numbers.
-type ReadArrays = fn(File, Option<u64>, &mut ReadingBudget, Watch<'_>) -> Result<(Vec<Array>, Vec<String>), TableError>;
-
 impl Format {
     /// Names of all formats, for messages and help.
     pub const NAMES: &str = "CSV, Excel, .npy, .npz or .mat";
 
     /// Usual file extensions, those of text files first.
-    pub const EXTENSIONS: [&str; 10] = ["csv", "txt", "tsv", "dat", "npy", "npz", "mat", "xlsx", "xls", "ods"];
+    pub const EXTENSIONS: [&str; 9] = ["csv", "txt", "tsv", "dat", "npy", "npz", "mat", "xlsx", "ods"];
 
     /// Returns the files in `folder` with one of the usual extensions, sorted by name.
     ///
@@ -118,29 +117,14 @@ impl Contents {
     /// # Errors
     /// If it is a known kind of file that is not read.
     pub(super) fn of(path: &Path, beginning: &[u8]) -> Result<Self, TableError> {
-        let has_extension = |extension: &str| {
-            path.extension()
-                .is_some_and(|found| found.eq_ignore_ascii_case(extension))
-        };
+        let is_named = path.extension().is_some_and(|found| found.eq_ignore_ascii_case("mat"));
         if let Some((_, what, cure)) = REFUSED.iter().find(|(start, ..)| beginning.starts_with(start)) {
             return Err(TableError::OtherKind { what, cure });
         }
         Ok(match beginning {
-            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Self::Arrays(Format::Npy, |file, size, budget, watch| {
-                let array = numpy::read("", BufReader::new(Watched::new(file, size, watch)), budget);
-                let array = array.map_err(|error| match error {
-                    TableError::Array { reason, .. } => TableError::array("NumPy array", reason),
-                    error => error,
-                })?;
-                Ok((vec![array], Vec::new()))
-            }),
+            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Self::Npy,
             [b'P', b'K', 3 | 5, ..] => Self::Zip,
-            [0xd0, 0xcf, 0x11, 0xe0, ..] => Self::OldExcel,
-            _ if has_extension("mat") || beginning.starts_with(b"MATLAB") => {
-                Self::Arrays(Format::Matlab, |file, size, budget, watch| {
-                    matlab::read(BufReader::new(Watched::new(file, size, watch)), budget)
-                })
-            }
+            _ if is_named || beginning.starts_with(b"MATLAB") => Self::Matlab,
             _ => Self::Text,
         })
     }

@@ -1,7 +1,7 @@
 use std::{
     borrow::Cow,
     fs::File,
-    io::{BufReader, Read, Seek},
+    io::{self, BufReader, Read, Seek},
     path::{Path, PathBuf},
 };
 
@@ -13,14 +13,14 @@ use decoupler_core::{
 use serde::Serialize;
 
 use super::{
-    Cells, Cure, Derived, DialectChoice, Excess, FileSet, Format, ImportError, Joined, Missing, Recipe, Table,
-    TableError, Watch, arrays,
+    Cells, Cure, Derived, DialectChoice, FileSet, Format, ImportError, Joined, Missing, Recipe, Table, TableError,
+    Watch, arrays,
     csv_table::{self, Reading},
     derived::TimeColumn,
     format::Contents,
     inputs::{ColumnId, Names},
     join::{Partners, Source, gather, median_interval, nearest},
-    numpy,
+    matlab, numpy,
     part::Part,
     positions::read_positions,
     progress::Watched,
@@ -77,8 +77,8 @@ impl Recipe {
         for (number, (joined, stem)) in self.join.iter().zip(&stems).enumerate() {
             files.push(self.read(folder, number + 1, &joined.file, Some(stem), watch)?);
         }
-        let tables: Vec<&Table> = files.iter().map(|(_, table)| table).collect();
-        let names = Names::of(&tables, &stems);
+        let columns = Vec::from_iter(files.iter().map(|(_, table)| table.columns.as_slice()));
+        let names = Names::of(&columns, &stems);
         let meanings = Meanings::of(self, &names)?;
         let mut warnings = notes(&files);
         let used = |id: &ColumnId| meanings.inputs.contains(id) || meanings.targets.contains(id);
@@ -329,26 +329,11 @@ impl Recipe {
 
 /// Returns the notes on each file.
 fn notes(files: &[(PathBuf, Table)]) -> Vec<String> {
-    let mut notes = Vec::new();
-    for (path, table) in files {
-        let file = path.display();
-        notes.extend(table.notes.iter().map(|note| format!("'{file}': {note}")));
-        for (excess, what) in [
-            (
-                table.too_short,
-                "with fewer cells than there are columns, which are missing",
-            ),
-            (table.too_long, "with more cells than there are columns, left out"),
-        ] {
-            if let Some(line) = excess.first_line {
-                notes.push(format!(
-                    "'{file}': {} {what}, the first on line {line}",
-                    counted(excess.rows, "row")
-                ));
-            }
-        }
-    }
-    notes
+    let of_file = |(path, table): &(PathBuf, Table)| {
+        let file = path.display().to_string();
+        Vec::from_iter(table.notes.iter().map(|note| format!("'{file}': {note}")))
+    };
+    files.iter().flat_map(of_file).collect()
 }
 
 /// Reads the table in the file at `path`; a file that does not start like a known array format is read as text.
@@ -364,33 +349,16 @@ pub fn read_table(path: &Path, choice: DialectChoice, watch: Watch<'_>) -> Resul
 }
 
 pub(super) fn read(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Result<Table, ImportError> {
-    let refused = |source| ImportError::Read {
-        path: path.to_owned(),
-        source,
-    };
-    let file = File::open(path).map_err(refused)?;
-    let metadata = file.metadata().map_err(refused)?;
-    if metadata.is_dir() {
-        return Err(refused(std::io::ErrorKind::IsADirectory.into()));
-    }
-    let size = metadata.is_file().then_some(metadata.len());
-    read_file(path, file, size, reading, watch).map_err(|source| match source {
-        TableError::Io(source) => refused(source),
-        TableError::Cancelled => ImportError::Cancelled,
-        source => ImportError::File {
-            path: path.to_owned(),
-            source,
-        },
-    })
+    read_file(path, reading, watch).map_err(|error| error.in_file(path))
 }
 
-fn read_file(
-    path: &Path,
-    mut file: File,
-    size: Option<u64>,
-    reading: &Reading<'_>,
-    watch: Watch<'_>,
-) -> Result<Table, TableError> {
+fn read_file(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Result<Table, TableError> {
+    let mut file = File::open(path)?;
+    let metadata = file.metadata()?;
+    if metadata.is_dir() {
+        return Err(io::Error::from(io::ErrorKind::IsADirectory).into());
+    }
+    let size = metadata.is_file().then_some(metadata.len());
     let mut start = Vec::new();
     let budget = &mut ReadingBudget::now();
     if size.is_none() {
@@ -401,7 +369,6 @@ fn read_file(
     file.rewind()?;
     let (found, left_out, format) = match Contents::of(path, &start)? {
         Contents::Text => return csv_table::read(path, Watched::new(file, size, watch), reading, budget),
-        Contents::OldExcel => return Spreadsheet::Xls.read(path, file, reading, budget, watch),
         Contents::Zip => {
             let kind = Spreadsheet::of_zip(&file)?;
             file.rewind()?;
@@ -411,9 +378,13 @@ fn read_file(
             let (found, left_out) = numpy::read_archive(BufReader::new(file), budget, watch)?;
             (found, left_out, Format::Npz)
         }
-        Contents::Arrays(format, read_arrays) => {
-            let (found, left_out) = read_arrays(file, size, budget, watch)?;
-            (found, left_out, format)
+        Contents::Npy => {
+            let array = numpy::read("", BufReader::new(Watched::new(file, size, watch)), budget)?;
+            (vec![array], Vec::new(), Format::Npy)
+        }
+        Contents::Matlab => {
+            let (found, left_out) = matlab::read(BufReader::new(Watched::new(file, size, watch)), budget)?;
+            (found, left_out, Format::Matlab)
         }
     };
     arrays::table(path, found, format, left_out, reading)
@@ -476,8 +447,8 @@ pub struct FileReport {
     pub rows: usize,
     /// Number of columns.
     pub columns: usize,
-    /// Rows that end before the last column.
-    pub too_short: Excess,
+    /// `true` if the file names its columns.
+    pub(super) has_names: bool,
     /// The join by time; `None` for the first file and for files joined row by row.
     pub join: Option<JoinReport>,
 }

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use decoupler_core::{
-    dataset::{History, RowOrder},
+    dataset::RowOrder,
     problem::{Channel, Problem},
     text::{clean_name, counted},
 };
@@ -9,8 +9,12 @@ use ndarray::Array2;
 use thiserror::Error;
 
 use super::{
-    Column, Derived, ImportError, Recipe, Table, TableError, Watch, csv_table::named, derived::TimeColumn,
-    derived_stream::DerivedStream, table::name_and_unit,
+    Column, Derived, ImportError, Recipe, TableError, Watch,
+    csv_table::named,
+    derived::{DerivedStream, TimeColumn},
+    selection::{Rows, order_note, seconds},
+    suggestion::Meanings,
+    table::name_and_unit,
 };
 
 /// Inputs of a network, read from a file.
@@ -44,43 +48,34 @@ pub struct KeptColumn {
 
 /// Columns of a table that contain the inputs of a network.
 #[derive(Clone, Debug, PartialEq)]
-pub struct InputColumns {
+pub(super) struct InputColumns {
     /// Column index of each input, in the order of the network.
-    pub inputs: Vec<usize>,
+    pub(super) inputs: Vec<usize>,
     /// Index of the row-wire column, if there is one.
-    pub row_wire: Option<usize>,
-    /// Time column, if there is one.
-    pub time: Option<InputTime>,
+    pub(super) row_wire: Option<usize>,
+    /// Index of the time column and the seconds in its unit, if there is one.
+    pub(super) time: Option<(usize, f64)>,
     /// Index of the group column, if a memory needs it and there is one.
-    pub group: Option<usize>,
+    pub(super) group: Option<usize>,
     /// Columns copied to the output, with their titles.
-    pub kept: Vec<(usize, String)>,
+    pub(super) kept: Vec<(usize, String)>,
     /// Number of columns of the table.
-    pub width: usize,
-}
-
-/// Time column of a table.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InputTime {
-    /// Index of the column.
-    pub column: usize,
-    /// Seconds in the unit of the column.
-    pub unit_s: f64,
+    pub(super) width: usize,
 }
 
 /// Names of the columns that contain no inputs of a network.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct OtherColumns {
+pub(super) struct OtherColumns {
     /// Column of row-wires.
-    pub row_wire: Option<String>,
+    pub(super) row_wire: Option<String>,
     /// Time column, which a memory and derived columns need.
-    pub time: Option<String>,
+    pub(super) time: Option<String>,
     /// Unit of the times, if the header does not give it.
-    pub time_unit: Option<String>,
+    pub(super) time_unit: Option<String>,
     /// Column of groups, which a memory needs.
-    pub group: Option<String>,
+    pub(super) group: Option<String>,
     /// Columns that say when or to what a sample belongs and are copied to the output.
-    pub kept: Vec<String>,
+    pub(super) kept: Vec<String>,
 }
 
 /// Reason why the columns of a table are not the inputs of a network.
@@ -105,11 +100,14 @@ pub enum InputError {
         /// Unit of the input.
         expected: String,
     },
+    /// Two columns have the name of an input.
+    #[error("there are two columns '{0}'; keep one")]
+    Twice(String),
     /// A derived column cannot be computed.
     #[error("{0}")]
     Derived(String),
     /// There is no header, and the number of columns is wrong.
-    #[error("{found} cells where {expected} are needed; give the inputs of the network in their order, or a header")]
+    #[error("{} where {expected} are needed, separated by commas; give the inputs of the network in their order, or a header", counted(*.found, "cell"))]
     Count {
         /// Number of columns.
         found: usize,
@@ -123,7 +121,7 @@ impl InputColumns {
     ///
     /// # Errors
     /// If an input has no column of its name, or a column with a different unit.
-    pub fn of_header(header: &[String], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
+    pub(super) fn of_header(header: &[String], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
         Self::find(&named(header, header.len()), inputs, others)
     }
 
@@ -156,7 +154,7 @@ impl InputColumns {
     ///
     /// # Errors
     /// If the number of columns is wrong.
-    pub fn unnamed(
+    pub(super) fn unnamed(
         width: usize,
         inputs: &[Channel],
         others: &OtherColumns,
@@ -172,19 +170,31 @@ impl InputColumns {
         if width != expected {
             return Err(InputError::Count { found: width, expected });
         }
-        Ok(Self {
-            inputs: (before..width).collect(),
-            row_wire: has_row_wire.then_some(0),
+        Ok(Self::in_order(inputs.len(), has_row_wire))
+    }
+
+    /// Returns the first `count` columns or, if the first has the row-wire, those after it.
+    pub(super) fn in_order(count: usize, begins_with_row_wire: bool) -> Self {
+        let before = usize::from(begins_with_row_wire);
+        Self {
+            inputs: (before..before + count).collect(),
+            row_wire: begins_with_row_wire.then_some(0),
             time: None,
             group: None,
             kept: Vec::new(),
-            width,
-        })
+            width: before + count,
+        }
+    }
+
+    /// Returns the first input that several cells of a header name.
+    pub(super) fn named_twice(header: &[String], inputs: &[Channel]) -> Option<String> {
+        let count = |input: &&Channel| header.iter().filter(|cell| name_and_unit(cell).0 == input.name).count();
+        Some(inputs.iter().find(|input| count(input) > 1)?.name.clone())
     }
 
     /// Returns `true` if the cells are a header: the names of all inputs, the names of some inputs among other texts, or only
     /// texts, as many as there are inputs. A single text is a header in the first line only: elsewhere it may be garbage.
-    pub fn is_header(cells: &[String], inputs: &[Channel], is_first_line: bool) -> bool {
+    pub(super) fn is_header(cells: &[String], inputs: &[Channel], is_first_line: bool) -> bool {
         let is_name = |cell: &String| inputs.iter().any(|input| input.name == name_and_unit(cell).0);
         let is_text = |cell: &&String| !cell.trim().is_empty() && cell.trim().parse::<f64>().is_err();
         let (names, texts) = (
@@ -197,7 +207,7 @@ impl InputColumns {
     }
 
     /// Returns `true` if the cells are a header with the names of all inputs.
-    pub fn has_all(cells: &[String], inputs: &[Channel]) -> bool {
+    pub(super) fn has_all(cells: &[String], inputs: &[Channel]) -> bool {
         Self::of_header(cells, inputs, &OtherColumns::default()).is_ok()
     }
 
@@ -209,12 +219,12 @@ impl InputColumns {
 
     /// Time of a line in seconds; `None` without a time.
     pub(super) fn time_s(&self, cells: &[f64]) -> Option<f64> {
-        let time_s = self.time.map(|time| time.unit_s * cells[time.column]);
+        let time_s = self.time.map(|(column, unit_s)| unit_s * cells[column]);
         time_s.filter(|time_s| time_s.is_finite())
     }
 
     fn find(columns: &[Column], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
-        let names = Names::of_columns(&[columns], &[]);
+        let names = Names::of(&[columns], &[]);
         let mut found = Vec::with_capacity(inputs.len());
         for Channel { name, unit, .. } in inputs {
             let column = match names.find(name) {
@@ -239,8 +249,8 @@ impl InputColumns {
         let other = |name: &Option<String>| Some(names.find(name.as_ref()?).ok()?.column);
         let time = other(&others.time).and_then(|column| {
             let unit = columns[column].unit.as_deref().or(others.time_unit.as_deref());
-            let unit_s = super::selection::seconds(unit)?;
-            Some(InputTime { column, unit_s })
+            let unit_s = seconds(unit)?;
+            Some((column, unit_s))
         });
         let kept = others
             .kept
@@ -276,12 +286,11 @@ impl Recipe {
         watch: Watch<'_>,
     ) -> Result<InputTable, ImportError> {
         let (inputs, others) = (&problem.inputs, &self.other_columns(problem));
-        let file = (path.to_owned(), self.read(Path::new(""), 0, path, None, watch)?.1);
-        let table = &file.1;
+        let files = [(path.to_owned(), self.read(Path::new(""), 0, path, None, watch)?.1)];
+        let table = &files[0].1;
         if let Some(line) = table.too_long.first_line {
-            return Err(self.uneven(path, line));
+            return Err(TableError::Uneven { line }.in_file(path));
         }
-        let names = Names::of(&[table], &[]);
         // Derived columns have names.
         let has_header = table.has_header() || !self.derive.is_empty();
         let found = if has_header {
@@ -289,28 +298,37 @@ impl Recipe {
         } else {
             InputColumns::unnamed(table.columns.len(), inputs, others, has_row_wire)
         };
-        let InputColumns {
-            inputs: columns,
-            row_wire,
-            time,
-            group,
-            kept,
-            ..
-        } = found.map_err(|source| ImportError::Inputs {
-            path: path.to_owned(),
-            source,
-        })?;
-        let files = [file];
+        let found = found.map_err(|error| TableError::Inputs(error).in_file(path))?;
+        let id = |column: usize| ColumnId { file: 0, column };
         // A memory cannot place a row without a time.
-        let time = time.filter(|_| problem.memory.is_some());
-        let time_column = time.map(|time| time.column);
-        for &column in columns.iter().chain(&row_wire).chain(&time_column) {
-            super::selection::not_a_number(&files, &names, ColumnId { file: 0, column })?;
-        }
-        let table = &files[0].1;
-        for &column in columns.iter().chain(&row_wire) {
-            let cells = &table.columns[column].cells;
-            if let Some(row) = (0..table.rows).find(|&row| cells.is_missing(row)) {
+        let time = found
+            .time
+            .filter(|_| problem.memory.is_some())
+            .map(|(column, _)| id(column));
+        let given_unit = time.zip(others.time_unit.clone());
+        let meanings = Meanings {
+            inputs: found.inputs.iter().copied().map(id).collect(),
+            time,
+            group: found.group.map(id),
+            row_wire: found.row_wire.map(id),
+            units: given_unit
+                .into_iter()
+                .filter(|(id, _)| table.columns[id.column].unit.is_none())
+                .collect(),
+            ..Meanings::default()
+        };
+        let names = Names::of(&[&table.columns], &[]);
+        let rows = Rows {
+            recipe: self,
+            files: &files,
+            names: &names,
+            meanings: &meanings,
+            joins: &[],
+        };
+        rows.check_numbers()?;
+        let cells = |column: usize| &table.columns[column].cells;
+        for &column in found.inputs.iter().chain(&found.row_wire) {
+            if let Some(row) = (0..table.rows).find(|&row| cells(column).is_missing(row)) {
                 return Err(ImportError::MissingInput {
                     path: path.to_owned(),
                     line: table.line(row),
@@ -318,61 +336,46 @@ impl Recipe {
                 });
             }
         }
-        let cells = |column: usize| &table.columns[column].cells;
-        let is_placed = |row: &usize| time.is_none_or(|time| !cells(time.column).is_missing(*row));
-        let rows = Vec::from_iter((0..table.rows).filter(is_placed));
+        let is_placed = |row: &usize| time.is_none_or(|id| !cells(id.column).is_missing(*row));
+        let (placed, without_time): (Vec<usize>, Vec<usize>) = (0..table.rows).partition(is_placed);
         let mut warnings = Vec::new();
-        if let Some(row) = (0..table.rows).find(|row| !is_placed(row)) {
+        if let Some(&row) = without_time.first() {
+            let verb = if without_time.len() == 1 { "is" } else { "are" };
             warnings.push(format!(
-                "{} without a time, which the history of readings needs, {} left out; the first is line {}",
-                counted(table.rows - rows.len(), "line"),
-                if table.rows - rows.len() == 1 { "is" } else { "are" },
+                "{} without a time, which the history of readings needs, {verb} left out; the first is line {}",
+                counted(without_time.len(), "line"),
                 table.line(row)
             ));
         }
-        let mut readings = Array2::from_shape_fn((rows.len(), columns.len()), |(row, input)| {
-            cells(columns[input]).number(rows[row])
+        let mut readings = Array2::from_shape_fn((placed.len(), inputs.len()), |(row, input)| {
+            cells(found.inputs[input]).number(placed[row])
         });
-        let row_wires: Option<Vec<usize>> = match row_wire {
-            None => None,
-            Some(column) => {
-                let name = &table.columns[column].name;
-                let of = |&row: &usize| super::selection::row_wire(name, cells(column).number(row));
-                Some(rows.iter().map(of).collect::<Result<_, _>>()?)
-            }
-        };
         let times_s = self.time.as_ref().and_then(|name| {
             let Column { cells, unit, .. } = &table.columns[names.find(name).ok()?.column];
-            let unit_s = super::selection::seconds(unit.as_deref().or_else(|| self.unit_of(name)))?;
-            Some(rows.iter().map(|&row| unit_s * cells.number(row)).collect())
+            let unit_s = seconds(unit.as_deref().or_else(|| self.unit_of(name)))?;
+            Some(placed.iter().map(|&row| unit_s * cells.number(row)).collect())
         });
         if let Some(memory) = &problem.memory {
-            let groups = group.map(|column| Vec::from_iter(rows.iter().map(|&row| cells(column).group(row))));
-            let times_s = time.map(|time| {
-                let times_s = rows.iter().map(|&row| time.unit_s * cells(time.column).number(row));
-                times_s.collect()
-            });
-            let samples = (0..rows.len()).collect();
-            let history = History::new(readings, groups.as_deref(), row_wires.as_deref(), times_s, samples);
+            let history = rows.past(&placed, &placed)?.with_readings(readings);
             if let order @ (RowOrder::Restarts { first_row, .. } | RowOrder::Shuffled { first_row, .. }) =
                 history.order()
             {
-                warnings.extend(super::selection::order_note(order, table.line(rows[first_row])));
+                warnings.extend(order_note(order, table.line(placed[first_row])));
             }
             let features = history.features(memory);
             readings = features
                 .map_err(|error| ImportError::from(error).of_file(path))?
                 .into_owned();
         }
-        let kept = kept.into_iter().map(|(column, title)| {
-            let cells = rows.iter().map(|&row| cells(column).text(row)).collect();
-            KeptColumn { title, cells }
+        let kept = found.kept.iter().map(|(column, title)| KeptColumn {
+            title: title.clone(),
+            cells: placed.iter().map(|&row| cells(*column).text(row)).collect(),
         });
         Ok(InputTable {
             readings,
-            row_wires,
+            row_wires: rows.row_wires(&placed)?,
             times_s,
-            lines: rows.iter().map(|&row| table.line(row)).collect(),
+            lines: placed.iter().map(|&row| table.line(row)).collect(),
             torn_line: table.torn_line,
             warnings,
             kept: kept.collect(),
@@ -381,7 +384,7 @@ impl Recipe {
 
     /// Names of the columns that contain no inputs of a network of `problem`; times are used only by a memory and by derived
     /// columns.
-    pub fn other_columns(&self, problem: &Problem) -> OtherColumns {
+    pub(super) fn other_columns(&self, problem: &Problem) -> OtherColumns {
         let needs_time = problem.memory.is_some() || self.derive.iter().any(Derived::needs_time);
         let time = self.time.clone().filter(|_| needs_time);
         let kept = [&self.time, &self.group, &self.row_wire].into_iter().flatten();
@@ -391,13 +394,6 @@ impl Recipe {
             group: self.group.clone().filter(|_| problem.memory.is_some()),
             time_unit: time.as_deref().and_then(|time| self.unit_of(time)).map(str::to_owned),
             time,
-        }
-    }
-
-    fn uneven(&self, path: &Path, line: u64) -> ImportError {
-        ImportError::File {
-            path: path.to_owned(),
-            source: TableError::Uneven { line },
         }
     }
 }
@@ -420,14 +416,8 @@ pub(super) struct Names {
 const FEW: usize = 24;
 
 impl Names {
-    /// Names the columns of the files; `stems` are the stems of the joined files.
-    pub(super) fn of(files: &[&Table], stems: &[String]) -> Self {
-        let columns: Vec<&[Column]> = files.iter().map(|table| table.columns.as_slice()).collect();
-        Self::of_columns(&columns, stems)
-    }
-
     /// Names the columns of each file; `stems` are the stems of the joined files.
-    pub(super) fn of_columns(files: &[&[Column]], stems: &[String]) -> Self {
+    pub(super) fn of(files: &[&[Column]], stems: &[String]) -> Self {
         let mut names = Vec::new();
         for (file, columns) in files.iter().enumerate() {
             for (index, column) in columns.iter().enumerate() {

@@ -3,7 +3,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler_core::text::counted;
 use serde::Serialize;
 
 use super::{
@@ -125,7 +124,7 @@ impl Inspection {
         let mut columns: Vec<ColumnSummary> = table.columns.iter().map(ColumnSummary::of).collect();
         name_duplicates(table, &mut columns);
         let chosen = match time {
-            Some(name) => Some((super::inputs::Names::of(&[table], &[]).find(name)?.column, false)),
+            Some(name) => Some((Names::of(&[&table.columns], &[]).find(name)?.column, false)),
             None => guess_time(table, &columns).map(|column| (column, true)),
         };
         let time = chosen.and_then(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));
@@ -136,18 +135,6 @@ impl Inspection {
         warnings.extend(sentinels);
         let rounded = columns.iter().filter(|column| column.is_rounding);
         warnings.extend(rounded.map(|column| rounding_warning(&column.name)));
-        if let Some(line) = table.too_short.first_line {
-            let rows = counted(table.too_short.rows, "row");
-            warnings.push(format!(
-                "{rows} with fewer cells than there are columns, the first on line {line}"
-            ));
-        }
-        if let Some(line) = table.too_long.first_line {
-            let rows = counted(table.too_long.rows, "row");
-            warnings.push(format!(
-                "left out: {rows} with more cells than there are columns, the first on line {line}"
-            ));
-        }
         Ok(Self {
             rows: table.rows,
             columns,
@@ -345,7 +332,10 @@ impl Recipe {
             }
             tables.push(table);
         }
-        let names = Names::of(&Vec::from_iter(&tables), &stems);
+        let names = Names::of(
+            &Vec::from_iter(tables.iter().map(|table| table.columns.as_slice())),
+            &stems,
+        );
         for (id, meaning) in self.meant(&names)? {
             inspected[id.file].meanings[id.column] = meaning;
         }

@@ -47,6 +47,14 @@ pub(super) fn read(mut source: impl Read, budget: &mut ReadingBudget) -> Result<
         }
     };
     let (mut arrays, mut left_out) = (Vec::new(), Vec::new());
+    let mut variable = |source: &mut dyn Read| {
+        let (name, value) = Value::read(source, endian, budget, 0)?;
+        // MATLAB stores internal data, such as `__function_workspace__`, in variables without a name.
+        if !name.is_empty() {
+            value.add(name, &mut arrays, &mut left_out);
+        }
+        drain(source)
+    };
     while let Some(tag) = Tag::read(&mut source, endian)? {
         match (tag.kind, tag.small) {
             (COMPRESSED, None) => {
@@ -59,8 +67,7 @@ pub(super) fn read(mut source: impl Read, budget: &mut ReadingBudget) -> Result<
                 }) = Tag::read(&mut inflated, endian)?
                 {
                     let mut matrix = (&mut inflated).take(size as u64);
-                    variable(&mut matrix, endian, budget, &mut arrays, &mut left_out)?;
-                    drain(&mut matrix)?;
+                    variable(&mut matrix)?;
                 }
                 // The checksum is verified at the end of the data.
                 if fill(&mut inflated, &mut [0])? {
@@ -74,8 +81,7 @@ pub(super) fn read(mut source: impl Read, budget: &mut ReadingBudget) -> Result<
             (MATRIX, None) => {
                 let padding = tag.size.next_multiple_of(8) - tag.size;
                 let mut limited = (&mut source).take(tag.size as u64);
-                variable(&mut limited, endian, budget, &mut arrays, &mut left_out)?;
-                drain(&mut limited)?;
+                variable(&mut limited)?;
                 if limited.limit() > 0 {
                     return Err(cut_off());
                 }
@@ -85,22 +91,6 @@ pub(super) fn read(mut source: impl Read, budget: &mut ReadingBudget) -> Result<
         }
     }
     Ok((arrays, left_out))
-}
-
-/// Reads one variable.
-fn variable(
-    source: &mut dyn Read,
-    endian: Endian,
-    budget: &mut ReadingBudget,
-    arrays: &mut Vec<Array>,
-    left_out: &mut Vec<String>,
-) -> Result<(), TableError> {
-    let (name, value) = Value::read(source, endian, budget, 0)?;
-    // MATLAB stores internal data, such as `__function_workspace__`, in variables without a name.
-    if !name.is_empty() {
-        value.add(name, arrays, left_out);
-    }
-    Ok(())
 }
 
 /// Maximum depth of structures in structures.

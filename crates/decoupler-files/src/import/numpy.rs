@@ -32,36 +32,39 @@ struct Header {
 
 /// Reads an array: samples × any further dimensions. `budget` limits its memory.
 pub(super) fn read(name: &str, mut source: impl Read, budget: &mut ReadingBudget) -> Result<Array, TableError> {
-    let wrong = |reason: String| TableError::array(name, reason);
-    let mut start = [0; 8];
-    fill(&mut source, &mut start)
-        .map_err(|error| error.unwrap_or_else(|| wrong("it is cut off; copy it again".to_owned())))?;
-    let [b'\x93', b'N', b'U', b'M', b'P', b'Y', major, _] = start else {
+    let what = if name.is_empty() { "NumPy array" } else { name };
+    let wrong = |reason: String| TableError::array(what, reason);
+    let mut bytes = |count: usize| {
+        let mut bytes = vec![0; count];
+        source.read_exact(&mut bytes).map_err(|error| match error.kind() {
+            io::ErrorKind::UnexpectedEof => wrong("it is cut off; copy it again".to_owned()),
+            _ => table_error(error),
+        })?;
+        Ok::<_, TableError>(bytes)
+    };
+    let [b'\x93', b'N', b'U', b'M', b'P', b'Y', major, _] = bytes(8)?[..] else {
         return Err(wrong("it is not a NumPy file; save it with numpy.save".to_owned()));
     };
-    let mut length = [0; 4];
-    let bytes = match major {
-        1 => 2,
-        2 | 3 => 4,
+    let length = match major {
+        1 => bytes(2)?,
+        2 | 3 => bytes(4)?,
         _ => {
             return Err(wrong(format!(
                 "version {major} of the format is unknown; save it with numpy.save"
             )));
         }
     };
-    let cut_off = || wrong("it is cut off; copy it again".to_owned());
-    fill(&mut source, &mut length[..bytes]).map_err(|error| error.unwrap_or_else(cut_off))?;
-    let length = u32::from_le_bytes(length) as usize;
+    let length = length
+        .iter()
+        .rev()
+        .fold(0, |length, byte| (length << 8) + usize::from(*byte));
     if length > LONGEST_HEADER {
         return Err(wrong(format!("its header has {length} bytes; save it with numpy.save")));
     }
-    let mut header = vec![0; length];
-    fill(&mut source, &mut header).map_err(|error| error.unwrap_or_else(cut_off))?;
-    let header = Header::parse(&String::from_utf8_lossy(&header)).map_err(wrong)?;
+    let header = Header::parse(&String::from_utf8_lossy(&bytes(length)?)).map_err(wrong)?;
     let shape = header.shape.as_slice();
     let size = header.element.size();
-    let factors = shape.iter().chain(std::iter::once(&size));
-    let expected = factors.copied().try_fold(1, usize::checked_mul);
+    let expected = shape.iter().copied().try_fold(size, usize::checked_mul);
     let written = written(shape);
     let expected = expected.ok_or_else(|| wrong(format!("{written} numbers do not fit into memory")))?;
     if expected == 0 {
@@ -71,35 +74,25 @@ pub(super) fn read(name: &str, mut source: impl Read, budget: &mut ReadingBudget
     // The numbers in the order of the file are freed once they are copied to their columns.
     budget.claim(count.saturating_mul(2 * NUMBER))?;
     let mut numbers = Vec::new();
-    let mut left = expected;
     let mut block = Vec::new();
-    while left > 0 {
+    while numbers.len() * size < expected {
         block.clear();
-        let wanted = left.min(BLOCK);
+        let wanted = (expected - numbers.len() * size).min(BLOCK);
         (&mut source)
             .take(wanted as u64)
             .read_to_end(&mut block)
             .map_err(table_error)?;
+        numbers.extend(header.element.read(&block, header.endian));
         if block.len() < wanted {
-            let found = (expected - left + block.len()) / size;
+            let found = numbers.len();
             return Err(wrong(format!(
                 "it is cut off: its header states {written} numbers, but it has {found}; copy it again"
             )));
         }
-        left -= wanted;
-        numbers.extend(header.element.read(&block, header.endian));
     }
     let array = Array::new(name.to_owned(), shape, numbers, header.is_by_column)?;
     budget.release(count * NUMBER);
     Ok(array)
-}
-
-/// Fills `buffer`, or fails with `None` if the source is too short.
-fn fill(source: &mut impl Read, buffer: &mut [u8]) -> Result<(), Option<TableError>> {
-    source.read_exact(buffer).map_err(|error| match error.kind() {
-        std::io::ErrorKind::UnexpectedEof => None,
-        _ => Some(table_error(error)),
-    })
 }
 
 impl Header {

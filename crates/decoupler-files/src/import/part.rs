@@ -5,7 +5,7 @@ use std::{collections::HashMap, path::Path};
 use decoupler_core::{dataset::Dataset, text::counted};
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
 
-use super::{FileReport, Format, ImportError, Recording};
+use super::{FileReport, ImportError, Recording};
 
 /// Samples of one of the files of an experiment, with what is joined to it.
 pub(super) struct Part {
@@ -104,19 +104,10 @@ fn check_same(first: &Recording, other: &Recording) -> Result<(), ImportError> {
     }
     // Columns without names are known by their numbers only.
     for (one, another) in first.files.iter().zip(&other.files) {
-        if one.columns != another.columns && !(has_names(one) && has_names(another)) {
+        if one.columns != another.columns && !(one.has_names && another.has_names) {
             let of = |file: &FileReport| format!("{} in '{}'", counted(file.columns, "column"), file.path.display());
             return Err(refuse(of(another), of(one)));
         }
     }
     Ok(())
-}
-
-fn has_names(file: &FileReport) -> bool {
-    match &file.format {
-        Format::Text(dialect) => dialect.header,
-        Format::Npy => false,
-        Format::Sheet { header, .. } => *header,
-        Format::Npz | Format::Matlab => true,
-    }
 }

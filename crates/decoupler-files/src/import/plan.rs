@@ -79,6 +79,16 @@ impl Plan {
     /// If the files cannot be imported or the samples cannot be split.
     pub fn sets(&self, folder: &Path, seed: Seed, watch: Watch<'_>) -> Result<PlannedSets, ImportError> {
         let (recording, test_recording) = self.recordings(folder, watch)?;
+        self.planned(recording, test_recording, seed)
+    }
+
+    /// Splits imported samples; `seed` is the seed of the run.
+    pub(super) fn planned(
+        &self,
+        recording: Recording,
+        test_recording: Option<Recording>,
+        seed: Seed,
+    ) -> Result<PlannedSets, ImportError> {
         let (split, test) = self.divide(&recording, test_recording.as_ref(), seed)?;
         Ok(PlannedSets {
             recording,

@@ -107,15 +107,9 @@ pub(super) fn read_positions(
 ) -> Result<Vec<TargetPosition>, ImportError> {
     let table = table(path, watch)?;
     if let Some(line) = table.too_long.first_line {
-        return Err(ImportError::File {
-            path: path.to_owned(),
-            source: TableError::Uneven { line },
-        });
+        return Err(TableError::Uneven { line }.in_file(path));
     }
-    positions(&table, targets).map_err(|source| ImportError::Positions {
-        path: path.to_owned(),
-        source,
-    })
+    positions(&table, targets).map_err(|error| TableError::Positions(error).in_file(path))
 }
 
 fn table(path: &Path, watch: Watch<'_>) -> Result<Table, ImportError> {

@@ -15,7 +15,7 @@ use decoupler_core::{
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets, TableError, Watch,
+    Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets, Watch,
     progress::{Watched, table_error},
     table::name_and_unit,
 };
@@ -222,15 +222,10 @@ impl Recorded {
     pub(super) fn of(plan: Plan, sets: &PlannedSets, watch: Watch<'_>) -> Result<Self, ImportError> {
         let checksum = |path: &PathBuf| {
             // A pipe can be read only once, and is empty now.
-            let is_file = path.is_file();
-            let crc32 = if is_file {
-                file_crc32(path, watch)?
-            } else {
-                String::new()
-            };
+            let crc32 = path.is_file().then(|| file_crc32(path, watch)).transpose()?;
             Ok(FileChecksum {
                 path: path.clone(),
-                crc32,
+                crc32: crc32.unwrap_or_default(),
             })
         };
         let files = plan.files().map(checksum).collect::<Result<_, ImportError>>()?;
@@ -277,18 +272,10 @@ impl Recorded {
     }
 
     fn with_paths(&self, of: impl Fn(&Path) -> PathBuf) -> Self {
-        let file = |file: &FileChecksum| FileChecksum {
-            path: of(&file.path),
-            crc32: file.crc32.clone(),
-        };
-        Self {
-            files: self.files.iter().map(file).collect(),
-            plan: self.plan.with_paths(|path| of(path)),
-            samples_crc32: self.samples_crc32.clone(),
-            search: self.search.clone(),
-            combined: self.combined.clone(),
-            chosen_intervals: self.chosen_intervals.clone(),
-        }
+        let mut recorded = self.clone();
+        recorded.files.iter_mut().for_each(|file| file.path = of(&file.path));
+        recorded.plan = self.plan.with_paths(|path| of(path));
+        recorded
     }
 }
 
@@ -302,13 +289,7 @@ pub(super) fn is_irregular(path: &Path) -> bool {
 /// # Errors
 /// If the file cannot be read, or `watch` breaks.
 pub fn file_crc32(path: &Path, watch: Watch<'_>) -> Result<String, ImportError> {
-    let refused = |source| match table_error(source) {
-        TableError::Io(source) => ImportError::Read {
-            path: path.to_owned(),
-            source,
-        },
-        _ => ImportError::Cancelled,
-    };
+    let refused = |error| table_error(error).in_file(path);
     if is_irregular(path) {
         return Err(ImportError::Irregular(path.to_owned()));
     }

@@ -1,11 +1,6 @@
-use std::{
-    io::{BufRead, BufReader, Read},
-    ops::Range,
-};
+use std::io::{BufRead, BufReader, Read};
 
-use csv_core::ReadRecordResult;
-
-use super::{Separator, TableError, progress::table_error};
+use super::{Separator, TableError, fields::Fields, progress::table_error};
 
 /// Maximum length of a row in bytes: 16 MiB, enough for more than ten thousand columns.
 pub(super) const LONGEST_ROW: usize = 1 << 24;
@@ -15,9 +10,11 @@ const BUFFER: usize = 1 << 18;
 
 /// Rows of a text file, split into cells and with their line numbers. A row may span several lines if the line breaks are
 /// quoted.
-pub(super) struct Rows<R> {
+pub(crate) struct Rows<R> {
     source: BufReader<R>,
-    separator: Separator,
+    fields: Fields,
+    /// Maximum length of a row in bytes, and of blank lines before it.
+    longest: usize,
     line_break: u8,
     text: Vec<u8>,
     /// `true` if the current row ends with a line break.
@@ -26,31 +23,25 @@ pub(super) struct Rows<R> {
     line: u64,
     /// Number of lines read.
     lines: u64,
-    cells: Cells,
-}
-
-/// Cells of one row; the buffers are reused to avoid allocations.
-#[derive(Default)]
-struct Cells {
-    /// Unquoted text of the cells, for rows with quotes.
-    unquoted: Vec<u8>,
-    is_quoted: bool,
-    ends: Vec<usize>,
-    ranges: Vec<Range<usize>>,
 }
 
 impl<R: Read> Rows<R> {
-    pub(super) fn new(source: R, separator: Separator, has_carriage_returns: bool) -> Self {
+    pub(crate) fn new(source: R, separator: Separator, has_carriage_returns: bool) -> Self {
         Self {
             source: BufReader::with_capacity(BUFFER, source),
-            separator,
+            fields: Fields::new(separator, MAX_CELLS),
+            longest: LONGEST_ROW,
             line_break: if has_carriage_returns { b'\r' } else { b'\n' },
             text: Vec::new(),
             is_ended: false,
             line: 0,
             lines: 0,
-            cells: Cells::default(),
         }
+    }
+
+    /// Returns the rows with another maximum length in bytes.
+    pub(crate) fn limited(self, longest: usize) -> Self {
+        Self { longest, ..self }
     }
 
     /// Skips `lines` lines.
@@ -65,8 +56,22 @@ impl<R: Read> Rows<R> {
         Ok(())
     }
 
-    /// Advances to the next row that is not blank; returns `false` at the end.
+    /// Advances to the next row that is not blank, and splits it; returns `false` at the end.
     pub(super) fn advance(&mut self) -> Result<bool, TableError> {
+        if !self.next_text()? {
+            return Ok(false);
+        }
+        self.fields.split(&self.text);
+        if self.fields.len() > MAX_CELLS {
+            let limit = MAX_CELLS;
+            return Err(TableError::Wide { line: self.line, limit });
+        }
+        Ok(true)
+    }
+
+    /// Advances to the [text](Self::text) of the next row that is not blank; returns `false` at the end.
+    pub(crate) fn next_text(&mut self) -> Result<bool, TableError> {
+        let mut blank = 0;
         loop {
             self.text.clear();
             self.line = self.lines + 1;
@@ -81,6 +86,10 @@ impl<R: Read> Rows<R> {
             }
             // Spaces only: an empty cell between tabs is a cell.
             if self.text.iter().all(|byte| b" \r\n".contains(byte)) {
+                blank += self.text.len();
+                if blank > self.longest {
+                    return Err(self.endless());
+                }
                 continue;
             }
             let mut quotes = count_quotes(&self.text);
@@ -95,27 +104,26 @@ impl<R: Read> Rows<R> {
             while self.text.last().is_some_and(|byte| b"\r\n".contains(byte)) {
                 self.text.pop();
             }
-            self.cells.split(&self.text, self.separator, quotes > 0);
-            if self.cells.ranges.len() > MAX_CELLS {
-                let limit = MAX_CELLS;
-                return Err(TableError::Wide { line: self.line, limit });
-            }
             return Ok(true);
+        }
+    }
+
+    fn endless(&self) -> TableError {
+        TableError::Endless {
+            line: self.line,
+            limit: self.longest,
         }
     }
 
     /// Appends the next line to the text; returns `false` at the end.
     fn append_line(&mut self) -> Result<bool, TableError> {
-        let left = LONGEST_ROW.saturating_sub(self.text.len());
+        let left = self.longest.saturating_sub(self.text.len());
         let mut limited = (&mut self.source).take(left as u64 + 1);
         let read = limited
             .read_until(self.line_break, &mut self.text)
             .map_err(table_error)?;
         if read > left {
-            return Err(TableError::Endless {
-                line: self.line,
-                limit: LONGEST_ROW,
-            });
+            return Err(self.endless());
         }
         self.lines += u64::from(read > 0);
         let start = self.text.len() - read;
@@ -125,101 +133,43 @@ impl<R: Read> Rows<R> {
         Ok(read > 0)
     }
 
+    /// Text of the current row, without its line break.
+    pub(crate) fn text(&self) -> &[u8] {
+        &self.text
+    }
+
     /// Returns `true` if the current row ends with a line break.
-    pub(super) fn is_ended(&self) -> bool {
+    pub(crate) fn is_ended(&self) -> bool {
         self.is_ended
     }
 
     /// Line on which the current row starts, from 1.
-    pub(super) fn line(&self) -> u64 {
+    pub(crate) fn line(&self) -> u64 {
         self.line
     }
 
     /// Number of cells in the current row.
     pub(super) fn len(&self) -> usize {
-        self.cells.ranges.len()
+        self.fields.len()
     }
 
     /// Cells of the current row, without surrounding spaces.
-    pub(super) fn cells(&self) -> impl Iterator<Item = &[u8]> + Clone {
-        let text = if self.cells.is_quoted {
-            &self.cells.unquoted
-        } else {
-            &self.text
-        };
-        self.cells.ranges.iter().map(|range| text[range.clone()].trim_ascii())
+    pub(super) fn cells(&self) -> impl DoubleEndedIterator<Item = &[u8]> + Clone {
+        self.fields.iter(&self.text)
     }
+}
+
+/// Returns the most common number of cells of a row, and how often it occurs.
+pub(super) fn commonest(widths: impl Iterator<Item = usize>) -> (usize, usize) {
+    let mut widths: Vec<usize> = widths.collect();
+    widths.sort_unstable();
+    let runs = widths.chunk_by(|a, b| a == b);
+    runs.max_by_key(|run| run.len())
+        .map_or((0, 0), |run| (run[0], run.len()))
 }
 
 fn count_quotes(text: &[u8]) -> usize {
     text.iter().filter(|&&byte| byte == b'"').count()
-}
-
-impl Cells {
-    fn split(&mut self, text: &[u8], separator: Separator, has_quotes: bool) {
-        self.ranges.clear();
-        self.is_quoted = has_quotes;
-        match (has_quotes, separator) {
-            (true, _) => self.split_quoted(text, separator),
-            (false, Separator::Space) => {
-                let mut start = None;
-                for (place, byte) in text.iter().enumerate() {
-                    match (byte.is_ascii_whitespace(), start) {
-                        (false, None) => start = Some(place),
-                        (true, Some(first)) => {
-                            self.ranges.push(first..place);
-                            start = None;
-                        }
-                        _ => {}
-                    }
-                }
-                self.ranges.extend(start.map(|first| first..text.len()));
-            }
-            (false, _) => {
-                let separator = separator.byte();
-                let mut start = 0;
-                for (place, &byte) in text.iter().enumerate() {
-                    if byte == separator {
-                        self.ranges.push(start..place);
-                        start = place + 1;
-                    }
-                }
-                self.ranges.push(start..text.len());
-            }
-        }
-    }
-
-    fn split_quoted(&mut self, text: &[u8], separator: Separator) {
-        let mut parser = csv_core::ReaderBuilder::new().delimiter(separator.byte()).build();
-        let Self {
-            unquoted, ends, ranges, ..
-        } = self;
-        // The text of the cells is never longer than the row.
-        unquoted.resize(unquoted.len().max(text.len() + 1), 0);
-        ends.resize(MAX_CELLS + 2, 0);
-        let (mut rest, mut written, mut count) = (text, 0, 0);
-        loop {
-            let (result, read, copied, found) = parser.read_record(rest, &mut unquoted[written..], &mut ends[count..]);
-            rest = &rest[read..];
-            written += copied;
-            count += found;
-            match result {
-                // The parser treats empty input as the end of the record.
-                ReadRecordResult::InputEmpty => {}
-                ReadRecordResult::Record
-                | ReadRecordResult::End
-                | ReadRecordResult::OutputFull
-                | ReadRecordResult::OutputEndsFull => break,
-            }
-        }
-        let mut start = 0;
-        for &end in &ends[..count] {
-            if separator != Separator::Space || end > start {
-                ranges.push(start..end);
-            }
-            start = end;
-        }
-    }
 }
 
 #[cfg(test)]
@@ -272,5 +222,13 @@ mod tests {
         let mut rows = Rows::new(text.as_bytes(), Separator::Comma, false);
         let error = rows.advance().unwrap_err().to_string();
         assert!(error.contains("line 1") && error.contains("16 MiB"), "{error}");
+    }
+
+    #[test]
+    fn endless_rows_are_refused() {
+        for byte in [b'1', b'\n', b',', b'"', 0, 255] {
+            let mut rows = Rows::new(std::io::repeat(byte), Separator::Comma, false);
+            assert!(rows.advance().is_err(), "{byte}");
+        }
     }
 }

@@ -1,7 +1,7 @@
 use std::{collections::HashMap, path::PathBuf};
 
 use super::{
-    Cells, Column, Dropped, FileReport, ImportError, JoinReport, Recipe, Table,
+    Cells, Column, Dropped, FileReport, Format, ImportError, JoinReport, Recipe, Table,
     inputs::{ColumnId, Names},
     join::Partners,
     suggestion::Meanings,
@@ -15,7 +15,7 @@ use decoupler_core::{
 use ndarray::Array2;
 
 /// Largest number of a row-wire.
-const LAST_ROW_WIRE: f64 = 10_000.0;
+pub(super) const LAST_ROW_WIRE: usize = 10_000;
 
 /// Rows of the first file and their matches in the joined files.
 pub(super) struct Rows<'a> {
@@ -268,7 +268,7 @@ impl Rows<'_> {
                 format: table.format.clone(),
                 rows: table.rows,
                 columns: table.columns.len(),
-                too_short: table.too_short,
+                has_names: table.has_header() && table.format != Format::Npy,
                 join: join.map(|partners| {
                     let mut is_used = vec![false; table.rows];
                     partners
@@ -400,7 +400,7 @@ fn not_understood(cell: &str, start: Option<TimeStamp>) -> &'static str {
 
 /// Returns the index of the row-wire with the number `value`.
 pub(super) fn row_wire(name: &str, value: f64) -> Result<usize, ImportError> {
-    if value.fract() == 0.0 && (1.0..=LAST_ROW_WIRE).contains(&value) {
+    if value.fract() == 0.0 && (1.0..=LAST_ROW_WIRE as f64).contains(&value) {
         Ok(value as usize - 1)
     } else {
         let name = name.to_owned();

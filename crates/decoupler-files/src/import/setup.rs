@@ -88,9 +88,8 @@ impl Setup {
     pub fn recording(settings: RunSettings, plan: Plan) -> Self {
         assert!(settings.simulation().is_none(), "the source is a recording");
         Self {
-            settings,
             plan: Some(plan),
-            is_stored: false,
+            ..settings.into()
         }
     }
 
@@ -98,9 +97,8 @@ impl Setup {
     pub fn of(settings: RunSettings, plan: Option<Plan>) -> Option<Self> {
         let is_recording = settings.simulation().is_none();
         (is_recording == plan.is_some()).then_some(Self {
-            settings,
             plan,
-            is_stored: false,
+            ..settings.into()
         })
     }
 
@@ -128,8 +126,7 @@ impl Setup {
     pub fn with_settings(&self, settings: RunSettings) -> Self {
         Self {
             settings,
-            plan: self.plan.clone(),
-            is_stored: self.is_stored,
+            ..self.clone()
         }
     }
 

@@ -8,7 +8,7 @@ use std::{
     path::Path,
 };
 
-use calamine::{Cell, Data, DataRef, Ods, Range, Reader, Xls, Xlsx, XlsxError, open_workbook_from_rs};
+use calamine::{Cell, Data, DataRef, Ods, Range, Reader, Xlsx, XlsxError, open_workbook_from_rs};
 use decoupler_core::text::clean_name;
 use zip::ZipArchive;
 
@@ -18,17 +18,14 @@ use super::{
     numpy::check_names,
     progress::Watched,
     sheet_claims::{self, LARGEST, OF_CELL, Rectangle, outside},
-    xls_claims,
 };
-use crate::machine::ReadingBudget;
+use crate::{export::csv_cell, machine::ReadingBudget};
 
 /// Kind of spreadsheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Spreadsheet {
     /// Excel since 2007.
     Xlsx,
-    /// Excel up to 2003.
-    Xls,
     /// OpenDocument.
     Ods,
 }
@@ -70,22 +67,13 @@ impl Spreadsheet {
         budget: &mut ReadingBudget,
         watch: Watch<'_>,
     ) -> Result<Table, TableError> {
-        match self {
-            Self::Xls => xls_claims::claim(&file, budget)?,
-            Self::Xlsx | Self::Ods => {
-                check_names(&mut BufReader::new(&file))?;
-                let is_strict = matches!(self, Self::Ods);
-                sheet_claims::claim(BufReader::new(&file), is_strict, budget, watch)?;
-            }
-        }
+        check_names(&mut BufReader::new(&file))?;
+        sheet_claims::claim(BufReader::new(&file), self == Self::Ods, budget, watch)?;
         (&file).rewind()?;
         let source = BufReader::new(file);
         // The reader of spreadsheets may panic on a file whose parts contradict each other.
         let read = catch_unwind(AssertUnwindSafe(|| match self {
             Self::Xlsx => Sheets::read(source, watch, |workbook, name| cells(workbook, name, budget)),
-            Self::Xls => Sheets::read(source, watch, |workbook: &mut Xls<_>, name| {
-                workbook.worksheet_range(name).map_err(damaged)
-            }),
             Self::Ods => Sheets::read(source, watch, |workbook: &mut Ods<_>, name| {
                 workbook.worksheet_range(name).map_err(damaged)
             }),
@@ -243,13 +231,7 @@ fn write_cell(cell: &Data, text: &mut String) {
         Data::String(text) | Data::DateTimeIso(text) | Data::DurationIso(text) => text.clone(),
         Data::Error(error) => error.to_string(),
     };
-    if written.contains([',', '"', '\n', '\r']) {
-        text.push('"');
-        text.push_str(&written.replace('"', "\"\""));
-        text.push('"');
-    } else {
-        text.push_str(&written);
-    }
+    text.push_str(&csv_cell(&written));
 }
 
 #[cfg(test)]

@@ -4,93 +4,39 @@ use decoupler_core::dataset::{Division, SplitBy};
 
 use super::{
     ColumnKind, ColumnSummary, FileSet, Format, ImportError, InspectedFile, Joined, Plan, Recipe, TestFiles,
+    expression::Expression,
     inputs::{ColumnId, Names},
-    missing::Comparison,
     table::stem,
 };
 
-/// Words in names of columns and files that suggest a target, with their weights.
-const TARGET_WORDS: [(&str, i32); 27] = [
-    ("force", 3),
-    ("torque", 3),
-    ("target", 3),
-    ("label", 3),
-    ("truth", 3),
-    ("load", 3),
-    ("moment", 3),
-    ("state", 2),
-    ("probe", 2),
-    ("robot", 2),
-    ("pose", 2),
-    ("position", 2),
-    ("pos", 2),
-    ("depth", 2),
-    ("displacement", 2),
-    ("deflection", 2),
-    ("indentation", 2),
-    ("angle", 2),
-    ("roll", 2),
-    ("pitch", 2),
-    ("yaw", 2),
-    ("weight", 2),
-    ("stiffness", 2),
-    ("fx", 2),
-    ("fy", 2),
-    ("fz", 2),
-    ("output", 2),
+/// Words in names of columns and files that suggest a target, by their weights.
+const TARGET_WORDS: [(i32, &str); 2] = [
+    (3, "force torque target label truth load moment"),
+    (
+        2,
+        "state probe robot pose position pos depth displacement deflection indentation angle roll pitch yaw weight stiffness \
+         fx fy fz output",
+    ),
 ];
-
 /// Words that suggest an input.
-const INPUT_WORDS: [&str; 19] = [
-    "sensor",
-    "reading",
-    "readings",
-    "taxel",
-    "tactile",
-    "skin",
-    "channel",
-    "ch",
-    "adc",
-    "raw",
-    "mag",
-    "magnetometer",
-    "hall",
-    "resistance",
-    "voltage",
-    "capacitance",
-    "input",
-    "feature",
-    "pixel",
-];
-
-/// Typical units of targets, and of sensor readings.
-const TARGET_UNITS: [&str; 22] = [
-    "m", "mm", "cm", "µm", "um", "n", "mn", "kn", "nm", "n·m", "n m", "nmm", "n·mm", "mnm", "kg", "g", "deg", "°",
-    "rad", "kpa", "pa", "mrad",
-];
-const INPUT_UNITS: [&str; 22] = [
-    "v", "mv", "µv", "uv", "ω", "ohm", "kω", "kohm", "mω", "t", "mt", "µt", "ut", "gauss", "pf", "nf", "a", "ma", "µa",
-    "counts", "lsb", "adc",
-];
-
+const INPUT_WORDS: &str = "sensor reading readings taxel tactile skin channel ch adc raw mag magnetometer hall resistance \
+                           voltage capacitance input feature pixel";
+/// Typical units of targets, and of sensor readings, with commas between them.
+const TARGET_UNITS: &str = "m,mm,cm,µm,um,n,mn,kn,nm,n·m,n m,nmm,n·mm,mnm,kg,g,deg,°,rad,kpa,pa,mrad";
+const INPUT_UNITS: &str = "v,mv,µv,uv,ω,ohm,kω,kohm,mω,t,mt,µt,ut,gauss,pf,nf,a,ma,µa,counts,lsb,adc";
 /// Names of group columns.
-const GROUP_NAMES: [&str; 15] = [
-    "file",
-    "experiment",
-    "participant",
-    "grasp",
-    "group",
-    "session",
-    "trial",
-    "press",
-    "run",
-    "episode",
-    "subject",
-    "block",
-    "recording",
-    "take",
-    "touch",
-];
+const GROUP_NAMES: &str = "file experiment participant grasp group session trial press run episode subject block recording \
+                           take touch";
+
+/// Words that suggest a target, with their weights.
+fn target_words() -> impl Iterator<Item = (i32, &'static str)> {
+    let weighted = |(weight, words): (i32, &'static str)| words.split_whitespace().map(move |word| (weight, word));
+    TARGET_WORDS.into_iter().flat_map(weighted)
+}
+
+fn is_one_of(word: &str, words: &str) -> bool {
+    words.split_whitespace().any(|other| other == word)
+}
 
 /// Guesses a plan from the names, units and values in inspected files: which file has the readings, how the others are
 /// joined to it, which are test files, and what each column means. The guess should be checked: names may be misleading.
@@ -290,18 +236,17 @@ fn share_time(one: &InspectedFile, other: &InspectedFile) -> bool {
 /// Returns the score of a file name: positive for targets, negative for readings.
 fn score_of_file(path: &Path) -> i32 {
     let name = stem(path).to_lowercase();
-    let targets = TARGET_WORDS
-        .iter()
-        .filter(|(word, _)| word.len() > 3 && name.contains(word));
-    let inputs = INPUT_WORDS.iter().filter(|word| word.len() > 2 && name.contains(*word));
-    targets.map(|(_, weight)| *weight).max().unwrap_or(0) - 4 * i32::from(inputs.count() > 0)
+    let targets = target_words().filter(|(_, word)| word.len() > 3 && name.contains(word));
+    let mut inputs = INPUT_WORDS.split_whitespace();
+    let has_input = inputs.any(|word| word.len() > 2 && name.contains(word));
+    targets.map(|(weight, _)| weight).max().unwrap_or(0) - 4 * i32::from(has_input)
 }
 
 /// Returns `true` if a column of this name looks like a group, such as `trial`, `Session_ID` or `press number`.
 pub(super) fn is_group_name(name: &str) -> bool {
     let name = name.trim().to_lowercase();
     let words = Vec::from_iter(name.split(|letter: char| !letter.is_alphanumeric()));
-    GROUP_NAMES.contains(&words[0])
+    is_one_of(words[0], GROUP_NAMES)
         && words[1..]
             .iter()
             .all(|word| ["", "id", "no", "nr", "number"].contains(word))
@@ -344,10 +289,11 @@ fn guesses(file: &InspectedFile, is_alone: bool) -> Vec<Meaning> {
 
 fn looks_like_target(name: &str, unit: Option<&str>) -> bool {
     if let Some(unit) = unit.map(|unit| unit.trim().to_lowercase()) {
-        if INPUT_UNITS.contains(&unit.as_str()) {
+        let is_in = |units: &str| units.split(',').any(|other| other == unit);
+        if is_in(INPUT_UNITS) {
             return false;
         }
-        if TARGET_UNITS.contains(&unit.as_str()) {
+        if is_in(TARGET_UNITS) {
             return true;
         }
     }
@@ -355,10 +301,10 @@ fn looks_like_target(name: &str, unit: Option<&str>) -> bool {
         let words = name.split(|letter: char| !letter.is_alphanumeric());
         words.map(|word| word.trim_end_matches(|letter: char| letter.is_ascii_digit()))
     };
-    if words().any(|word| INPUT_WORDS.contains(&word)) {
+    if words().any(|word| is_one_of(word, INPUT_WORDS)) {
         return false;
     }
-    ["x", "y", "z"].contains(&name) || words().any(|word| TARGET_WORDS.iter().any(|(target, _)| *target == word))
+    ["x", "y", "z"].contains(&name) || words().any(|word| target_words().any(|(_, target)| target == word))
 }
 
 /// Adds the columns of a file to a recipe by their full names.
@@ -381,20 +327,21 @@ fn add(recipe: &mut Recipe, file: &InspectedFile, meanings: &[Meaning], stem: Op
 }
 
 /// Columns by their meaning.
+#[derive(Default)]
 pub(super) struct Meanings {
     pub(super) inputs: Vec<ColumnId>,
     pub(super) targets: Vec<ColumnId>,
     pub(super) time: Option<ColumnId>,
     pub(super) group: Option<ColumnId>,
     pub(super) row_wire: Option<ColumnId>,
-    pub(super) comparisons: Vec<(ColumnId, Comparison)>,
+    pub(super) comparisons: Vec<(ColumnId, Expression<String>)>,
     pub(super) units: HashMap<ColumnId, String>,
 }
 
 impl Meanings {
     pub(super) fn of(recipe: &Recipe, names: &Names) -> Result<Self, ImportError> {
         let one = |name: &Option<String>| name.as_ref().map(|name| names.find(name)).transpose();
-        let comparisons = recipe.conditions.iter().flat_map(|condition| condition.comparisons());
+        let comparisons = recipe.conditions.iter().flat_map(|condition| &condition.comparisons);
         for missing in recipe.missing.iter().filter_map(|missing| missing.column.as_deref()) {
             names.find(missing)?;
         }

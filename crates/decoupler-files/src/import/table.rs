@@ -25,8 +25,6 @@ pub struct Table {
     pub torn_line: Option<u64>,
     /// Rows that were left out because they have more cells than there are columns.
     pub too_long: Excess,
-    /// Rows that end before the last column; their other cells are missing.
-    pub too_short: Excess,
     pub(super) lines: Lines,
 }
 
@@ -294,6 +292,16 @@ pub(super) fn name_and_unit(header: &str) -> (&str, Option<&str>) {
         }
     }
     (header, None)
+}
+
+/// Returns the text for a message: the first 40 characters, with control characters escaped.
+pub(super) fn excerpt(text: &str) -> String {
+    let text: String = text.chars().take(40).collect();
+    if text.contains(char::is_control) {
+        text.escape_debug().to_string()
+    } else {
+        text
+    }
 }
 
 #[cfg(test)]

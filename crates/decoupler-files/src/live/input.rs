@@ -13,12 +13,12 @@ use decoupler_core::{
 };
 
 use super::{
-    Fault, Keeping, Line, Lines, Motion, NextLine, Note, SessionError, Simulated, Source,
-    reading_lines::{Reading, ReadingLines},
-    replay::Replay,
-    tally::Tally,
+    Fault, Keeping, Line, Lines, Motion, NextLine, Note, SessionError, Simulated, Source, replay::Replay, tally::Tally,
 };
-use crate::{export::NetworkFile, import::KeptCell};
+use crate::{
+    export::NetworkFile,
+    import::{KeptCell, LineParser, ParsedLine},
+};
 
 /// Source of frames.
 #[derive(Clone, Debug, PartialEq)]
@@ -230,7 +230,7 @@ impl SimulatedInput {
 pub(super) struct LineInput {
     source: Source,
     pub(super) lines: Lines,
-    parser: ReadingLines,
+    parser: LineParser,
     /// Time at which reading began.
     begun: Instant,
     has_stepped_back: bool,
@@ -244,7 +244,7 @@ impl LineInput {
         by_frame: bool,
     ) -> Result<Self, SessionError> {
         let keeping = source.keeping();
-        let parser = ReadingLines::new(file, by_frame, keeping == Keeping::All)?;
+        let parser = file.line_parser(by_frame, keeping == Keeping::All)?;
         let lines = Lines::spawn(opened, keeping, source.begins_anywhere());
         let mut lines = lines.map_err(SessionError::Reader)?;
         // The latest line of each row-wire.
@@ -277,19 +277,20 @@ impl LineInput {
             return Taken::Bad(format!("line {number}: it is longer than {} bytes", Lines::LONGEST));
         };
         let (row_index, readings, kept, is_snapshot) = match self.parser.parse(number, text) {
-            Ok(Reading::None) => return Taken::Nothing,
-            Ok(Reading::Start { is_first }) => {
+            Ok(ParsedLine::NoReadings) => return Taken::Nothing,
+            Ok(ParsedLine::Start { is_first }) => {
                 if is_first {
                     notes.push(Note::Start(number));
                 }
                 return Taken::Nothing;
             }
-            Ok(Reading::Snapshot(readings)) => (Some(0), readings, &[][..], true),
-            Ok(Reading::Row {
+            Ok(ParsedLine::Snapshot(readings)) => (Some(0), readings, &[][..], true),
+            Ok(ParsedLine::Row {
                 row_index,
                 readings,
                 place,
                 kept,
+                ..
             }) => {
                 let is_step_back = matches!(place, Some(Place::AfterStepBack(_)));
                 if is_step_back && !std::mem::replace(&mut self.has_stepped_back, true) {
@@ -298,10 +299,10 @@ impl LineInput {
                 (row_index, readings, kept, false)
             }
             // Reading may begin in the middle of a line.
-            Err(bad) if bad.is_final && !(self.source.begins_anywhere() && number == 1) => {
-                return Taken::End(Err(SessionError::Line(self.source.clone(), bad.reason)));
+            Err(error) if error.is_final() && !(self.source.begins_anywhere() && number == 1) => {
+                return Taken::End(Err(SessionError::Line(self.source.clone(), error)));
             }
-            Err(bad) => return Taken::Bad(bad.reason),
+            Err(error) => return Taken::Bad(error.to_string()),
         };
         arrived.line = number;
         arrived.first_row = row_index;

@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use crate::import::LONGEST_ROW;
+use crate::import::LONGEST_LINE;
 
 /// Lines of a source, read on a separate thread as they arrive.
 ///
@@ -84,7 +84,7 @@ impl Lines {
     /// machine.
     pub const PATIENCE: Duration = Duration::from_millis(100);
     /// Maximum length of a line in bytes, including its line break: 1 MiB, as for any file of readings.
-    pub const LONGEST: usize = LONGEST_ROW as usize;
+    pub const LONGEST: usize = LONGEST_LINE;
 
     /// Starts reading `source`. With `skips_first` its first line is skipped unless it is empty or begins with a letter
     /// or a quote, like a header: reading from a device may begin in the middle of a line.

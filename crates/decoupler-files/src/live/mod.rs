@@ -10,7 +10,6 @@ mod history;
 mod input;
 mod latencies;
 mod lines;
-mod reading_lines;
 mod recording;
 mod recording_file;
 mod replay;

@@ -1,9 +1,9 @@
-use std::io::{self, BufRead, Write};
+use std::io::{self, Read, Write};
 
 use ndarray::{Array3, ArrayView2, Axis};
 use thiserror::Error;
 
-use crate::import::{CsvFields, ReadError, ResistanceColumns};
+use crate::import::{LONGEST_LINE, LineError, LineParser, ParsedLine, ReadError, Rows, Separator};
 
 /// Writes frames with their times as CSV: one line per row-wire, with columns `time_s`, `row` (from 1) and `r_1` to
 /// `r_M4` in ohm. `decode` reads these files too. Every frame is flushed, so that the file ends with a complete line even
@@ -110,52 +110,39 @@ impl Recording {
     ///
     /// # Errors
     /// If the file cannot be read, is malformed, or has no complete frame.
-    pub fn read(
-        mut source: impl BufRead,
-        rows: &[usize],
-        array_rows: usize,
-        channels: usize,
-    ) -> Result<Self, RecordingError> {
-        let mut fields = CsvFields::default();
-        let mut columns: Option<(ResistanceColumns, usize)> = None;
+    pub fn read(source: impl Read, rows: &[usize], array_rows: usize, channels: usize) -> Result<Self, RecordingError> {
+        let mut parser = LineParser::of_numbered_rows(channels, rows.to_vec(), array_rows);
+        let mut texts = Rows::new(source, Separator::Comma, false).limited(LONGEST_LINE);
         let (mut times_s, mut readings_ohm): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
         let (mut lines, mut torn_line) = (0, None);
-        let mut text = Vec::new();
-        for number in 1.. {
-            text.clear();
-            if source.read_until(b'\n', &mut text).map_err(ReadError::from)? == 0 {
+        while texts.next_text().map_err(ReadError::from)? {
+            let line = texts.line();
+            if !texts.is_ended() && line > 1 {
+                torn_line = Some(line);
                 break;
             }
-            if !text.ends_with(b"\n") && columns.is_some() {
-                torn_line = Some(number).filter(|_| !text.trim_ascii().is_empty());
-                break;
-            }
-            if text.trim_ascii().is_empty() {
-                continue;
-            }
-            fields.split(text.trim_ascii());
-            let Some((columns, time_column)) = &columns else {
-                let time = fields.iter().position(|name| name == b"time_s");
-                let named = ResistanceColumns::named(&fields, channels)?;
-                columns = Some((named, time.ok_or(RecordingError::Time(number))?));
-                continue;
+            let expected = lines % rows.len();
+            let (row_index, readings, time_s) = match parser.parse(line, texts.text()) {
+                Ok(ParsedLine::Row {
+                    row_index,
+                    readings,
+                    time_s,
+                    ..
+                }) => (row_index, readings, time_s),
+                Ok(_) => continue,
+                Err(LineError::OtherRow { .. }) => (None, &[][..], None),
+                Err(error) => return Err(ReadError::from(error).into()),
             };
-            columns.read(number, &fields, &mut readings_ohm)?;
-            let row = columns.row_wire(number, &fields, array_rows)?;
-            let expected = rows[lines % rows.len()];
-            if row != Some(expected) {
+            if row_index != Some(expected) {
                 return Err(RecordingError::Row {
-                    line: number,
-                    expected: expected + 1,
+                    line,
+                    expected: rows[expected] + 1,
                 });
             }
-            let time_s = std::str::from_utf8(fields.get(*time_column))
-                .ok()
-                .and_then(|text| text.parse().ok());
-            let time_s =
-                time_s.filter(|time_s: &f64| time_s.is_finite() && times_s.last().is_none_or(|last| time_s >= last));
-            let time_s = time_s.ok_or(RecordingError::Time(number))?;
-            if lines.is_multiple_of(rows.len()) {
+            let time_s = time_s.filter(|time_s| times_s.last().is_none_or(|last| time_s >= last));
+            let time_s = time_s.ok_or(RecordingError::Time(line))?;
+            readings_ohm.extend_from_slice(readings);
+            if expected == 0 {
                 times_s.push(time_s);
             }
             lines += 1;
@@ -336,7 +323,7 @@ mod tests {
         for (from, to, expected) in [
             ("0.1,3", "0.1,1", "line 5: row 3 is expected"),
             ("0.2,1", "0.05,1", "line 6: the time"),
-            ("time_s", "time", "line 1: the time"),
+            ("time_s", "time", "line 2: the time"),
             ("0.1,1,10.1", "0.1,1,-1", "line 4, column 3: '-1'"),
         ] {
             let message = read(text.replacen(from, to, 1).as_bytes()).unwrap_err().to_string();

@@ -8,13 +8,10 @@ use std::{
 
 use ndarray::Array3;
 
-use super::{
-    Lines, Recording, SessionError,
-    reading_lines::{Reading, ReadingLines},
-    tally::Tally,
-};
+use super::{Lines, Recording, SessionError, tally::Tally};
 use crate::{
     export::NetworkFile,
+    import::ParsedLine,
     machine::{ReadingBudget, system_cause},
 };
 
@@ -220,14 +217,14 @@ fn read_frames(path: &Path, file: &NetworkFile, tally: &mut Tally) -> Result<Rec
         }
         return Ok(recording);
     }
-    let mut lines = ReadingLines::new(file, true, true)?;
+    let mut lines = file.line_parser(true, true)?;
     let (columns, length) = (scale.columns(), read.len() * scale.columns());
     let mut all_ohm: Vec<f64> = Vec::new();
     let mut frame_ohm: Vec<f64> = Vec::with_capacity(length);
     for (line, number) in reader.split(b'\n').zip(1..) {
         match lines.parse(number, &line.map_err(system)?) {
-            Ok(Reading::Snapshot(readings)) => all_ohm.extend_from_slice(readings),
-            Ok(Reading::Row {
+            Ok(ParsedLine::Snapshot(readings)) => all_ohm.extend_from_slice(readings),
+            Ok(ParsedLine::Row {
                 row_index, readings, ..
             }) => {
                 let begin = row_index.unwrap_or(0) * columns;
@@ -242,9 +239,9 @@ fn read_frames(path: &Path, file: &NetworkFile, tally: &mut Tally) -> Result<Rec
                     all_ohm.append(&mut frame_ohm);
                 }
             }
-            Ok(Reading::None | Reading::Start { .. }) => {}
-            Err(bad) if bad.is_final => return Err(refused(&bad.reason)),
-            Err(bad) => tally.bad(&bad.reason),
+            Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => {}
+            Err(error) if error.is_final() => return Err(refused(&error)),
+            Err(error) => tally.bad(&error.to_string()),
         }
     }
     let frames = all_ohm.len() / length;

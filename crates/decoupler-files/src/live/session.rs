@@ -6,6 +6,7 @@ use std::{
 };
 
 use decoupler_core::{
+    dataset::DatasetError,
     live::{Drift, FaultEvent, FaultyWire, LiveError, ZeroGains},
     scene::{Deformation, Noise, Scene, SceneError},
     sensor::SensorError,
@@ -23,7 +24,7 @@ use super::{
 };
 use crate::{
     export::NetworkFile,
-    import::{ImportError, KeptCell},
+    import::{ImportError, KeptCell, LineError},
     machine::system_cause,
 };
 
@@ -126,7 +127,7 @@ pub enum SessionError {
     Lost(Source, io::Error),
     /// No line of the source can be read.
     #[error("{0}: {1}")]
-    Line(Source, String),
+    Line(Source, LineError),
     /// The source has ended without an answer.
     #[error("{0}: no line could be decoded: {1}")]
     NothingDecoded(Source, String),
@@ -148,6 +149,9 @@ pub enum SessionError {
     /// The array does not have the rows of the scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// The lines cannot be read for the network.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
 }
 
 impl Session {

@@ -3,10 +3,10 @@
 use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
 
 use decoupler_core::{
-    dataset::{Memory, MemoryStream, Span},
+    dataset::{Memory, Span},
     problem::{Channel, Problem},
 };
-use decoupler_files::import::{InputLine, InputLines, Recipe};
+use decoupler_files::import::{LineParser, ParsedLine, Recipe};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 /// A recipe with every kind of derived column, one of them computed from another, and the inputs that it has.
@@ -32,12 +32,8 @@ fn text(rows: usize) -> String {
     text
 }
 
-fn lines(recipe: &Recipe, problem: &Problem) -> InputLines {
-    let memory = problem.memory.as_ref();
-    let memory = memory.map(|memory| MemoryStream::new(memory, problem.inputs.len()).unwrap());
-    InputLines::new(problem.inputs.clone(), recipe.other_columns(problem), None)
-        .with_derived(recipe.derive.clone())
-        .with_memory(memory)
+fn lines(recipe: &Recipe, problem: &Problem) -> LineParser {
+    LineParser::of_recording(problem, recipe, None).unwrap()
 }
 
 /// A channel without a unit.
@@ -80,9 +76,10 @@ fn a_stream_has_the_derived_columns_of_a_file_bit_for_bit_once_the_start_is_over
         let mut found = Vec::new();
         for (number, line) in (1..).zip(text.lines()) {
             match lines.parse(number, line.as_bytes()).unwrap() {
-                InputLine::NoReadings => assert_eq!(number, 1),
-                InputLine::Start { .. } => found.push(None),
-                InputLine::Readings { readings, .. } => found.push(Some(readings.to_vec())),
+                ParsedLine::NoReadings => assert_eq!(number, 1),
+                ParsedLine::Start { .. } => found.push(None),
+                ParsedLine::Row { readings, .. } => found.push(Some(readings.to_vec())),
+                ParsedLine::Snapshot(_) => panic!("no array"),
             }
         }
         assert_eq!(found.len(), 60);
@@ -104,7 +101,7 @@ fn lines_without_a_derived_value_or_a_column_are_refused_with_the_reason() {
     let parsed = |texts: &[&str]| {
         let mut lines = lines(&recipe, &problem);
         let parse = |(number, text): (u64, &&str)| match lines.parse(number, text.as_bytes()) {
-            Ok(InputLine::Readings { readings, .. }) => Ok(readings.to_vec()),
+            Ok(ParsedLine::Row { readings, .. }) => Ok(readings.to_vec()),
             Ok(_) => Ok(Vec::new()),
             Err(error) => Err((error.is_final(), error.to_string())),
         };
@@ -119,7 +116,11 @@ fn lines_without_a_derived_value_or_a_column_are_refused_with_the_reason() {
     );
     for (texts, is_final, reason) in [
         (&[header, "4,2,0", "9,3,0.2", "9,0,0.3"][..], false, "'q' has no value"),
-        (&[header, "4,x,0"][..], false, "cell 2 is not a finite number"),
+        (
+            &[header, "4,x,0"][..],
+            false,
+            "line 2, column 2: 'x' is not a finite number",
+        ),
         (&["a,t (s)", "4,0"][..1], true, "q=a / b"),
         (&["a,b", "4,2"][..1], true, "seconds need the time column"),
         (&["a,b,t (V)"][..], true, "'t' has no unit of time"),

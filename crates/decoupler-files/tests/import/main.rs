@@ -7,6 +7,7 @@ mod derived;
 mod memory;
 mod networks;
 mod positions;
+mod readers;
 mod recordings;
 mod samples;
 mod several_files;

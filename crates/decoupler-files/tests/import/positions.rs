@@ -5,7 +5,7 @@ use std::{fs, ops::ControlFlow, path::Path};
 use decoupler_core::problem::TargetPosition;
 use decoupler_files::{
     export::RecipeFile,
-    import::{ImportError, Plan, PositionsError, Recipe, Recording, holds_positions},
+    import::{ImportError, Plan, PositionsError, Recipe, Recording, TableError, holds_positions},
 };
 use tempfile::TempDir;
 
@@ -109,8 +109,8 @@ fn invalid_files_are_refused_with_line_and_cause() {
     let is_typed = |error: &ImportError| {
         matches!(
             error,
-            ImportError::Positions {
-                source: PositionsError::NoTarget { line: 3, .. },
+            ImportError::File {
+                source: TableError::Positions(PositionsError::NoTarget { line: 3, .. }),
                 ..
             }
         )

@@ -7,11 +7,12 @@ use decoupler_core::{
     evaluation::{Run, RunSettings},
     job::Job,
     network::{DecouplingNetwork, Mlp, Networks},
+    scene::Rows,
     training::Method,
 };
 use decoupler_files::{
     export::{CheckpointFile, NetworkFile, RunFolder, write_samples, write_samples_header},
-    import::ResistanceReader,
+    import::{LineParser, ReadingsFile},
 };
 use ndarray::Array2;
 use proptest::prelude::*;
@@ -64,13 +65,13 @@ proptest! {
         let mut file = Vec::new();
         write_samples_header("3x2_2x6".parse().unwrap(), false, &mut file).unwrap();
         write_samples(&set, None, 1, &mut file).unwrap();
-        let mut reader = ResistanceReader::new(file.as_slice(), 6).unwrap().with_row_wires(3);
+        let parser = LineParser::of_array("3x2_2x6".parse().unwrap(), Rows::Known, true).unwrap();
+        let mut reader = ReadingsFile::new(file.as_slice(), parser);
         let mut sample = 0;
         while let Some(reading) = reader.read(most).unwrap() {
-            for (index, resistances_ohm) in reading.resistances_ohm.outer_iter().enumerate() {
-                prop_assert_eq!(resistances_ohm.to_vec(), set.sample_readings(sample));
-                let row_wires = reading.row_wires.as_ref().unwrap();
-                prop_assert_eq!(Some(row_wires[index]), set.row_wire(sample));
+            for (index, readings_ohm) in reading.values_ohm.outer_iter().enumerate() {
+                prop_assert_eq!(readings_ohm.to_vec(), set.sample_readings(sample));
+                prop_assert_eq!(Some(reading.row_indices[index]), set.row_wire(sample));
                 sample += 1;
             }
         }

@@ -4,11 +4,12 @@ use std::{fmt::Display, fs, path::Path};
 
 use decoupler_core::{
     evaluation::{Run, RunSettings},
+    scene::Rows,
     sensor::SensorModel,
 };
 use decoupler_files::{
     export::{CheckpointFile, NetworkFile},
-    import::ResistanceReader,
+    import::{LineParser, ReadingsFile},
 };
 
 use crate::{
@@ -128,10 +129,11 @@ fn rewrite(path: &Path, damage: Damage, place: f64) {
 /// Judges a table of three resistances per line, given its values, or `None` if it must be refused.
 fn judge_table(text: &str, expected: Option<&[[f64; 3]]>) -> Verdict {
     let read = || {
-        let mut reader = ResistanceReader::new(text.as_bytes(), 3)?;
+        let parser = LineParser::of_array("2x1_1x3".parse().unwrap(), Rows::All, true).unwrap();
+        let mut reader = ReadingsFile::new(text.as_bytes(), parser);
         let mut values = Vec::new();
-        while let Some(reading) = reader.read(2)? {
-            values.extend(reading.resistances_ohm);
+        while let Some(readings) = reader.read(2)? {
+            values.extend(readings.values_ohm);
         }
         Ok::<_, decoupler_files::import::ReadError>(values)
     };
@@ -173,7 +175,7 @@ fn tables() -> Vec<Text> {
             Some(vec![[1e308, 1e-308, 5e-324]]),
         ),
         ("nothing", String::new(), None),
-        ("only names", "r_1,r_2,r_3\n".to_owned(), Some(Vec::new())),
+        ("only names", "r_1,r_2,r_3\n".to_owned(), None),
         ("a column missing", "r_1,r_2\n1,2\n".to_owned(), None),
         ("a column twice", "r_1,r_1,r_2,r_3\n1,1,2,3\n".to_owned(), None),
         ("a value missing", "1,2,3\n1,2\n".to_owned(), None),

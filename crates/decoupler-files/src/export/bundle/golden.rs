@@ -6,6 +6,7 @@ use decoupler_core::{
 };
 
 use super::{contents::Contents, exported_program::Limits};
+use crate::export::write_csv_row;
 
 /// Readings with the answers that the decoder gives to them.
 #[derive(Clone, Debug)]
@@ -157,8 +158,9 @@ impl Golden {
         let channels = meaning.inputs.iter().chain(&meaning.targets);
         let names = names.chain(channels.map(|channel| inert(&channel.name))).collect();
         // User-defined names may contain commas and quotation marks.
-        let mut writer = csv::Writer::from_writer(Vec::new());
-        let mut write = |fields: Vec<String>| writer.write_record(fields).expect("writing to memory does not fail");
+        let mut bytes = Vec::new();
+        let mut write =
+            |fields: Vec<String>| write_csv_row(fields, &mut bytes).expect("writing to memory does not fail");
         write(names);
         for row in self.rows() {
             let mut fields = Vec::new();
@@ -172,7 +174,6 @@ impl Golden {
             fields.extend(row.readings.iter().chain(&row.targets).map(f64::to_string));
             write(fields);
         }
-        let bytes = writer.into_inner().expect("writing to memory does not fail");
         String::from_utf8_lossy(&bytes).into_owned()
     }
 }

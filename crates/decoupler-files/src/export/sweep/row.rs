@@ -14,6 +14,7 @@ use thiserror::Error;
 
 use super::{SweepFiles, Trial, TrialId, TrialOptions};
 pub use crate::export::DocumentError;
+use crate::export::write_csv_row;
 
 /// Fields of a report that are times: they differ from run to run and are excluded from comparisons.
 const TIMES: [&str; 4] = ["epoch_ms", "frame_us", "fit_seconds", "training_seconds"];
@@ -285,13 +286,12 @@ impl SweepTableFormat {
 fn write_csv(merged: &MergedSweep, writer: &mut dyn Write) -> io::Result<()> {
     let rows: Vec<_> = merged.trials.iter().map(|row| row.cells()).collect();
     let columns: BTreeSet<_> = rows.iter().flat_map(|cells| cells.keys()).collect();
-    let mut table = csv::Writer::from_writer(writer);
-    table.write_record(columns.iter().map(|column| column.heading()))?;
+    write_csv_row(columns.iter().map(|column| column.heading()), writer)?;
     for cells in &rows {
         let cell = |column| cells.get(column).map_or("", String::as_str);
-        table.write_record(columns.iter().map(|&column| inert(cell(column))))?;
+        write_csv_row(columns.iter().map(|&column| inert(cell(column))), writer)?;
     }
-    table.flush()
+    writer.flush()
 }
 
 /// Reasons why a folder has no table.

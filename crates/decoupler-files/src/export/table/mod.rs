@@ -1,8 +1,10 @@
 //! Tables: described once, and written as CSV for other programs or as text for papers and spreadsheets.
 //! LaTeX has the rules of `booktabs` and the numeric columns of `siunitx`.
 
+mod csv_row;
 mod text;
 
+pub use csv_row::{csv_cell, write_csv_row};
 pub use text::TableForm;
 
 use std::io::{self, Write};
@@ -174,13 +176,9 @@ impl Table {
     /// # Errors
     /// Any error of `writer`.
     pub fn write_csv(&self, writer: &mut dyn Write) -> io::Result<()> {
-        let fields = self.columns.iter().map(|column| quoted(&inert(&column.field)));
-        writeln!(writer, "{}", fields.collect::<Vec<_>>().join(","))?;
-        for row in &self.rows {
-            let cells = row.iter().map(|cell| quoted(&cell.for_spreadsheet()));
-            writeln!(writer, "{}", cells.collect::<Vec<_>>().join(","))?;
-        }
-        Ok(())
+        write_csv_row(self.columns.iter().map(|column| inert(&column.field)), writer)?;
+        let mut rows = self.rows.iter();
+        rows.try_for_each(|row| write_csv_row(row.iter().map(Cell::for_spreadsheet), writer))
     }
 }
 
@@ -221,15 +219,6 @@ impl Serialize for Cell {
             Self::Count(count) => serializer.serialize_u64(*count),
             Self::Number(number) | Self::R2(number) => number.filter(|number| number.is_finite()).serialize(serializer),
         }
-    }
-}
-
-/// Quotes a CSV field if necessary (RFC 4180).
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
     }
 }
 

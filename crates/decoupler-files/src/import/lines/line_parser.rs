@@ -1,39 +1,94 @@
+use std::hash::{DefaultHasher, Hash, Hasher};
+
 use decoupler_core::{
+    dataset::{DatasetError, MemoryStream, Place, Series},
+    problem::{Channel, Problem},
     scene::{RowModel, Rows, SceneError},
     sensor::ArrayScale,
 };
-use thiserror::Error;
 
-use super::resistance_reader::{CsvFields, ReadError, ResistanceColumns, number as parsed_number};
+use super::{
+    super::{
+        Derived, InputError, Recipe, Separator,
+        derived::{self, DerivedStream},
+        fields::Fields,
+        inputs::{InputColumns, OtherColumns},
+        selection::{LAST_ROW_WIRE, row_wire},
+        table::excerpt,
+        time_stamp::TimeStamp,
+    },
+    LineError, Needed,
+};
 
-/// Parses frames from successive CSV lines, without allocation in steady state.
+/// Parser of successive lines of CSV with the readings of a network, without allocation in steady state.
 ///
-/// A line has the resistances of one row-wire: in columns named as for `decode`, possibly among others; as M4 unnamed
-/// columns; or as M4 + 1 unnamed columns, the first being the number of the row-wire. Or it has those of a whole
-/// snapshot: rows × M4 unnamed columns, row by row. The first line of readings determines the layout; a header may be
-/// repeated, for example when a device restarts, and a comma may end a line.
+/// A header names the columns, in any order and among others; without one, the first line of readings determines the layout:
+/// the inputs in their order, possibly after the number of the row-wire or, for an array, a whole snapshot row by row. A header
+/// may be repeated, for example when a device restarts, and a comma may end a line.
 #[derive(Debug)]
 pub struct LineParser {
-    scale: ArrayScale,
-    rows: Rows,
-    /// Row-wires read.
-    read: Vec<usize>,
-    /// True if the input is read from its beginning, so that the row-wire follows from the line count.
-    is_complete: bool,
-    fields: CsvFields,
-    layout: Option<Layout>,
-    /// True once a line had readings.
-    has_frames: bool,
-    /// Number of single-row lines without a row number so far, valid or not.
-    turns: usize,
-    readings_ohm: Vec<f64>,
-}
-
-#[derive(Debug)]
-struct Layout {
-    columns: ResistanceColumns,
+    inputs: Vec<Channel>,
+    others: OtherColumns,
+    /// Columns computed from others.
+    derive: Vec<Derived>,
+    /// Channels by which a header is recognised: the inputs, and the columns from which derived inputs are computed.
+    read: Vec<Channel>,
+    /// Row-wires with their own readings; `None` if one network of a recording reads all.
+    rows: Option<RowWires>,
+    /// `true` for the resistances of an array.
+    is_array: bool,
+    fields: Fields,
+    /// Columns of the lines, from the header or the first line of readings.
+    columns: Option<InputColumns>,
     has_names: bool,
     is_snapshot: bool,
+    /// `true` once a line had readings.
+    has_readings: bool,
+    /// Number of lines so far whose row-wire follows from their order, valid or not.
+    lines_in_turn: usize,
+    /// The derived columns, once the columns of the lines are known.
+    derived: Option<DerivedStream>,
+    /// Group of each line of the start, which is waited for.
+    groups_of_start: Vec<u64>,
+    memory: Option<MemoryStream>,
+    /// First time stamp, if times are stamps.
+    start: Option<TimeStamp>,
+    /// Cells of the line as numbers; NaN if they are not numbers.
+    cells: Vec<f64>,
+    readings: Vec<f64>,
+    kept: Vec<KeptCell>,
+}
+
+/// Row-wires that are read.
+#[derive(Debug)]
+struct RowWires {
+    /// From 0, in the order of their networks.
+    read: Vec<usize>,
+    /// Largest number of a row-wire.
+    last: usize,
+    unnumbered: Unnumbered,
+}
+
+/// What is known of the row-wire of a line without a row number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Unnumbered {
+    /// Nothing, and the network needs no row.
+    Any,
+    /// There is only one.
+    Single,
+    /// It follows from the number of lines so far.
+    InTurn,
+    /// Nothing.
+    Refused,
+}
+
+/// Cell of a line that is copied to the output.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct KeptCell {
+    /// Name of its column, with the unit in brackets if there is one.
+    pub title: String,
+    /// Its text.
+    pub text: String,
 }
 
 /// Contents of a line.
@@ -41,205 +96,691 @@ struct Layout {
 pub enum ParsedLine<'a> {
     /// An empty line or a header.
     NoReadings,
-    /// Resistances of one row-wire in ohm: M4.
+    /// Line at the start of the stream, from which the mean of a derived column is computed: there are no inputs before that.
+    Start {
+        /// `true` for the first of them.
+        is_first: bool,
+    },
+    /// Readings of one row-wire, or of a recording.
     Row {
-        /// Index among the row-wires read; `None` if unknown.
+        /// Index of the row-wire among those read, 0 if one network of a recording reads all; `None` if unknown.
         row_index: Option<usize>,
-        /// Readings: M4.
-        readings_ohm: &'a [f64],
+        /// Readings in the order of the inputs; with a memory, their features.
+        readings: &'a [f64],
+        /// Time in seconds, if there is a time column.
+        time_s: Option<f64>,
+        /// Where the line comes in its group and row-wire, for a memory.
+        place: Option<Place>,
+        /// Time, group and row-wire of the line, as far as it has them.
+        kept: &'a [KeptCell],
     },
     /// Resistances of all row-wires read, in ohm: rows × M4.
     Snapshot(&'a [f64]),
 }
 
-/// Error in a line. The next line can be read unless the error [is final](LineError::is_final).
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum LineError {
-    /// A field is missing or wrong.
-    #[error(transparent)]
-    Fields(#[from] ReadError),
-    /// A resistance is missing from the header, or is named twice.
-    #[error("line {line}: {source}")]
-    Names {
-        /// Line number.
-        line: u64,
-        /// Error in the header.
-        source: ReadError,
+/// What was found in a line, without its readings.
+enum Found {
+    NoReadings,
+    Start {
+        is_first: bool,
     },
-    /// The network does not read this row-wire.
-    #[error("line {line}: it belongs to row {row}, but the network reads only row {rows}")]
-    OtherRow {
-        /// Line number.
-        line: u64,
-        /// Row-wire, from 1.
-        row: usize,
-        /// Rows that are read.
-        rows: Rows,
+    Readings {
+        row_index: Option<usize>,
+        place: Option<Place>,
     },
-    /// The line has no row number, which the network needs.
-    #[error(
-        "line {0}: it has no row number, and it is not known with which row a device begins; send the row number before \
-         the resistances, or whole snapshots in one line"
-    )]
-    NoRow(u64),
-}
-
-impl LineError {
-    /// Returns `true` if later lines cannot be assigned to wires either, so that decoding must stop.
-    pub fn is_final(&self) -> bool {
-        matches!(self, Self::Names { .. } | Self::NoRow(_))
-    }
 }
 
 impl LineParser {
-    /// Prepares to read lines for a network of `rows` of an array. `is_complete` means that the input is read from its
-    /// beginning and no line is lost, so that the row of a line without a row number follows from counting lines.
+    /// Returns a parser of the resistances of `rows` of an array, in columns `r_1` to `r_M4`, with the row-wire from 1 in `row`
+    /// and the time in `time_s` if there are such columns. `is_complete` means that the input is read from its beginning and no
+    /// line is lost, so that the row of a line without a row number follows from counting lines.
     ///
     /// # Errors
     /// If the array does not have the row.
-    pub fn new(scale: ArrayScale, rows: Rows, is_complete: bool) -> Result<Self, SceneError> {
+    pub fn of_array(scale: ArrayScale, rows: Rows, is_complete: bool) -> Result<Self, SceneError> {
+        let read = rows.read(scale.rows())?;
+        let unnumbered = match rows.model() {
+            RowModel::Shared => Unnumbered::Any,
+            RowModel::Each if read.len() == 1 => Unnumbered::Single,
+            RowModel::Each if is_complete => Unnumbered::InTurn,
+            RowModel::Each => Unnumbered::Refused,
+        };
+        let last = scale.rows();
+        Ok(Self::of_resistances(
+            scale.columns(),
+            RowWires { read, last, unnumbered },
+        ))
+    }
+
+    /// Returns a parser of the resistances of numbered row-wires, those in `read`, of an array with `last` row-wires.
+    pub(crate) fn of_numbered_rows(channels: usize, read: Vec<usize>, last: usize) -> Self {
+        let unnumbered = Unnumbered::Refused;
+        Self::of_resistances(channels, RowWires { read, last, unnumbered })
+    }
+
+    fn of_resistances(channels: usize, rows: RowWires) -> Self {
+        let inputs = (1..=channels).map(|channel| Channel::new(format!("r_{channel}"), None));
+        let others = OtherColumns {
+            row_wire: Some("row".to_owned()),
+            time: Some("time_s".to_owned()),
+            ..OtherColumns::default()
+        };
+        Self {
+            is_array: true,
+            ..Self::new(inputs.collect(), others, Some(rows))
+        }
+    }
+
+    /// Returns a parser of the inputs of a network of `problem`, with the other columns of `recipe`; `row_wires` are those of the
+    /// networks, from 0, if each row-wire has one.
+    ///
+    /// Derived columns are computed as in a file with the same lines; the first lines, from which means at the start are
+    /// computed, have no readings. A memory continues as in training, by the group, row-wire and time of each line. Without a
+    /// time column, a line comes one usual interval of the training after the line before, so that a stream is decoded like a
+    /// file with the same lines, however it arrives.
+    ///
+    /// # Errors
+    /// If the memory of `problem` is invalid.
+    pub fn of_recording(
+        problem: &Problem,
+        recipe: &Recipe,
+        row_wires: Option<Vec<usize>>,
+    ) -> Result<Self, DatasetError> {
+        let inputs = &problem.inputs;
+        let is_derived = |name: &String| recipe.derive.iter().any(|derived| derived.name == *name);
+        let names = inputs.iter().map(|input| &input.name);
+        let names = names.chain(recipe.derive.iter().flat_map(Derived::columns));
+        let mut read: Vec<Channel> = Vec::new();
+        for name in names.filter(|name| !is_derived(name)) {
+            if read.iter().all(|channel| channel.name != *name) {
+                read.push(Channel::new(name, None));
+            }
+        }
+        let memory = problem.memory.as_ref();
+        let rows = row_wires.map(|read| RowWires {
+            read,
+            last: LAST_ROW_WIRE,
+            unnumbered: Unnumbered::Refused,
+        });
         Ok(Self {
-            read: rows.read(scale.rows())?,
-            scale,
-            rows,
-            is_complete,
-            fields: CsvFields::default(),
-            layout: None,
-            has_frames: false,
-            turns: 0,
-            readings_ohm: Vec::with_capacity(scale.rows() * scale.columns()),
+            read,
+            derive: recipe.derive.clone(),
+            memory: memory
+                .map(|memory| MemoryStream::new(memory, inputs.len()))
+                .transpose()?,
+            ..Self::new(inputs.clone(), recipe.other_columns(problem), rows)
         })
     }
 
-    /// Returns whether each line is a whole snapshot; `None` before the first line of readings.
-    pub fn is_snapshot(&self) -> Option<bool> {
-        self.layout.as_ref().map(|layout| layout.is_snapshot)
-    }
-
-    /// Parses a line without its line break; `number` is used in messages.
-    ///
-    /// # Errors
-    /// If the line is not a frame.
-    pub fn parse(&mut self, number: u64, line: &[u8]) -> Result<ParsedLine<'_>, LineError> {
-        let byte_order_mark: &[u8] = if number == 1 { b"\xef\xbb\xbf" } else { b"" };
-        let text = line.strip_prefix(byte_order_mark).unwrap_or(line).trim_ascii();
-        if text.is_empty() {
-            return Ok(ParsedLine::NoReadings);
-        }
-        if text.contains(&b'\r') {
-            self.count_bad();
-            return Err(ReadError::LineBreak(number).into());
-        }
-        self.fields.split(text);
-        if self.has_names() {
-            let columns = ResistanceColumns::named(&self.fields, self.scale.columns());
-            // After a frame, a device that starts again repeats its header whole; other texts are garbage, or an overflow.
-            if !self.has_frames || columns.is_ok() {
-                self.layout = Some(Layout {
-                    columns: columns.map_err(|source| LineError::Names { line: number, source })?,
-                    has_names: true,
-                    is_snapshot: false,
-                });
-                return Ok(ParsedLine::NoReadings);
-            }
-        }
-        let is_first = self.layout.is_none();
-        let layout = self.layout.get_or_insert_with(|| {
-            let found = self.fields.count() - usize::from(self.fields.ends_with_comma());
-            Layout::unnamed(found, self.scale, self.read.len())
-        });
-        self.readings_ohm.clear();
-        let columns = &layout.columns;
-        let read = columns.read(number, &self.fields, &mut self.readings_ohm);
-        let row_wire = read.and_then(|()| columns.row_wire(number, &self.fields, self.scale.rows()));
-        let is_snapshot = layout.is_snapshot;
-        self.has_frames |= row_wire.is_ok();
-        match row_wire {
-            Err(error) => {
-                self.count_bad();
-                if is_first && !self.layout.as_ref().is_some_and(|layout| layout.has_names) {
-                    self.layout = None;
-                }
-                Err(error.into())
-            }
-            Ok(_) if is_snapshot => Ok(ParsedLine::Snapshot(&self.readings_ohm)),
-            Ok(row_wire) => Ok(ParsedLine::Row {
-                row_index: self.row_index(number, row_wire)?,
-                readings_ohm: &self.readings_ohm,
-            }),
+    fn new(inputs: Vec<Channel>, others: OtherColumns, rows: Option<RowWires>) -> Self {
+        Self {
+            read: inputs.clone(),
+            inputs,
+            others,
+            derive: Vec::new(),
+            rows,
+            is_array: false,
+            fields: Fields::new(Separator::Comma, usize::MAX),
+            columns: None,
+            has_names: false,
+            is_snapshot: false,
+            has_readings: false,
+            lines_in_turn: 0,
+            derived: None,
+            groups_of_start: Vec::new(),
+            memory: None,
+            start: None,
+            cells: Vec::new(),
+            readings: Vec::new(),
+            kept: Vec::new(),
         }
     }
 
-    /// Returns `true` for a line with the name of a resistance, or with at least as many text cells as there are
-    /// resistances.
-    fn has_names(&self) -> bool {
-        let channels = self.scale.columns();
-        let is_text = |field: &[u8]| !field.is_empty() && parsed_number(field).is_none();
-        ResistanceColumns::has_name(&self.fields, channels)
-            || (self.fields.count() >= channels.max(2) && self.fields.iter().all(is_text))
+    /// Number of readings of a row-wire.
+    pub(super) fn channels(&self) -> usize {
+        self.inputs.len()
+    }
+
+    /// Number of lines so far whose row-wire follows from their order, valid or not.
+    pub fn lines_in_turn(&self) -> usize {
+        self.lines_in_turn
     }
 
     /// Counts a malformed line, which still advances the row counter.
     pub fn count_bad(&mut self) {
-        self.turns += usize::from(self.layout.as_ref().is_some_and(|layout| !layout.columns.has_row()));
+        let is_in_turn = self
+            .rows
+            .as_ref()
+            .is_some_and(|rows| rows.unnumbered == Unnumbered::InTurn);
+        let has_no_row = |columns: &InputColumns| columns.row_wire.is_none();
+        self.lines_in_turn += usize::from(is_in_turn && self.columns.as_ref().is_some_and(has_no_row));
     }
 
-    /// Index of the line's row-wire among those read: from its row number `row_wire`, or else from the line count.
-    fn row_index(&mut self, line: u64, row_wire: Option<usize>) -> Result<Option<usize>, LineError> {
-        if let Some(row_wire) = row_wire {
-            let index = self.read.iter().position(|&other| other == row_wire);
-            return index.map(Some).ok_or(LineError::OtherRow {
+    /// Parses a line without its line break; `line` is its number, from 1.
+    ///
+    /// # Errors
+    /// If the line has no readings; the next line can be read unless the error [is final](LineError::is_final).
+    pub fn parse(&mut self, line: u64, text: &[u8]) -> Result<ParsedLine<'_>, LineError> {
+        let found = self.find(line, text);
+        if found.is_err() {
+            self.count_bad();
+            // Garbage before the first readings does not determine the layout.
+            if !self.has_names && !self.has_readings {
+                (self.columns, self.derived) = (None, None);
+            }
+        }
+        Ok(match found? {
+            Found::NoReadings => ParsedLine::NoReadings,
+            Found::Start { is_first } => ParsedLine::Start { is_first },
+            Found::Readings { .. } if self.is_snapshot => ParsedLine::Snapshot(&self.readings),
+            Found::Readings { row_index, place } => ParsedLine::Row {
+                row_index,
+                readings: &self.readings,
+                time_s: self.columns.as_ref().and_then(|columns| columns.time_s(&self.cells)),
+                place,
+                kept: &self.kept,
+            },
+        })
+    }
+
+    fn find(&mut self, line: u64, text: &[u8]) -> Result<Found, LineError> {
+        let byte_order_mark: &[u8] = if line == 1 { b"\xef\xbb\xbf" } else { b"" };
+        let text = text.strip_prefix(byte_order_mark).unwrap_or(text).trim_ascii();
+        if text.is_empty() {
+            return Ok(Found::NoReadings);
+        }
+        if text.contains(&b'\r') {
+            return Err(LineError::LineBreak(line));
+        }
+        self.fields.split(text);
+        self.cells.clear();
+        self.cells
+            .extend(self.fields.iter(text).map(|cell| number(cell).unwrap_or(f64::NAN)));
+        self.read_stamp(text);
+        let is_readings = |columns: &InputColumns| self.check(columns, line, text).is_ok();
+        // Only the first line, or a line that cannot be used, may be a header: other lines need no strings.
+        if !self.columns.as_ref().is_some_and(is_readings) {
+            let cells = self
+                .fields
+                .iter(text)
+                .map(|cell| String::from_utf8_lossy(cell).into_owned());
+            let cells: Vec<String> = cells.collect();
+            // After a line with readings, a device that starts again repeats its header whole; other texts are garbage, or an
+            // overflow of the device.
+            let is_header = if self.has_readings {
+                InputColumns::has_all(&cells, &self.read)
+            } else {
+                InputColumns::is_header(&cells, &self.read, line == 1)
+            };
+            if is_header {
+                let found = self.find_columns(&cells, cells.len());
+                found.map_err(|source| LineError::Header { line, source })?;
+                return Ok(Found::NoReadings);
+            }
+            if self.columns.is_none() {
+                // A comma may end the line.
+                let last = self.fields.iter(text).next_back();
+                let has_comma = self.cells.len() > 1 && last.is_some_and(<[u8]>::is_empty);
+                let found = self.find_columns(&[], self.cells.len() - usize::from(has_comma));
+                found.map_err(|source| LineError::Unnamed { line, source })?;
+                self.read_stamp(text);
+            }
+            if let Some(columns) = &self.columns {
+                self.check(columns, line, text)?;
+            }
+        }
+        let row_index = self.row_index(line)?;
+        self.has_readings = true;
+        self.readings_of(line, text, row_index)
+    }
+
+    /// Checks that the cells can be used.
+    fn check(&self, columns: &InputColumns, line: u64, text: &[u8]) -> Result<(), LineError> {
+        let width = columns.width;
+        let found = self.fields.len();
+        let has_trailing_comma = found == width + 1 && found > 1 && self.fields.get(text, width).is_empty();
+        if found != width && !has_trailing_comma {
+            let expected = width;
+            return Err(LineError::Width { line, found, expected });
+        }
+        let reading = if self.is_array {
+            Needed::Resistance
+        } else {
+            Needed::Number
+        };
+        let read = columns.inputs.iter().filter(|column| **column < width);
+        let derived = self.derived.iter().flat_map(|derived| derived.needed(width));
+        // A memory places the line in its series.
+        let time = columns.time.filter(|_| self.memory.is_some());
+        let row_wire = columns
+            .row_wire
+            .filter(|_| self.memory.is_some() || self.rows.is_some());
+        let last = self.rows.as_ref().map_or(LAST_ROW_WIRE, |rows| rows.last);
+        let all = read
+            .map(|column| (*column, reading))
+            .chain(row_wire.map(|column| (column, Needed::RowWire(last))))
+            .chain(derived.map(|column| (column, Needed::Number)))
+            .chain(time.map(|(column, _)| (column, Needed::Time)));
+        for (column, needed) in all {
+            if !needed.is_met(self.cells[column]) {
+                return Err(LineError::Cell {
+                    line,
+                    column: column + 1,
+                    text: excerpt(&String::from_utf8_lossy(self.fields.get(text, column))),
+                    needed,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Gathers the readings of a line whose cells can be used.
+    fn readings_of(&mut self, line: u64, text: &[u8], row_index: Option<usize>) -> Result<Found, LineError> {
+        let Some(columns) = &self.columns else {
+            return Ok(Found::NoReadings);
+        };
+        let width = columns.width;
+        self.cells.truncate(width);
+        let group = columns.group.filter(|&column| column < width);
+        let group = group.map_or(0, |column| key(self.fields.get(text, column)));
+        if let Some(derived) = &mut self.derived {
+            let taken = derived.take(&mut self.cells).map_err(|error| LineError::Header {
                 line,
-                row: row_wire + 1,
-                rows: self.rows,
+                source: InputError::Derived(error.to_string()),
+            });
+            match taken? {
+                derived::Progress::Start { is_first } => {
+                    self.groups_of_start.push(group);
+                    return Ok(Found::Start { is_first });
+                }
+                derived::Progress::Complete(start) => self.remember(&start),
+            }
+        }
+        let (Some(columns), derived) = (&self.columns, &self.derived) else {
+            return Ok(Found::NoReadings);
+        };
+        if let Some(column) = columns.inputs.iter().find(|&&column| !self.cells[column].is_finite()) {
+            let name = derived.as_ref().map_or("", |derived| derived.name(column - width));
+            let name = name.to_owned();
+            return Err(LineError::NoValue { line, name });
+        }
+        columns.gather(&self.cells, &mut self.readings);
+        for (&(column, _), kept) in columns.kept.iter().zip(&mut self.kept) {
+            kept.text.clear();
+            if column < width {
+                kept.text
+                    .push_str(&String::from_utf8_lossy(self.fields.get(text, column)));
+            } else if !self.cells[column].is_nan() {
+                kept.text.push_str(&self.cells[column].to_string());
+            }
+        }
+        let mut place = None;
+        if let Some(memory) = &mut self.memory {
+            let series = columns.series(group, &self.cells);
+            let (features, found) = memory.step(series, &self.readings, columns.time_s(&self.cells));
+            place = Some(found);
+            self.readings.clear();
+            self.readings.extend_from_slice(features);
+        }
+        Ok(Found::Readings { row_index, place })
+    }
+
+    /// Replaces a time stamp by the time since the first.
+    fn read_stamp(&mut self, text: &[u8]) {
+        let time = self.columns.as_ref().and_then(|columns| columns.time);
+        let Some((column, unit_s)) = time.filter(|(column, _)| *column < self.cells.len()) else {
+            return;
+        };
+        if let Some(stamp) = TimeStamp::parse(self.fields.get(text, column)) {
+            let start = *self.start.get_or_insert(stamp);
+            if start.has_zone == stamp.has_zone {
+                // Stamps are in seconds, whatever unit the header has.
+                self.cells[column] = stamp.seconds_since(start) / unit_s;
+            }
+        }
+    }
+
+    /// Takes the lines of the start into the memory; those without all inputs are no samples.
+    fn remember(&mut self, start: &[Vec<f64>]) {
+        let (Some(columns), Some(memory)) = (&self.columns, &mut self.memory) else {
+            return;
+        };
+        for (cells, group) in start.iter().zip(self.groups_of_start.drain(..)) {
+            columns.gather(cells, &mut self.readings);
+            if self.readings.iter().all(|reading| reading.is_finite()) {
+                memory.step(columns.series(group, cells), &self.readings, columns.time_s(cells));
+            }
+        }
+    }
+
+    /// Index of the row-wire of a line whose cells can be used.
+    fn row_index(&mut self, line: u64) -> Result<Option<usize>, LineError> {
+        let (Some(rows), Some(columns)) = (&self.rows, &self.columns) else {
+            return Ok(Some(0));
+        };
+        let Some(column) = columns.row_wire.filter(|_| !self.is_snapshot) else {
+            return match rows.unnumbered {
+                _ if self.is_snapshot => Ok(Some(0)),
+                Unnumbered::Any => Ok(None),
+                Unnumbered::Single => Ok(Some(0)),
+                Unnumbered::InTurn => {
+                    let turn = self.lines_in_turn % rows.read.len();
+                    self.lines_in_turn += 1;
+                    Ok(Some(turn))
+                }
+                Unnumbered::Refused => Err(LineError::NoRow(line)),
+            };
+        };
+        let row = self.cells[column] as usize;
+        let index = rows.read.iter().position(|read| read + 1 == row);
+        let read = || rows.read.clone();
+        let index = index.ok_or_else(|| LineError::OtherRow {
+            line,
+            row,
+            read: read(),
+        })?;
+        Ok(Some(index))
+    }
+
+    /// Finds the inputs in the cells of a header, or in lines of `width` cells without one.
+    fn find_columns(&mut self, header: &[String], width: usize) -> Result<(), InputError> {
+        let mut is_snapshot = false;
+        let has_rows = self.rows.is_some();
+        let mut found_derived = None;
+        let columns = match header {
+            _ if !self.derive.is_empty() => {
+                // Derived columns have names.
+                let (columns, derived) =
+                    InputColumns::with_derived(header, width, &self.inputs, &self.others, &self.derive)?;
+                found_derived = Some(derived);
+                columns
+            }
+            [] if self.is_array => {
+                let all = self.rows.as_ref().map_or(0, |rows| rows.read.len()) * self.inputs.len();
+                is_snapshot = width == all && width > self.inputs.len();
+                let count = if is_snapshot { all } else { self.inputs.len() };
+                InputColumns::in_order(count, !is_snapshot && width == count + 1)
+            }
+            [] => InputColumns::unnamed(width, &self.inputs, &self.others, has_rows)?,
+            header => InputColumns::of_header(header, &self.inputs, &self.others)?,
+        };
+        if self.is_array
+            && let Some(name) = InputColumns::named_twice(header, &self.inputs)
+        {
+            return Err(InputError::Twice(name));
+        }
+        if has_rows && !self.is_array && columns.row_wire.is_none() {
+            return Err(InputError::Missing {
+                name: self.others.row_wire.clone().unwrap_or_else(|| "row".to_owned()),
+                near: "each row-wire has its own network, which is selected by this column".to_owned(),
             });
         }
-        match self.rows.model() {
-            RowModel::Shared => Ok(None),
-            RowModel::Each if self.read.len() == 1 => Ok(Some(0)),
-            RowModel::Each if self.is_complete => {
-                let turn = self.turns % self.read.len();
-                self.turns += 1;
-                Ok(Some(turn))
-            }
-            RowModel::Each => Err(LineError::NoRow(line)),
+        // The header of a device that starts again does not begin another start.
+        if self.columns.as_ref() != Some(&columns) {
+            let cells = columns.kept.iter().map(|(_, title)| KeptCell {
+                title: title.clone(),
+                ..KeptCell::default()
+            });
+            self.kept = cells.collect();
+            (self.columns, self.derived) = (Some(columns), found_derived);
         }
+        (self.has_names, self.is_snapshot) = (!header.is_empty(), is_snapshot);
+        Ok(())
     }
 }
 
-impl Layout {
-    fn unnamed(found: usize, scale: ArrayScale, rows: usize) -> Self {
-        let (one, all) = (scale.columns(), rows * scale.columns());
-        let is_snapshot = found == all && rows > 1;
-        let count = if is_snapshot { all } else { one };
-        Self {
-            columns: ResistanceColumns::unnamed(count, found == one + 1 && !is_snapshot),
-            has_names: false,
-            is_snapshot,
+/// Parses a number; `None` if the cell is not a number.
+fn number(cell: &[u8]) -> Option<f64> {
+    std::str::from_utf8(cell).ok()?.parse().ok()
+}
+
+/// Number of a group, from its text.
+fn key(group: &[u8]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    group.hash(&mut hasher);
+    hasher.finish()
+}
+
+impl InputColumns {
+    fn series(&self, group: u64, cells: &[f64]) -> Series {
+        let row_wire = self.row_wire.and_then(|column| row_wire("", cells[column]).ok());
+        Series {
+            group,
+            row_wire: row_wire.unwrap_or(0),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use decoupler_core::dataset::{Memory, Span};
+
     use super::*;
 
-    fn parser(rows: Rows, is_complete: bool) -> LineParser {
-        LineParser::new("2x1_1x3".parse().unwrap(), rows, is_complete).unwrap()
+    fn channels(names: &[&str]) -> Vec<Channel> {
+        let channel = |name: &&str| Channel::new(*name, None);
+        names.iter().map(channel).collect()
     }
 
-    fn row(row_index: Option<usize>, readings_ohm: &[f64]) -> ParsedLine<'_> {
+    fn readings(lines: &mut LineParser, line: u64, text: &str) -> Option<(usize, Vec<f64>)> {
+        match lines.parse(line, text.as_bytes()).unwrap() {
+            ParsedLine::Row {
+                row_index, readings, ..
+            } => Some((row_index.unwrap(), readings.to_vec())),
+            _ => None,
+        }
+    }
+
+    /// Parser of these inputs, with the columns and the memory of `recipe`.
+    fn lines(inputs: &[&str], recipe: &Recipe, row_wires: Option<Vec<usize>>) -> LineParser {
+        let problem = Problem {
+            inputs: channels(inputs),
+            targets: channels(&["x"]),
+            memory: recipe.memory.clone(),
+            positions: Vec::new(),
+            sensor: None,
+        };
+        LineParser::of_recording(&problem, recipe, row_wires).unwrap()
+    }
+
+    fn plain(inputs: &[&str]) -> LineParser {
+        lines(inputs, &Recipe::default(), None)
+    }
+
+    /// Line, column and text of a cell that cannot be used.
+    fn bad_cell(error: &LineError) -> (u64, usize, &str) {
+        match error {
+            LineError::Cell { line, column, text, .. } => (*line, *column, text),
+            _ => panic!("{error}"),
+        }
+    }
+
+    #[test]
+    fn inputs_are_found_by_name_or_by_order() {
+        let mut lines = plain(&["u1", "u2"]);
+        assert_eq!(readings(&mut lines, 1, "time,u2,u1"), None);
+        assert_eq!(readings(&mut lines, 2, "0.1,2,1"), Some((0, vec![1.0, 2.0])));
+        assert_eq!(readings(&mut lines, 3, ""), None);
+        let error = lines.parse(4, b"0.2,?,1").unwrap_err();
+        assert_eq!(bad_cell(&error), (4, 2, "?"));
+        assert!(!error.is_final());
+        let mut unnamed = plain(&["u1", "u2"]);
+        assert_eq!(readings(&mut unnamed, 1, "1,2"), Some((0, vec![1.0, 2.0])));
+        let other = unnamed.parse(2, b"1,2,3").unwrap_err();
+        assert!(
+            matches!(
+                other,
+                LineError::Width {
+                    found: 3,
+                    expected: 2,
+                    ..
+                }
+            ),
+            "{other}"
+        );
+        let mut renamed = plain(&["u1", "u2"]);
+        let missing = renamed.parse(1, b"time,u1,v2").unwrap_err();
+        assert!(missing.is_final() && missing.to_string().contains("u2"), "{missing}");
+    }
+
+    /// Arduino prints ovf for a float that is too large, multimeters print OL.
+    #[test]
+    fn garbage_after_the_first_line_is_a_bad_line_and_a_whole_header_still_counts() {
+        for (header, garbage) in [
+            ("u1,u2", "ovf,ovf"),
+            ("u1,u2", "OL,OL"),
+            ("u1,u2", "-,-"),
+            ("u1,u2", "ERR"),
+            ("u1,u2", "u1,\u{fffd}x"),
+            ("", "ovf,ovf"),
+        ] {
+            let mut lines = plain(&["u1", "u2"]);
+            assert_eq!(readings(&mut lines, 1, header), None);
+            assert_eq!(readings(&mut lines, 2, "93,91"), Some((0, vec![93.0, 91.0])));
+            let error = lines.parse(3, garbage.as_bytes()).unwrap_err();
+            assert!(!error.is_final(), "{garbage}: {error}");
+            assert_eq!(readings(&mut lines, 4, "93,90"), Some((0, vec![93.0, 90.0])));
+            assert_eq!(readings(&mut lines, 5, "time,u2,u1"), None);
+            assert_eq!(readings(&mut lines, 6, "0.1,2,1"), Some((0, vec![1.0, 2.0])));
+        }
+    }
+
+    #[test]
+    fn a_line_may_end_with_a_comma() {
+        for header in ["u1,u2", "u1,u2,", ""] {
+            let mut lines = plain(&["u1", "u2"]);
+            assert_eq!(readings(&mut lines, 1, header), None);
+            assert_eq!(readings(&mut lines, 2, "1,2,"), Some((0, vec![1.0, 2.0])), "{header}");
+            assert_eq!(readings(&mut lines, 3, "3,4,"), Some((0, vec![3.0, 4.0])), "{header}");
+            assert!(lines.parse(4, b"1,2,3,4").is_err());
+        }
+    }
+
+    #[test]
+    fn a_line_that_a_memory_cannot_place_is_bad() {
+        let recipe = Recipe {
+            time: Some("t".to_owned()),
+            row_wire: Some("row".to_owned()),
+            memory: Some(Memory {
+                lags: vec![Span::Samples(1.0)],
+                ..Memory::default()
+            }),
+            ..Recipe::default()
+        };
+        let mut lines = lines(&["u"], &recipe, None);
+        assert_eq!(readings(&mut lines, 1, "t,row,u"), None);
+        assert_eq!(
+            readings(&mut lines, 2, "2026-11-24T12:00:00Z,1,5"),
+            Some((0, vec![5.0, 5.0]))
+        );
+        for (text, column) in [
+            ("2026-11-24T12:61:00Z,1,5", 1),
+            ("nan,1,5", 1),
+            ("2026-11-24T12:00:00.1Z,0.5,5", 2),
+        ] {
+            assert_eq!(
+                bad_cell(&lines.parse(3, text.as_bytes()).unwrap_err()).1,
+                column,
+                "{text}"
+            );
+        }
+        assert_eq!(
+            readings(&mut lines, 4, "2026-11-24T12:00:00.2Z,2,6"),
+            Some((0, vec![6.0, 6.0]))
+        );
+        assert_eq!(
+            readings(&mut lines, 5, "2026-11-24T12:00:00.3Z,1,7"),
+            Some((0, vec![7.0, 5.0]))
+        );
+    }
+
+    #[test]
+    fn the_row_wire_selects_the_network() {
+        let recipe = Recipe {
+            row_wire: Some("row".to_owned()),
+            ..Recipe::default()
+        };
+        let mut lines = lines(&["u"], &recipe, Some(vec![0, 2]));
+        assert_eq!(readings(&mut lines, 1, "row,u"), None);
+        assert_eq!(readings(&mut lines, 2, "3,5"), Some((1, vec![5.0])));
+        let error = lines.parse(3, b"2,5").unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "line 3: there is no network for row 2, only for rows 1, 3"
+        );
+    }
+
+    #[test]
+    fn columns_are_copied_as_they_came_and_derived_ones_as_numbers() {
+        let recipe = Recipe {
+            time: Some("press".to_owned()),
+            group: Some("gap".to_owned()),
+            derive: vec!["gap=u1-u2".parse().unwrap()],
+            ..Recipe::default()
+        };
+        let mut lines = lines(&["u1", "u2"], &recipe, None);
+        assert_eq!(readings(&mut lines, 1, "press,u1,u2"), None);
+        let Ok(ParsedLine::Row { kept, .. }) = lines.parse(2, b"\"007\",2.50,1") else {
+            panic!("no readings")
+        };
+        let texts = kept.iter().map(|cell| (cell.title.as_str(), cell.text.as_str()));
+        assert_eq!(Vec::from_iter(texts), [("press", "007"), ("gap", "1.5")]);
+    }
+
+    #[test]
+    fn a_memory_continues_from_line_to_line_and_uses_the_time_column() {
+        let recipe = Recipe {
+            time: Some("t".to_owned()),
+            memory: Some(Memory {
+                interval_s: Some(0.1),
+                averages: vec![Span::Seconds(2.0)],
+                ..Memory::default()
+            }),
+            ..Recipe::default()
+        };
+        let new = || lines(&["u"], &recipe, None);
+        let mut lines = new();
+        let average = |elapsed_s: f64| 1.0 - f64::exp(-elapsed_s / 2.0);
+        let mut check = |line: u64, text: &str, expected: f64| {
+            let (_, found) = readings(&mut lines, line, text).unwrap();
+            assert!((found[1] - expected).abs() < 1e-14, "{text}: {found:?}");
+        };
+        check(1, "0", 0.0);
+        check(2, "1", average(0.1));
+        check(3, "1", average(0.2));
+        let mut timed = new();
+        assert_eq!(readings(&mut timed, 1, "u,t (ms)"), None);
+        readings(&mut timed, 2, "0,50");
+        let (_, found) = readings(&mut timed, 3, "1,450").unwrap();
+        assert!((found[1] - average(0.4)).abs() < 1e-14);
+        assert!(timed.parse(4, b"?,500").is_err());
+        let (_, found) = readings(&mut timed, 5, "1,550").unwrap();
+        assert!((found[1] - average(0.5)).abs() < 1e-14, "a bad line is no sample");
+        let (_, found) = readings(&mut timed, 6, "3,90000").unwrap();
+        assert_eq!(found, [3.0, 3.0], "it starts again after a gap");
+    }
+
+    fn parser(rows: Rows, is_complete: bool) -> LineParser {
+        LineParser::of_array("2x1_1x3".parse().unwrap(), rows, is_complete).unwrap()
+    }
+
+    fn row(row_index: Option<usize>, readings: &[f64]) -> ParsedLine<'_> {
         ParsedLine::Row {
             row_index,
-            readings_ohm,
+            readings,
+            time_s: None,
+            place: None,
+            kept: &[],
         }
     }
 
     #[test]
     fn rows_are_identified_by_name_by_number_or_by_count() {
         let mut named = parser(Rows::Known, false);
-        assert_eq!(named.parse(1, b"time,row,r_2,r_1,r_3").unwrap(), ParsedLine::NoReadings);
+        assert_eq!(
+            named.parse(1, b"clock,row,r_2,r_1,r_3").unwrap(),
+            ParsedLine::NoReadings
+        );
         assert_eq!(
             named.parse(2, b"0.1,2,5,4,6\r").unwrap(),
             row(Some(1), &[4.0, 5.0, 6.0])
@@ -264,9 +805,8 @@ mod tests {
             parser.parse(1, b"1,2,3,4,5,6").unwrap(),
             ParsedLine::Snapshot(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
         );
-        assert_eq!(parser.is_snapshot(), Some(true));
         let message = parser.parse(2, b"1,2,3").unwrap_err().to_string();
-        assert!(message.starts_with("line 2: 3 columns where 6"), "{message}");
+        assert!(message.starts_with("line 2: 3 cells where 6"), "{message}");
     }
 
     /// Arduino prints ovf for a float that is too large.
@@ -308,9 +848,9 @@ mod tests {
     #[test]
     fn a_header_that_lacks_a_resistance_is_refused() {
         for (names, words) in [
-            ("time,r_1,r_2", "line 1: there is no column r_3"),
-            ("R1,R2,R3", "line 1: there is no column r_1"),
-            ("r_1,r_2,r_3,r_2", "line 1: there are two columns r_2"),
+            ("time,r_1,r_2", "line 1: there is no column 'r_3'"),
+            ("R1,R2,R3", "line 1: there is no column 'r_1'"),
+            ("r_1,r_2,r_3,r_2", "line 1: there are two columns 'r_2'"),
         ] {
             let error = parser(Rows::Known, true).parse(1, names.as_bytes()).unwrap_err();
             assert!(error.is_final() && error.to_string().starts_with(words), "{error}");
@@ -320,6 +860,7 @@ mod tests {
     #[test]
     fn garbage_before_the_first_frame_does_not_determine_the_layout() {
         let mut parser = parser(Rows::Known, false);
+        assert!(parser.parse(1, b"4,5,").is_err());
         assert!(parser.parse(1, b"5,6").is_err());
         assert!(parser.parse(2, b"boot ok").is_err());
         assert!(parser.parse(3, b"1,4,5,6").is_ok());
@@ -333,10 +874,22 @@ mod tests {
             .parse(3, b"2,4,5,6")
             .unwrap_err()
             .to_string();
-        assert_eq!(message, "line 3: it belongs to row 2, but the network reads only row 1");
+        assert_eq!(message, "line 3: there is no network for row 2, only for row 1");
         assert_eq!(
             parser(Rows::One(1), false).parse(3, b"4,5,6").unwrap(),
             row(Some(0), &[4.0, 5.0, 6.0])
         );
+    }
+
+    #[test]
+    fn the_time_of_a_line_is_that_of_its_column() {
+        let mut parser = parser(Rows::Known, false);
+        parser.parse(1, b"row,time_s,r_1,r_2,r_3").unwrap();
+        for (text, expected) in [("1,0.25,4,5,6", Some(0.25)), ("2,?,4,5,6", None)] {
+            let ParsedLine::Row { time_s, .. } = parser.parse(2, text.as_bytes()).unwrap() else {
+                panic!("no row")
+            };
+            assert_eq!(time_s, expected, "{text}");
+        }
     }
 }

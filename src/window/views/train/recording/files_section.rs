@@ -36,7 +36,6 @@ pub(super) const FILES: FileWords = FileWords {
         "npz",
         "mat",
         "xlsx",
-        "xls",
         "ods",
         "json",
         "checkpoint",
