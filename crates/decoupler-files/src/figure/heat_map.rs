@@ -57,7 +57,7 @@ impl HeatMapDrawing {
         let place = (point - self.grid.min) / self.cell;
         let last = (self.grid.size() / self.cell).round() - 1.0;
         let cell = place.floor().min(last);
-        self.grid.contains(point).then(|| [cell.y as usize, cell.x as usize])
+        self.grid.contains(point).then_some([cell.y as usize, cell.x as usize])
     }
 }
 

@@ -229,7 +229,8 @@ fn repeats(results: &ExperimentResults) -> PlotFigure {
     ];
     let notes = notes
         .into_iter()
-        .filter_map(|(applies, note)| applies.then(|| note.to_owned()));
+        .filter(|(applies, _)| *applies)
+        .map(|(_, note)| note.to_owned());
     PlotFigure {
         plots: plots.into(),
         notes: notes.collect(),
