@@ -461,7 +461,7 @@ mod tests {
     #[test]
     fn headers_that_lack_a_resistance_are_refused() {
         let message = read(b"time,r_1,r_2\n1,2,3\n4,5,6\n").0.unwrap_err();
-        assert!(message.contains("line 1: there is no column r_3"), "{message}");
+        assert!(message.contains("line 1: there is no column 'r_3'"), "{message}");
     }
 
     #[test]
