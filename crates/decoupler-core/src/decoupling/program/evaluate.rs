@@ -49,6 +49,8 @@ struct Values {
 enum Work {
     /// As the operation says, value by value.
     Plain,
+    /// The readings, or those that were checked: they are not copied.
+    Readings,
     /// Constants for all row-wires, which are repeated for each row of a chunk from the beginning.
     Shared(Vec<f64>),
     /// Constants of each row-wire, one after the other.
@@ -102,7 +104,7 @@ impl ProgramDecoder {
             let is_single = work.is_single(node);
             let zeros = |is_needed: bool| if is_taken(place) && is_needed { length } else { 0 };
             let mut values = Values {
-                doubles: vec![0.0; zeros(in_double[place] || !is_single)],
+                doubles: vec![0.0; zeros(!matches!(work, Work::Readings) && (in_double[place] || !is_single))],
                 singles: vec![0.0; zeros(in_single[place] || is_single)],
             };
             if let Work::Shared(constants) = &work {
@@ -221,7 +223,7 @@ impl ProgramDecoder {
             let by_row = |id: &NodeId| rows.by_row::<f64>(&before[id.index()]);
             let of_rows = rows.indices.iter().copied().enumerate();
             match (&node.operation, work) {
-                (Operation::Readings, _) => results[..rows.readings.len()].copy_from_slice(rows.readings),
+                (Operation::Readings, _) => convert(rows.readings, &mut values.singles, |value| value as f32),
                 (_, Work::OfRow(constants)) => {
                     if !rows.is_run {
                         for (row, row_index) in of_rows {
@@ -235,7 +237,7 @@ impl ProgramDecoder {
                         }
                     }
                 }
-                (Operation::Valid { of, domain }, _) => {
+                (Operation::Valid { of, domain }, work) => {
                     let checked = all(of);
                     // Invalid readings are rare: one vectorised pass finds whether there is any.
                     if !kernel::are_valid(*domain, checked)
@@ -247,7 +249,11 @@ impl ProgramDecoder {
                             value: checked[place],
                         });
                     }
-                    results[..checked.len()].copy_from_slice(checked);
+                    if matches!(work, Work::Readings) {
+                        convert(checked, &mut values.singles, |value| value as f32);
+                    } else {
+                        results[..checked.len()].copy_from_slice(checked);
+                    }
                 }
                 (Operation::Affine { of, biases, .. }, Work::Placement(placements)) => {
                     let (of, biases) = (by_row(of), all(biases));
@@ -296,7 +302,7 @@ impl ProgramDecoder {
                     assert!(is_computed, "every operation is prepared as such");
                 }
             }
-            if !matches!(rest[0].work, Work::OfRow(_)) {
+            if !matches!(rest[0].work, Work::Readings | Work::OfRow(_)) {
                 let Values { doubles, singles } = &mut rest[0].values;
                 convert(doubles, singles, |value| value as f32);
             }
@@ -304,7 +310,7 @@ impl ProgramDecoder {
         let last = &nodes[output];
         let is_elsewhere = matches!(
             last.work,
-            Work::Shared(_) | Work::OfRow(_) | Work::Doubles(_) | Work::Singles(_)
+            Work::Readings | Work::Shared(_) | Work::OfRow(_) | Work::Doubles(_) | Work::Singles(_)
         );
         if is_elsewhere || last.work.is_single(program.node(program.output())) {
             targets.copy_from_slice(rows.values(last));
@@ -347,6 +353,8 @@ impl Work {
             _ => panic!("the tables of an operation are constants"),
         };
         match &node.operation {
+            Operation::Readings => Self::Readings,
+            Operation::Valid { of, .. } if matches!(program.node(*of).operation, Operation::Readings) => Self::Readings,
             Operation::Select { tables, .. } => {
                 let rounded = |&value: &f64| match node.precision {
                     Precision::Double => value,
@@ -414,6 +422,9 @@ trait Width: Real {
     /// The values in this precision.
     fn held(values: &Values) -> &[Self];
 
+    /// The readings, which are converted only to single precision.
+    fn read<'a>(readings: &'a [f64], converted: &'a Values) -> &'a [Self];
+
     /// Weights or points in this precision, if the node has any.
     fn tables(work: &Work) -> Option<&PerRow<Padded<Self>>>;
 }
@@ -422,6 +433,11 @@ impl Width for f64 {
     #[inline(always)]
     fn held(values: &Values) -> &[Self] {
         &values.doubles
+    }
+
+    #[inline(always)]
+    fn read<'a>(readings: &'a [f64], _: &'a Values) -> &'a [Self] {
+        readings
     }
 
     #[inline(always)]
@@ -437,6 +453,11 @@ impl Width for f32 {
     #[inline(always)]
     fn held(values: &Values) -> &[Self] {
         &values.singles
+    }
+
+    #[inline(always)]
+    fn read<'a>(_: &'a [f64], converted: &'a Values) -> &'a [Self] {
+        &converted.singles
     }
 
     #[inline(always)]
@@ -501,6 +522,7 @@ impl Rows<'_> {
     fn values<'a, T: Width>(&'a self, node: &'a Prepared) -> &'a [T] {
         let length = self.indices.len() * node.size;
         match &node.work {
+            Work::Readings => &T::read(self.readings, &node.values)[..length],
             Work::OfRow(constants) if self.is_run => {
                 let first = self.indices[0] * node.size;
                 &T::held(constants)[first..first + length]
