@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use decoupler_core::{
     dataset::Simulation,
     decoupling::DecoderKind,
@@ -82,7 +82,7 @@ fn argument(option: &'static RunOption) -> Arg {
     let argument = Arg::new(word.clone()).long(word).value_name(option.form);
     let argument = argument.help(format!("{help}{default}"));
     if setting.name == "inputs" {
-        return argument.value_delimiter(',');
+        return argument.value_delimiter(',').action(ArgAction::Append);
     }
     argument.value_parser(move |text: &str| parsed(option, text))
 }

@@ -83,10 +83,8 @@ impl Case {
 impl Trade {
     pub(super) fn run(self) -> Result<(), Failure> {
         let cases = self.cases()?;
-        let mut trade_off = TradeOff {
-            source: TradeSource::Array(self.scene.settings_at(Preset::default(), 0.0)?.drawn()?.sensor.scale),
-            levels: Vec::new(),
-        };
+        let simulation = cases.first().and_then(|case| case.setup.settings().simulation());
+        let mut source = simulation.map(|simulation| TradeSource::Array(simulation.sensor.scale));
         let bar = progress_bar(self.json, cases.len(), "{bar:30} {pos} of {len}, {msg}, {elapsed}");
         let graceful = Graceful::begin();
         let mut recordings: Option<Recordings> = None;
@@ -100,7 +98,7 @@ impl Trade {
                     })?;
                     if let Some(read) = &read {
                         self.import.save_recipe(&case.setup)?;
-                        trade_off.source = TradeSource::Recording(Box::new(RecordedSource::new(&sets, read)));
+                        source = Some(TradeSource::Recording(Box::new(RecordedSource::new(&sets, read))));
                     }
                     recordings = read;
                     sets
@@ -139,9 +137,10 @@ impl Trade {
         bar.finish_and_clear();
         drop(graceful);
         let done = levels.iter().map(|level| level.level.points.len()).sum();
-        trade_off.levels = levels;
-        if end.is_ok() || done > 0 {
-            trade_off.print(self.limits(), self.json)?;
+        if (end.is_ok() || done > 0)
+            && let Some(source) = source
+        {
+            TradeOff { source, levels }.print(self.limits(), self.json)?;
         }
         if end? {
             return Ok(());

@@ -77,8 +77,8 @@ fn invalid_arguments_end_with_status_2() {
     let cases = [
         ("train --hidden 0", "from 1 to 512"),
         ("train --hidden twelve", "from 1 to 512"),
-        ("train --samples 0", "from 1 to 1000000"),
-        ("train --samples -5", "from 1 to 1000000"),
+        ("train --samples 0", "samples is 0: it must be from 1"),
+        ("train --samples -5", "not a whole number"),
         ("train --test-samples 0", "from 1"),
         ("train --validation-samples 1000001", "from 0 to 1000000"),
         ("train --epochs 0", "from 1"),

@@ -294,7 +294,7 @@ fn arguments_that_contradict_the_checkpoint_are_refused() {
     let bytes = fs::read(folder.join("run.checkpoint")).unwrap();
     let cases = [
         ("--hidden 5", "--hidden 5: the checkpoint has 4"),
-        ("--array 10x8_4x24", "--array 10×8_4×24: the checkpoint has 10×6_3×18"),
+        ("--array 10x8_4x24", "--array 10x8_4x24: the checkpoint has 10x6_3x18"),
         ("--seed 6", "--seed 6: the checkpoint has 5"),
         ("--samples 200", "--samples 200: the checkpoint has 100"),
         ("--test-samples 10", "the checkpoint has 100"),
@@ -396,7 +396,7 @@ fn every_stopping_rule_can_be_given() {
     assert_eq!(stopped("--max-fail 1"), "validation_rose");
     for rule in ["--goal -1", "--goal NaN", "--max-fail 0", "--min-gradient inf"] {
         assert!(
-            failure(&format!("train {rule}"), folder.path(), 2).contains("give a"),
+            failure(&format!("train {rule}"), folder.path(), 2).contains("it must be from"),
             "{rule}"
         );
     }

@@ -199,7 +199,7 @@ fn errors_are_named() {
         ("train --scaling none", "minmax or whiten"),
         ("train --noise -1", "from 0"),
         ("train --noise 2", "from 0 to 1"),
-        ("train --noise 0,1", "one number"),
+        ("train --noise 0,1", "not a number"),
         ("train --decoder knn", "rbf, fuzzy, newton or polish"),
         ("simulate --decoder mean,ridge", "only one here"),
         ("trade --hidden 0", "from 1"),

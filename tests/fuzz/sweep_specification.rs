@@ -1,4 +1,4 @@
-//! Specifications of sweeps. None is trained: the command prints a script for the trials.
+//! Specifications of sweeps. None is trained: the command looks for results in an empty folder.
 
 use std::{fs, path::Path, process::Command};
 
@@ -11,7 +11,7 @@ use crate::{
 fn check(bytes: &[u8], folder: &Path) -> bool {
     fs::write(folder.join("spec.json"), bytes).unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_decoupler"))
-        .args(["sweep", "--spec", "spec.json", "--engine", "slurm", "--out", "results"])
+        .args(["sweep", "--merge", ".", "--spec", "spec.json", "--out", "table.csv"])
         .current_dir(folder)
         .env("DECOUPLER_MEMORY_GB", "1")
         .output()
@@ -20,15 +20,13 @@ fn check(bytes: &[u8], folder: &Path) -> bool {
     let text = || String::from_utf8_lossy(bytes);
     assert!(!message.contains("panicked"), "{}: {message}", text());
     match output.status.code() {
-        Some(0) => assert!(output.stdout.starts_with(b"#!"), "{}", text()),
         Some(1 | 2) => {
             assert!(message.starts_with("error: "), "{}: {message}", text());
             assert!(message.len() < 3000, "{}: {message}", text());
         }
         other => panic!("{}: {other:?} {message}", text()),
     }
-    assert!(!folder.join("results").exists(), "{}", text());
-    output.status.success()
+    message.contains("no sweep in '.'")
 }
 
 #[test]
