@@ -8,14 +8,15 @@
 `SensorArray`, `simulate`,      resistance model of an array, samples drawn from it, and
 `errors`                        the error figures of the paper
 `load_network`, `Network`       network files of the program `decoupler`
-`import_recording`              recordings described by a recipe
+`read_recording`,               recordings in files, also those that a recipe describes
+`import_recording`
 ==============================  =======================================================
 
 Examples
 --------
 >>> from decoupler import NetworkRegressor, errors, simulate
 >>> data = simulate("10x6_3x18", samples=300, seed=1)
->>> model = NetworkRegressor(hidden_nodes=6, epochs=30, inputs="resistance", random_state=1)
+>>> model = NetworkRegressor(hidden=6, epochs=30, inputs="resistance", random_state=1)
 >>> model = model.fit(data.train.X, data.train.y, validation=data.validation)
 >>> found = errors(data.test.y, model.predict(data.test.X), stroke_mm=data.stroke_mm)
 >>> found.z_percent < 5.0
@@ -26,7 +27,7 @@ from importlib.metadata import version
 
 from ._decoders import FuzzyDecoder, RadialBasisDecoder, RidgeDecoder
 from ._network import Exported, Network, load_network
-from ._recording import Recording, import_recording
+from ._recording import Recording, import_recording, read_recording
 from ._regressor import NetworkRegressor
 from ._samples import Samples
 from ._sensor import Identifiability, SensorArray
@@ -50,5 +51,6 @@ __all__ = [
     "errors",
     "import_recording",
     "load_network",
+    "read_recording",
     "simulate",
 ]

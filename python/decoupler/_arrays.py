@@ -1,6 +1,6 @@
 """Arguments of estimators: samples, row-wires and seeds."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Integral
 from typing import Any
 
@@ -64,11 +64,9 @@ def seed_of(random_state: Any) -> int:
     return int(check_random_state(random_state).randint(np.iinfo(np.int32).max))
 
 
-def count(name: str, value: Any, lowest: int) -> int:
-    """Return a whole number."""
-    if not isinstance(value, Integral) or isinstance(value, bool) or value < lowest:
-        raise ValueError(f"{name} is {value!r}: give a whole number from {lowest}")
-    return int(value)
+def texts(settings: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return names and texts of the settings that are given, which the program checks."""
+    return [(name, str(value)) for name, value in settings.items() if value is not None]
 
 
 def number(name: str, value: Any) -> float:

@@ -48,7 +48,7 @@ class Network:
     >>> import numpy as np
     >>> from decoupler import NetworkRegressor
     >>> X = np.random.default_rng(0).uniform(size=(100, 3))
-    >>> model = NetworkRegressor(hidden_nodes=2, epochs=5, random_state=0).fit(X, X[:, :2])
+    >>> model = NetworkRegressor(hidden=2, epochs=5, random_state=0).fit(X, X[:, :2])
     >>> model.network_
     <Network 3-2-2>
     >>> model.network_.predict(X[:4]).shape
@@ -147,9 +147,9 @@ class Network:
         return self._native.row_wires
 
     @property
-    def hidden_nodes(self) -> int:
+    def hidden(self) -> int:
         """Number of hidden nodes of each network."""
-        return self._native.hidden_nodes
+        return self._native.hidden
 
     @property
     def weights(self) -> int:

@@ -11,13 +11,27 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils.validation import check_is_fitted
 
 from . import _native
-from ._arrays import count, group_numbers, matrix, number, seed_of
+from ._arrays import group_numbers, matrix, number, seed_of, texts
 from ._base import Decoder
 from ._network import Exported, Network, Path
 
 #: Called after each epoch with its number and the losses "training" and "validation" (None if
 #: nothing is held out). Training ends if it returns True.
 Callback = Callable[[int, dict[str, float | None]], object]
+
+#: Parameters that are settings of the program, with its names, defaults and limits.
+SETTINGS = (
+    "hidden",
+    "method",
+    "epochs",
+    "starts",
+    "combine",
+    "begin",
+    "goal",
+    "min_gradient",
+    "max_fail",
+    "scaling",
+)
 
 
 class NetworkRegressor(Decoder):
@@ -29,17 +43,17 @@ class NetworkRegressor(Decoder):
 
     Parameters
     ----------
-    hidden_nodes : int or "auto", default=12
+    hidden : int or "auto", default=12
         Number of hidden nodes. With "auto", settings are chosen by cross-validation that respects
         `split`, as by the program, and the answer is the best convex combination of the training
         mean, ridge, kernel ridge and networks; other settings of the network are then ignored.
     memory : {"none", "auto"} or sequence of float or str, default=None
         Time constants of exponential averages of the readings, in samples, which become inputs:
         the rows of `X` are then consecutive, in `fit` (within groups) and in `predict`. With
-        ``hidden_nodes="auto"``, "auto" tries memories and takes one that is clearly better; None
+        ``hidden="auto"``, "auto" tries memories and takes one that is clearly better; None
         tries none.
     budget : float, default=60.0
-        Seconds of one core for ``hidden_nodes="auto"``, estimated from the work.
+        Seconds of one core for ``hidden="auto"``, estimated from the work.
     method : str, default="lm"
         Training method: "lm" (Levenberg-Marquardt), "br" (Bayesian regularisation), "scg"
         (scaled conjugate gradient), and other methods of the program.
@@ -47,11 +61,11 @@ class NetworkRegressor(Decoder):
         Settings of the method that differ from their defaults, such as ``{"mu": 0.01}``.
     epochs : int, default=1000
         Largest number of epochs.
-    restarts : int, default=1
+    starts : int, default=1
         Number of trainings from different random weights, in parallel.
     combine : {"best", "mean"}, default="best"
-        The network of several restarts: that with the lowest validation loss, or the mean of all.
-    initialization : {"random", "ridge"}, default="random"
+        The network of several starts: that with the lowest validation loss, or the mean of all.
+    begin : {"random", "ridge"}, default="random"
         Weights with which a training begins: those of Nguyen and Widrow, or ridge regression.
     goal : float, default=0.0
         Training loss at which the training ends.
@@ -107,23 +121,23 @@ class NetworkRegressor(Decoder):
     >>> from decoupler import NetworkRegressor
     >>> X = np.random.default_rng(0).uniform(-1.0, 1.0, size=(500, 2))
     >>> y = np.tanh(X[:, 0] - 2.0 * X[:, 1])
-    >>> model = NetworkRegressor(hidden_nodes=2, random_state=0).fit(X[:400], y[:400])
+    >>> model = NetworkRegressor(hidden=2, random_state=0).fit(X[:400], y[:400])
     >>> model.score(X[400:], y[400:]) > 0.999
     True
     """
 
     def __init__(
         self,
-        hidden_nodes: int | str = 12,
+        hidden: int | str = 12,
         *,
         memory: str | Sequence[float | str] | None = None,
         budget: float = 60.0,
         method: str = "lm",
         method_settings: Mapping[str, float] | None = None,
         epochs: int = 1000,
-        restarts: int = 1,
+        starts: int = 1,
         combine: str = "best",
-        initialization: str = "random",
+        begin: str = "random",
         goal: float = 0.0,
         min_gradient: float = 1e-7,
         max_fail: int = 6,
@@ -136,15 +150,15 @@ class NetworkRegressor(Decoder):
         random_state: Any = None,
         callback: Callback | None = None,
     ) -> None:
-        self.hidden_nodes = hidden_nodes
+        self.hidden = hidden
         self.memory = memory
         self.budget = budget
         self.method = method
         self.method_settings = method_settings
         self.epochs = epochs
-        self.restarts = restarts
+        self.starts = starts
         self.combine = combine
-        self.initialization = initialization
+        self.begin = begin
         self.goal = goal
         self.min_gradient = min_gradient
         self.max_fail = max_fail
@@ -218,30 +232,22 @@ class NetworkRegressor(Decoder):
     def _settings(self, y: ArrayLike) -> dict[str, Any]:
         fraction = self.validation_fraction
         settings = self.method_settings or {}
-        is_auto = isinstance(self.hidden_nodes, str)
-        if is_auto and self.hidden_nodes != "auto":
-            raise ValueError(f"hidden_nodes: {self.hidden_nodes!r} is not a number; give one, or 'auto'")
+        is_auto = isinstance(self.hidden, str)
+        if is_auto and self.hidden != "auto":
+            raise ValueError(f"hidden: {self.hidden!r} is not a number; give one, or 'auto'")
         words = [self.memory] if isinstance(self.memory, str) else self.memory
         memory = None if words is None else [str(word) for word in words]
+        run = {name: getattr(self, name) for name in SETTINGS}
+        run["hidden"] = None if is_auto else self.hidden
         return {
-            "hidden_nodes": None if is_auto else count("hidden_nodes", self.hidden_nodes, 1),
+            "run": [*texts(run), ("seed", str(seed_of(self.random_state)))],
             "memory": memory,
             "budget": number("budget", self.budget),
-            "method": str(self.method),
             "method_settings": [(str(name), number(name, settings[name])) for name in settings],
-            "epochs": count("epochs", self.epochs, 1),
-            "restarts": count("restarts", self.restarts, 1),
-            "combine": str(self.combine),
-            "initialization": str(self.initialization),
-            "goal": number("goal", self.goal),
-            "min_gradient": number("min_gradient", self.min_gradient),
-            "max_fail": count("max_fail", self.max_fail, 1),
             "validation_fraction": None if fraction is None else number("validation_fraction", fraction),
             "split": str(self.split),
             "inputs": str(self.inputs),
-            "scaling": str(self.scaling),
             "intervals": str(self.intervals),
-            "seed": seed_of(self.random_state),
             "input_names": self._reading_names(),
             "target_names": target_names(y),
         }

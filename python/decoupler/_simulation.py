@@ -5,7 +5,7 @@ from typing import NamedTuple
 from numpy.typing import ArrayLike
 
 from . import _native
-from ._arrays import count, group_numbers, matrix, row_wires, seed_of
+from ._arrays import group_numbers, matrix, row_wires, seed_of, texts
 from ._samples import Samples, samples
 from ._sensor import SensorArray
 
@@ -103,25 +103,21 @@ def simulate(
     """
     sensor = array if isinstance(array, SensorArray) else SensorArray(array)
 
-    def optional(name: str, value: int | None, lowest: int) -> int | None:
-        return None if value is None else count(name, value, lowest)
-
     settings = {
-        "preset": preset,
-        "samples": optional("samples", samples, 1),
-        "validation_samples": optional("validation_samples", validation_samples, 0),
-        "test_samples": optional("test_samples", test_samples, 1),
-        "rows": None if rows is None else str(rows),
+        "samples": samples,
+        "validation_samples": validation_samples,
+        "test_samples": test_samples,
+        "rows": rows,
         "axes": axes,
         "loading": loading,
-        "noise": float(noise),
-        "noise_ohm": float(noise_ohm),
-        "adc_bits": None if adc_bits is None else min(count("adc_bits", adc_bits, 1), 255),
-        "drift": float(drift),
+        "noise": noise,
+        "noise_ohm": noise_ohm,
+        "adc_bits": adc_bits,
+        "drift": drift,
         "noise_in": noise_in,
         "seed": seed_of(seed),
     }
-    train, validation, test, stroke_mm = _native.simulate(sensor._sensor(), settings)
+    train, validation, test, stroke_mm = _native.simulate(sensor._sensor(), str(preset), texts(settings))
     held_out = None if validation is None else _samples(validation)
     return Simulated(_samples(train), held_out, _samples(test), stroke_mm)
 

@@ -35,7 +35,7 @@ print("condition number of a row-wire", round(sensor.identifiability(row=4).cond
 # ## Training
 
 # %%
-model = NetworkRegressor(hidden_nodes=12, epochs=200, inputs="resistance", random_state=1)
+model = NetworkRegressor(hidden=12, epochs=200, inputs="resistance", random_state=1)
 model.fit(data.train.X, data.train.y, validation=data.validation)
 answers = model.predict(data.test.X)
 found = errors(data.test.y, answers, stroke_mm=data.stroke_mm)
@@ -68,14 +68,14 @@ for plot, (title, coordinates) in zip(axes, surfaces.items(), strict=True):
 # Samples of one snapshot share a deformation, so folds keep them together.
 
 # %%
-quick = NetworkRegressor(hidden_nodes=8, epochs=40, inputs="resistance", random_state=1)
+quick = NetworkRegressor(hidden=8, epochs=40, inputs="resistance", random_state=1)
 folds = list(GroupKFold(3).split(data.train.X, groups=data.train.groups))
 scores = cross_val_score(quick, data.train.X, data.train.y, cv=folds)
 print("R2 in each fold", np.round(scores, 3))
 
-search = GridSearchCV(quick, {"hidden_nodes": [4, 8, 16]}, cv=folds)
+search = GridSearchCV(quick, {"hidden": [4, 8, 16]}, cv=folds)
 search.fit(data.train.X, data.train.y)
-print("best number of hidden nodes", search.best_params_["hidden_nodes"])
+print("best number of hidden nodes", search.best_params_["hidden"])
 
 # %% [markdown]
 # ## Export

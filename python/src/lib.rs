@@ -6,6 +6,7 @@
 //! | `work` | work without the interpreter lock, exceptions |
 //! | `arrays` | samples in NumPy arrays |
 //! | `network`, `training`, `saving`, `decoders` | trained networks, their training, their files, the other decoders |
+//! | `settings` | settings by their names |
 //! | `sensor`, `simulation`, `recording` | sensor model, simulated samples, recorded samples |
 
 mod arrays;
@@ -14,6 +15,7 @@ mod network;
 mod recording;
 mod saving;
 mod sensor;
+mod settings;
 mod simulation;
 mod training;
 mod work;
@@ -35,9 +37,10 @@ mod _native {
     use super::{
         decoders::{FittedDecoder, fit_decoder},
         network::{Network, load_network},
-        recording::import_recording,
+        recording::{import_recording, read_recording},
         run_program,
         sensor::{Sensor, default_geometry, node_errors},
+        settings::default_settings,
         simulation::simulate,
         training::{Training, train},
     };

@@ -284,7 +284,7 @@ impl Network {
 
     /// Number of hidden nodes of each network.
     #[getter]
-    fn hidden_nodes(&self) -> usize {
+    fn hidden(&self) -> usize {
         self.record.networks.at(0).mlp().shape().hidden
     }
 
@@ -407,7 +407,7 @@ impl Network {
             Some(rows) => format!(", one for each of {} row-wires", rows.len()),
             None => String::new(),
         };
-        format!("<Network {inputs}-{}-{targets}{networks}>", self.hidden_nodes())
+        format!("<Network {inputs}-{}-{targets}{networks}>", self.hidden())
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {

@@ -8,7 +8,7 @@ use std::{
 use decoupler_core::{dataset::Seed, problem::Channel};
 use decoupler_files::{
     export::RecipeFile,
-    import::{ImportError, Recording},
+    import::{ImportError, Plan, Recording},
 };
 use numpy::ToPyArray;
 use pyo3::{prelude::*, types::PyDict};
@@ -22,6 +22,17 @@ use crate::{
 #[pyfunction]
 pub fn import_recording<'py>(py: Python<'py>, recipe: PathBuf, seed: u64) -> PyResult<Bound<'py, PyDict>> {
     let plan = detached(py, || RecipeFile::load_recording(&recipe))?;
+    divided(py, &plan, seed)
+}
+
+/// Imports a recording; `plan` is the JSON that a recipe has under `recording`, with paths relative to the working folder.
+#[pyfunction]
+pub fn read_recording<'py>(py: Python<'py>, plan: &str, seed: u64) -> PyResult<Bound<'py, PyDict>> {
+    let plan: Plan = serde_json::from_str(plan).map_err(value_error)?;
+    divided(py, &plan, seed)
+}
+
+fn divided<'py>(py: Python<'py>, plan: &Plan, seed: u64) -> PyResult<Bound<'py, PyDict>> {
     let sets = detached(py, || {
         let mut interrupted = None;
         let sets = plan.sets(

@@ -1,10 +1,9 @@
 //! Samples of a simulated array.
 
 use decoupler_core::{
-    dataset::{Dataset, Seed},
+    dataset::Dataset,
     evaluation::{Preset, RunSets, RunSettings},
     job::Job,
-    scene::{Loading, Movement, Noise, NoisySets, Rows},
     text::Named,
 };
 use decoupler_files::machine::memory_budget;
@@ -13,66 +12,30 @@ use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
     sensor::Sensor,
+    settings::{self, Given},
     work::{detached, value_error},
 };
 
-/// Settings of a simulation, under the names of the arguments in Python; `None` for the value of the preset.
-#[derive(FromPyObject)]
-#[pyo3(from_item_all)]
-struct Settings {
-    preset: String,
-    samples: Option<usize>,
-    validation_samples: Option<usize>,
-    test_samples: Option<usize>,
-    rows: Option<String>,
-    axes: Option<String>,
-    loading: Option<String>,
-    noise: f64,
-    noise_ohm: f64,
-    adc_bits: Option<u8>,
-    drift: f64,
-    noise_in: String,
-    seed: u64,
-}
-
-impl Settings {
-    /// Settings as the program makes them from the same values.
-    fn run(&self, sensor: &Sensor) -> PyResult<RunSettings> {
-        let noise = Noise {
-            relative: self.noise,
-            additive_ohm: self.noise_ohm,
-            converter_bits: self.adc_bits,
-            drift: self.drift,
-            sets: match self.noise_in.as_str() {
-                "both" => NoisySets::Both,
-                "training" => NoisySets::Training,
-                "test" => NoisySets::Test,
-                other => return Err(value_error(format!("noise_in: '{other}': give both, training or test"))),
-            },
-        };
-        let preset: Preset = Preset::parse(&self.preset).map_err(value_error)?;
-        let mut source = preset.simulation_in(noise);
-        source.sensor = sensor.0;
-        source.samples = self.samples.unwrap_or(source.samples);
-        source.validation_samples = self.validation_samples.unwrap_or(source.validation_samples);
-        source.test_samples = self.test_samples.unwrap_or(source.test_samples);
-        let scene = &mut source.scene;
-        if let Some(rows) = &self.rows {
-            scene.rows = rows.parse::<Rows>().map_err(value_error)?;
+/// Settings of a simulation of `sensor`, with what is given in Python; the rest is that of the preset at this noise.
+fn settings_of(sensor: &Sensor, preset: &str, given: &Given) -> PyResult<RunSettings> {
+    let preset: Preset = Preset::parse(preset).map_err(value_error)?;
+    let with = |base: RunSettings| {
+        let mut settings = base;
+        if let Some(simulation) = settings.simulation_mut() {
+            simulation.sensor = sensor.0;
         }
-        if let Some(axes) = &self.axes {
-            scene.movement = Movement::parse(axes).map_err(value_error)?;
-        }
-        if let Some(loading) = &self.loading {
-            scene.loading = loading.parse::<Loading>().map_err(value_error)?;
-        }
-        scene.check().map_err(value_error)?;
-        Ok(RunSettings {
-            source: source.into(),
-            seed: Seed(self.seed),
-            ..preset.settings_in(noise)
-        })
+        settings::apply(&mut settings, given)?;
+        Ok::<_, PyErr>(settings)
+    };
+    // As many samples as the noise requires.
+    let noise = with(preset.settings())?
+        .simulation()
+        .map(|simulation| simulation.scene.noise);
+    let settings = with(preset.settings_in(noise.unwrap_or_default()))?;
+    if let Some(simulation) = settings.simulation() {
+        simulation.scene.check().map_err(value_error)?;
     }
+    Ok(settings)
 }
 
 /// Arrays of a set: readings, targets, row-wires and snapshots, both from 0.
@@ -95,9 +58,10 @@ pub fn arrays<'py>(py: Python<'py>, set: &Dataset) -> PyResult<Bound<'py, PyDict
 pub fn simulate<'py>(
     py: Python<'py>,
     sensor: &Sensor,
-    settings: &Bound<'py, PyAny>,
+    preset: &str,
+    settings: Given,
 ) -> PyResult<(Bound<'py, PyDict>, Option<Bound<'py, PyDict>>, Bound<'py, PyDict>, f64)> {
-    let settings = settings.extract::<Settings>()?.run(sensor)?;
+    let settings = settings_of(sensor, preset, &settings)?;
     let stroke_mm = settings.drawn().map_err(value_error)?.stroke_mm();
     let sets = detached(py, || RunSets::draw(&settings, memory_budget(), &Job::UNINTERRUPTED))?;
     let validation = sets.split.validation.as_ref();

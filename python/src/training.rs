@@ -3,18 +3,18 @@
 use std::sync::{Mutex, PoisonError};
 
 use decoupler_core::{
-    dataset::{Dataset, History, Memory, Seed, Split, SplitBy},
+    dataset::{Dataset, History, Memory, Split, SplitBy},
     evaluation::{
-        Combination, Initialization, Intervals, Run, RunError, RunSets, RunSettings, TrainingSize, Workload,
+        Intervals, Run, RunError, RunSets, RunSettings, TrainingSize, Workload,
         auto::{AutoChoice, AutoFixed, AutoSamples, choose_settings},
     },
     job::Job,
-    network::{Quantity, ScalingChoice},
+    network::Quantity,
     problem::{Channel, Problem},
     scene::RowModel,
     settings::Value,
     text::Named,
-    training::{EpochRecord, Method, StoppingRules},
+    training::{EpochRecord, Method},
 };
 use decoupler_files::machine::memory_budget;
 use numpy::{IntoPyArray, PyArray1};
@@ -24,6 +24,7 @@ use crate::{
     arrays::{Matrix, Samples, parts},
     network::Network,
     saving::{self, Origin, division, samples_crc32},
+    settings::{self, Given},
     work::{detached, value_error},
 };
 
@@ -31,26 +32,17 @@ use crate::{
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 struct Settings {
-    /// `None` to choose settings by cross-validation.
-    hidden_nodes: Option<usize>,
+    /// Settings of network and training, by their names in the table of settings; without `hidden`, settings are chosen by
+    /// cross-validation.
+    run: Given,
     /// Time constants of a memory, `none` or `auto`.
     memory: Option<Vec<String>>,
     budget: f64,
-    method: String,
     method_settings: Option<Vec<(String, f64)>>,
-    epochs: usize,
-    restarts: usize,
-    combine: String,
-    initialization: String,
-    goal: f64,
-    min_gradient: f64,
-    max_fail: usize,
     validation_fraction: Option<f64>,
     split: String,
     inputs: String,
-    scaling: String,
     intervals: String,
-    seed: u64,
     /// Names of the readings, where known.
     input_names: Option<Vec<String>>,
     /// Names of the targets, where known.
@@ -66,27 +58,20 @@ impl Settings {
             RowModel::Shared
         };
         let mut settings = RunSettings::measured(rows);
-        settings.choose_method(self.method()?);
+        settings::apply(&mut settings, &self.run)?;
         let method = &mut settings.training.method;
         for (name, value) in self.method_settings.iter().flatten() {
             set(method, name, *value)?;
         }
-        settings.training.stopping = StoppingRules {
-            epochs: self.epochs,
-            goal_mse: self.goal,
-            min_gradient: self.min_gradient,
-            max_fail: self.max_fail,
-        };
         settings.training.check().map_err(value_error)?;
-        settings.hidden = self.hidden_nodes.unwrap_or(settings.hidden);
-        settings.starts = self.restarts;
-        settings.combine = Combination::parse(&self.combine).map_err(value_error)?;
-        settings.initialization = Initialization::parse(&self.initialization).map_err(value_error)?;
         settings.inputs.quantity = quantity(&self.inputs)?;
-        settings.inputs.scaling = ScalingChoice::parse(&self.scaling).map_err(value_error)?;
-        settings.seed = Seed(self.seed);
         settings.check_counts().map_err(value_error)?;
         Ok(settings)
+    }
+
+    /// Returns `true` if settings are chosen by cross-validation.
+    fn is_auto(&self) -> bool {
+        self.run.iter().all(|(name, _)| name != "hidden")
     }
 
     /// Memory that is given, and whether a choice of settings tries some.
@@ -95,9 +80,9 @@ impl Settings {
         match Vec::from_iter(words)[..] {
             [] => Ok((None, false)),
             ["none"] => Ok((Some(Memory::default()), false)),
-            ["auto"] if self.hidden_nodes.is_none() => Ok((None, true)),
+            ["auto"] if self.is_auto() => Ok((None, true)),
             ["auto"] => Err(value_error(
-                "memory: \"auto\" is for hidden_nodes=\"auto\"; give time constants",
+                "memory: \"auto\" is for hidden=\"auto\"; give time constants",
             )),
             ref spans => {
                 let averages = spans
@@ -112,10 +97,6 @@ impl Settings {
                 Ok((Some(memory), false))
             }
         }
-    }
-
-    fn method(&self) -> PyResult<Method> {
-        Method::named(&self.method).map_err(value_error)
     }
 
     /// `true` if intervals are to be calibrated.
@@ -245,10 +226,10 @@ pub fn train(
     let usual = run_settings.validation_fraction();
     let division = division(by, settings.validation_fraction.unwrap_or(usual));
     let (given, tries_memory) = settings.memory()?;
-    let is_auto = settings.hidden_nodes.is_none();
+    let is_auto = settings.is_auto();
     if (is_auto || given.is_some()) && (validation.is_some() || samples.row_wires.is_some()) {
         return Err(PyValueError::new_err(
-            "hidden_nodes=\"auto\" and memory are for one network, without validation samples given apart: leave out rows \
+            "hidden=\"auto\" and memory are for one network, without validation samples given apart: leave out rows \
              and validation",
         ));
     }

@@ -24,7 +24,7 @@ def curve() -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.fixture
 def quick() -> NetworkRegressor:
-    return NetworkRegressor(hidden_nodes=4, epochs=20, random_state=5)
+    return NetworkRegressor(hidden=4, epochs=20, random_state=5)
 
 
 def program(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:

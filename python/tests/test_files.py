@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from conftest import program
 
-from decoupler import NetworkRegressor, import_recording, load_network
+from decoupler import NetworkRegressor, import_recording, load_network, read_recording
 
 NAMES = ["a", "b", "c"]
 TARGETS = ["force", "angle"]
@@ -48,7 +48,7 @@ def trained(folder, *settings):
     [
         ({}, ["--epochs", "1000", "--method", "lm"]),
         (
-            {"hidden_nodes": 5, "restarts": 3, "random_state": 7, "epochs": 25},
+            {"hidden": 5, "starts": 3, "random_state": 7, "epochs": 25},
             ["--hidden", "5", "--starts", "3", "--seed", "7", "--epochs", "25", "--method", "lm"],
         ),
         (
@@ -56,7 +56,7 @@ def trained(folder, *settings):
             ["--method", "br", "--epochs", "20", "--scaling", "whiten"],
         ),
         (
-            {"split": "group", "epochs": 20, "random_state": 3, "combine": "mean", "restarts": 2},
+            {"split": "group", "epochs": 20, "random_state": 3, "combine": "mean", "starts": 2},
             [
                 "--group",
                 "press",
@@ -75,7 +75,7 @@ def trained(folder, *settings):
             ],
         ),
         (
-            {"initialization": "ridge", "epochs": 20, "method_settings": {"mu_decrease": 0.5}},
+            {"begin": "ridge", "epochs": 20, "method_settings": {"mu_decrease": 0.5}},
             ["--begin", "ridge", "--epochs", "20", "--method", "lm", "--set", "mu-decrease=0.5"],
         ),
     ],
@@ -220,6 +220,15 @@ def test_a_recording_is_imported_with_the_division_of_the_program(folder, record
     np.testing.assert_array_equal(recording.test.X, train[NAMES][150:])
     with pytest.raises(ValueError, match="cannot read"):
         import_recording(folder / "none.json")
+    read = read_recording(folder / "train.csv", inputs=["a..c"], targets=TARGETS, test_fraction=0.25)
+    for found, expected in zip((read.train, read.validation, read.test), (recording.train, recording.validation, recording.test)):
+        np.testing.assert_array_equal(found.X, expected.X)
+        np.testing.assert_array_equal(found.y, expected.y)
+    halves = read_recording([folder / "train.csv"] * 2, inputs=["a"], targets=TARGETS[:1], where=["b>2"])
+    large = train[NAMES[1]] > 2
+    assert len(halves.all.X) == 2 * large.sum()
+    with pytest.raises(ValueError, match="no column"):
+        read_recording(folder / "train.csv", inputs=["z"], targets=TARGETS)
     (folder / "recipe.json").write_text(json.dumps(RECIPE).replace("train.csv", "none.csv"))
     with pytest.raises(ValueError, match=r"none\.csv"):
         import_recording(folder / "recipe.json")

@@ -16,10 +16,11 @@ from sklearn.base import clone
 from sklearn.exceptions import ConvergenceWarning, NotFittedError
 from sklearn.model_selection import GridSearchCV, cross_val_score
 
-from decoupler import FuzzyDecoder, NetworkRegressor, RadialBasisDecoder, RidgeDecoder
+from decoupler import FuzzyDecoder, NetworkRegressor, RadialBasisDecoder, RidgeDecoder, _native
+from decoupler._regressor import SETTINGS
 
 ALL = [
-    NetworkRegressor(hidden_nodes=4, epochs=20, random_state=5),
+    NetworkRegressor(hidden=4, epochs=20, random_state=5),
     RidgeDecoder(),
     RadialBasisDecoder(random_state=5),
     FuzzyDecoder(random_state=5),
@@ -103,10 +104,10 @@ class TestAllEstimators:
 
 def test_known_row_wires_are_trained_apart(small):
     train, test = small.train, small.test
-    model = NetworkRegressor(hidden_nodes=4, epochs=30, rows=-1, random_state=0)
+    model = NetworkRegressor(hidden=4, epochs=30, rows=-1, random_state=0)
     answers = model.fit(train.with_rows(), train.y).predict(test.with_rows())
     assert model.network_.row_wires == [0, 1, 2, 3]
-    shared = NetworkRegressor(hidden_nodes=4, epochs=30, random_state=0).fit(train.X, train.y)
+    shared = NetworkRegressor(hidden=4, epochs=30, random_state=0).fit(train.X, train.y)
     z = slice(2, None, 3)
     own, common = (np.abs(a - test.y)[:, z].mean() for a in (answers, shared.predict(test.X)))
     assert own < common
@@ -115,9 +116,9 @@ def test_known_row_wires_are_trained_apart(small):
 def test_parameters_are_stored_unchanged_and_settings_reach_the_training(curve):
     X, y = curve
     settings = {"mu_decrease": 0.5}
-    model = NetworkRegressor(method_settings=settings, hidden_nodes="twelve")
+    model = NetworkRegressor(method_settings=settings, hidden="twelve")
     assert model.method_settings is settings
-    assert model.hidden_nodes == "twelve"
+    assert model.hidden == "twelve"
     usual = NetworkRegressor(epochs=5, random_state=0).fit(X, y)
     other = NetworkRegressor(epochs=5, random_state=0, method_settings=settings).fit(X, y)
     assert (usual.loss_curve_ != other.loss_curve_).any()
@@ -126,18 +127,18 @@ def test_parameters_are_stored_unchanged_and_settings_reach_the_training(curve):
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"hidden_nodes": 0}, "hidden_nodes is 0"),
-        ({"hidden_nodes": 1.5}, "hidden_nodes is 1.5"),
-        ({"hidden_nodes": 10_000}, "hidden nodes: 10000 is not possible, give from 1 to"),
+        ({"hidden": 0}, "hidden is 0"),
+        ({"hidden": 1.5}, "hidden: '1.5' is not a whole number"),
+        ({"hidden": 10_000}, "hidden is 1e4: it must be from 1 to 512"),
         ({"method": "adam"}, "'adam' is not a training method: give lm"),
         ({"method_settings": {"nu": 1}}, "lm has no setting 'nu'; it has mu"),
         ({"method_settings": {"mu": -1}}, "mu"),
         ({"epochs": 0}, "epochs is 0"),
-        ({"restarts": 101}, "starts: 101"),
+        ({"starts": 101}, "starts is 101"),
         ({"combine": "median"}, "give best or mean"),
-        ({"initialization": "zeros"}, "give random or ridge"),
+        ({"begin": "zeros"}, "give random or ridge"),
         ({"goal": -1.0}, "goal is -1"),
-        ({"min_gradient": "small"}, "min_gradient is 'small'"),
+        ({"min_gradient": "small"}, "min gradient: 'small' is not a number"),
         ({"validation_fraction": 1.0}, "validation fraction 1"),
         ({"split": "group"}, "give the group of each sample"),
         ({"split": "rows"}, "give time, group or random"),
@@ -229,8 +230,8 @@ def test_searches_and_cross_validation(curve):
     X, y = curve
     scores = cross_val_score(NetworkRegressor(6, epochs=40, random_state=0), X, y, cv=3, n_jobs=2)
     assert (scores > 0.9).all()
-    search = GridSearchCV(NetworkRegressor(epochs=30, random_state=0), {"hidden_nodes": [1, 6]}, cv=3).fit(X, y)
-    assert search.best_params_ == {"hidden_nodes": 6}
+    search = GridSearchCV(NetworkRegressor(epochs=30, random_state=0), {"hidden": [1, 6]}, cv=3).fit(X, y)
+    assert search.best_params_ == {"hidden": 6}
 
 
 def test_the_callback_sees_every_epoch_and_can_end_the_training(curve):
@@ -290,8 +291,15 @@ def test_ctrl_c_reaches_a_training_without_a_callback():
     assert subprocess.run([sys.executable, "-c", script], timeout=120).returncode == 0
 
 
+def test_names_and_defaults_are_those_of_the_program():
+    defaults = dict(_native.default_settings())
+    parameters = NetworkRegressor().get_params()
+    for name in SETTINGS:
+        assert str(type(parameters[name])(defaults[name])) == str(parameters[name]), name
+
+
 def fit_one(seed, X, y):
-    return NetworkRegressor(5, epochs=15, restarts=2, random_state=seed).fit(X, y).loss_curve_
+    return NetworkRegressor(5, epochs=15, starts=2, random_state=seed).fit(X, y).loss_curve_
 
 
 def test_a_hundred_fits_in_threads_and_processes_give_the_same_numbers(curve):

@@ -8,7 +8,7 @@ from decoupler import FuzzyDecoder, NetworkRegressor, RadialBasisDecoder, RidgeD
 ESTIMATORS = [
     NetworkRegressor(epochs=100, random_state=0),
     NetworkRegressor(method="br", epochs=50, random_state=0),
-    NetworkRegressor(method="scg", scaling="whiten", restarts=2, random_state=0),
+    NetworkRegressor(method="scg", scaling="whiten", starts=2, random_state=0),
     RidgeDecoder(),
     RadialBasisDecoder(random_state=0),
     FuzzyDecoder(random_state=0),
