@@ -1,8 +1,10 @@
 //! Samples in NumPy arrays.
 
+use std::{num::NonZero, panic::resume_unwind, thread};
+
 use decoupler_core::{
     dataset::{Dataset, Division, Seed, Split},
-    decoupling::{DecodeError, Decoder},
+    decoupling::{DecodeError, Decoder as _, ProgramDecoder},
 };
 use ndarray::{Array2, ArrayView2, Axis, Slice};
 use numpy::PyReadonlyArray2;
@@ -69,7 +71,13 @@ impl MatrixView<'_> {
         values.clear();
         let rows = Slice::from(first..end);
         match self {
-            Self::Double(view) => values.extend(view.slice_axis(Axis(0), rows)),
+            Self::Double(view) => {
+                let rows = view.slice_axis(Axis(0), rows);
+                match rows.as_slice() {
+                    Some(rows) => values.extend_from_slice(rows),
+                    None => values.extend(rows),
+                }
+            }
             Self::Single(view) => values.extend(view.slice_axis(Axis(0), rows).iter().map(|&value| f64::from(value))),
         }
     }
@@ -165,23 +173,57 @@ impl Samples<'_> {
 }
 
 /// Decodes readings (samples × channels), each of the row-wire with its index among those read, 0 if `row_indices` is
-/// `None`. Returns samples × outputs.
+/// `None`. Returns samples × outputs. Many samples are decoded on all cores.
 ///
 /// # Errors
 /// If a reading cannot be decoded; `row_index` is then the index of the sample.
 pub fn decode(
-    decoder: &mut dyn Decoder,
+    decoder: &mut ProgramDecoder,
     readings: MatrixView<'_>,
     row_indices: Option<&[usize]>,
 ) -> Result<Array2<f64>, DecodeError> {
-    /// Samples that are decoded at once.
-    const BLOCK: usize = 1024;
+    /// Samples for which a thread is worth its start.
+    const OF_THREAD: usize = 2048;
     let (samples, outputs) = (readings.dim().0, decoder.outputs());
     let mut answers = vec![0.0; samples * outputs];
-    let shared = vec![0; BLOCK.min(samples)];
+    let cores = thread::available_parallelism().map_or(1, NonZero::get);
+    let threads = cores.min(samples / OF_THREAD).max(1);
+    let share = samples.div_ceil(threads).max(1);
+    let mut parts = answers.chunks_mut(share * outputs).zip((0..).step_by(share));
+    let own = parts.next();
+    thread::scope(|scope| {
+        let others = parts.map(|(answers, first)| {
+            let mut decoder = decoder.clone();
+            scope.spawn(move || decode_part(&mut decoder, readings, row_indices, first, answers))
+        });
+        let others = Vec::from_iter(others);
+        let mut decoded = own.map_or(Ok(()), |(answers, first)| {
+            decode_part(decoder, readings, row_indices, first, answers)
+        });
+        for other in others {
+            let other = other.join().unwrap_or_else(|panic| resume_unwind(panic));
+            decoded = decoded.and(other);
+        }
+        decoded
+    })?;
+    Ok(Array2::from_shape_vec((samples, outputs), answers).expect("samples × outputs answers"))
+}
+
+/// Decodes the samples from `first` on, as many as there is room in `answers`.
+fn decode_part(
+    decoder: &mut ProgramDecoder,
+    readings: MatrixView<'_>,
+    row_indices: Option<&[usize]>,
+    first: usize,
+    answers: &mut [f64],
+) -> Result<(), DecodeError> {
+    /// Samples that are decoded at once.
+    const BLOCK: usize = 1024;
+    let outputs = decoder.outputs();
+    let shared = vec![0; BLOCK.min(answers.len() / outputs)];
     let mut block = Vec::new();
     for (number, answers) in answers.chunks_mut(BLOCK * outputs).enumerate() {
-        let (first, count) = (number * BLOCK, answers.len() / outputs);
+        let (first, count) = (first + number * BLOCK, answers.len() / outputs);
         readings.copy_rows(first, first + count, &mut block);
         let row_indices = row_indices.map_or(&shared[..count], |indices| &indices[first..first + count]);
         decoder
@@ -191,7 +233,7 @@ pub fn decode(
                 ..error
             })?;
     }
-    Ok(Array2::from_shape_vec((samples, outputs), answers).expect("samples × outputs answers"))
+    Ok(())
 }
 
 /// Returns the index of each row-wire among those that a decoder knows.
