@@ -96,8 +96,9 @@ def read_recording(
 ) -> Recording:
     """Read a recording from text files, spreadsheets, or files of NumPy or MATLAB.
 
-    Columns are named as in the header, or c1, c2, ... if there is none; "c1..c8" is a range. What is not an argument here,
-    such as joined files and computed columns, is described in a recipe: see `import_recording`.
+    Columns are named as in the header, or c1, c2, ... if there is none; "c1..c8" is a range. What
+    is not an argument here, such as joined files and computed columns, is described in a recipe:
+    see `import_recording`.
 
     Parameters
     ----------

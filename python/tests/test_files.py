@@ -221,7 +221,8 @@ def test_a_recording_is_imported_with_the_division_of_the_program(folder, record
     with pytest.raises(ValueError, match="cannot read"):
         import_recording(folder / "none.json")
     read = read_recording(folder / "train.csv", inputs=["a..c"], targets=TARGETS, test_fraction=0.25)
-    for found, expected in zip((read.train, read.validation, read.test), (recording.train, recording.validation, recording.test)):
+    for part in ("train", "validation", "test"):
+        found, expected = getattr(read, part), getattr(recording, part)
         np.testing.assert_array_equal(found.X, expected.X)
         np.testing.assert_array_equal(found.y, expected.y)
     halves = read_recording([folder / "train.csv"] * 2, inputs=["a"], targets=TARGETS[:1], where=["b>2"])
