@@ -8,6 +8,7 @@ use crate::{
         errors::{extremes, mean},
     },
     numerics::means_differ,
+    text::format_number,
 };
 
 /// Errors of decoded values while a target rises (loading) and while it falls (unloading), and the hysteresis that is
@@ -153,9 +154,10 @@ impl HysteresisLoop {
     /// Returns a sentence on the hysteresis of the target of this name.
     pub fn sentence(&self, name: &str) -> String {
         format!(
-            "{name}: RMSE {:.4} while it rises and {:.4} while it falls; hysteresis of the decoded values {:.1} % of the \
-             range",
-            self.loading.rmse, self.unloading.rmse, self.percent_of_range
+            "{name}: RMSE {} while it rises and {} while it falls; hysteresis of the decoded values {:.1} % of the range",
+            format_number(self.loading.rmse),
+            format_number(self.unloading.rmse),
+            self.percent_of_range
         )
     }
 }

@@ -3,10 +3,11 @@ use crate::{
     dataset::{Dataset, SplitBy},
     evaluation::auto::{Fits, TriedModel},
     numerics::autocorrelation,
+    text::format_number,
 };
 
-/// Held-out errors of the better of ridge and kernel ridge regression on the same samples, for folds by group (by time without groups) and for random folds. The
-/// difference shows how optimistic a random split is.
+/// Held-out errors of the better of ridge and kernel ridge regression on the same samples, for folds by group (by time without
+/// groups) and for random folds. The difference shows how optimistic a random split is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SplitComparison {
     /// Rule of the folds that are not random.
@@ -58,22 +59,22 @@ impl SplitComparison {
 
     /// Returns a sentence on the error that a random split would have reported for the target of this name.
     pub fn sentence(&self, target: usize, name: &str) -> String {
-        let [honest, random] = self.rmse[target];
+        let [honest, random] = self.rmse[target].map(format_number);
         let (by, model) = (self.by, self.model);
         match self.ratios[target] {
             Some(ratio) if ratio.high < 1.0 && ratio.value < 1.0 - Self::MIN_OPTIMISM => format!(
-                "a random split would report an RMSE of {random:.4} for {name} by {model}; split by {by} it is {honest:.4}: the \
+                "a random split would report an RMSE of {random} for {name} by {model}; split by {by} it is {honest}: the \
                  random split is optimistic by {:.0} %{}",
                 100.0 * (1.0 - ratio.value),
                 self.cause(target)
             ),
             None => format!(
-                "split at random, the RMSE of {name} by {model} is {random:.4}, and split by {by} {honest:.4}: too few \
+                "split at random, the RMSE of {name} by {model} is {random}, and split by {by} {honest}: too few \
                  independent samples to judge the difference"
             ),
             Some(_) => format!(
-                "no significant difference between a random split (RMSE {random:.4} for {name} by {model}) and a split by {by} \
-                 ({honest:.4})"
+                "no significant difference between a random split (RMSE {random} for {name} by {model}) and a split by {by} \
+                 ({honest})"
             ),
         }
     }
