@@ -4,10 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::to_raw_value;
 
 use super::{
-    AtomicFile, DocumentError, DocumentKind,
-    document::PROGRAM,
-    network_file::{Sealed, settings_defect},
-    unfinished::folder_of,
+    AtomicFile, DocumentError, DocumentKind, document::PROGRAM, network_file::settings_defect, unfinished::folder_of,
 };
 use crate::import::{Progress, Recorded, Setup, SetupError, SetupSets};
 use decoupler_core::{
@@ -22,28 +19,21 @@ const KIND: DocumentKind = DocumentKind::Checkpoint;
 ///
 /// The file is JSON. It does not contain the samples: those of a simulated array follow from the settings, those of a recording
 /// are read again by its plan and recognised by their checksum. Another checksum (CRC-32) detects changes to the file.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct CheckpointFile {
     /// Program and version that wrote the file.
+    #[serde(skip)]
     pub program: String,
     /// Settings of the run, with the method and stopping rules of that epoch.
     pub settings: RunSettings,
     /// Origin of recorded samples, with absolute paths; `None` for a simulated array.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recorded: Option<Recorded>,
     /// Time that all starts together have taken: [`Run::wall_time`].
     pub wall_time: Option<Duration>,
     /// State of every trainer: by start, then, if there is a network for each row-wire, by row.
     pub starts: Vec<TrainerState>,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Document {
-    settings: RunSettings,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    recorded: Option<Recorded>,
-    wall_time: Option<Duration>,
-    starts: Vec<TrainerState>,
 }
 
 impl CheckpointFile {
@@ -98,17 +88,15 @@ impl CheckpointFile {
             path: path.to_owned(),
             defect: error.to_string(),
         };
-        let recorded = self.recorded.as_ref();
-        let run = to_raw_value(&Document {
-            settings: self.settings,
-            recorded: recorded.map(|recorded| recorded.relative_to(folder_of(path))),
-            wall_time: self.wall_time,
-            starts: self.starts.clone(),
-        });
-        let run = run.map_err(unsound)?;
+        let located = |recorded: &Recorded| recorded.relative_to(folder_of(path));
+        let file = Self {
+            recorded: self.recorded.as_ref().map(located),
+            ..self.clone()
+        };
+        let contents = to_raw_value(&file).map_err(unsound)?;
         // A weight that is not finite would be written as `null`, which cannot be read back.
-        serde_json::from_str::<Document>(run.get()).map_err(unsound)?;
-        Ok(Sealed::new(KIND, &self.program, &run).save(path, AtomicFile::commit)?)
+        serde_json::from_str::<Self>(contents.get()).map_err(unsound)?;
+        Ok(KIND.save(&self.program, &contents, path, AtomicFile::commit)?)
     }
 
     /// Reads the file at `path`.
@@ -116,20 +104,12 @@ impl CheckpointFile {
     /// # Errors
     /// The file cannot be read, is of another kind or version, or is damaged.
     pub fn load(path: &Path) -> Result<Self, DocumentError> {
-        let bytes = KIND.read(path)?;
-        Self::parse(&bytes, folder_of(path)).map_err(|defect| KIND.damaged(path, defect))
-    }
-
-    fn parse(bytes: &[u8], folder: &Path) -> Result<Self, String> {
-        let Sealed { program, run, .. } = Sealed::read(bytes)?;
-        let document: Document = serde_json::from_str(run.get()).map_err(|error| error.to_string())?;
-        let file = Self {
-            program,
-            settings: document.settings,
-            recorded: document.recorded.map(|recorded| recorded.within(folder)),
-            wall_time: document.wall_time,
-            starts: document.starts,
-        };
-        settings_defect(&file.settings, file.recorded.as_ref()).map_or(Ok(file), Err)
+        let (program, mut file): (_, Self) = KIND.load(path)?;
+        file.program = program;
+        file.recorded = file.recorded.map(|recorded| recorded.within(folder_of(path)));
+        match settings_defect(&file.settings, file.recorded.as_ref()) {
+            None => Ok(file),
+            Some(defect) => Err(KIND.damaged(path, defect)),
+        }
     }
 }

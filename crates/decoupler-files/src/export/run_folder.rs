@@ -11,11 +11,8 @@ use std::{
 
 use decoupler_core::text::clean_name;
 use serde::{Serialize, de::DeserializeOwned};
-use serde_json::value::to_raw_value;
 
-use super::{
-    AtomicFile, DocumentError, DocumentKind, NetworkFile, WriteError, document::PROGRAM, network_file::Sealed,
-};
+use super::{AtomicFile, DocumentError, DocumentKind, NetworkFile, WriteError, document::PROGRAM};
 use crate::{import::Setup, machine::system_cause};
 
 /// The finished trainings, and the two that are compared.
@@ -136,9 +133,14 @@ impl RunFolder {
                 return false;
             };
             let Some(file) = &run.file else { return false };
-            let written = file.save_by(&run_path(folder, id), AtomicFile::commit_new);
-            let named = written.and_then(|()| Ok(write(&name_path(folder, id), &run.name)?));
-            named.is_err() && !run_path(folder, id).exists()
+            match file.save_by(&run_path(folder, id), AtomicFile::commit_new) {
+                Ok(is_new) => {
+                    // A name that cannot be written lasts until the next look.
+                    let _ = is_new.then(|| write(&name_path(folder, id), &run.name));
+                    false
+                }
+                Err(_) => !run_path(folder, id).exists(),
+            }
         });
     }
 
@@ -267,9 +269,9 @@ impl RunFolder {
             if !self.kept.runs.iter().any(|run| run.id == id) {
                 let Some(folder) = &self.path else { return (id, Ok(())) };
                 match file.save_by(&run_path(folder, id), AtomicFile::commit_new) {
-                    Err(DocumentError::Write(error)) if error.is_taken() => {}
+                    Ok(false) => {}
                     Err(error) => return (id, Err(error)),
-                    Ok(()) => return (id, write(&name_path(folder, id), &name).map_err(Into::into)),
+                    Ok(true) => return (id, write(&name_path(folder, id), &name).map_err(Into::into)),
                 }
             }
             id = id.wrapping_add(1);
@@ -347,22 +349,22 @@ fn left_out(error: &DocumentError) -> String {
 const KIND: DocumentKind = DocumentKind::RunList;
 
 /// Network file of run `id`.
-pub(super) fn run_path(folder: &Path, id: u64) -> PathBuf {
+fn run_path(folder: &Path, id: u64) -> PathBuf {
     folder.join(format!("run-{id}.json"))
 }
 
 /// File with the name of run `id`.
-pub(super) fn name_path(folder: &Path, id: u64) -> PathBuf {
+fn name_path(folder: &Path, id: u64) -> PathBuf {
     folder.join(format!("run-{id}.name.json"))
 }
 
 /// File with the ids of the two runs that are compared.
-pub(super) fn pinned_path(folder: &Path) -> PathBuf {
+fn pinned_path(folder: &Path) -> PathBuf {
     folder.join("pinned.json")
 }
 
 /// Returns the ids of all runs in `folder`, in ascending order.
-pub(super) fn ids(folder: &Path) -> io::Result<Vec<u64>> {
+fn ids(folder: &Path) -> io::Result<Vec<u64>> {
     let mut ids = Vec::new();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
@@ -383,27 +385,18 @@ pub(super) fn ids(folder: &Path) -> io::Result<Vec<u64>> {
 }
 
 /// Writes a small value, sealed with a checksum.
-pub(super) fn write(path: &Path, value: &impl Serialize) -> Result<(), WriteError> {
-    let value = to_raw_value(value).map_err(|error| WriteError::io(path, error.into()))?;
-    Sealed::new(KIND, PROGRAM, &value).save(path, AtomicFile::commit)
+fn write(path: &Path, value: &impl Serialize) -> Result<(), WriteError> {
+    KIND.save(PROGRAM, value, path, AtomicFile::commit)
 }
 
 /// Reads what [`write`] has written; `None` if there is no file.
 ///
 /// # Errors
 /// The file cannot be read, is of another kind or version, or is damaged.
-pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, DocumentError> {
-    if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-        return Err(KIND.damaged(path, "it is not a file".to_owned()));
+fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, DocumentError> {
+    match fs::metadata(path) {
+        Ok(found) if !found.is_file() => Err(KIND.damaged(path, "it is not a file".to_owned())),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        _ => KIND.load(path).map(|(_, value)| Some(value)),
     }
-    let bytes = match KIND.read(path) {
-        Ok(bytes) => bytes,
-        Err(DocumentError::Read { source, .. }) if source.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(error),
-    };
-    let read = Sealed::read(&bytes).and_then(|sealed| {
-        let value = serde_json::from_str(sealed.run.get());
-        value.map_err(|error| error.to_string())
-    });
-    read.map(Some).map_err(|defect| KIND.damaged(path, defect))
 }

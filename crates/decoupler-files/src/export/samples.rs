@@ -108,15 +108,18 @@ fn write_numbers<'a>(numbers: impl IntoIterator<Item = &'a f64>, writer: &mut dy
 
 /// Record of a training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Document", into = "Document")]
+#[serde(deny_unknown_fields)]
 pub struct TrainingRecord {
     /// Reason why training ended; `None` while it runs.
     pub stop_reason: Option<StopReason>,
     /// Epoch of the best network.
     pub best_epoch: usize,
+    /// Number of epochs run: the last of the history.
+    pub epochs: usize,
     /// Training time on one thread in seconds, summed over the networks of all rows.
     pub seconds: f64,
     /// Record of every epoch, from the initial weights on.
+    #[serde(with = "decoupler_core::training::epoch_columns")]
     pub history: Vec<EpochRecord>,
     /// Training methods in the order in which they were used.
     pub stages: Vec<Stage>,
@@ -131,6 +134,7 @@ impl TrainingRecord {
         Self {
             stop_reason: run.stop_reason(),
             best_epoch: trainer.best_epoch(),
+            epochs: last_epoch(trainer.history()),
             seconds: trainer.elapsed().as_secs_f64(),
             history: trainer.history().to_vec(),
             stages: trainer.stages().to_vec(),
@@ -148,6 +152,7 @@ impl TrainingRecord {
         Self {
             stop_reason: Some(StopReason::Stopped),
             best_epoch: past.best_epoch,
+            epochs: last_epoch(&trainer.history()[..epochs]),
             seconds: past.elapsed.as_secs_f64(),
             history: trainer.history()[..epochs].to_vec(),
             stages: trainer.stages()[..stages].to_vec(),
@@ -155,60 +160,8 @@ impl TrainingRecord {
             starts: Vec::new(),
         }
     }
-
-    /// Number of epochs run.
-    pub fn epochs(&self) -> usize {
-        self.history.last().map_or(0, |record| record.epoch)
-    }
 }
 
-/// Layout of the record in files.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Document {
-    stop_reason: Option<StopReason>,
-    best_epoch: usize,
-    epochs: usize,
-    seconds: f64,
-    #[serde(with = "decoupler_core::training::epoch_columns")]
-    history: Vec<EpochRecord>,
-    stages: Vec<Stage>,
-    starts: Vec<StartRecord>,
-}
-
-impl From<TrainingRecord> for Document {
-    fn from(record: TrainingRecord) -> Self {
-        Self {
-            stop_reason: record.stop_reason,
-            best_epoch: record.best_epoch,
-            epochs: record.epochs(),
-            seconds: record.seconds,
-            history: record.history,
-            stages: record.stages,
-            starts: record.starts,
-        }
-    }
-}
-
-impl TryFrom<Document> for TrainingRecord {
-    type Error = String;
-
-    fn try_from(document: Document) -> Result<Self, String> {
-        let record = Self {
-            stop_reason: document.stop_reason,
-            best_epoch: document.best_epoch,
-            seconds: document.seconds,
-            history: document.history,
-            stages: document.stages,
-            starts: document.starts,
-        };
-        let (epochs, last) = (document.epochs, record.epochs());
-        if epochs == last {
-            Ok(record)
-        } else {
-            Err(format!(
-                "training.epochs: it is {epochs}, but the history ends with epoch {last}"
-            ))
-        }
-    }
+fn last_epoch(history: &[EpochRecord]) -> usize {
+    history.last().map_or(0, |record| record.epoch)
 }

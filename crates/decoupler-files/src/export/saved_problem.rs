@@ -2,11 +2,12 @@ use decoupler_core::{
     dataset::{Memory, Simulation},
     problem::{Channel, Problem, TargetPosition},
 };
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// A [`Problem`] as it is saved next to the settings of a run, which contain its sensor.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// Layout of a [`Problem`] that is saved next to the settings of a run, which contain its sensor: it contains only whether there
+/// is one. The sensor that is read is therefore the default one, to be replaced by that of the settings.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Problem", deny_unknown_fields)]
 pub struct SavedProblem {
     inputs: Vec<Channel>,
     targets: Vec<Channel>,
@@ -14,31 +15,19 @@ pub struct SavedProblem {
     memory: Option<Memory>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     positions: Vec<TargetPosition>,
-    #[serde(default)]
-    has_nodes: bool,
+    #[serde(
+        default,
+        rename = "has_nodes",
+        serialize_with = "is_known",
+        deserialize_with = "default_if_known"
+    )]
+    sensor: Option<Simulation>,
 }
 
-impl From<Problem> for SavedProblem {
-    fn from(problem: Problem) -> Self {
-        Self {
-            has_nodes: problem.has_nodes(),
-            inputs: problem.inputs,
-            targets: problem.targets,
-            memory: problem.memory,
-            positions: problem.positions,
-        }
-    }
+fn is_known<S: Serializer>(sensor: &Option<Simulation>, serializer: S) -> Result<S::Ok, S::Error> {
+    sensor.is_some().serialize(serializer)
 }
 
-impl SavedProblem {
-    /// Returns the problem with this sensor, if its targets are nodes; `None` if there is no sensor for them.
-    pub fn with_sensor(self, sensor: Option<&Simulation>) -> Option<Problem> {
-        Some(Problem {
-            sensor: if self.has_nodes { Some(*sensor?) } else { None },
-            inputs: self.inputs,
-            targets: self.targets,
-            memory: self.memory,
-            positions: self.positions,
-        })
-    }
+fn default_if_known<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Simulation>, D::Error> {
+    Ok(bool::deserialize(deserializer)?.then(Simulation::default))
 }

@@ -4,58 +4,65 @@ use decoupler_core::{
     text::format_percent,
 };
 
-use super::{Cell, Table, TableColumn};
+use super::{Cell, Table, TableColumn, table::Columns};
 
 /// Returns the candidates of a search as a table; the choice is marked.
 pub fn search_table(record: &AutoRecord) -> Table {
-    let columns = [
+    let network = |tried: &Tried| match tried.model {
+        TriedModel::Network { begin, epochs, .. } => Some((begin, epochs)),
+        _ => None,
+    };
+    let mut columns = Columns::<(usize, &Tried)>::new();
+    columns.add(
         TableColumn::new("share_percent", "share", "%")
             .meaning("Weight in the answer: the convex combination with the lowest error of held-out answers."),
+        |(_, tried)| match tried.share {
+            share if share > 0.0 => Cell::from(100.0 * share),
+            _ => Cell::from(""),
+        },
+    );
+    columns.add(
         TableColumn::new("features", "inputs", "").meaning("Quantity, memory and scaling of the inputs."),
+        |(_, tried)| tried.features(),
+    );
+    columns.add(
         TableColumn::new("model", "model", "").meaning(
             "Training mean, ridge, kernel ridge, or networks × hidden nodes and their training method; * marks the network that \
              is trained.",
         ),
+        |&(place, tried)| format!("{}{}", tried.model, if place == record.chosen { "*" } else { "" }),
+    );
+    columns.add(
         TableColumn::new("begin", "begins at", "")
             .meaning("Weights with which the trainings begin: random, or ridge regression with random weights added."),
+        |(_, tried)| network(tried).map_or(String::new(), |(begin, _)| begin.to_string()),
+    );
+    columns.add(
         TableColumn::new("error_percent", "error", "%").meaning(
             "Root mean square error of held-out answers in cross-validation, relative to the standard deviation of each \
              target: 100 % for always answering the mean.",
         ),
+        |(_, tried)| 100.0 * tried.error,
+    );
+    columns.add(
         TableColumn::new("standard_error_percent", "±", "%")
             .meaning("Standard error of the error, from the differences between folds."),
-        TableColumn::new("epochs", "epochs", "").meaning("Epoch with the lowest error, at which training stops; + if the budget cut off the candidate before."),
+        |(_, tried)| 100.0 * tried.standard_error,
+    );
+    columns.add(
+        TableColumn::new("epochs", "epochs", "").meaning(
+            "Epoch with the lowest error, at which training stops; + if the budget cut off the candidate before.",
+        ),
+        |(_, tried)| {
+            let cut_off = if tried.is_cut_off { "+" } else { "" };
+            network(tried).map_or(String::new(), |(_, epochs)| format!("{epochs}{cut_off}"))
+        },
+    );
+    columns.add(
         TableColumn::new("seconds", "time", "s").meaning("Estimated time on one core, counted against the budget."),
-    ];
-    let row = |(place, tried): (usize, &Tried)| -> Vec<Cell> {
-        let cut_off = if tried.is_cut_off { "+" } else { "" };
-        let (begin, epochs) = match tried.model {
-            TriedModel::Network { begin, epochs, .. } => {
-                (Cell::from(begin.to_string()), Cell::from(format!("{epochs}{cut_off}")))
-            }
-            _ => (Cell::from(""), Cell::from("")),
-        };
-        let share = if tried.share > 0.0 {
-            (100.0 * tried.share).into()
-        } else {
-            Cell::from("")
-        };
-        let mark = if place == record.chosen { "*" } else { "" };
-        vec![
-            share,
-            tried.features().into(),
-            format!("{}{mark}", tried.model).into(),
-            begin,
-            (100.0 * tried.error).into(),
-            (100.0 * tried.standard_error).into(),
-            epochs,
-            tried.seconds.into(),
-        ]
-    };
-    Table {
-        columns: columns.to_vec(),
-        rows: record.tried.iter().enumerate().map(row).collect(),
-    }
+        |(_, tried)| tried.seconds,
+    );
+    columns.table(record.tried.iter().enumerate())
 }
 
 /// Describes how the settings were chosen, in one sentence.

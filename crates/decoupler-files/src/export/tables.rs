@@ -10,37 +10,27 @@ use decoupler_core::{
         },
     },
     problem::{Channel, Problem, TargetPosition},
-    text::in_one_line,
     training::EpochRecord,
 };
-use serde::Deserialize;
-use serde_json::error::Category;
-
-use super::{Cell, Table, TableColumn, format_number};
+use super::{Cell, Table, TableColumn, format_number, table::Columns};
 use crate::import::{Recording, SetupSets};
 
 /// Returns the error table: a row for each decoder and baseline; for a recording, a row for each of them and each
 /// target.
 pub fn error_table(tables: &[ErrorTable]) -> Table {
-    let has_targets = tables.iter().any(|table| table.target.is_some());
-    let target = has_targets.then(|| TableColumn::new("target", "Target", ""));
-    let measures = tables.first().map_or(&[][..], |table| table.measures);
-    let row = |table: &ErrorTable, row: &ErrorRow| -> Vec<Cell> {
-        let target = has_targets.then(|| table.target.as_ref().map_or(String::new(), Channel::title).into());
-        let errors = row.errors.iter().zip(measures).map(error_cell);
-        target.into_iter().chain([row.name.into()]).chain(errors).collect()
-    };
-    let rows = tables
-        .iter()
-        .flat_map(|table| table.rows.iter().map(move |line| row(table, line)));
-    Table {
-        columns: target
-            .into_iter()
-            .chain([TableColumn::new("decoupler", "Decoder", "")])
-            .chain(measures.iter().copied().map(error_column))
-            .collect(),
-        rows: rows.collect(),
+    let mut columns = Columns::<(&ErrorTable, &ErrorRow)>::new();
+    if tables.iter().any(|table| table.target.is_some()) {
+        columns.add(("target", "Target", ""), |(table, _)| {
+            table.target.as_ref().map_or(String::new(), Channel::title)
+        });
     }
+    columns.add(("decoupler", "Decoder", ""), |(_, row)| row.name);
+    let measures = tables.first().map_or(&[][..], |table| table.measures);
+    for (place, &measure) in measures.iter().enumerate() {
+        columns.add(error_column(measure), move |(_, row)| error_cell(measure, row.errors[place]));
+    }
+    let rows = tables.iter().flat_map(|table| table.rows.iter().map(move |row| (table, row)));
+    columns.table(rows)
 }
 
 /// Returns the table of measured decoders: for an array a row for each, and the `model_based` errors if they exceed
@@ -55,74 +45,51 @@ pub fn decoder_table(problem: &Problem, reports: &[DecoderReport], model_based: 
 
 fn array_decoder_table(reports: &[DecoderReport], model_based: Option<&Errors>) -> Table {
     let model_based = model_based.filter(|errors| !errors.is_rounding());
-    let row = |report: &DecoderReport| {
-        let nodes = report.errors.nodes();
-        vec![
-            report.kind.name(report.precision).into(),
-            report.errors.percent().into(),
-            nodes.map(|errors| errors.z_mm).into(),
-            model_based.and_then(|model_based| nodes?.times(model_based)).into(),
-            report.residual.into(),
-            report.frame_us.into(),
-        ]
-    };
-    let of_model_based = model_based.map(|errors| {
-        let nothing = || Cell::Number(None);
-        vec![
-            "model-based".into(),
-            errors.z_percent.into(),
-            errors.z_mm.into(),
-            1.0.into(),
-            nothing(),
-            nothing(),
-        ]
+    // Without a report, the errors are those of the model-based decoder.
+    let mut columns = Columns::<(Option<&DecoderReport>, Option<&Errors>)>::new();
+    columns.add(("decoder", "Decoder", ""), |(report, _)| {
+        report.map_or("model-based", |report| report.kind.name(report.precision))
     });
-    let mut table = Table {
-        columns: vec![
-            TableColumn::new("decoder", "Decoder", ""),
-            TableColumn::new("z_percent", "Z", "%"),
-            TableColumn::new("z_mm", "Z", "mm"),
-            TableColumn::new("times_model_based", "times model-based", ""),
-            TableColumn::new("residual", "residual", ""),
-            TableColumn::new("frame_us", "a frame", "µs"),
-        ],
-        rows: reports.iter().map(row).chain(of_model_based).collect(),
-    };
-    if model_based.is_none() {
-        table.remove_column("times_model_based");
+    columns.add(("z_percent", "Z", "%"), |(report, errors)| match report {
+        Some(report) => report.errors.percent(),
+        None => errors.and_then(|errors| errors.z_percent),
+    });
+    columns.add(("z_mm", "Z", "mm"), |(_, errors)| errors.map(|errors| errors.z_mm));
+    if let Some(model_based) = model_based {
+        let times = ("times_model_based", "times model-based", "");
+        columns.add(times, |(report, errors)| match report {
+            Some(_) => errors.and_then(|errors| errors.times(model_based)),
+            None => Some(1.0),
+        });
     }
-    table
+    columns.add("residual", |(report, _)| report.and_then(|report| report.residual));
+    columns.add(("frame_us", "a frame", "µs"), |(report, _)| report.map(|report| report.frame_us));
+    let rows = reports.iter().map(|report| (Some(report), report.errors.nodes()));
+    columns.table(rows.chain(model_based.map(|errors| (None, Some(errors)))))
 }
 
 fn recording_decoder_table(problem: &Problem, reports: &[DecoderReport]) -> Table {
-    let measures = [ErrorMeasure::Rmse, ErrorMeasure::R2, ErrorMeasure::RangePercent];
-    let row = |report: &DecoderReport, target: &Channel, errors: &TargetErrors| {
-        let names = [report.kind.name(report.precision).into(), target.title().into()];
-        let errors = measures.map(|measure| error_cell((&measure.of_target(errors), &measure)));
-        let times = [report.frame_us.into(), report.fit_seconds.into()];
-        Vec::from_iter(names.into_iter().chain(errors).chain(times))
-    };
+    let mut columns = Columns::<(&DecoderReport, (&Channel, &TargetErrors))>::new();
+    columns.add(("decoder", "Decoder", ""), |(report, _)| report.kind.name(report.precision));
+    columns.add(("target", "Target", ""), |(_, (target, _))| target.title());
+    for measure in [ErrorMeasure::Rmse, ErrorMeasure::R2, ErrorMeasure::RangePercent] {
+        columns.add(error_column(measure), move |(_, (_, errors))| {
+            error_cell(measure, measure.of_target(errors))
+        });
+    }
+    columns.add(("frame_us", "a frame", "µs"), |(report, _)| report.frame_us);
+    columns.add(("fit_seconds", "fit", "s"), |(report, _)| report.fit_seconds);
     let rows = reports.iter().flat_map(|report| {
         let targets = problem.targets.iter().zip(report.errors.targets());
-        targets.map(move |(target, errors)| row(report, target, errors))
+        targets.map(move |target| (report, target))
     });
-    let names =
-        [("decoder", "Decoder"), ("target", "Target")].map(|(field, heading)| TableColumn::new(field, heading, ""));
-    let times = [
-        TableColumn::new("frame_us", "a frame", "µs"),
-        TableColumn::new("fit_seconds", "fit", "s"),
-    ];
-    let errors = measures.map(error_column);
-    Table {
-        columns: names.into_iter().chain(errors).chain(times).collect(),
-        rows: rows.collect(),
-    }
+    columns.table(rows)
 }
 
-fn error_cell((error, measure): (&Option<f64>, &ErrorMeasure)) -> Cell {
+fn error_cell(measure: ErrorMeasure, error: Option<f64>) -> Cell {
     match measure {
-        ErrorMeasure::R2 => Cell::R2(*error),
-        _ => Cell::Number(*error),
+        ErrorMeasure::R2 => Cell::R2(error),
+        _ => Cell::Number(error),
     }
 }
 
@@ -140,8 +107,8 @@ pub fn write_loss_curves(history: &[EpochRecord], writer: &mut dyn Write) -> io:
         writer,
         "epoch,training_mse,validation_mse,test_mse,gradient_norm,parameter,effective_parameters"
     )?;
+    let text = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
     for record in history {
-        write!(writer, "{}", record.epoch)?;
         let values = [
             Some(record.training_mse),
             record.validation_mse,
@@ -150,78 +117,9 @@ pub fn write_loss_curves(history: &[EpochRecord], writer: &mut dyn Write) -> io:
             Some(record.parameter),
             record.effective_parameters,
         ];
-        for value in values {
-            write_optional(value, writer)?;
-        }
-        writeln!(writer)?;
+        writeln!(writer, "{},{}", record.epoch, values.map(text).join(","))?;
     }
     Ok(())
-}
-
-fn write_optional(value: Option<f64>, writer: &mut dyn Write) -> io::Result<()> {
-    match value {
-        Some(value) => write!(writer, ",{value:?}"),
-        None => write!(writer, ","),
-    }
-}
-
-/// Fields that identify a JSON file of Decoupler. They are read before the rest, which differs between versions.
-#[derive(Deserialize)]
-pub(super) struct Heading {
-    pub(super) format: serde_json::Value,
-    #[serde(default)]
-    pub(super) version: serde_json::Value,
-    #[serde(default)]
-    program: serde_json::Value,
-}
-
-/// Reasons why a file has no heading of Decoupler.
-pub(super) enum NoHeading {
-    /// Not JSON; the parser's message, with line and column.
-    NotJson(String),
-    /// JSON that ends too early, at this line and column, counted from 1.
-    CutOff { line: usize, column: usize },
-    /// JSON of another program.
-    Other,
-}
-
-impl Heading {
-    pub(super) fn read(bytes: &[u8]) -> Result<Self, NoHeading> {
-        serde_json::from_slice(bytes).map_err(|error| {
-            let cut_off = NoHeading::CutOff {
-                line: error.line(),
-                column: error.column(),
-            };
-            // The parser reports an incomplete number such as "1e" as invalid, but the file was cut off.
-            match error.classify() {
-                _ if bytes.trim_ascii().is_empty() => NoHeading::NotJson("it is empty".to_owned()),
-                Category::Eof => cut_off,
-                Category::Syntax if in_last_number(bytes, &error) => cut_off,
-                Category::Data => NoHeading::Other,
-                Category::Syntax | Category::Io => NoHeading::NotJson(error.to_string()),
-            }
-        })
-    }
-
-    /// The version, if it is another one.
-    pub(super) fn version_other_than(&self, known: u64) -> Option<String> {
-        (self.version.as_u64() != Some(known)).then(|| self.version.to_string())
-    }
-
-    /// The program that wrote it.
-    pub(super) fn program(&self) -> String {
-        in_one_line(self.program.as_str().unwrap_or("another program"))
-    }
-}
-
-/// Returns true if the parser stopped in a number at the end of the file, such as `1e`.
-fn in_last_number(bytes: &[u8], error: &serde_json::Error) -> bool {
-    let text = bytes.trim_ascii_end();
-    let last_line = text.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
-    let lines = 1 + text.iter().filter(|byte| **byte == b'\n').count();
-    error.to_string().starts_with("invalid number")
-        && (error.line(), error.column()) >= (lines, last_line.len())
-        && !text.ends_with(b"}")
 }
 
 /// Warns of targets that the readings explain little of or that could not be judged; `measured` has an entry for each target.

@@ -7,7 +7,7 @@ use decoupler_core::{
     text::counted,
 };
 
-use super::{Cell, Table, TableColumn, format_duration};
+use super::{Table, format_duration, table::Columns};
 use crate::{
     figure::{TradeOffCost, TradeOffLevel, point_name},
     machine::memory_budget,
@@ -15,119 +15,74 @@ use crate::{
 
 /// Returns the table of all points of all levels with all their figures, for programs.
 pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
-    const FIELDS: [&str; 17] = [
-        "noise",
-        "preset",
-        "decoder",
-        "precision",
-        "hidden",
-        "method",
-        "samples",
-        "epochs",
-        "z_percent",
-        "z_mm",
-        "frame_us",
-        "training_s",
-        "residual",
-        "model_based_z_percent",
-        "model_based_z_mm",
-        "on_decoding_front",
-        "on_training_front",
-    ];
-    let of_level = |level: &TradeOffLevel| {
+    /// Noise of a level, a point of it, and whether it is on the fronts of decoding and training.
+    type Row<'a> = (Option<f64>, &'a TradeOffPoint, bool, bool);
+    let rows = levels.iter().flat_map(|level| {
         let [decoding, training] = TradeOffCost::ALL.map(|cost| level.front(cost));
         let points = level.points.iter().zip(decoding).zip(training);
-        let row = |((point, on_decoding), on_training): ((&TradeOffPoint, bool), bool)| {
-            let report = &point.report;
-            let precision = match report.precision {
-                Precision::Double => "f64",
-                Precision::Single => "f32",
-            };
-            let hidden = point.hidden();
-            let count = |count: Option<usize>| count.map_or(Cell::Number(None), Cell::from);
-            vec![
-                level.noise.into(),
-                point
-                    .preset
-                    .map_or(Cell::Number(None), |preset| preset.to_string().into()),
-                report.kind.to_string().into(),
-                precision.into(),
-                count(hidden),
-                point
-                    .method()
-                    .map_or(Cell::Number(None), |method| method.short_name().into()),
-                count(point.settings.simulation().map(|simulation| simulation.samples)),
-                count(hidden.map(|_| point.settings.training.stopping.epochs)),
-                report.errors.percent().into(),
-                report.errors.nodes().map(|errors| errors.z_mm).into(),
-                report.frame_us.into(),
-                point.training_seconds.into(),
-                report.residual.into(),
-                point.model_based.and_then(|errors| errors.z_percent).into(),
-                point.model_based.map(|errors| errors.z_mm).into(),
-                on_decoding.to_string().into(),
-                on_training.to_string().into(),
-            ]
-        };
-        points.map(row).collect::<Vec<_>>()
-    };
-    let mut table = Table {
-        columns: FIELDS.map(TableColumn::field).to_vec(),
-        rows: levels.iter().flat_map(of_level).collect(),
-    };
-    if levels.iter().all(|level| level.noise.is_none()) {
-        let of_arrays = ["noise", "preset", "samples", "z_mm", "residual"];
-        for field in of_arrays
-            .into_iter()
-            .chain(["model_based_z_percent", "model_based_z_mm"])
-        {
-            table.remove_column(field);
-        }
-        let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
-        percent
-            .into_iter()
-            .for_each(|column| *column = TableColumn::field("percent_of_range"));
+        points.map(|((point, on_decoding), on_training)| (level.noise, point, on_decoding, on_training))
+    });
+    let is_array = levels.iter().any(|level| level.noise.is_some());
+    let mut columns = Columns::<Row<'_>>::new();
+    if is_array {
+        columns.add("noise", |(noise, ..)| *noise);
+        columns.add("preset", |(_, point, ..)| point.preset.map(|preset| preset.to_string()));
     }
-    table
+    columns.add("decoder", |(_, point, ..)| point.report.kind.to_string());
+    columns.add("precision", |(_, point, ..)| match point.report.precision {
+        Precision::Double => "f64",
+        Precision::Single => "f32",
+    });
+    columns.add("hidden", |(_, point, ..)| point.hidden());
+    columns.add("method", |(_, point, ..)| point.method().map(|method| method.short_name()));
+    if is_array {
+        columns.add("samples", |(_, point, ..)| {
+            point.settings.simulation().map(|simulation| simulation.samples)
+        });
+    }
+    columns.add("epochs", |(_, point, ..)| {
+        point.hidden().map(|_| point.settings.training.stopping.epochs)
+    });
+    let percent = if is_array { "z_percent" } else { "percent_of_range" };
+    columns.add(percent, |(_, point, ..)| point.report.errors.percent());
+    if is_array {
+        columns.add("z_mm", |(_, point, ..)| point.report.errors.nodes().map(|errors| errors.z_mm));
+    }
+    columns.add("frame_us", |(_, point, ..)| point.report.frame_us);
+    columns.add("training_s", |(_, point, ..)| point.training_seconds);
+    if is_array {
+        columns.add("residual", |(_, point, ..)| point.report.residual);
+        columns.add("model_based_z_percent", |(_, point, ..)| {
+            point.model_based.and_then(|errors| errors.z_percent)
+        });
+        columns.add("model_based_z_mm", |(_, point, ..)| point.model_based.map(|errors| errors.z_mm));
+    }
+    columns.add("on_decoding_front", |(.., on_decoding, _)| on_decoding.to_string());
+    columns.add("on_training_front", |(.., on_training)| on_training.to_string());
+    columns.table(rows)
 }
 
 /// Returns the table of the points of one level, fastest first, for readers.
 pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
-    let row = |point: &TradeOffPoint| {
-        vec![
-            point_name(point).into(),
-            point.report.errors.percent().into(),
-            point.report.errors.nodes().map(|errors| errors.z_mm).into(),
-            point.to_model_based().into(),
-            point.report.frame_us.into(),
-            point.training_seconds.into(),
-        ]
-    };
     let mut points: Vec<&TradeOffPoint> = level.points.iter().collect();
     points.sort_by(|a, b| a.report.frame_us.total_cmp(&b.report.frame_us));
-    let mut table = Table {
-        columns: vec![
-            TableColumn::new("decoder", "Decoder", ""),
-            TableColumn::new("z_percent", "Z", "%"),
-            TableColumn::new("z_mm", "Z", "mm"),
-            TableColumn::new("times_model_based", "times model-based", ""),
-            TableColumn::new("frame_us", "a frame", "µs"),
-            TableColumn::new("training_s", "training", "s"),
-        ],
-        rows: points.into_iter().map(row).collect(),
+    let mut columns = Columns::<&TradeOffPoint>::new();
+    columns.add(("decoder", "Decoder", ""), |point| point_name(point));
+    let percent = match level.noise {
+        Some(_) => ("z_percent", "Z", "%"),
+        None => ("percent_of_range", "MAE", "% of range"),
     };
-    if level.noise.is_none() {
-        table.remove_column("z_mm");
-        let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
-        percent
-            .into_iter()
-            .for_each(|column| *column = TableColumn::new("percent_of_range", "MAE", "% of range"));
+    columns.add(percent, |point| point.report.errors.percent());
+    if level.noise.is_some() {
+        columns.add(("z_mm", "Z", "mm"), |point| point.report.errors.nodes().map(|errors| errors.z_mm));
     }
     // Ratios to rounding are meaningless.
-    if level.points.iter().all(|point| point.to_model_based().is_none()) {
-        table.remove_column("times_model_based");
+    if level.points.iter().any(|point| point.to_model_based().is_some()) {
+        columns.add(("times_model_based", "times model-based", ""), |point| point.to_model_based());
     }
-    table
+    columns.add(("frame_us", "a frame", "µs"), |point| point.report.frame_us);
+    columns.add(("training_s", "training", "s"), |point| point.training_seconds);
+    columns.table(points)
 }
 
 /// Describes the memory and time that a run will take on this machine. The first call measures its speed, which takes

@@ -1,13 +1,367 @@
 //! The report of a run: one self-contained HTML file, for any browser and for print.
 
 mod command;
-mod contents;
 mod html;
 mod pictures;
-mod settings;
 
 #[cfg(test)]
 mod tests;
 
 pub use command::{CommandGap, changed_options, quoted, train_command};
-pub use contents::RunReport;
+
+use std::{fmt::Display, path::Path, time::Duration};
+
+use self::{
+    command::{division_options, file_options},
+    html::{Block, document},
+    pictures::pictures,
+};
+use super::{
+    NetworkFile, Table, WriteError, atomic_write, decoder_table, describe_determinacy, describe_search,
+    describe_worse_than_ridge, document::PROGRAM, error_table, format_duration, format_number, format_percent,
+    search_table, table::Columns, unfinished::folder_of,
+};
+use crate::import::{Plan, Setup};
+use decoupler_core::{
+    dataset::{Dataset, Simulation},
+    evaluation::{
+        DecoderReport, ErrorTable, Errors, Outlook, RUN_OPTIONS, StartRecord, TestErrors, error_remarks,
+        recorded::{Determination, HysteresisLoop},
+    },
+    problem::Channel,
+    scene::{Loading, RowModel},
+    sensor::Geometry,
+    settings::Setting,
+    text::{capitalised, counted},
+    training::StopReason,
+};
+
+/// A run to be reported: of a simulated array or a recording.
+#[derive(Clone, Copy, Debug)]
+pub struct RunReport<'a> {
+    /// Name that the user gave it.
+    pub name: Option<&'a str>,
+    /// Its network, record and errors.
+    pub file: &'a NetworkFile,
+    /// Defect of its training, if there is one.
+    pub defect: Option<&'a str>,
+    /// Other decoders that were measured on its test set.
+    pub decoders: &'a [DecoderReport],
+    /// Its test set: [`Run::test`](decoupler_core::evaluation::Run::test), or [`NetworkFile::test_set`], which draws or reads it again.
+    pub test: &'a Dataset,
+}
+
+impl RunReport<'_> {
+    /// Writes the report atomically. It names recordings relative to its folder.
+    ///
+    /// # Errors
+    /// The path cannot be written.
+    ///
+    /// # Panics
+    /// If the test set does not belong to the run.
+    pub fn save(&self, path: &Path) -> Result<(), WriteError> {
+        let html = self.html(folder_of(path));
+        atomic_write(path, |writer| writer.write_all(html.as_bytes()))
+    }
+
+    /// Returns the report as HTML for a file in `folder`.
+    ///
+    /// # Panics
+    /// If the test set does not belong to the run.
+    pub fn html(&self, folder: &Path) -> String {
+        document(&self.title(), &self.blocks(folder))
+    }
+
+    fn blocks(&self, folder: &Path) -> Vec<Block> {
+        let Self { file, decoders, .. } = *self;
+        let setup = self.setup(folder);
+        let is_array = setup.plan().is_none();
+        let answers = file.decoder().answers_to(self.test);
+        let loops = setup.plan().map_or_else(Vec::new, |plan| {
+            HysteresisLoop::of_test(self.test, answers.view(), plan.test_order())
+        });
+        let note = |text: &str| Block::Note(text.to_owned());
+        let mut blocks = vec![Block::Note(self.summary())];
+        blocks.extend(self.remarks(&setup, &answers).into_iter().map(Block::Warning));
+        let mut tables = file.error_table();
+        ErrorTable::add_loops(&mut tables, &loops);
+        blocks.extend([
+            Block::Heading("Errors on the test set"),
+            Block::Table(error_table(&tables), "network"),
+            note(if is_array {
+                "Means of |error|, in percent of the coordinate as in the paper, in mm, or in percent of the stroke. \
+                 The model-based decoder knows the equations, the noise, and mean and covariance of the loading; \
+                 training mean and linear map are what a network has to beat."
+            } else {
+                "RMSE, MAE and worst are in the unit of the target. R² is the share of the target's variance that the \
+                 answers explain: 1 is exact, 0 is no better than the mean. Training mean and ridge regression are what \
+                 a network has to beat."
+            }),
+        ]);
+        if !decoders.is_empty() {
+            let model_based = file.scores.baselines.model_based.as_ref();
+            blocks.extend([
+                Block::Heading("Decoders"),
+                Block::Table(decoder_table(&file.problem, decoders, model_based), "Network"),
+                note(if is_array {
+                    "The residual is the rms relative difference between the readings and those of the decoded \
+                     deformation; it needs no ground truth. Times are those of a frame on one thread."
+                } else {
+                    "Times are those of a frame on one thread. All decoders were fitted to the same samples."
+                }),
+            ]);
+        }
+        blocks.push(Block::Heading("Figures"));
+        let pictures = pictures(file, self.test, &answers, &loops).into_iter();
+        blocks.extend(pictures.map(|(caption, figure)| Block::Figure(caption, Box::new(figure))));
+        if file.training.starts.len() > 1 {
+            blocks.extend([Block::Heading("Starts"), Block::Table(self.starts_table(), "")]);
+        }
+        if let Some(search) = file.recorded.as_ref().and_then(|recorded| recorded.search.as_ref()) {
+            blocks.extend([
+                Block::Heading("Choice of settings"),
+                Block::Note(format!("{}.", describe_search(search))),
+                Block::Table(search_table(search), ""),
+            ]);
+        }
+        let settings = self.settings(&setup).into_iter();
+        let settings = settings.map(|(name, value)| vec![capitalised(&name).into(), value.into()]);
+        blocks.extend([
+            Block::Heading("Settings"),
+            Block::Table(Table::of_headings(["Setting", "Value"], settings), ""),
+        ]);
+        if let Some(simulation) = setup.settings().simulation() {
+            blocks.extend(simulation.sensor.scale.note().map(Block::Note));
+            blocks.push(note(Geometry::ASSUMPTION));
+        }
+        blocks.push(Block::Heading("Repeating this run"));
+        blocks.extend(self.repeat(&setup));
+        blocks
+    }
+
+    /// Setup of the run, with paths for a file in `folder`.
+    fn setup(&self, folder: &Path) -> Setup {
+        let plan = self
+            .file
+            .recorded
+            .as_ref()
+            .map(|recorded| recorded.relative_to(folder).plan);
+        Setup::of(self.file.settings, plan).expect("a file of a recording has its plan")
+    }
+
+    fn title(&self) -> String {
+        let what = format!(
+            "{}, {}, seed {}",
+            self.file.source_name(),
+            counted(self.file.settings.hidden, "hidden node"),
+            self.file.settings.seed
+        );
+        match self.name {
+            Some(name) => format!("{name}: {what}"),
+            None => what,
+        }
+    }
+
+    /// Summary of the training in two sentences.
+    fn summary(&self) -> String {
+        let Self { file, .. } = *self;
+        let training = &file.training;
+        let reason = training
+            .stop_reason
+            .map_or("not ended".to_owned(), |reason| reason.to_string());
+        let time = Duration::try_from_secs_f64(training.seconds).unwrap_or_default();
+        let error = format_percent(file.scores.network.percent());
+        let error = match file.scores.network {
+            TestErrors::Nodes(_) => format!("Z error {error} on the test set"),
+            TestErrors::Targets(_) => format!(
+                "Mean absolute error {error} of the range on the test set, averaged over {}",
+                counted(file.problem.targets.len(), "target")
+            ),
+        };
+        format!(
+            "{error}. Trained for {}, {} on one thread ({reason}); weights kept from epoch {}.",
+            counted(training.epochs, "epoch"),
+            format_duration(time),
+            training.best_epoch
+        )
+    }
+
+    /// Returns all warnings and remarks on the run, with cause and remedy.
+    fn remarks(&self, setup: &Setup, answers: &ndarray::Array2<f64>) -> Vec<String> {
+        let mut remarks = Vec::from_iter(self.defect.map(str::to_owned));
+        match (setup.settings().simulation(), setup.plan()) {
+            (Some(simulation), _) => remarks.extend(self.array_remarks(simulation)),
+            (None, Some(plan)) => remarks.extend(self.recording_remarks(plan, answers)),
+            (None, None) => {}
+        }
+        for decoder in self.decoders {
+            let name = decoder.kind.name(decoder.precision);
+            remarks.extend(decoder.remarks.iter().map(|remark| format!("{name}: {remark}")));
+        }
+        remarks.into_iter().map(|remark| capitalised(remark.trim_end_matches('.')) + ".").collect()
+    }
+
+    fn array_remarks(&self, simulation: &Simulation) -> Vec<String> {
+        let Self { file, .. } = *self;
+        let outlook = Outlook::of(simulation).ok();
+        let warnings = outlook.iter().flat_map(|outlook| &outlook.warnings);
+        let mut remarks = Vec::from_iter(warnings.map(ToString::to_string));
+        let reason = file.training.stop_reason;
+        let of_rows = error_remarks(&file.settings, &file.scores, reason);
+        remarks.extend(of_rows.iter().map(|(row, remark)| format!("{row}: {remark}")));
+        let baselines = &file.scores.baselines;
+        let (Some(network), Some(linear)) = (file.scores.network.nodes(), baselines.linear.nodes()) else {
+            return remarks;
+        };
+        if network.z_mm > linear.z_mm
+            && let Some(reason) = reason
+        {
+            let remedy = reason.remedy(&file.settings.training.method);
+            remarks.push(format!(
+                "a linear map of the resistances is better on z than this network: {remedy}"
+            ));
+        }
+        remarks.extend(baselines.model_based_note().map(str::to_owned));
+        let model_based = baselines.model_based.as_ref().and_then(TestErrors::nodes);
+        if model_based.is_some_and(Errors::is_rounding) {
+            let text = "the model-based error is nothing but rounding: the readings determine the deformation, and no \
+                        ratio to it is given";
+            remarks.push(text.to_owned());
+        }
+        remarks
+    }
+
+    fn recording_remarks(&self, plan: &Plan, answers: &ndarray::Array2<f64>) -> Vec<String> {
+        let measured = Determination::measure(self.test, answers.view(), plan.division.by);
+        let mut remarks = describe_determinacy(&self.file.problem.targets, &measured, self.file.combined().is_some());
+        let NetworkFile { problem, scores, .. } = self.file;
+        remarks.extend(describe_worse_than_ridge(problem, scores));
+        if plan.is_optimistic() {
+            let text = "test samples are drawn at random, which is optimistic where neighbouring rows are similar; split \
+                        by time or by group for an honest test";
+            remarks.push(text.to_owned());
+        }
+        remarks
+    }
+
+    fn starts_table(&self) -> Table {
+        let mut columns = Columns::<(usize, &StartRecord)>::new();
+        columns.add(("start", "Start", ""), |(number, _)| number + 1);
+        columns.add(("train_mse", "training mse", ""), |(_, start)| start.train_mse);
+        columns.add(("validation_mse", "validation mse", ""), |(_, start)| start.validation_mse);
+        if self.file.problem.has_nodes() {
+            columns.add(("z_percent", "Z", "%"), |(_, start)| start.percent());
+        }
+        columns.add("epochs", |(_, start)| start.epochs);
+        columns.add(("best_epoch", "best epoch", ""), |(_, start)| start.best_epoch);
+        columns.table(self.file.training.starts.iter().enumerate())
+    }
+
+    /// Names and values of all settings.
+    fn settings(&self, setup: &Setup) -> Vec<(String, String)> {
+        let Self { file, test, .. } = *self;
+        let settings = setup.settings();
+        let mut rows = Vec::new();
+        let mut add = |name: &str, value: &dyn Display| rows.push((name.to_owned(), value.to_string()));
+        if let Some(plan) = setup.plan() {
+            let options = file_options(plan, None).into_iter().chain(division_options(plan, None));
+            options.for_each(|(option, value)| add(&option.replace('-', " "), &value));
+            let titles = |channels: &[Channel]| Vec::from_iter(channels.iter().map(Channel::title)).join(", ");
+            add("readings", &titles(&file.problem.inputs));
+            add("answers", &titles(&file.problem.targets));
+            add("test samples", &test.samples());
+            add("quantity of the inputs", &settings.inputs.quantity);
+            let networks = match settings.source.row_model() {
+                RowModel::Each => "a network for each",
+                RowModel::Shared => "one network for all",
+            };
+            let rows = file.row_wires.as_ref().map(|rows| format!("{}, {networks}", rows.len()));
+            add("row-wires", &rows.as_deref().unwrap_or("not known"));
+        }
+        let value = |setting: &Setting<_>| setting.get(settings).map(|value| value.to_string());
+        for setting in RUN_OPTIONS.iter().map(|option| &option.setting) {
+            match value(setting).filter(|value| !value.is_empty()) {
+                Some(value) if setting.name != "method" => add(setting.name, &value),
+                _ => {}
+            }
+        }
+        for (number, stage) in file.training.stages.iter().enumerate() {
+            let name = match number {
+                0 => "method".to_owned(),
+                _ => format!("method from epoch {}", stage.first_epoch),
+            };
+            add(&name, &stage.method);
+            for setting in stage.method.settings() {
+                let value = setting.get(&stage.method).map(|value| value.to_string());
+                add(setting.name, &value.unwrap_or_default());
+            }
+        }
+        add("weights", &file.network.weights());
+        if let Some(simulation) = settings.simulation() {
+            let (scene, geometry) = (&simulation.scene, &simulation.sensor.geometry);
+            let [percent, mm] = [100.0 * scene.largest_compression, simulation.stroke_mm()].map(format_number);
+            add("largest compression", &format_args!("{percent} % of the height, {mm} mm"));
+            add("largest shift sideways", &format_args!("{} mm", scene.movement.largest_shift_mm()));
+            if let Loading::Indenter(indenter) = scene.loading {
+                let (radius, tilt_degrees) = indenter.radius_mm_and_tilt_degrees();
+                if let Some(radius) = radius {
+                    add("radius of the indenter", &format_args!("{} to {} mm", radius.smallest, radius.largest));
+                }
+                add("tilt of the indenter", &format_args!("up to {tilt_degrees}°"));
+                add("decay length", &format_args!("{} mm", indenter.spread_mm));
+            }
+            add("height", &format_args!("{} mm", geometry.height_mm));
+            let wires = |axis, from_mm, apart_mm| format!("from {axis} = {from_mm} mm, {apart_mm} mm apart");
+            add("row-wires", &wires("x", geometry.row_x0_mm, geometry.row_pitch_mm));
+            add("nodes of a row-wire", &format_args!("{} mm apart", geometry.node_pitch_mm));
+            add("column-wires", &wires("y", geometry.column_y0_mm, geometry.column_pitch_mm));
+            let nodes = wires("x", geometry.column_node_x0_mm, geometry.column_node_pitch_mm);
+            add("nodes of a column-wire", &nodes);
+            let rubber = simulation.sensor.resistivity_ohm_per_mm;
+            add("resistance of the rubber", &format_args!("{rubber} ohm/mm"));
+        }
+        rows
+    }
+
+    /// Returns the terminal command that repeats the run, and its limitations.
+    fn repeat(&self, setup: &Setup) -> Vec<Block> {
+        let training = &self.file.training;
+        let mut settings = *setup.settings();
+        if let Some(first) = training.stages.first() {
+            settings.training.method = first.method;
+        }
+        let is_cut_short = matches!(training.stop_reason, None | Some(StopReason::Stopped));
+        if is_cut_short {
+            settings.training.stopping.epochs = training.epochs.max(1);
+        }
+        let mut blocks = match train_command(&setup.with_settings(settings), None) {
+            Ok(command) => {
+                let place = match setup.plan() {
+                    None => "In a terminal",
+                    Some(_) => "In a terminal, in the folder of this report",
+                };
+                let text = format!("{place}, the same version of the program gives the same network with:");
+                vec![Block::Text(text), Block::Command(command)]
+            }
+            Err(gap) => vec![Block::Text(format!(
+                "No command repeats this run: {gap}. It can be repeated in the window with the settings above."
+            ))],
+        };
+        if let Some(second) = training.stages.get(1) {
+            blocks.push(Block::Warning(format!(
+                "This trains with the first method only; the run changed its method at epoch {}. A checkpoint resumed with \
+                 --method continues with another.",
+                second.first_epoch
+            )));
+        } else if is_cut_short {
+            let text = "The run was stopped early; the command stops at the same epoch.";
+            blocks.push(Block::Note(text.to_owned()));
+        }
+        let saved = match &self.file.program {
+            program if program == PROGRAM => String::new(),
+            program => format!("; the network was saved by {program}"),
+        };
+        blocks.push(Block::Note(format!("Report by {PROGRAM}{saved}.")));
+        blocks
+    }
+}

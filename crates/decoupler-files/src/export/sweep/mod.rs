@@ -11,10 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use serde::{Serialize, de::DeserializeOwned};
-use serde_json::value::to_raw_value;
-
-use super::{AtomicFile, DocumentError, DocumentKind, WriteError, network_file::Sealed};
+use super::DocumentError;
 use crate::machine::system_cause;
 
 pub use self::{
@@ -61,23 +58,4 @@ impl SweepFiles {
         files.unfinished.sort_unstable();
         Ok(files)
     }
-}
-
-/// Writes a file of this kind unless it exists already; returns true if it was written.
-fn save_new(kind: DocumentKind, program: &str, value: &impl Serialize, path: &Path) -> Result<bool, WriteError> {
-    let value = to_raw_value(value).map_err(|error| WriteError::io(path, error.into()))?;
-    match Sealed::new(kind, program, &value).save(path, AtomicFile::commit_new) {
-        Err(error) if error.is_taken() => Ok(false),
-        saved => saved.map(|()| true),
-    }
-}
-
-/// Reads a file of this kind, with the program that wrote it.
-fn load<T: DeserializeOwned>(kind: DocumentKind, path: &Path) -> Result<(String, T), DocumentError> {
-    let bytes = kind.read(path)?;
-    let read = Sealed::read(&bytes).and_then(|sealed| {
-        let value = serde_json::from_str(sealed.run.get()).map_err(|error| error.to_string())?;
-        Ok((sealed.program, value))
-    });
-    read.map_err(|defect| kind.damaged(path, defect))
 }

@@ -9,8 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use siphasher::sip128::SipHasher24;
 
-use super::{load, save_new};
-use crate::export::{DocumentError, DocumentKind, WriteError, document::PROGRAM};
+use crate::export::{AtomicFile, DocumentError, DocumentKind, WriteError, document::PROGRAM};
 
 const KIND: DocumentKind = DocumentKind::Trial;
 
@@ -18,9 +17,11 @@ const KIND: DocumentKind = DocumentKind::Trial;
 pub type TrialOptions = BTreeMap<String, Value>;
 
 /// A finished trial of a sweep.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Trial {
     /// Program and version that trained it.
+    #[serde(skip)]
     pub(crate) program: String,
     /// Options that determine the result.
     pub(crate) options: TrialOptions,
@@ -28,14 +29,6 @@ pub struct Trial {
     pub(crate) report: Value,
     /// Time for the trial in seconds: drawing, training and measuring, on one thread.
     pub(crate) seconds: f64,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TrialDocument {
-    options: TrialOptions,
-    report: Value,
-    seconds: f64,
 }
 
 impl Trial {
@@ -78,12 +71,8 @@ impl Trial {
     /// # Errors
     /// The file cannot be written.
     pub fn save_in(&self, folder: &Path) -> Result<(), WriteError> {
-        let document = TrialDocument {
-            options: self.options.clone(),
-            report: self.report.clone(),
-            seconds: self.seconds,
-        };
-        save_new(KIND, &self.program, &document, &Self::path(folder, self.id())).map(drop)
+        let path = Self::path(folder, self.id());
+        KIND.save(&self.program, self, &path, AtomicFile::commit_new).map(drop)
     }
 
     /// Reads the file at `path`.
@@ -91,27 +80,14 @@ impl Trial {
     /// # Errors
     /// The file cannot be read, is of another kind or version, is damaged, or has the name of another trial.
     pub(crate) fn load(path: &Path) -> Result<Self, DocumentError> {
-        let (program, document) = load(KIND, path)?;
-        let TrialDocument {
-            options,
-            report,
-            seconds,
-        } = document;
-        let trial = Self {
-            program,
-            options,
-            report,
-            seconds,
-        };
+        let (program, trial) = KIND.load(path)?;
+        let trial = Self { program, ..trial };
         if path.file_stem() == Some(trial.id().to_string().as_ref()) {
-            Ok(trial)
-        } else {
-            let defect = format!(
-                "its name belongs to another trial: its options are those of trial {}",
-                trial.id()
-            );
-            Err(KIND.damaged(path, defect))
+            return Ok(trial);
         }
+        let id = trial.id();
+        let defect = format!("its name belongs to another trial: its options are those of trial {id}");
+        Err(KIND.damaged(path, defect))
     }
 }
 

@@ -6,11 +6,12 @@ mod text;
 
 pub use csv_row::{csv_cell, write_csv_row};
 pub use text::TableForm;
+pub(super) use text::escaped_html;
 
 use std::io::{self, Write};
 
-use decoupler_core::text::{begins_formula, inert};
-use serde::ser::{Serialize, SerializeMap as _, SerializeSeq as _, Serializer};
+use decoupler_core::text::inert;
+use serde::ser::{Serialize, Serializer};
 
 use crate::export::{format_number, format_r2};
 
@@ -68,8 +69,48 @@ impl TableColumn {
     }
 }
 
-/// Contents of a cell.
-#[derive(Clone, Debug, PartialEq)]
+/// A column for readers: name in files, heading and unit.
+impl From<(&str, &str, &'static str)> for TableColumn {
+    fn from((field, heading, unit): (&str, &str, &'static str)) -> Self {
+        Self::new(field, heading, unit)
+    }
+}
+
+/// A column for programs.
+impl From<&str> for TableColumn {
+    fn from(field: &str) -> Self {
+        Self::field(field)
+    }
+}
+
+type CellOf<'a, T> = Box<dyn Fn(&T) -> Cell + 'a>;
+
+/// Columns of a table of `T`, and how their cells follow from the items.
+pub(super) struct Columns<'a, T>(Vec<(TableColumn, CellOf<'a, T>)>);
+
+impl<'a, T> Columns<'a, T> {
+    pub(super) fn new() -> Self {
+        Self(Vec::new())
+    }
+
+    /// Adds a column on the right.
+    pub(super) fn add<C: Into<Cell>>(&mut self, column: impl Into<TableColumn>, cell: impl Fn(&T) -> C + 'a) {
+        let cell = move |item: &T| cell(item).into();
+        self.0.push((column.into(), Box::new(cell)));
+    }
+
+    /// Returns the table with a row for each of `items`.
+    pub(super) fn table(self, items: impl IntoIterator<Item = T>) -> Table {
+        let row = |item| self.0.iter().map(|(_, cell)| cell(&item)).collect();
+        let rows = items.into_iter().map(row).collect();
+        let columns = self.0.into_iter().map(|(column, _)| column).collect();
+        Table { columns, rows }
+    }
+}
+
+/// Contents of a cell. In JSON, numbers keep every digit, and are `null` where there is none.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[serde(untagged)]
 pub enum Cell {
     /// A text.
     Text(String),
@@ -137,9 +178,9 @@ impl From<f64> for Cell {
     }
 }
 
-impl From<Option<f64>> for Cell {
-    fn from(number: Option<f64>) -> Self {
-        Self::Number(number)
+impl<T: Into<Cell>> From<Option<T>> for Cell {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self::Number(None), T::into)
     }
 }
 
@@ -161,16 +202,6 @@ impl Table {
         cells.all(|cell| !matches!(cell, Cell::Text(_)))
     }
 
-    /// Removes the column with this field.
-    pub(in crate::export) fn remove_column(&mut self, field: &str) {
-        if let Some(place) = self.columns.iter().position(|column| column.field == field) {
-            self.columns.remove(place);
-            for row in &mut self.rows {
-                row.remove(place);
-            }
-        }
-    }
-
     /// Writes the table as CSV. Numbers read back bit for bit; where there is none the field is empty.
     ///
     /// # Errors
@@ -182,143 +213,21 @@ impl Table {
     }
 }
 
-/// JSON: an array of the rows, each an object whose keys are the fields of the columns. Numbers keep every digit; where there
-/// is none the value is `null`.
+/// JSON: an array of the rows, each an object whose keys are the fields of the columns, in their order.
 impl Serialize for Table {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut rows = serializer.serialize_seq(Some(self.rows.len()))?;
-        for cells in &self.rows {
-            rows.serialize_element(&Row {
-                columns: &self.columns,
-                cells,
-            })?;
-        }
-        rows.end()
+        let row = |cells| Row(&self.columns, cells);
+        serializer.collect_seq(self.rows.iter().map(row))
     }
 }
 
-struct Row<'a> {
-    columns: &'a [TableColumn],
-    cells: &'a [Cell],
-}
+struct Row<'a>(&'a [TableColumn], &'a Vec<Cell>);
 
 impl Serialize for Row<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut fields = serializer.serialize_map(Some(self.cells.len()))?;
-        for (column, cell) in self.columns.iter().zip(self.cells) {
-            fields.serialize_entry(&column.field, cell)?;
-        }
-        fields.end()
+        let fields = self.0.iter().map(|column| &column.field);
+        serializer.collect_map(fields.zip(self.1))
     }
-}
-
-impl Serialize for Cell {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Text(text) => serializer.serialize_str(text),
-            Self::Count(count) => serializer.serialize_u64(*count),
-            Self::Number(number) | Self::R2(number) => number.filter(|number| number.is_finite()).serialize(serializer),
-        }
-    }
-}
-
-pub(super) fn latex(table: &Table) -> String {
-    let columns = 0..table.columns.len();
-    let alignments: Vec<String> = columns.map(|column| alignment(table, column)).collect();
-    let line = |cells: Vec<String>| format!("{} \\\\\n", cells.join(" & "));
-    let headings = table.columns.iter().enumerate().map(|(number, column)| {
-        let title = escaped(&column.title());
-        // Braces keep siunitx from reading it as a number.
-        if table.is_numeric(number) {
-            format!("{{{title}}}")
-        } else {
-            title
-        }
-    });
-    let mut text = "% \\usepackage{booktabs, siunitx}\n".to_owned();
-    text += &format!("\\begin{{tabular}}{{{}}}\n\\toprule\n", alignments.join(" "));
-    text += &line(headings.collect());
-    text += "\\midrule\n";
-    for row in &table.rows {
-        let cells = row.iter().enumerate().map(|(column, cell)| match cell {
-            Cell::Number(number) | Cell::R2(number)
-                if table.is_numeric(column) && !number.is_some_and(f64::is_finite) =>
-            {
-                format!("{{{}}}", cell.rounded())
-            }
-            _ => escaped(&cell.rounded()),
-        });
-        text += &line(cells.collect());
-    }
-    text + "\\bottomrule\n\\end{tabular}\n"
-}
-
-/// Column type: names at the left, numbers at their decimal points, mixed columns at the right.
-fn alignment(table: &Table, column: usize) -> String {
-    if !table.is_numeric(column) {
-        return if column == 0 { "l" } else { "r" }.to_owned();
-    }
-    let cells = table.rows.iter().filter_map(|row| row.get(column));
-    let numbers = cells
-        .map(Cell::rounded)
-        .filter(|text| text.ends_with(|end: char| end.is_ascii_digit()));
-    let mut widest = NumberWidth::default();
-    for number in numbers {
-        widest.take(&number);
-    }
-    format!("S[table-format={}]", widest.format())
-}
-
-/// Maximum number of digits of a column's numbers before and after the decimal point, and in the exponent.
-#[derive(Default)]
-struct NumberWidth {
-    has_sign: bool,
-    whole: usize,
-    decimals: usize,
-    exponent: usize,
-    has_exponent_sign: bool,
-}
-
-impl NumberWidth {
-    fn take(&mut self, number: &str) {
-        let (mantissa, exponent) = number.split_once('e').unwrap_or((number, ""));
-        let (whole, decimals) = mantissa.split_once('.').unwrap_or((mantissa, ""));
-        self.has_sign |= whole.starts_with('-');
-        self.whole = self.whole.max(whole.trim_start_matches('-').len());
-        self.decimals = self.decimals.max(decimals.len());
-        self.has_exponent_sign |= exponent.starts_with('-');
-        self.exponent = self.exponent.max(exponent.trim_start_matches('-').len());
-    }
-
-    /// The `table-format` of siunitx.
-    fn format(&self) -> String {
-        let sign = |has_sign| if has_sign { "-" } else { "" };
-        let mut format = format!("{}{}.{}", sign(self.has_sign), self.whole.max(1), self.decimals);
-        if self.exponent > 0 {
-            format += &format!("e{}{}", sign(self.has_exponent_sign), self.exponent);
-        }
-        format
-    }
-}
-
-/// Escapes the special characters of LaTeX.
-fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    // After the end of a row, LaTeX takes [ and * for arguments of \\, and a number stays one for siunitx.
-    if text.starts_with(['[', '*']) || begins_formula(text) {
-        escaped += "{}";
-    }
-    for letter in text.chars() {
-        match letter {
-            '\\' => escaped += "\\textbackslash{}",
-            '~' => escaped += "\\textasciitilde{}",
-            '^' => escaped += "\\textasciicircum{}",
-            '\n' | '\r' => escaped.push(' '),
-            '{' | '}' | '$' | '&' | '#' | '%' | '_' => escaped.extend(['\\', letter]),
-            _ => escaped.push(letter),
-        }
-    }
-    escaped
 }
 
 #[cfg(test)]

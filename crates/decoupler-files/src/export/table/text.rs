@@ -1,7 +1,7 @@
 use std::fmt;
 
-use super::{Cell, Table, TableColumn, latex};
-use decoupler_core::text::inert;
+use super::{Cell, Table, TableColumn};
+use decoupler_core::text::{begins_formula, inert};
 
 /// Form in which a table is copied into other documents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +37,7 @@ impl Table {
     pub fn text(&self, form: TableForm) -> String {
         match form {
             TableForm::Markdown => self.markdown(),
-            TableForm::Latex => latex(self),
+            TableForm::Latex => self.latex(),
             TableForm::TabSeparated => self.tab_separated(),
             TableForm::Json => self.json(),
         }
@@ -105,6 +105,109 @@ impl Table {
         }
         text
     }
+
+    /// Returns the table as HTML, numbers rounded for readers; rows with the name `own` in their first or second column are
+    /// highlighted.
+    pub(in crate::export) fn html(&self, own: &str) -> String {
+        let is_text = self.columns.len() > 1 && !self.is_numeric(self.columns.len() - 1);
+        let class = if is_text { " class=\"text\"" } else { "" };
+        let headings = self.columns.iter();
+        let headings = headings.map(|column| format!("<th scope=\"col\">{}</th>", escaped_html(&column.title())));
+        let rows = self.rows.iter().map(|row| {
+            let cells: Vec<String> = row.iter().map(Cell::rounded).collect();
+            let is_own = cells.iter().take(2).any(|name| name == own);
+            let class = if is_own { " class=\"own\"" } else { "" };
+            let cells = cells.iter().map(|cell| format!("<td>{}</td>", escaped_html(cell)));
+            format!("<tr{class}>{}</tr>\n", String::from_iter(cells))
+        });
+        format!(
+            "<table{class}>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}</tbody></table>",
+            String::from_iter(headings),
+            String::from_iter(rows)
+        )
+    }
+
+    fn latex(&self) -> String {
+        let alignments: Vec<String> = (0..self.columns.len()).map(|column| self.alignment(column)).collect();
+        let line = |cells: Vec<String>| format!("{} \\\\\n", cells.join(" & "));
+        // Braces keep siunitx from reading a text as a number.
+        let in_column = |column: usize, is_number: bool, text: &str| match self.is_numeric(column) && !is_number {
+            true => format!("{{{}}}", escaped_latex(text)),
+            false => escaped_latex(text),
+        };
+        let headings = self.columns.iter().enumerate();
+        let headings = headings.map(|(number, column)| in_column(number, false, &column.title()));
+        let rows = self.rows.iter().map(|row| {
+            let cells = row.iter().enumerate();
+            line(cells.map(|(column, cell)| in_column(column, !cell.exact().is_empty(), &cell.rounded())).collect())
+        });
+        format!(
+            "% \\usepackage{{booktabs, siunitx}}\n\\begin{{tabular}}{{{}}}\n\\toprule\n{}\\midrule\n{}\\bottomrule\n\
+             \\end{{tabular}}\n",
+            alignments.join(" "),
+            line(headings.collect()),
+            String::from_iter(rows)
+        )
+    }
+
+    /// Column type of LaTeX: names at the left, numbers at their decimal points, mixed columns at the right.
+    fn alignment(&self, column: usize) -> String {
+        if !self.is_numeric(column) {
+            return if column == 0 { "l" } else { "r" }.to_owned();
+        }
+        let cells = self.rows.iter().filter_map(|row| row.get(column));
+        let numbers = cells.filter(|cell| !cell.exact().is_empty());
+        let widest = numbers.fold([0, 1, 0, 0, 0], |widest: [usize; 5], cell| {
+            let of_cell = number_widths(&cell.rounded());
+            std::array::from_fn(|part| widest[part].max(of_cell[part]))
+        });
+        let [sign, whole, decimals, exponent_sign, exponent] = widest;
+        let [sign, exponent_sign] = [sign, exponent_sign].map(|signs| "-".repeat(signs));
+        let exponent = match exponent {
+            0 => String::new(),
+            digits => format!("e{exponent_sign}{digits}"),
+        };
+        format!("S[table-format={sign}{whole}.{decimals}{exponent}]")
+    }
+}
+
+/// Widths of sign, whole digits and decimals of a number, and of sign and digits of its exponent.
+fn number_widths(number: &str) -> [usize; 5] {
+    let (mantissa, exponent) = number.split_once('e').unwrap_or((number, ""));
+    let (whole, decimals) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let signed = |digits: &str| {
+        let sign = usize::from(digits.starts_with('-'));
+        [sign, digits.len() - sign]
+    };
+    let ([sign, whole], [exponent_sign, exponent]) = (signed(whole), signed(exponent));
+    [sign, whole, decimals.len(), exponent_sign, exponent]
+}
+
+/// Escapes the special characters of LaTeX.
+fn escaped_latex(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    // After the end of a row, LaTeX takes [ and * for arguments of \\, and a number stays one for siunitx.
+    if text.starts_with(['[', '*']) || begins_formula(text) {
+        escaped += "{}";
+    }
+    for letter in text.chars() {
+        match letter {
+            '\\' => escaped += "\\textbackslash{}",
+            '~' => escaped += "\\textasciitilde{}",
+            '^' => escaped += "\\textasciicircum{}",
+            '\n' | '\r' => escaped.push(' '),
+            '{' | '}' | '$' | '&' | '#' | '%' | '_' => escaped.extend(['\\', letter]),
+            _ => escaped.push(letter),
+        }
+    }
+    escaped
+}
+
+/// Escapes the special characters of HTML and leaves out control characters, which it does not allow.
+pub(in crate::export) fn escaped_html(text: &str) -> String {
+    let text = text.replace(|letter: char| letter.is_control() && !"\n\t".contains(letter), "");
+    let text = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    text.replace('"', "&quot;")
 }
 
 /// Escapes the special characters of Markdown.
