@@ -195,7 +195,9 @@ pub fn is_same(one: &Path, other: &Path) -> bool {
 #[cfg(unix)]
 fn is_same_on_disk(found: &[Option<Metadata>; 2]) -> bool {
     use std::os::unix::fs::MetadataExt;
-    let [one, other] = found.each_ref().map(|found| found.as_ref().map(|found| (found.dev(), found.ino())));
+    let [one, other] = found
+        .each_ref()
+        .map(|found| found.as_ref().map(|found| (found.dev(), found.ino())));
     one.is_some() && one == other
 }
 

@@ -432,7 +432,9 @@ fn check_number(network: &Networks, settings: &RunSettings, row_wires: Option<&[
             format!("network: {found} of them for {rows} row-wires")
         });
     };
-    let rows = source.rows().map_err(|defect| format!("settings.source.scene.rows: {defect}"))?;
+    let rows = source
+        .rows()
+        .map_err(|defect| format!("settings.source.scene.rows: {defect}"))?;
     let needed = source.scene.rows.model().decoders(rows);
     require(needed == found, || {
         let (rows, scale) = (source.scene.rows, source.sensor.scale);

@@ -1,5 +1,7 @@
 use std::io::{self, Write};
 
+use super::{Cell, Table, TableColumn, format_number, table::Columns};
+use crate::import::{Recording, SetupSets};
 use decoupler_core::{
     dataset::{Dataset, Seed, SplitBy},
     evaluation::{
@@ -12,8 +14,6 @@ use decoupler_core::{
     problem::{Channel, Problem, TargetPosition},
     training::EpochRecord,
 };
-use super::{Cell, Table, TableColumn, format_number, table::Columns};
-use crate::import::{Recording, SetupSets};
 
 /// Returns the error table: a row for each decoder and baseline; for a recording, a row for each of them and each
 /// target.
@@ -27,9 +27,13 @@ pub fn error_table(tables: &[ErrorTable]) -> Table {
     columns.add(("decoupler", "Decoder", ""), |(_, row)| row.name);
     let measures = tables.first().map_or(&[][..], |table| table.measures);
     for (place, &measure) in measures.iter().enumerate() {
-        columns.add(error_column(measure), move |(_, row)| error_cell(measure, row.errors[place]));
+        columns.add(error_column(measure), move |(_, row)| {
+            error_cell(measure, row.errors[place])
+        });
     }
-    let rows = tables.iter().flat_map(|table| table.rows.iter().map(move |row| (table, row)));
+    let rows = tables
+        .iter()
+        .flat_map(|table| table.rows.iter().map(move |row| (table, row)));
     columns.table(rows)
 }
 
@@ -63,14 +67,18 @@ fn array_decoder_table(reports: &[DecoderReport], model_based: Option<&Errors>) 
         });
     }
     columns.add("residual", |(report, _)| report.and_then(|report| report.residual));
-    columns.add(("frame_us", "a frame", "µs"), |(report, _)| report.map(|report| report.frame_us));
+    columns.add(("frame_us", "a frame", "µs"), |(report, _)| {
+        report.map(|report| report.frame_us)
+    });
     let rows = reports.iter().map(|report| (Some(report), report.errors.nodes()));
     columns.table(rows.chain(model_based.map(|errors| (None, Some(errors)))))
 }
 
 fn recording_decoder_table(problem: &Problem, reports: &[DecoderReport]) -> Table {
     let mut columns = Columns::<(&DecoderReport, (&Channel, &TargetErrors))>::new();
-    columns.add(("decoder", "Decoder", ""), |(report, _)| report.kind.name(report.precision));
+    columns.add(("decoder", "Decoder", ""), |(report, _)| {
+        report.kind.name(report.precision)
+    });
     columns.add(("target", "Target", ""), |(_, (target, _))| target.title());
     for measure in [ErrorMeasure::Rmse, ErrorMeasure::R2, ErrorMeasure::RangePercent] {
         columns.add(error_column(measure), move |(_, (_, errors))| {

@@ -34,7 +34,9 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
         Precision::Single => "f32",
     });
     columns.add("hidden", |(_, point, ..)| point.hidden());
-    columns.add("method", |(_, point, ..)| point.method().map(|method| method.short_name()));
+    columns.add("method", |(_, point, ..)| {
+        point.method().map(|method| method.short_name())
+    });
     if is_array {
         columns.add("samples", |(_, point, ..)| {
             point.settings.simulation().map(|simulation| simulation.samples)
@@ -46,7 +48,9 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
     let percent = if is_array { "z_percent" } else { "percent_of_range" };
     columns.add(percent, |(_, point, ..)| point.report.errors.percent());
     if is_array {
-        columns.add("z_mm", |(_, point, ..)| point.report.errors.nodes().map(|errors| errors.z_mm));
+        columns.add("z_mm", |(_, point, ..)| {
+            point.report.errors.nodes().map(|errors| errors.z_mm)
+        });
     }
     columns.add("frame_us", |(_, point, ..)| point.report.frame_us);
     columns.add("training_s", |(_, point, ..)| point.training_seconds);
@@ -55,7 +59,9 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
         columns.add("model_based_z_percent", |(_, point, ..)| {
             point.model_based.and_then(|errors| errors.z_percent)
         });
-        columns.add("model_based_z_mm", |(_, point, ..)| point.model_based.map(|errors| errors.z_mm));
+        columns.add("model_based_z_mm", |(_, point, ..)| {
+            point.model_based.map(|errors| errors.z_mm)
+        });
     }
     columns.add("on_decoding_front", |(.., on_decoding, _)| on_decoding.to_string());
     columns.add("on_training_front", |(.., on_training)| on_training.to_string());
@@ -74,11 +80,15 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
     };
     columns.add(percent, |point| point.report.errors.percent());
     if level.noise.is_some() {
-        columns.add(("z_mm", "Z", "mm"), |point| point.report.errors.nodes().map(|errors| errors.z_mm));
+        columns.add(("z_mm", "Z", "mm"), |point| {
+            point.report.errors.nodes().map(|errors| errors.z_mm)
+        });
     }
     // Ratios to rounding are meaningless.
     if level.points.iter().any(|point| point.to_model_based().is_some()) {
-        columns.add(("times_model_based", "times model-based", ""), |point| point.to_model_based());
+        columns.add(("times_model_based", "times model-based", ""), |point| {
+            point.to_model_based()
+        });
     }
     columns.add(("frame_us", "a frame", "µs"), |point| point.report.frame_us);
     columns.add(("training_s", "training", "s"), |point| point.training_seconds);

@@ -56,7 +56,8 @@ impl<T: AsRef<Path>> Unfinished<T> {
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode));
         for _ in 0..ATTEMPTS {
             // The default error contains the temporary name, which the user does not know.
-            let item = create(&builder).map_err(|error| error.raw_os_error().map_or(error, io::Error::from_raw_os_error))?;
+            let item =
+                create(&builder).map_err(|error| error.raw_os_error().map_or(error, io::Error::from_raw_os_error))?;
             // Some file systems have no locks; nothing is swept there.
             let _lock = File::open(&item).ok().inspect(|file| _ = file.lock());
             // Another program may have swept it before it was locked.
@@ -130,7 +131,9 @@ fn sync_folder(folder: &Path) {
 /// Removes the unfinished files and folders in `folder` that are not in use. Those that cannot be removed stay.
 fn sweep(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-        let (path, Ok(kind)) = (entry.path(), entry.file_type()) else { continue };
+        let (path, Ok(kind)) = (entry.path(), entry.file_type()) else {
+            continue;
+        };
         // Opening a pipe would wait for a program that writes to it.
         if !is_our_name(&entry.file_name()) || !(kind.is_file() || kind.is_dir()) {
             continue;

@@ -218,7 +218,11 @@ fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
     } = dialect;
     let joined = Vec::from_iter(join.iter().map(|joined| joined.file.clone()));
     let mut options = set_options(data, &joined, ["data", "join"]);
-    options.extend(append.iter().flat_map(|set| set_options(&set.data, &set.join, ["data", "join"])));
+    options.extend(
+        append
+            .iter()
+            .flat_map(|set| set_options(&set.data, &set.join, ["data", "join"])),
+    );
     let mut times = Vec::from_iter(join.iter().filter_map(|joined| joined.time.clone()));
     // One for all, or one for each.
     if times.windows(2).all(|pair| pair[0] == pair[1]) {
@@ -232,7 +236,10 @@ fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
     let units = units.iter().map(|(column, unit)| format!("{column}={unit}"));
     let options_of_columns = [
         ("join-time", times),
-        ("join-limit", texts(join.first().and_then(|joined| joined.limit.as_ref()))),
+        (
+            "join-limit",
+            texts(join.first().and_then(|joined| joined.limit.as_ref())),
+        ),
         ("inputs", vec![inputs.join(",")]),
         ("targets", vec![targets.join(",")]),
         ("time", texts(time)),

@@ -198,7 +198,10 @@ impl RunReport<'_> {
             let name = decoder.kind.name(decoder.precision);
             remarks.extend(decoder.remarks.iter().map(|remark| format!("{name}: {remark}")));
         }
-        remarks.into_iter().map(|remark| capitalised(remark.trim_end_matches('.')) + ".").collect()
+        remarks
+            .into_iter()
+            .map(|remark| capitalised(remark.trim_end_matches('.')) + ".")
+            .collect()
     }
 
     fn array_remarks(&self, simulation: &Simulation) -> Vec<String> {
@@ -248,7 +251,9 @@ impl RunReport<'_> {
         let mut columns = Columns::<(usize, &StartRecord)>::new();
         columns.add(("start", "Start", ""), |(number, _)| number + 1);
         columns.add(("train_mse", "training mse", ""), |(_, start)| start.train_mse);
-        columns.add(("validation_mse", "validation mse", ""), |(_, start)| start.validation_mse);
+        columns.add(("validation_mse", "validation mse", ""), |(_, start)| {
+            start.validation_mse
+        });
         if self.file.problem.has_nodes() {
             columns.add(("z_percent", "Z", "%"), |(_, start)| start.percent());
         }
@@ -275,7 +280,10 @@ impl RunReport<'_> {
                 RowModel::Each => "a network for each",
                 RowModel::Shared => "one network for all",
             };
-            let rows = file.row_wires.as_ref().map(|rows| format!("{}, {networks}", rows.len()));
+            let rows = file
+                .row_wires
+                .as_ref()
+                .map(|rows| format!("{}, {networks}", rows.len()));
             add("row-wires", &rows.as_deref().unwrap_or("not known"));
         }
         let value = |setting: &Setting<_>| setting.get(settings).map(|value| value.to_string());
@@ -300,12 +308,21 @@ impl RunReport<'_> {
         if let Some(simulation) = settings.simulation() {
             let (scene, geometry) = (&simulation.scene, &simulation.sensor.geometry);
             let [percent, mm] = [100.0 * scene.largest_compression, simulation.stroke_mm()].map(format_number);
-            add("largest compression", &format_args!("{percent} % of the height, {mm} mm"));
-            add("largest shift sideways", &format_args!("{} mm", scene.movement.largest_shift_mm()));
+            add(
+                "largest compression",
+                &format_args!("{percent} % of the height, {mm} mm"),
+            );
+            add(
+                "largest shift sideways",
+                &format_args!("{} mm", scene.movement.largest_shift_mm()),
+            );
             if let Loading::Indenter(indenter) = scene.loading {
                 let (radius, tilt_degrees) = indenter.radius_mm_and_tilt_degrees();
                 if let Some(radius) = radius {
-                    add("radius of the indenter", &format_args!("{} to {} mm", radius.smallest, radius.largest));
+                    add(
+                        "radius of the indenter",
+                        &format_args!("{} to {} mm", radius.smallest, radius.largest),
+                    );
                 }
                 add("tilt of the indenter", &format_args!("up to {tilt_degrees}°"));
                 add("decay length", &format_args!("{} mm", indenter.spread_mm));
@@ -313,8 +330,14 @@ impl RunReport<'_> {
             add("height", &format_args!("{} mm", geometry.height_mm));
             let wires = |axis, from_mm, apart_mm| format!("from {axis} = {from_mm} mm, {apart_mm} mm apart");
             add("row-wires", &wires("x", geometry.row_x0_mm, geometry.row_pitch_mm));
-            add("nodes of a row-wire", &format_args!("{} mm apart", geometry.node_pitch_mm));
-            add("column-wires", &wires("y", geometry.column_y0_mm, geometry.column_pitch_mm));
+            add(
+                "nodes of a row-wire",
+                &format_args!("{} mm apart", geometry.node_pitch_mm),
+            );
+            add(
+                "column-wires",
+                &wires("y", geometry.column_y0_mm, geometry.column_pitch_mm),
+            );
             let nodes = wires("x", geometry.column_node_x0_mm, geometry.column_node_pitch_mm);
             add("nodes of a column-wire", &nodes);
             let rubber = simulation.sensor.resistivity_ohm_per_mm;

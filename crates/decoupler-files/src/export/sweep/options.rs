@@ -13,7 +13,10 @@ use thiserror::Error;
 
 use super::TrialOptions;
 use crate::{
-    export::report::{CommandGap, train_command},
+    export::{
+        experiment_tables::axis_word,
+        report::{CommandGap, train_command},
+    },
     import::Plan,
 };
 
@@ -44,7 +47,7 @@ pub fn sweep_specification(experiment: &Experiment, plan: Option<&Plan>) -> Resu
     let mut train = train_options(&experiment.base, &[DecoderKind::Network]);
     let mut axes = Map::new();
     for axis in experiment.axes() {
-        axes.insert(option(axis.kind).to_owned(), values(axis));
+        axes.insert(axis_word(axis.kind).to_owned(), values(axis));
         if axis.kind == AxisKind::Method {
             // `set` belongs to one method; here, each method has its own settings.
             train.remove("set");
@@ -52,7 +55,7 @@ pub fn sweep_specification(experiment: &Experiment, plan: Option<&Plan>) -> Resu
     }
     let seeds = experiment.seeds_of(&experiment.base).map(|seed| seed.0);
     let seeds = Value::from_iter(seeds);
-    axes.entry(option(AxisKind::Seed)).or_insert(seeds);
+    axes.entry(axis_word(AxisKind::Seed)).or_insert(seeds);
     if let Some(plan) = plan {
         let division = &plan.division;
         train.insert("split".to_owned(), division.by.to_string().into());
@@ -72,23 +75,6 @@ pub fn sweep_specification(experiment: &Experiment, plan: Option<&Plan>) -> Resu
         });
     }
     Ok(specification)
-}
-
-/// Option of `train` for a setting.
-fn option(kind: AxisKind) -> &'static str {
-    match kind {
-        AxisKind::Hidden => "hidden",
-        AxisKind::Array => "array",
-        AxisKind::Samples => "samples",
-        AxisKind::Noise => "noise",
-        AxisKind::Inputs => "inputs",
-        AxisKind::Scaling => "scaling",
-        AxisKind::Method => "method",
-        AxisKind::Epochs => "epochs",
-        AxisKind::Starts => "starts",
-        AxisKind::Split => "split",
-        AxisKind::Seed => "seed",
-    }
 }
 
 fn values(axis: &Axis) -> Value {
@@ -137,24 +123,21 @@ pub fn train_options(settings: &RunSettings, decoders: &[DecoderKind]) -> TrialO
 /// The folders of the files are left out: a trial is the same wherever they are.
 pub fn recording_options(plan: &Plan, crc32: &[String]) -> TrialOptions {
     let named = plan.named();
-    let mut import = serde_json::to_value(&named.import).unwrap_or_default();
-    let mut taken = |field: &str| {
-        let fields = import.as_object_mut();
-        fields.and_then(|fields| fields.remove(field)).unwrap_or_default()
-    };
+    let division = &plan.division;
+    let import = serde_json::to_value(&named.import).unwrap_or_default();
     let mut options = TrialOptions::from([
-        ("data".to_owned(), taken("data")),
-        ("inputs".to_owned(), taken("inputs")),
-        ("targets".to_owned(), taken("targets")),
-        ("crc32".to_owned(), crc32.iter().cloned().collect()),
-        ("split".to_owned(), text(&plan.division.by)),
-        ("test-fraction".to_owned(), number(plan.division.test_fraction)),
-        (
-            "validation-fraction".to_owned(),
-            number(plan.division.validation_fraction),
-        ),
+        ("crc32".to_owned(), crc32.into()),
+        ("split".to_owned(), division.by.to_string().into()),
+        ("test-fraction".to_owned(), number(division.test_fraction)),
+        ("validation-fraction".to_owned(), number(division.validation_fraction)),
     ]);
-    options.insert("import".to_owned(), import);
+    let Value::Object(mut import) = import else {
+        return options;
+    };
+    for field in ["data", "inputs", "targets"] {
+        options.insert(field.to_owned(), import.remove(field).unwrap_or_default());
+    }
+    options.insert("import".to_owned(), import.into());
     if let Some(test) = &named.test {
         options.insert("test".to_owned(), serde_json::to_value(test).unwrap_or_default());
     }
@@ -164,10 +147,6 @@ pub fn recording_options(plan: &Plan, crc32: &[String]) -> TrialOptions {
 /// Negative zero is written as zero.
 fn number(value: f64) -> Value {
     Value::from(value + 0.0)
-}
-
-fn text(value: &dyn ToString) -> Value {
-    Value::from(value.to_string())
 }
 
 fn method_settings(method: Method) -> Value {

@@ -53,11 +53,7 @@ impl Trial {
     }
 
     fn id_by(program: &str, options: &TrialOptions) -> TrialId {
-        let pairs: Vec<String> = options
-            .iter()
-            .map(|(option, value)| format!("{option}={value}"))
-            .collect();
-        TrialId::of(&format!("{program}\n{}", pairs.join("\n")))
+        TrialId::of(&format!("{program}\n{}", options_text(options)))
     }
 
     /// File of the trial `id` in `folder`.
@@ -89,6 +85,12 @@ impl Trial {
         let defect = format!("its name belongs to another trial: its options are those of trial {id}");
         Err(KIND.damaged(path, defect))
     }
+}
+
+/// The options as one text: the same for the same options.
+pub(super) fn options_text(options: &TrialOptions) -> String {
+    let pairs = options.iter().map(|(option, value)| format!("{option}={value}"));
+    Vec::from_iter(pairs).join("\n")
 }
 
 /// Number of digits of a written identifier.

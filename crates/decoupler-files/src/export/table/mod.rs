@@ -8,12 +8,15 @@ pub use csv_row::{csv_cell, write_csv_row};
 pub use text::TableForm;
 pub(super) use text::escaped_html;
 
-use std::io::{self, Write};
+use std::{
+    io::{self, Write},
+    time::Duration,
+};
 
-use decoupler_core::text::inert;
+use decoupler_core::{settings::Value, text::inert};
 use serde::ser::{Serialize, Serializer};
 
-use crate::export::{format_number, format_r2};
+use crate::export::{format_duration, format_number, format_r2};
 
 /// Contents of a table, independent of the form in which it is written.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -120,6 +123,8 @@ pub enum Cell {
     Number(Option<f64>),
     /// A coefficient of determination, near 1 with more digits for readers; `None` where there is none.
     R2(Option<f64>),
+    /// A time in seconds, with a fitting unit for readers; `None` where there is none.
+    Seconds(Option<f64>),
 }
 
 impl Cell {
@@ -130,6 +135,10 @@ impl Cell {
             Self::Count(count) => count.to_string(),
             Self::Number(number) => format_number(*number),
             Self::R2(number) => format_r2(*number),
+            Self::Seconds(seconds) => {
+                let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+                time.map_or_else(|| format_number(None), format_duration)
+            }
         }
     }
 
@@ -137,7 +146,7 @@ impl Cell {
     pub(super) fn for_spreadsheet(&self) -> String {
         match self {
             Self::Text(text) => inert(text),
-            Self::Count(_) | Self::Number(_) | Self::R2(_) => self.exact(),
+            _ => self.exact(),
         }
     }
 
@@ -146,10 +155,19 @@ impl Cell {
         match self {
             Self::Text(text) => text.clone(),
             Self::Count(count) => count.to_string(),
-            Self::Number(number) | Self::R2(number) => {
-                let number = number.filter(|number| number.is_finite());
+            Self::Number(_) | Self::R2(_) | Self::Seconds(_) => {
+                let number = self.number().filter(|number| number.is_finite());
                 number.map_or_else(String::new, |number| format!("{number:?}"))
             }
+        }
+    }
+
+    /// Returns the number in the cell, if there is one.
+    pub fn number(&self) -> Option<f64> {
+        match self {
+            Self::Text(_) => None,
+            Self::Count(count) => Some(*count as f64),
+            Self::Number(number) | Self::R2(number) | Self::Seconds(number) => *number,
         }
     }
 }
@@ -175,6 +193,16 @@ impl From<usize> for Cell {
 impl From<f64> for Cell {
     fn from(number: f64) -> Self {
         Self::Number(Some(number))
+    }
+}
+
+impl From<Value> for Cell {
+    fn from(value: Value) -> Self {
+        match value {
+            Value::Integer(value) => Self::Count(value),
+            Value::Number(value) => value.into(),
+            Value::Text(value) => value.into(),
+        }
     }
 }
 

@@ -139,7 +139,11 @@ impl Table {
         let headings = headings.map(|(number, column)| in_column(number, false, &column.title()));
         let rows = self.rows.iter().map(|row| {
             let cells = row.iter().enumerate();
-            line(cells.map(|(column, cell)| in_column(column, !cell.exact().is_empty(), &cell.rounded())).collect())
+            line(
+                cells
+                    .map(|(column, cell)| in_column(column, !cell.exact().is_empty(), &cell.rounded()))
+                    .collect(),
+            )
         });
         format!(
             "% \\usepackage{{booktabs, siunitx}}\n\\begin{{tabular}}{{{}}}\n\\toprule\n{}\\midrule\n{}\\bottomrule\n\
