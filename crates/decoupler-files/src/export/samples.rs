@@ -9,7 +9,7 @@ use decoupler_core::{
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-use super::PastNetwork;
+use super::{PastNetwork, write_csv_row};
 
 /// Writes the names of the columns of [`write_samples`], with or without those of decoded coordinates, and ends the
 /// line.
@@ -17,19 +17,11 @@ use super::PastNetwork;
 /// # Errors
 /// Any error of `writer`.
 pub fn write_samples_header(scale: ArrayScale, with_decoded: bool, writer: &mut dyn Write) -> io::Result<()> {
-    write!(writer, "snapshot,row,")?;
-    for column in 1..=scale.columns() {
-        write!(writer, "r_{column},")?;
-    }
-    if with_decoded {
-        for node in 1..=scale.nodes_per_row() {
-            write!(writer, "x_{node},y_{node},z_{node},")?;
-        }
-        write_names("decoded_", scale.nodes_per_row(), writer)?;
-    } else {
-        write_names("", scale.nodes_per_row(), writer)?;
-    }
-    writeln!(writer)
+    let nodes = scale.nodes_per_row();
+    let readings = (1..=scale.columns()).map(|column| format!("r_{column}"));
+    let names = ["snapshot", "row"].map(str::to_owned).into_iter().chain(readings);
+    let decoded = coordinates("decoded_", nodes).take(if with_decoded { 3 * nodes } else { 0 });
+    write_csv_row(names.chain(coordinates("", nodes)).chain(decoded), writer)
 }
 
 /// Writes the samples of `set` as CSV: snapshot and row-wire, M4 resistances in ohm, x, y, z of each node in
@@ -49,11 +41,11 @@ pub fn write_samples(
         if let Some(row_wire) = set.row_wire(sample) {
             write!(writer, "{}", row_wire + 1)?;
         }
-        write!(writer, ",")?;
         let decoded_mm = decoded_mm.map(|decoded_mm| decoded_mm.row(sample));
-        let decoded_mm = decoded_mm.iter().flatten();
         let measured = set.sample_readings(sample).iter().chain(set.sample_targets(sample));
-        write_numbers(measured.chain(decoded_mm), writer)?;
+        for number in measured.chain(decoded_mm.iter().flatten()) {
+            write!(writer, ",{number:?}")?;
+        }
         writeln!(writer)?;
     }
     Ok(())
@@ -64,12 +56,12 @@ pub fn write_samples(
 /// # Errors
 /// Any error of `writer`.
 pub fn write_decoded_header(nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
-    write_names("", nodes, writer)?;
-    writeln!(writer, ",readings_outside,coordinates_outside")
+    let counts = ["readings_outside", "coordinates_outside"].map(str::to_owned);
+    write_csv_row(coordinates("", nodes).chain(counts), writer)
 }
 
-/// Writes decoded coordinates in millimetres, how many of the readings were outside the range seen in training, empty if
-/// that is not known, and how many of the coordinates.
+/// Writes decoded coordinates in millimetres, which read back bit for bit, how many of the readings were outside the range seen
+/// in training, empty if that is not known, and how many of the coordinates.
 ///
 /// # Errors
 /// Any error of `writer`.
@@ -79,31 +71,18 @@ pub fn write_decoded(
     coordinates_outside: usize,
     writer: &mut dyn Write,
 ) -> io::Result<()> {
-    write_numbers(coordinates_mm, writer)?;
-    write!(writer, ",")?;
+    for number in coordinates_mm {
+        write!(writer, "{number:?},")?;
+    }
     if let Some(count) = readings_outside {
         write!(writer, "{count}")?;
     }
     writeln!(writer, ",{coordinates_outside}")
 }
 
-/// Writes `x_1,y_1,z_1,…` for the nodes of a row-wire, each name prefixed with `before`.
-fn write_names(before: &str, nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
-    for node in 1..=nodes {
-        let separator = if node == 1 { "" } else { "," };
-        write!(writer, "{separator}{before}x_{node},{before}y_{node},{before}z_{node}")?;
-    }
-    Ok(())
-}
-
-/// Writes numbers separated by commas; they read back bit for bit.
-fn write_numbers<'a>(numbers: impl IntoIterator<Item = &'a f64>, writer: &mut dyn Write) -> io::Result<()> {
-    let mut separator = "";
-    for number in numbers {
-        write!(writer, "{separator}{number:?}")?;
-        separator = ",";
-    }
-    Ok(())
+/// Names `x_1`, `y_1`, `z_1`, … of the nodes of a row-wire, each prefixed with `before`.
+fn coordinates(before: &str, nodes: usize) -> impl Iterator<Item = String> {
+    (1..=nodes).flat_map(move |node| ["x", "y", "z"].map(|axis| format!("{before}{axis}_{node}")))
 }
 
 /// Record of a training.
@@ -134,7 +113,7 @@ impl TrainingRecord {
         Self {
             stop_reason: run.stop_reason(),
             best_epoch: trainer.best_epoch(),
-            epochs: last_epoch(trainer.history()),
+            epochs: trainer.history().last().map_or(0, |record| record.epoch),
             seconds: trainer.elapsed().as_secs_f64(),
             history: trainer.history().to_vec(),
             stages: trainer.stages().to_vec(),
@@ -145,23 +124,19 @@ impl TrainingRecord {
     /// Captures the record, until a past epoch, of the start that was best at that epoch.
     pub(super) fn until(run: &Run, past: &PastNetwork) -> Self {
         let trainer = run.trainers().get(past.start).unwrap_or_else(|| run.leader());
-        let epochs = trainer.history().partition_point(|record| record.epoch <= past.epoch);
-        let stages = trainer
-            .stages()
-            .partition_point(|stage| stage.first_epoch <= past.epoch);
+        let mut history = trainer.history().to_vec();
+        history.retain(|record| record.epoch <= past.epoch);
+        let mut stages = trainer.stages().to_vec();
+        stages.retain(|stage| stage.first_epoch <= past.epoch);
         Self {
             stop_reason: Some(StopReason::Stopped),
             best_epoch: past.best_epoch,
-            epochs: last_epoch(&trainer.history()[..epochs]),
+            epochs: history.last().map_or(0, |record| record.epoch),
             seconds: past.elapsed.as_secs_f64(),
-            history: trainer.history()[..epochs].to_vec(),
-            stages: trainer.stages()[..stages].to_vec(),
+            history,
+            stages,
             // The states of the other starts at that epoch are not kept.
             starts: Vec::new(),
         }
     }
-}
-
-fn last_epoch(history: &[EpochRecord]) -> usize {
-    history.last().map_or(0, |record| record.epoch)
 }

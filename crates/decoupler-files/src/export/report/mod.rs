@@ -18,8 +18,8 @@ use self::{
 };
 use super::{
     NetworkFile, Table, WriteError, atomic_write, decoder_table, describe_determinacy, describe_search,
-    describe_worse_than_ridge, document::PROGRAM, error_table, format_duration, format_number, format_percent,
-    search_table, table::Columns, unfinished::folder_of,
+    describe_worse_than_ridge, document::PROGRAM, error_table, format_duration, format_percent, search_table,
+    sweep::flatten, table::Columns, unfinished::folder_of,
 };
 use crate::import::{Plan, Setup};
 use decoupler_core::{
@@ -29,12 +29,13 @@ use decoupler_core::{
         recorded::{Determination, HysteresisLoop},
     },
     problem::Channel,
-    scene::{Loading, RowModel},
+    scene::RowModel,
     sensor::Geometry,
     settings::Setting,
     text::{capitalised, counted},
     training::StopReason,
 };
+use serde_json::json;
 
 /// A run to be reported: of a simulated array or a recording.
 #[derive(Clone, Copy, Debug)]
@@ -305,43 +306,19 @@ impl RunReport<'_> {
             }
         }
         add("weights", &file.network.weights());
-        if let Some(simulation) = settings.simulation() {
-            let (scene, geometry) = (&simulation.scene, &simulation.sensor.geometry);
-            let [percent, mm] = [100.0 * scene.largest_compression, simulation.stroke_mm()].map(format_number);
-            add(
-                "largest compression",
-                &format_args!("{percent} % of the height, {mm} mm"),
-            );
-            add(
-                "largest shift sideways",
-                &format_args!("{} mm", scene.movement.largest_shift_mm()),
-            );
-            if let Loading::Indenter(indenter) = scene.loading {
-                let (radius, tilt_degrees) = indenter.radius_mm_and_tilt_degrees();
-                if let Some(radius) = radius {
-                    add(
-                        "radius of the indenter",
-                        &format_args!("{} to {} mm", radius.smallest, radius.largest),
-                    );
-                }
-                add("tilt of the indenter", &format_args!("up to {tilt_degrees}°"));
-                add("decay length", &format_args!("{} mm", indenter.spread_mm));
-            }
-            add("height", &format_args!("{} mm", geometry.height_mm));
-            let wires = |axis, from_mm, apart_mm| format!("from {axis} = {from_mm} mm, {apart_mm} mm apart");
-            add("row-wires", &wires("x", geometry.row_x0_mm, geometry.row_pitch_mm));
-            add(
-                "nodes of a row-wire",
-                &format_args!("{} mm apart", geometry.node_pitch_mm),
-            );
-            add(
-                "column-wires",
-                &wires("y", geometry.column_y0_mm, geometry.column_pitch_mm),
-            );
-            let nodes = wires("x", geometry.column_node_x0_mm, geometry.column_node_pitch_mm);
-            add("nodes of a column-wire", &nodes);
-            let rubber = simulation.sensor.resistivity_ohm_per_mm;
-            add("resistance of the rubber", &format_args!("{rubber} ohm/mm"));
+        if let Some(Simulation { sensor, scene, .. }) = settings.simulation() {
+            // What the table does not contain, by its names in recipes.
+            let source = json!({
+                "geometry": sensor.geometry,
+                "resistivity_ohm_per_mm": sensor.resistivity_ohm_per_mm,
+                "largest_compression": scene.largest_compression,
+                "movement": scene.movement,
+                "loading": scene.loading,
+            });
+            flatten(&source, "", &mut |place, value| {
+                let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+                add(&place.replace(['.', '_'], " "), &text);
+            });
         }
         rows
     }

@@ -14,13 +14,12 @@ use std::{
 use super::DocumentError;
 use crate::machine::system_cause;
 
+pub(super) use self::row::flatten;
 pub use self::{
-    row::SweepRow,
-    trial_file::{Trial, TrialOptions},
+    options::{decoders_in_order, recording_options, sweep_specification, train_options},
+    row::{MergedSweep, SweepFolderError, SweepRow, SweepTableFormat},
+    trial_file::{Trial, TrialId, TrialOptions},
 };
-pub use options::{decoders_in_order, recording_options, sweep_specification, train_options};
-pub use row::{MergedSweep, SweepFolderError, SweepTableFormat};
-pub use trial_file::TrialId;
 
 /// Files of the trials in a folder.
 #[derive(Debug, PartialEq, Eq)]

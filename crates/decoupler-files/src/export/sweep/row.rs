@@ -129,7 +129,7 @@ fn take_times(value: &mut Value, place: &str, times: &mut BTreeMap<String, Value
 
 /// Visits every value in `value` that is not an object, with its place. Objects of a list are identified by their
 /// names, if they have any.
-fn flatten(value: &Value, place: &str, visit: &mut impl FnMut(&str, &Value)) {
+pub(in crate::export) fn flatten(value: &Value, place: &str, visit: &mut impl FnMut(&str, &Value)) {
     match value {
         Value::Object(fields) => {
             for (name, value) in fields {
