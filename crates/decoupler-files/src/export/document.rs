@@ -100,9 +100,10 @@ impl DocumentKind {
         file.take(BEGINNING).read_to_end(&mut beginning).ok()?;
         let text = String::from_utf8_lossy(&beginning);
         let (_, rest) = text.trim_start().strip_prefix('{')?.split_once("\"format\"")?;
-        let format = rest.trim_start().strip_prefix(':')?.trim_start().strip_prefix('"')?;
-        let (format, _) = format.split_once('"')?;
-        Self::ALL.into_iter().find(|kind| kind.format() == format)
+        let rest = rest.trim_start_matches(|c: char| c == ':' || c.is_whitespace());
+        Self::ALL
+            .into_iter()
+            .find(|kind| rest.starts_with(&format!("\"{}\"", kind.format())))
     }
 
     /// Returns the origin of the samples of `run` for its file: `recorded`, or `None` if they are simulated.

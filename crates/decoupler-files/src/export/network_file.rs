@@ -7,15 +7,14 @@ use decoupler_core::{
     job::Job,
     live::{DriftReference, LiveError},
     network::{DecouplingNetwork, Networks},
-    problem::{Problem, TargetPosition},
+    problem::{Channel, Problem, TargetPosition},
     scene::Rows,
 };
 use glam::DVec3;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{
-    AtomicFile, DocumentError, DocumentKind, SavedProblem, TrainingRecord, WriteError, document::PROGRAM,
-    unfinished::folder_of,
+    AtomicFile, DocumentError, DocumentKind, TrainingRecord, WriteError, document::PROGRAM, unfinished::folder_of,
 };
 use crate::import::{LineParser, Recipe, Recorded, Setup, SetupError};
 
@@ -100,6 +99,34 @@ fn read_drift<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Result<Drift
         SavedDrift::NotMonitored { not_monitored } => Err(not_monitored),
         SavedDrift::Older(_) => not_described(),
     })
+}
+
+/// Layout of a [`Problem`] that is saved next to the settings of a run, which contain its sensor: it contains only whether there
+/// is one. The sensor that is read is therefore the default one, to be replaced by that of the settings.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Problem", deny_unknown_fields)]
+pub struct SavedProblem {
+    inputs: Vec<Channel>,
+    targets: Vec<Channel>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    memory: Option<Memory>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    positions: Vec<TargetPosition>,
+    #[serde(
+        default,
+        rename = "has_nodes",
+        serialize_with = "is_known",
+        deserialize_with = "default_if_known"
+    )]
+    sensor: Option<Simulation>,
+}
+
+fn is_known<S: Serializer>(sensor: &Option<Simulation>, serializer: S) -> Result<S::Ok, S::Error> {
+    sensor.is_some().serialize(serializer)
+}
+
+fn default_if_known<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Simulation>, D::Error> {
+    Ok(bool::deserialize(deserializer)?.then(Simulation::default))
 }
 
 /// Network that a run stopped at an epoch would have returned.

@@ -1,12 +1,13 @@
 use std::io::{self, Write};
 
-use super::{Cell, Table, TableColumn, format_number, table::Columns};
+use super::{Cell, Table, TableColumn, format_number, format_percent, table::Columns};
 use crate::import::{Recording, SetupSets};
 use decoupler_core::{
     dataset::{Dataset, Seed, SplitBy},
     evaluation::{
         Coverage, DecoderReport, ErrorMeasure, ErrorRow, ErrorTable, Errors, HalfWidth, Intervals, Scores,
         TargetErrors, TestErrors,
+        auto::{AutoRecord, Tried, TriedModel},
         recorded::{
             Determinacy, Determination, Findings, TargetFindings, Undetermined, channel_remarks, target_remarks,
         },
@@ -104,6 +105,76 @@ fn error_cell(measure: ErrorMeasure, error: Option<f64>) -> Cell {
 fn error_column(measure: ErrorMeasure) -> TableColumn {
     let (heading, unit) = measure.heading();
     TableColumn::new(measure.field(), heading, unit)
+}
+
+/// Definitions of the columns of [`search_table`].
+const SEARCH_MEANINGS: [&str; 8] = [
+    "Weight in the answer: the convex combination with the lowest error of held-out answers.",
+    "Quantity, memory and scaling of the inputs.",
+    "Training mean, ridge, kernel ridge, or networks × hidden nodes and their training method; * marks the network that is \
+     trained.",
+    "Weights with which the trainings begin: random, or ridge regression with random weights added.",
+    "Root mean square error of held-out answers in cross-validation, relative to the standard deviation of each target: \
+     100 % for always answering the mean.",
+    "Standard error of the error, from the differences between folds.",
+    "Epoch with the lowest error, at which training stops; + if the budget cut off the candidate before.",
+    "Estimated time on one core, counted against the budget.",
+];
+
+/// Returns the candidates of a search as a table; the choice is marked.
+pub fn search_table(record: &AutoRecord) -> Table {
+    let network = |tried: &Tried| match tried.model {
+        TriedModel::Network { begin, epochs, .. } => Some((begin, epochs)),
+        _ => None,
+    };
+    let mut columns = Columns::<(usize, &Tried)>::new();
+    columns.add(("share_percent", "share", "%"), |(_, tried)| match tried.share {
+        share if share > 0.0 => Cell::from(100.0 * share),
+        _ => Cell::from(""),
+    });
+    columns.add(("features", "inputs", ""), |(_, tried)| tried.features());
+    columns.add("model", |&(place, tried)| {
+        let mark = if place == record.chosen { "*" } else { "" };
+        format!("{}{mark}", tried.model)
+    });
+    columns.add(("begin", "begins at", ""), |(_, tried)| {
+        network(tried).map_or(String::new(), |(begin, _)| begin.to_string())
+    });
+    columns.add(("error_percent", "error", "%"), |(_, tried)| 100.0 * tried.error);
+    columns.add(("standard_error_percent", "±", "%"), |(_, tried)| {
+        100.0 * tried.standard_error
+    });
+    columns.add("epochs", |(_, tried)| {
+        let cut_off = if tried.is_cut_off { "+" } else { "" };
+        network(tried).map_or(String::new(), |(_, epochs)| format!("{epochs}{cut_off}"))
+    });
+    columns.add(("seconds", "time", "s"), |(_, tried)| tried.seconds);
+    let mut table = columns.table(record.tried.iter().enumerate());
+    for (column, meaning) in table.columns.iter_mut().zip(SEARCH_MEANINGS) {
+        column.meaning = meaning;
+    }
+    table
+}
+
+/// Describes how the settings were chosen, in one sentence.
+pub fn describe_search(record: &AutoRecord) -> String {
+    format!(
+        "Answer chosen from {} candidates by cross-validation on {} of the training samples{}; {:.0} s of one core and {:.0} s of \
+         training within a budget of {} s (*: the network that is trained)",
+        record.tried.len(),
+        match record.by {
+            SplitBy::Time => format!("{} blocks of time", record.folds),
+            SplitBy::Group => format!("{} sets of groups", record.folds),
+            SplitBy::Random => format!("{} random parts", record.folds),
+        },
+        record.combined.map_or(String::new(), |error| format!(
+            ", error of the combination {}",
+            format_percent(100.0 * error)
+        )),
+        record.seconds(),
+        record.training_s,
+        record.budget_s
+    )
 }
 
 /// Writes the errors of every epoch as CSV, formatted as by [`Table::write_csv`].

@@ -160,29 +160,19 @@ pub(super) fn file_options(plan: &Plan, recipe: Option<&Path>) -> Vec<GivenOptio
 /// for validation by default.
 pub(super) fn division_options(plan: &Plan, usual: Option<f64>) -> Vec<GivenOption> {
     let (division, default) = (plan.division, Division::default());
-    let by_default = match plan.import.has_groups() {
-        true => SplitBy::Group,
-        false => default.by,
-    };
-    let is_by_default = division.by == by_default && division.by == default.by;
-    let options = [
-        (is_by_default, "split", division.by.to_string()),
-        (
-            division.test_fraction == default.test_fraction,
-            "test-fraction",
-            division.test_fraction.to_string(),
-        ),
-        (
-            usual == Some(division.validation_fraction),
-            "validation-fraction",
-            division.validation_fraction.to_string(),
-        ),
-    ];
-    let is_given = |(is_default, name, _): &(bool, &str, String)| {
-        (usual.is_none() || !is_default) && (plan.test.is_none() || *name != "test-fraction")
-    };
-    let given = options.into_iter().filter(is_given);
-    given.map(|(_, name, value)| (name.into(), value)).collect()
+    let is_given = |is_default: bool| usual.is_none() || !is_default;
+    let mut options = Vec::new();
+    let has_default_rule = !plan.import.has_groups() || default.by == SplitBy::Group;
+    if is_given(has_default_rule && division.by == default.by) {
+        options.push(("split".into(), division.by.to_string()));
+    }
+    if plan.test.is_none() && is_given(division.test_fraction == default.test_fraction) {
+        options.push(("test-fraction".into(), division.test_fraction.to_string()));
+    }
+    if is_given(usual == Some(division.validation_fraction)) {
+        options.push(("validation-fraction".into(), division.validation_fraction.to_string()));
+    }
+    options
 }
 
 fn set_options(data: &Path, join: &[PathBuf], [data_name, join_name]: [&'static str; 2]) -> Vec<GivenOption> {

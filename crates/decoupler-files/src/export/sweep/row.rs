@@ -12,9 +12,8 @@ use serde::Serialize;
 use serde_json::Value;
 use thiserror::Error;
 
-use super::{SweepFiles, Trial, TrialId, TrialOptions, trial_file::options_text};
-pub use crate::export::DocumentError;
-use crate::export::write_csv_row;
+use super::{SweepFiles, Trial, TrialId, TrialOptions, options_text};
+use crate::export::{DocumentError, write_csv_row};
 
 /// Fields of a report that are times: they differ from run to run and are excluded from comparisons.
 const TIMES: [&str; 4] = ["epoch_ms", "frame_us", "fit_seconds", "training_seconds"];

@@ -1,14 +1,13 @@
 //! Tables: described once, and written as CSV for other programs or as text for papers and spreadsheets.
 //! LaTeX has the rules of `booktabs` and the numeric columns of `siunitx`.
 
-mod csv_row;
 mod text;
 
-pub use csv_row::{csv_cell, write_csv_row};
 pub use text::TableForm;
 pub(super) use text::escaped_html;
 
 use std::{
+    borrow::Cow,
     io::{self, Write},
     time::Duration,
 };
@@ -258,6 +257,27 @@ impl Serialize for Row<'_> {
     }
 }
 
+/// Returns a cell of CSV: quoted if necessary (RFC 4180).
+pub fn csv_cell(text: &str) -> Cow<'_, str> {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\"")).into()
+    } else {
+        text.into()
+    }
+}
+
+/// Writes a row of CSV.
+///
+/// # Errors
+/// Any error of `writer`.
+pub fn write_csv_row<T: AsRef<str>>(cells: impl IntoIterator<Item = T>, writer: &mut dyn Write) -> io::Result<()> {
+    for (place, cell) in cells.into_iter().enumerate() {
+        let comma = if place == 0 { "" } else { "," };
+        write!(writer, "{comma}{}", csv_cell(cell.as_ref()))?;
+    }
+    writeln!(writer)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -311,5 +331,24 @@ mod tests {
         for cell in [Cell::Number(None), f64::NAN.into(), f64::INFINITY.into()] {
             assert_eq!((cell.exact().as_str(), cell.rounded().as_str()), ("", "–"));
         }
+    }
+
+    #[test]
+    fn rows_are_read_back_by_the_csv_crate() {
+        let row = [
+            "",
+            "plain",
+            "with, comma",
+            "with \"quotes\"",
+            "with\nbreak",
+            "with\r",
+            " spaces ",
+            "=1",
+        ];
+        let mut text = Vec::new();
+        write_csv_row(row, &mut text).unwrap();
+        let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(&text[..]);
+        let read = reader.records().next().unwrap().unwrap();
+        assert_eq!(Vec::from_iter(&read), row);
     }
 }
