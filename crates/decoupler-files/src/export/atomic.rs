@@ -1,7 +1,7 @@
 //! Atomic writing of files, and bounded reading of JSON files.
 
 use std::{
-    fs::{self, File, Metadata, Permissions},
+    fs::{self, File, Permissions},
     io::{self, BufWriter, ErrorKind, Write},
     path::{Path, PathBuf},
 };
@@ -181,29 +181,15 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
 /// Returns true if two paths lead to the same file, existing or not, also through links and hard links. Pipes and devices
 /// are never the same: reading from one does not destroy what was written to it.
 pub fn is_same(one: &Path, other: &Path) -> bool {
-    let found = [one, other].map(|path| fs::metadata(path).ok());
-    if found.iter().flatten().any(|found| !found.is_file()) {
+    let is_special = |path: &Path| fs::metadata(path).is_ok_and(|found| !found.is_file());
+    if is_special(one) || is_special(other) {
         return false;
     }
     let place = |path: &Path| {
         let new = || Some(fs::canonicalize(folder_of(path)).ok()?.join(path.file_name()?));
         fs::canonicalize(path).ok().or_else(new)
     };
-    is_same_on_disk(&found) || (place(one).is_some() && place(one) == place(other))
-}
-
-#[cfg(unix)]
-fn is_same_on_disk(found: &[Option<Metadata>; 2]) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let [one, other] = found
-        .each_ref()
-        .map(|found| found.as_ref().map(|found| (found.dev(), found.ino())));
-    one.is_some() && one == other
-}
-
-#[cfg(not(unix))]
-fn is_same_on_disk(_found: &[Option<Metadata>; 2]) -> bool {
-    false
+    same_file::is_same_file(one, other).unwrap_or(false) || (place(one).is_some() && place(one) == place(other))
 }
 
 #[cfg(test)]

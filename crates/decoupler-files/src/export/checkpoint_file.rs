@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::to_raw_value;
 
 use super::{
-    AtomicFile, DocumentError, DocumentKind, document::PROGRAM, network_file::settings_defect, unfinished::folder_of,
+    AtomicFile, DocumentError, DocumentKind, document::PROGRAM, network_file::check_settings, unfinished::folder_of,
 };
 use crate::import::{Progress, Recorded, Setup, SetupError, SetupSets};
 use decoupler_core::{
@@ -112,10 +112,9 @@ impl CheckpointFile {
         let (program, mut file): (_, Self) = KIND.load(path)?;
         file.program = program;
         file.recorded = file.recorded.map(|recorded| recorded.within(folder_of(path)));
-        match settings_defect(&file.settings, file.recorded.as_ref()) {
-            None => Ok(file),
-            Some(defect) => Err(KIND.damaged(path, defect)),
-        }
+        let checked = check_settings(&file.settings, file.recorded.as_ref());
+        checked.map_err(|defect| KIND.damaged(path, defect))?;
+        Ok(file)
     }
 }
 

@@ -48,31 +48,26 @@ impl DocumentKind {
         Self::Trial,
     ];
 
-    /// Returns the value of the field `format`, the only version that can be read, the name in sentences, and the remedy for
-    /// damage.
-    fn description(self) -> (&'static str, u64, &'static str, &'static str) {
+    /// Returns the name of the format, the only version that can be read, and the name in sentences.
+    fn description(self) -> (&'static str, u64, &'static str) {
         match self {
-            Self::Network => ("decoupler network", 4, "network file", "copy or save it again"),
-            Self::Checkpoint => (
-                "decoupler checkpoint",
-                4,
-                "checkpoint",
-                "copy it again, or start a new training",
-            ),
-            Self::Recipe => (
-                "decoupler recipe",
-                1,
-                "recipe",
-                "correct it, or write it again with --save-recipe",
-            ),
-            Self::Sensor => ("decoupler sensor", 1, "sensor file", "correct it, or calibrate again"),
-            Self::RunList => (
-                "decoupler run list",
-                1,
-                "part of a run list",
-                "name the run or choose A and B again",
-            ),
-            Self::Trial => ("decoupler trial", 1, "trial", "delete it and run the sweep again"),
+            Self::Network => ("decoupler network", 4, "network file"),
+            Self::Checkpoint => ("decoupler checkpoint", 4, "checkpoint"),
+            Self::Recipe => ("decoupler recipe", 1, "recipe"),
+            Self::Sensor => ("decoupler sensor", 1, "sensor file"),
+            Self::RunList => ("decoupler run list", 1, "part of a run list"),
+            Self::Trial => ("decoupler trial", 1, "trial"),
+        }
+    }
+
+    fn cure(self) -> &'static str {
+        match self {
+            Self::Network => "copy or save it again",
+            Self::Recipe => "correct it, or write it again with --save-recipe",
+            Self::Sensor => "correct it, or calibrate again",
+            Self::Checkpoint => "copy it again, or start a new training",
+            Self::RunList => "name the run or choose A and B again",
+            Self::Trial => "delete it and run the sweep again",
         }
     }
 
@@ -84,10 +79,6 @@ impl DocumentKind {
     /// Version of the format, the only one that can be read.
     pub(super) fn version(self) -> u64 {
         self.description().1
-    }
-
-    fn cure(self) -> &'static str {
-        self.description().3
     }
 
     /// Returns the kind of the file at `path`, determined by its beginning; `None` if it is of no kind or cannot be

@@ -1,4 +1,4 @@
-use std::{fmt::Display, path::Path, sync::Arc, time::Duration};
+use std::{path::Path, sync::Arc, time::Duration};
 
 use decoupler_core::{
     dataset::{Dataset, DatasetError, Memory, Simulation},
@@ -331,7 +331,7 @@ impl NetworkFile {
             scores,
             ..
         } = self;
-        settings_defect(settings, self.recorded.as_ref()).map_or(Ok(()), Err)?;
+        check_settings(settings, self.recorded.as_ref())?;
         let simulation = settings.simulation();
         let is_placed = |position: &TargetPosition| position.target < problem.targets.len();
         let has_memory = |memory: &Memory| memory.check(problem.inputs.len()).is_ok();
@@ -429,26 +429,22 @@ fn require(holds: bool, defect: impl FnOnce() -> String) -> Result<(), String> {
     if holds { Ok(()) } else { Err(defect()) }
 }
 
-/// Describes the first invalid value of the settings in a file, and its field.
-pub(super) fn settings_defect(settings: &RunSettings, recorded: Option<&Recorded>) -> Option<String> {
-    let at = |field: &str, defect: &dyn Display| format!("{field}: {defect}");
-    let training = settings
-        .training
-        .check()
-        .map_err(|defect| at("settings.training", &defect));
-    let counts = settings.check_counts().map_err(|defect| at("settings", &defect));
-    let source = settings
-        .simulation()
-        .map_or(Ok(()), |Simulation { sensor, scene, .. }| {
-            (sensor.check()).map_err(|defect| at("settings.source.sensor", &defect))?;
-            (scene.check()).map_err(|defect| at("settings.source.scene", &defect))
-        });
-    let recorded = match (settings.simulation(), recorded) {
+/// Checks the settings in a file, and that a recording has its plan.
+///
+/// # Errors
+/// The first invalid value, with its field.
+pub(super) fn check_settings(settings: &RunSettings, recorded: Option<&Recorded>) -> Result<(), String> {
+    (settings.check_counts()).map_err(|defect| format!("settings: {defect}"))?;
+    if let Some(Simulation { sensor, scene, .. }) = settings.simulation() {
+        (sensor.check()).map_err(|defect| format!("settings.source.sensor: {defect}"))?;
+        (scene.check()).map_err(|defect| format!("settings.source.scene: {defect}"))?;
+    }
+    (settings.training.check()).map_err(|defect| format!("settings.training: {defect}"))?;
+    match (settings.simulation(), recorded) {
         (Some(_), Some(_)) => Err("recorded: the source is a simulated array".to_owned()),
         (None, None) => Err("recorded: it is missing".to_owned()),
         _ => Ok(()),
-    };
-    [counts, source, training, recorded].into_iter().find_map(Result::err)
+    }
 }
 
 fn check_number(network: &Networks, settings: &RunSettings, row_wires: Option<&[usize]>) -> Result<(), String> {

@@ -20,11 +20,10 @@ use decoupler_core::{
 /// target.
 pub fn error_table(tables: &[ErrorTable]) -> Table {
     let mut columns = Columns::<(&ErrorTable, &ErrorRow)>::new();
-    if tables.iter().any(|table| table.target.is_some()) {
-        columns.add(("target", "Target", ""), |(table, _)| {
-            table.target.as_ref().map_or(String::new(), Channel::title)
-        });
-    }
+    let has_targets = tables.iter().any(|table| table.target.is_some());
+    columns.add_if(has_targets, ("target", "Target", ""), |(table, _)| {
+        table.target.as_ref().map_or(String::new(), Channel::title)
+    });
     columns.add(("decoupler", "Decoder", ""), |(_, row)| row.name);
     let measures = tables.first().map_or(&[][..], |table| table.measures);
     for (place, &measure) in measures.iter().enumerate() {
@@ -60,13 +59,11 @@ fn array_decoder_table(reports: &[DecoderReport], model_based: Option<&Errors>) 
         None => errors.and_then(|errors| errors.z_percent),
     });
     columns.add(("z_mm", "Z", "mm"), |(_, errors)| errors.map(|errors| errors.z_mm));
-    if let Some(model_based) = model_based {
-        let times = ("times_model_based", "times model-based", "");
-        columns.add(times, |(report, errors)| match report {
-            Some(_) => errors.and_then(|errors| errors.times(model_based)),
-            None => Some(1.0),
-        });
-    }
+    let times = ("times_model_based", "times model-based", "");
+    columns.add_if(model_based.is_some(), times, |(report, errors)| match report {
+        Some(_) => errors.and_then(|errors| errors.times(model_based?)),
+        None => Some(1.0),
+    });
     columns.add("residual", |(report, _)| report.and_then(|report| report.residual));
     columns.add(("frame_us", "a frame", "µs"), |(report, _)| {
         report.map(|report| report.frame_us)
@@ -247,39 +244,31 @@ pub fn describe_half_widths(targets: &[Channel], intervals: &Intervals) -> Optio
 
 /// Warns of the targets whose intervals contain significantly fewer test samples than stated, with cause and remedy.
 pub fn describe_coverage(targets: &[Channel], coverage: &[Option<Coverage>]) -> Vec<String> {
-    let low = targets.iter().zip(coverage).filter_map(|(target, coverage)| {
-        Some((
-            target,
-            coverage.as_ref().filter(|of| of.is_too_low() || of.is_too_high())?,
-        ))
-    });
-    let describe = |(target, coverage): (&Channel, &Coverage)| {
-        let percent = |share: f64| format!("{:.0}", 100.0 * share);
+    let describe = |(target, coverage): (&Channel, &Option<Coverage>)| {
+        let coverage = coverage.as_ref().filter(|of| of.is_too_low() || of.is_too_high())?;
         let cause = if coverage.is_too_high() {
             "they are too wide for these samples: part of the training recording was answered much worse than this test part; \
              look for a stretch of it that differs"
                 .to_owned()
         } else if coverage.bias.abs() > 0.5 * coverage.half_width {
+            let [bias, half_width] = [coverage.bias, coverage.half_width].map(format_number);
             format!(
-                "the test part is offset from the training part (mean error {}, half-width {}): re-zero the sensor, or \
-                 record training data closer to the time of use",
-                format_number(coverage.bias),
-                format_number(coverage.half_width)
+                "the test part is offset from the training part (mean error {bias}, half-width {half_width}): re-zero the \
+                 sensor, or record training data closer to the time of use"
             )
         } else {
             "the test part differs from the training part: record training data that cover its conditions, or split by \
              group"
                 .to_owned()
         };
-        format!(
-            "the 90 % intervals of {} contain {} % of the test samples (expected {} to {} %): {cause}",
-            target.name,
-            percent(coverage.share),
-            percent(coverage.expected[0]),
-            percent(coverage.expected[1])
-        )
+        let [low, high] = coverage.expected;
+        let [share, low, high] = [coverage.share, low, high].map(|share| format!("{:.0}", 100.0 * share));
+        let name = &target.name;
+        Some(format!(
+            "the 90 % intervals of {name} contain {share} % of the test samples (expected {low} to {high} %): {cause}"
+        ))
     };
-    low.map(describe).collect()
+    targets.iter().zip(coverage).filter_map(describe).collect()
 }
 
 /// Describes the positions of targets: their number, and the grid if they form one; `None` if no target has a position.
@@ -332,15 +321,14 @@ pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
         let values = values.column(target);
         values.iter().all(|value| *value == values[0])
     };
-    let untrained = targets.iter().enumerate();
-    let untrained = untrained.filter(|(target, _)| is_constant(training, *target) && !is_constant(test, *target));
-    warnings.extend(untrained.map(|(_, target)| {
-        format!(
-            "{} is constant in the training samples, so that the network always answers this constant: record its changes, \
-             or split another way",
-            target.name
-        )
-    }));
+    for (target, Channel { name, .. }) in targets.iter().enumerate() {
+        if is_constant(training, target) && !is_constant(test, target) {
+            warnings.push(format!(
+                "{name} is constant in the training samples, so that the network always answers this constant: record its \
+                 changes, or split another way"
+            ));
+        }
+    }
     warnings
 }
 
@@ -363,23 +351,23 @@ pub fn describe_worse_than_ridge(problem: &Problem, scores: &Scores) -> Option<S
     let worse = all.filter(|(_, (network, ridge))| network.r2.is_some() && network.rmse > ridge.rmse);
     let mut comparison = "no better than";
     let mut targets = Vec::new();
-    for (target, (network, ridge)) in worse {
+    for (Channel { name, .. }, (network, ridge)) in worse {
         let (of_network, of_ridge) = (format_number(network.rmse), format_number(ridge.rmse));
         targets.push(if of_network == of_ridge {
-            format!("{} (RMSE {of_ridge} for both)", target.name)
+            format!("{name} (RMSE {of_ridge} for both)")
         } else {
             comparison = "worse than";
-            format!("{} (RMSE {of_network}, ridge {of_ridge})", target.name)
+            format!("{name} (RMSE {of_network}, ridge {of_ridge})")
         });
     }
     let more = match targets.len() {
         0 => return None,
-        count if count > NAMED + 1 => format!(" and {} more", count - NAMED),
+        count if count > NAMED + 1 => {
+            targets.truncate(NAMED);
+            format!(" and {} more", count - NAMED)
+        }
         _ => String::new(),
     };
-    if !more.is_empty() {
-        targets.truncate(NAMED);
-    }
     let targets = targets.join(", ");
     Some(match scores.network_alone {
         None => format!(

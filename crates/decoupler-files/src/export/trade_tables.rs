@@ -24,10 +24,9 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
     });
     let is_array = levels.iter().any(|level| level.noise.is_some());
     let mut columns = Columns::<Row<'_>>::new();
-    if is_array {
-        columns.add("noise", |(noise, ..)| *noise);
-        columns.add("preset", |(_, point, ..)| point.preset.map(|preset| preset.to_string()));
-    }
+    columns.add_if(is_array, "noise", |(noise, ..)| *noise);
+    let preset = |(_, point, ..): &Row<'_>| point.preset.map(|preset| preset.to_string());
+    columns.add_if(is_array, "preset", preset);
     columns.add("decoder", |(_, point, ..)| point.report.kind.to_string());
     columns.add("precision", |(_, point, ..)| match point.report.precision {
         Precision::Double => "f64",
@@ -37,32 +36,21 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
     columns.add("method", |(_, point, ..)| {
         point.method().map(|method| method.short_name())
     });
-    if is_array {
-        columns.add("samples", |(_, point, ..)| {
-            point.settings.simulation().map(|simulation| simulation.samples)
-        });
-    }
-    columns.add("epochs", |(_, point, ..)| {
-        point.hidden().map(|_| point.settings.training.stopping.epochs)
-    });
+    let samples = |(_, point, ..): &Row<'_>| Some(point.settings.simulation()?.samples);
+    columns.add_if(is_array, "samples", samples);
+    let epochs = |(_, point, ..): &Row<'_>| point.hidden().map(|_| point.settings.training.stopping.epochs);
+    columns.add("epochs", epochs);
     let percent = if is_array { "z_percent" } else { "percent_of_range" };
     columns.add(percent, |(_, point, ..)| point.report.errors.percent());
-    if is_array {
-        columns.add("z_mm", |(_, point, ..)| {
-            point.report.errors.nodes().map(|errors| errors.z_mm)
-        });
-    }
+    let z_mm = |(_, point, ..): &Row<'_>| Some(point.report.errors.nodes()?.z_mm);
+    columns.add_if(is_array, "z_mm", z_mm);
     columns.add("frame_us", |(_, point, ..)| point.report.frame_us);
     columns.add("training_s", |(_, point, ..)| point.training_seconds);
-    if is_array {
-        columns.add("residual", |(_, point, ..)| point.report.residual);
-        columns.add("model_based_z_percent", |(_, point, ..)| {
-            point.model_based.and_then(|errors| errors.z_percent)
-        });
-        columns.add("model_based_z_mm", |(_, point, ..)| {
-            point.model_based.map(|errors| errors.z_mm)
-        });
-    }
+    columns.add_if(is_array, "residual", |(_, point, ..)| point.report.residual);
+    let model_percent = |(_, point, ..): &Row<'_>| point.model_based.as_ref()?.z_percent;
+    columns.add_if(is_array, "model_based_z_percent", model_percent);
+    let model_mm = |(_, point, ..): &Row<'_>| Some(point.model_based.as_ref()?.z_mm);
+    columns.add_if(is_array, "model_based_z_mm", model_mm);
     columns.add("on_decoding_front", |(.., on_decoding, _)| on_decoding.to_string());
     columns.add("on_training_front", |(.., on_training)| on_training.to_string());
     columns.table(rows)
@@ -79,17 +67,12 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
         None => ("percent_of_range", "MAE", "% of range"),
     };
     columns.add(percent, |point| point.report.errors.percent());
-    if level.noise.is_some() {
-        columns.add(("z_mm", "Z", "mm"), |point| {
-            point.report.errors.nodes().map(|errors| errors.z_mm)
-        });
-    }
+    let z_mm = |point: &&TradeOffPoint| Some(point.report.errors.nodes()?.z_mm);
+    columns.add_if(level.noise.is_some(), ("z_mm", "Z", "mm"), z_mm);
     // Ratios to rounding are meaningless.
-    if level.points.iter().any(|point| point.to_model_based().is_some()) {
-        columns.add(("times_model_based", "times model-based", ""), |point| {
-            point.to_model_based()
-        });
-    }
+    let has_ratio = points.iter().any(|point| point.to_model_based().is_some());
+    let times = ("times_model_based", "times model-based", "");
+    columns.add_if(has_ratio, times, |point| point.to_model_based());
     columns.add(("frame_us", "a frame", "µs"), |point| point.report.frame_us);
     columns.add(("training_s", "training", "s"), |point| point.training_seconds);
     columns.table(points)

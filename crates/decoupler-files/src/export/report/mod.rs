@@ -21,17 +21,16 @@ use super::{
     describe_worse_than_ridge, document::PROGRAM, error_table, format_duration, format_percent, search_table,
     sweep::flatten, table::Columns, unfinished::folder_of,
 };
-use crate::import::{Plan, Setup};
+use crate::import::Setup;
 use decoupler_core::{
     dataset::{Dataset, Simulation},
     evaluation::{
-        DecoderReport, ErrorTable, Errors, Outlook, RUN_OPTIONS, StartRecord, TestErrors, error_remarks,
+        DecoderReport, ErrorTable, Errors, Outlook, RUN_OPTIONS, RunOption, StartRecord, TestErrors, error_remarks,
         recorded::{Determination, HysteresisLoop},
     },
     problem::Channel,
     scene::RowModel,
     sensor::Geometry,
-    settings::Setting,
     text::{capitalised, counted},
     training::StopReason,
 };
@@ -75,7 +74,9 @@ impl RunReport<'_> {
 
     fn blocks(&self, folder: &Path) -> Vec<Block> {
         let Self { file, decoders, .. } = *self;
-        let setup = self.setup(folder);
+        let recorded = file.recorded.as_ref().map(|recorded| recorded.relative_to(folder));
+        let setup = Setup::of(file.settings, recorded.map(|recorded| recorded.plan));
+        let setup = setup.expect("a file of a recording has its plan");
         let is_array = setup.plan().is_none();
         let answers = file.decoder().answers_to(self.test);
         let loops = setup.plan().map_or_else(Vec::new, |plan| {
@@ -140,27 +141,12 @@ impl RunReport<'_> {
         blocks
     }
 
-    /// Setup of the run, with paths for a file in `folder`.
-    fn setup(&self, folder: &Path) -> Setup {
-        let plan = self
-            .file
-            .recorded
-            .as_ref()
-            .map(|recorded| recorded.relative_to(folder).plan);
-        Setup::of(self.file.settings, plan).expect("a file of a recording has its plan")
-    }
-
     fn title(&self) -> String {
-        let what = format!(
-            "{}, {}, seed {}",
-            self.file.source_name(),
-            counted(self.file.settings.hidden, "hidden node"),
-            self.file.settings.seed
-        );
-        match self.name {
-            Some(name) => format!("{name}: {what}"),
-            None => what,
-        }
+        let Self { name, file, .. } = *self;
+        let (source, seed) = (file.source_name(), file.settings.seed);
+        let name = name.map_or(String::new(), |name| format!("{name}: "));
+        let hidden = counted(file.settings.hidden, "hidden node");
+        format!("{name}{source}, {hidden}, seed {seed}")
     }
 
     /// Summary of the training in two sentences.
@@ -189,75 +175,62 @@ impl RunReport<'_> {
 
     /// Returns all warnings and remarks on the run, with cause and remedy.
     fn remarks(&self, setup: &Setup, answers: &ndarray::Array2<f64>) -> Vec<String> {
+        let Self { file, .. } = *self;
+        let NetworkFile { problem, scores, .. } = file;
         let mut remarks = Vec::from_iter(self.defect.map(str::to_owned));
-        match (setup.settings().simulation(), setup.plan()) {
-            (Some(simulation), _) => remarks.extend(self.array_remarks(simulation)),
-            (None, Some(plan)) => remarks.extend(self.recording_remarks(plan, answers)),
-            (None, None) => {}
+        if let Some(simulation) = setup.settings().simulation() {
+            let outlook = Outlook::of(simulation).ok();
+            let warnings = outlook.iter().flat_map(|outlook| &outlook.warnings);
+            remarks.extend(warnings.map(ToString::to_string));
+            let reason = file.training.stop_reason;
+            let of_rows = error_remarks(&file.settings, scores, reason);
+            remarks.extend(of_rows.iter().map(|(row, remark)| format!("{row}: {remark}")));
+            let z_mm = |errors: &TestErrors| errors.nodes().map(|errors| errors.z_mm);
+            let linear_is_better = z_mm(&scores.network) > z_mm(&scores.baselines.linear);
+            if let Some(reason) = reason.filter(|_| linear_is_better) {
+                let remedy = reason.remedy(&file.settings.training.method);
+                remarks.push(format!(
+                    "a linear map of the resistances is better on z than this network: {remedy}"
+                ));
+            }
+            remarks.extend(scores.baselines.model_based_note().map(str::to_owned));
+            let model_based = scores.baselines.model_based.as_ref().and_then(TestErrors::nodes);
+            let is_rounding = model_based.is_some_and(Errors::is_rounding).then_some(
+                "the model-based error is nothing but rounding: the readings determine the deformation, and no ratio to it \
+                 is given",
+            );
+            remarks.extend(is_rounding.map(str::to_owned));
+        }
+        if let Some(plan) = setup.plan() {
+            let measured = Determination::measure(self.test, answers.view(), plan.division.by);
+            remarks.extend(describe_determinacy(
+                &problem.targets,
+                &measured,
+                file.combined().is_some(),
+            ));
+            remarks.extend(describe_worse_than_ridge(problem, scores));
+            let is_optimistic = plan.is_optimistic().then_some(
+                "test samples are drawn at random, which is optimistic where neighbouring rows are similar; split by time \
+                 or by group for an honest test",
+            );
+            remarks.extend(is_optimistic.map(str::to_owned));
         }
         for decoder in self.decoders {
             let name = decoder.kind.name(decoder.precision);
             remarks.extend(decoder.remarks.iter().map(|remark| format!("{name}: {remark}")));
         }
-        remarks
-            .into_iter()
-            .map(|remark| capitalised(remark.trim_end_matches('.')) + ".")
-            .collect()
-    }
-
-    fn array_remarks(&self, simulation: &Simulation) -> Vec<String> {
-        let Self { file, .. } = *self;
-        let outlook = Outlook::of(simulation).ok();
-        let warnings = outlook.iter().flat_map(|outlook| &outlook.warnings);
-        let mut remarks = Vec::from_iter(warnings.map(ToString::to_string));
-        let reason = file.training.stop_reason;
-        let of_rows = error_remarks(&file.settings, &file.scores, reason);
-        remarks.extend(of_rows.iter().map(|(row, remark)| format!("{row}: {remark}")));
-        let baselines = &file.scores.baselines;
-        let (Some(network), Some(linear)) = (file.scores.network.nodes(), baselines.linear.nodes()) else {
-            return remarks;
-        };
-        if network.z_mm > linear.z_mm
-            && let Some(reason) = reason
-        {
-            let remedy = reason.remedy(&file.settings.training.method);
-            remarks.push(format!(
-                "a linear map of the resistances is better on z than this network: {remedy}"
-            ));
-        }
-        remarks.extend(baselines.model_based_note().map(str::to_owned));
-        let model_based = baselines.model_based.as_ref().and_then(TestErrors::nodes);
-        if model_based.is_some_and(Errors::is_rounding) {
-            let text = "the model-based error is nothing but rounding: the readings determine the deformation, and no \
-                        ratio to it is given";
-            remarks.push(text.to_owned());
-        }
-        remarks
-    }
-
-    fn recording_remarks(&self, plan: &Plan, answers: &ndarray::Array2<f64>) -> Vec<String> {
-        let measured = Determination::measure(self.test, answers.view(), plan.division.by);
-        let mut remarks = describe_determinacy(&self.file.problem.targets, &measured, self.file.combined().is_some());
-        let NetworkFile { problem, scores, .. } = self.file;
-        remarks.extend(describe_worse_than_ridge(problem, scores));
-        if plan.is_optimistic() {
-            let text = "test samples are drawn at random, which is optimistic where neighbouring rows are similar; split \
-                        by time or by group for an honest test";
-            remarks.push(text.to_owned());
-        }
-        remarks
+        let sentence = |remark: String| capitalised(remark.trim_end_matches('.')) + ".";
+        remarks.into_iter().map(sentence).collect()
     }
 
     fn starts_table(&self) -> Table {
         let mut columns = Columns::<(usize, &StartRecord)>::new();
         columns.add(("start", "Start", ""), |(number, _)| number + 1);
         columns.add(("train_mse", "training mse", ""), |(_, start)| start.train_mse);
-        columns.add(("validation_mse", "validation mse", ""), |(_, start)| {
-            start.validation_mse
-        });
-        if self.file.problem.has_nodes() {
-            columns.add(("z_percent", "Z", "%"), |(_, start)| start.percent());
-        }
+        let validation = ("validation_mse", "validation mse", "");
+        columns.add(validation, |(_, start)| start.validation_mse);
+        let has_nodes = self.file.problem.has_nodes();
+        columns.add_if(has_nodes, ("z_percent", "Z", "%"), |(_, start)| start.percent());
         columns.add("epochs", |(_, start)| start.epochs);
         columns.add(("best_epoch", "best epoch", ""), |(_, start)| start.best_epoch);
         columns.table(self.file.training.starts.iter().enumerate())
@@ -287,11 +260,11 @@ impl RunReport<'_> {
                 .map(|rows| format!("{}, {networks}", rows.len()));
             add("row-wires", &rows.as_deref().unwrap_or("not known"));
         }
-        let value = |setting: &Setting<_>| setting.get(settings).map(|value| value.to_string());
-        for setting in RUN_OPTIONS.iter().map(|option| &option.setting) {
-            match value(setting).filter(|value| !value.is_empty()) {
-                Some(value) if setting.name != "method" => add(setting.name, &value),
-                _ => {}
+        for RunOption { setting, .. } in &RUN_OPTIONS {
+            let value = setting.get(settings).map(|value| value.to_string()).unwrap_or_default();
+            // The methods follow.
+            if !value.is_empty() && setting.name != "method" {
+                add(setting.name, &value);
             }
         }
         for (number, stage) in file.training.stages.iter().enumerate() {

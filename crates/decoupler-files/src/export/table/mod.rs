@@ -101,6 +101,18 @@ impl<'a, T> Columns<'a, T> {
         self.0.push((column.into(), Box::new(cell)));
     }
 
+    /// Adds a column that some tables have.
+    pub(super) fn add_if<C: Into<Cell>>(
+        &mut self,
+        is_there: bool,
+        column: impl Into<TableColumn>,
+        cell: impl Fn(&T) -> C + 'a,
+    ) {
+        if is_there {
+            self.add(column, cell);
+        }
+    }
+
     /// Returns the table with a row for each of `items`.
     pub(super) fn table(self, items: impl IntoIterator<Item = T>) -> Table {
         let row = |item| self.0.iter().map(|(_, cell)| cell(&item)).collect();
