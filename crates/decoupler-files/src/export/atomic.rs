@@ -63,6 +63,10 @@ pub struct AtomicFile {
 fn target_of(path: &Path) -> Result<Option<(PathBuf, Option<Permissions>)>, WriteError> {
     /// The limit of Linux.
     const MAX_LINKS: usize = 40;
+    // Also a file to which a shell redirects it is not replaced.
+    if path == Path::new("/dev/stdout") {
+        return Ok(None);
+    }
     let is_folder = path.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator);
     if is_folder || path.is_dir() {
         return Err(WriteError::Folder(path.to_owned()));
@@ -96,7 +100,7 @@ impl AtomicFile {
         let place = target_of(path)?;
         let created = || {
             let Some((target, permissions)) = place else {
-                return Ok((File::options().write(true).open(path)?, None));
+                return Ok((File::options().append(true).open(path)?, None));
             };
             let unfinished = UnfinishedFile::begin(folder_of(&target))?;
             if let Some(permissions) = permissions {

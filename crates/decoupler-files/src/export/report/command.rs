@@ -186,7 +186,14 @@ fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
         data,
         join,
         append,
-        dialect,
+        dialect:
+            DialectChoice {
+                encoding,
+                separator,
+                decimal,
+                header,
+                skip_lines,
+            },
         inputs,
         targets,
         time,
@@ -199,13 +206,6 @@ fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
         units,
         positions,
     } = recipe;
-    let DialectChoice {
-        encoding,
-        separator,
-        decimal,
-        header,
-        skip_lines,
-    } = dialect;
     let joined = Vec::from_iter(join.iter().map(|joined| joined.file.clone()));
     let mut options = set_options(data, &joined, ["data", "join"]);
     options.extend(

@@ -73,49 +73,66 @@ impl RunReport<'_> {
     }
 
     fn blocks(&self, folder: &Path) -> Vec<Block> {
-        let Self { file, decoders, .. } = *self;
+        let Self { file, test, .. } = *self;
         let recorded = file.recorded.as_ref().map(|recorded| recorded.relative_to(folder));
         let setup = Setup::of(file.settings, recorded.map(|recorded| recorded.plan));
         let setup = setup.expect("a file of a recording has its plan");
-        let is_array = setup.plan().is_none();
-        let answers = file.decoder().answers_to(self.test);
+        let answers = file.decoder().answers_to(test);
         let loops = setup.plan().map_or_else(Vec::new, |plan| {
-            HysteresisLoop::of_test(self.test, answers.view(), plan.test_order())
+            HysteresisLoop::of_test(test, answers.view(), plan.test_order())
         });
-        let note = |text: &str| Block::Note(text.to_owned());
+        let sentence = |remark: String| Block::Warning(capitalised(remark.trim_end_matches('.')) + ".");
         let mut blocks = vec![Block::Note(self.summary())];
-        blocks.extend(self.remarks(&setup, &answers).into_iter().map(Block::Warning));
+        blocks.extend(self.remarks(&setup, &answers).into_iter().map(sentence));
+        blocks.extend(self.results(&loops));
+        blocks.push(Block::Heading("Figures"));
+        let pictures = pictures(file, test, &answers, &loops).into_iter();
+        blocks.extend(pictures.map(|(caption, figure)| Block::Figure(caption, Box::new(figure))));
+        blocks.extend(self.training(&setup));
+        blocks.push(Block::Heading("Repeating this run"));
+        blocks.extend(self.repeat(&setup));
+        blocks
+    }
+
+    /// Tables of errors.
+    fn results(&self, loops: &[Option<HysteresisLoop>]) -> Vec<Block> {
+        let Self { file, decoders, .. } = *self;
+        let is_array = file.problem.has_nodes();
+        let note =
+            |of_array: &str, of_recording: &str| Block::Note(if is_array { of_array } else { of_recording }.to_owned());
         let mut tables = file.error_table();
-        ErrorTable::add_loops(&mut tables, &loops);
-        blocks.extend([
+        ErrorTable::add_loops(&mut tables, loops);
+        let mut blocks = vec![
             Block::Heading("Errors on the test set"),
             Block::Table(error_table(&tables), "network"),
-            note(if is_array {
+            note(
                 "Means of |error|, in percent of the coordinate as in the paper, in mm, or in percent of the stroke. \
                  The model-based decoder knows the equations, the noise, and mean and covariance of the loading; \
-                 training mean and linear map are what a network has to beat."
-            } else {
+                 training mean and linear map are what a network has to beat.",
                 "RMSE, MAE and worst are in the unit of the target. R² is the share of the target's variance that the \
                  answers explain: 1 is exact, 0 is no better than the mean. Training mean and ridge regression are what \
-                 a network has to beat."
-            }),
-        ]);
+                 a network has to beat.",
+            ),
+        ];
         if !decoders.is_empty() {
             let model_based = file.scores.baselines.model_based.as_ref();
             blocks.extend([
                 Block::Heading("Decoders"),
                 Block::Table(decoder_table(&file.problem, decoders, model_based), "Network"),
-                note(if is_array {
+                note(
                     "The residual is the rms relative difference between the readings and those of the decoded \
-                     deformation; it needs no ground truth. Times are those of a frame on one thread."
-                } else {
-                    "Times are those of a frame on one thread. All decoders were fitted to the same samples."
-                }),
+                     deformation; it needs no ground truth. Times are those of a frame on one thread.",
+                    "Times are those of a frame on one thread. All decoders were fitted to the same samples.",
+                ),
             ]);
         }
-        blocks.push(Block::Heading("Figures"));
-        let pictures = pictures(file, self.test, &answers, &loops).into_iter();
-        blocks.extend(pictures.map(|(caption, figure)| Block::Figure(caption, Box::new(figure))));
+        blocks
+    }
+
+    /// Starts, choice of settings, and settings.
+    fn training(&self, setup: &Setup) -> Vec<Block> {
+        let Self { file, .. } = *self;
+        let mut blocks = Vec::new();
         if file.training.starts.len() > 1 {
             blocks.extend([Block::Heading("Starts"), Block::Table(self.starts_table(), "")]);
         }
@@ -126,18 +143,16 @@ impl RunReport<'_> {
                 Block::Table(search_table(search), ""),
             ]);
         }
-        let settings = self.settings(&setup).into_iter();
+        let settings = self.settings(setup).into_iter();
         let settings = settings.map(|(name, value)| vec![capitalised(&name).into(), value.into()]);
         blocks.extend([
             Block::Heading("Settings"),
             Block::Table(Table::of_headings(["Setting", "Value"], settings), ""),
         ]);
-        if let Some(simulation) = setup.settings().simulation() {
+        if let Some(simulation) = file.settings.simulation() {
             blocks.extend(simulation.sensor.scale.note().map(Block::Note));
-            blocks.push(note(Geometry::ASSUMPTION));
+            blocks.push(Block::Note(Geometry::ASSUMPTION.to_owned()));
         }
-        blocks.push(Block::Heading("Repeating this run"));
-        blocks.extend(self.repeat(&setup));
         blocks
     }
 
@@ -219,8 +234,7 @@ impl RunReport<'_> {
             let name = decoder.kind.name(decoder.precision);
             remarks.extend(decoder.remarks.iter().map(|remark| format!("{name}: {remark}")));
         }
-        let sentence = |remark: String| capitalised(remark.trim_end_matches('.')) + ".";
-        remarks.into_iter().map(sentence).collect()
+        remarks
     }
 
     fn starts_table(&self) -> Table {
