@@ -12,7 +12,7 @@ use decoupler_core::{
     text::counted,
 };
 
-use super::{Cell, Table, TableColumn, TableForm};
+use super::{Cell, Table, TableColumn, TableForm, table::cell};
 
 /// Table of the results of an experiment for readers, with the same columns in the terminal, in files and in the
 /// window.
@@ -139,27 +139,27 @@ fn figures(cell: &experiments::Cell, has_published: bool) -> Vec<CellFigure> {
 
 /// Returns the table of all cells, for programs.
 pub fn cells_table(results: &ExperimentResults) -> Table {
-    table_of(results.cells.iter().map(|cell| {
-        let mut fields = settings_fields(cell);
-        fields.push(field("starts", cell.settings.starts));
-        fields.push(field("trials", cell.trials.len()));
-        let is_array = cell.settings.simulation().is_some();
-        for (measure, figure) in cell.errors().filter(|(measure, _)| *measure != ErrorMeasure::ZMm) {
+    Table::of_rows(results.cells.iter().map(|of| {
+        let mut fields = settings_fields(of);
+        fields.push(cell("starts", of.settings.starts));
+        fields.push(cell("trials", of.trials.len()));
+        let is_array = of.settings.simulation().is_some();
+        for (measure, figure) in of.errors().filter(|(measure, _)| *measure != ErrorMeasure::ZMm) {
             let name = measure.field();
-            fields.extend(is_array.then(|| field(format!("{name}_published"), figure.published)));
+            fields.extend(is_array.then(|| cell(&*format!("{name}_published"), figure.published)));
             fields.extend([
-                field(format!("{name}_median"), figure.median),
-                field(format!("{name}_min"), figure.min),
-                field(format!("{name}_max"), figure.max),
+                cell(&*format!("{name}_median"), figure.median),
+                cell(&*format!("{name}_min"), figure.min),
+                cell(&*format!("{name}_max"), figure.max),
             ]);
         }
         let name = percent_of(is_array).field();
         fields.extend([
-            field(format!("mean_{name}"), cell.mean_percent()),
-            field(format!("linear_{name}"), cell.linear_percent()),
-            field("epochs_run", cell.epochs_run()),
-            field("training_seconds", cell.training_seconds()),
-            field("epoch_ms", cell.epoch_ms()),
+            cell(&*format!("mean_{name}"), of.mean_percent()),
+            cell(&*format!("linear_{name}"), of.linear_percent()),
+            cell("epochs_run", of.epochs_run()),
+            cell("training_seconds", of.training_seconds()),
+            cell("epoch_ms", of.epoch_ms()),
         ]);
         fields
     }))
@@ -168,14 +168,14 @@ pub fn cells_table(results: &ExperimentResults) -> Table {
 /// Returns the table of all trials, for programs. Repeats are counted from 1.
 pub fn trials_table(results: &ExperimentResults) -> Table {
     use ErrorMeasure::{Mae, R2, RangePercent, Rmse, Worst, WorstMm, XPercent, YPercent, ZMm, ZPercent};
-    let trials = { results.cells.iter() }.flat_map(|cell| cell.trials.iter().map(move |trial| (cell, trial)));
+    let trials = { results.cells.iter() }.flat_map(|of| of.trials.iter().map(move |trial| (of, trial)));
     let targets = results.problem.as_ref().map_or(&[][..], |problem| &problem.targets);
-    table_of(trials.map(|(cell, trial)| {
+    Table::of_rows(trials.map(|(of, trial)| {
         let (network, baselines) = (&trial.scores.network, &trial.scores.baselines);
         let is_array = network.nodes().is_some();
-        let mut fields = settings_fields(cell);
-        fields.push(field("seed", Cell::Count(trial.seed.0)));
-        fields.push(field("repeat", trial.repeat + 1));
+        let mut fields = settings_fields(of);
+        fields.push(cell("seed", Cell::Count(trial.seed.0)));
+        fields.push(cell("repeat", trial.repeat + 1));
         let measures = match is_array {
             true => &[ZPercent, XPercent, YPercent, ZMm, WorstMm][..],
             false => &[RangePercent, R2],
@@ -183,22 +183,22 @@ pub fn trials_table(results: &ExperimentResults) -> Table {
         fields.extend(
             measures
                 .iter()
-                .map(|&measure| field(measure.field(), network.figure(measure))),
+                .map(|&measure| cell(measure.field(), network.figure(measure))),
         );
         // The errors of each target, in its unit.
         for (number, errors) in network.targets().iter().enumerate() {
             let name = targets.get(number).map(|target| target.name.clone());
             let name = name.unwrap_or_else(|| format!("t{}", number + 1));
             let of_target =
-                |measure: ErrorMeasure| field(format!("{name}.{}", measure.field()), measure.of_target(errors));
+                |measure: ErrorMeasure| cell(&*format!("{name}.{}", measure.field()), measure.of_target(errors));
             fields.extend([Rmse, Mae, R2, Worst].map(of_target));
         }
         let name = percent_of(is_array).field();
         fields.extend([
-            field(format!("mean_{name}"), baselines.mean.percent()),
-            field(format!("linear_{name}"), baselines.linear.percent()),
-            field("epochs_run", trial.effort.epochs),
-            field("seconds", trial.effort.seconds),
+            cell(&*format!("mean_{name}"), baselines.mean.percent()),
+            cell(&*format!("linear_{name}"), baselines.linear.percent()),
+            cell("epochs_run", trial.effort.epochs),
+            cell("seconds", trial.effort.seconds),
         ]);
         fields
     }))
@@ -212,22 +212,14 @@ fn percent_of(is_array: bool) -> ErrorMeasure {
     }
 }
 
-type Field = (String, Cell);
-
-fn field(name: impl Into<String>, value: impl Into<Cell>) -> Field {
-    (name.into(), value.into())
-}
-
 /// Settings of a cell.
-fn settings_fields(cell: &experiments::Cell) -> Vec<Field> {
+fn settings_fields(of: &experiments::Cell) -> Vec<(TableColumn, Cell)> {
     use AxisKind::{Array, Epochs, Hidden, Method, Samples, Scaling, Split};
-    let kinds = match cell.settings.simulation() {
+    let kinds = match of.settings.simulation() {
         Some(_) => [Array, Hidden, Samples, Method, Epochs],
         None => [Split, Scaling, Hidden, Method, Epochs],
     };
-    kinds
-        .map(|kind| field(axis_word(kind), kind.setting().get(cell)))
-        .to_vec()
+    kinds.map(|kind| cell(axis_word(kind), kind.setting().get(of))).to_vec()
 }
 
 /// Option of `train` for a setting, and its name in tables for programs.
@@ -235,18 +227,6 @@ pub(super) fn axis_word(kind: AxisKind) -> &'static str {
     match kind {
         AxisKind::Hidden => "hidden",
         kind => kind.setting().name,
-    }
-}
-
-/// A table of rows that have the same fields.
-fn table_of(rows: impl Iterator<Item = Vec<Field>>) -> Table {
-    let rows = Vec::from_iter(rows);
-    let columns = rows.first().into_iter().flatten();
-    Table {
-        columns: columns.map(|(name, _)| TableColumn::field(name.clone())).collect(),
-        rows: { rows.iter() }
-            .map(|fields| fields.iter().map(|(_, value)| value.clone()).collect())
-            .collect(),
     }
 }
 

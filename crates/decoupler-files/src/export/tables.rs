@@ -1,6 +1,6 @@
 use std::io::{self, Write};
 
-use super::{Cell, Table, TableColumn, format_number, format_percent, table::Columns};
+use super::{Cell, Table, TableColumn, format_number, format_percent, table::cell};
 use crate::import::{Recording, SetupSets};
 use decoupler_core::{
     dataset::{Dataset, Seed, SplitBy},
@@ -19,22 +19,18 @@ use decoupler_core::{
 /// Returns the error table: a row for each decoder and baseline; for a recording, a row for each of them and each
 /// target.
 pub fn error_table(tables: &[ErrorTable]) -> Table {
-    let mut columns = Columns::<(&ErrorTable, &ErrorRow)>::new();
     let has_targets = tables.iter().any(|table| table.target.is_some());
-    columns.add_if(has_targets, ("target", "Target", ""), |(table, _)| {
-        table.target.as_ref().map_or(String::new(), Channel::title)
-    });
-    columns.add(("decoupler", "Decoder", ""), |(_, row)| row.name);
-    let measures = tables.first().map_or(&[][..], |table| table.measures);
-    for (place, &measure) in measures.iter().enumerate() {
-        columns.add(error_column(measure), move |(_, row)| {
-            error_cell(measure, row.errors[place])
-        });
-    }
-    let rows = tables
-        .iter()
-        .flat_map(|table| table.rows.iter().map(move |row| (table, row)));
-    columns.table(rows)
+    let of_row = |table: &ErrorTable, row: &ErrorRow| {
+        let target = || table.target.as_ref().map_or(String::new(), Channel::title);
+        let target = has_targets.then(|| cell(("target", "Target", ""), target()));
+        let mut cells = Vec::from_iter(target);
+        cells.push(cell(("decoupler", "Decoder", ""), row.name));
+        let errors = table.measures.iter().zip(&row.errors);
+        cells.extend(errors.map(|(measure, error)| error_cell(*measure, *error)));
+        cells
+    };
+    let rows = { tables.iter() }.flat_map(|table| table.rows.iter().map(move |row| of_row(table, row)));
+    Table::of_rows(rows)
 }
 
 /// Returns the table of measured decoders: for an array a row for each, and the `model_based` errors if they exceed
@@ -50,58 +46,60 @@ pub fn decoder_table(problem: &Problem, reports: &[DecoderReport], model_based: 
 fn array_decoder_table(reports: &[DecoderReport], model_based: Option<&Errors>) -> Table {
     let model_based = model_based.filter(|errors| !errors.is_rounding());
     // Without a report, the errors are those of the model-based decoder.
-    let mut columns = Columns::<(Option<&DecoderReport>, Option<&Errors>)>::new();
-    columns.add(("decoder", "Decoder", ""), |(report, _)| {
-        report.map_or("model-based", |report| report.kind.name(report.precision))
-    });
-    columns.add(("z_percent", "Z", "%"), |(report, errors)| match report {
-        Some(report) => report.errors.percent(),
-        None => errors.and_then(|errors| errors.z_percent),
-    });
-    columns.add(("z_mm", "Z", "mm"), |(_, errors)| errors.map(|errors| errors.z_mm));
-    let times = ("times_model_based", "times model-based", "");
-    columns.add_if(model_based.is_some(), times, |(report, errors)| match report {
-        Some(_) => errors.and_then(|errors| errors.times(model_based?)),
-        None => Some(1.0),
-    });
-    columns.add("residual", |(report, _)| report.and_then(|report| report.residual));
-    columns.add(("frame_us", "a frame", "µs"), |(report, _)| {
-        report.map(|report| report.frame_us)
-    });
-    let rows = reports.iter().map(|report| (Some(report), report.errors.nodes()));
-    columns.table(rows.chain(model_based.map(|errors| (None, Some(errors)))))
+    let row = |report: Option<&DecoderReport>, errors: Option<&Errors>| {
+        let name = report.map_or("model-based", |report| report.kind.name(report.precision));
+        let percent = match report {
+            Some(report) => report.errors.percent(),
+            None => errors.and_then(|errors| errors.z_percent),
+        };
+        let times = model_based.map(|model_based| match report {
+            Some(_) => errors.and_then(|errors| errors.times(model_based)),
+            None => Some(1.0),
+        });
+        let mut cells = vec![
+            cell(("decoder", "Decoder", ""), name),
+            cell(("z_percent", "Z", "%"), percent),
+            cell(("z_mm", "Z", "mm"), errors.map(|errors| errors.z_mm)),
+        ];
+        cells.extend(times.map(|times| cell(("times_model_based", "times model-based", ""), times)));
+        cells.push(cell("residual", report.and_then(|report| report.residual)));
+        cells.push(cell(
+            ("frame_us", "a frame", "µs"),
+            report.map(|report| report.frame_us),
+        ));
+        cells
+    };
+    let rows = reports.iter().map(|report| row(Some(report), report.errors.nodes()));
+    Table::of_rows(rows.chain(model_based.map(|errors| row(None, Some(errors)))))
 }
 
 fn recording_decoder_table(problem: &Problem, reports: &[DecoderReport]) -> Table {
-    let mut columns = Columns::<(&DecoderReport, (&Channel, &TargetErrors))>::new();
-    columns.add(("decoder", "Decoder", ""), |(report, _)| {
-        report.kind.name(report.precision)
-    });
-    columns.add(("target", "Target", ""), |(_, (target, _))| target.title());
-    for measure in [ErrorMeasure::Rmse, ErrorMeasure::R2, ErrorMeasure::RangePercent] {
-        columns.add(error_column(measure), move |(_, (_, errors))| {
-            error_cell(measure, measure.of_target(errors))
-        });
-    }
-    columns.add(("frame_us", "a frame", "µs"), |(report, _)| report.frame_us);
-    columns.add(("fit_seconds", "fit", "s"), |(report, _)| report.fit_seconds);
-    let rows = reports.iter().flat_map(|report| {
+    let row = |report: &DecoderReport, target: &Channel, errors: &TargetErrors| {
+        let [rmse, r2, percent] = [ErrorMeasure::Rmse, ErrorMeasure::R2, ErrorMeasure::RangePercent]
+            .map(|measure| error_cell(measure, measure.of_target(errors)));
+        vec![
+            cell(("decoder", "Decoder", ""), report.kind.name(report.precision)),
+            cell(("target", "Target", ""), target.title()),
+            rmse,
+            r2,
+            percent,
+            cell(("frame_us", "a frame", "µs"), report.frame_us),
+            cell(("fit_seconds", "fit", "s"), report.fit_seconds),
+        ]
+    };
+    Table::of_rows(reports.iter().flat_map(|report| {
         let targets = problem.targets.iter().zip(report.errors.targets());
-        targets.map(move |target| (report, target))
-    });
-    columns.table(rows)
+        targets.map(move |(target, errors)| row(report, target, errors))
+    }))
 }
 
-fn error_cell(measure: ErrorMeasure, error: Option<f64>) -> Cell {
-    match measure {
-        ErrorMeasure::R2 => Cell::R2(error),
-        _ => Cell::Number(error),
-    }
-}
-
-fn error_column(measure: ErrorMeasure) -> TableColumn {
+fn error_cell(measure: ErrorMeasure, error: Option<f64>) -> (TableColumn, Cell) {
     let (heading, unit) = measure.heading();
-    TableColumn::new(measure.field(), heading, unit)
+    let column = TableColumn::new(measure.field(), heading, unit);
+    match measure {
+        ErrorMeasure::R2 => cell(column, Cell::R2(error)),
+        _ => cell(column, error),
+    }
 }
 
 /// Definitions of the columns of [`search_table`].
@@ -120,33 +118,28 @@ const SEARCH_MEANINGS: [&str; 8] = [
 
 /// Returns the candidates of a search as a table; the choice is marked.
 pub fn search_table(record: &AutoRecord) -> Table {
-    let network = |tried: &Tried| match tried.model {
-        TriedModel::Network { begin, epochs, .. } => Some((begin, epochs)),
-        _ => None,
-    };
-    let mut columns = Columns::<(usize, &Tried)>::new();
-    columns.add(("share_percent", "share", "%"), |(_, tried)| match tried.share {
-        share if share > 0.0 => Cell::from(100.0 * share),
-        _ => Cell::from(""),
-    });
-    columns.add(("features", "inputs", ""), |(_, tried)| tried.features());
-    columns.add("model", |&(place, tried)| {
+    let row = |(place, tried): (usize, &Tried)| {
+        let share = (tried.share > 0.0).then(|| Cell::from(100.0 * tried.share));
         let mark = if place == record.chosen { "*" } else { "" };
-        format!("{}{mark}", tried.model)
-    });
-    columns.add(("begin", "begins at", ""), |(_, tried)| {
-        network(tried).map_or(String::new(), |(begin, _)| begin.to_string())
-    });
-    columns.add(("error_percent", "error", "%"), |(_, tried)| 100.0 * tried.error);
-    columns.add(("standard_error_percent", "±", "%"), |(_, tried)| {
-        100.0 * tried.standard_error
-    });
-    columns.add("epochs", |(_, tried)| {
-        let cut_off = if tried.is_cut_off { "+" } else { "" };
-        network(tried).map_or(String::new(), |(_, epochs)| format!("{epochs}{cut_off}"))
-    });
-    columns.add(("seconds", "time", "s"), |(_, tried)| tried.seconds);
-    let mut table = columns.table(record.tried.iter().enumerate());
+        let (begin, epochs) = match tried.model {
+            TriedModel::Network { begin, epochs, .. } => (
+                begin.to_string(),
+                format!("{epochs}{}", if tried.is_cut_off { "+" } else { "" }),
+            ),
+            _ => (String::new(), String::new()),
+        };
+        vec![
+            cell(("share_percent", "share", "%"), share.unwrap_or_else(|| "".into())),
+            cell(("features", "inputs", ""), tried.features()),
+            cell("model", format!("{}{mark}", tried.model)),
+            cell(("begin", "begins at", ""), begin),
+            cell(("error_percent", "error", "%"), 100.0 * tried.error),
+            cell(("standard_error_percent", "±", "%"), 100.0 * tried.standard_error),
+            cell("epochs", epochs),
+            cell(("seconds", "time", "s"), tried.seconds),
+        ]
+    };
+    let mut table = Table::of_rows(record.tried.iter().enumerate().map(row));
     for (column, meaning) in table.columns.iter_mut().zip(SEARCH_MEANINGS) {
         column.meaning = meaning;
     }

@@ -7,7 +7,7 @@ use decoupler_core::{
     text::counted,
 };
 
-use super::{Table, format_duration, table::Columns};
+use super::{Cell, Table, format_duration, table::cell};
 use crate::{
     figure::{TradeOffCost, TradeOffLevel, point_name},
     machine::memory_budget,
@@ -15,67 +15,81 @@ use crate::{
 
 /// Returns the table of all points of all levels with all their figures, for programs.
 pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
-    /// Noise of a level, a point of it, and whether it is on the fronts of decoding and training.
-    type Row<'a> = (Option<f64>, &'a TradeOffPoint, bool, bool);
-    let rows = levels.iter().flat_map(|level| {
+    let is_array = levels.iter().any(|level| level.noise.is_some());
+    let percent = if is_array { "z_percent" } else { "percent_of_range" };
+    let of_array = |field: &'static str, value: Option<Cell>| is_array.then(|| cell(field, value));
+    let row = |noise: Option<f64>, point: &TradeOffPoint, on_decoding: bool, on_training: bool| {
+        let report = &point.report;
+        let (model_based, nodes) = (point.model_based.as_ref(), report.errors.nodes());
+        let simulation = point.settings.simulation();
+        let mut cells = Vec::new();
+        cells.extend(of_array("noise", noise.map(Cell::from)));
+        cells.extend(of_array("preset", point.preset.map(|preset| preset.to_string().into())));
+        cells.push(cell("decoder", report.kind.to_string()));
+        cells.push(cell(
+            "precision",
+            match report.precision {
+                Precision::Double => "f64",
+                Precision::Single => "f32",
+            },
+        ));
+        cells.push(cell("hidden", point.hidden()));
+        cells.push(cell("method", point.method().map(|method| method.short_name())));
+        cells.extend(of_array(
+            "samples",
+            simulation.map(|simulation| simulation.samples.into()),
+        ));
+        let epochs = point.settings.training.stopping.epochs;
+        cells.push(cell("epochs", point.hidden().map(|_| epochs)));
+        cells.push(cell(percent, report.errors.percent()));
+        cells.extend(of_array("z_mm", nodes.map(|errors| errors.z_mm.into())));
+        cells.push(cell("frame_us", report.frame_us));
+        cells.push(cell("training_s", point.training_seconds));
+        cells.extend(of_array("residual", report.residual.map(Cell::from)));
+        cells.extend(of_array(
+            "model_based_z_percent",
+            model_based.map(|errors| errors.z_percent.into()),
+        ));
+        cells.extend(of_array(
+            "model_based_z_mm",
+            model_based.map(|errors| errors.z_mm.into()),
+        ));
+        cells.push(cell("on_decoding_front", on_decoding.to_string()));
+        cells.push(cell("on_training_front", on_training.to_string()));
+        cells
+    };
+    Table::of_rows(levels.iter().flat_map(|level| {
         let [decoding, training] = TradeOffCost::ALL.map(|cost| level.front(cost));
         let points = level.points.iter().zip(decoding).zip(training);
-        points.map(|((point, on_decoding), on_training)| (level.noise, point, on_decoding, on_training))
-    });
-    let is_array = levels.iter().any(|level| level.noise.is_some());
-    let mut columns = Columns::<Row<'_>>::new();
-    columns.add_if(is_array, "noise", |(noise, ..)| *noise);
-    let preset = |(_, point, ..): &Row<'_>| point.preset.map(|preset| preset.to_string());
-    columns.add_if(is_array, "preset", preset);
-    columns.add("decoder", |(_, point, ..)| point.report.kind.to_string());
-    columns.add("precision", |(_, point, ..)| match point.report.precision {
-        Precision::Double => "f64",
-        Precision::Single => "f32",
-    });
-    columns.add("hidden", |(_, point, ..)| point.hidden());
-    columns.add("method", |(_, point, ..)| {
-        point.method().map(|method| method.short_name())
-    });
-    let samples = |(_, point, ..): &Row<'_>| Some(point.settings.simulation()?.samples);
-    columns.add_if(is_array, "samples", samples);
-    let epochs = |(_, point, ..): &Row<'_>| point.hidden().map(|_| point.settings.training.stopping.epochs);
-    columns.add("epochs", epochs);
-    let percent = if is_array { "z_percent" } else { "percent_of_range" };
-    columns.add(percent, |(_, point, ..)| point.report.errors.percent());
-    let z_mm = |(_, point, ..): &Row<'_>| Some(point.report.errors.nodes()?.z_mm);
-    columns.add_if(is_array, "z_mm", z_mm);
-    columns.add("frame_us", |(_, point, ..)| point.report.frame_us);
-    columns.add("training_s", |(_, point, ..)| point.training_seconds);
-    columns.add_if(is_array, "residual", |(_, point, ..)| point.report.residual);
-    let model_percent = |(_, point, ..): &Row<'_>| point.model_based.as_ref()?.z_percent;
-    columns.add_if(is_array, "model_based_z_percent", model_percent);
-    let model_mm = |(_, point, ..): &Row<'_>| Some(point.model_based.as_ref()?.z_mm);
-    columns.add_if(is_array, "model_based_z_mm", model_mm);
-    columns.add("on_decoding_front", |(.., on_decoding, _)| on_decoding.to_string());
-    columns.add("on_training_front", |(.., on_training)| on_training.to_string());
-    columns.table(rows)
+        points.map(move |((point, on_decoding), on_training)| row(level.noise, point, on_decoding, on_training))
+    }))
 }
 
 /// Returns the table of the points of one level, fastest first, for readers.
 pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
     let mut points: Vec<&TradeOffPoint> = level.points.iter().collect();
     points.sort_by(|a, b| a.report.frame_us.total_cmp(&b.report.frame_us));
-    let mut columns = Columns::<&TradeOffPoint>::new();
-    columns.add(("decoder", "Decoder", ""), |point| point_name(point));
-    let percent = match level.noise {
-        Some(_) => ("z_percent", "Z", "%"),
-        None => ("percent_of_range", "MAE", "% of range"),
-    };
-    columns.add(percent, |point| point.report.errors.percent());
-    let z_mm = |point: &&TradeOffPoint| Some(point.report.errors.nodes()?.z_mm);
-    columns.add_if(level.noise.is_some(), ("z_mm", "Z", "mm"), z_mm);
-    // Ratios to rounding are meaningless.
     let has_ratio = points.iter().any(|point| point.to_model_based().is_some());
-    let times = ("times_model_based", "times model-based", "");
-    columns.add_if(has_ratio, times, |point| point.to_model_based());
-    columns.add(("frame_us", "a frame", "µs"), |point| point.report.frame_us);
-    columns.add(("training_s", "training", "s"), |point| point.training_seconds);
-    columns.table(points)
+    let row = |point: &TradeOffPoint| {
+        let report = &point.report;
+        let percent = match level.noise {
+            Some(_) => ("z_percent", "Z", "%"),
+            None => ("percent_of_range", "MAE", "% of range"),
+        };
+        let z_mm = report.errors.nodes().map(|errors| errors.z_mm);
+        let mut cells = vec![
+            cell(("decoder", "Decoder", ""), point_name(point)),
+            cell(percent, report.errors.percent()),
+        ];
+        cells.extend(level.noise.map(|_| cell(("z_mm", "Z", "mm"), z_mm)));
+        // Ratios to rounding are meaningless.
+        let times = ("times_model_based", "times model-based", "");
+        cells.extend(has_ratio.then(|| cell(times, point.to_model_based())));
+        cells.push(cell(("frame_us", "a frame", "µs"), report.frame_us));
+        cells.push(cell(("training_s", "training", "s"), point.training_seconds));
+        cells
+    };
+    Table::of_rows(points.into_iter().map(row))
 }
 
 /// Describes the memory and time that a run will take on this machine. The first call measures its speed, which takes

@@ -19,7 +19,7 @@ use self::{
 use super::{
     NetworkFile, Table, WriteError, atomic_write, decoder_table, describe_determinacy, describe_search,
     describe_worse_than_ridge, document::PROGRAM, error_table, format_duration, format_percent, search_table,
-    sweep::flatten, table::Columns, unfinished::folder_of,
+    sweep::flatten, table::cell, unfinished::folder_of,
 };
 use crate::import::Setup;
 use decoupler_core::{
@@ -238,16 +238,19 @@ impl RunReport<'_> {
     }
 
     fn starts_table(&self) -> Table {
-        let mut columns = Columns::<(usize, &StartRecord)>::new();
-        columns.add(("start", "Start", ""), |(number, _)| number + 1);
-        columns.add(("train_mse", "training mse", ""), |(_, start)| start.train_mse);
-        let validation = ("validation_mse", "validation mse", "");
-        columns.add(validation, |(_, start)| start.validation_mse);
-        let has_nodes = self.file.problem.has_nodes();
-        columns.add_if(has_nodes, ("z_percent", "Z", "%"), |(_, start)| start.percent());
-        columns.add("epochs", |(_, start)| start.epochs);
-        columns.add(("best_epoch", "best epoch", ""), |(_, start)| start.best_epoch);
-        columns.table(self.file.training.starts.iter().enumerate())
+        let row = |(number, start): (usize, &StartRecord)| {
+            let mut cells = vec![
+                cell(("start", "Start", ""), number + 1),
+                cell(("train_mse", "training mse", ""), start.train_mse),
+                cell(("validation_mse", "validation mse", ""), start.validation_mse),
+                cell(("z_percent", "Z", "%"), start.percent()),
+                cell("epochs", start.epochs),
+                cell(("best_epoch", "best epoch", ""), start.best_epoch),
+            ];
+            cells.retain(|(column, _)| self.file.problem.has_nodes() || column.field != "z_percent");
+            cells
+        };
+        Table::of_rows(self.file.training.starts.iter().enumerate().map(row))
     }
 
     /// Names and values of all settings.

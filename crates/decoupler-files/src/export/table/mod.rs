@@ -85,41 +85,9 @@ impl From<&str> for TableColumn {
     }
 }
 
-type CellOf<'a, T> = Box<dyn Fn(&T) -> Cell + 'a>;
-
-/// Columns of a table of `T`, and how their cells follow from the items.
-pub(super) struct Columns<'a, T>(Vec<(TableColumn, CellOf<'a, T>)>);
-
-impl<'a, T> Columns<'a, T> {
-    pub(super) fn new() -> Self {
-        Self(Vec::new())
-    }
-
-    /// Adds a column on the right.
-    pub(super) fn add<C: Into<Cell>>(&mut self, column: impl Into<TableColumn>, cell: impl Fn(&T) -> C + 'a) {
-        let cell = move |item: &T| cell(item).into();
-        self.0.push((column.into(), Box::new(cell)));
-    }
-
-    /// Adds a column that some tables have.
-    pub(super) fn add_if<C: Into<Cell>>(
-        &mut self,
-        is_there: bool,
-        column: impl Into<TableColumn>,
-        cell: impl Fn(&T) -> C + 'a,
-    ) {
-        if is_there {
-            self.add(column, cell);
-        }
-    }
-
-    /// Returns the table with a row for each of `items`.
-    pub(super) fn table(self, items: impl IntoIterator<Item = T>) -> Table {
-        let row = |item| self.0.iter().map(|(_, cell)| cell(&item)).collect();
-        let rows = items.into_iter().map(row).collect();
-        let columns = self.0.into_iter().map(|(column, _)| column).collect();
-        Table { columns, rows }
-    }
+/// Returns a cell of a row, with its column: see [`Table::of_rows`].
+pub(super) fn cell(column: impl Into<TableColumn>, value: impl Into<Cell>) -> (TableColumn, Cell) {
+    (column.into(), value.into())
 }
 
 /// Contents of a cell. In JSON, numbers keep every digit, and are `null` where there is none.
@@ -233,6 +201,17 @@ impl Table {
             columns: headings.into_iter().map(TableColumn::field).collect(),
             rows: rows.into_iter().collect(),
         }
+    }
+
+    /// A table of rows that have the same columns.
+    pub(super) fn of_rows(rows: impl IntoIterator<Item = Vec<(TableColumn, Cell)>>) -> Self {
+        let mut table = Self::default();
+        for row in rows {
+            let (columns, cells) = row.into_iter().unzip();
+            table.columns = columns;
+            table.rows.push(cells);
+        }
+        table
     }
 
     /// Returns true if the column contains only numbers.
