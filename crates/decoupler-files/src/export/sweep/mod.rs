@@ -5,7 +5,7 @@ mod options;
 mod row;
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     ffi::OsStr,
     fmt, fs, io,
     path::{Path, PathBuf},
@@ -26,11 +26,11 @@ pub use self::{
 };
 
 /// Files of the trials in a folder.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub struct SweepFiles {
-    pub(crate) trials: Vec<PathBuf>,
-    /// Claims on trials without a result.
-    pub(crate) unfinished: Vec<PathBuf>,
+    pub(crate) trials: BTreeSet<PathBuf>,
+    /// Trials that are claimed, without a result.
+    pub(crate) unfinished: BTreeSet<TrialId>,
 }
 
 impl SweepFiles {
@@ -40,25 +40,18 @@ impl SweepFiles {
             path: folder.to_owned(),
             source: io::Error::other(system_cause(&source)),
         };
-        let mut files = Self {
-            trials: Vec::new(),
-            unfinished: Vec::new(),
-        };
+        let mut files = Self::default();
         for entry in fs::read_dir(folder).map_err(error)? {
             let path = entry.map_err(error)?.path();
-            let name = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
-            if !TrialId::is_written(name) {
-                continue;
-            }
-            match path.extension().and_then(OsStr::to_str) {
-                Some("json") => files.trials.push(path),
+            let [name, extension] = [path.file_stem(), path.extension()].map(|part| part.and_then(OsStr::to_str));
+            let Some(Ok(id)) = name.map(str::parse) else { continue };
+            match extension {
+                Some("json") => _ = files.trials.insert(path),
                 // A program that was killed after its result leaves its claim next to it.
-                Some("claim") if !path.with_extension("json").exists() => files.unfinished.push(path),
+                Some("claim") if !path.with_extension("json").exists() => _ = files.unfinished.insert(id),
                 _ => {}
             }
         }
-        files.trials.sort_unstable();
-        files.unfinished.sort_unstable();
         Ok(files)
     }
 }
@@ -158,11 +151,6 @@ impl TrialId {
     pub(crate) fn of(text: &str) -> Self {
         Self(u128::from_le_bytes(SipHasher24::new().hash(text.as_bytes()).as_bytes()))
     }
-
-    /// Returns true for the text of an identifier.
-    fn is_written(text: &str) -> bool {
-        text.parse().is_ok_and(|id: Self| id.to_string() == text)
-    }
 }
 
 impl fmt::Display for TrialId {
@@ -181,8 +169,8 @@ impl FromStr for TrialId {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let number = u128::from_str_radix(text, 16).ok();
-        let id = number.filter(|_| text.len() == DIGITS).map(Self);
+        let id = u128::from_str_radix(text, 16).ok().map(Self);
+        let id = id.filter(|id| id.to_string() == text);
         id.ok_or_else(|| format!("'{text}' does not identify a trial"))
     }
 }
@@ -203,7 +191,7 @@ mod tests {
             assert_eq!(id.parse(), Ok(TrialId::of(text)));
         }
         for other in ["", "1f", "xx", &"0".repeat(33), &"F".repeat(32)] {
-            assert!(!TrialId::is_written(other), "{other}");
+            assert!(other.parse::<TrialId>().is_err(), "{other}");
         }
     }
 }

@@ -288,8 +288,7 @@ impl MergedSweep {
             if files.trials.is_empty() && files.unfinished.is_empty() {
                 return Err(SweepFolderError::NoSweep(folder.clone()));
             }
-            let names = files.unfinished.iter().filter_map(|path| path.file_stem()?.to_str());
-            unfinished.extend(names.filter_map(|name| name.parse::<TrialId>().ok()));
+            unfinished.extend(files.unfinished);
             for path in files.trials {
                 match Trial::load(&path) {
                     Ok(trial) => {

@@ -1,6 +1,6 @@
 use std::fmt;
 
-use super::{Cell, Table, TableColumn};
+use super::{Cell, Table};
 use decoupler_core::text::{begins_formula, inert};
 
 /// Form in which a table is copied into other documents.
@@ -43,23 +43,35 @@ impl Table {
         }
     }
 
+    /// Headings and rows, as texts that `heading` and `cell` return.
+    fn lines(
+        &self,
+        heading: impl Fn(usize, String) -> String,
+        cell: impl Fn(usize, &Cell) -> String,
+    ) -> Vec<Vec<String>> {
+        let headings = self.columns.iter().enumerate();
+        let headings = headings.map(|(place, column)| heading(place, column.title())).collect();
+        let rows = self.rows.iter().map(|row| {
+            let cells = row.iter().enumerate();
+            cells.map(|(place, of_row)| cell(place, of_row)).collect()
+        });
+        std::iter::once(headings).chain(rows).collect()
+    }
+
     /// Returns the table for a terminal: numbers rounded for readers, columns apart by two spaces. Figures are aligned on the
     /// right, also those with a unit or an interval; other texts on the left.
     pub fn aligned(&self) -> String {
-        let headings: Vec<String> = self.columns.iter().map(TableColumn::title).collect();
-        let rows = self.rows.iter().map(|row| row.iter().map(Cell::rounded).collect());
-        let lines: Vec<Vec<String>> = std::iter::once(headings).chain(rows).collect();
+        let lines = self.lines(|_, title| title, |_, cell| cell.rounded());
         let width = |column: usize| {
             let cells = lines.iter().filter_map(|line| line.get(column));
             cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
         };
-        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
         let is_figure =
             |text: &String| text.is_empty() || text.starts_with(|c: char| c.is_ascii_digit() || "-–".contains(c));
         let is_right = |column: usize| lines[1..].iter().filter_map(|line| line.get(column)).all(is_figure);
-        let right: Vec<bool> = (0..self.columns.len()).map(is_right).collect();
+        let layout = Vec::from_iter((0..self.columns.len()).map(|column| (width(column), is_right(column))));
         let line = |cells: &Vec<String>| {
-            let padded = cells.iter().zip(&widths).zip(&right).map(|((cell, width), is_right)| {
+            let padded = cells.iter().zip(&layout).map(|(cell, (width, is_right))| {
                 // A width in a format string panics above 65 535.
                 let spaces = " ".repeat(width - cell.chars().count());
                 if *is_right {
@@ -80,30 +92,18 @@ impl Table {
     }
 
     fn markdown(&self) -> String {
-        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
-        let mut text = line(self.columns.iter().map(|column| escaped(&column.title())).collect());
-        let rules = (0..self.columns.len()).map(|column| if self.is_numeric(column) { "---:" } else { "---" });
-        text += &line(rules.map(str::to_owned).collect());
-        for row in &self.rows {
-            text += &line(row.iter().map(|cell| escaped(&cell.rounded())).collect());
-        }
-        text
+        let mut lines = self.lines(|_, title| escaped(&title), |_, cell| escaped(&cell.rounded()));
+        let rule = |column| if self.is_numeric(column) { "---:" } else { "---" }.to_owned();
+        lines.insert(1, (0..self.columns.len()).map(rule).collect());
+        let lines = lines.iter().map(|cells| format!("| {} |\n", cells.join(" | ")));
+        lines.collect()
     }
 
     fn tab_separated(&self) -> String {
         // A tab or line break inside a cell would start a new cell.
         let plain = |text: String| text.replace(['\t', '\n', '\r'], " ");
-        let line = |cells: Vec<String>| cells.join("\t") + "\n";
-        let mut text = line(
-            self.columns
-                .iter()
-                .map(|column| plain(inert(&column.title())))
-                .collect(),
-        );
-        for row in &self.rows {
-            text += &line(row.iter().map(|cell: &Cell| plain(cell.for_spreadsheet())).collect());
-        }
-        text
+        let lines = self.lines(|_, title| plain(inert(&title)), |_, cell| plain(cell.for_spreadsheet()));
+        lines.iter().map(|cells| cells.join("\t") + "\n").collect()
     }
 
     /// Returns the table as HTML, numbers rounded for readers; rows with the name `own` in their first or second column are
@@ -129,28 +129,22 @@ impl Table {
 
     fn latex(&self) -> String {
         let alignments: Vec<String> = (0..self.columns.len()).map(|column| self.alignment(column)).collect();
-        let line = |cells: Vec<String>| format!("{} \\\\\n", cells.join(" & "));
         // Braces keep siunitx from reading a text as a number.
         let in_column = |column: usize, is_number: bool, text: &str| match self.is_numeric(column) && !is_number {
             true => format!("{{{}}}", escaped_latex(text)),
             false => escaped_latex(text),
         };
-        let headings = self.columns.iter().enumerate();
-        let headings = headings.map(|(number, column)| in_column(number, false, &column.title()));
-        let rows = self.rows.iter().map(|row| {
-            let cells = row.iter().enumerate();
-            line(
-                cells
-                    .map(|(column, cell)| in_column(column, !cell.exact().is_empty(), &cell.rounded()))
-                    .collect(),
-            )
-        });
+        let lines = self.lines(
+            |column, title| in_column(column, false, &title),
+            |column, cell| in_column(column, !cell.exact().is_empty(), &cell.rounded()),
+        );
+        let lines = Vec::from_iter(lines.iter().map(|cells| format!("{} \\\\\n", cells.join(" & "))));
         format!(
             "% \\usepackage{{booktabs, siunitx}}\n\\begin{{tabular}}{{{}}}\n\\toprule\n{}\\midrule\n{}\\bottomrule\n\
              \\end{{tabular}}\n",
             alignments.join(" "),
-            line(headings.collect()),
-            String::from_iter(rows)
+            lines[0],
+            lines[1..].concat()
         )
     }
 
@@ -235,7 +229,7 @@ fn escaped(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::TableColumn, *};
 
     fn table() -> Table {
         Table {
