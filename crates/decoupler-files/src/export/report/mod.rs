@@ -306,8 +306,10 @@ impl RunReport<'_> {
                 "loading": scene.loading,
             });
             flatten(&source, "", &mut |place, value| {
-                let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-                add(&place.replace(['.', '_'], " "), &text);
+                // Names are in the table.
+                if value.is_number() {
+                    add(&place.replace(['.', '_'], " "), value);
+                }
             });
         }
         rows
