@@ -62,17 +62,17 @@ struct Record {
 mod saved_problem {
     use decoupler_core::problem::Problem;
     use decoupler_files::export::SavedProblem;
-    use serde::{Deserialize as _, Deserializer, Serialize as _, Serializer, de::Error as _};
+    use serde::{Deserializer, Serializer, de::Error as _};
 
     pub(super) fn serialize<S: Serializer>(problem: &Problem, serializer: S) -> Result<S::Ok, S::Error> {
-        SavedProblem::from(problem.clone()).serialize(serializer)
+        SavedProblem::serialize(problem, serializer)
     }
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Problem, D::Error> {
-        let saved = SavedProblem::deserialize(deserializer)?;
-        saved
-            .with_sensor(None)
-            .ok_or_else(|| D::Error::custom("the network has no sensor model"))
+        match SavedProblem::deserialize(deserializer)? {
+            problem if problem.has_nodes() => Err(D::Error::custom("the network has no sensor model")),
+            problem => Ok(problem),
+        }
     }
 }
 

@@ -54,6 +54,7 @@ impl Origin {
         TrainingRecord {
             stop_reason: self.stop_reason,
             best_epoch: self.best_epoch,
+            epochs: self.history.last().map_or(0, |record| record.epoch),
             seconds: self.seconds,
             history: self.history.clone(),
             stages: self.stages.clone(),

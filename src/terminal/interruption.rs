@@ -124,7 +124,7 @@ impl CheckpointArguments {
     /// The requested checkpoints; `recorded` is the origin of recorded samples.
     pub(super) fn checkpointing(&self, recorded: Option<&Recorded>) -> Option<Checkpointing> {
         let interval = Duration::from_secs_f64(self.checkpoint_interval);
-        Some(Checkpointing::from_now(interval, self.checkpoint.clone()?, recorded))
+        Some(Checkpointing::every(interval, self.checkpoint.clone()?, recorded).from_now())
     }
 
     /// Refuses to overwrite an existing file unless its training is resumed.

@@ -22,8 +22,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        Cell, ExperimentTable, Table, atomic_write, cells_table, check_writable, describe_conditions,
-        describe_failures, describe_worse_than_mean,
+        ExperimentTable, Table, atomic_write, cells_table, check_writable, describe_conditions, describe_failures,
+        describe_worse_than_mean,
         figures::{PictureError, PictureFormat},
         format_duration, trials_table, write_experiment_markdown,
     },
@@ -363,11 +363,7 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -
         )?;
         let table = ExperimentTable::new(results);
         let headings = table.columns.iter().map(|column| column.heading);
-        let rows = table
-            .rows
-            .iter()
-            .map(|row| row.iter().map(|text| Cell::from(text.as_str())).collect());
-        writeln!(out, "{}", Table::of_headings(headings, rows).aligned())?;
+        writeln!(out, "{}", Table::of_headings(headings, table.rows.clone()).aligned())?;
         notes.insert(table.note);
         for failure in describe_failures(results) {
             writeln!(out, "{failure}")?;

@@ -528,7 +528,7 @@ impl<'a> TrainingLoop<'a> {
             self.keeping.clear();
         }
         let file = trained.network_file();
-        let checked = file.and_then(|file| file.defect().map_or(Ok(Box::new(file)), Err));
+        let checked = file.and_then(|file| file.check().map(|()| Box::new(file)));
         let finished = checked.map_err(|defect| format!("This training was not added to the run list: {defect}"));
         self.report.send(Event::Finished(finished));
     }

@@ -2,17 +2,14 @@
 
 use std::{
     fs::{self, File, Permissions},
-    io::{self, BufWriter, ErrorKind, Read, Write},
+    io::{self, BufWriter, ErrorKind, Write},
     path::{Path, PathBuf},
 };
 
 use thiserror::Error;
 
-use super::{
-    tables::{Heading, NoHeading},
-    unfinished::{UnfinishedFile, folder_of},
-};
-use crate::machine::{ReadingBudget, system_cause};
+use super::unfinished::{UnfinishedFile, folder_of};
+use crate::machine::system_cause;
 
 /// Errors of writing a file.
 #[derive(Debug, Error)]
@@ -50,11 +47,6 @@ impl WriteError {
             source,
         }
     }
-
-    /// Returns true if there is such a file already, see [`AtomicFile::commit_new`].
-    pub(super) fn is_taken(&self) -> bool {
-        matches!(self, Self::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists)
-    }
 }
 
 /// A file that is written under a temporary name next to its target and then renamed over it: readers never see a
@@ -67,74 +59,36 @@ pub struct AtomicFile {
     unfinished: Option<(UnfinishedFile, PathBuf)>,
 }
 
-/// The file that a path leads to, new or old, in an existing folder.
-struct Place {
-    target: PathBuf,
-    folder: PathBuf,
-    permissions: Option<Permissions>,
-}
-
-impl Place {
-    /// Returns the place of a file; `None` for a pipe or device.
-    fn of(path: &Path) -> Result<Option<Self>, WriteError> {
-        let is_folder = path.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator);
-        if is_folder || path.is_dir() {
-            return Err(WriteError::Folder(path.to_owned()));
-        }
-        let folder = existing_folder(path, path)?;
-        let error = |source| WriteError::io(path, source);
-        let old = match fs::metadata(path) {
-            Ok(old) => old,
-            Err(missing) if missing.kind() == ErrorKind::NotFound => {
-                let target = link_target(path);
-                let folder = existing_folder(path, &target)?;
-                let permissions = None;
-                return Ok(Some(Self {
-                    target,
-                    folder,
-                    permissions,
-                }));
-            }
-            Err(source) => return Err(error(source)),
-        };
-        if !old.is_file() {
-            return Ok(None);
-        }
-        if old.permissions().readonly() {
-            return Err(WriteError::ReadOnly(path.to_owned()));
-        }
-        // The target of a link is replaced, not the link itself.
-        let target = fs::canonicalize(path).map_err(error)?;
-        let folder = target.parent().unwrap_or(&folder).to_owned();
-        let permissions = Some(old.permissions());
-        Ok(Some(Self {
-            target,
-            folder,
-            permissions,
-        }))
-    }
-}
-
-/// Returns the folder of `target`, the file that `path` leads to.
-fn existing_folder(path: &Path, target: &Path) -> Result<PathBuf, WriteError> {
-    let folder = folder_of(target).to_owned();
-    if folder.is_dir() {
-        return Ok(folder);
-    }
-    let path = path.to_owned();
-    Err(WriteError::NoFolder { path, folder })
-}
-
-/// Follows a link to a file that is missing, through further links.
-fn link_target(path: &Path) -> PathBuf {
+/// Returns the file that a path leads to, in an existing folder, and its permissions if it exists; `None` for a pipe or device.
+fn target_of(path: &Path) -> Result<Option<(PathBuf, Option<Permissions>)>, WriteError> {
     /// The limit of Linux.
     const MAX_LINKS: usize = 40;
+    // Also a file to which a shell redirects it is not replaced.
+    if path == Path::new("/dev/stdout") {
+        return Ok(None);
+    }
+    let is_folder = path.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator);
+    if is_folder || path.is_dir() {
+        return Err(WriteError::Folder(path.to_owned()));
+    }
+    // The target of a link is replaced, not the link itself.
     let mut target = path.to_owned();
     for _ in 0..MAX_LINKS {
         let Ok(next) = fs::read_link(&target) else { break };
         target = target.parent().unwrap_or(Path::new("")).join(next);
     }
-    target
+    let folder = folder_of(&target);
+    if !folder.is_dir() {
+        let (path, folder) = (path.to_owned(), folder.to_owned());
+        return Err(WriteError::NoFolder { path, folder });
+    }
+    match fs::metadata(&target) {
+        Ok(old) if !old.is_file() => Ok(None),
+        Ok(old) if old.permissions().readonly() => Err(WriteError::ReadOnly(path.to_owned())),
+        Ok(old) => Ok(Some((target, Some(old.permissions())))),
+        Err(missing) if missing.kind() == ErrorKind::NotFound => Ok(Some((target, None))),
+        Err(source) => Err(WriteError::io(path, source)),
+    }
 }
 
 impl AtomicFile {
@@ -143,16 +97,16 @@ impl AtomicFile {
     /// # Errors
     /// The path cannot be written.
     pub fn create(path: &Path) -> Result<Self, WriteError> {
-        let place = Place::of(path)?;
+        let place = target_of(path)?;
         let created = || {
-            let Some(place) = place else {
-                return Ok((File::options().write(true).open(path)?, None));
+            let Some((target, permissions)) = place else {
+                return Ok((File::options().append(true).open(path)?, None));
             };
-            let unfinished = UnfinishedFile::begin(&place.folder)?;
-            if let Some(permissions) = place.permissions {
+            let unfinished = UnfinishedFile::begin(folder_of(&target))?;
+            if let Some(permissions) = permissions {
                 unfinished.as_file().set_permissions(permissions)?;
             }
-            Ok((unfinished.as_file().try_clone()?, Some((unfinished, place.target))))
+            Ok((unfinished.as_file().try_clone()?, Some((unfinished, target))))
         };
         let (file, unfinished) = created().map_err(|source| WriteError::io(path, source))?;
         Ok(Self {
@@ -170,12 +124,16 @@ impl AtomicFile {
         self.finish(true)
     }
 
-    /// As [`Self::commit`], but never replaces a file, not even one that another program has just written.
+    /// As [`Self::commit`], but never replaces a file, not even one that another program has just written: returns `false` if
+    /// there is one.
     ///
     /// # Errors
-    /// Any error of the operating system: [`ErrorKind::AlreadyExists`] if there is such a file.
-    pub(super) fn commit_new(self) -> Result<(), WriteError> {
-        self.finish(false)
+    /// Any error of the operating system.
+    pub(super) fn commit_new(self) -> Result<bool, WriteError> {
+        match self.finish(false) {
+            Err(WriteError::Io { source, .. }) if source.kind() == ErrorKind::AlreadyExists => Ok(false),
+            finished => finished.map(|()| true),
+        }
     }
 
     fn finish(self, may_replace: bool) -> Result<(), WriteError> {
@@ -217,7 +175,7 @@ pub fn atomic_write(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
 /// # Errors
 /// The path cannot be written.
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
-    match Place::of(path)? {
+    match target_of(path)? {
         // Opening and closing a pipe would signal the end of the file to its reader.
         None => Ok(()),
         Some(_) => AtomicFile::create(path).map(drop),
@@ -232,83 +190,15 @@ pub fn is_same(one: &Path, other: &Path) -> bool {
         return false;
     }
     let place = |path: &Path| {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let folder = fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()?;
-        let new = path.file_name().map(|name| folder.join(name));
-        fs::canonicalize(path).ok().or(new)
+        let new = || Some(fs::canonicalize(folder_of(path)).ok()?.join(path.file_name()?));
+        fs::canonicalize(path).ok().or_else(new)
     };
-    is_same_on_disk(one, other) || (place(one).is_some() && place(one) == place(other))
-}
-
-#[cfg(unix)]
-fn is_same_on_disk(one: &Path, other: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let on_disk = |path: &Path| fs::metadata(path).ok().map(|found| (found.dev(), found.ino()));
-    on_disk(one).is_some() && on_disk(one) == on_disk(other)
-}
-
-#[cfg(not(unix))]
-fn is_same_on_disk(_one: &Path, _other: &Path) -> bool {
-    false
-}
-
-/// Memory that a byte of JSON may take once it is read: short arrays of short numbers.
-const MEMORY_OF_BYTE: u64 = 8;
-/// Largest JSON file that is read or written, in bytes: 1 GiB.
-pub(super) const LARGEST_BYTES: u64 = 1 << 30;
-/// Number of bytes that are read at once.
-const BLOCK: u64 = 1 << 20;
-/// Number of bytes that are read first, to decide whether to read the rest.
-const BEGINNING: u64 = 1 << 16;
-
-/// Reads the JSON file at `path`. If its beginning shows that Decoupler did not write it, returns only the beginning.
-///
-/// # Errors
-/// The operating system refuses, or the file does not end within [`LARGEST_BYTES`], or it needs too much memory.
-pub(super) fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
-    let file = File::open(path)?;
-    let length = file.metadata()?.len();
-    if length > LARGEST_BYTES {
-        return Err(too_large());
-    }
-    let mut budget = ReadingBudget::now();
-    let mut claim = |bytes: u64| {
-        let claimed = budget.claim(bytes.saturating_mul(MEMORY_OF_BYTE));
-        claimed.map_err(|over| io::Error::new(ErrorKind::FileTooLarge, over))
-    };
-    claim(length)?;
-    let mut bytes = Vec::new();
-    (&file).take(BEGINNING).read_to_end(&mut bytes)?;
-    if matches!(Heading::read(&bytes), Err(NoHeading::NotJson(_) | NoHeading::Other)) {
-        return Ok(bytes);
-    }
-    // The length of a pipe or device is unknown.
-    loop {
-        let before = bytes.len() as u64;
-        (&file).take(BLOCK).read_to_end(&mut bytes)?;
-        let read = bytes.len() as u64;
-        if read == before {
-            return Ok(bytes);
-        }
-        if read > LARGEST_BYTES {
-            return Err(too_large());
-        }
-        claim(read.saturating_sub(before.max(length)))?;
-    }
-}
-
-pub(super) fn too_large() -> io::Error {
-    io::Error::new(
-        ErrorKind::FileTooLarge,
-        "it is larger than 1 GiB, the largest size of such files",
-    )
+    same_file::is_same_file(one, other).unwrap_or(false) || (place(one).is_some() && place(one) == place(other))
 }
 
 #[cfg(test)]
 mod tests {
     use std::fs;
-
-    use rand::{Rng, SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;
     use crate::export::test_folder::names;
@@ -405,8 +295,7 @@ mod tests {
         };
         let (first, second) = (write(b"first"), write(b"second"));
         let commit = |file: Result<AtomicFile, WriteError>| file.unwrap().commit_new();
-        commit(first).unwrap();
-        assert!(commit(second).unwrap_err().is_taken());
+        assert!(commit(first).unwrap() && !commit(second).unwrap());
         assert_eq!(fs::read(&path).unwrap(), b"first");
         assert_eq!(names(folder.path()), ["run.json"]);
     }
@@ -429,47 +318,5 @@ mod tests {
     #[test]
     fn a_device_may_be_read_and_written() {
         assert!(!is_same(Path::new("/dev/null"), Path::new("/dev/null")));
-    }
-
-    #[test]
-    fn only_the_beginning_of_other_files_than_json_is_read() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("file");
-        let read = |bytes: &[u8]| {
-            fs::write(&path, bytes).unwrap();
-            read_limited(&path).unwrap()
-        };
-        let json = format!("{{\"format\":\"a\",\"text\":\"{}\"}}", "ä".repeat(100_000));
-        assert_eq!(read(json.as_bytes()), json.as_bytes());
-        let cut = &json.as_bytes()[..150_000];
-        assert_eq!(read(cut), cut);
-        assert_eq!(read(&[b'x'; 100_000]).len(), 1 << 16);
-    }
-
-    #[test]
-    fn only_the_beginning_of_random_bytes_is_read() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("file");
-        let mut bytes = vec![0; 100_000];
-        ChaCha8Rng::seed_from_u64(0).fill_bytes(&mut bytes);
-        for first in 0..=u8::MAX {
-            bytes[0] = first;
-            fs::write(&path, &bytes).unwrap();
-            assert_eq!(read_limited(&path).unwrap().len(), 1 << 16, "first byte {first}");
-        }
-    }
-
-    #[test]
-    fn oversized_files_are_refused_unread() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("file");
-        fs::write(&path, "{\"format\":\"").unwrap();
-        File::options()
-            .write(true)
-            .open(&path)
-            .unwrap()
-            .set_len(1 << 40)
-            .unwrap();
-        assert_eq!(read_limited(&path).unwrap_err().kind(), ErrorKind::FileTooLarge);
     }
 }

@@ -1,18 +1,22 @@
 use std::{
     fmt, fs,
-    io::{self, Read as _},
+    io::{self, ErrorKind, Read as _, Write as _},
     path::{Path, PathBuf},
 };
 
 use decoupler_core::{evaluation::Run, text::in_one_line};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::{
+    Value,
+    value::{RawValue, to_raw_value},
+};
 use thiserror::Error;
 
-use super::{
-    WriteError,
-    atomic::read_limited,
-    tables::{Heading, NoHeading},
+use super::{AtomicFile, WriteError};
+use crate::{
+    import::Recorded,
+    machine::{ReadingBudget, system_cause},
 };
-use crate::{import::Recorded, machine::system_cause};
 
 pub(super) const PROGRAM: &str = concat!("decoupler ", env!("CARGO_PKG_VERSION"));
 
@@ -44,50 +48,16 @@ impl DocumentKind {
         Self::Trial,
     ];
 
-    /// Returns the kind of the file at `path`, determined by its beginning; `None` if it is of no kind or cannot be
-    /// read.
-    pub fn of_file(path: &Path) -> Option<Self> {
-        /// Number of bytes within which the format is named, even in a recipe formatted by hand.
-        const BEGINNING: u64 = 512;
-        let mut beginning = Vec::new();
-        let file = fs::File::open(path).ok()?;
-        file.take(BEGINNING).read_to_end(&mut beginning).ok()?;
-        let text = String::from_utf8_lossy(&beginning);
-        let (_, rest) = text.trim_start().strip_prefix('{')?.split_once("\"format\"")?;
-        let format = rest.trim_start().strip_prefix(':')?.trim_start().strip_prefix('"')?;
-        let (format, _) = format.split_once('"')?;
-        Self::ALL.into_iter().find(|kind| kind.format() == format)
-    }
-
-    /// Value of the field `format`.
-    pub(super) fn format(self) -> &'static str {
+    /// Returns the name of the format, the only version that can be read, and the name in sentences.
+    fn description(self) -> (&'static str, u64, &'static str) {
         match self {
-            Self::Network => "decoupler network",
-            Self::Checkpoint => "decoupler checkpoint",
-            Self::Recipe => "decoupler recipe",
-            Self::Sensor => "decoupler sensor",
-            Self::RunList => "decoupler run list",
-            Self::Trial => "decoupler trial",
+            Self::Network => ("decoupler network", 4, "network file"),
+            Self::Checkpoint => ("decoupler checkpoint", 4, "checkpoint"),
+            Self::Recipe => ("decoupler recipe", 1, "recipe"),
+            Self::Sensor => ("decoupler sensor", 1, "sensor file"),
+            Self::RunList => ("decoupler run list", 1, "part of a run list"),
+            Self::Trial => ("decoupler trial", 1, "trial"),
         }
-    }
-
-    /// Version of the format, the only one that can be read.
-    pub(super) fn version(self) -> u64 {
-        match self {
-            Self::Network | Self::Checkpoint => 4,
-            Self::Recipe | Self::Sensor | Self::RunList | Self::Trial => 1,
-        }
-    }
-
-    /// Returns the origin of the samples of `run` for its file: `recorded`, or `None` if they are simulated.
-    ///
-    /// # Errors
-    /// [`DocumentError::NoPlan`] if the samples are recorded and no plan is given.
-    pub(super) fn recorded_of(self, run: &Run, recorded: Option<&Recorded>) -> Result<Option<Recorded>, DocumentError> {
-        if run.settings().simulation().is_some() {
-            return Ok(None);
-        }
-        recorded.map_or(Err(DocumentError::NoPlan(self)), |recorded| Ok(Some(recorded.clone())))
     }
 
     fn cure(self) -> &'static str {
@@ -101,6 +71,43 @@ impl DocumentKind {
         }
     }
 
+    /// Value of the field `format`.
+    pub(super) fn format(self) -> &'static str {
+        self.description().0
+    }
+
+    /// Version of the format, the only one that can be read.
+    pub(super) fn version(self) -> u64 {
+        self.description().1
+    }
+
+    /// Returns the kind of the file at `path`, determined by its beginning; `None` if it is of no kind or cannot be
+    /// read.
+    pub fn of_file(path: &Path) -> Option<Self> {
+        /// Number of bytes within which the format is named, even in a recipe formatted by hand.
+        const BEGINNING: u64 = 512;
+        let mut beginning = Vec::new();
+        let file = fs::File::open(path).ok()?;
+        file.take(BEGINNING).read_to_end(&mut beginning).ok()?;
+        let text = String::from_utf8_lossy(&beginning);
+        let (_, rest) = text.trim_start().strip_prefix('{')?.split_once("\"format\"")?;
+        let rest = rest.trim_start_matches(|c: char| c == ':' || c.is_whitespace());
+        Self::ALL
+            .into_iter()
+            .find(|kind| rest.starts_with(&format!("\"{}\"", kind.format())))
+    }
+
+    /// Returns the origin of the samples of `run` for its file: `recorded`, or `None` if they are simulated.
+    ///
+    /// # Errors
+    /// [`DocumentError::NoPlan`] if the samples are recorded and no plan is given.
+    pub(super) fn recorded_of(self, run: &Run, recorded: Option<&Recorded>) -> Result<Option<Recorded>, DocumentError> {
+        if run.settings().simulation().is_some() {
+            return Ok(None);
+        }
+        recorded.map_or(Err(DocumentError::NoPlan(self)), |recorded| Ok(Some(recorded.clone())))
+    }
+
     /// Reads the bytes of the file of this kind at `path` and checks their heading.
     ///
     /// # Errors
@@ -110,40 +117,103 @@ impl DocumentKind {
             path: path.to_owned(),
             source,
         })?;
-        self.check_heading(path, &bytes)?;
+        let other = |reason: &str| DocumentError::Other {
+            path: path.to_owned(),
+            kind: self,
+            reason: in_one_line(reason),
+        };
+        let beginning = format!("{{\"format\":\"{}\",", self.format());
+        let heading: Heading = serde_json::from_slice(&bytes).map_err(|error| match error {
+            _ if bytes.trim_ascii().is_empty() => other("it is empty"),
+            error if is_cut_off(&bytes, &error) => DocumentError::CutOff {
+                path: path.to_owned(),
+                kind: self,
+                line: error.line(),
+                column: error.column(),
+            },
+            error if error.is_data() => other(&format!("it has no field \"format\": \"{}\"", self.format())),
+            error if bytes.starts_with(beginning.as_bytes()) => self.damaged(path, error.to_string()),
+            error => other(&error.to_string()),
+        })?;
+        if heading.format != self.format() {
+            return Err(other(&format!("its format is {}", heading.format)));
+        }
+        if heading.version.as_u64() != Some(self.version()) {
+            return Err(DocumentError::Version {
+                path: path.to_owned(),
+                kind: self,
+                version: heading.version.to_string(),
+                program: in_one_line(heading.program.as_str().unwrap_or("another program")),
+            });
+        }
         Ok(bytes)
     }
 
-    fn check_heading(self, path: &Path, bytes: &[u8]) -> Result<(), DocumentError> {
-        let path = || path.to_owned();
-        let other = |reason: String| DocumentError::Other {
-            path: path(),
-            kind: self,
-            reason: in_one_line(&reason),
+    /// Reads the contents of the file of this kind at `path`, and the program that wrote it.
+    ///
+    /// # Errors
+    /// The file cannot be read, is of another kind or version, or is damaged.
+    pub(super) fn load<T: DeserializeOwned>(self, path: &Path) -> Result<(String, T), DocumentError> {
+        let bytes = self.read(path)?;
+        self.unseal(&bytes).map_err(|defect| self.damaged(path, defect))
+    }
+
+    /// Reads the contents of a file of this kind, and the program that wrote it.
+    ///
+    /// # Errors
+    /// A description of the damage.
+    pub(super) fn unseal<T: DeserializeOwned>(self, bytes: &[u8]) -> Result<(String, T), String> {
+        let text = |error: serde_json::Error| error.to_string();
+        let sealed: Sealed<'_> = serde_json::from_slice(bytes).map_err(text)?;
+        let contents = match (sealed.crc32, sealed.run, sealed.sensor) {
+            (Some(crc32), Some(run), None) if crc32 == checksum(run) => run,
+            (Some(_), Some(_), None) => return Err("its checksum shows that something in it has changed".to_owned()),
+            (None, None, Some(sensor)) if self == Self::Sensor => sensor,
+            _ => return Err("the field `crc32` or `run` is missing".to_owned()),
         };
-        let beginning = format!("{{\"format\":\"{}\",", self.format());
-        let heading = Heading::read(bytes).map_err(|no_heading| match no_heading {
-            NoHeading::NotJson(defect) if bytes.starts_with(beginning.as_bytes()) => self.damaged(&path(), defect),
-            NoHeading::NotJson(reason) => other(reason),
-            NoHeading::CutOff { line, column } => DocumentError::CutOff {
-                path: path(),
-                kind: self,
-                line,
-                column,
-            },
-            NoHeading::Other => other(format!("it has no field \"format\": \"{}\"", self.format())),
-        })?;
-        if heading.format != self.format() {
-            return Err(other(format!("its format is {}", heading.format)));
+        Ok((sealed.program, serde_json::from_str(contents.get()).map_err(text)?))
+    }
+
+    /// Writes `contents`, of `program`, to the file of this kind at `path`, whole or not at all; `commit` puts it in its place.
+    ///
+    /// # Errors
+    /// The path cannot be written, or the file would be too large to be read again.
+    pub(super) fn save<T>(
+        self,
+        program: &str,
+        contents: &impl Serialize,
+        path: &Path,
+        commit: fn(AtomicFile) -> Result<T, WriteError>,
+    ) -> Result<T, WriteError> {
+        /// Upper bound on the length of the heading.
+        const HEADING: u64 = 1 << 10;
+        let error = |source| WriteError::io(path, source);
+        let contents = to_raw_value(contents).map_err(|source| error(source.into()))?;
+        if contents.get().len() as u64 + HEADING > LARGEST_BYTES {
+            return Err(error(too_large()));
         }
-        match heading.version_other_than(self.version()) {
-            Some(version) => Err(DocumentError::Version {
-                path: path(),
-                kind: self,
-                version,
-                program: heading.program(),
-            }),
-            None => Ok(()),
+        let mut file = AtomicFile::create(path)?;
+        serde_json::to_writer(&mut file, &self.sealed(program, &contents)).map_err(|source| error(source.into()))?;
+        writeln!(file).map_err(error)?;
+        commit(file)
+    }
+
+    /// Returns the text of a file of this kind.
+    ///
+    /// # Errors
+    /// The contents cannot be written as JSON.
+    pub(super) fn seal(self, program: &str, contents: &impl Serialize) -> serde_json::Result<String> {
+        serde_json::to_string(&self.sealed(program, &to_raw_value(contents)?))
+    }
+
+    fn sealed<'a>(self, program: &str, contents: &'a RawValue) -> Sealed<'a> {
+        Sealed {
+            format: self.format().to_owned(),
+            version: self.version(),
+            program: program.to_owned(),
+            crc32: Some(checksum(contents)),
+            run: Some(contents),
+            sensor: None,
         }
     }
 
@@ -159,15 +229,97 @@ impl DocumentKind {
 
 impl fmt::Display for DocumentKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Network => "network file",
-            Self::Checkpoint => "checkpoint",
-            Self::Recipe => "recipe",
-            Self::Sensor => "sensor file",
-            Self::RunList => "part of a run list",
-            Self::Trial => "trial",
-        })
+        f.write_str(self.description().2)
     }
+}
+
+/// Fields that identify a JSON file of Decoupler. They are read before the rest, which differs between versions.
+#[derive(Deserialize)]
+struct Heading {
+    format: Value,
+    #[serde(default)]
+    version: Value,
+    #[serde(default)]
+    program: Value,
+}
+
+/// Layout of a file with a checksum, which detects any change to its contents.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sealed<'a> {
+    format: String,
+    version: u64,
+    program: String,
+    /// CRC-32 of the text of `run`, as hexadecimal digits.
+    crc32: Option<String>,
+    #[serde(borrow)]
+    run: Option<&'a RawValue>,
+    /// Contents of a sensor file that is written by hand, without a checksum.
+    #[serde(borrow, skip_serializing_if = "Option::is_none")]
+    sensor: Option<&'a RawValue>,
+}
+
+fn checksum(run: &RawValue) -> String {
+    format!("{:08x}", crc32fast::hash(run.get().as_bytes()))
+}
+
+/// Returns true if JSON ends too early. The parser reports an incomplete number at the end, such as `1e`, as invalid.
+fn is_cut_off(bytes: &[u8], error: &serde_json::Error) -> bool {
+    let text = bytes.trim_ascii_end();
+    let last_line = text.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
+    let lines = 1 + text.iter().filter(|byte| **byte == b'\n').count();
+    let is_in_last_number = error.is_syntax()
+        && error.to_string().starts_with("invalid number")
+        && (error.line(), error.column()) >= (lines, last_line.len())
+        && !text.ends_with(b"}");
+    error.is_eof() || is_in_last_number
+}
+
+/// Memory that a byte of JSON may take once it is read: short arrays of short numbers.
+const MEMORY_OF_BYTE: u64 = 8;
+/// Largest JSON file that is read or written, in bytes: 1 GiB.
+const LARGEST_BYTES: u64 = 1 << 30;
+/// Number of bytes that are read at once.
+const BLOCK: u64 = 1 << 20;
+/// Number of bytes that are read first, to decide whether to read the rest.
+const BEGINNING: u64 = 1 << 16;
+
+/// Reads the JSON file at `path`. If its beginning shows that Decoupler did not write it, returns only the beginning.
+///
+/// # Errors
+/// The operating system refuses, or the file does not end within [`LARGEST_BYTES`], or it needs too much memory.
+fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
+    let file = fs::File::open(path)?;
+    let mut budget = ReadingBudget::now();
+    // The length of a pipe or device is unknown; it is claimed block by block.
+    let mut claimed = 0;
+    let mut claim = |bytes: u64| {
+        if bytes > LARGEST_BYTES {
+            return Err(too_large());
+        }
+        let more = bytes.saturating_sub(claimed);
+        claimed += more;
+        let claimed = budget.claim(more * MEMORY_OF_BYTE);
+        claimed.map_err(|over| io::Error::new(ErrorKind::FileTooLarge, over))
+    };
+    claim(file.metadata()?.len())?;
+    let mut bytes = Vec::new();
+    (&file).take(BEGINNING).read_to_end(&mut bytes)?;
+    let begun = serde_json::from_slice::<Heading>(&bytes);
+    if begun.is_err_and(|error| !is_cut_off(&bytes, &error)) {
+        return Ok(bytes);
+    }
+    while (&file).take(BLOCK).read_to_end(&mut bytes)? > 0 {
+        claim(bytes.len() as u64)?;
+    }
+    Ok(bytes)
+}
+
+fn too_large() -> io::Error {
+    io::Error::new(
+        ErrorKind::FileTooLarge,
+        "it is larger than 1 GiB, the largest size of such files",
+    )
 }
 
 /// Errors of reading or writing a network file, a checkpoint, a run list or the files of a sweep.
@@ -245,4 +397,55 @@ pub enum DocumentError {
     /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs::File;
+
+    use rand::{Rng, SeedableRng, rngs::ChaCha8Rng};
+
+    use super::*;
+
+    #[test]
+    fn only_the_beginning_of_other_files_than_json_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let read = |bytes: &[u8]| {
+            fs::write(&path, bytes).unwrap();
+            read_limited(&path).unwrap()
+        };
+        let json = format!("{{\"format\":\"a\",\"text\":\"{}\"}}", "ä".repeat(100_000));
+        assert_eq!(read(json.as_bytes()), json.as_bytes());
+        let cut = &json.as_bytes()[..150_000];
+        assert_eq!(read(cut), cut);
+        assert_eq!(read(&[b'x'; 100_000]).len(), 1 << 16);
+    }
+
+    #[test]
+    fn only_the_beginning_of_random_bytes_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let mut bytes = vec![0; 100_000];
+        ChaCha8Rng::seed_from_u64(0).fill_bytes(&mut bytes);
+        for first in 0..=u8::MAX {
+            bytes[0] = first;
+            fs::write(&path, &bytes).unwrap();
+            assert_eq!(read_limited(&path).unwrap().len(), 1 << 16, "first byte {first}");
+        }
+    }
+
+    #[test]
+    fn oversized_files_are_refused_unread() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        fs::write(&path, "{\"format\":\"").unwrap();
+        File::options()
+            .write(true)
+            .open(&path)
+            .unwrap()
+            .set_len(1 << 40)
+            .unwrap();
+        assert_eq!(read_limited(&path).unwrap_err().kind(), ErrorKind::FileTooLarge);
+    }
 }

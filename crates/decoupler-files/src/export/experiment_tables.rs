@@ -1,22 +1,18 @@
 //! Tables of the results of an experiment, and the sentences that are shown with them.
 
-use std::{
-    io::{self, Write},
-    time::Duration,
-};
+use std::io::{self, Write};
 
 use decoupler_core::{
     dataset::{Simulation, SplitBy},
     evaluation::{
-        Combination, CrossValidation, ErrorMeasure, TargetErrors,
-        experiments::{self, AxisKind, Experiment, ExperimentRecording, ExperimentResults, Figure, Trial},
+        Combination, CrossValidation, ErrorMeasure, TestErrors,
+        experiments::{self, AxisKind, Experiment, ExperimentRecording, ExperimentResults, Trial},
     },
     network::suggested_hidden,
-    problem::Channel,
     text::counted,
 };
 
-use super::{Cell, Table, TableColumn, TableForm, format_duration, format_number};
+use super::{Cell, Table, TableColumn, TableForm, table::cell};
 
 /// Table of the results of an experiment for readers, with the same columns in the terminal, in files and in the
 /// window.
@@ -25,9 +21,7 @@ pub struct ExperimentTable {
     /// Columns of the table.
     pub columns: Vec<ExperimentColumn>,
     /// Cells of the experiment, row by row.
-    pub rows: Vec<Vec<String>>,
-    /// Sort keys of the rows: the numbers behind the texts; for an axis, the index of the value in its list.
-    pub values: Vec<Vec<Option<f64>>>,
+    pub rows: Vec<Vec<Cell>>,
     /// Explanation of the last columns, to be shown below the table.
     pub note: &'static str,
 }
@@ -52,64 +46,48 @@ pub enum ExperimentColumnKind {
     Published,
     /// Errors of the linear baseline.
     Linear,
-    /// Training time.
-    Time,
     /// Other figures.
     Other,
 }
-
-/// A column, and the value of a cell in it as number and text.
-type CellFigure = (ExperimentColumn, Option<f64>, String);
 
 impl ExperimentTable {
     /// The results so far.
     pub fn new(results: &ExperimentResults) -> Self {
         let has_published = results.cells.iter().any(|cell| cell.published.is_some());
-        let axes = results.experiment.axes().map(|axis| ExperimentColumn {
-            heading: axis.kind.name(),
-            kind: ExperimentColumnKind::Axis,
-        });
-        let first = results.cells.first().map(|cell| figures(cell, has_published));
-        let first = first.unwrap_or_default();
-        let columns = axes.chain(first.into_iter().map(|(column, ..)| column)).collect();
         let row = |cell: &experiments::Cell| {
-            let places = [cell.column, cell.row].map(|place| Some(place as f64));
-            let labels = places.into_iter().zip(results.cell_labels(cell));
-            let figures = figures(cell, has_published).into_iter();
-            labels.chain(figures.map(|(_, value, text)| (value, text))).unzip()
+            let labels = results.experiment.axes().zip(results.cell_labels(cell));
+            let labels = labels.map(|(axis, label)| {
+                let cell = label.parse().map_or_else(|_| Cell::Text(label.clone()), Cell::Count);
+                (axis.kind.name(), ExperimentColumnKind::Axis, cell)
+            });
+            Vec::from_iter(labels.chain(figures(cell, has_published)))
         };
-        let (values, rows) = results.cells.iter().map(row).unzip();
-        let note = match results.experiment.recording {
-            None => NODES_NOTE,
-            Some(_) => TARGETS_NOTE,
-        };
+        let rows = Vec::from_iter(results.cells.iter().map(row));
+        let columns = rows.first().into_iter().flatten();
+        let columns = columns.map(|&(heading, kind, _)| ExperimentColumn { heading, kind });
         Self {
-            columns,
-            rows,
-            values,
-            note,
+            columns: columns.collect(),
+            note: match results.experiment.recording {
+                None => NODES_NOTE,
+                Some(_) => TARGETS_NOTE,
+            },
+            rows: { rows.into_iter() }
+                .map(|row| row.into_iter().map(|(.., cell)| cell).collect())
+                .collect(),
         }
     }
 
     /// Returns the table for export, with the training time in seconds.
     pub fn table(&self) -> Table {
-        let is_axis = |column: &&ExperimentColumn| column.kind == ExperimentColumnKind::Axis;
-        let axes = self.columns.iter().take_while(is_axis).count();
-        let columns = self.columns.iter().map(|column| match column.kind {
-            ExperimentColumnKind::Time => TableColumn::new(column.heading, column.heading, "s"),
-            _ => TableColumn::field(column.heading),
-        });
-        let row = |(texts, values): (&Vec<String>, &Vec<Option<f64>>)| {
-            let labels = texts[..axes].iter().map(|label| match label.parse() {
-                Ok(count) => Cell::Count(count),
-                Err(_) => Cell::Text(label.clone()),
-            });
-            labels.chain(values[axes..].iter().copied().map(Cell::from)).collect()
-        };
-        Table {
-            columns: columns.collect(),
-            rows: self.rows.iter().zip(&self.values).map(row).collect(),
+        let mut table = Table::of_headings(self.columns.iter().map(|column| column.heading), self.rows.clone());
+        for (place, column) in table.columns.iter_mut().enumerate() {
+            for row in &mut table.rows {
+                if let Cell::Seconds(seconds) = row[place] {
+                    (column.unit, row[place]) = ("s", Cell::Number(seconds));
+                }
+            }
         }
+        table
     }
 }
 
@@ -120,30 +98,25 @@ const TARGETS_NOTE: &str = "Median, minimum and maximum over seeds. error: mean 
      the target, averaged over the targets that vary, and R² likewise; mean: always answering the training mean; ridge: \
      ridge regression; epochs: mean of the starts; training: one network, all its starts.";
 
+/// A figure of a cell: heading and kind of its column, and its value.
+type CellFigure = (&'static str, ExperimentColumnKind, Cell);
+
 /// Columns with the figures of a cell.
 fn figures(cell: &experiments::Cell, has_published: bool) -> Vec<CellFigure> {
-    use ExperimentColumnKind::{Linear, Other, Published, Ranking, Time};
-    let number = |heading, kind, value: Option<f64>| {
-        let column = ExperimentColumn { heading, kind };
-        (column, value, format_number(value))
-    };
-    let published = |heading, figure: &Figure| {
-        let value = figure.published;
-        has_published.then(|| number(heading, Published, value))
-    };
-    let percent = cell.percent();
+    use ExperimentColumnKind::{Linear, Other, Published, Ranking};
     let is_array = cell.settings.simulation().is_some();
     let [publ, median, mean, linear] = if is_array {
         ["Z % publ.", "Z % median", "mean Z %", "linear Z %"]
     } else {
         ["error % publ.", "error % median", "mean %", "ridge %"]
     };
-    let mut figures = Vec::from_iter(published(publ, &percent));
-    figures.extend([
-        number(median, Ranking, percent.median),
-        number("min", Other, percent.min),
-        number("max", Other, percent.max),
-    ]);
+    let percent = cell.percent();
+    let mut figures: Vec<CellFigure> = vec![
+        (publ, Published, percent.published.into()),
+        (median, Ranking, percent.median.into()),
+        ("min", Other, percent.min.into()),
+        ("max", Other, percent.max.into()),
+    ];
     for (measure, figure) in cell.errors() {
         let (publ, median) = match measure {
             ErrorMeasure::XPercent => (Some("X % publ."), "X % median"),
@@ -151,171 +124,110 @@ fn figures(cell: &experiments::Cell, has_published: bool) -> Vec<CellFigure> {
             ErrorMeasure::R2 => (None, "R² median"),
             _ => continue,
         };
-        figures.extend(publ.and_then(|publ| published(publ, &figure)));
-        figures.push(number(median, Other, figure.median));
+        figures.extend(publ.map(|publ| (publ, Published, figure.published.into())));
+        figures.push((median, Other, figure.median.into()));
     }
-    figures.push(number(mean, Other, cell.mean_percent()));
-    figures.push(number(linear, Linear, cell.linear_percent()));
-    figures.push(number("epochs", Other, cell.epochs_run()));
-    let seconds = cell.training_seconds();
-    let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    let column = ExperimentColumn {
-        heading: "training",
-        kind: Time,
-    };
-    let time = time.map_or_else(|| format_number(None), format_duration);
-    figures.push((column, seconds, time));
+    figures.extend([
+        (mean, Other, cell.mean_percent().into()),
+        (linear, Linear, cell.linear_percent().into()),
+        ("epochs", Other, cell.epochs_run().into()),
+        ("training", Other, Cell::Seconds(cell.training_seconds())),
+    ]);
+    figures.retain(|(_, kind, _)| has_published || *kind != Published);
     figures
 }
 
 /// Returns the table of all cells, for programs.
 pub fn cells_table(results: &ExperimentResults) -> Table {
-    let rows = results.cells.iter().map(|cell| {
-        let mut fields = settings_fields(cell);
-        fields.extend([
-            field("starts", cell.settings.starts.into()),
-            field("trials", cell.trials.len().into()),
-        ]);
-        let figure = |name: &str, figure: &Figure, has_published: bool| {
-            let published = has_published.then_some(("published", figure.published));
-            let of_trials = [("median", figure.median), ("min", figure.min), ("max", figure.max)];
-            let figures = published.into_iter().chain(of_trials);
-            Vec::from_iter(figures.map(|(which, value)| field(&format!("{name}_{which}"), value.into())))
-        };
-        let is_array = cell.settings.simulation().is_some();
-        for (measure, of_trials) in cell.errors() {
-            if measure != ErrorMeasure::ZMm {
-                fields.extend(figure(measure.field(), &of_trials, is_array));
-            }
+    Table::of_rows(results.cells.iter().map(|of| {
+        let mut fields = settings_fields(of);
+        fields.push(cell("starts", of.settings.starts));
+        fields.push(cell("trials", of.trials.len()));
+        let is_array = of.settings.simulation().is_some();
+        for (measure, figure) in of.errors().filter(|(measure, _)| *measure != ErrorMeasure::ZMm) {
+            let name = measure.field();
+            fields.extend(is_array.then(|| cell(&*format!("{name}_published"), figure.published)));
+            fields.extend([
+                cell(&*format!("{name}_median"), figure.median),
+                cell(&*format!("{name}_min"), figure.min),
+                cell(&*format!("{name}_max"), figure.max),
+            ]);
         }
-        let name = if is_array {
-            ErrorMeasure::ZPercent
-        } else {
-            ErrorMeasure::RangePercent
-        };
-        let name = name.field();
+        let name = percent_of(is_array).field();
         fields.extend([
-            field(&format!("mean_{name}"), cell.mean_percent().into()),
-            field(&format!("linear_{name}"), cell.linear_percent().into()),
-            field("epochs_run", cell.epochs_run().into()),
-            field("training_seconds", cell.training_seconds().into()),
-            field("epoch_ms", cell.epoch_ms().into()),
-        ]);
-        fields
-    });
-    table_of(rows)
-}
-
-/// Returns the table of all trials, for programs. Repeats are counted from 1.
-pub fn trials_table(results: &ExperimentResults) -> Table {
-    let trials = results
-        .cells
-        .iter()
-        .flat_map(|cell| cell.trials.iter().map(move |trial| (cell, trial)));
-    let targets = results.problem.as_ref().map_or(&[][..], |problem| &problem.targets);
-    table_of(trials.map(|(cell, trial)| {
-        let mut fields = settings_fields(cell);
-        fields.extend([
-            field("seed", Cell::Count(trial.seed.0)),
-            field("repeat", (trial.repeat + 1).into()),
-        ]);
-        let name = match trial.scores.network.nodes() {
-            Some(errors) => {
-                fields.extend([
-                    field("z_percent", errors.z_percent.into()),
-                    field("x_percent", errors.x_percent.into()),
-                    field("y_percent", errors.y_percent.into()),
-                    field("z_mm", errors.z_mm.into()),
-                    field("worst_mm", errors.worst_mm.into()),
-                ]);
-                "z_percent"
-            }
-            None => {
-                fields.extend(target_fields(trial, targets));
-                "percent_of_range"
-            }
-        };
-        fields.extend([
-            field(&format!("mean_{name}"), trial.scores.baselines.mean.percent().into()),
-            field(
-                &format!("linear_{name}"),
-                trial.scores.baselines.linear.percent().into(),
-            ),
-            field("epochs_run", trial.effort.epochs.into()),
-            field("seconds", trial.effort.seconds.into()),
+            cell(&*format!("mean_{name}"), of.mean_percent()),
+            cell(&*format!("linear_{name}"), of.linear_percent()),
+            cell("epochs_run", of.epochs_run()),
+            cell("training_seconds", of.training_seconds()),
+            cell("epoch_ms", of.epoch_ms()),
         ]);
         fields
     }))
 }
 
-type Field = (String, Cell);
+/// Returns the table of all trials, for programs. Repeats are counted from 1.
+pub fn trials_table(results: &ExperimentResults) -> Table {
+    use ErrorMeasure::{Mae, R2, RangePercent, Rmse, Worst, WorstMm, XPercent, YPercent, ZMm, ZPercent};
+    let trials = { results.cells.iter() }.flat_map(|of| of.trials.iter().map(move |trial| (of, trial)));
+    let targets = results.problem.as_ref().map_or(&[][..], |problem| &problem.targets);
+    Table::of_rows(trials.map(|(of, trial)| {
+        let (network, baselines) = (&trial.scores.network, &trial.scores.baselines);
+        let is_array = network.nodes().is_some();
+        let mut fields = settings_fields(of);
+        fields.push(cell("seed", Cell::Count(trial.seed.0)));
+        fields.push(cell("repeat", trial.repeat + 1));
+        let measures = match is_array {
+            true => &[ZPercent, XPercent, YPercent, ZMm, WorstMm][..],
+            false => &[RangePercent, R2],
+        };
+        fields.extend(
+            measures
+                .iter()
+                .map(|&measure| cell(measure.field(), network.figure(measure))),
+        );
+        // The errors of each target, in its unit.
+        for (number, errors) in network.targets().iter().enumerate() {
+            let name = targets.get(number).map(|target| target.name.clone());
+            let name = name.unwrap_or_else(|| format!("t{}", number + 1));
+            let of_target =
+                |measure: ErrorMeasure| cell(&*format!("{name}.{}", measure.field()), measure.of_target(errors));
+            fields.extend([Rmse, Mae, R2, Worst].map(of_target));
+        }
+        let name = percent_of(is_array).field();
+        fields.extend([
+            cell(&*format!("mean_{name}"), baselines.mean.percent()),
+            cell(&*format!("linear_{name}"), baselines.linear.percent()),
+            cell("epochs_run", trial.effort.epochs),
+            cell("seconds", trial.effort.seconds),
+        ]);
+        fields
+    }))
+}
 
-fn field(name: &str, value: Cell) -> Field {
-    (name.to_owned(), value)
+/// Measure by which the errors of an array, or of a recording, are compared.
+fn percent_of(is_array: bool) -> ErrorMeasure {
+    match is_array {
+        true => ErrorMeasure::ZPercent,
+        false => ErrorMeasure::RangePercent,
+    }
 }
 
 /// Settings of a cell.
-fn settings_fields(cell: &experiments::Cell) -> Vec<Field> {
-    let settings = &cell.settings;
-    let method = field("method", settings.training.method.short_name().into());
-    let epochs = field("epochs", settings.training.stopping.epochs.into());
-    match settings.simulation() {
-        Some(source) => vec![
-            field("array", source.sensor.scale.to_string().into()),
-            field("hidden", settings.hidden.into()),
-            field("samples", source.samples.into()),
-            method,
-            epochs,
-        ],
-        None => {
-            let split = cell.division.map(|division| division.by.to_string());
-            vec![
-                field("split", split.unwrap_or_default().into()),
-                field("scaling", settings.inputs.scaling.to_string().into()),
-                field("hidden", settings.hidden.into()),
-                method,
-                epochs,
-            ]
-        }
-    }
+fn settings_fields(of: &experiments::Cell) -> Vec<(TableColumn, Cell)> {
+    use AxisKind::{Array, Epochs, Hidden, Method, Samples, Scaling, Split};
+    let kinds = match of.settings.simulation() {
+        Some(_) => [Array, Hidden, Samples, Method, Epochs],
+        None => [Split, Scaling, Hidden, Method, Epochs],
+    };
+    kinds.map(|kind| cell(axis_word(kind), kind.setting().get(of))).to_vec()
 }
 
-/// Errors of a trial on a recording: over all targets, and of each in its unit.
-fn target_fields(trial: &Trial, targets: &[Channel]) -> Vec<Field> {
-    let errors = trial.scores.network.targets();
-    let r2 = TargetErrors::over_all(errors).and_then(|errors| errors.r2);
-    let mut fields = vec![
-        field("percent_of_range", trial.scores.network.percent().into()),
-        field("r2", r2.into()),
-    ];
-    for (number, errors) in errors.iter().enumerate() {
-        let name = targets
-            .get(number)
-            .map_or_else(|| format!("t{}", number + 1), |target| target.name.clone());
-        fields.extend([
-            field(&format!("{name}.rmse"), errors.rmse.into()),
-            field(&format!("{name}.mae"), errors.mae.into()),
-            field(&format!("{name}.r2"), errors.r2.into()),
-            field(&format!("{name}.worst"), errors.worst.into()),
-        ]);
+/// Option of `train` for a setting, and its name in tables for programs.
+pub(super) fn axis_word(kind: AxisKind) -> &'static str {
+    match kind {
+        AxisKind::Hidden => "hidden",
+        kind => kind.setting().name,
     }
-    fields
-}
-
-/// A table of rows that have the same fields.
-fn table_of(rows: impl Iterator<Item = Vec<Field>>) -> Table {
-    let mut columns = Vec::new();
-    let rows = rows.map(|fields| {
-        if columns.is_empty() {
-            columns = fields
-                .iter()
-                .map(|(name, _)| TableColumn::field(name.clone()))
-                .collect();
-        }
-        fields.into_iter().map(|(_, value)| value).collect()
-    });
-    let rows = Vec::from_iter(rows);
-    Table { columns, rows }
 }
 
 /// Writes the table as Markdown under `title`, with `conditions` between.
@@ -446,12 +358,8 @@ pub fn describe_worse_than_mean(results: &ExperimentResults) -> Vec<String> {
 }
 
 fn is_worse_than_mean(trial: &Trial) -> bool {
-    let mean = &trial.scores.baselines.mean;
-    match (trial.scores.network.nodes(), mean.nodes()) {
-        (Some(errors), Some(mean)) => errors.z_mm > mean.z_mm,
-        // An error that is not finite counts as worse.
-        _ => mean
-            .percent()
-            .is_some_and(|mean| trial.scores.network.percent().is_none_or(|percent| percent > mean)),
-    }
+    let error = |errors: &TestErrors| errors.figure(ErrorMeasure::ZMm).or_else(|| errors.percent());
+    let [network, mean] = [&trial.scores.network, &trial.scores.baselines.mean].map(error);
+    // An error that is not finite counts as worse.
+    mean.is_some_and(|mean| network.is_none_or(|network| network > mean))
 }

@@ -30,7 +30,6 @@
 mod atomic;
 pub mod bundle;
 mod checkpoint_file;
-mod checkpointing;
 mod document;
 mod experiment_tables;
 pub mod figures;
@@ -39,8 +38,6 @@ mod recipe_file;
 pub mod report;
 mod run_folder;
 mod samples;
-mod saved_problem;
-mod search_table;
 mod sensor_file;
 mod sweep;
 mod table;
@@ -50,30 +47,10 @@ mod test_folder;
 mod trade_tables;
 mod unfinished;
 
-pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable, is_same};
-pub use checkpoint_file::CheckpointFile;
-pub use checkpointing::{CheckpointPlace, Checkpointing};
+pub use self::{
+    atomic::*, checkpoint_file::*, experiment_tables::*, network_file::*, recipe_file::*, run_folder::*, samples::*,
+    sensor_file::*, sweep::*, table::*, tables::*, trade_tables::*,
+};
 pub use decoupler_core::text::{format_below_one, format_duration, format_number, format_percent, format_r2};
 pub use document::{DocumentError, DocumentKind};
-pub use experiment_tables::{
-    ExperimentColumn, ExperimentColumnKind, ExperimentTable, cells_table, describe_conditions, describe_failures,
-    describe_worse_than_mean, trials_table, write_experiment_markdown,
-};
-pub use network_file::{NetworkFile, PastNetwork};
-pub use recipe_file::{RecipeFile, RecipeSource};
-pub use run_folder::{KeptRun, KeptRuns, RunFolder, RunSummary};
-pub use samples::{TrainingRecord, write_decoded, write_decoded_header, write_samples, write_samples_header};
-pub use saved_problem::SavedProblem;
-pub use search_table::{describe_search, search_table};
-pub use sensor_file::SensorFile;
-pub use sweep::{
-    MergedSweep, SweepFiles, SweepFolderError, SweepRow, SweepTableFormat, Trial, TrialId, TrialOptions,
-    decoders_in_order, recording_options, sweep_specification, train_options,
-};
-pub use table::{Cell, Table, TableColumn, TableForm, csv_cell, write_csv_row};
-pub use tables::{
-    decoder_table, describe_coverage, describe_determinacy, describe_half_widths, describe_positions, describe_samples,
-    describe_target, describe_warnings, describe_worse_than_ridge, error_table, write_loss_curves,
-};
-pub use trade_tables::{describe_recorded_workload, describe_workload, trade_off_points, trade_off_summary};
 pub use unfinished::exit_leaving_nothing;

@@ -1,24 +1,20 @@
-use std::{fmt::Display, io::Write as _, path::Path, sync::Arc, time::Duration};
+use std::{path::Path, sync::Arc, time::Duration};
 
 use decoupler_core::{
-    dataset::{Dataset, DatasetError, Simulation},
+    dataset::{Dataset, DatasetError, Memory, Simulation},
     decoupling::{Combined, ProgramDecoder},
     evaluation::{ErrorTable, Intervals, Run, RunSettings, Scores, StartRecord, TestErrors},
     job::Job,
     live::{DriftReference, LiveError},
     network::{DecouplingNetwork, Networks},
-    problem::{Problem, TargetPosition},
+    problem::{Channel, Problem, TargetPosition},
     scene::Rows,
 };
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
-use serde_json::value::{RawValue, to_raw_value};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{
-    AtomicFile, DocumentError, DocumentKind, SavedProblem, TrainingRecord, WriteError,
-    atomic::{LARGEST_BYTES, too_large},
-    document::PROGRAM,
-    unfinished::folder_of,
+    AtomicFile, DocumentError, DocumentKind, TrainingRecord, WriteError, document::PROGRAM, unfinished::folder_of,
 };
 use crate::import::{LineParser, Recipe, Recorded, Setup, SetupError};
 
@@ -28,15 +24,19 @@ const KIND: DocumentKind = DocumentKind::Network;
 /// recording also the plan that reads it. The file is JSON; a network that is read back gives bit-identical results.
 ///
 /// Paths of recordings are stored relative to the folder of the file.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct NetworkFile {
     /// Program and version that wrote the file.
+    #[serde(skip)]
     pub program: String,
     /// Settings of the run: source, method, stopping rules, seed.
     pub settings: RunSettings,
     /// Origin of recorded samples, with absolute paths; `None` for a simulated array.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recorded: Option<Recorded>,
     /// Names, units and positions of readings and targets.
+    #[serde(with = "SavedProblem")]
     pub problem: Problem,
     /// Row-wires of the samples in ascending order, from 0, if they are known.
     pub row_wires: Option<Vec<usize>>,
@@ -47,36 +47,34 @@ pub struct NetworkFile {
     /// Errors of the network and of the baselines on the test set.
     pub scores: Scores,
     /// Prediction intervals of the answers, if they were calibrated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intervals: Option<Intervals>,
     /// Training readings of a recording, by which a later drift is detected, or the reason why they are not monitored.
+    #[serde(
+        default = "not_described",
+        skip_serializing_if = "is_not_described",
+        serialize_with = "write_drift",
+        deserialize_with = "read_drift"
+    )]
     pub drift: Result<DriftReference, LiveError>,
-}
-
-/// The part of the file that the checksum covers.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Document {
-    settings: RunSettings,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    recorded: Option<Recorded>,
-    problem: SavedProblem,
-    row_wires: Option<Vec<usize>>,
-    network: Networks,
-    training: TrainingRecord,
-    scores: Scores,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    intervals: Option<Intervals>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    drift: Option<SavedDrift>,
 }
 
 const NODES_OF_RECORDING: &str = "problem: the targets of a recording are not nodes";
 
-/// Description of the training readings as it is saved; older files have none if there were too few readings.
+/// Older files have no description of the training readings if there were too few.
+fn not_described() -> Result<DriftReference, LiveError> {
+    Err(LiveError::NotDescribed)
+}
+
+fn is_not_described(drift: &Result<DriftReference, LiveError>) -> bool {
+    *drift == not_described()
+}
+
+/// Description of the training readings as it is saved.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
-enum SavedDrift {
-    Monitored(DriftReference),
+enum SavedDrift<T> {
+    Monitored(T),
     NotMonitored {
         not_monitored: LiveError,
     },
@@ -85,22 +83,50 @@ enum SavedDrift {
     Older(serde::de::IgnoredAny),
 }
 
-impl SavedDrift {
-    fn of(drift: Result<DriftReference, LiveError>) -> Option<Self> {
-        match drift {
-            Ok(reference) => Some(Self::Monitored(reference)),
-            Err(LiveError::NotDescribed) => None,
-            Err(not_monitored) => Some(Self::NotMonitored { not_monitored }),
-        }
-    }
+fn write_drift<S: Serializer>(drift: &Result<DriftReference, LiveError>, serializer: S) -> Result<S::Ok, S::Error> {
+    let saved = match drift {
+        Ok(reference) => SavedDrift::Monitored(reference),
+        Err(error) => SavedDrift::NotMonitored {
+            not_monitored: error.clone(),
+        },
+    };
+    saved.serialize(serializer)
+}
 
-    fn read(saved: Option<Self>) -> Result<DriftReference, LiveError> {
-        match saved {
-            Some(Self::Monitored(reference)) => Ok(reference),
-            Some(Self::NotMonitored { not_monitored }) => Err(not_monitored),
-            Some(Self::Older(_)) | None => Err(LiveError::NotDescribed),
-        }
-    }
+fn read_drift<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Result<DriftReference, LiveError>, D::Error> {
+    Ok(match SavedDrift::deserialize(deserializer)? {
+        SavedDrift::Monitored(reference) => Ok(reference),
+        SavedDrift::NotMonitored { not_monitored } => Err(not_monitored),
+        SavedDrift::Older(_) => not_described(),
+    })
+}
+
+/// Layout of a [`Problem`] that is saved next to the settings of a run, which contain its sensor: it contains only whether there
+/// is one. The sensor that is read is therefore the default one, to be replaced by that of the settings.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Problem", deny_unknown_fields)]
+pub struct SavedProblem {
+    inputs: Vec<Channel>,
+    targets: Vec<Channel>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    memory: Option<Memory>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    positions: Vec<TargetPosition>,
+    #[serde(
+        default,
+        rename = "has_nodes",
+        serialize_with = "is_known",
+        deserialize_with = "default_if_known"
+    )]
+    sensor: Option<Simulation>,
+}
+
+fn is_known<S: Serializer>(sensor: &Option<Simulation>, serializer: S) -> Result<S::Ok, S::Error> {
+    sensor.is_some().serialize(serializer)
+}
+
+fn default_if_known<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Simulation>, D::Error> {
+    Ok(bool::deserialize(deserializer)?.then(Simulation::default))
 }
 
 /// Network that a run stopped at an epoch would have returned.
@@ -235,22 +261,31 @@ impl NetworkFile {
     }
 
     /// As [`Self::save`]; `commit` puts the file in its place.
-    pub(super) fn save_by(&self, path: &Path, commit: Commit) -> Result<(), DocumentError> {
-        let run = self.run_record(path, |recorded| recorded.relative_to(folder_of(path)))?;
-        Ok(Sealed::new(KIND, &self.program, &run).save(path, commit)?)
+    pub(super) fn save_by<T>(
+        &self,
+        path: &Path,
+        commit: fn(AtomicFile) -> Result<T, WriteError>,
+    ) -> Result<T, DocumentError> {
+        self.check().map_err(|defect| unsound(path, defect))?;
+        let located = |recorded: &Recorded| recorded.relative_to(folder_of(path));
+        let file = Self {
+            recorded: self.recorded.as_ref().map(located),
+            ..self.clone()
+        };
+        Ok(KIND.save(&self.program, &file, path, commit)?)
     }
+
+    /// Name of a network file that is only text, in messages.
+    const TEXT: &str = "network in memory";
 
     /// Text of the file with the paths as they are, for a program that stores it elsewhere than in a file.
     ///
     /// # Errors
     /// The network has values that could not be read back.
     pub fn to_text(&self) -> Result<String, DocumentError> {
-        let place = Path::new(Self::TEXT);
-        let run = self.run_record(place, Recorded::clone)?;
-        serde_json::to_string(&Sealed::new(KIND, &self.program, &run)).map_err(|error| DocumentError::Unsound {
-            path: place.to_owned(),
-            defect: error.to_string(),
-        })
+        let checked = self.check();
+        let text = checked.and_then(|()| KIND.seal(&self.program, self).map_err(|error| error.to_string()));
+        text.map_err(|defect| unsound(Path::new(Self::TEXT), defect))
     }
 
     /// Reads the text of [`Self::to_text`].
@@ -258,51 +293,9 @@ impl NetworkFile {
     /// # Errors
     /// The text is damaged.
     pub fn from_text(text: &str) -> Result<Self, DocumentError> {
-        let read = Self::parse(text.as_bytes(), Path::new(""));
-        let checked = read.and_then(|file| defect(&file).map_or(Ok(file), Err));
+        let read = KIND.unseal(text.as_bytes());
+        let checked = read.and_then(|(program, file): (_, Self)| file.completed(program, Path::new("")));
         checked.map_err(|defect| KIND.damaged(Path::new(Self::TEXT), defect))
-    }
-
-    /// Name of a network file that is only text, in messages.
-    const TEXT: &str = "network in memory";
-
-    /// Returns the part of the file that the checksum covers, with the paths of `located`.
-    fn run_record(
-        &self,
-        path: &Path,
-        located: impl FnOnce(&Recorded) -> Recorded,
-    ) -> Result<Box<RawValue>, DocumentError> {
-        let unsound = |defect: String| DocumentError::Unsound {
-            path: path.to_owned(),
-            defect,
-        };
-        if let Some(defect) = defect(self) {
-            return Err(unsound(defect));
-        }
-        let Self {
-            program: _,
-            settings,
-            recorded,
-            problem,
-            row_wires,
-            network,
-            training,
-            scores,
-            intervals,
-            drift,
-        } = self.clone();
-        let document = Document {
-            settings,
-            recorded: recorded.as_ref().map(located),
-            problem: problem.into(),
-            row_wires,
-            network,
-            training,
-            scores,
-            intervals,
-            drift: SavedDrift::of(drift),
-        };
-        to_raw_value(&document).map_err(|error| unsound(error.to_string()))
     }
 
     /// Reads the file at `path`.
@@ -310,263 +303,197 @@ impl NetworkFile {
     /// # Errors
     /// The file cannot be read, is of another kind or version, or is damaged.
     pub fn load(path: &Path) -> Result<Self, DocumentError> {
-        let bytes = KIND.read(path)?;
-        let read = Self::parse(&bytes, folder_of(path));
-        let checked = read.and_then(|file| defect(&file).map_or(Ok(file), Err));
-        checked.map_err(|defect| KIND.damaged(path, defect))
+        let (program, file): (_, Self) = KIND.load(path)?;
+        file.completed(program, folder_of(path))
+            .map_err(|defect| KIND.damaged(path, defect))
     }
 
-    /// Describes the first defect that would keep the file from being read back.
-    pub fn defect(&self) -> Option<String> {
-        defect(self)
+    /// Completes and checks the contents of a file in `folder`.
+    fn completed(mut self, program: String, folder: &Path) -> Result<Self, String> {
+        self.program = program;
+        self.recorded = self.recorded.map(|recorded| recorded.within(folder));
+        if let Some(sensor) = &mut self.problem.sensor {
+            *sensor = *self.settings.simulation().ok_or(NODES_OF_RECORDING)?;
+        }
+        self.check().map(|()| self)
     }
 
-    fn parse(bytes: &[u8], folder: &Path) -> Result<Self, String> {
-        let Sealed { program, run, .. } = Sealed::read(bytes)?;
-        let document: Document = serde_json::from_str(run.get()).map_err(|error| error.to_string())?;
-        Ok(Self {
-            program,
-            settings: document.settings,
-            recorded: document.recorded.map(|recorded| recorded.within(folder)),
-            problem: (document.problem.with_sensor(document.settings.simulation())).ok_or(NODES_OF_RECORDING)?,
-            row_wires: document.row_wires,
-            network: document.network,
-            training: document.training,
-            scores: document.scores,
-            intervals: document.intervals,
-            drift: SavedDrift::read(document.drift),
+    /// Checks that the file can be read back. Done before writing and after reading, so that every file that is written can be
+    /// read.
+    ///
+    /// # Errors
+    /// The first defect, with its field.
+    pub fn check(&self) -> Result<(), String> {
+        let Self {
+            settings,
+            problem,
+            network,
+            scores,
+            ..
+        } = self;
+        check_settings(settings, self.recorded.as_ref())?;
+        let simulation = settings.simulation();
+        let is_placed = |position: &TargetPosition| position.target < problem.targets.len();
+        let has_memory = |memory: &Memory| memory.check(problem.inputs.len()).is_ok();
+        match simulation {
+            Some(simulation) => require(*problem == simulation.problem(), || {
+                "problem: it does not match the array".to_owned()
+            })?,
+            None => {
+                require(!problem.has_nodes(), || NODES_OF_RECORDING.to_owned())?;
+                require(problem.memory.as_ref().is_none_or(has_memory), || {
+                    "problem.memory: it is not possible for these inputs".to_owned()
+                })?;
+                require(problem.positions.iter().all(is_placed), || {
+                    "problem.positions: a target does not exist".to_owned()
+                })?;
+            }
+        }
+        for network in network.values() {
+            let infinite = network.mlp().weights().iter().position(|weight| !weight.is_finite());
+            let defect = infinite.map(|index| format!("network: weight {index} is not a finite number"));
+            defect.map_or(Ok(()), Err)?;
+        }
+        check_number(network, settings, self.row_wires.as_deref())?;
+        for network in network.values() {
+            check_sizes(network, problem, settings.network_hidden())?;
+        }
+        if let Some(simulation) = simulation {
+            check_places(network, simulation)?;
+        }
+        self.check_training()?;
+        if let Some(intervals) = &self.intervals {
+            let checked = intervals.check(problem.targets.len());
+            checked.map_err(|defect| format!("intervals: {defect}"))?;
+        }
+        let drift = self.drift.as_ref().ok();
+        require(
+            drift.is_none_or(|drift| drift.is_valid() && drift.channels() == problem.inputs.len()),
+            || "drift: it does not match the inputs".to_owned(),
+        )?;
+        let combined = self.combined();
+        let defect = combined.and_then(|combined| combined.defect(problem.feature_count(), problem.targets.len()));
+        defect.map_or(Ok(()), |defect| Err(format!("recorded.combined: {defect}")))?;
+        let errors = [
+            ("network", Some(&scores.network)),
+            ("network_alone", scores.network_alone.as_ref()),
+            ("baselines.mean", Some(&scores.baselines.mean)),
+            ("baselines.linear", Some(&scores.baselines.linear)),
+            ("baselines.model_based", scores.baselines.model_based.as_ref()),
+        ];
+        let mut errors = errors.into_iter().filter_map(|(place, errors)| Some((place, errors?)));
+        errors.try_for_each(|(place, errors)| check_errors(&format!("scores.{place}"), errors, problem))
+    }
+
+    fn check_training(&self) -> Result<(), String> {
+        let TrainingRecord {
+            best_epoch,
+            epochs,
+            seconds,
+            history,
+            starts,
+            ..
+        } = &self.training;
+        let last = history.last().ok_or("training.history: it is empty")?.epoch;
+        require(*epochs == last, || {
+            format!("training.epochs: it is {epochs}, but the history ends with epoch {last}")
+        })?;
+        require(*best_epoch <= last, || {
+            format!("training.best_epoch: {best_epoch} is after the last, {last}")
+        })?;
+        require(*seconds >= 0.0 && seconds.is_finite(), || {
+            format!("training.seconds: {seconds} is not a time")
+        })?;
+        let (found, expected) = (starts.len(), self.settings.starts);
+        require(found == 0 || found == expected, || {
+            format!("training.starts: {found} of them, but the settings ask for {expected}")
+        })?;
+        let infinite = |start: &StartRecord| {
+            let figures = [Some(start.train_mse), start.validation_mse, start.percent()];
+            figures.into_iter().flatten().any(|figure| !figure.is_finite())
+        };
+        starts.iter().position(infinite).map_or(Ok(()), |place| {
+            Err(format!(
+                "training.starts: an error of number {place} is not a finite number"
+            ))
         })
     }
 }
 
-/// Layout of a file with a checksum: a heading and the record of a run. The checksum detects any change to the record.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Sealed<'a> {
-    format: String,
-    pub(super) version: u64,
-    pub(super) program: String,
-    /// CRC-32 of the text of `run`, as hexadecimal digits.
-    crc32: String,
-    #[serde(borrow)]
-    pub(super) run: &'a RawValue,
+fn unsound(path: &Path, defect: String) -> DocumentError {
+    let path = path.to_owned();
+    DocumentError::Unsound { path, defect }
 }
 
-impl<'a> Sealed<'a> {
-    pub(super) fn new(kind: DocumentKind, program: &str, run: &'a RawValue) -> Self {
-        Self {
-            format: kind.format().to_owned(),
-            version: kind.version(),
-            program: program.to_owned(),
-            crc32: checksum(run),
-            run,
-        }
+fn require(holds: bool, defect: impl FnOnce() -> String) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(defect()) }
+}
+
+/// Checks the settings in a file, and that a recording has its plan.
+///
+/// # Errors
+/// The first invalid value, with its field.
+pub(super) fn check_settings(settings: &RunSettings, recorded: Option<&Recorded>) -> Result<(), String> {
+    (settings.check_counts()).map_err(|defect| format!("settings: {defect}"))?;
+    if let Some(Simulation { sensor, scene, .. }) = settings.simulation() {
+        (sensor.check()).map_err(|defect| format!("settings.source.sensor: {defect}"))?;
+        (scene.check()).map_err(|defect| format!("settings.source.scene: {defect}"))?;
     }
-
-    /// Reads a file and checks its checksum.
-    ///
-    /// # Errors
-    /// A description of the damage.
-    pub(super) fn read(bytes: &'a [u8]) -> Result<Self, String> {
-        let sealed: Self = serde_json::from_slice(bytes).map_err(|error| error.to_string())?;
-        if sealed.crc32 == checksum(sealed.run) {
-            Ok(sealed)
-        } else {
-            Err("its checksum shows that something in it has changed".to_owned())
-        }
-    }
-
-    /// Writes the file at `path`, whole or not at all; `commit` puts it in its place.
-    ///
-    /// # Errors
-    /// The path cannot be written, or the file would be too large to be read again.
-    pub(super) fn save(&self, path: &Path, commit: Commit) -> Result<(), WriteError> {
-        /// Upper bound on the length of the heading.
-        const HEADING: u64 = 1 << 10;
-        let error = |source| WriteError::io(path, source);
-        if self.run.get().len() as u64 + HEADING > LARGEST_BYTES {
-            return Err(error(too_large()));
-        }
-        let mut file = AtomicFile::create(path)?;
-        serde_json::to_writer(&mut file, self).map_err(|source| error(source.into()))?;
-        writeln!(file).map_err(error)?;
-        commit(file)
-    }
-}
-
-/// Puts a written file in its place: [`AtomicFile::commit`] or [`AtomicFile::commit_new`].
-pub(super) type Commit = fn(AtomicFile) -> Result<(), WriteError>;
-
-fn checksum(run: &RawValue) -> String {
-    format!("{:08x}", crc32fast::hash(run.get().as_bytes()))
-}
-
-/// Describes the first defect of a network file and its field. Checked before writing and after reading, so
-/// that every file that is written can be read.
-pub(super) fn defect(file: &NetworkFile) -> Option<String> {
-    let NetworkFile {
-        program: _,
-        settings,
-        recorded,
-        problem,
-        row_wires,
-        network,
-        training,
-        scores:
-            Scores {
-                network: errors,
-                network_alone: alone,
-                baselines,
-                coverage: _,
-            },
-        intervals,
-        drift,
-    } = file;
-    let weight = |network: &DecouplingNetwork| {
-        let weights = network.mlp().weights();
-        weights.iter().position(|weight| !weight.is_finite())
-    };
-    let last_epoch = training.history.last().map(|record| record.epoch);
-    let simulation = settings.simulation();
-    let defects = [
-        (network.values().iter().find_map(weight))
-            .map(|index| format!("network: weight {index} is not a finite number")),
-        number_defect(network, settings, row_wires.as_deref()),
-        (network.values().iter()).find_map(|network| mismatch(network, problem, settings.network_hidden())),
-        simulation.and_then(|simulation| place_defect(network, simulation)),
-        last_epoch.is_none().then(|| "training.history: it is empty".to_owned()),
-        last_epoch
-            .filter(|&last| training.best_epoch > last)
-            .map(|last| format!("training.best_epoch: {} is after the last, {last}", training.best_epoch)),
-        (!(training.seconds >= 0.0 && training.seconds.is_finite()))
-            .then(|| format!("training.seconds: {} is not a time", training.seconds)),
-        starts_defect(file),
-        (intervals.as_ref())
-            .and_then(|intervals| intervals.check(problem.targets.len()).err())
-            .map(|defect| format!("intervals: {defect}")),
-        (drift.as_ref().ok())
-            .filter(|drift| !drift.is_valid() || drift.channels() != problem.inputs.len())
-            .map(|_| "drift: it does not match the inputs".to_owned()),
-        file.combined()
-            .and_then(|combined| combined.defect(problem.feature_count(), problem.targets.len()))
-            .map(|defect| format!("recorded.combined: {defect}")),
-        unmeasured("scores.network", errors, problem),
-        alone
-            .as_ref()
-            .and_then(|errors| unmeasured("scores.network_alone", errors, problem)),
-        unmeasured("scores.baselines.mean", &baselines.mean, problem),
-        unmeasured("scores.baselines.linear", &baselines.linear, problem),
-        (baselines.model_based.as_ref()).and_then(|errors| unmeasured("scores.baselines.model_based", errors, problem)),
-    ];
-    let is_placed = |position: &TargetPosition| position.target < problem.targets.len();
-    let problem_defect = match simulation {
-        Some(simulation) if *problem != simulation.problem() => Some("problem: it does not match the array"),
-        None if problem.has_nodes() => Some(NODES_OF_RECORDING),
-        None if problem
-            .memory
-            .as_ref()
-            .is_some_and(|memory| memory.check(problem.inputs.len()).is_err()) =>
-        {
-            Some("problem.memory: it is not possible for these inputs")
-        }
-        None if !problem.positions.iter().all(is_placed) => Some("problem.positions: a target does not exist"),
-        _ => None,
-    };
-    settings_defect(settings, recorded.as_ref())
-        .or(problem_defect.map(str::to_owned))
-        .or_else(|| defects.into_iter().flatten().next())
-}
-
-/// Describes the first invalid value of the settings in a file, and its field.
-pub(super) fn settings_defect(settings: &RunSettings, recorded: Option<&Recorded>) -> Option<String> {
-    let at = |field: &str, defect: &dyn Display| format!("{field}: {defect}");
-    let training = settings
-        .training
-        .check()
-        .map_err(|defect| at("settings.training", &defect));
-    let counts = settings.check_counts().map_err(|defect| at("settings", &defect));
-    let source = settings
-        .simulation()
-        .map_or(Ok(()), |Simulation { sensor, scene, .. }| {
-            (sensor.check()).map_err(|defect| at("settings.source.sensor", &defect))?;
-            (scene.check()).map_err(|defect| at("settings.source.scene", &defect))
-        });
-    let recorded = match (settings.simulation(), recorded) {
+    (settings.training.check()).map_err(|defect| format!("settings.training: {defect}"))?;
+    match (settings.simulation(), recorded) {
         (Some(_), Some(_)) => Err("recorded: the source is a simulated array".to_owned()),
         (None, None) => Err("recorded: it is missing".to_owned()),
         _ => Ok(()),
-    };
-    [counts, source, training, recorded].into_iter().find_map(Result::err)
-}
-
-fn starts_defect(file: &NetworkFile) -> Option<String> {
-    let starts = &file.training.starts;
-    if !starts.is_empty() && starts.len() != file.settings.starts {
-        let (found, expected) = (starts.len(), file.settings.starts);
-        return Some(format!(
-            "training.starts: {found} of them, but the settings ask for {expected}"
-        ));
     }
-    let infinite = |start: &StartRecord| {
-        let figures = [Some(start.train_mse), start.validation_mse, start.percent()];
-        figures.into_iter().flatten().any(|figure| !figure.is_finite())
-    };
-    let place = starts.iter().position(infinite)?;
-    Some(format!(
-        "training.starts: an error of number {place} is not a finite number"
-    ))
 }
 
-fn number_defect(network: &Networks, settings: &RunSettings, row_wires: Option<&[usize]>) -> Option<String> {
+fn check_number(network: &Networks, settings: &RunSettings, row_wires: Option<&[usize]>) -> Result<(), String> {
     let found = network.values().len();
-    match settings.simulation() {
-        Some(source) => match source.rows().map(|rows| source.scene.rows.model().decoders(rows)) {
-            Ok(needed) if needed == found => None,
-            Ok(needed) => Some(format!(
-                "network: {found} of them, but rows {} of {} need {needed}",
-                source.scene.rows, source.sensor.scale
-            )),
-            Err(defect) => Some(format!("settings.source.scene.rows: {defect}")),
-        },
-        None => {
-            let rows = row_wires.map_or(1, <[usize]>::len);
-            (found != 1 && found != rows).then(|| format!("network: {found} of them for {rows} row-wires"))
-        }
-    }
+    let Some(source) = settings.simulation() else {
+        let rows = row_wires.map_or(1, <[usize]>::len);
+        return require(found == 1 || found == rows, || {
+            format!("network: {found} of them for {rows} row-wires")
+        });
+    };
+    let rows = source
+        .rows()
+        .map_err(|defect| format!("settings.source.scene.rows: {defect}"))?;
+    let needed = source.scene.rows.model().decoders(rows);
+    require(needed == found, || {
+        let (rows, scale) = (source.scene.rows, source.sensor.scale);
+        format!("network: {found} of them, but rows {rows} of {scale} need {needed}")
+    })
 }
 
-fn mismatch(network: &DecouplingNetwork, problem: &Problem, hidden: usize) -> Option<String> {
+fn check_sizes(network: &DecouplingNetwork, problem: &Problem, hidden: usize) -> Result<(), String> {
+    let (inputs, outputs) = (network.inputs().channels(), network.outputs().channels());
     let sizes = [
-        (
-            "reads",
-            network.inputs().channels(),
-            problem.feature_count(),
-            "readings",
-        ),
-        ("gives", network.outputs().channels(), problem.targets.len(), "targets"),
+        ("reads", inputs, problem.feature_count(), "readings"),
+        ("gives", outputs, problem.targets.len(), "targets"),
         ("has", network.mlp().shape().hidden, hidden, "hidden nodes"),
     ];
-    let (verb, found, expected, what) = sizes.into_iter().find(|(_, found, expected, _)| found != expected)?;
-    Some(format!(
-        "network: it {verb} {found} {what}, but the settings need {expected}"
-    ))
+    let mut sizes = sizes.into_iter();
+    sizes.try_for_each(|(verb, found, expected, what)| {
+        require(found == expected, || {
+            format!("network: it {verb} {found} {what}, but the settings need {expected}")
+        })
+    })
 }
 
 /// Describes the first coordinate whose training range is out of reach of the nodes of the scene, even with a margin of
 /// one stroke. Networks whose sizes or number do not match the settings are not checked.
-fn place_defect(networks: &Networks, simulation: &Simulation) -> Option<String> {
+fn check_places(networks: &Networks, simulation: &Simulation) -> Result<(), String> {
     let Simulation { sensor, scene, .. } = simulation;
-    let rows = scene.rows.read(sensor.scale.rows()).ok()?;
+    let Ok(rows) = scene.rows.read(sensor.scale.rows()) else {
+        return Ok(());
+    };
     let spare_mm = simulation.stroke_mm() + scene.movement.largest_shift_mm();
     for (index, network) in networks.values().iter().enumerate() {
         let outputs = network.outputs();
         let rows = match networks.only() {
             Some(_) => &rows[..],
-            None => rows.get(index..=index)?,
+            None => rows.get(index..=index).unwrap_or_default(),
         };
-        if outputs.channels() != sensor.scale.coordinates_per_row() {
-            return None;
-        }
         for channel in 0..outputs.channels() {
             let (node, axis) = (channel / 3, channel % 3);
             let rest_mm = rows
@@ -578,29 +505,29 @@ fn place_defect(networks: &Networks, simulation: &Simulation) -> Option<String> 
             let rounding_mm = 1e-9 * (low.abs().max(high.abs()) + spare_mm);
             let possible = low - spare_mm - rounding_mm..=high + spare_mm + rounding_mm;
             let (min, max) = outputs.extremes(channel);
-            if !(possible.contains(&min) && possible.contains(&max)) {
-                return Some(format!(
+            require(possible.contains(&min) && possible.contains(&max), || {
+                format!(
                     "network: node {} was trained from {min:e} to {max:e} mm, but lies from {low} to {high} mm",
                     node + 1
-                ));
-            }
+                )
+            })?;
         }
     }
-    None
+    Ok(())
 }
 
-fn unmeasured(place: &str, errors: &TestErrors, problem: &Problem) -> Option<String> {
+fn check_errors(place: &str, errors: &TestErrors, problem: &Problem) -> Result<(), String> {
+    let expected = problem.targets.len();
     match errors {
-        TestErrors::Nodes(_) if !problem.has_nodes() => return Some(format!("{place}: the targets are not nodes")),
-        TestErrors::Targets(_) if problem.has_nodes() => return Some(format!("{place}: the targets are nodes")),
-        TestErrors::Targets(targets) if targets.len() != problem.targets.len() => {
-            let (found, expected) = (targets.len(), problem.targets.len());
-            return Some(format!("{place}: {found} of them for {expected} targets"));
+        TestErrors::Nodes(_) if !problem.has_nodes() => return Err(format!("{place}: the targets are not nodes")),
+        TestErrors::Targets(_) if problem.has_nodes() => return Err(format!("{place}: the targets are nodes")),
+        TestErrors::Targets(found) if found.len() != expected => {
+            return Err(format!("{place}: {} of them for {expected} targets", found.len()));
         }
         _ => {}
     }
-    let name = errors.infinite_figure()?;
-    Some(format!("{place}.{name}: it is not a finite number"))
+    let infinite = errors.infinite_figure();
+    infinite.map_or(Ok(()), |name| Err(format!("{place}.{name}: it is not a finite number")))
 }
 
 #[cfg(test)]
@@ -619,7 +546,7 @@ mod tests {
                 LiveError::TooFewReadings { blocks: 4, block: 5 },
             ),
         ] {
-            let found = SavedDrift::read(Some(serde_json::from_str(saved).unwrap()));
+            let found = read_drift(&mut serde_json::Deserializer::from_str(saved)).unwrap();
             assert_eq!(found, Err(expected));
         }
     }

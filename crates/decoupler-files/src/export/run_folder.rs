@@ -11,11 +11,8 @@ use std::{
 
 use decoupler_core::text::clean_name;
 use serde::{Serialize, de::DeserializeOwned};
-use serde_json::value::to_raw_value;
 
-use super::{
-    AtomicFile, DocumentError, DocumentKind, NetworkFile, WriteError, document::PROGRAM, network_file::Sealed,
-};
+use super::{AtomicFile, DocumentError, DocumentKind, NetworkFile, WriteError, document::PROGRAM};
 use crate::{import::Setup, machine::system_cause};
 
 /// The finished trainings, and the two that are compared.
@@ -67,6 +64,24 @@ impl RunSummary {
 }
 
 impl KeptRun {
+    /// The run in a network file, which stays in its file, with a name that none of `others` has: source, hidden nodes and
+    /// method, numbered if there is such a name.
+    fn new(id: u64, file: &NetworkFile, others: &[Self]) -> Self {
+        let summary = Arc::new(RunSummary::of(file));
+        let settings = summary.setup.settings();
+        let method = settings.training.method.short_name();
+        let name = format!("{} h{} {method}", summary.setup.source_name(), settings.hidden);
+        let is_taken = |name: &String| others.iter().any(|run| run.name == *name);
+        let numbered = (2..).map(|number| format!("{name} ({number})"));
+        let mut names = std::iter::once(name.clone()).chain(numbered);
+        Self {
+            id,
+            name: names.find(|name| !is_taken(name)).unwrap_or(name),
+            summary,
+            file: None,
+        }
+    }
+
     /// Returns the run, which is read from its file in `folder` if it is not in memory.
     ///
     /// # Errors
@@ -127,80 +142,55 @@ impl RunFolder {
         self.unwritten.len()
     }
 
-    /// Tries again to write the runs that exist only in memory.
-    fn write_unwritten(&mut self) {
-        let Some(folder) = &self.path else { return };
-        let runs = &self.kept.runs;
-        self.unwritten.retain(|&id| {
-            let Some(run) = runs.iter().find(|run| run.id == id) else {
-                return false;
-            };
-            let Some(file) = &run.file else { return false };
-            let written = file.save_by(&run_path(folder, id), AtomicFile::commit_new);
-            let named = written.and_then(|()| Ok(write(&name_path(folder, id), &run.name)?));
-            named.is_err() && !run_path(folder, id).exists()
-        });
-    }
-
     /// Reads what other programs have changed: new runs, names, the pair that is compared, removals. Returns the files
     /// that cannot be read, each once; they are left as they are. Runs that could not be written are tried again.
     pub fn look(&mut self) -> Vec<String> {
-        self.write_unwritten();
         let Some(path) = &self.path else { return Vec::new() };
-        let mut problems = Vec::new();
-        let ids = match ids(path) {
-            Ok(ids) => ids,
-            Err(error) => {
-                let path = path.display();
-                return self.untold(vec![format!(
-                    "cannot read the run list '{path}': {}",
-                    system_cause(&error)
-                )]);
+        let KeptRuns { runs, pinned } = &mut self.kept;
+        let unwritten = &mut self.unwritten;
+        for run in &*runs {
+            let is_written = || write_run(path, run).is_ok() || run_path(path, run.id).exists();
+            if unwritten.contains(&run.id) && is_written() {
+                unwritten.remove(&run.id);
             }
-        };
-        let unwritten = &self.unwritten;
-        self.kept
-            .runs
-            .retain(|run| ids.contains(&run.id) || unwritten.contains(&run.id));
-        for id in ids {
-            if let Err(place) = self.kept.runs.binary_search_by_key(&id, |run| run.id) {
-                match NetworkFile::load(&run_path(path, id)) {
-                    Ok(file) => {
-                        let summary = Arc::new(RunSummary::of(&file));
-                        let name = new_name(&self.kept.runs, &summary.setup);
-                        let run = KeptRun {
-                            id,
-                            name,
-                            summary,
-                            file: None,
-                        };
-                        self.kept.runs.insert(place, run);
+        }
+        let mut problems = Vec::new();
+        match ids(path) {
+            Ok(ids) => {
+                runs.retain(|run| ids.contains(&run.id) || unwritten.contains(&run.id));
+                for id in ids {
+                    let Err(place) = runs.binary_search_by_key(&id, |run| run.id) else {
+                        continue;
+                    };
+                    match NetworkFile::load(&run_path(path, id)) {
+                        Ok(file) => runs.insert(place, KeptRun::new(id, &file, runs)),
+                        // Another program has removed it just now.
+                        Err(_) if !run_path(path, id).exists() => {}
+                        Err(error) => problems.push(left_out(&error)),
                     }
-                    // Another program has removed it just now.
-                    Err(_) if !run_path(path, id).exists() => {}
-                    Err(error) => problems.push(left_out(&error)),
+                }
+            }
+            Err(error) => {
+                let (path, cause) = (path.display(), system_cause(&error));
+                return self.untold(vec![format!("cannot read the run list '{path}': {cause}")]);
+            }
+        }
+        for run in &mut *runs {
+            match read::<String>(&name_path(path, run.id)) {
+                Ok(name) => run.name = name.map_or_else(|| run.name.clone(), |name| clean_name(&name)),
+                Err(defect) => {
+                    let name = &run.name;
+                    problems.push(format!("the name of a run cannot be read: {defect}; rename '{name}'"));
                 }
             }
         }
-        for run in &mut self.kept.runs {
-            match read::<String>(&name_path(path, run.id)) {
-                Ok(Some(name)) => run.name = clean_name(&name),
-                Ok(None) => {}
-                Err(defect) => problems.push(format!(
-                    "the name of a run cannot be read: {defect}; rename '{}'",
-                    run.name
-                )),
-            }
-        }
-        match read::<[Option<u64>; 2]>(&pinned_path(path)) {
-            Ok(pinned) => self.kept.pinned = pinned.unwrap_or(self.kept.pinned),
+        match read(&pinned_path(path)) {
+            Ok(found) => *pinned = found.unwrap_or(*pinned),
             Err(defect) => problems.push(format!(
                 "the runs compared cannot be read: {defect}; choose A and B again"
             )),
         }
-        let runs = &self.kept.runs;
-        let is_there = |id: &u64| runs.iter().any(|run| run.id == *id);
-        self.kept.pinned = self.kept.pinned.map(|id| id.filter(is_there));
+        *pinned = pinned.map(|id| id.filter(|id| runs.iter().any(|run| run.id == *id)));
         self.untold(problems)
     }
 
@@ -209,27 +199,27 @@ impl RunFolder {
     pub fn load_used(&mut self) -> Vec<String> {
         let Some(folder) = &self.path else { return Vec::new() };
         let KeptRuns { runs, pinned } = &mut self.kept;
-        let newest = runs.last().map(|run| run.id);
-        let count = runs.len();
         let mut problems = Vec::new();
-        runs.retain_mut(|run| {
+        let mut newest = true;
+        // From the newest: if it cannot be read, the one before it is the newest.
+        for place in (0..runs.len()).rev() {
+            let run = &mut runs[place];
+            let is_used = newest || pinned.contains(&Some(run.id));
             if self.unwritten.contains(&run.id) {
-                return true;
+                newest = false;
+            } else if !is_used {
+                run.file = None;
+            } else {
+                match run.load(folder) {
+                    Ok(file) => (run.file, newest) = (Some(file), false),
+                    Err(error) => {
+                        problems.push(left_out(&error));
+                        runs.remove(place);
+                    }
+                }
             }
-            let is_used = newest == Some(run.id) || pinned.contains(&Some(run.id));
-            let loaded = is_used.then(|| run.load(folder)).transpose();
-            run.file = loaded.unwrap_or_else(|error| {
-                problems.push(left_out(&error));
-                None
-            });
-            run.file.is_some() || !is_used
-        });
-        let is_newest_another = runs.len() < count;
-        let mut untold = self.untold(problems);
-        if is_newest_another {
-            untold.extend(self.load_used());
         }
-        untold
+        self.untold(problems)
     }
 
     fn untold(&mut self, mut problems: Vec<String>) -> Vec<String> {
@@ -242,38 +232,29 @@ impl RunFolder {
     /// # Errors
     /// Its file cannot be written; it is then in the list until the program ends.
     pub fn keep(&mut self, file: Arc<NetworkFile>) -> Result<(), DocumentError> {
-        let summary = Arc::new(RunSummary::of(&file));
-        let name = new_name(&self.kept.runs, &summary.setup);
-        let (id, written) = self.write_run(&file, &name);
-        if self.folder_of(id).is_none() {
-            self.unwritten.insert(id);
-        }
-        let place = self.kept.runs.partition_point(|run| run.id < id);
-        let run = KeptRun {
-            id,
-            name,
-            summary,
-            file: Some(file),
-        };
-        self.kept.runs.insert(place, run);
-        written
-    }
-
-    /// Writes the run under a unique id, even while other programs write runs to the folder.
-    fn write_run(&self, file: &NetworkFile, name: &str) -> (u64, Result<(), DocumentError>) {
+        let runs = &mut self.kept.runs;
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let mut id = u64::try_from(now.as_micros()).unwrap_or(0);
-        loop {
-            if !self.kept.runs.iter().any(|run| run.id == id) {
-                let Some(folder) = &self.path else { return (id, Ok(())) };
-                match file.save_by(&run_path(folder, id), AtomicFile::commit_new) {
-                    Err(DocumentError::Write(error)) if error.is_taken() => {}
-                    Err(error) => return (id, Err(error)),
-                    Ok(()) => return (id, write(&name_path(folder, id), &name).map_err(Into::into)),
+        let mut run = KeptRun::new(u64::try_from(now.as_micros()).unwrap_or(0), &file, runs);
+        run.file = Some(file);
+        // A unique id, even while other programs write runs to the folder.
+        let written = loop {
+            if runs.iter().all(|other| other.id != run.id) {
+                match self.path.as_ref().map_or(Ok(true), |folder| write_run(folder, &run)) {
+                    Ok(false) => {}
+                    written => break written.map(drop),
                 }
             }
-            id = id.wrapping_add(1);
+            run.id = run.id.wrapping_add(1);
+        };
+        let is_there = self
+            .path
+            .as_ref()
+            .is_some_and(|folder| run_path(folder, run.id).exists());
+        if !is_there {
+            self.unwritten.insert(run.id);
         }
+        runs.insert(runs.partition_point(|other| other.id < run.id), run);
+        written
     }
 
     /// Renames run `id`.
@@ -329,15 +310,15 @@ impl RunFolder {
     }
 }
 
-/// Returns source, hidden nodes and method; numbered if there is such a name.
-fn new_name(runs: &[KeptRun], setup: &Setup) -> String {
-    let settings = setup.settings();
-    let method = settings.training.method.short_name();
-    let name = format!("{} h{} {method}", setup.source_name(), settings.hidden);
-    let is_taken = |name: &str| runs.iter().any(|run| run.name == name);
-    let numbered = (2..).map(|number| format!("{name} ({number})"));
-    let mut names = std::iter::once(name.clone()).chain(numbered);
-    names.find(|name| !is_taken(name)).unwrap_or(name)
+/// Writes a run and its name; returns `false` if there is a run with its id. A name that cannot be written is an error of the
+/// run, which is nevertheless there.
+fn write_run(folder: &Path, run: &KeptRun) -> Result<bool, DocumentError> {
+    let Some(file) = &run.file else { return Ok(false) };
+    let is_new = file.save_by(&run_path(folder, run.id), AtomicFile::commit_new)?;
+    if is_new {
+        write(&name_path(folder, run.id), &run.name)?;
+    }
+    Ok(is_new)
 }
 
 fn left_out(error: &DocumentError) -> String {
@@ -347,22 +328,22 @@ fn left_out(error: &DocumentError) -> String {
 const KIND: DocumentKind = DocumentKind::RunList;
 
 /// Network file of run `id`.
-pub(super) fn run_path(folder: &Path, id: u64) -> PathBuf {
+fn run_path(folder: &Path, id: u64) -> PathBuf {
     folder.join(format!("run-{id}.json"))
 }
 
 /// File with the name of run `id`.
-pub(super) fn name_path(folder: &Path, id: u64) -> PathBuf {
+fn name_path(folder: &Path, id: u64) -> PathBuf {
     folder.join(format!("run-{id}.name.json"))
 }
 
 /// File with the ids of the two runs that are compared.
-pub(super) fn pinned_path(folder: &Path) -> PathBuf {
+fn pinned_path(folder: &Path) -> PathBuf {
     folder.join("pinned.json")
 }
 
 /// Returns the ids of all runs in `folder`, in ascending order.
-pub(super) fn ids(folder: &Path) -> io::Result<Vec<u64>> {
+fn ids(folder: &Path) -> io::Result<Vec<u64>> {
     let mut ids = Vec::new();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
@@ -383,27 +364,18 @@ pub(super) fn ids(folder: &Path) -> io::Result<Vec<u64>> {
 }
 
 /// Writes a small value, sealed with a checksum.
-pub(super) fn write(path: &Path, value: &impl Serialize) -> Result<(), WriteError> {
-    let value = to_raw_value(value).map_err(|error| WriteError::io(path, error.into()))?;
-    Sealed::new(KIND, PROGRAM, &value).save(path, AtomicFile::commit)
+fn write(path: &Path, value: &impl Serialize) -> Result<(), WriteError> {
+    KIND.save(PROGRAM, value, path, AtomicFile::commit)
 }
 
 /// Reads what [`write`] has written; `None` if there is no file.
 ///
 /// # Errors
 /// The file cannot be read, is of another kind or version, or is damaged.
-pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, DocumentError> {
-    if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-        return Err(KIND.damaged(path, "it is not a file".to_owned()));
+fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, DocumentError> {
+    match fs::metadata(path) {
+        Ok(found) if !found.is_file() => Err(KIND.damaged(path, "it is not a file".to_owned())),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        _ => KIND.load(path).map(|(_, value)| Some(value)),
     }
-    let bytes = match KIND.read(path) {
-        Ok(bytes) => bytes,
-        Err(DocumentError::Read { source, .. }) if source.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(error),
-    };
-    let read = Sealed::read(&bytes).and_then(|sealed| {
-        let value = serde_json::from_str(sealed.run.get());
-        value.map_err(|error| error.to_string())
-    });
-    read.map(Some).map_err(|defect| KIND.damaged(path, defect))
 }

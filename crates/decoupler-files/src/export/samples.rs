@@ -9,7 +9,7 @@ use decoupler_core::{
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-use super::PastNetwork;
+use super::{PastNetwork, write_csv_row};
 
 /// Writes the names of the columns of [`write_samples`], with or without those of decoded coordinates, and ends the
 /// line.
@@ -17,19 +17,11 @@ use super::PastNetwork;
 /// # Errors
 /// Any error of `writer`.
 pub fn write_samples_header(scale: ArrayScale, with_decoded: bool, writer: &mut dyn Write) -> io::Result<()> {
-    write!(writer, "snapshot,row,")?;
-    for column in 1..=scale.columns() {
-        write!(writer, "r_{column},")?;
-    }
-    if with_decoded {
-        for node in 1..=scale.nodes_per_row() {
-            write!(writer, "x_{node},y_{node},z_{node},")?;
-        }
-        write_names("decoded_", scale.nodes_per_row(), writer)?;
-    } else {
-        write_names("", scale.nodes_per_row(), writer)?;
-    }
-    writeln!(writer)
+    let nodes = scale.nodes_per_row();
+    let readings = (1..=scale.columns()).map(|column| format!("r_{column}"));
+    let names = ["snapshot", "row"].map(str::to_owned).into_iter().chain(readings);
+    let decoded = coordinates("decoded_", nodes).take(if with_decoded { 3 * nodes } else { 0 });
+    write_csv_row(names.chain(coordinates("", nodes)).chain(decoded), writer)
 }
 
 /// Writes the samples of `set` as CSV: snapshot and row-wire, M4 resistances in ohm, x, y, z of each node in
@@ -49,11 +41,11 @@ pub fn write_samples(
         if let Some(row_wire) = set.row_wire(sample) {
             write!(writer, "{}", row_wire + 1)?;
         }
-        write!(writer, ",")?;
         let decoded_mm = decoded_mm.map(|decoded_mm| decoded_mm.row(sample));
-        let decoded_mm = decoded_mm.iter().flatten();
         let measured = set.sample_readings(sample).iter().chain(set.sample_targets(sample));
-        write_numbers(measured.chain(decoded_mm), writer)?;
+        for number in measured.chain(decoded_mm.iter().flatten()) {
+            write!(writer, ",{number:?}")?;
+        }
         writeln!(writer)?;
     }
     Ok(())
@@ -64,12 +56,12 @@ pub fn write_samples(
 /// # Errors
 /// Any error of `writer`.
 pub fn write_decoded_header(nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
-    write_names("", nodes, writer)?;
-    writeln!(writer, ",readings_outside,coordinates_outside")
+    let counts = ["readings_outside", "coordinates_outside"].map(str::to_owned);
+    write_csv_row(coordinates("", nodes).chain(counts), writer)
 }
 
-/// Writes decoded coordinates in millimetres, how many of the readings were outside the range seen in training, empty if
-/// that is not known, and how many of the coordinates.
+/// Writes decoded coordinates in millimetres, which read back bit for bit, how many of the readings were outside the range seen
+/// in training, empty if that is not known, and how many of the coordinates.
 ///
 /// # Errors
 /// Any error of `writer`.
@@ -79,44 +71,34 @@ pub fn write_decoded(
     coordinates_outside: usize,
     writer: &mut dyn Write,
 ) -> io::Result<()> {
-    write_numbers(coordinates_mm, writer)?;
-    write!(writer, ",")?;
+    for number in coordinates_mm {
+        write!(writer, "{number:?},")?;
+    }
     if let Some(count) = readings_outside {
         write!(writer, "{count}")?;
     }
     writeln!(writer, ",{coordinates_outside}")
 }
 
-/// Writes `x_1,y_1,z_1,…` for the nodes of a row-wire, each name prefixed with `before`.
-fn write_names(before: &str, nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
-    for node in 1..=nodes {
-        let separator = if node == 1 { "" } else { "," };
-        write!(writer, "{separator}{before}x_{node},{before}y_{node},{before}z_{node}")?;
-    }
-    Ok(())
-}
-
-/// Writes numbers separated by commas; they read back bit for bit.
-fn write_numbers<'a>(numbers: impl IntoIterator<Item = &'a f64>, writer: &mut dyn Write) -> io::Result<()> {
-    let mut separator = "";
-    for number in numbers {
-        write!(writer, "{separator}{number:?}")?;
-        separator = ",";
-    }
-    Ok(())
+/// Names `x_1`, `y_1`, `z_1`, … of the nodes of a row-wire, each prefixed with `before`.
+fn coordinates(before: &str, nodes: usize) -> impl Iterator<Item = String> {
+    (1..=nodes).flat_map(move |node| ["x", "y", "z"].map(|axis| format!("{before}{axis}_{node}")))
 }
 
 /// Record of a training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Document", into = "Document")]
+#[serde(deny_unknown_fields)]
 pub struct TrainingRecord {
     /// Reason why training ended; `None` while it runs.
     pub stop_reason: Option<StopReason>,
     /// Epoch of the best network.
     pub best_epoch: usize,
+    /// Number of epochs run: the last of the history.
+    pub epochs: usize,
     /// Training time on one thread in seconds, summed over the networks of all rows.
     pub seconds: f64,
     /// Record of every epoch, from the initial weights on.
+    #[serde(with = "decoupler_core::training::epoch_columns")]
     pub history: Vec<EpochRecord>,
     /// Training methods in the order in which they were used.
     pub stages: Vec<Stage>,
@@ -131,6 +113,7 @@ impl TrainingRecord {
         Self {
             stop_reason: run.stop_reason(),
             best_epoch: trainer.best_epoch(),
+            epochs: trainer.history().last().map_or(0, |record| record.epoch),
             seconds: trainer.elapsed().as_secs_f64(),
             history: trainer.history().to_vec(),
             stages: trainer.stages().to_vec(),
@@ -141,74 +124,19 @@ impl TrainingRecord {
     /// Captures the record, until a past epoch, of the start that was best at that epoch.
     pub(super) fn until(run: &Run, past: &PastNetwork) -> Self {
         let trainer = run.trainers().get(past.start).unwrap_or_else(|| run.leader());
-        let epochs = trainer.history().partition_point(|record| record.epoch <= past.epoch);
-        let stages = trainer
-            .stages()
-            .partition_point(|stage| stage.first_epoch <= past.epoch);
+        let mut history = trainer.history().to_vec();
+        history.retain(|record| record.epoch <= past.epoch);
+        let mut stages = trainer.stages().to_vec();
+        stages.retain(|stage| stage.first_epoch <= past.epoch);
         Self {
             stop_reason: Some(StopReason::Stopped),
             best_epoch: past.best_epoch,
+            epochs: history.last().map_or(0, |record| record.epoch),
             seconds: past.elapsed.as_secs_f64(),
-            history: trainer.history()[..epochs].to_vec(),
-            stages: trainer.stages()[..stages].to_vec(),
+            history,
+            stages,
             // The states of the other starts at that epoch are not kept.
             starts: Vec::new(),
-        }
-    }
-
-    /// Number of epochs run.
-    pub fn epochs(&self) -> usize {
-        self.history.last().map_or(0, |record| record.epoch)
-    }
-}
-
-/// Layout of the record in files.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Document {
-    stop_reason: Option<StopReason>,
-    best_epoch: usize,
-    epochs: usize,
-    seconds: f64,
-    #[serde(with = "decoupler_core::training::epoch_columns")]
-    history: Vec<EpochRecord>,
-    stages: Vec<Stage>,
-    starts: Vec<StartRecord>,
-}
-
-impl From<TrainingRecord> for Document {
-    fn from(record: TrainingRecord) -> Self {
-        Self {
-            stop_reason: record.stop_reason,
-            best_epoch: record.best_epoch,
-            epochs: record.epochs(),
-            seconds: record.seconds,
-            history: record.history,
-            stages: record.stages,
-            starts: record.starts,
-        }
-    }
-}
-
-impl TryFrom<Document> for TrainingRecord {
-    type Error = String;
-
-    fn try_from(document: Document) -> Result<Self, String> {
-        let record = Self {
-            stop_reason: document.stop_reason,
-            best_epoch: document.best_epoch,
-            seconds: document.seconds,
-            history: document.history,
-            stages: document.stages,
-            starts: document.starts,
-        };
-        let (epochs, last) = (document.epochs, record.epochs());
-        if epochs == last {
-            Ok(record)
-        } else {
-            Err(format!(
-                "training.epochs: it is {epochs}, but the history ends with epoch {last}"
-            ))
         }
     }
 }

@@ -1,46 +1,36 @@
 use std::io::{self, Write};
 
+use super::{Cell, Table, TableColumn, format_number, format_percent, table::cell};
+use crate::import::{Recording, SetupSets};
 use decoupler_core::{
     dataset::{Dataset, Seed, SplitBy},
     evaluation::{
         Coverage, DecoderReport, ErrorMeasure, ErrorRow, ErrorTable, Errors, HalfWidth, Intervals, Scores,
         TargetErrors, TestErrors,
+        auto::{AutoRecord, Tried, TriedModel},
         recorded::{
             Determinacy, Determination, Findings, TargetFindings, Undetermined, channel_remarks, target_remarks,
         },
     },
     problem::{Channel, Problem, TargetPosition},
-    text::in_one_line,
     training::EpochRecord,
 };
-use serde::Deserialize;
-use serde_json::error::Category;
-
-use super::{Cell, Table, TableColumn, format_number};
-use crate::import::{Recording, SetupSets};
 
 /// Returns the error table: a row for each decoder and baseline; for a recording, a row for each of them and each
 /// target.
 pub fn error_table(tables: &[ErrorTable]) -> Table {
     let has_targets = tables.iter().any(|table| table.target.is_some());
-    let target = has_targets.then(|| TableColumn::new("target", "Target", ""));
-    let measures = tables.first().map_or(&[][..], |table| table.measures);
-    let row = |table: &ErrorTable, row: &ErrorRow| -> Vec<Cell> {
-        let target = has_targets.then(|| table.target.as_ref().map_or(String::new(), Channel::title).into());
-        let errors = row.errors.iter().zip(measures).map(error_cell);
-        target.into_iter().chain([row.name.into()]).chain(errors).collect()
+    let of_row = |table: &ErrorTable, row: &ErrorRow| {
+        let target = || table.target.as_ref().map_or(String::new(), Channel::title);
+        let target = has_targets.then(|| cell(("target", "Target", ""), target()));
+        let mut cells = Vec::from_iter(target);
+        cells.push(cell(("decoupler", "Decoder", ""), row.name));
+        let errors = table.measures.iter().zip(&row.errors);
+        cells.extend(errors.map(|(measure, error)| error_cell(*measure, *error)));
+        cells
     };
-    let rows = tables
-        .iter()
-        .flat_map(|table| table.rows.iter().map(move |line| row(table, line)));
-    Table {
-        columns: target
-            .into_iter()
-            .chain([TableColumn::new("decoupler", "Decoder", "")])
-            .chain(measures.iter().copied().map(error_column))
-            .collect(),
-        rows: rows.collect(),
-    }
+    let rows = { tables.iter() }.flat_map(|table| table.rows.iter().map(move |row| of_row(table, row)));
+    Table::of_rows(rows)
 }
 
 /// Returns the table of measured decoders: for an array a row for each, and the `model_based` errors if they exceed
@@ -55,80 +45,126 @@ pub fn decoder_table(problem: &Problem, reports: &[DecoderReport], model_based: 
 
 fn array_decoder_table(reports: &[DecoderReport], model_based: Option<&Errors>) -> Table {
     let model_based = model_based.filter(|errors| !errors.is_rounding());
-    let row = |report: &DecoderReport| {
-        let nodes = report.errors.nodes();
+    // Without a report, the errors are those of the model-based decoder.
+    let row = |report: Option<&DecoderReport>, errors: Option<&Errors>| {
+        let name = report.map_or("model-based", |report| report.kind.name(report.precision));
+        let percent = match report {
+            Some(report) => report.errors.percent(),
+            None => errors.and_then(|errors| errors.z_percent),
+        };
+        let times = model_based.map(|model_based| match report {
+            Some(_) => errors.and_then(|errors| errors.times(model_based)),
+            None => Some(1.0),
+        });
+        let mut cells = vec![
+            cell(("decoder", "Decoder", ""), name),
+            cell(("z_percent", "Z", "%"), percent),
+            cell(("z_mm", "Z", "mm"), errors.map(|errors| errors.z_mm)),
+        ];
+        cells.extend(times.map(|times| cell(("times_model_based", "times model-based", ""), times)));
+        cells.push(cell("residual", report.and_then(|report| report.residual)));
+        cells.push(cell(
+            ("frame_us", "a frame", "µs"),
+            report.map(|report| report.frame_us),
+        ));
+        cells
+    };
+    let rows = reports.iter().map(|report| row(Some(report), report.errors.nodes()));
+    Table::of_rows(rows.chain(model_based.map(|errors| row(None, Some(errors)))))
+}
+
+fn recording_decoder_table(problem: &Problem, reports: &[DecoderReport]) -> Table {
+    let row = |report: &DecoderReport, target: &Channel, errors: &TargetErrors| {
+        let [rmse, r2, percent] = [ErrorMeasure::Rmse, ErrorMeasure::R2, ErrorMeasure::RangePercent]
+            .map(|measure| error_cell(measure, measure.of_target(errors)));
         vec![
-            report.kind.name(report.precision).into(),
-            report.errors.percent().into(),
-            nodes.map(|errors| errors.z_mm).into(),
-            model_based.and_then(|model_based| nodes?.times(model_based)).into(),
-            report.residual.into(),
-            report.frame_us.into(),
+            cell(("decoder", "Decoder", ""), report.kind.name(report.precision)),
+            cell(("target", "Target", ""), target.title()),
+            rmse,
+            r2,
+            percent,
+            cell(("frame_us", "a frame", "µs"), report.frame_us),
+            cell(("fit_seconds", "fit", "s"), report.fit_seconds),
         ]
     };
-    let of_model_based = model_based.map(|errors| {
-        let nothing = || Cell::Number(None);
+    Table::of_rows(reports.iter().flat_map(|report| {
+        let targets = problem.targets.iter().zip(report.errors.targets());
+        targets.map(move |(target, errors)| row(report, target, errors))
+    }))
+}
+
+fn error_cell(measure: ErrorMeasure, error: Option<f64>) -> (TableColumn, Cell) {
+    let (heading, unit) = measure.heading();
+    let column = TableColumn::new(measure.field(), heading, unit);
+    match measure {
+        ErrorMeasure::R2 => cell(column, Cell::R2(error)),
+        _ => cell(column, error),
+    }
+}
+
+/// Definitions of the columns of [`search_table`].
+const SEARCH_MEANINGS: [&str; 8] = [
+    "Weight in the answer: the convex combination with the lowest error of held-out answers.",
+    "Quantity, memory and scaling of the inputs.",
+    "Training mean, ridge, kernel ridge, or networks × hidden nodes and their training method; * marks the network that is \
+     trained.",
+    "Weights with which the trainings begin: random, or ridge regression with random weights added.",
+    "Root mean square error of held-out answers in cross-validation, relative to the standard deviation of each target: \
+     100 % for always answering the mean.",
+    "Standard error of the error, from the differences between folds.",
+    "Epoch with the lowest error, at which training stops; + if the budget cut off the candidate before.",
+    "Estimated time on one core, counted against the budget.",
+];
+
+/// Returns the candidates of a search as a table; the choice is marked.
+pub fn search_table(record: &AutoRecord) -> Table {
+    let row = |(place, tried): (usize, &Tried)| {
+        let share = (tried.share > 0.0).then(|| Cell::from(100.0 * tried.share));
+        let mark = if place == record.chosen { "*" } else { "" };
+        let (begin, epochs) = match tried.model {
+            TriedModel::Network { begin, epochs, .. } => (
+                begin.to_string(),
+                format!("{epochs}{}", if tried.is_cut_off { "+" } else { "" }),
+            ),
+            _ => (String::new(), String::new()),
+        };
         vec![
-            "model-based".into(),
-            errors.z_percent.into(),
-            errors.z_mm.into(),
-            1.0.into(),
-            nothing(),
-            nothing(),
+            cell(("share_percent", "share", "%"), share.unwrap_or_else(|| "".into())),
+            cell(("features", "inputs", ""), tried.features()),
+            cell("model", format!("{}{mark}", tried.model)),
+            cell(("begin", "begins at", ""), begin),
+            cell(("error_percent", "error", "%"), 100.0 * tried.error),
+            cell(("standard_error_percent", "±", "%"), 100.0 * tried.standard_error),
+            cell("epochs", epochs),
+            cell(("seconds", "time", "s"), tried.seconds),
         ]
-    });
-    let mut table = Table {
-        columns: vec![
-            TableColumn::new("decoder", "Decoder", ""),
-            TableColumn::new("z_percent", "Z", "%"),
-            TableColumn::new("z_mm", "Z", "mm"),
-            TableColumn::new("times_model_based", "times model-based", ""),
-            TableColumn::new("residual", "residual", ""),
-            TableColumn::new("frame_us", "a frame", "µs"),
-        ],
-        rows: reports.iter().map(row).chain(of_model_based).collect(),
     };
-    if model_based.is_none() {
-        table.remove_column("times_model_based");
+    let mut table = Table::of_rows(record.tried.iter().enumerate().map(row));
+    for (column, meaning) in table.columns.iter_mut().zip(SEARCH_MEANINGS) {
+        column.meaning = meaning;
     }
     table
 }
 
-fn recording_decoder_table(problem: &Problem, reports: &[DecoderReport]) -> Table {
-    let measures = [ErrorMeasure::Rmse, ErrorMeasure::R2, ErrorMeasure::RangePercent];
-    let row = |report: &DecoderReport, target: &Channel, errors: &TargetErrors| {
-        let names = [report.kind.name(report.precision).into(), target.title().into()];
-        let errors = measures.map(|measure| error_cell((&measure.of_target(errors), &measure)));
-        let times = [report.frame_us.into(), report.fit_seconds.into()];
-        Vec::from_iter(names.into_iter().chain(errors).chain(times))
-    };
-    let rows = reports.iter().flat_map(|report| {
-        let targets = problem.targets.iter().zip(report.errors.targets());
-        targets.map(move |(target, errors)| row(report, target, errors))
-    });
-    let names =
-        [("decoder", "Decoder"), ("target", "Target")].map(|(field, heading)| TableColumn::new(field, heading, ""));
-    let times = [
-        TableColumn::new("frame_us", "a frame", "µs"),
-        TableColumn::new("fit_seconds", "fit", "s"),
-    ];
-    let errors = measures.map(error_column);
-    Table {
-        columns: names.into_iter().chain(errors).chain(times).collect(),
-        rows: rows.collect(),
-    }
-}
-
-fn error_cell((error, measure): (&Option<f64>, &ErrorMeasure)) -> Cell {
-    match measure {
-        ErrorMeasure::R2 => Cell::R2(*error),
-        _ => Cell::Number(*error),
-    }
-}
-
-fn error_column(measure: ErrorMeasure) -> TableColumn {
-    let (heading, unit) = measure.heading();
-    TableColumn::new(measure.field(), heading, unit)
+/// Describes how the settings were chosen, in one sentence.
+pub fn describe_search(record: &AutoRecord) -> String {
+    format!(
+        "Answer chosen from {} candidates by cross-validation on {} of the training samples{}; {:.0} s of one core and {:.0} s of \
+         training within a budget of {} s (*: the network that is trained)",
+        record.tried.len(),
+        match record.by {
+            SplitBy::Time => format!("{} blocks of time", record.folds),
+            SplitBy::Group => format!("{} sets of groups", record.folds),
+            SplitBy::Random => format!("{} random parts", record.folds),
+        },
+        record.combined.map_or(String::new(), |error| format!(
+            ", error of the combination {}",
+            format_percent(100.0 * error)
+        )),
+        record.seconds(),
+        record.training_s,
+        record.budget_s
+    )
 }
 
 /// Writes the errors of every epoch as CSV, formatted as by [`Table::write_csv`].
@@ -140,8 +176,8 @@ pub fn write_loss_curves(history: &[EpochRecord], writer: &mut dyn Write) -> io:
         writer,
         "epoch,training_mse,validation_mse,test_mse,gradient_norm,parameter,effective_parameters"
     )?;
+    let text = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
     for record in history {
-        write!(writer, "{}", record.epoch)?;
         let values = [
             Some(record.training_mse),
             record.validation_mse,
@@ -150,78 +186,9 @@ pub fn write_loss_curves(history: &[EpochRecord], writer: &mut dyn Write) -> io:
             Some(record.parameter),
             record.effective_parameters,
         ];
-        for value in values {
-            write_optional(value, writer)?;
-        }
-        writeln!(writer)?;
+        writeln!(writer, "{},{}", record.epoch, values.map(text).join(","))?;
     }
     Ok(())
-}
-
-fn write_optional(value: Option<f64>, writer: &mut dyn Write) -> io::Result<()> {
-    match value {
-        Some(value) => write!(writer, ",{value:?}"),
-        None => write!(writer, ","),
-    }
-}
-
-/// Fields that identify a JSON file of Decoupler. They are read before the rest, which differs between versions.
-#[derive(Deserialize)]
-pub(super) struct Heading {
-    pub(super) format: serde_json::Value,
-    #[serde(default)]
-    pub(super) version: serde_json::Value,
-    #[serde(default)]
-    program: serde_json::Value,
-}
-
-/// Reasons why a file has no heading of Decoupler.
-pub(super) enum NoHeading {
-    /// Not JSON; the parser's message, with line and column.
-    NotJson(String),
-    /// JSON that ends too early, at this line and column, counted from 1.
-    CutOff { line: usize, column: usize },
-    /// JSON of another program.
-    Other,
-}
-
-impl Heading {
-    pub(super) fn read(bytes: &[u8]) -> Result<Self, NoHeading> {
-        serde_json::from_slice(bytes).map_err(|error| {
-            let cut_off = NoHeading::CutOff {
-                line: error.line(),
-                column: error.column(),
-            };
-            // The parser reports an incomplete number such as "1e" as invalid, but the file was cut off.
-            match error.classify() {
-                _ if bytes.trim_ascii().is_empty() => NoHeading::NotJson("it is empty".to_owned()),
-                Category::Eof => cut_off,
-                Category::Syntax if in_last_number(bytes, &error) => cut_off,
-                Category::Data => NoHeading::Other,
-                Category::Syntax | Category::Io => NoHeading::NotJson(error.to_string()),
-            }
-        })
-    }
-
-    /// The version, if it is another one.
-    pub(super) fn version_other_than(&self, known: u64) -> Option<String> {
-        (self.version.as_u64() != Some(known)).then(|| self.version.to_string())
-    }
-
-    /// The program that wrote it.
-    pub(super) fn program(&self) -> String {
-        in_one_line(self.program.as_str().unwrap_or("another program"))
-    }
-}
-
-/// Returns true if the parser stopped in a number at the end of the file, such as `1e`.
-fn in_last_number(bytes: &[u8], error: &serde_json::Error) -> bool {
-    let text = bytes.trim_ascii_end();
-    let last_line = text.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
-    let lines = 1 + text.iter().filter(|byte| **byte == b'\n').count();
-    error.to_string().starts_with("invalid number")
-        && (error.line(), error.column()) >= (lines, last_line.len())
-        && !text.ends_with(b"}")
 }
 
 /// Warns of targets that the readings explain little of or that could not be judged; `measured` has an entry for each target.
@@ -270,39 +237,31 @@ pub fn describe_half_widths(targets: &[Channel], intervals: &Intervals) -> Optio
 
 /// Warns of the targets whose intervals contain significantly fewer test samples than stated, with cause and remedy.
 pub fn describe_coverage(targets: &[Channel], coverage: &[Option<Coverage>]) -> Vec<String> {
-    let low = targets.iter().zip(coverage).filter_map(|(target, coverage)| {
-        Some((
-            target,
-            coverage.as_ref().filter(|of| of.is_too_low() || of.is_too_high())?,
-        ))
-    });
-    let describe = |(target, coverage): (&Channel, &Coverage)| {
-        let percent = |share: f64| format!("{:.0}", 100.0 * share);
+    let describe = |(target, coverage): (&Channel, &Option<Coverage>)| {
+        let coverage = coverage.as_ref().filter(|of| of.is_too_low() || of.is_too_high())?;
         let cause = if coverage.is_too_high() {
             "they are too wide for these samples: part of the training recording was answered much worse than this test part; \
              look for a stretch of it that differs"
                 .to_owned()
         } else if coverage.bias.abs() > 0.5 * coverage.half_width {
+            let [bias, half_width] = [coverage.bias, coverage.half_width].map(format_number);
             format!(
-                "the test part is offset from the training part (mean error {}, half-width {}): re-zero the sensor, or \
-                 record training data closer to the time of use",
-                format_number(coverage.bias),
-                format_number(coverage.half_width)
+                "the test part is offset from the training part (mean error {bias}, half-width {half_width}): re-zero the \
+                 sensor, or record training data closer to the time of use"
             )
         } else {
             "the test part differs from the training part: record training data that cover its conditions, or split by \
              group"
                 .to_owned()
         };
-        format!(
-            "the 90 % intervals of {} contain {} % of the test samples (expected {} to {} %): {cause}",
-            target.name,
-            percent(coverage.share),
-            percent(coverage.expected[0]),
-            percent(coverage.expected[1])
-        )
+        let [low, high] = coverage.expected;
+        let [share, low, high] = [coverage.share, low, high].map(|share| format!("{:.0}", 100.0 * share));
+        let name = &target.name;
+        Some(format!(
+            "the 90 % intervals of {name} contain {share} % of the test samples (expected {low} to {high} %): {cause}"
+        ))
     };
-    low.map(describe).collect()
+    targets.iter().zip(coverage).filter_map(describe).collect()
 }
 
 /// Describes the positions of targets: their number, and the grid if they form one; `None` if no target has a position.
@@ -355,15 +314,14 @@ pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
         let values = values.column(target);
         values.iter().all(|value| *value == values[0])
     };
-    let untrained = targets.iter().enumerate();
-    let untrained = untrained.filter(|(target, _)| is_constant(training, *target) && !is_constant(test, *target));
-    warnings.extend(untrained.map(|(_, target)| {
-        format!(
-            "{} is constant in the training samples, so that the network always answers this constant: record its changes, \
-             or split another way",
-            target.name
-        )
-    }));
+    for (target, Channel { name, .. }) in targets.iter().enumerate() {
+        if is_constant(training, target) && !is_constant(test, target) {
+            warnings.push(format!(
+                "{name} is constant in the training samples, so that the network always answers this constant: record its \
+                 changes, or split another way"
+            ));
+        }
+    }
     warnings
 }
 
@@ -386,23 +344,23 @@ pub fn describe_worse_than_ridge(problem: &Problem, scores: &Scores) -> Option<S
     let worse = all.filter(|(_, (network, ridge))| network.r2.is_some() && network.rmse > ridge.rmse);
     let mut comparison = "no better than";
     let mut targets = Vec::new();
-    for (target, (network, ridge)) in worse {
+    for (Channel { name, .. }, (network, ridge)) in worse {
         let (of_network, of_ridge) = (format_number(network.rmse), format_number(ridge.rmse));
         targets.push(if of_network == of_ridge {
-            format!("{} (RMSE {of_ridge} for both)", target.name)
+            format!("{name} (RMSE {of_ridge} for both)")
         } else {
             comparison = "worse than";
-            format!("{} (RMSE {of_network}, ridge {of_ridge})", target.name)
+            format!("{name} (RMSE {of_network}, ridge {of_ridge})")
         });
     }
     let more = match targets.len() {
         0 => return None,
-        count if count > NAMED + 1 => format!(" and {} more", count - NAMED),
+        count if count > NAMED + 1 => {
+            targets.truncate(NAMED);
+            format!(" and {} more", count - NAMED)
+        }
         _ => String::new(),
     };
-    if !more.is_empty() {
-        targets.truncate(NAMED);
-    }
     let targets = targets.join(", ");
     Some(match scores.network_alone {
         None => format!(

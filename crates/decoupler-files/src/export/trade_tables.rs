@@ -7,7 +7,7 @@ use decoupler_core::{
     text::counted,
 };
 
-use super::{Cell, Table, TableColumn, format_duration};
+use super::{Cell, Table, format_duration, table::cell};
 use crate::{
     figure::{TradeOffCost, TradeOffLevel, point_name},
     machine::memory_budget,
@@ -15,119 +15,81 @@ use crate::{
 
 /// Returns the table of all points of all levels with all their figures, for programs.
 pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
-    const FIELDS: [&str; 17] = [
-        "noise",
-        "preset",
-        "decoder",
-        "precision",
-        "hidden",
-        "method",
-        "samples",
-        "epochs",
-        "z_percent",
-        "z_mm",
-        "frame_us",
-        "training_s",
-        "residual",
-        "model_based_z_percent",
-        "model_based_z_mm",
-        "on_decoding_front",
-        "on_training_front",
-    ];
-    let of_level = |level: &TradeOffLevel| {
-        let [decoding, training] = TradeOffCost::ALL.map(|cost| level.front(cost));
-        let points = level.points.iter().zip(decoding).zip(training);
-        let row = |((point, on_decoding), on_training): ((&TradeOffPoint, bool), bool)| {
-            let report = &point.report;
-            let precision = match report.precision {
+    let is_array = levels.iter().any(|level| level.noise.is_some());
+    let percent = if is_array { "z_percent" } else { "percent_of_range" };
+    let of_array = |field: &'static str, value: Option<Cell>| is_array.then(|| cell(field, value));
+    let row = |noise: Option<f64>, point: &TradeOffPoint, on_decoding: bool, on_training: bool| {
+        let report = &point.report;
+        let (model_based, nodes) = (point.model_based.as_ref(), report.errors.nodes());
+        let simulation = point.settings.simulation();
+        let mut cells = Vec::new();
+        cells.extend(of_array("noise", noise.map(Cell::from)));
+        cells.extend(of_array("preset", point.preset.map(|preset| preset.to_string().into())));
+        cells.push(cell("decoder", report.kind.to_string()));
+        cells.push(cell(
+            "precision",
+            match report.precision {
                 Precision::Double => "f64",
                 Precision::Single => "f32",
-            };
-            let hidden = point.hidden();
-            let count = |count: Option<usize>| count.map_or(Cell::Number(None), Cell::from);
-            vec![
-                level.noise.into(),
-                point
-                    .preset
-                    .map_or(Cell::Number(None), |preset| preset.to_string().into()),
-                report.kind.to_string().into(),
-                precision.into(),
-                count(hidden),
-                point
-                    .method()
-                    .map_or(Cell::Number(None), |method| method.short_name().into()),
-                count(point.settings.simulation().map(|simulation| simulation.samples)),
-                count(hidden.map(|_| point.settings.training.stopping.epochs)),
-                report.errors.percent().into(),
-                report.errors.nodes().map(|errors| errors.z_mm).into(),
-                report.frame_us.into(),
-                point.training_seconds.into(),
-                report.residual.into(),
-                point.model_based.and_then(|errors| errors.z_percent).into(),
-                point.model_based.map(|errors| errors.z_mm).into(),
-                on_decoding.to_string().into(),
-                on_training.to_string().into(),
-            ]
-        };
-        points.map(row).collect::<Vec<_>>()
+            },
+        ));
+        cells.push(cell("hidden", point.hidden()));
+        cells.push(cell("method", point.method().map(|method| method.short_name())));
+        cells.extend(of_array(
+            "samples",
+            simulation.map(|simulation| simulation.samples.into()),
+        ));
+        let epochs = point.settings.training.stopping.epochs;
+        cells.push(cell("epochs", point.hidden().map(|_| epochs)));
+        cells.push(cell(percent, report.errors.percent()));
+        cells.extend(of_array("z_mm", nodes.map(|errors| errors.z_mm.into())));
+        cells.push(cell("frame_us", report.frame_us));
+        cells.push(cell("training_s", point.training_seconds));
+        cells.extend(of_array("residual", report.residual.map(Cell::from)));
+        cells.extend(of_array(
+            "model_based_z_percent",
+            model_based.map(|errors| errors.z_percent.into()),
+        ));
+        cells.extend(of_array(
+            "model_based_z_mm",
+            model_based.map(|errors| errors.z_mm.into()),
+        ));
+        cells.push(cell("on_decoding_front", on_decoding.to_string()));
+        cells.push(cell("on_training_front", on_training.to_string()));
+        cells
     };
-    let mut table = Table {
-        columns: FIELDS.map(TableColumn::field).to_vec(),
-        rows: levels.iter().flat_map(of_level).collect(),
-    };
-    if levels.iter().all(|level| level.noise.is_none()) {
-        let of_arrays = ["noise", "preset", "samples", "z_mm", "residual"];
-        for field in of_arrays
-            .into_iter()
-            .chain(["model_based_z_percent", "model_based_z_mm"])
-        {
-            table.remove_column(field);
-        }
-        let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
-        percent
-            .into_iter()
-            .for_each(|column| *column = TableColumn::field("percent_of_range"));
-    }
-    table
+    Table::of_rows(levels.iter().flat_map(|level| {
+        let [decoding, training] = TradeOffCost::ALL.map(|cost| level.front(cost));
+        let points = level.points.iter().zip(decoding).zip(training);
+        points.map(move |((point, on_decoding), on_training)| row(level.noise, point, on_decoding, on_training))
+    }))
 }
 
 /// Returns the table of the points of one level, fastest first, for readers.
 pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
-    let row = |point: &TradeOffPoint| {
-        vec![
-            point_name(point).into(),
-            point.report.errors.percent().into(),
-            point.report.errors.nodes().map(|errors| errors.z_mm).into(),
-            point.to_model_based().into(),
-            point.report.frame_us.into(),
-            point.training_seconds.into(),
-        ]
-    };
     let mut points: Vec<&TradeOffPoint> = level.points.iter().collect();
     points.sort_by(|a, b| a.report.frame_us.total_cmp(&b.report.frame_us));
-    let mut table = Table {
-        columns: vec![
-            TableColumn::new("decoder", "Decoder", ""),
-            TableColumn::new("z_percent", "Z", "%"),
-            TableColumn::new("z_mm", "Z", "mm"),
-            TableColumn::new("times_model_based", "times model-based", ""),
-            TableColumn::new("frame_us", "a frame", "µs"),
-            TableColumn::new("training_s", "training", "s"),
-        ],
-        rows: points.into_iter().map(row).collect(),
+    let has_ratio = points.iter().any(|point| point.to_model_based().is_some());
+    let row = |point: &TradeOffPoint| {
+        let report = &point.report;
+        let percent = match level.noise {
+            Some(_) => ("z_percent", "Z", "%"),
+            None => ("percent_of_range", "MAE", "% of range"),
+        };
+        let z_mm = report.errors.nodes().map(|errors| errors.z_mm);
+        let mut cells = vec![
+            cell(("decoder", "Decoder", ""), point_name(point)),
+            cell(percent, report.errors.percent()),
+        ];
+        cells.extend(level.noise.map(|_| cell(("z_mm", "Z", "mm"), z_mm)));
+        // Ratios to rounding are meaningless.
+        let times = ("times_model_based", "times model-based", "");
+        cells.extend(has_ratio.then(|| cell(times, point.to_model_based())));
+        cells.push(cell(("frame_us", "a frame", "µs"), report.frame_us));
+        cells.push(cell(("training_s", "training", "s"), point.training_seconds));
+        cells
     };
-    if level.noise.is_none() {
-        table.remove_column("z_mm");
-        let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
-        percent
-            .into_iter()
-            .for_each(|column| *column = TableColumn::new("percent_of_range", "MAE", "% of range"));
-    }
-    // Ratios to rounding are meaningless.
-    if level.points.iter().all(|point| point.to_model_based().is_none()) {
-        table.remove_column("times_model_based");
-    }
-    table
+    Table::of_rows(points.into_iter().map(row))
 }
 
 /// Describes the memory and time that a run will take on this machine. The first call measures its speed, which takes

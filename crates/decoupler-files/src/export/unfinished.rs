@@ -4,7 +4,7 @@ use std::{
     fs::{self, File},
     io,
     path::{Path, PathBuf},
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{Mutex, PoisonError},
 };
 
 use tempfile::{Builder, NamedTempFile, TempDir};
@@ -12,38 +12,30 @@ use tempfile::{Builder, NamedTempFile, TempDir};
 const PREFIX: &str = ".decoupler-";
 const SUFFIX: &str = ".part";
 
-/// Paths of all unfinished files and folders. A program that exits from another thread drops nothing, so
-/// [`exit_leaving_nothing`] removes these.
-static ALL: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-
-fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
-    // A panic elsewhere does not leave the set inconsistent.
-    ALL.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Folders in which this program has removed the unfinished files of killed programs.
-static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+/// Paths of all unfinished files and folders, and the folders that were swept.
+static ALL: Mutex<(BTreeSet<PathBuf>, BTreeSet<PathBuf>)> = Mutex::new((BTreeSet::new(), BTreeSet::new()));
 
 /// An unfinished file or folder, removed when dropped. It is locked while in use; an unlocked one was left by a program that
 /// was killed. Windows cannot lock folders, so none is swept there.
 #[derive(Debug)]
 pub(super) struct Unfinished<T> {
     item: T,
-    listed: Listed,
+    _listed: Listed,
     /// Open while it is in use.
-    lock: Option<File>,
+    _lock: Option<File>,
 }
 
 pub(super) type UnfinishedFile = Unfinished<NamedTempFile>;
 pub(super) type UnfinishedFolder = Unfinished<TempDir>;
 
-/// An entry of [`ALL`], removed when dropped.
+/// An entry of [`ALL`], removed when dropped. A program that exits from another thread drops nothing, so
+/// [`exit_leaving_nothing`] removes these.
 #[derive(Debug)]
 struct Listed(PathBuf);
 
 impl Drop for Listed {
     fn drop(&mut self) {
-        all().remove(&self.0);
+        ALL.lock().unwrap_or_else(PoisonError::into_inner).0.remove(&self.0);
     }
 }
 
@@ -51,22 +43,33 @@ impl<T: AsRef<Path>> Unfinished<T> {
     /// Creates it in `parent` with the permissions `mode` minus the umask. The first call for a parent removes what killed
     /// programs left there.
     fn create(parent: &Path, mode: u32, create: impl Fn(&Builder<'_, '_>) -> io::Result<T>) -> io::Result<Self> {
-        sweep_once(parent);
+        /// A program sweeps a folder once, so that more attempts mean another fault.
+        const ATTEMPTS: usize = 10;
+        // A panic elsewhere does not leave the sets inconsistent.
+        let (all, swept) = &mut *ALL.lock().unwrap_or_else(PoisonError::into_inner);
+        if swept.insert(parent.to_owned()) {
+            sweep(parent);
+        }
         let mut builder = Builder::new();
         builder.prefix(PREFIX).suffix(SUFFIX);
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode));
-        let mut all = all();
-        let (item, lock) = not_swept(|| {
-            let item = create(&builder).map_err(plain)?;
+        for _ in 0..ATTEMPTS {
+            // The default error contains the temporary name, which the user does not know.
+            let item =
+                create(&builder).map_err(|error| error.raw_os_error().map_or(error, io::Error::from_raw_os_error))?;
             // Some file systems have no locks; nothing is swept there.
-            let lock = File::open(&item).ok();
-            let _ = lock.as_ref().map(File::lock);
-            Ok(item.as_ref().try_exists()?.then_some((item, lock)))
-        })?;
-        all.insert(item.as_ref().to_owned());
-        let listed = Listed(item.as_ref().to_owned());
-        Ok(Self { item, listed, lock })
+            let _lock = File::open(&item).ok().inspect(|file| _ = file.lock());
+            // Another program may have swept it before it was locked.
+            if item.as_ref().try_exists()? {
+                all.insert(item.as_ref().to_owned());
+                let _listed = Listed(item.as_ref().to_owned());
+                return Ok(Self { item, _listed, _lock });
+            }
+        }
+        Err(io::Error::other(
+            "temporary files vanish as soon as they are created; give another place",
+        ))
     }
 }
 
@@ -82,13 +85,10 @@ impl UnfinishedFile {
 
     /// Renames it to `target`; if there is a file already, replaces it or fails.
     pub(super) fn persist(self, target: &Path, may_replace: bool) -> io::Result<()> {
-        let Self { item, listed, lock } = self;
-        let persisted = match may_replace {
-            true => item.persist(target),
-            false => item.persist_noclobber(target),
-        };
-        drop((listed, lock));
-        persisted.map_err(|error| error.error)?;
+        match may_replace {
+            true => self.item.persist(target),
+            false => self.item.persist_noclobber(target),
+        }?;
         sync_folder(folder_of(target));
         Ok(())
     }
@@ -106,39 +106,12 @@ impl UnfinishedFolder {
 
     /// Renames it to `target`, which must be missing or an empty folder.
     pub(super) fn persist(self, target: &Path) -> io::Result<()> {
-        let Self { item, listed, lock } = self;
-        fs::rename(item.path(), target)?;
+        fs::rename(self.item.path(), target)?;
         // Its temporary name no longer exists.
-        let _ = item.keep();
-        drop((listed, lock));
+        let _ = self.item.keep();
         sync_folder(folder_of(target));
         Ok(())
     }
-}
-
-/// Calls `create` until what it has created still exists: another program may have swept it before it was locked.
-fn not_swept<T>(mut create: impl FnMut() -> io::Result<Option<T>>) -> io::Result<T> {
-    /// A program sweeps a folder once, so that more attempts mean another fault.
-    const ATTEMPTS: usize = 10;
-    for _ in 0..ATTEMPTS {
-        if let Some(created) = create()? {
-            return Ok(created);
-        }
-    }
-    Err(io::Error::other(
-        "temporary files vanish as soon as they are created; give another place",
-    ))
-}
-
-/// Returns the system's error: the default one contains the temporary name, which the user does not know.
-fn plain(error: io::Error) -> io::Error {
-    error.raw_os_error().map_or(error, io::Error::from_raw_os_error)
-}
-
-/// Opens and locks a folder that is not in use.
-fn locked_folder(path: &Path) -> Option<File> {
-    let folder = File::open(path).ok()?;
-    folder.try_lock().is_ok().then_some(folder)
 }
 
 /// Folder of the file `path`.
@@ -155,33 +128,20 @@ fn sync_folder(folder: &Path) {
     }
 }
 
-/// Sweeps `folder` the first time that this program writes there.
-fn sweep_once(folder: &Path) {
-    let is_new = SWEPT
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .insert(folder.to_owned());
-    if is_new {
-        sweep(folder);
-    }
-}
-
 /// Removes the unfinished files and folders in `folder` that are not in use. Those that cannot be removed stay.
 fn sweep(folder: &Path) {
-    let Ok(entries) = fs::read_dir(folder) else { return };
-    for entry in entries.flatten() {
-        let Ok(kind) = entry.file_type() else { continue };
-        if !is_our_name(&entry.file_name()) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let (path, Ok(kind)) = (entry.path(), entry.file_type()) else {
+            continue;
+        };
+        // Opening a pipe would wait for a program that writes to it.
+        if !is_our_name(&entry.file_name()) || !(kind.is_file() || kind.is_dir()) {
             continue;
         }
-        let path = entry.path();
-        if kind.is_file() {
-            let left = File::options().read(true).write(true).open(&path);
-            if left.is_ok_and(|left| left.try_lock().is_ok()) {
-                let _ = fs::remove_file(path);
-            }
-        } else if kind.is_dir() && locked_folder(&path).is_some() {
-            let _ = fs::remove_dir_all(path);
+        // Some file systems lock only what is open for writing, which a folder cannot be.
+        let left = File::options().read(true).write(kind.is_file()).open(&path);
+        if left.is_ok_and(|left| left.try_lock().is_ok()) {
+            let _ = fs::remove_file(&path).or_else(|_| fs::remove_dir_all(&path));
         }
     }
 }
@@ -196,26 +156,21 @@ fn is_our_name(name: &OsStr) -> bool {
 }
 
 /// Removes a folder to which another thread may be writing.
-fn remove_folder(path: &Path) -> io::Result<()> {
+fn remove_folder(path: &Path) {
     /// Each attempt fails only if a file was created while it removed the others.
     const ATTEMPTS: usize = 1000;
-    let mut removed = fs::remove_dir_all(path);
-    for _ in 1..ATTEMPTS {
-        if removed.is_ok() || !path.exists() {
-            break;
-        }
-        removed = fs::remove_dir_all(path);
-    }
-    removed
+    let _ = (0..ATTEMPTS).find(|_| fs::remove_dir_all(path).is_ok() || !path.exists());
 }
 
 /// Ends the program with this exit status, from any thread, after removing unfinished files.
 pub fn exit_leaving_nothing(status: i32) -> ! {
     // Held until the end, so no other thread can add an entry.
-    let all = all();
-    for path in all.iter() {
+    let all = ALL.lock().unwrap_or_else(PoisonError::into_inner);
+    for path in &all.0 {
         // It may have been renamed or removed just now.
-        let _ = fs::remove_file(path).or_else(|_| remove_folder(path));
+        if fs::remove_file(path).is_err() {
+            remove_folder(path);
+        }
     }
     std::process::exit(status)
 }
@@ -226,13 +181,21 @@ mod tests {
 
     #[test]
     fn attempts_are_limited() {
-        let mut attempts = 0;
-        let vanished = not_swept(|| {
-            attempts += 1;
-            Ok(None::<()>)
-        });
-        assert!(vanished.is_err() && attempts == 10, "{attempts}");
-        assert_eq!(not_swept(|| Ok(Some(1))).unwrap(), 1);
+        let home = tempfile::tempdir().unwrap();
+        let attempts = std::cell::Cell::new(0);
+        let vanishing = |remaining: usize| {
+            attempts.set(0);
+            Unfinished::create(home.path(), 0o666, |builder| {
+                attempts.set(attempts.get() + 1);
+                let file = builder.tempfile_in(home.path())?;
+                if attempts.get() <= remaining {
+                    fs::remove_file(file.path())?;
+                }
+                Ok(file)
+            })
+        };
+        assert!(vanishing(usize::MAX).is_err() && attempts.get() == 10, "{attempts:?}");
+        assert!(vanishing(3).is_ok() && attempts.get() == 4);
     }
 
     #[test]
@@ -243,7 +206,7 @@ mod tests {
             fs::create_dir(&folder).unwrap();
             std::thread::scope(|scope| {
                 let filling = scope.spawn(|| (0..).find(|k| fs::write(folder.join(format!("{k}")), "x").is_err()));
-                let _ = remove_folder(&folder);
+                remove_folder(&folder);
                 assert!(!folder.exists());
                 filling.join().unwrap();
             });
@@ -258,7 +221,7 @@ mod tests {
         sweep(home.path());
         assert!(at_work.path().join("half").exists());
         // As a killed program leaves it: neither removed nor locked.
-        let Unfinished { item, lock, .. } = at_work;
+        let Unfinished { item, _lock: lock, .. } = at_work;
         let left = item.keep();
         drop(lock);
         sweep(home.path());

@@ -438,7 +438,7 @@ const FIGURES: [(&str, FigureOf); 20] = [
     }),
     ("best epoch", |run| {
         let training = &run.file.training;
-        Some(format!("{} of {}", training.best_epoch, training.epochs()))
+        Some(format!("{} of {}", training.best_epoch, training.epochs))
     }),
     ("training time, one thread", |run| {
         let time = Duration::try_from_secs_f64(run.file.training.seconds);

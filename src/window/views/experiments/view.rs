@@ -5,7 +5,7 @@ use std::time::Instant;
 use decoupler_core::text::counted;
 use decoupler_files::{
     export::{
-        ExperimentColumn, ExperimentColumnKind, ExperimentTable, describe_conditions, describe_failures,
+        Cell, ExperimentColumn, ExperimentColumnKind, ExperimentTable, describe_conditions, describe_failures,
         describe_worse_than_mean,
     },
     figure::{Figure, HeatMap},
@@ -290,8 +290,10 @@ pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, share
     let palette = &Theme::of(ui).palette;
     let axes = outcome.results.experiment.axes().count();
     let headings = &outcome.table.columns;
+    let rounded = |row: &Vec<Cell>| Vec::from_iter(row.iter().map(Cell::rounded));
+    let texts = Vec::from_iter(outcome.table.rows.iter().map(rounded));
     let column = |(place, of_table): (usize, &ExperimentColumn)| {
-        let texts = outcome.table.rows.iter().map(|row| row[place].as_str());
+        let texts = texts.iter().map(|row| row[place].as_str());
         let column = if place < axes {
             TableColumn::text(of_table.heading)
         } else {
@@ -300,12 +302,20 @@ pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, share
         column.width(ColumnWidth::of_longest(texts))
     };
     let columns: Vec<TableColumn<'_>> = headings.iter().enumerate().map(column).collect();
-    let values = &outcome.table.values;
-    let figure = |cell: usize, column: usize| (values[cell].get(column).copied().flatten(), "");
+    // An axis is sorted by the places in its list.
+    let figure = |cell: usize, column: usize| {
+        let of_results = &outcome.results.cells[cell];
+        let value = match column {
+            0 => Some(of_results.column as f64),
+            1 if axes > 1 => Some(of_results.row as f64),
+            _ => outcome.table.rows[cell].get(column).and_then(Cell::number),
+        };
+        (value, "")
+    };
     let order = look.sort.order(outcome.table.rows.len(), figure);
     let row = |place: usize| {
         let number = order[place];
-        let texts = &outcome.table.rows[number];
+        let texts = &texts[number];
         let name = texts[..axes].join(", ");
         let loses = loses_to_linear_map(outcome, number);
         let cells = headings

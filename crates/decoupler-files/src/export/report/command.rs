@@ -1,13 +1,16 @@
 //! The terminal command that repeats a training.
 
-use std::{fmt, path::Path};
+use std::{
+    borrow::Cow,
+    fmt,
+    path::{Path, PathBuf},
+};
 
-use crate::import::{DialectChoice, FileSet, Plan, Recipe, Setup};
+use crate::import::{DialectChoice, Plan, Recipe, Setup};
 use decoupler_core::{
-    dataset::{Division, Simulation, Span, SplitBy},
-    evaluation::{RUN_OPTIONS, RunSettings},
-    scene::{Loading, Movement, RowModel, Scene},
-    sensor::SensorModel,
+    dataset::{Division, Memory, Simulation, Span, SplitBy},
+    evaluation::{RUN_OPTIONS, RunOption, RunSettings},
+    scene::RowModel,
 };
 
 /// Settings for which the terminal has no option.
@@ -27,43 +30,48 @@ impl fmt::Display for CommandGap {
 /// Settings for which the terminal has no option.
 pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, CommandGap> {
     let settings = setup.settings();
-    let mut command = Command("decoupler train".to_owned());
-    let mut usual = match (settings.simulation(), setup.plan()) {
-        (Some(simulation), _) => {
-            check_simulation(simulation)?;
-            RunSettings::default()
-        }
+    let mut options = Vec::new();
+    let mut usual = RunSettings::default();
+    match (settings.simulation(), setup.plan()) {
+        (Some(simulation), _) => check_simulation(simulation)?,
         (None, Some(plan)) => {
-            let usual = RunSettings::measured(RowModel::Shared);
+            usual = RunSettings::measured(RowModel::Shared);
             check([(
                 settings.inputs.quantity != usual.inputs.quantity,
                 "the quantity of the inputs",
             )])?;
             check_plan(plan, recipe)?;
-            command.recording(plan, recipe, settings.validation_fraction());
+            options = file_options(plan, recipe);
+            // The recipe may have another division.
+            let usual_fraction = recipe.is_none().then(|| settings.validation_fraction());
+            options.extend(division_options(plan, usual_fraction));
             // Without it, settings are chosen.
-            command.add("hidden", settings.hidden);
-            RunSettings {
-                hidden: settings.hidden,
-                ..usual
-            }
+            options.push(("hidden".into(), settings.hidden.to_string()));
+            usual.hidden = settings.hidden;
         }
         (None, None) => return Err(CommandGap(vec!["samples in memory"])),
-    };
+    }
     let method = settings.training.method;
     if method.short_name() != usual.training.method.short_name() {
-        command.add("method", method.short_name());
+        options.push(("method".into(), method.short_name().to_owned()));
         usual.choose_method(method.with_defaults());
     }
     for setting in method.settings() {
         let [value, usual] = [method, usual.training.method].map(|method| setting.number(&method).unwrap_or(f64::NAN));
         if value.to_bits() != usual.to_bits() {
-            command.add("set", format!("{}={value}", setting.word("-")));
+            options.push(("set".into(), format!("{}={value}", setting.word("-"))));
         }
     }
-    changed_options(settings, &usual).for_each(|(word, value)| command.add(&word, value));
-    Ok(command.0)
+    options.extend(changed_options(settings, &usual).map(|(word, value)| (word.into(), value)));
+    let written = options.iter().map(|(name, value)| match &**value {
+        "" => format!(" --{name}"),
+        value => format!(" --{name} {}", quoted(Path::new(value))),
+    });
+    Ok("decoupler train".to_owned() + &String::from_iter(written))
 }
+
+/// An option and its value, empty if it has none.
+pub(super) type GivenOption = (Cow<'static, str>, String);
 
 /// Options, with their values, in which `settings` differ from `usual`, except those of the method.
 pub fn changed_options(settings: &RunSettings, usual: &RunSettings) -> impl Iterator<Item = (String, String)> {
@@ -84,23 +92,28 @@ pub fn quoted(path: &Path) -> String {
     format!("'{}'", text.replace('\'', r"'\''"))
 }
 
+/// Checks that the table of settings describes the array completely.
 fn check_simulation(source: &Simulation) -> Result<(), CommandGap> {
-    let (scene, usual) = (&source.scene, Scene::default());
-    let read_back = |loading: Loading| loading.to_string().parse() == Ok(loading);
+    let (run, mut described) = (RunSettings::from(*source), RunSettings::default());
+    for RunOption { setting, .. } in &RUN_OPTIONS {
+        if let Some(value) = setting.get(&run) {
+            // A value that cannot be set again is a difference.
+            let _ = setting.set(&mut described, &value);
+        }
+    }
+    let described = described.simulation().copied().unwrap_or_default();
+    let (scene, same) = (&source.scene, &described.scene);
     check([
         (
-            source.sensor != SensorModel::new(source.sensor.scale),
+            described.sensor != source.sensor,
             "the geometry or the resistance per mm",
         ),
         (
-            scene.largest_compression.to_bits() != usual.largest_compression.to_bits(),
+            scene.largest_compression.to_bits() != same.largest_compression.to_bits(),
             "the largest compression",
         ),
-        (
-            !matches!(scene.movement, Movement::Z) && scene.movement != Movement::SIDEWAYS,
-            "the largest shift sideways",
-        ),
-        (!read_back(scene.loading), "the sizes of the indenter"),
+        (scene.movement != same.movement, "the largest shift sideways"),
+        (scene.loading != same.loading, "the sizes of the indenter"),
     ])
 }
 
@@ -128,114 +141,121 @@ fn check<const N: usize>(gaps: [(bool, &'static str); N]) -> Result<(), CommandG
     if gaps.is_empty() { Ok(()) } else { Err(CommandGap(gaps)) }
 }
 
-struct Command(String);
-
-impl Command {
-    fn add(&mut self, name: &str, value: impl fmt::Display) {
-        self.0 += &format!(" --{name} {}", quoted(Path::new(&value.to_string())));
+/// Options with the files of a recording and the meanings of their columns.
+pub(super) fn file_options(plan: &Plan, recipe: Option<&Path>) -> Vec<GivenOption> {
+    let mut options = match recipe {
+        Some(recipe) => vec![("recipe".into(), recipe.display().to_string())],
+        None => import_options(&plan.import),
+    };
+    if let Some(test) = &plan.test {
+        let names = ["test-data", "test-join"];
+        options.extend(set_options(&test.data, &test.join, names));
+        let more = test.append.iter();
+        options.extend(more.flat_map(|set| set_options(&set.data, &set.join, names)));
     }
+    options
+}
 
-    /// Adds the files of a recording, the meanings of their columns and the division of the samples, of which
-    /// `validation_fraction` is held out by default.
-    fn recording(&mut self, plan: &Plan, recipe: Option<&Path>, validation_fraction: f64) {
-        match recipe {
-            Some(recipe) => self.add("recipe", recipe.display()),
-            None => self.import(&plan.import),
-        }
-        if let Some(test) = &plan.test {
-            let sets = std::iter::once((&test.data, &test.join));
-            let sets = sets.chain(test.append.iter().map(|set| (&set.data, &set.join)));
-            for (data, join) in sets {
-                self.add("test-data", data.display());
-                join.iter().for_each(|file| self.add("test-join", file.display()));
-            }
-        }
-        let (division, default) = (plan.division, Division::default());
-        let by_default = match plan.import.has_groups() {
-            true => SplitBy::Group,
-            false => default.by,
-        };
-        // The recipe may have another division.
-        if recipe.is_some() || division.by != by_default || division.by != default.by {
-            self.add("split", division.by);
-        }
-        if plan.test.is_none() && (recipe.is_some() || division.test_fraction != default.test_fraction) {
-            self.add("test-fraction", division.test_fraction);
-        }
-        if recipe.is_some() || division.validation_fraction != validation_fraction {
-            self.add("validation-fraction", division.validation_fraction);
-        }
+/// Options with the division of the samples; without those that have their default, if `usual` is given, the fraction held out
+/// for validation by default.
+pub(super) fn division_options(plan: &Plan, usual: Option<f64>) -> Vec<GivenOption> {
+    let (division, default) = (plan.division, Division::default());
+    let is_given = |is_default: bool| usual.is_none() || !is_default;
+    let mut options = Vec::new();
+    let has_default_rule = !plan.import.has_groups() || default.by == SplitBy::Group;
+    if is_given(has_default_rule && division.by == default.by) {
+        options.push(("split".into(), division.by.to_string()));
     }
+    if plan.test.is_none() && is_given(division.test_fraction == default.test_fraction) {
+        options.push(("test-fraction".into(), division.test_fraction.to_string()));
+    }
+    if is_given(usual == Some(division.validation_fraction)) {
+        options.push(("validation-fraction".into(), division.validation_fraction.to_string()));
+    }
+    options
+}
 
-    fn import(&mut self, recipe: &Recipe) {
-        let Recipe {
-            data,
-            join,
-            append,
-            dialect,
-            inputs,
-            targets,
-            time,
-            group,
-            row_wire,
-            memory,
-            conditions,
-            derive,
-            missing,
-            units,
-            positions,
-        } = recipe;
-        self.add("data", data.display());
-        join.iter().for_each(|joined| self.add("join", joined.file.display()));
-        for FileSet { data, join } in append {
-            self.add("data", data.display());
-            join.iter().for_each(|file| self.add("join", file.display()));
-        }
-        let times = Vec::from_iter(join.iter().filter_map(|joined| joined.time.as_deref()));
-        // One for all, or one for each.
-        let is_one = times.windows(2).all(|pair| pair[0] == pair[1]);
-        let most = if is_one { 1 } else { times.len() };
-        times.iter().take(most).for_each(|time| self.add("join-time", time));
-        if let Some(limit) = join.first().and_then(|joined| joined.limit) {
-            self.add("join-limit", limit);
-        }
-        self.add("inputs", inputs.join(","));
-        self.add("targets", targets.join(","));
-        for (name, column) in [("time", time), ("group", group), ("row-wire", row_wire)] {
-            column.iter().for_each(|column| self.add(name, column));
-        }
-        if let Some(memory) = memory {
-            for (name, spans) in [("lags", &memory.lags), ("memory", &memory.averages)] {
-                let spans = Vec::from_iter(spans.iter().map(Span::to_string));
-                if !spans.is_empty() {
-                    self.add(name, spans.join(","));
-                }
-            }
-            if memory.differences {
-                self.0 += " --differences";
-            }
-        }
-        conditions.iter().for_each(|condition| self.add("where", condition));
-        derive.iter().for_each(|derived| self.add("derive", derived));
-        missing.iter().for_each(|missing| self.add("missing", missing));
-        units
+fn set_options(data: &Path, join: &[PathBuf], [data_name, join_name]: [&'static str; 2]) -> Vec<GivenOption> {
+    let join = join.iter().map(|file| (join_name.into(), file.display().to_string()));
+    let data = (data_name.into(), data.display().to_string());
+    std::iter::once(data).chain(join).collect()
+}
+
+fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
+    let Recipe {
+        data,
+        join,
+        append,
+        dialect:
+            DialectChoice {
+                encoding,
+                separator,
+                decimal,
+                header,
+                skip_lines,
+            },
+        inputs,
+        targets,
+        time,
+        group,
+        row_wire,
+        memory,
+        conditions,
+        derive,
+        missing,
+        units,
+        positions,
+    } = recipe;
+    let joined = Vec::from_iter(join.iter().map(|joined| joined.file.clone()));
+    let mut options = set_options(data, &joined, ["data", "join"]);
+    options.extend(
+        append
             .iter()
-            .for_each(|(column, unit)| self.add("unit", format!("{column}={unit}")));
-        positions.iter().for_each(|file| self.add("positions", file.display()));
-        let DialectChoice {
-            encoding,
-            separator,
-            decimal,
-            header,
-            skip_lines,
-        } = dialect;
-        separator.iter().for_each(|separator| self.add("separator", separator));
-        decimal.iter().for_each(|decimal| self.add("decimal", decimal));
-        let header = header.map(|header| if header { "yes" } else { "no" });
-        header.iter().for_each(|header| self.add("header", header));
-        encoding.iter().for_each(|encoding| self.add("encoding", encoding));
-        skip_lines.iter().for_each(|lines| self.add("skip-lines", lines));
+            .flat_map(|set| set_options(&set.data, &set.join, ["data", "join"])),
+    );
+    let mut times = Vec::from_iter(join.iter().filter_map(|joined| joined.time.clone()));
+    // One for all, or one for each.
+    if times.windows(2).all(|pair| pair[0] == pair[1]) {
+        times.truncate(1);
     }
+    let spans = |of: fn(&Memory) -> &Vec<Span>| {
+        let spans = memory.as_ref().map(of).filter(|spans| !spans.is_empty());
+        spans.map(|spans| texts(spans).join(","))
+    };
+    let has_differences = memory.as_ref().is_some_and(|memory| memory.differences);
+    let units = units.iter().map(|(column, unit)| format!("{column}={unit}"));
+    let options_of_columns = [
+        ("join-time", times),
+        (
+            "join-limit",
+            texts(join.first().and_then(|joined| joined.limit.as_ref())),
+        ),
+        ("inputs", vec![inputs.join(",")]),
+        ("targets", vec![targets.join(",")]),
+        ("time", texts(time)),
+        ("group", texts(group)),
+        ("row-wire", texts(row_wire)),
+        ("lags", texts(&spans(|memory| &memory.lags))),
+        ("memory", texts(&spans(|memory| &memory.averages))),
+        ("differences", Vec::from_iter(has_differences.then(String::new))),
+        ("where", texts(conditions)),
+        ("derive", texts(derive)),
+        ("missing", texts(missing)),
+        ("unit", units.collect()),
+        ("positions", texts(&positions.as_ref().map(|file| file.display()))),
+        ("separator", texts(separator)),
+        ("decimal", texts(decimal)),
+        ("header", texts(&header.map(|header| if header { "yes" } else { "no" }))),
+        ("encoding", texts(encoding)),
+        ("skip-lines", texts(skip_lines)),
+    ];
+    let of_columns = options_of_columns.into_iter();
+    options.extend(of_columns.flat_map(|(name, values)| values.into_iter().map(move |value| (name.into(), value))));
+    options
+}
+
+fn texts<'a, T: ToString + 'a>(values: impl IntoIterator<Item = &'a T>) -> Vec<String> {
+    values.into_iter().map(ToString::to_string).collect()
 }
 
 #[cfg(test)]

@@ -15,7 +15,6 @@ use crate::{
 use decoupler_core::{
     dataset::{Dataset, Simulation},
     evaluation::{NodeAddress, recorded::HysteresisLoop},
-    problem::Channel,
     surface::SurfaceMap,
 };
 
@@ -30,73 +29,57 @@ pub(super) fn pictures(
     loops: &[Option<HysteresisLoop>],
 ) -> Vec<(String, Figure)> {
     let training = &file.training;
-    let of_training = [
-        (
-            "Mean squared error of every epoch, in scaled units.".to_owned(),
-            loss_figure(&training.history, &training.stages, training.best_epoch).into(),
-        ),
-        (
-            "Gradient and the method's own quantities.".to_owned(),
-            training_state_figure(&training.history, &training.stages).into(),
-        ),
-    ];
-    let (surfaces, of_errors) = match (&file.problem.sensor, file.scores.network.nodes()) {
-        (Some(simulation), Some(errors)) => (
-            array_surfaces(simulation, test, answers, errors.worst_node),
-            array_errors(test, answers).into(),
-        ),
-        _ => (target_surfaces(file, test, answers), target_errors(file, test, answers)),
+    let of_array = file.problem.sensor.as_ref().zip(file.scores.network.nodes());
+    let surfaces = match of_array {
+        Some((simulation, errors)) => array_surfaces(simulation, test, answers, errors.worst_node),
+        None => target_surfaces(file, test, answers),
     };
-    let targets = file.problem.targets.iter().zip(loops).take(MAX_TARGETS);
-    let of_loops = targets.filter_map(|(target, found)| {
-        let caption = format!(
-            "Mean decoded against actual values of {} in the test set, loading and unloading.",
-            target.name
-        );
-        Some((caption, hysteresis_figure(found.as_ref()?, target).into()))
-    });
-    surfaces
-        .into_iter()
-        .chain(of_training)
-        .chain(of_errors)
-        .chain(of_loops)
-        .collect()
-}
-
-/// Errors of the nodes of an array.
-fn array_errors(test: &Dataset, decoupled_mm: &Array2<f64>) -> [(String, Figure); 2] {
-    let pairs_mm = z_pairs_mm(test, decoupled_mm);
-    [
-        (
+    let mut pictures = Vec::from_iter(surfaces);
+    let mut add = |caption: String, figure: Figure| pictures.push((caption, figure));
+    add(
+        "Mean squared error of every epoch, in scaled units.".to_owned(),
+        loss_figure(&training.history, &training.stages, training.best_epoch).into(),
+    );
+    add(
+        "Gradient and the method's own quantities.".to_owned(),
+        training_state_figure(&training.history, &training.stages).into(),
+    );
+    if of_array.is_some() {
+        let pairs_mm = z_pairs_mm(test, answers);
+        add(
             "Distribution of the z errors of the test set.".to_owned(),
             error_histogram_figure(&pairs_mm, None).into(),
-        ),
-        (
+        );
+        add(
             "Decoupled against actual z of the nodes of the test set.".to_owned(),
             regression_figure(&pairs_mm).into(),
-        ),
-    ]
-}
-
-/// Errors of the targets of a recording; only of the first ones if there are many.
-fn target_errors(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) -> Vec<(String, Figure)> {
-    let targets = file.problem.targets.iter().enumerate().take(MAX_TARGETS);
-    let of_target = |(index, target): (usize, &Channel)| {
+        );
+        return pictures;
+    }
+    let targets = || file.problem.targets.iter().take(MAX_TARGETS);
+    for (index, target) in targets().enumerate() {
         let pairs = target_pairs(test, answers, index);
         let line = RegressionLine::of(pairs.iter().copied());
         let (name, unit) = (&target.name, target.unit.as_deref());
-        [
-            (
-                format!("Decoded against actual values of {name} in the test set."),
-                target_regression_figure((pairs.len(), &|sample| pairs[sample]), &line, name, unit).into(),
-            ),
-            (
-                format!("Distribution of the errors of {name} in the test set."),
-                target_histogram_figure(&pairs, None, target).into(),
-            ),
-        ]
-    };
-    targets.flat_map(of_target).collect()
+        add(
+            format!("Decoded against actual values of {name} in the test set."),
+            target_regression_figure((pairs.len(), &|sample| pairs[sample]), &line, name, unit).into(),
+        );
+        add(
+            format!("Distribution of the errors of {name} in the test set."),
+            target_histogram_figure(&pairs, None, target).into(),
+        );
+    }
+    for (target, found) in targets().zip(loops) {
+        if let Some(found) = found {
+            let name = &target.name;
+            add(
+                format!("Mean decoded against actual values of {name} in the test set, loading and unloading."),
+                hysteresis_figure(found, target).into(),
+            );
+        }
+    }
+    pictures
 }
 
 /// Actual and decoded surface of the test sample with the largest error of a target that has a position, and the error;
@@ -115,14 +98,13 @@ fn target_surfaces(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) ->
     });
     let range = surface.range_of(&Vec::from_iter(ranges));
     let sample = Some(worst.worst_sample).filter(|&sample| sample < test.samples())?;
-    let values = |rows: ArrayView2<'_, f64>| rows.row(sample).to_vec();
-    let surfaces = surface.surfaces(&values(targets), &values(answers.view()), range);
+    let [actual, decoded] = [targets, answers.view()].map(|rows| rows.row(sample).to_vec());
     let name = &problem.targets[surface.nodes()[node].target].name;
     let caption = format!(
         "Sample {} of the test set, which has the largest error of all targets with a position ({name}, marked).",
         sample + 1
     );
-    Some((caption, from_above(surfaces, node)))
+    Some((caption, from_above(surface.surfaces(&actual, &decoded, range), node)))
 }
 
 /// Actual and decoupled surface of the snapshot of `worst`, which is marked, and the error; `None` where no surface can be
@@ -139,14 +121,13 @@ fn array_surfaces(
     let map = SurfaceMap::shared(&x_mm, &y_mm).ok()?;
     let snapshots = test.snapshots();
     let samples = snapshots.get(worst.snapshot)?;
-    let nodes = |coordinates_mm: ArrayView2<'_, f64>| -> Vec<DVec3> {
+    let nodes = |coordinates_mm: ArrayView2<'_, f64>| {
         let rows = samples.iter().map(|&sample| coordinates_mm.row(sample).to_vec());
-        rows.flat_map(|row| row.chunks_exact(3).map(DVec3::from_slice).collect::<Vec<_>>())
-            .collect()
+        Vec::from_iter(rows.flat_map(|row| Vec::from_iter(row.chunks_exact(3).map(DVec3::from_slice))))
     };
     let (actual, decoupled) = (nodes(test.targets()), nodes(decoupled_mm.view()));
     let pairs = actual.iter().zip(&decoupled);
-    let error: Vec<DVec3> = pairs.map(|(a, d)| a.with_z(d.z - a.z)).collect();
+    let error = Vec::from_iter(pairs.map(|(actual, decoupled)| actual.with_z(decoupled.z - actual.z)));
     let heights = geometry.height_mm - source.stroke_mm()..=geometry.height_mm;
     let errors_mm = error.iter().map(|node| node.z.abs()).filter(|z| z.is_finite());
     // Errors below a nanometre are not distinguished by colour.
@@ -165,18 +146,13 @@ fn array_surfaces(
     ];
     let surfaces =
         surfaces.map(|(title, nodes, quantity, range)| Surface::through(title, &map, nodes, quantity, range));
-    Some((
-        caption,
-        from_above(surfaces, place * scale.nodes_per_row() + worst.node),
-    ))
+    let marked = place * scale.nodes_per_row() + worst.node;
+    Some((caption, from_above(surfaces, marked)))
 }
 
 /// The surfaces from above, with one node marked.
-fn from_above(surfaces: [Surface; 3], marked: usize) -> Figure {
-    let surfaces = surfaces.map(|surface| Surface {
-        mode: ViewMode::Top,
-        ..surface
-    });
+fn from_above(mut surfaces: [Surface; 3], marked: usize) -> Figure {
+    surfaces.iter_mut().for_each(|surface| surface.mode = ViewMode::Top);
     SurfaceFigure {
         surfaces: surfaces.into(),
         marked_node: Some(marked),

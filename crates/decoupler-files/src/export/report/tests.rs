@@ -117,6 +117,17 @@ fn a_report_contains_the_figures_of_its_run() {
         let expected = [(number + 1).to_string(), format_number(start.train_mse)];
         assert!(rows.iter().any(|row| row.starts_with(&expected)), "{expected:?}");
     }
+    for expected in [
+        ["Array", "4x4_2x12"],
+        ["Hidden", "3"],
+        ["Starts", "2"],
+        ["Method", &file.settings.training.method.to_string()],
+        ["Weights", &file.network.weights().to_string()],
+        ["Geometry height mm", "5.0"],
+        ["Loading", "random"],
+    ] {
+        assert!(rows.contains(&expected.map(str::to_owned).to_vec()), "{expected:?}");
+    }
     let command = document.descendants().find(|node| node.has_tag_name("pre")).unwrap();
     assert_eq!(
         command.text(),
@@ -207,6 +218,15 @@ fn a_report_of_a_recording_has_its_errors_figures_and_command() {
     for (target, errors) in file.problem.targets.iter().zip(decoders[0].errors.targets()) {
         let expected = ["Ridge".to_owned(), target.title(), format_number(errors.rmse)];
         assert!(rows.iter().any(|row| row.starts_with(&expected)), "{expected:?}");
+    }
+    for expected in [
+        ["Data", "press.csv"],
+        ["Targets", "d1..d4"],
+        ["Answers", "d1 (mm), d2 (mm), d3 (mm), d4 (mm)"],
+        ["Split", "time"],
+        ["Hidden", "2"],
+    ] {
+        assert!(rows.contains(&expected.map(str::to_owned).to_vec()), "{expected:?}");
     }
     let heading = document.descendants().find(|node| node.has_tag_name("h1")).unwrap();
     assert_eq!(heading.text(), Some("press, 2 hidden nodes, seed 0"));

@@ -13,7 +13,10 @@ use thiserror::Error;
 
 use super::TrialOptions;
 use crate::{
-    export::report::{CommandGap, train_command},
+    export::{
+        experiment_tables::axis_word,
+        report::{CommandGap, train_command},
+    },
     import::Plan,
 };
 
@@ -44,58 +47,36 @@ pub fn sweep_specification(experiment: &Experiment, plan: Option<&Plan>) -> Resu
     let mut train = train_options(&experiment.base, &[DecoderKind::Network]);
     let mut axes = Map::new();
     for axis in experiment.axes() {
-        axes.insert(option(axis.kind).to_owned(), values(axis));
+        axes.insert(axis_word(axis.kind).to_owned(), values(axis));
         if axis.kind == AxisKind::Method {
             // `set` belongs to one method; here, each method has its own settings.
             train.remove("set");
         }
     }
-    let seeds = experiment.seeds_of(&experiment.base).map(|seed| seed.0);
-    let seeds = Value::from_iter(seeds);
-    axes.entry(option(AxisKind::Seed)).or_insert(seeds);
+    let seeds = Value::from_iter(experiment.seeds_of(&experiment.base).map(|seed| seed.0));
+    axes.entry(axis_word(AxisKind::Seed)).or_insert(seeds);
+    let mut specification = json!({});
     if let Some(plan) = plan {
-        let division = &plan.division;
-        train.insert("split".to_owned(), division.by.to_string().into());
-        train.insert("test-fraction".to_owned(), division.test_fraction.into());
-        if division.validation_fraction != experiment.base.validation_fraction() {
-            train.insert("validation-fraction".to_owned(), division.validation_fraction.into());
-        }
-    }
-    train.retain(|option, value| !axes.contains_key(option) && *value != json!([]));
-    let mut specification = json!({"train": train, "axes": axes});
-    if let Some(plan) = plan {
+        let usual = experiment.base.validation_fraction();
+        let mut division = division_options(&plan.division);
+        division.retain(|option, value| option != "validation-fraction" || *value != json!(usual));
+        train.append(&mut division);
         // The division is in the options.
-        let division = Division::default();
         specification["recording"] = json!(Plan {
-            division,
+            division: Division::default(),
             ..plan.clone()
         });
     }
+    train.retain(|option, value| !axes.contains_key(option) && *value != json!([]));
+    specification["train"] = json!(train);
+    specification["axes"] = axes.into();
     Ok(specification)
-}
-
-/// Option of `train` for a setting.
-fn option(kind: AxisKind) -> &'static str {
-    match kind {
-        AxisKind::Hidden => "hidden",
-        AxisKind::Array => "array",
-        AxisKind::Samples => "samples",
-        AxisKind::Noise => "noise",
-        AxisKind::Inputs => "inputs",
-        AxisKind::Scaling => "scaling",
-        AxisKind::Method => "method",
-        AxisKind::Epochs => "epochs",
-        AxisKind::Starts => "starts",
-        AxisKind::Split => "split",
-        AxisKind::Seed => "seed",
-    }
 }
 
 fn values(axis: &Axis) -> Value {
     let value = |value: &settings::Value| match value {
-        settings::Value::Number(value) => Value::from(*value),
-        settings::Value::Integer(value) => Value::from(*value),
-        settings::Value::Text(value) => Value::from(value.replace('×', "x")),
+        settings::Value::Text(text) => text.replace('×', "x").into(),
+        value => json!(value),
     };
     axis.values.iter().map(value).collect()
 }
@@ -116,14 +97,12 @@ pub fn train_options(settings: &RunSettings, decoders: &[DecoderKind]) -> TrialO
         let value = setting.get(settings)?;
         // Left out at their defaults, so that trials keep the names they had before these options existed.
         let is_left_out = ["combine", "begin", "adc bits"].contains(&setting.name) && setting.get(&defaults)? == value;
-        let value = match &value {
-            settings::Value::Number(value) => number(*value),
-            settings::Value::Integer(value) => Value::from(*value),
+        let value = match value {
+            // Negative zero is written as zero.
+            settings::Value::Number(value) => Value::from(value + 0.0),
             // As a number, which it is.
-            settings::Value::Text(bits) if setting.name == "adc bits" => {
-                bits.parse::<u64>().map_or(Value::Null, Value::from)
-            }
-            settings::Value::Text(text) => Value::from(text.as_str()),
+            settings::Value::Text(bits) if setting.name == "adc bits" => json!(bits.parse::<u64>().ok()),
+            value => json!(value),
         };
         (!is_left_out).then(|| (setting.word("-"), value))
     };
@@ -137,42 +116,37 @@ pub fn train_options(settings: &RunSettings, decoders: &[DecoderKind]) -> TrialO
 /// The folders of the files are left out: a trial is the same wherever they are.
 pub fn recording_options(plan: &Plan, crc32: &[String]) -> TrialOptions {
     let named = plan.named();
-    let mut import = serde_json::to_value(&named.import).unwrap_or_default();
-    let mut taken = |field: &str| {
-        let fields = import.as_object_mut();
-        fields.and_then(|fields| fields.remove(field)).unwrap_or_default()
-    };
-    let mut options = TrialOptions::from([
-        ("data".to_owned(), taken("data")),
-        ("inputs".to_owned(), taken("inputs")),
-        ("targets".to_owned(), taken("targets")),
-        ("crc32".to_owned(), crc32.iter().cloned().collect()),
-        ("split".to_owned(), text(&plan.division.by)),
-        ("test-fraction".to_owned(), number(plan.division.test_fraction)),
-        (
-            "validation-fraction".to_owned(),
-            number(plan.division.validation_fraction),
-        ),
-    ]);
-    options.insert("import".to_owned(), import);
+    let mut options = division_options(&plan.division);
+    options.insert("crc32".to_owned(), crc32.into());
+    if let Ok(Value::Object(mut import)) = serde_json::to_value(&named.import) {
+        for field in ["data", "inputs", "targets"] {
+            options.insert(field.to_owned(), import.remove(field).unwrap_or_default());
+        }
+        options.insert("import".to_owned(), import.into());
+    }
     if let Some(test) = &named.test {
-        options.insert("test".to_owned(), serde_json::to_value(test).unwrap_or_default());
+        options.insert("test".to_owned(), json!(test));
     }
     options
 }
 
-/// Negative zero is written as zero.
-fn number(value: f64) -> Value {
-    Value::from(value + 0.0)
-}
-
-fn text(value: &dyn ToString) -> Value {
-    Value::from(value.to_string())
+fn division_options(division: &Division) -> TrialOptions {
+    let Division {
+        by,
+        test_fraction,
+        validation_fraction,
+    } = division;
+    let options = [
+        ("split", by.to_string().into()),
+        ("test-fraction", (test_fraction + 0.0).into()),
+        ("validation-fraction", (validation_fraction + 0.0).into()),
+    ];
+    options.map(|(option, value)| (option.to_owned(), value)).into()
 }
 
 fn method_settings(method: Method) -> Value {
     let pairs = method.settings().filter_map(|setting| {
-        let value = number(setting.number(&method)?);
+        let value = Value::from(setting.number(&method)? + 0.0);
         Some(format!("{}={value}", setting.word("-")))
     });
     pairs.collect()

@@ -9,12 +9,11 @@ use std::{
 
 use decoupler_core::text::inert;
 use serde::Serialize;
-use serde_json::{Map, Value};
+use serde_json::Value;
 use thiserror::Error;
 
-use super::{SweepFiles, Trial, TrialId, TrialOptions};
-pub use crate::export::DocumentError;
-use crate::export::write_csv_row;
+use super::{SweepFiles, Trial, TrialId, TrialOptions, options_text};
+use crate::export::{DocumentError, write_csv_row};
 
 /// Fields of a report that are times: they differ from run to run and are excluded from comparisons.
 const TIMES: [&str; 4] = ["epoch_ms", "frame_us", "fit_seconds", "training_seconds"];
@@ -48,24 +47,17 @@ impl From<Trial> for SweepRow {
     }
 }
 
-impl SweepRow {
-    /// The options as one text: the same for the same options.
-    pub(super) fn key(&self) -> String {
-        let pairs: Vec<_> = self
-            .options
-            .iter()
-            .map(|(option, value)| format!("{option}={value}"))
-            .collect();
-        pairs.join("\n")
-    }
+/// Cells of a row by their columns, which are sorted by kind and heading.
+type Cells = BTreeMap<(u8, String), String>;
 
+impl SweepRow {
     /// The part by which tables of results are compared: options and result.
-    pub(super) fn compared(&self) -> String {
-        format!("{}\n{}", self.key(), sorted(&self.result))
+    fn compared(&self) -> String {
+        format!("{}\n{}", options_text(&self.options), self.result)
     }
 
     /// Order in the table: by the options, in the order of their names; numbers by their size.
-    pub(super) fn order(&self, other: &Self) -> Ordering {
+    fn order(&self, other: &Self) -> Ordering {
         let pairs = self.options.iter().zip(&other.options);
         let by_value = pairs.map(|((name, value), (other_name, other_value))| {
             let names = name.cmp(other_name);
@@ -80,26 +72,27 @@ impl SweepRow {
         decided.unwrap_or(length).then(self.trial.cmp(&other.trial))
     }
 
-    /// Cells of the row by column. Results that repeat an option, and lists of objects, are left out.
-    pub(super) fn cells(&self) -> BTreeMap<Column, String> {
-        let mut cells = BTreeMap::new();
-        cells.insert(Column::Trial, self.trial.to_string());
-        cells.insert(Column::Program, self.program.clone());
-        for (option, value) in &self.options {
-            cells.insert(Column::Option(option.clone()), text(value).unwrap_or_default());
-        }
-        for (place, value) in &self.time {
-            cells.insert(Column::Time(place.clone()), text(value).unwrap_or_default());
-        }
-        if let Value::Object(fields) = &self.result {
-            let own = fields.iter().filter(|(name, _)| !self.is_told_by_options(name));
-            for (name, value) in own {
-                flatten(value, name, &mut |place, value| {
-                    if let Some(text) = text(value) {
-                        cells.insert(Column::Result(place.to_owned()), text);
-                    }
-                });
-            }
+    /// Cells of the row. Results that repeat an option, and lists of objects, are left out.
+    fn cells(&self) -> Cells {
+        let mut cells = Cells::from([
+            ((0, "trial".to_owned()), self.trial.to_string()),
+            ((1, "program".to_owned()), self.program.clone()),
+        ]);
+        let options = self.options.iter().map(|(option, value)| ((2, option.clone()), value));
+        let times = self
+            .time
+            .iter()
+            .map(|(place, value)| ((4, format!("time.{place}")), value));
+        cells.extend(
+            options
+                .chain(times)
+                .map(|(column, value)| (column, text(value).unwrap_or_default())),
+        );
+        let fields = self.result.as_object().into_iter().flatten();
+        for (name, value) in fields.filter(|(name, _)| !self.is_told_by_options(name)) {
+            flatten(value, name, &mut |place, value| {
+                cells.extend(text(value).map(|text| ((3, format!("result.{place}")), text)));
+            });
         }
         cells
     }
@@ -112,43 +105,17 @@ impl SweepRow {
     }
 }
 
-/// Columns of a table, in their order.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Column {
-    Trial,
-    Program,
-    Option(String),
-    Result(String),
-    Time(String),
-}
-
-impl Column {
-    pub(super) fn heading(&self) -> String {
-        match self {
-            Self::Trial => "trial".to_owned(),
-            Self::Program => "program".to_owned(),
-            Self::Option(option) => option.clone(),
-            Self::Result(place) => format!("result.{place}"),
-            Self::Time(place) => format!("time.{place}"),
-        }
-    }
-}
-
 /// Moves the times out of an object and the objects in it.
 fn take_times(value: &mut Value, place: &str, times: &mut BTreeMap<String, Value>) {
     match value {
         Value::Object(fields) => {
-            let mut kept = Map::new();
-            for (name, mut value) in std::mem::take(fields) {
-                let place = joined(place, &name);
-                if TIMES.contains(&name.as_str()) {
-                    times.insert(place, value);
-                } else {
-                    take_times(&mut value, &place, times);
-                    kept.insert(name, value);
-                }
+            let found = TIMES
+                .iter()
+                .filter_map(|name| Some((joined(place, name), fields.remove(*name)?)));
+            times.extend(found);
+            for (name, value) in fields {
+                take_times(value, &joined(place, name), times);
             }
-            *fields = kept;
         }
         Value::Array(values) => {
             for (index, value) in values.iter_mut().enumerate() {
@@ -159,28 +126,9 @@ fn take_times(value: &mut Value, place: &str, times: &mut BTreeMap<String, Value
     }
 }
 
-/// Returns JSON with the fields of each object sorted by name.
-fn sorted(value: &Value) -> String {
-    match value {
-        Value::Object(fields) => {
-            let texts: BTreeMap<_, _> = fields.iter().map(|(name, value)| (name, sorted(value))).collect();
-            let texts: Vec<_> = texts
-                .into_iter()
-                .map(|(name, text)| format!("{name:?}:{text}"))
-                .collect();
-            format!("{{{}}}", texts.join(","))
-        }
-        Value::Array(values) => {
-            let texts: Vec<_> = values.iter().map(sorted).collect();
-            format!("[{}]", texts.join(","))
-        }
-        value => value.to_string(),
-    }
-}
-
 /// Visits every value in `value` that is not an object, with its place. Objects of a list are identified by their
 /// names, if they have any.
-fn flatten(value: &Value, place: &str, visit: &mut impl FnMut(&str, &Value)) {
+pub(in crate::export) fn flatten(value: &Value, place: &str, visit: &mut impl FnMut(&str, &Value)) {
     match value {
         Value::Object(fields) => {
             for (name, value) in fields {
@@ -284,9 +232,9 @@ impl SweepTableFormat {
 }
 
 fn write_csv(merged: &MergedSweep, writer: &mut dyn Write) -> io::Result<()> {
-    let rows: Vec<_> = merged.trials.iter().map(|row| row.cells()).collect();
-    let columns: BTreeSet<_> = rows.iter().flat_map(|cells| cells.keys()).collect();
-    write_csv_row(columns.iter().map(|column| column.heading()), writer)?;
+    let rows: Vec<Cells> = merged.trials.iter().map(SweepRow::cells).collect();
+    let columns: BTreeSet<_> = rows.iter().flat_map(Cells::keys).collect();
+    write_csv_row(columns.iter().map(|(_, heading)| heading), writer)?;
     for cells in &rows {
         let cell = |column| cells.get(column).map_or("", String::as_str);
         write_csv_row(columns.iter().map(|&column| inert(cell(column))), writer)?;
@@ -331,21 +279,26 @@ impl MergedSweep {
     /// A folder cannot be read, or no sweep has begun to fill it.
     pub fn read(folders: &[PathBuf]) -> Result<Self, SweepFolderError> {
         let mut merged = Self::default();
-        let mut found: BTreeMap<String, Vec<Found>> = BTreeMap::new();
+        // Different results of the same options. Of the same results, those of the latest program version are kept, in any
+        // order of the folders.
+        let mut found: BTreeMap<String, BTreeMap<String, (PathBuf, SweepRow)>> = BTreeMap::new();
         let mut unfinished = BTreeSet::new();
         for folder in folders {
             let files = SweepFiles::list(folder)?;
             if files.trials.is_empty() && files.unfinished.is_empty() {
                 return Err(SweepFolderError::NoSweep(folder.clone()));
             }
-            let names = files.unfinished.iter().filter_map(|path| path.file_stem()?.to_str());
-            unfinished.extend(names.filter_map(|name| name.parse::<TrialId>().ok()));
+            unfinished.extend(files.unfinished);
             for path in files.trials {
                 match Trial::load(&path) {
                     Ok(trial) => {
                         merged.finished.insert(trial.id());
                         let row = SweepRow::from(trial);
-                        found.entry(row.key()).or_default().push(Found { path, row });
+                        let same = found.entry(options_text(&row.options)).or_default();
+                        let (kept_path, kept) = same.entry(row.compared()).or_insert((path.clone(), row.clone()));
+                        if (&row.program, &path) > (&kept.program, kept_path) {
+                            (*kept_path, *kept) = (path, row);
+                        }
                     }
                     Err(error) => merged.damaged.push(error.to_string()),
                 }
@@ -355,31 +308,19 @@ impl MergedSweep {
         merged.missing = unfinished
             .map(|id| format!("trial {id} (begun, not finished)"))
             .collect();
-        for same in found.into_values() {
-            merged.add(same);
+        for results in found.into_values() {
+            if results.len() == 1 {
+                merged.trials.extend(results.into_values().map(|(_, row)| row));
+                continue;
+            }
+            let files = results.values();
+            let files = files.map(|(path, row)| format!("'{}' ({})", path.display(), row.program));
+            merged.conflicting.push(Vec::from_iter(files).join(" and "));
         }
         merged.trials.sort_by(SweepRow::order);
         let compared: Vec<_> = merged.trials.iter().map(SweepRow::compared).collect();
         merged.digest = TrialId::of(&compared.join("\n\n\n")).to_string();
         Ok(merged)
-    }
-
-    /// Adds trials with the same options: one row if their results are the same.
-    fn add(&mut self, same: Vec<Found>) {
-        let mut by_result: BTreeMap<String, Found> = BTreeMap::new();
-        for found in same {
-            let kept = by_result.entry(found.row.compared()).or_insert_with(|| found.clone());
-            // Of several program versions, the latest is kept, in any order of the folders.
-            if (&found.row.program, &found.path) > (&kept.row.program, &kept.path) {
-                *kept = found;
-            }
-        }
-        if by_result.len() == 1 {
-            self.trials.extend(by_result.into_values().map(|found| found.row));
-            return;
-        }
-        let files: Vec<_> = by_result.values().map(Found::describe).collect();
-        self.conflicting.push(files.join(" and "));
     }
 
     /// Returns true if one of the folders has a result of the trial.
@@ -390,18 +331,6 @@ impl MergedSweep {
     /// Returns true if no trial is known to be missing from the table.
     pub fn is_whole(&self) -> bool {
         self.missing.is_empty() && self.conflicting.is_empty() && self.damaged.is_empty()
-    }
-}
-
-#[derive(Clone)]
-struct Found {
-    path: PathBuf,
-    row: SweepRow,
-}
-
-impl Found {
-    fn describe(&self) -> String {
-        format!("'{}' ({})", Path::display(&self.path), self.row.program)
     }
 }
 
@@ -427,7 +356,7 @@ mod tests {
         let cells = row.cells();
         let texts: Vec<_> = cells
             .iter()
-            .map(|(column, text)| (column.heading(), text.as_str()))
+            .map(|((_, heading), text)| (heading.clone(), text.as_str()))
             .collect();
         let texts: Vec<_> = texts
             .iter()
@@ -458,9 +387,9 @@ mod tests {
             "baselines": {"ridge": [{"name": "fx", "rmse": 0.75}]},
         });
         let cells = row(json!({"targets": ["fx", "fz"]}), report).cells();
-        let of_results = cells.iter().filter(|(column, _)| matches!(column, Column::Result(_)));
+        let of_results = cells.iter().filter(|((kind, _), _)| *kind == 3);
         let of_results: Vec<_> = of_results
-            .map(|(column, text)| (column.heading(), text.as_str()))
+            .map(|((_, heading), text)| (heading.clone(), text.as_str()))
             .collect();
         let expected = [
             ("result.baselines.ridge.fx.rmse", "0.75"),

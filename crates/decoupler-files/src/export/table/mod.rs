@@ -1,18 +1,21 @@
 //! Tables: described once, and written as CSV for other programs or as text for papers and spreadsheets.
 //! LaTeX has the rules of `booktabs` and the numeric columns of `siunitx`.
 
-mod csv_row;
 mod text;
 
-pub use csv_row::{csv_cell, write_csv_row};
 pub use text::TableForm;
+pub(super) use text::escaped_html;
 
-use std::io::{self, Write};
+use std::{
+    borrow::Cow,
+    io::{self, Write},
+    time::Duration,
+};
 
-use decoupler_core::text::{begins_formula, inert};
-use serde::ser::{Serialize, SerializeMap as _, SerializeSeq as _, Serializer};
+use decoupler_core::{settings::Value, text::inert};
+use serde::ser::{Serialize, Serializer};
 
-use crate::export::{format_number, format_r2};
+use crate::export::{format_duration, format_number, format_r2};
 
 /// Contents of a table, independent of the form in which it is written.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -68,8 +71,28 @@ impl TableColumn {
     }
 }
 
-/// Contents of a cell.
-#[derive(Clone, Debug, PartialEq)]
+/// A column for readers: name in files, heading and unit.
+impl From<(&str, &str, &'static str)> for TableColumn {
+    fn from((field, heading, unit): (&str, &str, &'static str)) -> Self {
+        Self::new(field, heading, unit)
+    }
+}
+
+/// A column for programs.
+impl From<&str> for TableColumn {
+    fn from(field: &str) -> Self {
+        Self::field(field)
+    }
+}
+
+/// Returns a cell of a row, with its column: see [`Table::of_rows`].
+pub(super) fn cell(column: impl Into<TableColumn>, value: impl Into<Cell>) -> (TableColumn, Cell) {
+    (column.into(), value.into())
+}
+
+/// Contents of a cell. In JSON, numbers keep every digit, and are `null` where there is none.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[serde(untagged)]
 pub enum Cell {
     /// A text.
     Text(String),
@@ -79,6 +102,8 @@ pub enum Cell {
     Number(Option<f64>),
     /// A coefficient of determination, near 1 with more digits for readers; `None` where there is none.
     R2(Option<f64>),
+    /// A time in seconds, with a fitting unit for readers; `None` where there is none.
+    Seconds(Option<f64>),
 }
 
 impl Cell {
@@ -89,6 +114,10 @@ impl Cell {
             Self::Count(count) => count.to_string(),
             Self::Number(number) => format_number(*number),
             Self::R2(number) => format_r2(*number),
+            Self::Seconds(seconds) => {
+                let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+                time.map_or_else(|| format_number(None), format_duration)
+            }
         }
     }
 
@@ -96,7 +125,7 @@ impl Cell {
     pub(super) fn for_spreadsheet(&self) -> String {
         match self {
             Self::Text(text) => inert(text),
-            Self::Count(_) | Self::Number(_) | Self::R2(_) => self.exact(),
+            _ => self.exact(),
         }
     }
 
@@ -105,10 +134,19 @@ impl Cell {
         match self {
             Self::Text(text) => text.clone(),
             Self::Count(count) => count.to_string(),
-            Self::Number(number) | Self::R2(number) => {
-                let number = number.filter(|number| number.is_finite());
+            Self::Number(_) | Self::R2(_) | Self::Seconds(_) => {
+                let number = self.number().filter(|number| number.is_finite());
                 number.map_or_else(String::new, |number| format!("{number:?}"))
             }
+        }
+    }
+
+    /// Returns the number in the cell, if there is one.
+    pub fn number(&self) -> Option<f64> {
+        match self {
+            Self::Text(_) => None,
+            Self::Count(count) => Some(*count as f64),
+            Self::Number(number) | Self::R2(number) | Self::Seconds(number) => *number,
         }
     }
 }
@@ -137,9 +175,19 @@ impl From<f64> for Cell {
     }
 }
 
-impl From<Option<f64>> for Cell {
-    fn from(number: Option<f64>) -> Self {
-        Self::Number(number)
+impl From<Value> for Cell {
+    fn from(value: Value) -> Self {
+        match value {
+            Value::Integer(value) => Self::Count(value),
+            Value::Number(value) => value.into(),
+            Value::Text(value) => value.into(),
+        }
+    }
+}
+
+impl<T: Into<Cell>> From<Option<T>> for Cell {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self::Number(None), T::into)
     }
 }
 
@@ -155,20 +203,21 @@ impl Table {
         }
     }
 
+    /// A table of rows that have the same columns.
+    pub(super) fn of_rows(rows: impl IntoIterator<Item = Vec<(TableColumn, Cell)>>) -> Self {
+        let mut table = Self::default();
+        for row in rows {
+            let (columns, cells) = row.into_iter().unzip();
+            table.columns = columns;
+            table.rows.push(cells);
+        }
+        table
+    }
+
     /// Returns true if the column contains only numbers.
     pub fn is_numeric(&self, column: usize) -> bool {
         let mut cells = self.rows.iter().filter_map(|row| row.get(column));
         cells.all(|cell| !matches!(cell, Cell::Text(_)))
-    }
-
-    /// Removes the column with this field.
-    pub(in crate::export) fn remove_column(&mut self, field: &str) {
-        if let Some(place) = self.columns.iter().position(|column| column.field == field) {
-            self.columns.remove(place);
-            for row in &mut self.rows {
-                row.remove(place);
-            }
-        }
     }
 
     /// Writes the table as CSV. Numbers read back bit for bit; where there is none the field is empty.
@@ -182,143 +231,42 @@ impl Table {
     }
 }
 
-/// JSON: an array of the rows, each an object whose keys are the fields of the columns. Numbers keep every digit; where there
-/// is none the value is `null`.
+/// JSON: an array of the rows, each an object whose keys are the fields of the columns, in their order.
 impl Serialize for Table {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut rows = serializer.serialize_seq(Some(self.rows.len()))?;
-        for cells in &self.rows {
-            rows.serialize_element(&Row {
-                columns: &self.columns,
-                cells,
-            })?;
-        }
-        rows.end()
+        let row = |cells| Row(&self.columns, cells);
+        serializer.collect_seq(self.rows.iter().map(row))
     }
 }
 
-struct Row<'a> {
-    columns: &'a [TableColumn],
-    cells: &'a [Cell],
-}
+struct Row<'a>(&'a [TableColumn], &'a Vec<Cell>);
 
 impl Serialize for Row<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut fields = serializer.serialize_map(Some(self.cells.len()))?;
-        for (column, cell) in self.columns.iter().zip(self.cells) {
-            fields.serialize_entry(&column.field, cell)?;
-        }
-        fields.end()
+        let fields = self.0.iter().map(|column| &column.field);
+        serializer.collect_map(fields.zip(self.1))
     }
 }
 
-impl Serialize for Cell {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Text(text) => serializer.serialize_str(text),
-            Self::Count(count) => serializer.serialize_u64(*count),
-            Self::Number(number) | Self::R2(number) => number.filter(|number| number.is_finite()).serialize(serializer),
-        }
+/// Returns a cell of CSV: quoted if necessary (RFC 4180).
+pub fn csv_cell(text: &str) -> Cow<'_, str> {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\"")).into()
+    } else {
+        text.into()
     }
 }
 
-pub(super) fn latex(table: &Table) -> String {
-    let columns = 0..table.columns.len();
-    let alignments: Vec<String> = columns.map(|column| alignment(table, column)).collect();
-    let line = |cells: Vec<String>| format!("{} \\\\\n", cells.join(" & "));
-    let headings = table.columns.iter().enumerate().map(|(number, column)| {
-        let title = escaped(&column.title());
-        // Braces keep siunitx from reading it as a number.
-        if table.is_numeric(number) {
-            format!("{{{title}}}")
-        } else {
-            title
-        }
-    });
-    let mut text = "% \\usepackage{booktabs, siunitx}\n".to_owned();
-    text += &format!("\\begin{{tabular}}{{{}}}\n\\toprule\n", alignments.join(" "));
-    text += &line(headings.collect());
-    text += "\\midrule\n";
-    for row in &table.rows {
-        let cells = row.iter().enumerate().map(|(column, cell)| match cell {
-            Cell::Number(number) | Cell::R2(number)
-                if table.is_numeric(column) && !number.is_some_and(f64::is_finite) =>
-            {
-                format!("{{{}}}", cell.rounded())
-            }
-            _ => escaped(&cell.rounded()),
-        });
-        text += &line(cells.collect());
+/// Writes a row of CSV.
+///
+/// # Errors
+/// Any error of `writer`.
+pub fn write_csv_row<T: AsRef<str>>(cells: impl IntoIterator<Item = T>, writer: &mut dyn Write) -> io::Result<()> {
+    for (place, cell) in cells.into_iter().enumerate() {
+        let comma = if place == 0 { "" } else { "," };
+        write!(writer, "{comma}{}", csv_cell(cell.as_ref()))?;
     }
-    text + "\\bottomrule\n\\end{tabular}\n"
-}
-
-/// Column type: names at the left, numbers at their decimal points, mixed columns at the right.
-fn alignment(table: &Table, column: usize) -> String {
-    if !table.is_numeric(column) {
-        return if column == 0 { "l" } else { "r" }.to_owned();
-    }
-    let cells = table.rows.iter().filter_map(|row| row.get(column));
-    let numbers = cells
-        .map(Cell::rounded)
-        .filter(|text| text.ends_with(|end: char| end.is_ascii_digit()));
-    let mut widest = NumberWidth::default();
-    for number in numbers {
-        widest.take(&number);
-    }
-    format!("S[table-format={}]", widest.format())
-}
-
-/// Maximum number of digits of a column's numbers before and after the decimal point, and in the exponent.
-#[derive(Default)]
-struct NumberWidth {
-    has_sign: bool,
-    whole: usize,
-    decimals: usize,
-    exponent: usize,
-    has_exponent_sign: bool,
-}
-
-impl NumberWidth {
-    fn take(&mut self, number: &str) {
-        let (mantissa, exponent) = number.split_once('e').unwrap_or((number, ""));
-        let (whole, decimals) = mantissa.split_once('.').unwrap_or((mantissa, ""));
-        self.has_sign |= whole.starts_with('-');
-        self.whole = self.whole.max(whole.trim_start_matches('-').len());
-        self.decimals = self.decimals.max(decimals.len());
-        self.has_exponent_sign |= exponent.starts_with('-');
-        self.exponent = self.exponent.max(exponent.trim_start_matches('-').len());
-    }
-
-    /// The `table-format` of siunitx.
-    fn format(&self) -> String {
-        let sign = |has_sign| if has_sign { "-" } else { "" };
-        let mut format = format!("{}{}.{}", sign(self.has_sign), self.whole.max(1), self.decimals);
-        if self.exponent > 0 {
-            format += &format!("e{}{}", sign(self.has_exponent_sign), self.exponent);
-        }
-        format
-    }
-}
-
-/// Escapes the special characters of LaTeX.
-fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    // After the end of a row, LaTeX takes [ and * for arguments of \\, and a number stays one for siunitx.
-    if text.starts_with(['[', '*']) || begins_formula(text) {
-        escaped += "{}";
-    }
-    for letter in text.chars() {
-        match letter {
-            '\\' => escaped += "\\textbackslash{}",
-            '~' => escaped += "\\textasciitilde{}",
-            '^' => escaped += "\\textasciicircum{}",
-            '\n' | '\r' => escaped.push(' '),
-            '{' | '}' | '$' | '&' | '#' | '%' | '_' => escaped.extend(['\\', letter]),
-            _ => escaped.push(letter),
-        }
-    }
-    escaped
+    writeln!(writer)
 }
 
 #[cfg(test)]
@@ -374,5 +322,24 @@ mod tests {
         for cell in [Cell::Number(None), f64::NAN.into(), f64::INFINITY.into()] {
             assert_eq!((cell.exact().as_str(), cell.rounded().as_str()), ("", "–"));
         }
+    }
+
+    #[test]
+    fn rows_are_read_back_by_the_csv_crate() {
+        let row = [
+            "",
+            "plain",
+            "with, comma",
+            "with \"quotes\"",
+            "with\nbreak",
+            "with\r",
+            " spaces ",
+            "=1",
+        ];
+        let mut text = Vec::new();
+        write_csv_row(row, &mut text).unwrap();
+        let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(&text[..]);
+        let read = reader.records().next().unwrap().unwrap();
+        assert_eq!(Vec::from_iter(&read), row);
     }
 }

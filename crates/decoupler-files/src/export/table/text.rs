@@ -1,7 +1,7 @@
 use std::fmt;
 
-use super::{Cell, Table, TableColumn, latex};
-use decoupler_core::text::inert;
+use super::{Cell, Table};
+use decoupler_core::text::{begins_formula, inert};
 
 /// Form in which a table is copied into other documents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,29 +37,41 @@ impl Table {
     pub fn text(&self, form: TableForm) -> String {
         match form {
             TableForm::Markdown => self.markdown(),
-            TableForm::Latex => latex(self),
+            TableForm::Latex => self.latex(),
             TableForm::TabSeparated => self.tab_separated(),
             TableForm::Json => self.json(),
         }
     }
 
+    /// Headings and rows, as texts that `heading` and `cell` return.
+    fn lines(
+        &self,
+        heading: impl Fn(usize, String) -> String,
+        cell: impl Fn(usize, &Cell) -> String,
+    ) -> Vec<Vec<String>> {
+        let headings = self.columns.iter().enumerate();
+        let headings = headings.map(|(place, column)| heading(place, column.title())).collect();
+        let rows = self.rows.iter().map(|row| {
+            let cells = row.iter().enumerate();
+            cells.map(|(place, of_row)| cell(place, of_row)).collect()
+        });
+        std::iter::once(headings).chain(rows).collect()
+    }
+
     /// Returns the table for a terminal: numbers rounded for readers, columns apart by two spaces. Figures are aligned on the
     /// right, also those with a unit or an interval; other texts on the left.
     pub fn aligned(&self) -> String {
-        let headings: Vec<String> = self.columns.iter().map(TableColumn::title).collect();
-        let rows = self.rows.iter().map(|row| row.iter().map(Cell::rounded).collect());
-        let lines: Vec<Vec<String>> = std::iter::once(headings).chain(rows).collect();
+        let lines = self.lines(|_, title| title, |_, cell| cell.rounded());
         let width = |column: usize| {
             let cells = lines.iter().filter_map(|line| line.get(column));
             cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
         };
-        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
         let is_figure =
             |text: &String| text.is_empty() || text.starts_with(|c: char| c.is_ascii_digit() || "-–".contains(c));
         let is_right = |column: usize| lines[1..].iter().filter_map(|line| line.get(column)).all(is_figure);
-        let right: Vec<bool> = (0..self.columns.len()).map(is_right).collect();
+        let layout = Vec::from_iter((0..self.columns.len()).map(|column| (width(column), is_right(column))));
         let line = |cells: &Vec<String>| {
-            let padded = cells.iter().zip(&widths).zip(&right).map(|((cell, width), is_right)| {
+            let padded = cells.iter().zip(&layout).map(|(cell, (width, is_right))| {
                 // A width in a format string panics above 65 535.
                 let spaces = " ".repeat(width - cell.chars().count());
                 if *is_right {
@@ -80,31 +92,120 @@ impl Table {
     }
 
     fn markdown(&self) -> String {
-        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
-        let mut text = line(self.columns.iter().map(|column| escaped(&column.title())).collect());
-        let rules = (0..self.columns.len()).map(|column| if self.is_numeric(column) { "---:" } else { "---" });
-        text += &line(rules.map(str::to_owned).collect());
-        for row in &self.rows {
-            text += &line(row.iter().map(|cell| escaped(&cell.rounded())).collect());
-        }
-        text
+        let mut lines = self.lines(|_, title| escaped(&title), |_, cell| escaped(&cell.rounded()));
+        let rule = |column| if self.is_numeric(column) { "---:" } else { "---" }.to_owned();
+        lines.insert(1, (0..self.columns.len()).map(rule).collect());
+        let lines = lines.iter().map(|cells| format!("| {} |\n", cells.join(" | ")));
+        lines.collect()
     }
 
     fn tab_separated(&self) -> String {
         // A tab or line break inside a cell would start a new cell.
         let plain = |text: String| text.replace(['\t', '\n', '\r'], " ");
-        let line = |cells: Vec<String>| cells.join("\t") + "\n";
-        let mut text = line(
-            self.columns
-                .iter()
-                .map(|column| plain(inert(&column.title())))
-                .collect(),
-        );
-        for row in &self.rows {
-            text += &line(row.iter().map(|cell: &Cell| plain(cell.for_spreadsheet())).collect());
-        }
-        text
+        let lines = self.lines(|_, title| plain(inert(&title)), |_, cell| plain(cell.for_spreadsheet()));
+        lines.iter().map(|cells| cells.join("\t") + "\n").collect()
     }
+
+    /// Returns the table as HTML, numbers rounded for readers; rows with the name `own` in their first or second column are
+    /// highlighted.
+    pub(in crate::export) fn html(&self, own: &str) -> String {
+        let is_text = self.columns.len() > 1 && !self.is_numeric(self.columns.len() - 1);
+        let class = if is_text { " class=\"text\"" } else { "" };
+        let headings = self.columns.iter();
+        let headings = headings.map(|column| format!("<th scope=\"col\">{}</th>", escaped_html(&column.title())));
+        let rows = self.rows.iter().map(|row| {
+            let cells: Vec<String> = row.iter().map(Cell::rounded).collect();
+            let is_own = cells.iter().take(2).any(|name| name == own);
+            let class = if is_own { " class=\"own\"" } else { "" };
+            let cells = cells.iter().map(|cell| format!("<td>{}</td>", escaped_html(cell)));
+            format!("<tr{class}>{}</tr>\n", String::from_iter(cells))
+        });
+        format!(
+            "<table{class}>\n<thead><tr>{}</tr></thead>\n<tbody>\n{}</tbody></table>",
+            String::from_iter(headings),
+            String::from_iter(rows)
+        )
+    }
+
+    fn latex(&self) -> String {
+        let alignments: Vec<String> = (0..self.columns.len()).map(|column| self.alignment(column)).collect();
+        // Braces keep siunitx from reading a text as a number.
+        let in_column = |column: usize, is_number: bool, text: &str| match self.is_numeric(column) && !is_number {
+            true => format!("{{{}}}", escaped_latex(text)),
+            false => escaped_latex(text),
+        };
+        let lines = self.lines(
+            |column, title| in_column(column, false, &title),
+            |column, cell| in_column(column, !cell.exact().is_empty(), &cell.rounded()),
+        );
+        let lines = Vec::from_iter(lines.iter().map(|cells| format!("{} \\\\\n", cells.join(" & "))));
+        format!(
+            "% \\usepackage{{booktabs, siunitx}}\n\\begin{{tabular}}{{{}}}\n\\toprule\n{}\\midrule\n{}\\bottomrule\n\
+             \\end{{tabular}}\n",
+            alignments.join(" "),
+            lines[0],
+            lines[1..].concat()
+        )
+    }
+
+    /// Column type of LaTeX: names at the left, numbers at their decimal points, mixed columns at the right.
+    fn alignment(&self, column: usize) -> String {
+        if !self.is_numeric(column) {
+            return if column == 0 { "l" } else { "r" }.to_owned();
+        }
+        let cells = self.rows.iter().filter_map(|row| row.get(column));
+        let numbers = cells.filter(|cell| !cell.exact().is_empty());
+        let widest = numbers.fold([0, 1, 0, 0, 0], |widest: [usize; 5], cell| {
+            let of_cell = number_widths(&cell.rounded());
+            std::array::from_fn(|part| widest[part].max(of_cell[part]))
+        });
+        let [sign, whole, decimals, exponent_sign, exponent] = widest;
+        let [sign, exponent_sign] = [sign, exponent_sign].map(|signs| "-".repeat(signs));
+        let exponent = match exponent {
+            0 => String::new(),
+            digits => format!("e{exponent_sign}{digits}"),
+        };
+        format!("S[table-format={sign}{whole}.{decimals}{exponent}]")
+    }
+}
+
+/// Widths of sign, whole digits and decimals of a number, and of sign and digits of its exponent.
+fn number_widths(number: &str) -> [usize; 5] {
+    let (mantissa, exponent) = number.split_once('e').unwrap_or((number, ""));
+    let (whole, decimals) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let signed = |digits: &str| {
+        let sign = usize::from(digits.starts_with('-'));
+        [sign, digits.len() - sign]
+    };
+    let ([sign, whole], [exponent_sign, exponent]) = (signed(whole), signed(exponent));
+    [sign, whole, decimals.len(), exponent_sign, exponent]
+}
+
+/// Escapes the special characters of LaTeX.
+fn escaped_latex(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    // After the end of a row, LaTeX takes [ and * for arguments of \\, and a number stays one for siunitx.
+    if text.starts_with(['[', '*']) || begins_formula(text) {
+        escaped += "{}";
+    }
+    for letter in text.chars() {
+        match letter {
+            '\\' => escaped += "\\textbackslash{}",
+            '~' => escaped += "\\textasciitilde{}",
+            '^' => escaped += "\\textasciicircum{}",
+            '\n' | '\r' => escaped.push(' '),
+            '{' | '}' | '$' | '&' | '#' | '%' | '_' => escaped.extend(['\\', letter]),
+            _ => escaped.push(letter),
+        }
+    }
+    escaped
+}
+
+/// Escapes the special characters of HTML and leaves out control characters, which it does not allow.
+pub(in crate::export) fn escaped_html(text: &str) -> String {
+    let text = text.replace(|letter: char| letter.is_control() && !"\n\t".contains(letter), "");
+    let text = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    text.replace('"', "&quot;")
 }
 
 /// Escapes the special characters of Markdown.
@@ -128,7 +229,7 @@ fn escaped(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::TableColumn, *};
 
     fn table() -> Table {
         Table {
