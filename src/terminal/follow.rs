@@ -12,10 +12,10 @@ use std::{
 };
 
 use clap::Args;
-use decoupler_core::{live::FaultEvent, scene::Noise, text::counted};
+use decoupler_core::{scene::Noise, text::counted};
 use decoupler_files::{
     export::NetworkFile,
-    live::{Note, Session, SessionEvent, SessionPlan, Source, SourcePlan, Unit, Unwatched, Watched},
+    live::{Input, Note, Session, SessionError, SessionEvent, SessionPlan, Source, SourcePlan, Unit, Watched},
 };
 
 use super::{
@@ -39,39 +39,36 @@ pub(super) struct Follow {
     #[arg(long, conflicts_with = "output")]
     pub(super) follow: bool,
     /// With --follow: output format [default: csv]
-    #[arg(long, value_name = "csv|jsonl", hide_possible_values = true)]
+    #[arg(long, value_name = "csv|jsonl", hide_possible_values = true, requires = "follow")]
     format: Option<Form>,
     /// With --follow: report rate and latency on standard error every N seconds; always at the end, and on SIGUSR1
-    #[arg(long, value_name = "SECONDS", value_parser = number)]
-    report: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, requires = "follow")]
+    report: Option<Duration>,
     /// With --follow: relative noise of the readings (standard deviation) assumed in fault detection [default: that of
     /// the network's scene]
-    #[arg(long, value_name = "REL", value_parser = number)]
+    #[arg(long, value_name = "REL", value_parser = number, requires = "follow")]
     noise: Option<f64>,
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse().ok().filter(|seconds| *seconds > 0.0 && *seconds <= 1e9);
+    seconds
+        .map(Duration::from_secs_f64)
+        .ok_or_else(|| "give a number of seconds above 0".to_owned())
 }
 
 /// Timeout of waiting for a line, after which requests for a report and to stop are checked.
 const WAIT: Duration = Duration::from_millis(100);
 
 impl Follow {
-    /// Refuses arguments that only --follow uses.
-    pub(super) fn check_unused(&self) -> Result<(), Failure> {
-        let given = [
-            (self.format.is_some(), "--format"),
-            (self.report.is_some(), "--report"),
-            (self.noise.is_some(), "--noise"),
-        ];
-        match given.into_iter().find(|(is_given, _)| *is_given) {
-            Some((_, argument)) => Err(wrong(argument, "it needs --follow")),
-            None => Ok(()),
-        }
-    }
-
     /// Decodes `input` with the network of `file` until it ends, or until a request to stop. Reports at the requested interval,
     /// on SIGUSR1, and at the end.
     pub(super) fn run(&self, input: &Path, file: NetworkFile) -> Result<(), Failure> {
         let noise = self.noise_of(&file)?;
-        let source = self.source(input)?;
+        let input = input
+            .to_str()
+            .ok_or_else(|| wrong("--input", "its name is not UTF-8"))?;
+        let source: Source = input.parse().map_err(|error| wrong("--input", error))?;
         let file = Arc::new(file);
         note_unmonitored(&file);
         let asked = Arc::new(AtomicBool::new(false));
@@ -85,28 +82,32 @@ impl Follow {
             zero: None,
             unit: Unit::Lines,
         };
-        let Some(mut session) = Session::open(plan, &|| true)? else {
-            return Ok(());
-        };
-        warn_unwatched(&session);
+        let mut session = Session::open(plan, &|| true)?;
         let graceful = Graceful::begin();
         let mut answers = Answers::new(&file, self.format.unwrap_or_default());
         let mut report = Report::new(source);
-        let every = self.report.map(Duration::from_secs_f64);
         let end = loop {
-            if asked.swap(false, Ordering::SeqCst) || every.is_some_and(|every| report.is_due(every)) {
+            if asked.swap(false, Ordering::SeqCst) || self.report.is_some_and(|every| report.is_due(every)) {
                 report.print(&session);
             }
             if graceful.is_end_requested() {
                 break Err(Failure::InterruptedFollow);
             }
             let event = session.next(Instant::now(), WAIT);
-            for note in session.notes() {
-                print_note(&file, &note);
+            if let SessionEvent::End(Err(error @ SessionError::Source(_))) = event {
+                // There is nothing to report.
+                return Err(error.into());
+            }
+            report.begin(&session);
+            for note in session.notes.drain(..) {
+                match note {
+                    Note::Drift(line, drift) => note_drift(&file, line, &drift),
+                    other => warn(&other),
+                }
             }
             match event {
                 SessionEvent::Answer => {
-                    if let Err(error) = answers.write(&session) {
+                    if let Err(error) = answers.write(&session.last) {
                         break Err(Failure::Output(error));
                     }
                     session.count();
@@ -138,18 +139,6 @@ impl Follow {
         }
         Ok(scene.noise.in_test())
     }
-
-    /// Source named by `input`, after a check of the other arguments.
-    fn source(&self, input: &Path) -> Result<Source, Failure> {
-        let input = input
-            .to_str()
-            .ok_or_else(|| wrong("--input", "its name is not UTF-8"))?;
-        let source: Source = input.parse().map_err(|error| wrong("--input", error))?;
-        if self.report.is_some_and(|seconds| !(seconds > 0.0 && seconds <= 1e9)) {
-            return Err(wrong("--report", "give a number of seconds above 0"));
-        }
-        Ok(source)
-    }
 }
 
 fn wrong(argument: &str, reason: impl Display) -> Failure {
@@ -161,55 +150,13 @@ fn warn(message: &dyn Display) {
     let _ = writeln!(messages(), "warning: {message}");
 }
 
-/// Reports why faults of the wires are not looked for, if they are not.
-fn warn_unwatched(session: &Session) {
-    let Some(Watched::Off(reason)) = session.array().map(|array| &array.watched) else {
-        return;
-    };
-    let reason = match reason {
-        Unwatched::NoNoise => {
-            "fault detection needs the noise of the readings, and the network was trained without noise; give --noise REL"
-        }
-        Unwatched::TooLarge => "the array is too large",
-    };
-    warn(&format_args!("wires are not checked for faults: {reason}"));
-}
-
-fn print_note(file: &NetworkFile, note: &Note) {
-    match note {
-        Note::Start(line) => warn(&format_args!(
-            "line {line}: the lines at the start give the means of derived columns and are not decoded"
-        )),
-        Note::StepBack(line) => warn(&format_args!(
-            "line {line}: the time steps back: the history of readings restarts here and at every further step back; \
-             send the lines in order of time"
-        )),
-        Note::NoRow(line) => warn(&format_args!(
-            "line {line}: wires are not checked for faults, because the line has no row number; add a column named row, \
-             or send whole snapshots in one line"
-        )),
-        Note::Fault(line, fault @ FaultEvent::Named { .. }) => warn(&format_args!(
-            "line {line}: {fault}; left out from here on; frames are decoded from the other readings by the Gauss-Newton \
-             method"
-        )),
-        Note::Fault(line, FaultEvent::Unexplained) => warn(&format_args!(
-            "line {line}: the readings contradict Eq. (2), and no single-wire fault explains them: the answers may be \
-             wrong; check the wiring, the geometry and the order of the rows"
-        )),
-        Note::Fault(line, FaultEvent::Recovered) => warn(&format_args!(
-            "line {line}: {}; all wires are used",
-            FaultEvent::Recovered
-        )),
-        Note::Drift(line, drift) => note_drift(file, *line, drift),
-        Note::RecordingEnded(..) => {}
-    }
-}
-
 /// Messages on standard error on the lines so far.
 struct Report {
     source: Source,
     begin: Instant,
     last: Instant,
+    /// True once the source is open.
+    has_begun: bool,
     /// True once it was reported that no line ends.
     has_warned_of_ends: bool,
     /// Number of bad lines since the last message.
@@ -228,15 +175,30 @@ impl Report {
             source,
             begin: now,
             last: now,
+            has_begun: false,
             has_warned_of_ends: false,
             unreported: 0,
             last_reported: now,
         }
     }
 
+    /// Reports once why faults of the wires are not looked for, if they are not.
+    fn begin(&mut self, session: &Session) {
+        let watched = session.array.as_ref().map(|array| &array.watched);
+        let reason = match watched {
+            _ if std::mem::replace(&mut self.has_begun, true) => return,
+            Some(Watched::NoNoise) => {
+                "fault detection needs the noise of the readings, and the network was trained without noise; give --noise REL"
+            }
+            Some(Watched::TooLarge) => "the array is too large",
+            Some(Watched::Checked(_)) | None => return,
+        };
+        warn(&format_args!("wires are not checked for faults: {reason}"));
+    }
+
     /// Reports a bad line, unless there are too many.
     fn bad(&mut self, reason: &str, session: &Session) {
-        let bad = session.bad_lines();
+        let bad = session.tally.bad;
         if bad > MAX_REPORTED && self.last_reported.elapsed() < REPORT_INTERVAL {
             self.unreported += 1;
             return;
@@ -248,9 +210,9 @@ impl Report {
                 "{reason} ({unreported} other bad lines since the last message)"
             )),
         }
-        if let Source::Serial { baud, .. } = self.source
+        if let Source::Serial(_, baud) = self.source
             && bad == MAX_REPORTED
-            && session.latencies().count() == 0
+            && session.tally.decoded == 0
         {
             warn(&format_args!(
                 "none of the first {MAX_REPORTED} lines is a frame: does the device send at {baud} baud?"
@@ -262,12 +224,13 @@ impl Report {
     fn waiting(&mut self, session: &Session) {
         /// More than the time between two lines of any device.
         const PATIENCE: Duration = Duration::from_secs(2);
-        if self.has_warned_of_ends || self.begin.elapsed() < PATIENCE {
+        let has_lines = session.tally.decoded + session.tally.bad > 0;
+        if self.has_warned_of_ends || has_lines || self.begin.elapsed() < PATIENCE {
             return;
         }
-        let has_lines = session.latencies().count() + session.bad_lines() > 0;
-        let unended = if has_lines { 0 } else { session.unended() };
-        if unended > 0 {
+        if let Input::Lines(lines) = &session.input
+            && let unended @ 1.. = lines.unended()
+        {
             self.has_warned_of_ends = true;
             warn(&format_args!(
                 "{unended} bytes have arrived, but no line has ended: does the sender end lines with LF or CR LF?"
@@ -286,16 +249,16 @@ impl Report {
 
     /// Prints the counts and latencies so far.
     fn print(&self, session: &Session) {
-        let (counts, latencies) = (session.counts(), session.latencies());
-        let (decoded, seconds) = (latencies.count(), self.begin.elapsed().as_secs_f64());
+        let (tally, seconds) = (&session.tally, self.begin.elapsed().as_secs_f64());
         // There is no one to report to if this fails.
         let _ = writeln!(
             messages(),
-            "{} decoded in {seconds:.1} s ({:.0} per second), {} bad, {} dropped; {latencies}",
-            counted(decoded, "line"),
-            decoded as f64 / seconds.max(1e-9),
-            counts.bad,
-            counts.dropped
+            "{} decoded in {seconds:.1} s ({:.0} per second), {} bad, {} dropped; {}",
+            counted(tally.decoded, "line"),
+            tally.decoded as f64 / seconds.max(1e-9),
+            tally.bad,
+            tally.dropped,
+            tally.latencies
         );
     }
 }

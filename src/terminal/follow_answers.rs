@@ -3,7 +3,7 @@ use std::io::{self, BufWriter, StdoutLock, Write, stdout};
 use clap::ValueEnum;
 use decoupler_files::{
     export::{NetworkFile, write_decoded},
-    live::Session,
+    live::Answer,
 };
 use ndarray::ArrayView1;
 use serde_json::{Map, Value, json};
@@ -43,17 +43,24 @@ impl<'a> Answers<'a> {
         }
     }
 
-    /// Writes and flushes the last answer of `session`, after the cells kept from its line.
-    pub(super) fn write(&mut self, session: &Session) -> io::Result<()> {
+    /// Writes and flushes an answer, after the cells kept from its line.
+    pub(super) fn write(&mut self, answer: &Answer) -> io::Result<()> {
         let problem = &self.file.problem;
-        let (line, answer, kept) = (session.line(), session.values(), session.kept());
-        let first_row = session.first_row();
-        let rows = answer.len() / problem.targets.len();
+        let Answer {
+            line,
+            first_row,
+            readings,
+            kept,
+            values,
+            left_out,
+            ..
+        } = answer;
+        let rows = values.len() / problem.targets.len();
         let (mut readings_outside, mut targets_outside) = (Some(0), 0);
-        let of_rows = session.readings().chunks_exact(session.readings().len() / rows);
-        for (row, (readings, answer)) in of_rows.zip(answer.chunks_exact(problem.targets.len())).enumerate() {
-            let network = self.file.network.at(first_row + row);
-            let of_row = self.outside.count(network, line, readings, answer);
+        let of_rows = readings.chunks_exact(readings.len() / rows);
+        let of_rows = of_rows.zip(values.chunks_exact(problem.targets.len()));
+        for (row, (readings, values)) in (first_row.unwrap_or(0)..).zip(of_rows) {
+            let of_row = self.outside.count(self.file.network.at(row), *line, readings, values);
             readings_outside = readings_outside.zip(of_row.readings).map(|(sum, count)| sum + count);
             targets_outside += of_row.targets;
         }
@@ -67,7 +74,7 @@ impl<'a> Answers<'a> {
                 for cell in kept {
                     write_cell(&cell.text, &mut self.output)?;
                 }
-                with_half_widths(self.file, answer, &mut self.values);
+                with_half_widths(self.file, values, &mut self.values);
                 write_decoded(
                     ArrayView1::from(&self.values),
                     readings_outside,
@@ -77,27 +84,24 @@ impl<'a> Answers<'a> {
             }
             Form::Jsonl if problem.has_nodes() => {
                 write!(self.output, "{{\"line\":{line},\"coordinates_mm\":[")?;
-                for (index, coordinate) in answer.iter().enumerate() {
+                for (index, coordinate) in values.iter().enumerate() {
                     let separator = if index == 0 { "" } else { "," };
                     write!(self.output, "{separator}{coordinate:?}")?;
                 }
-                match readings_outside {
-                    Some(count) => write!(self.output, "],\"readings_outside\":{count}")?,
-                    None => write!(self.output, "],\"readings_outside\":null")?,
-                }
-                write!(self.output, ",\"coordinates_outside\":{targets_outside}")?;
-                match session.left_out() {
-                    Some(wire) => writeln!(self.output, ",\"left_out\":\"{wire}\"}}")?,
-                    None => writeln!(self.output, ",\"left_out\":null}}")?,
-                }
+                let outside = json!(readings_outside);
+                let left_out = json!(left_out.map(|wire| wire.to_string()));
+                write!(self.output, "],\"readings_outside\":{outside},")?;
+                writeln!(
+                    self.output,
+                    "\"coordinates_outside\":{targets_outside},\"left_out\":{left_out}}}"
+                )?;
             }
             Form::Jsonl => {
-                let targets = problem.targets.iter().zip(answer);
-                let targets = targets.map(|(target, value)| (target.name.clone(), (*value).into()));
-                let half_widths = problem.targets.iter().zip(answer).enumerate();
-                let half_widths = half_widths.filter_map(|(index, (target, value))| {
+                let named = || problem.targets.iter().map(|target| target.name.clone()).zip(values);
+                let targets = named().map(|(name, value)| (name, json!(value)));
+                let half_widths = named().enumerate().filter_map(|(index, (name, value))| {
                     let half_width = self.file.intervals.as_ref()?.half_width(index, *value)?;
-                    Some((target.name.clone(), half_width.into()))
+                    Some((name, json!(half_width)))
                 });
                 let half_widths = half_widths.collect::<Map<String, Value>>();
                 let mut answer = json!({

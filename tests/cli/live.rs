@@ -30,7 +30,7 @@ pub(crate) fn answers(network: &Path, input: &Path) -> [Vec<Vec<f64>>; 2] {
             zero: None,
             unit: Unit::Frames,
         };
-        let mut session = Session::open(plan, &|| true).unwrap().unwrap();
+        let mut session = Session::open(plan, &|| true).unwrap();
         let (mut answers, mut now) = (Vec::new(), Instant::now());
         // A clock of its own, which jumps from frame to frame of a replay.
         while let Some(due) = session.due(now) {
@@ -38,7 +38,7 @@ pub(crate) fn answers(network: &Path, input: &Path) -> [Vec<Vec<f64>>; 2] {
             match session.next(now, Duration::from_secs(60)) {
                 SessionEvent::Answer => {
                     session.count();
-                    answers.push(session.values().to_vec());
+                    answers.push(session.last.values.clone());
                 }
                 SessionEvent::End(end) => {
                     end.unwrap();

@@ -1,18 +1,23 @@
 //! Recordings of frames that the Live view replays.
 
-use decoupler_files::live::{Recorder, Recording};
+use decoupler_core::scene::Rows;
+use decoupler_files::{
+    import::LineParser,
+    live::{Recorder, Recording, Tally},
+};
 
 use crate::{
     corpus::replay,
     mutation::{for_each_seed, mutated},
 };
 
-/// Row-wires read, of an array of three.
-const ROWS: [usize; 2] = [0, 2];
+/// Row-wires read.
+const ROWS: [usize; 2] = [0, 1];
 const CHANNELS: usize = 3;
 
 fn read(bytes: &[u8]) -> Option<Recording> {
-    match Recording::read(bytes, &ROWS, 3, CHANNELS) {
+    let parser = LineParser::of_array("2x1_1x3".parse().unwrap(), Rows::Known, true).unwrap();
+    match Recording::read(bytes, parser, ROWS.len() * CHANNELS, &mut Tally::default()) {
         Ok(recording) => Some(recording),
         Err(error) => {
             let message = error.to_string();
@@ -33,14 +38,14 @@ fn check(bytes: &[u8]) -> bool {
     let mut again = Vec::new();
     let mut recorder = Recorder::new(&mut again, &ROWS, CHANNELS).unwrap();
     for (frame, &time_s) in times_s.iter().enumerate() {
-        let frame_ohm = Vec::from_iter(recording.frame_ohm(frame).iter().copied());
+        let frame_ohm = recording.frame(frame);
         assert!(frame_ohm.iter().all(|ohm| *ohm > 0.0 && ohm.is_finite()));
         assert!(times_s[recording.frame_at(time_s)] == time_s);
-        recorder.record(time_s, &frame_ohm).unwrap();
+        recorder.record(time_s, frame_ohm).unwrap();
     }
     let again = read(&again).unwrap();
     assert_eq!(again.times_s(), times_s);
-    assert!((0..times_s.len()).all(|frame| again.frame_ohm(frame) == recording.frame_ohm(frame)));
+    assert!((0..times_s.len()).all(|frame| again.frame(frame) == recording.frame(frame)));
     true
 }
 

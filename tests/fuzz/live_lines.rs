@@ -43,7 +43,7 @@ fn split(bytes: &[u8], rng: &mut impl Rng) -> Vec<(u64, Vec<u8>)> {
         bytes: Cursor::new(bytes.to_vec()),
         rng: ChaCha8Rng::seed_from_u64(rng.random()),
     };
-    let mut lines = Lines::spawn(source, Keeping::All, false).unwrap();
+    let mut lines = Lines::spawn(|| Ok(source), Keeping::All, false).unwrap();
     let mut found = Vec::new();
     loop {
         match lines.next(Duration::from_secs(5)) {

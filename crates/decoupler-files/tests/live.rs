@@ -380,12 +380,9 @@ fn frames(
         for (&row, ohm) in rows.iter().zip(frame_ohm.chunks_exact_mut(columns)) {
             sensor.row_resistances_into(row, deformation.row_mm(row), ohm).unwrap();
         }
-        if let Some(faulty) = &faulty {
-            faulty.before_noise(&rows, &deformation, &mut frame_ohm);
-        }
-        source.disturb(&mut frame_ohm, &mut noise_rng);
-        if let Some(faulty) = &faulty {
-            faulty.after_noise(&rows, &mut frame_ohm);
+        match &faulty {
+            Some(faulty) => faulty.disturb_snapshot((&rows, &deformation), &mut frame_ohm, &source, &mut noise_rng),
+            None => source.disturb(&mut frame_ohm, &mut noise_rng),
         }
         take(&frame_ohm, &deformation);
     }

@@ -53,7 +53,6 @@ pub use plan::{Plan, PlannedSets, TestFiles};
 pub use positions::{PositionsError, holds_positions};
 pub use progress::{Progress, Watch};
 pub use recipe::{FileChecksum, FileSet, Joined, Recipe, Recorded, file_crc32};
-pub(crate) use rows::Rows;
 pub use sentinel::Sentinel;
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
 pub use suggestion::{Meaning, suggested_plan, suggested_plan_in_order};

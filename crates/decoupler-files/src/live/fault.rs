@@ -2,7 +2,7 @@ use std::{fmt, str::FromStr};
 
 use decoupler_core::{
     dataset::Dataset,
-    scene::{Deformation, Noise},
+    scene::{Deformation, Noise, NoiseSource},
     sensor::{ArrayScale, SensorError, SensorModel, short},
 };
 use glam::DVec3;
@@ -63,15 +63,8 @@ pub enum FaultError {
     )]
     Text(String),
     /// The array, or the scene, has no such wire or node.
-    #[error("there is no {what} {number}; give 1 to {last}")]
-    Number {
-        /// Kind of wire or node.
-        what: &'static str,
-        /// Number, from 1.
-        number: usize,
-        /// Largest number.
-        last: usize,
-    },
+    #[error("there is no {0} {1}; give 1 to {2}")]
+    Number(&'static str, usize, usize),
     /// The gain error is out of range.
     #[error("the gain error is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
     Gain(f64),
@@ -173,8 +166,7 @@ impl Fault {
             Self::Gain { column, .. } | Self::Stuck { column, .. } => [("column-wire", column, scale.columns()); 2],
         };
         if let Some((what, index, last)) = wires_and_nodes.into_iter().find(|(_, index, count)| index >= count) {
-            let number = index + 1;
-            return Err(FaultError::Number { what, number, last });
+            return Err(FaultError::Number(what, index + 1, last));
         }
         match self {
             Self::OpenRow { row, .. } if !read.contains(&row) => Err(FaultError::NotRead(row + 1)),
@@ -206,54 +198,92 @@ impl FaultySensor {
         })
     }
 
-    /// Replaces the readings of simulated snapshots by those of the faulty sensor with noise: its wires and amplifiers
-    /// come before the noise, its converter after.
+    /// Replaces the readings of simulated snapshots by those of the faulty sensor with noise.
     ///
     /// # Errors
-    /// See [`Dataset::disturb`].
+    /// If the undeformed sensor has no resistance.
     pub fn disturb(&self, set: &mut Dataset, noise: &Noise, rng: &mut impl Rng) -> Result<(), SensorError> {
+        let source = noise.source(&self.model)?;
         let read = set.row_wires_read().map_or_else(Vec::new, <[usize]>::to_vec);
-        let simulated = set.clone();
-        change_snapshots(set, |snapshot, ohms| {
+        let mut readings = set.readings().to_owned();
+        let all = readings
+            .as_slice_mut()
+            .expect("a set has its readings in standard layout");
+        for (snapshot, ohms) in all.chunks_exact_mut(set.row_count() * set.channels()).enumerate() {
             // Row-wires that are not read are at rest.
             let deformation = Deformation::from_fn(self.model.scale, |row, node| {
                 let index = read.iter().position(|&other| other == row);
                 index.map_or(DVec3::ZERO, |index| {
-                    let coordinates_mm = &simulated.sample_targets(snapshot * read.len() + index)[3 * node..];
+                    let coordinates_mm = &set.sample_targets(snapshot * read.len() + index)[3 * node..];
                     self.model.displacement_mm(row, node, DVec3::from_slice(coordinates_mm))
                 })
             });
-            self.before_noise(&read, &deformation, ohms);
-        });
-        set.disturb(&self.model, noise, rng)?;
-        change_snapshots(set, |_, ohms| self.after_noise(&read, ohms));
+            self.disturb_snapshot((&read, &deformation), ohms, &source, rng);
+        }
+        *set = set.with_readings(readings);
         Ok(())
+    }
+
+    /// Applies the fault and the noise to the resistances of one snapshot (rows `read`, row by row), which belong to
+    /// `deformation`: wires and amplifiers come before the noise, the converter after.
+    pub fn disturb_snapshot(
+        &self,
+        (read, deformation): (&[usize], &Deformation),
+        ohms: &mut [f64],
+        noise: &NoiseSource,
+        rng: &mut impl Rng,
+    ) {
+        self.before_noise(read, deformation, ohms);
+        noise.disturb(ohms, rng);
+        let columns = self.model.scale.columns();
+        for (&row, ohms) in read.iter().zip(ohms.chunks_exact_mut(columns)) {
+            let affected = match self.fault {
+                Fault::OpenRow { row: open, .. } if open == row => 0..columns,
+                Fault::OpenColumn { column, .. } | Fault::Gain { column, .. } | Fault::Stuck { column, .. } => {
+                    column..column + 1
+                }
+                Fault::OpenRow { .. } | Fault::ShortedColumns { .. } => 0..0,
+            };
+            // Without current, or when it is stuck, the converter reads an end of its range without noise.
+            let (lowest_ohm, full_scale_ohm) = self.range_ohm;
+            let (from_ohm, to_ohm) = match self.fault {
+                Fault::OpenRow { before_node: 0, .. } | Fault::OpenColumn { before_node: 0, .. } => {
+                    (full_scale_ohm, full_scale_ohm)
+                }
+                Fault::Stuck {
+                    end: ConverterEnd::High,
+                    ..
+                } => (full_scale_ohm, full_scale_ohm),
+                Fault::Stuck {
+                    end: ConverterEnd::Low, ..
+                } => (lowest_ohm, lowest_ohm),
+                _ => (0.0, full_scale_ohm),
+            };
+            ohms[affected]
+                .iter_mut()
+                .for_each(|ohm| *ohm = ohm.clamp(from_ohm, to_ohm));
+        }
     }
 
     /// Applies faults of wires and amplifiers to the resistances of one snapshot (rows `read`, row by row), which belong
     /// to `deformation`.
     pub fn before_noise(&self, read: &[usize], deformation: &Deformation, resistances_ohm: &mut [f64]) {
-        let scale = self.model.scale;
-        let (columns, full_scale_ohm) = (scale.columns(), self.range_ohm.1);
-        // Eq. (2) over the nodes before a break.
+        let (scale, geometry) = (self.model.scale, &self.model.geometry);
+        // Eq. (2) over the nodes before a break. Without any node there is no current, and the converter reads its full scale.
         let near_ohm = |row: usize, nodes: usize, column: usize, electrodes: usize| {
             let positions_mm = deformation.row_positions_mm(&self.model, row).take(nodes);
-            let reciprocals = positions_mm.flat_map(|at_mm| {
-                let electrodes = 0..electrodes;
-                electrodes.map(move |electrode| {
-                    let electrode_mm = self.model.geometry.column_node_mm(column, electrode);
-                    at_mm.distance(electrode_mm).recip()
+            let sum: f64 = positions_mm
+                .flat_map(|at_mm| {
+                    let electrodes = (0..electrodes).map(move |electrode| geometry.column_node_mm(column, electrode));
+                    electrodes.map(move |electrode_mm| at_mm.distance(electrode_mm).recip())
                 })
-            });
-            // Without any node there is no current, and the converter reads its full scale.
-            let sum: f64 = reciprocals.sum();
-            if sum > 0.0 {
-                self.model.resistivity_ohm_per_mm / sum
-            } else {
-                full_scale_ohm
+                .sum();
+            match sum > 0.0 {
+                true => self.model.resistivity_ohm_per_mm / sum,
+                false => self.range_ohm.1,
             }
         };
-        for (&row, ohms) in read.iter().zip(resistances_ohm.chunks_exact_mut(columns)) {
+        for (&row, ohms) in read.iter().zip(resistances_ohm.chunks_exact_mut(scale.columns())) {
             match self.fault {
                 Fault::OpenRow { row: open, before_node } if open == row => {
                     for (column, ohm) in ohms.iter_mut().enumerate() {
@@ -272,48 +302,4 @@ impl FaultySensor {
             }
         }
     }
-
-    /// Applies faults of the converter to the readings of one snapshot: without current, or when it is stuck, it reads an
-    /// end of its range without noise.
-    pub fn after_noise(&self, read: &[usize], readings_ohm: &mut [f64]) {
-        let (lowest_ohm, full_scale_ohm) = self.range_ohm;
-        for (&row, ohms) in read
-            .iter()
-            .zip(readings_ohm.chunks_exact_mut(self.model.scale.columns()))
-        {
-            let affected = match self.fault {
-                Fault::OpenRow { row: open, .. } if open == row => ohms,
-                Fault::OpenColumn { column, .. } | Fault::Gain { column, .. } | Fault::Stuck { column, .. } => {
-                    &mut ohms[column..=column]
-                }
-                Fault::OpenRow { .. } | Fault::ShortedColumns { .. } => continue,
-            };
-            for ohm in affected {
-                *ohm = match self.fault {
-                    Fault::OpenRow { before_node: 0, .. }
-                    | Fault::OpenColumn { before_node: 0, .. }
-                    | Fault::Stuck {
-                        end: ConverterEnd::High,
-                        ..
-                    } => full_scale_ohm,
-                    Fault::Stuck {
-                        end: ConverterEnd::Low, ..
-                    } => lowest_ohm,
-                    _ => ohm.min(full_scale_ohm),
-                };
-            }
-        }
-    }
-}
-
-/// Changes the readings of each snapshot (rows × M4), given its index.
-fn change_snapshots(set: &mut Dataset, mut change: impl FnMut(usize, &mut [f64])) {
-    let mut readings = set.readings().to_owned();
-    let all = readings
-        .as_slice_mut()
-        .expect("a set has its readings in standard layout");
-    for (snapshot, ohms) in all.chunks_exact_mut(set.row_count() * set.channels()).enumerate() {
-        change(snapshot, ohms);
-    }
-    *set = set.with_readings(readings);
 }

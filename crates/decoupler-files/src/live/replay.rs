@@ -1,43 +1,188 @@
 use std::{
     fs::{self, File},
-    io::{BufRead, BufReader, Seek, SeekFrom},
+    io::{self, BufRead, BufReader, Read},
     ops::{ControlFlow, RangeInclusive},
     path::Path,
     time::{Duration, Instant},
 };
 
-use ndarray::Array3;
+use thiserror::Error;
 
-use super::{Lines, Recording, SessionError, tally::Tally};
+use super::{Answer, Lines, SessionError, SessionEvent, Tally};
 use crate::{
     export::NetworkFile,
-    import::ParsedLine,
+    import::{LineError, LineParser, ParsedLine},
     machine::{ReadingBudget, system_cause},
 };
+
+/// Frames of an array, or samples of another sensor, for replay.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Time of each frame in seconds, in ascending order.
+    times_s: Vec<f64>,
+    /// Frames × readings of a frame.
+    readings: Vec<f64>,
+    /// Number of readings of a frame.
+    length: usize,
+    /// Index of the network of each sample; empty if a frame has all row-wires.
+    row_indices: Vec<usize>,
+}
+
+/// Error in a recording.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RecordingError {
+    /// The file cannot be read.
+    #[error("{}", system_cause(.0))]
+    File(#[from] io::Error),
+    /// No line can be read.
+    #[error(transparent)]
+    Line(#[from] LineError),
+    /// There is no complete frame, perhaps because of a malformed line.
+    #[error("it contains no complete frame: record again, or choose another file{}{}", if .0.is_empty() { "" } else { "; " }, .0)]
+    Empty(String),
+}
+
+/// Rate of frames without times, per second.
+const RATE_WITHOUT_TIMES: f64 = 50.0;
+
+impl Recording {
+    /// Reads the frames of an array, each with `length` readings, from lines in `parser`'s form: a file written by
+    /// [`Recorder`](super::Recorder), or another that `decode` reads. Malformed lines and rows out of order are counted in
+    /// `tally`, and their frames left out; so is a last line that is cut off in a file with times. Times are those of the file as
+    /// far as they ascend, as for samples; without any, frames come at an even rate.
+    ///
+    /// # Errors
+    /// If the file cannot be read, a header lacks a resistance, or there is no complete frame.
+    pub fn read(
+        source: impl Read,
+        mut parser: LineParser,
+        length: usize,
+        tally: &mut Tally,
+    ) -> Result<Self, RecordingError> {
+        let mut source = BufReader::new(source);
+        let (mut times_s, mut frame_s, mut readings) = (Vec::new(), f64::NAN, Vec::new());
+        let (mut text, mut line) = (Vec::new(), 0);
+        while source.read_until(b'\n', &mut text)? > 0 {
+            line += 1;
+            let is_ended = text.pop_if(|last| *last == b'\n').is_some();
+            if !is_ended && times_s.last().is_some_and(|time_s: &f64| time_s.is_finite()) {
+                // Its last number may be cut off.
+                tally.bad(&format!("line {line}, the last, is cut off and left out"));
+                break;
+            }
+            let parsed = parser.parse(line, &text);
+            // Readings of whole frames, and the place where those of the line should begin.
+            let (whole, place) = (times_s.len() * length, readings.len() - times_s.len() * length);
+            let (begin, row, time_s) = match parsed {
+                Ok(ParsedLine::Row {
+                    row_index,
+                    readings: row,
+                    time_s,
+                    ..
+                }) => (row_index.unwrap_or(0) * row.len(), row, time_s),
+                Ok(ParsedLine::Snapshot(frame)) => (0, frame, None),
+                Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => (length, &[][..], None),
+                Err(error) if error.is_final() => return Err(error.into()),
+                Err(error) => {
+                    readings.truncate(whole);
+                    tally.bad(&error.to_string());
+                    (length, &[][..], None)
+                }
+            };
+            text.clear();
+            if begin != place && !row.is_empty() {
+                // After a malformed line, the rest of its frame is left out without another word.
+                if place > 0 {
+                    let expected = place / row.len() + 1;
+                    tally.bad(&format!(
+                        "line {line}: row {expected} is expected here: each frame needs its rows in ascending order"
+                    ));
+                }
+                readings.truncate(whole);
+            }
+            if begin == readings.len() - whole {
+                frame_s = if begin == 0 {
+                    time_s.unwrap_or(f64::NAN)
+                } else {
+                    frame_s
+                };
+                readings.extend_from_slice(row);
+            }
+            if readings.len() == whole + length {
+                times_s.push(frame_s);
+            }
+        }
+        readings.truncate(times_s.len() * length);
+        match times_s.is_empty() {
+            true => Err(RecordingError::Empty(tally.first_bad.clone().unwrap_or_default())),
+            false => Ok(Self {
+                times_s: ascending(&times_s),
+                readings,
+                length,
+                row_indices: Vec::new(),
+            }),
+        }
+    }
+
+    /// Returns the times of the frames in seconds, in ascending order.
+    pub fn times_s(&self) -> &[f64] {
+        &self.times_s
+    }
+
+    /// Returns the index of the last frame at or before a time; 0 before the first frame.
+    pub fn frame_at(&self, time_s: f64) -> usize {
+        self.times_s.partition_point(|other| *other <= time_s).saturating_sub(1)
+    }
+
+    /// Returns the readings of a frame: those of an array in ohm, row by row.
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    pub fn frame(&self, index: usize) -> &[f64] {
+        &self.readings[index * self.length..][..self.length]
+    }
+}
+
+/// Times that never step back: a frame with an earlier time than the one before, or none, comes one usual interval (median) after
+/// it, and the following ones at their distances. Without any time, frames come at an even rate.
+fn ascending(times_s: &[f64]) -> Vec<f64> {
+    if times_s.iter().all(|time_s| time_s.is_nan()) {
+        return Vec::from_iter((0..times_s.len()).map(|frame| frame as f64 / RATE_WITHOUT_TIMES));
+    }
+    let steps = times_s.windows(2).map(|pair| pair[1] - pair[0]);
+    let steps = Vec::from_iter(steps.map(|step| Some(step).filter(|step| *step >= 0.0)));
+    let mut known = Vec::from_iter(steps.iter().flatten().copied().filter(|step| *step > 0.0));
+    known.sort_unstable_by(f64::total_cmp);
+    let usual_s = known.get(known.len() / 2).copied().unwrap_or(1.0 / RATE_WITHOUT_TIMES);
+    let first_s = times_s.first().copied().filter(|time_s| time_s.is_finite());
+    let mut time_s = first_s.unwrap_or(0.0);
+    let rest = steps.into_iter().map(|step| {
+        time_s += step.unwrap_or(usual_s);
+        time_s
+    });
+    std::iter::once(first_s.unwrap_or(0.0)).chain(rest).collect()
+}
 
 /// Replay of a recording: its frames come at their recorded times, at an adjustable speed.
 #[derive(Debug)]
 pub struct Replay {
     recording: Recording,
-    /// Index of the network of each sample; empty if a frame has all row-wires.
-    row_indices: Vec<usize>,
+    /// True if no frame is dropped: every one is taken once and in order, also if it is not displayed.
+    keeps_all: bool,
     /// Recorded seconds per second.
     speed: f64,
     is_playing: bool,
     /// Recorded time at an instant, from which it advances while playing.
     anchor: (f64, Instant),
-    /// Index of the next frame.
+    /// Index of the next frame by its time.
     next: usize,
     /// True if the next frame is due now, whatever its time.
     is_wanted: bool,
-}
-
-/// A frame that is due.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Due {
-    pub(super) index: usize,
-    /// Number of frames before it that were not taken in time.
-    pub(super) missed: usize,
+    /// Index of the frame that is due, until it and all before it are taken.
+    due: Option<usize>,
+    /// Number of frames that were taken in order.
+    taken: usize,
 }
 
 /// Position in a recording.
@@ -55,65 +200,26 @@ pub struct ReplayState {
 const SPEEDS: RangeInclusive<f64> = 0.1..=10.0;
 
 impl Replay {
-    /// Prepares the replay of the file at `path` for the network of `file`, from the first frame, not playing. Malformed
-    /// lines of an array are counted in `tally`.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or has no complete frame.
-    pub(super) fn open(
-        path: &Path,
-        file: &NetworkFile,
-        tally: &mut Tally,
-        is_wanted: &dyn Fn() -> bool,
-        now: Instant,
-    ) -> Result<Self, SessionError> {
-        let (recording, row_indices) = match &file.problem.sensor {
-            Some(_) => (read_frames(path, file, tally)?, Vec::new()),
-            None => read_samples(path, file, is_wanted)?,
-        };
-        Ok(Self::new(recording, row_indices, now))
-    }
-
-    fn new(recording: Recording, row_indices: Vec<usize>, now: Instant) -> Self {
+    /// Prepares a replay from the first frame, not playing.
+    pub(super) fn new(recording: Recording, keeps_all: bool, now: Instant) -> Self {
         Self {
-            anchor: (recording.times_s()[0], now),
+            anchor: (recording.times_s[0], now),
             recording,
-            row_indices,
+            keeps_all,
             speed: 1.0,
             is_playing: false,
             next: 0,
             is_wanted: true,
+            due: None,
+            taken: 0,
         }
-    }
-
-    /// Returns the time of a frame in seconds.
-    pub(super) fn frame_time_s(&self, index: usize) -> f64 {
-        self.recording.times_s()[index]
-    }
-
-    /// Writes the readings of a frame, and returns the index of the row-wire with which it begins.
-    pub(super) fn read(&self, index: usize, readings: &mut Vec<f64>) -> usize {
-        readings.clear();
-        readings.extend(self.recording.frame_ohm(index));
-        self.row_indices.get(index).copied().unwrap_or(0)
-    }
-
-    fn first_s(&self) -> f64 {
-        self.recording.times_s()[0]
-    }
-
-    fn frames(&self) -> usize {
-        self.recording.times_s().len()
     }
 
     /// Returns the recorded time at `now`.
     fn time_s(&self, now: Instant) -> f64 {
         let (time_s, since) = self.anchor;
-        if self.is_playing {
-            time_s + self.speed * now.saturating_duration_since(since).as_secs_f64()
-        } else {
-            time_s
-        }
+        let passed = now.saturating_duration_since(since).as_secs_f64();
+        time_s + if self.is_playing { self.speed * passed } else { 0.0 }
     }
 
     /// Sets the number of recorded seconds per second, from 0.1 to 10.
@@ -124,7 +230,7 @@ impl Replay {
 
     /// Pauses or resumes the replay; after the end, it restarts from the beginning.
     pub fn play(&mut self, is_playing: bool, now: Instant) {
-        if is_playing && self.next >= self.frames() {
+        if is_playing && self.next >= self.recording.times_s.len() {
             self.seek(0.0, now);
         }
         self.anchor = (self.time_s(now), now);
@@ -133,50 +239,59 @@ impl Replay {
 
     /// Seeks to a time in seconds after the first frame, and continues from there if it is playing.
     pub fn seek(&mut self, at_s: f64, now: Instant) {
-        let time_s = self.first_s() + at_s.max(0.0);
-        self.next = self.recording.frame_at(time_s);
-        self.anchor = (self.recording.times_s()[self.next], now);
-        self.is_wanted = true;
+        self.next = self.recording.frame_at(self.recording.times_s[0] + at_s.max(0.0));
+        self.anchor = (self.recording.times_s[self.next], now);
+        (self.is_wanted, self.due) = (true, None);
     }
 
     /// Returns the time at which the next frame is due; `None` while it is paused.
     pub(super) fn due(&self, now: Instant) -> Option<Instant> {
-        if self.is_wanted {
+        if self.is_wanted || self.due.is_some() {
             return Some(now);
         }
-        let time_s = self.recording.times_s().get(self.next).filter(|_| self.is_playing)?;
+        let time_s = self.recording.times_s.get(self.next).filter(|_| self.is_playing)?;
         let wait_s = (time_s - self.time_s(now)) / self.speed;
         Some(now + Duration::try_from_secs_f64(wait_s.max(0.0)).unwrap_or(Duration::MAX / 4))
     }
 
-    /// Takes the next frame, if it is due. Frames that were not taken in time are missed.
-    pub(super) fn take(&mut self, now: Instant) -> Option<Due> {
-        if self.due(now)? > now {
-            return None;
+    /// Takes the next frame, if it is due. Of an array, frames that were not taken in time are dropped.
+    pub(super) fn take(&mut self, now: Instant, answer: &mut Answer, tally: &mut Tally) -> SessionEvent {
+        if self.due(now).is_none_or(|due| due > now) {
+            return SessionEvent::Nothing;
         }
-        let mut missed = 0;
-        if !std::mem::take(&mut self.is_wanted) {
-            let latest = self.recording.frame_at(self.time_s(now));
-            let late_s = (self.time_s(now) - self.frame_time_s(self.next)) / self.speed;
-            if late_s > Lines::PATIENCE.as_secs_f64() && latest > self.next {
-                missed = latest - self.next;
+        let (now_s, times_s) = (self.time_s(now), &self.recording.times_s);
+        let due = *self.due.get_or_insert_with(|| {
+            let first = self.next;
+            let is_late = now_s - times_s[first] > self.speed * Lines::PATIENCE.as_secs_f64();
+            if !std::mem::take(&mut self.is_wanted) && is_late {
+                self.next = self.recording.frame_at(now_s).max(first);
             }
+            if !self.keeps_all {
+                tally.dropped += (self.next - first) as u64;
+            }
+            self.next += 1;
+            self.next - 1
+        });
+        if self.next >= times_s.len() {
+            (self.anchor, self.is_playing) = ((times_s[due], now), false);
         }
-        let index = self.next + missed;
-        self.next = index + 1;
-        if self.next >= self.frames() {
-            self.anchor = (self.frame_time_s(index), now);
-            self.is_playing = false;
-        }
-        Some(Due { index, missed })
+        let index = if self.keeps_all { due.min(self.taken) } else { due };
+        self.due = Some(due).filter(|due| index < *due);
+        answer.is_repeated = self.keeps_all && index < self.taken;
+        self.taken = self.taken.max(index + 1);
+        answer.readings.clear();
+        answer.readings.extend_from_slice(self.recording.frame(index));
+        answer.first_row = Some(self.recording.row_indices.get(index).copied().unwrap_or(0));
+        (answer.time_s, answer.read_at) = (times_s[index], Some(now));
+        SessionEvent::Answer
     }
 
     /// Returns the position of the frame at `time_s`.
     pub(super) fn state(&self, time_s: f64) -> ReplayState {
-        let last_s = self.recording.times_s().last().copied().unwrap_or_default();
+        let times_s = &self.recording.times_s;
         ReplayState {
-            at_s: time_s - self.first_s(),
-            length_s: last_s - self.first_s(),
+            at_s: time_s - times_s[0],
+            length_s: times_s[times_s.len() - 1] - times_s[0],
             is_playing: self.is_playing,
         }
     }
@@ -184,138 +299,61 @@ impl Replay {
 
 /// Memory of a byte of text that is replayed: short numbers, in a vector that has just doubled.
 const MEMORY_OF_BYTE: u64 = 8;
-/// Rate of frames without times, per second.
-const RATE_WITHOUT_TIMES: f64 = 50.0;
 
-/// Reads the frames of an array from a file: a recording with a time for each frame, or else lines as `decode` reads them, at
-/// an even rate. Malformed lines are counted in `tally`, and incomplete frames are skipped.
-fn read_frames(path: &Path, file: &NetworkFile, tally: &mut Tally) -> Result<Recording, SessionError> {
-    let simulation = file.problem.sensor.as_ref().ok_or(SessionError::NoModel)?;
-    let (scale, scene) = (simulation.sensor.scale, &simulation.scene);
-    let read = scene.rows.read(scale.rows())?;
-    let refused = |cause: &dyn std::fmt::Display| SessionError::Replay(path.to_owned(), cause.to_string());
-    let system = |error: std::io::Error| refused(&system_cause(&error));
-    let found = fs::metadata(path).map_err(system)?;
-    if !found.is_file() {
-        return Err(refused(&"it is not a file; choose a recording"));
-    }
-    let claimed = ReadingBudget::now().claim(found.len().saturating_mul(MEMORY_OF_BYTE));
-    claimed.map_err(|over| refused(&over))?;
-    let mut opened = File::open(path).map_err(system)?;
-    let mut first = Vec::new();
-    BufReader::new(&opened).read_until(b'\n', &mut first).map_err(system)?;
-    opened.seek(SeekFrom::Start(0)).map_err(system)?;
-    let reader = BufReader::new(opened);
-    let has_times = first
-        .split(|&byte| byte == b',')
-        .any(|name| name.trim_ascii() == b"time_s");
-    if has_times {
-        let recording =
-            Recording::read(reader, &read, scale.rows(), scale.columns()).map_err(|error| refused(&error))?;
-        if let Some(line) = recording.torn_line() {
-            tally.bad(&format!("line {line}, the last, is cut off and left out"));
-        }
-        return Ok(recording);
-    }
-    let mut lines = file.line_parser(true, true)?;
-    let (columns, length) = (scale.columns(), read.len() * scale.columns());
-    let mut all_ohm: Vec<f64> = Vec::new();
-    let mut frame_ohm: Vec<f64> = Vec::with_capacity(length);
-    for (line, number) in reader.split(b'\n').zip(1..) {
-        match lines.parse(number, &line.map_err(system)?) {
-            Ok(ParsedLine::Snapshot(readings)) => all_ohm.extend_from_slice(readings),
-            Ok(ParsedLine::Row {
-                row_index, readings, ..
-            }) => {
-                let begin = row_index.unwrap_or(0) * columns;
-                if begin != frame_ohm.len() {
-                    frame_ohm.clear();
-                }
-                // Otherwise an earlier row is missing, and the frame is incomplete.
-                if begin == frame_ohm.len() {
-                    frame_ohm.extend_from_slice(readings);
-                }
-                if frame_ohm.len() == length {
-                    all_ohm.append(&mut frame_ohm);
-                }
-            }
-            Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => {}
-            Err(error) if error.is_final() => return Err(refused(&error)),
-            Err(error) => tally.bad(&error.to_string()),
-        }
-    }
-    let frames = all_ohm.len() / length;
-    let frames_ohm = Array3::from_shape_vec((frames, read.len(), columns), all_ohm);
-    let frames_ohm = frames_ohm.expect("every frame has all readings");
-    let recording = Recording::at_rate(frames_ohm, RATE_WITHOUT_TIMES);
-    recording.map_err(|error| match &tally.counts.first_bad {
-        Some(reason) => refused(&format_args!("{error}; {reason}")),
-        None => refused(&error),
-    })
-}
-
-/// Reads the samples for a network of a recording from a file, with the index of the network of each. They come at the times of
-/// the file or, without a time column, at an even rate.
-fn read_samples(
+/// Reads the file at `path` for the network of `file`: frames of an array with `length` readings, or else samples, which come at
+/// the times of the file or, without a time column, at an even rate.
+pub(super) fn open(
     path: &Path,
     file: &NetworkFile,
+    length: Option<usize>,
+    tally: &mut Tally,
     is_wanted: &dyn Fn() -> bool,
-) -> Result<(Recording, Vec<usize>), SessionError> {
-    let refused = |cause: &dyn std::fmt::Display| SessionError::Replay(path.to_owned(), cause.to_string());
+) -> Result<Recording, SessionError> {
+    let refused = |cause: String| SessionError::Replay(path.to_owned(), cause);
+    if let Some(length) = length {
+        let found = fs::metadata(path).map_err(|error| refused(system_cause(&error)))?;
+        if !found.is_file() {
+            return Err(refused("it is not a file; choose a recording".to_owned()));
+        }
+        let claimed = ReadingBudget::now().claim(found.len().saturating_mul(MEMORY_OF_BYTE));
+        claimed.map_err(|over| refused(over.to_string()))?;
+        let parser = file.line_parser(true, true)?;
+        let opened = File::open(path).map_err(RecordingError::from);
+        let read = opened.and_then(|opened| Recording::read(opened, parser, length, tally));
+        return read.map_err(|error| refused(error.to_string()));
+    }
     let recipe = file.recorded.as_ref().map(|recorded| recorded.plan.import.clone());
     let watch = &mut |_| match is_wanted() {
         true => ControlFlow::Continue(()),
         false => ControlFlow::Break(()),
     };
     let has_rows = file.network.only().is_none();
-    let table = recipe
-        .unwrap_or_default()
-        .read_inputs(path, &file.problem, has_rows, watch)?;
+    let table = (recipe.unwrap_or_default()).read_inputs(path, &file.problem, has_rows, watch)?;
     let row_indices = match (&file.row_wires, &table.row_wires) {
         _ if !has_rows => Vec::new(),
         (Some(read), Some(of_samples)) => {
             let index = |(&row, &line): (&usize, &u64)| {
                 let index = read.iter().position(|read| *read == row);
-                index.ok_or_else(|| refused(&format_args!("line {line}: there is no network for row {}", row + 1)))
+                index.ok_or_else(|| refused(format!("line {line}: there is no network for row {}", row + 1)))
             };
             let indices = of_samples.iter().zip(&table.lines).map(index);
             indices.collect::<Result<_, _>>()?
         }
         _ => {
-            return Err(refused(
-                &"it has no column of row-wires, and there is a network for each",
-            ));
+            let reason = "it has no column of row-wires, and there is a network for each";
+            return Err(refused(reason.to_owned()));
         }
     };
-    let (samples, inputs) = table.readings.dim();
-    let readings = table.readings.into_shape_with_order((samples, 1, inputs));
-    let readings = readings.expect("each sample is a frame of one row");
-    let recording = match table.times_s {
-        Some(times_s) => Recording::at_times(ascending(&times_s), readings),
-        None => Recording::at_rate(readings, RATE_WITHOUT_TIMES),
-    };
-    Ok((recording.map_err(|error| refused(&error))?, row_indices))
-}
-
-/// Times that never step back: a sample with an earlier time than the one before, or none, comes one usual interval (median) after
-/// it, and the following ones at their distances.
-fn ascending(times_s: &[f64]) -> Vec<f64> {
-    let steps = times_s.windows(2).map(|pair| pair[1] - pair[0]);
-    let steps = Vec::from_iter(steps.map(|step| Some(step).filter(|step| *step >= 0.0)));
-    let mut known = Vec::from_iter(steps.iter().flatten().copied().filter(|step| *step > 0.0));
-    known.sort_unstable_by(f64::total_cmp);
-    let usual_s = known.get(known.len() / 2).copied().unwrap_or(1.0 / RATE_WITHOUT_TIMES);
-    let first_s = times_s
-        .first()
-        .copied()
-        .filter(|time_s| time_s.is_finite())
-        .unwrap_or(0.0);
-    let mut time_s = first_s;
-    let rest = steps.into_iter().map(|step| {
-        time_s += step.unwrap_or(usual_s);
-        time_s
-    });
-    std::iter::once(first_s).chain(rest).take(times_s.len()).collect()
+    let (samples, length) = table.readings.dim();
+    if samples == 0 {
+        return Err(refused(RecordingError::Empty(String::new()).to_string()));
+    }
+    Ok(Recording {
+        times_s: ascending(&table.times_s.unwrap_or_else(|| vec![f64::NAN; samples])),
+        readings: table.readings.into_iter().collect(),
+        length,
+        row_indices,
+    })
 }
 
 #[cfg(test)]
@@ -328,23 +366,28 @@ mod tests {
     use crate::live::Recorder;
 
     fn replay(speed: f64, start: Instant) -> Replay {
-        let frames = Array3::from_shape_fn((100, 1, 1), |(frame, ..)| frame as f64 + 1.0);
-        let mut replay = Replay::new(Recording::at_rate(frames, 20.0).unwrap(), Vec::new(), start);
+        let recording = Recording {
+            times_s: (0..100).map(|frame| f64::from(frame) / 20.0).collect(),
+            readings: (1..=100).map(f64::from).collect(),
+            length: 1,
+            row_indices: Vec::new(),
+        };
+        let mut replay = Replay::new(recording, false, start);
         replay.set_speed(speed, start);
         replay.play(true, start);
         replay
     }
 
     /// Returns the numbers of the frames, from 1, that come in `millis` after the start, polled every 5 ms, and of those missed.
-    fn frames(replay: &mut Replay, start: Instant, millis: std::ops::Range<u64>) -> (Vec<usize>, usize) {
-        let (mut received, mut missed) = (Vec::new(), 0);
+    fn frames(replay: &mut Replay, start: Instant, millis: std::ops::Range<u64>) -> (Vec<usize>, u64) {
+        let (mut received, mut tally, mut answer) = (Vec::new(), Tally::default(), Answer::default());
         for k in millis.step_by(5) {
-            while let Some(due) = replay.take(start + Duration::from_millis(k)) {
-                received.push(due.index + 1);
-                missed += due.missed;
+            let now = start + Duration::from_millis(k);
+            while matches!(replay.take(now, &mut answer, &mut tally), SessionEvent::Answer) {
+                received.push(answer.readings[0] as usize);
             }
         }
-        (received, missed)
+        (received, tally.dropped)
     }
 
     #[test]
@@ -386,7 +429,7 @@ mod tests {
         let nan = f64::NAN;
         let found = ascending(&[5.0, 5.5, 6.0, nan, 7.0, 0.0, 0.25, 10.25]);
         assert_eq!(found, [5.0, 5.5, 6.0, 6.5, 7.0, 7.5, 7.75, 17.75]);
-        assert_eq!(ascending(&[nan]), [0.0]);
+        assert_eq!(ascending(&[nan, nan]), [0.0, 0.02]);
         assert_eq!(ascending(&[]), [0.0; 0]);
     }
 
@@ -406,9 +449,76 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("frames.csv");
         fs::write(&path, text).unwrap();
-        let mut tally = Tally::new(Instant::now());
-        let read = read_frames(&path, &network(), &mut tally);
+        let mut tally = Tally::default();
+        let read = open(&path, &network(), Some(6), &mut tally, &|| true);
         (read.map_err(|error| error.to_string()), tally)
+    }
+
+    /// Four frames of two rows with three channels.
+    fn recorded() -> Vec<u8> {
+        let mut file = Vec::new();
+        let mut recorder = Recorder::new(&mut file, &[0, 1], 3).unwrap();
+        for frame in 0..4 {
+            let frame_ohm: Vec<f64> = (0..6).map(|k| 0.1 + f64::from(10 * frame + k)).collect();
+            recorder.record(0.1 * f64::from(frame), &frame_ohm).unwrap();
+        }
+        file
+    }
+
+    #[test]
+    fn recorded_frames_are_replayed_bit_for_bit() {
+        let recording = read(&recorded()).0.unwrap();
+        assert_eq!(recording.times_s(), [0.0, 0.1, 0.2, 0.1 * 3.0]);
+        assert_eq!(recording.frame(2), [20.1, 21.1, 22.1, 23.1, 24.1, 25.1]);
+        for (time_s, frame) in [(-1.0, 0), (0.0, 0), (0.15, 1), (0.2, 2), (99.0, 3)] {
+            assert_eq!(recording.frame_at(time_s), frame, "{time_s}");
+        }
+    }
+
+    #[test]
+    fn a_recording_cut_off_anywhere_keeps_its_complete_frames() {
+        let (bytes, network) = (recorded(), network());
+        let ends: Vec<usize> = (0..bytes.len()).filter(|&place| bytes[place] == b'\n').collect();
+        for length in ends[2] + 1..bytes.len() {
+            let (mut tally, parser) = (Tally::default(), network.line_parser(true, true).unwrap());
+            let recording = Recording::read(&bytes[..length], parser, 6, &mut tally).unwrap();
+            let whole = ends.iter().filter(|&&end| end < length).count() - 1;
+            assert_eq!(recording.times_s().len(), whole / 2, "{length}");
+            let is_torn = bytes[length - 1] != b'\n';
+            let torn = format!("line {}, the last, is cut off and left out", whole + 2);
+            assert_eq!(tally.last_bad, is_torn.then_some(torn), "{length}");
+            assert_eq!(recording.frame(0), [0.1, 1.1, 2.1, 3.1, 4.1, 5.1]);
+        }
+        let message = read(&bytes[..=ends[1]]).0.unwrap_err();
+        assert!(message.contains("no complete frame"), "{message}");
+    }
+
+    /// As when two recordings are joined, or a time is lost.
+    #[test]
+    fn times_that_do_not_ascend_continue_at_the_usual_interval() {
+        let text = String::from_utf8(recorded()).unwrap();
+        for (from, to) in [("0.2,", "0.05,"), ("0.2,", ","), ("0.2,", "x,")] {
+            let (recording, tally) = read(text.replace(from, to).as_bytes());
+            let times_s = recording.unwrap().times_s().to_vec();
+            assert!(
+                (times_s[2] - 0.2).abs() < 1e-12 && times_s.len() == 4 && tally.bad == 0,
+                "{to}: {times_s:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn frames_with_rows_out_of_order_or_malformed_cells_are_left_out_and_the_line_reported() {
+        let text = String::from_utf8(recorded()).unwrap();
+        for (from, to, expected) in [
+            ("0.1,2", "0.1,1", "line 6: row 2 is expected here"),
+            ("0.1,1,10.1", "0.1,1,-1", "line 4, column 3: '-1'"),
+        ] {
+            let (recording, tally) = read(text.replacen(from, to, 1).as_bytes());
+            assert_eq!((recording.unwrap().times_s().len(), tally.bad), (3, 1), "{to}");
+            let reason = tally.last_bad.unwrap();
+            assert!(reason.starts_with(expected), "{reason}");
+        }
     }
 
     #[test]
@@ -430,10 +540,7 @@ mod tests {
         for text in texts {
             let recording = read(text).0.unwrap();
             assert_eq!(recording.times_s(), [0.0, 0.02], "{}", String::from_utf8_lossy(text));
-            assert_eq!(
-                recording.frame_ohm(1),
-                ndarray::array![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
-            );
+            assert_eq!(recording.frame(1), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         }
     }
 
@@ -446,15 +553,20 @@ mod tests {
         }
         let (recording, tally) = read(&recorded[..recorded.len() - 3]);
         assert_eq!(recording.unwrap().times_s(), [0.5]);
-        let reason = tally.counts().last_bad.unwrap();
+        let reason = tally.last_bad.unwrap();
         assert!(reason.contains("line 5, the last, is cut off"), "{reason}");
     }
 
     #[cfg(unix)]
     #[test]
     fn what_is_no_file_is_refused_before_it_is_opened() {
-        let mut tally = Tally::new(Instant::now());
-        let refused = read_frames(Path::new("/dev/zero"), &network(), &mut tally);
+        let refused = open(
+            Path::new("/dev/zero"),
+            &network(),
+            Some(6),
+            &mut Tally::default(),
+            &|| true,
+        );
         assert!(refused.unwrap_err().to_string().contains("it is not a file"));
     }
 
@@ -468,8 +580,7 @@ mod tests {
     fn a_frame_with_a_bad_line_is_left_out_and_the_line_reported() {
         let (recording, tally) = read(b"1,2,3\n4,#,6\n1,2,3\n4,5,6\n");
         assert_eq!(recording.unwrap().times_s().len(), 1);
-        let counts = tally.counts();
-        assert!(counts.bad == 1 && counts.last_bad.unwrap().starts_with("line 2"));
+        assert!(tally.bad == 1 && tally.last_bad.unwrap().starts_with("line 2"));
         let message = read(b"1,2\n").0.unwrap_err();
         assert!(
             message.contains("frames.csv") && message.contains("line 1"),

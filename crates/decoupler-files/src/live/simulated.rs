@@ -2,14 +2,13 @@ use std::f64::consts::TAU;
 
 use decoupler_core::{
     dataset::{Seed, Stream},
-    scene::{Deformation, Indenter, Loading, NoiseSource, Scene, SceneError},
-    sensor::{SensorError, SensorModel, short},
+    scene::{Deformation, Indenter, Loading, Noise, NoiseSource, Scene},
+    sensor::{SensorError, SensorModel},
 };
 use glam::{DVec2, DVec3};
 use rand::{Rng, RngExt, rngs::ChaCha8Rng};
-use thiserror::Error;
 
-use super::{Fault, FaultError, FaultySensor};
+use super::{Fault, FaultySensor, SessionError};
 
 /// Source of frames without hardware: an indenter that moves over the array, pressing and lifting.
 ///
@@ -24,7 +23,7 @@ pub struct Simulated {
     stroke_mm: f64,
     path: PressPath,
     source: NoiseSource,
-    scene: Scene,
+    noise: Noise,
     noise_rng: ChaCha8Rng,
     fault: Option<FaultySensor>,
     frames_per_second: f64,
@@ -47,34 +46,16 @@ pub enum Motion {
     Lifted,
 }
 
-/// Error in setting up a simulated source.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum SimulatedError {
-    /// The scene is invalid.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The array does not have the wires of the fault.
-    #[error(transparent)]
-    Fault(#[from] FaultError),
-    /// The array has no resistance at rest.
-    #[error(transparent)]
-    Sensor(#[from] SensorError),
-    /// The rate is out of range.
-    #[error("{} frames per second: give a number above 0 and at most 1000000", short(*.0))]
-    Rate(f64),
-}
-
 impl Simulated {
     /// Prepares frames of `model` with the rows, stroke and noise of `scene`, and its indenter, or a ball if it has
     /// another loading.
     ///
     /// # Errors
     /// If the scene or the rate is invalid, or the array has no resistance at rest.
-    pub fn new(model: &SensorModel, scene: &Scene, seed: Seed, frames_per_second: f64) -> Result<Self, SimulatedError> {
+    pub fn new(model: &SensorModel, scene: &Scene, seed: Seed, frames_per_second: f64) -> Result<Self, SessionError> {
         scene.check()?;
         if !(frames_per_second > 0.0 && frames_per_second <= 1e6) {
-            return Err(SimulatedError::Rate(frames_per_second));
+            return Err(SessionError::Rate(frames_per_second));
         }
         let noise = scene.noise.in_test();
         let indenter = match scene.loading {
@@ -88,7 +69,7 @@ impl Simulated {
             stroke_mm: scene.stroke_mm(&model.geometry),
             path: PressPath::new(model, &mut seed.rng(Stream::Live)),
             source: noise.source(model)?,
-            scene: *scene,
+            noise,
             noise_rng: seed.rng(Stream::LiveNoise),
             fault: None,
             frames_per_second,
@@ -109,6 +90,11 @@ impl Simulated {
         self.rows.len() * self.model.scale.columns()
     }
 
+    /// Returns the number of frames per second.
+    pub fn frames_per_second(&self) -> f64 {
+        self.frames_per_second
+    }
+
     /// Sets the motion of the indenter from the next frame on.
     pub fn set_motion(&mut self, motion: Motion) {
         self.motion = motion;
@@ -126,13 +112,12 @@ impl Simulated {
     ///
     /// # Errors
     /// If the array does not have its wires.
-    pub fn set_fault(&mut self, fault: Option<Fault>) -> Result<(), SimulatedError> {
-        let prepared = |fault: Fault| {
+    pub fn set_fault(&mut self, fault: Option<Fault>) -> Result<(), SessionError> {
+        if let Some(fault) = fault {
             fault.check(self.model.scale, &self.rows)?;
-            let faulty = FaultySensor::new(&self.model, self.scene.noise.in_test(), fault)?;
-            Ok::<_, SimulatedError>(faulty)
-        };
-        self.fault = fault.map(prepared).transpose()?;
+        }
+        let prepared = fault.map(|fault| FaultySensor::new(&self.model, self.noise, fault));
+        self.fault = prepared.transpose()?;
         Ok(())
     }
 
@@ -156,12 +141,10 @@ impl Simulated {
             self.model
                 .row_resistances_into(row, self.deformation.row_mm(row), readings_ohm)?;
         }
-        if let Some(fault) = &self.fault {
-            fault.before_noise(&self.rows, &self.deformation, readings_ohm);
-        }
-        self.source.disturb(readings_ohm, &mut self.noise_rng);
-        if let Some(fault) = &self.fault {
-            fault.after_noise(&self.rows, readings_ohm);
+        let at = (&*self.rows, &self.deformation);
+        match &self.fault {
+            Some(fault) => fault.disturb_snapshot(at, readings_ohm, &self.source, &mut self.noise_rng),
+            None => self.source.disturb(readings_ohm, &mut self.noise_rng),
         }
         Ok(time_s)
     }
@@ -213,8 +196,6 @@ impl PressPath {
 
 #[cfg(test)]
 mod tests {
-    use decoupler_core::scene::Noise;
-
     use super::*;
 
     fn source() -> Simulated {

@@ -5,7 +5,7 @@ use std::{fs::File, io::BufReader, path::PathBuf};
 use decoupler_core::{dataset::Seed, decoupling::Decoder, glam::DVec3};
 use decoupler_files::{
     export::NetworkFile,
-    live::{Recording, Simulated},
+    live::{Recording, Simulated, Tally},
 };
 
 fn sample(name: &str) -> PathBuf {
@@ -22,7 +22,8 @@ fn the_network_decodes_the_recording() {
     let (sensor, scale) = (source.sensor, source.sensor.scale);
     let rows = Vec::from_iter(0..scale.rows());
     let reader = BufReader::new(File::open(sample("recording.csv")).unwrap());
-    let recording = Recording::read(reader, &rows, scale.rows(), scale.columns()).unwrap();
+    let (parser, length) = (file.line_parser(true, true).unwrap(), rows.len() * scale.columns());
+    let recording = Recording::read(reader, parser, length, &mut Tally::default()).unwrap();
     let mut decoder = file.network.decoder();
     let mut truth = Simulated::new(&sensor, &source.scene, Seed(0), 15.0).unwrap();
     let mut frame_ohm = vec![0.0; truth.readings()];
@@ -30,8 +31,7 @@ fn the_network_decodes_the_recording() {
     let (mut errors_mm, mut depths_mm, mut count) = (0.0, 0.0, 0.0);
     for (index, time_s) in recording.times_s().iter().enumerate() {
         assert!((truth.next_frame(&mut frame_ohm).unwrap() - time_s).abs() < 1e-5);
-        let frame = recording.frame_ohm(index);
-        decoder.decode(frame.as_slice().unwrap(), &mut coordinates_mm).unwrap();
+        decoder.decode(recording.frame(index), &mut coordinates_mm).unwrap();
         for (row, coordinates_mm) in rows.iter().zip(coordinates_mm.chunks_exact(decoder.outputs())) {
             for (node, depth) in truth.deformation().row_mm(*row).iter().enumerate() {
                 let height_mm = sensor.geometry.height_mm - depth.z;

@@ -13,7 +13,7 @@ use decoupler_files::{
 };
 use eframe::egui::{ComboBox, TextEdit, Ui, vec2};
 
-use super::{LiveView, engine::Command, tools::LiveFile};
+use super::{LiveView, tools::LiveFile};
 use crate::window::{
     job::{Background, Wake},
     shared::{Effect, RunList, Shared},
@@ -119,13 +119,13 @@ impl SourceForm {
                     is_playing: true,
                 }
             }
-            SourceKind::Serial => SourcePlan::Stream(Source::Serial {
-                path: filled(
+            SourceKind::Serial => SourcePlan::Stream(Source::Serial(
+                filled(
                     &self.port,
                     "Give the name of the serial port, for example /dev/ttyUSB0 or COM3.",
                 )?,
-                baud: u32::try_from(self.baud).unwrap_or(u32::MAX),
-            }),
+                u32::try_from(self.baud).unwrap_or(u32::MAX),
+            )),
             SourceKind::Tcp => {
                 let address = filled(
                     &self.address,
@@ -276,7 +276,11 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         view.source
             .form_ui(ui, simulation.as_ref(), has_sensor, view.running.is_some(), effects);
         if view.source.motion != motion {
-            view.command(Command::Move(view.source.motion));
+            let motion = view.source.motion;
+            view.simulate(move |source| {
+                source.set_motion(motion);
+                Ok(())
+            });
         }
         if let (SourceKind::Simulated, Some(simulation)) = (view.source.kind, simulation) {
             let scale = simulation.sensor.scale;
@@ -289,7 +293,7 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
             view.fault.form_ui(ui, scale, &read);
             let after = fault(view);
             if after != before {
-                view.command(Command::Break(after));
+                view.simulate(move |source| source.set_fault(after));
             }
         }
         if let (Some(obstacle), true) = (view.obstacle(shared), network.is_some()) {

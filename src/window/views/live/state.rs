@@ -5,17 +5,18 @@ use std::{
         Arc,
         mpsc::{Sender, channel},
     },
+    time::Instant,
 };
 
 use decoupler_core::{live::ZeroGains, scene::Noise};
 use decoupler_files::{
     export::{NetworkFile, atomic_write},
-    live::{Recorded, SessionPlan, SourcePlan, Unit},
+    live::{Input, Recorded, Replay, Session, SessionError, SessionPlan, Simulated, SourcePlan, Unit},
 };
 
 use super::{
     cards::{DropScale, FaultForm},
-    engine::{Command, LiveEvent, LivePlan, LiveShown, run},
+    engine::{Command, LiveEvent, LiveShown, run},
     source_form::{NetworkChoice, SourceForm, SourceKind},
 };
 use crate::window::{
@@ -104,7 +105,7 @@ impl LiveView {
     ///
     /// # Errors
     /// If there is no network or a setting is missing, with what to do.
-    fn plan(&self, shared: &Shared, at_s: f64) -> Result<(String, LivePlan), String> {
+    fn plan(&self, shared: &Shared, at_s: f64) -> Result<(String, SessionPlan), String> {
         let (name, network) = self
             .network
             .network(&shared.runs)
@@ -113,15 +114,14 @@ impl LiveView {
             if self.source.kind == SourceKind::Simulated {
                 return Err(NOTHING_TO_SIMULATE.to_owned());
             }
-            let session = SessionPlan {
+            let plan = SessionPlan {
                 network: Arc::clone(network),
                 source: self.source.plan(None, at_s)?,
                 noise: Noise::default(),
                 zero: None,
                 unit: Unit::Frames,
             };
-            let recordings = PathBuf::new();
-            return Ok((name.to_owned(), LivePlan { session, recordings }));
+            return Ok((name.to_owned(), plan));
         };
         let scale = simulation.sensor.scale;
         let read = simulation.scene.rows.read(scale.rows()).unwrap_or_default();
@@ -129,7 +129,7 @@ impl LiveView {
             .fault
             .fault(scale)
             .filter(|_| self.fault.problem(scale, &read).is_none());
-        let session = SessionPlan {
+        let plan = SessionPlan {
             network: Arc::clone(network),
             source: self.source.plan(fault, at_s)?,
             noise: Noise {
@@ -142,8 +142,7 @@ impl LiveView {
                 .filter(|zero| zero.is_sound(read.len(), scale.columns())),
             unit: Unit::Frames,
         };
-        let recordings = folder(shared).join("recordings");
-        Ok((name.to_owned(), LivePlan { session, recordings }))
+        Ok((name.to_owned(), plan))
     }
 
     /// Returns true if the network is that of an array, whose sensor model simulates, re-zeroes and finds faults.
@@ -188,10 +187,7 @@ impl LiveView {
 
     /// Returns true if a stream has ended by itself and is still the chosen source.
     pub fn can_retry(&self, shared: &Shared) -> bool {
-        let is_same = |ended: &SourcePlan| {
-            self.plan(shared, 0.0)
-                .is_ok_and(|(_, plan)| plan.session.source == *ended)
-        };
+        let is_same = |ended: &SourcePlan| self.plan(shared, 0.0).is_ok_and(|(_, plan)| plan.source == *ended);
         self.running.is_none() && self.ended.as_ref().is_some_and(is_same)
     }
 
@@ -208,7 +204,7 @@ impl LiveView {
         let Ok((network, mut plan)) = self.plan(shared, replay.map_or(0.0, |replay| replay.at_s)) else {
             return;
         };
-        if let (SourcePlan::Replay { is_playing, .. }, Some(replay)) = (&mut plan.session.source, replay) {
+        if let (SourcePlan::Replay { is_playing, .. }, Some(replay)) = (&mut plan.source, replay) {
             *is_playing = replay.is_playing;
         } else {
             self.shown = LiveShown::default();
@@ -216,9 +212,9 @@ impl LiveView {
         self.begin(network, plan);
     }
 
-    fn begin(&mut self, network: String, plan: LivePlan) {
+    fn begin(&mut self, network: String, plan: SessionPlan) {
         self.keep_recording();
-        self.zero.clone_from(&plan.session.zero);
+        self.zero.clone_from(&plan.zero);
         self.shows_zero &= self.zero.is_some();
         self.zero_problem = None;
         self.drops = DropScale::default();
@@ -227,8 +223,8 @@ impl LiveView {
         let (commands, incoming) = channel();
         self.running = Some(Running {
             network,
-            source: plan.session.source.clone(),
-            asked: plan.session.source.clone(),
+            source: plan.source.clone(),
+            asked: plan.source.clone(),
             commands,
         });
         self.job.start(
@@ -243,24 +239,56 @@ impl LiveView {
         self.running = None;
     }
 
-    /// Sends a command to the thread, if it is running.
-    pub(super) fn command(&self, command: Command) {
+    fn command(&self, command: Command) {
         if let Some(running) = &self.running {
             // A thread that has just ended ignores commands.
             let _ = running.commands.send(command);
         }
     }
 
+    /// Changes the session on its thread, if it is running; the event that `change` returns comes back.
+    fn change(&self, change: impl FnOnce(&mut Session) -> Option<LiveEvent> + Send + 'static) {
+        self.command(Command::Change(Box::new(change)));
+    }
+
+    /// Changes the simulated source, if there is one.
+    pub(super) fn simulate(&self, change: impl FnOnce(&mut Simulated) -> Result<(), SessionError> + Send + 'static) {
+        self.change(|session| {
+            let Input::Simulated(simulated, _) = &mut session.input else {
+                return None;
+            };
+            change(simulated)
+                .err()
+                .map(|error| LiveEvent::Failed(error.to_string()))
+        });
+    }
+
+    /// Changes the replay, if there is one.
+    pub(super) fn control(&self, change: impl FnOnce(&mut Replay, Instant) + Send + 'static) {
+        self.change(|session| {
+            if let Input::Replay(replay) = &mut session.input {
+                change(replay, Instant::now());
+            }
+            None
+        });
+    }
+
     /// Takes the latest frames as the unloaded state.
     pub(super) fn re_zero(&mut self) {
         self.zero_problem = None;
-        self.command(Command::Zero);
+        self.change(|session| {
+            let zero = session.array.as_mut()?.take_zero();
+            Some(LiveEvent::Zeroed(zero.map_err(|error| error.to_string())))
+        });
     }
 
     /// Stops dividing readings by gains.
     pub(super) fn clear_zero(&mut self) {
         (self.zero, self.zero_problem, self.shows_zero) = (None, None, false);
-        self.command(Command::UseZero(None));
+        self.change(|session| {
+            session.array.as_mut()?.use_zero(None);
+            None
+        });
     }
 
     /// Returns true if incoming frames can be recorded.
@@ -272,11 +300,15 @@ impl LiveView {
     }
 
     /// Begins a recording, or ends it.
-    pub(super) fn toggle_recording(&self) {
-        self.command(match self.recording {
-            None => Command::Record,
-            Some(_) => Command::EndRecording,
-        });
+    pub(super) fn toggle_recording(&self, shared: &Shared) {
+        let folder = folder(shared).join("recordings");
+        match self.recording {
+            Some(_) => self.change(|session| Some(LiveEvent::Recorded(session.end_recording()?, None))),
+            None => self.change(move |session| match session.record(&folder) {
+                Ok(recorded) => Some(LiveEvent::Recording(recorded?.path.clone())),
+                Err(reason) => Some(LiveEvent::Failed(reason)),
+            }),
+        }
     }
 
     /// Replays the last recording.
@@ -290,9 +322,9 @@ impl LiveView {
 
     /// Keeps the recording of a thread that has ended without reporting it.
     fn keep_recording(&mut self) {
-        let Some(path) = self.recording.take() else { return };
-        let (frames, seconds) = self.shown.recording.unwrap_or_default();
-        self.recorded = Some(Recorded { path, frames, seconds });
+        if self.recording.take().is_some() {
+            self.recorded = self.shown.recording.clone();
+        }
     }
 
     /// Takes the events of the thread.
@@ -315,7 +347,7 @@ impl LiveView {
                 LiveEvent::Zeroed(Ok(gains)) => (self.zero, self.zero_problem) = (Some(gains), None),
                 LiveEvent::Zeroed(Err(reason)) => self.zero_problem = Some(reason),
                 LiveEvent::Recording(path) => self.recording = Some(path),
-                LiveEvent::NotRecorded(reason) => notify(Notice::Failed(reason)),
+                LiveEvent::Failed(reason) => notify(Notice::Failed(reason)),
                 LiveEvent::Recorded(recorded, reason) => {
                     (self.recording, self.recorded) = (None, Some(recorded));
                     if let Some(reason) = reason {

@@ -144,8 +144,9 @@ fn status_ui(ui: &mut Ui, view: &LiveView) {
                 dim(ui, format!("{:.0} frames per second", counts.frames_per_second));
             }
         }
-        if let Some((frames, seconds)) = view.shown.recording.filter(|_| view.recording.is_some()) {
-            let text = format!("● Recording: {}, {seconds:.1} s", counted(frames, "frame"));
+        if let Some(recorded) = view.shown.recording.as_ref().filter(|_| view.recording.is_some()) {
+            let frames = counted(recorded.frames, "frame");
+            let text = format!("● Recording: {frames}, {:.1} s", recorded.seconds);
             ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
         }
     });
