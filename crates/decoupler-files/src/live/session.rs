@@ -705,10 +705,8 @@ mod tests {
             session.count();
         };
         decode(&mut session);
-        let rows = session
-            .readings()
-            .chunks_exact(12)
-            .zip(session.last.values.chunks_exact(12));
+        let rows = session.last.readings.chunks_exact(12);
+        let rows = rows.zip(session.last.values.chunks_exact(12));
         let squares = rows.map(|(ohm, mm)| resistance_residual(&sensor, ohm, mm).powi(2));
         let expected = (squares.sum::<f64>() / 4.0).sqrt();
         assert!((session.array.as_ref().unwrap().residual(&session.last) / expected - 1.0).abs() < 1e-9);
