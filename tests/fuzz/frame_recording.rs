@@ -1,8 +1,10 @@
 //! Recordings of frames that the Live view replays.
 
-use decoupler_core::scene::Rows;
+use std::{fs, sync::LazyLock};
+
+use decoupler_core::evaluation::{Run, RunSettings};
 use decoupler_files::{
-    import::LineParser,
+    export::NetworkFile,
     live::{Recorder, Recording, Tally},
 };
 
@@ -15,9 +17,22 @@ use crate::{
 const ROWS: [usize; 2] = [0, 1];
 const CHANNELS: usize = 3;
 
+static NETWORK: LazyLock<NetworkFile> = LazyLock::new(|| {
+    let mut settings = RunSettings::default();
+    let simulation = settings.simulation_mut().unwrap();
+    simulation.sensor.scale = "2x1_1x3".parse().unwrap();
+    (simulation.samples, settings.hidden) = (40, 2);
+    settings.training.stopping.epochs = 1;
+    let mut run = Run::prepare(settings).unwrap();
+    while run.step().is_none() {}
+    NetworkFile::from_run(&run, None).unwrap()
+});
+
 fn read(bytes: &[u8]) -> Option<Recording> {
-    let parser = LineParser::of_array("2x1_1x3".parse().unwrap(), Rows::Known, true).unwrap();
-    match Recording::read(bytes, parser, ROWS.len() * CHANNELS, &mut Tally::default()) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("frames.csv");
+    fs::write(&path, bytes).unwrap();
+    match Recording::read(&path, &NETWORK, &mut Tally::default(), &|| true) {
         Ok(recording) => Some(recording),
         Err(error) => {
             let message = error.to_string();

@@ -3,7 +3,7 @@
 use std::{
     cell::RefCell,
     collections::BTreeMap,
-    fs::{self, File},
+    fs,
     io::Write,
     net::TcpListener,
     path::{Path, PathBuf},
@@ -14,11 +14,10 @@ use decoupler_core::{
     dataset::Seed,
     decoupling::Decoder,
     live::ZeroGains,
-    scene::{Noise, Rows, Scene},
+    scene::{Noise, Scene},
 };
 use decoupler_files::{
     export::NetworkFile,
-    import::LineParser,
     live::{Recording, Simulated, Tally},
 };
 use eframe::egui::{Key, Modifiers, accesskit::Role, vec2};
@@ -213,9 +212,8 @@ fn recordings(folder: &Path) -> Vec<PathBuf> {
     entries.map(|entry| entry.unwrap().path()).collect()
 }
 
-fn read(path: &Path) -> Recording {
-    let parser = LineParser::of_array("10x6_3x18".parse().unwrap(), Rows::Known, true).unwrap();
-    Recording::read(File::open(path).unwrap(), parser, 180, &mut Tally::default()).unwrap()
+fn read(path: &Path, file: &NetworkFile) -> Recording {
+    Recording::read(path, file, &mut Tally::default(), &|| true).unwrap()
 }
 
 #[test]
@@ -241,7 +239,7 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
     });
     driver.press_with(Modifiers::COMMAND, Key::R);
     driver.wait("its end", |driver| driver.says("Recorded "));
-    let recording = read(&recordings(folder.path())[0]);
+    let recording = read(&recordings(folder.path())[0], &driver.kept(1));
 
     driver.click("Replay recording");
     let ended = |driver: &Driver| {
@@ -297,7 +295,7 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
     driver.settle();
     let copy = folder.path().join("copy.csv");
     driver.save("Save recording…", &copy);
-    assert_eq!(read(&copy), recording);
+    assert_eq!(read(&copy, &file), recording);
 }
 
 #[test]
@@ -340,8 +338,9 @@ fn closing_the_window_while_it_records_ends_at_once_and_loses_no_frame() {
     });
     assert!(driver.close());
     let frames = driver.views().live.shown.recording.as_ref().unwrap().frames;
+    let file = driver.kept(0);
     drop(driver);
-    let recording = read(&recordings(folder.path())[0]);
+    let recording = read(&recordings(folder.path())[0], &file);
     assert!(recording.times_s().len() >= frames as usize);
 }
 

@@ -1,7 +1,8 @@
-use std::{fmt, str::FromStr};
+use std::{ops::Range, str::FromStr};
 
 use decoupler_core::{
     dataset::Dataset,
+    live::FaultyWire,
     scene::{Deformation, Noise, NoiseSource},
     sensor::{ArrayScale, SensorError, SensorModel, short},
 };
@@ -16,40 +17,24 @@ use thiserror::Error;
 /// break a wire floats, and its nodes carry no current into an amplifier. Two touching column-wires share the measured
 /// current equally: both read 2/(1/R + 1/R′).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fault {
-    /// A row-wire is broken before node `before_node`, counted from 0; at its connector if this is 0.
-    OpenRow {
-        /// Row-wire, from 0.
-        row: usize,
-        /// First node that is cut off.
-        before_node: usize,
-    },
-    /// A column-wire is broken before node `before_node`, counted from 0; at its connector if this is 0.
-    OpenColumn {
-        /// Column-wire, from 0.
-        column: usize,
-        /// First node that is cut off.
-        before_node: usize,
-    },
-    /// Column-wires `column` and `column` + 1 touch.
-    ShortedColumns {
-        /// First of the two, from 0.
-        column: usize,
-    },
-    /// The amplifier of a column-wire has a gain error: its readings are 1 + `relative` times the resistances.
-    Gain {
-        /// Column-wire, from 0.
-        column: usize,
-        /// Relative error of its readings, above −1.
-        relative: f64,
-    },
-    /// The converter of a column-wire is stuck at an end of its range.
-    Stuck {
-        /// Column-wire, from 0.
-        column: usize,
-        /// End at which it is stuck.
-        end: ConverterEnd,
-    },
+pub struct Fault {
+    /// Faulty wire, or its amplifier or converter.
+    pub wire: FaultyWire,
+    /// Effect on its readings.
+    pub effect: FaultEffect,
+}
+
+/// Effect of a [`Fault`] on the readings of its wire.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaultEffect {
+    /// Broken before this node, counted from 0; at its connector if this is 0.
+    Open(usize),
+    /// Column-wires touch.
+    Shorted,
+    /// The amplifier has this gain error, above −1: readings are 1 + error times the resistances.
+    Gain(f64),
+    /// The converter is stuck at this end of its range.
+    Stuck(ConverterEnd),
 }
 
 /// Invalid fault.
@@ -62,7 +47,7 @@ pub enum FaultError {
          short-columns:COLUMN-COLUMN, gain:COLUMN=REL, stuck:COLUMN=low or stuck:COLUMN=high"
     )]
     Text(String),
-    /// The array, or the scene, has no such wire or node.
+    /// The array, or the scene, has no such wire or node: kind, number and largest number.
     #[error("there is no {0} {1}; give 1 to {2}")]
     Number(&'static str, usize, usize),
     /// The gain error is out of range.
@@ -87,63 +72,38 @@ impl FromStr for Fault {
 
     fn from_str(text: &str) -> Result<Self, FaultError> {
         let unknown = || FaultError::Text(text.to_owned());
-        let number = |text: &str| match text.parse::<usize>() {
+        let index = |text: &str| match text.parse::<usize>() {
             Ok(number @ 1..) => Ok(number - 1),
             _ => Err(unknown()),
         };
-        let place = |text: &str| match text.split_once('@') {
-            Some((wire, node)) => Ok((number(wire)?, number(node)?)),
-            None => Ok((number(text)?, 0)),
-        };
         let (kind, rest) = text.trim().split_once(':').ok_or_else(unknown)?;
-        let value = || rest.split_once('=').ok_or_else(unknown);
-        match kind {
-            "open-row" => place(rest).map(|(row, before_node)| Self::OpenRow { row, before_node }),
-            "open-column" => place(rest).map(|(column, before_node)| Self::OpenColumn { column, before_node }),
-            "short-columns" => {
-                let (first, second) = rest.split_once('-').ok_or_else(unknown)?;
-                let (column, next) = (number(first)?, number(second)?);
-                let short = (next == column + 1).then_some(Self::ShortedColumns { column });
-                short.ok_or_else(unknown)
+        let separator = match kind {
+            "short-columns" => '-',
+            "gain" | "stuck" => '=',
+            _ => '@',
+        };
+        let (wire, value) = match rest.split_once(separator) {
+            Some((wire, value)) => (index(wire)?, Some(value)),
+            None => (index(rest)?, None),
+        };
+        let column = FaultyWire::Column(wire);
+        let (wire, effect) = match (kind, value) {
+            ("open-row", node) => (FaultyWire::Row(wire), FaultEffect::Open(node.map_or(Ok(0), index)?)),
+            ("open-column", node) => (column, FaultEffect::Open(node.map_or(Ok(0), index)?)),
+            ("short-columns", Some(next)) if index(next)? == wire + 1 => {
+                (FaultyWire::Columns(wire), FaultEffect::Shorted)
             }
-            "gain" => {
-                let (column, relative) = value()?;
-                let relative: f64 = relative.parse().map_err(|_| unknown())?;
-                if relative > -1.0 && relative <= 10.0 && relative != 0.0 {
-                    number(column).map(|column| Self::Gain { column, relative })
-                } else {
-                    Err(FaultError::Gain(relative))
+            ("gain", Some(relative)) => match relative.parse().map_err(|_| unknown())? {
+                relative if relative > -1.0 && relative <= 10.0 && relative != 0.0 => {
+                    (column, FaultEffect::Gain(relative))
                 }
-            }
-            "stuck" => {
-                let (column, end) = value()?;
-                let end = match end {
-                    "low" => ConverterEnd::Low,
-                    "high" => ConverterEnd::High,
-                    _ => return Err(unknown()),
-                };
-                number(column).map(|column| Self::Stuck { column, end })
-            }
-            _ => Err(unknown()),
-        }
-    }
-}
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::OpenRow { row, before_node } => write!(f, "open-row:{}@{}", row + 1, before_node + 1),
-            Self::OpenColumn { column, before_node } => write!(f, "open-column:{}@{}", column + 1, before_node + 1),
-            Self::ShortedColumns { column } => write!(f, "short-columns:{}-{}", column + 1, column + 2),
-            Self::Gain { column, relative } => write!(f, "gain:{}={relative}", column + 1),
-            Self::Stuck { column, end } => {
-                let end = match end {
-                    ConverterEnd::Low => "low",
-                    ConverterEnd::High => "high",
-                };
-                write!(f, "stuck:{}={end}", column + 1)
-            }
-        }
+                relative => return Err(FaultError::Gain(relative)),
+            },
+            ("stuck", Some("low")) => (column, FaultEffect::Stuck(ConverterEnd::Low)),
+            ("stuck", Some("high")) => (column, FaultEffect::Stuck(ConverterEnd::High)),
+            _ => return Err(unknown()),
+        };
+        Ok(Self { wire, effect })
     }
 }
 
@@ -153,23 +113,26 @@ impl Fault {
     /// # Errors
     /// If a wire or node does not exist.
     pub fn check(self, scale: ArrayScale, read: &[usize]) -> Result<(), FaultError> {
-        let wires_and_nodes = match self {
-            Self::OpenRow { row, before_node } => [
+        let column = |column| ("column-wire", column, scale.columns());
+        let on_column = ("node on a column-wire", scale.nodes_per_column());
+        let (wire, (node, nodes)) = match self.wire {
+            FaultyWire::Row(row) => (
                 ("row-wire", row, scale.rows()),
-                ("node on a row-wire", before_node, scale.nodes_per_row()),
-            ],
-            Self::OpenColumn { column, before_node } => [
-                ("column-wire", column, scale.columns()),
-                ("node on a column-wire", before_node, scale.nodes_per_column()),
-            ],
-            Self::ShortedColumns { column } => [("column-wire", column + 1, scale.columns()); 2],
-            Self::Gain { column, .. } | Self::Stuck { column, .. } => [("column-wire", column, scale.columns()); 2],
+                ("node on a row-wire", scale.nodes_per_row()),
+            ),
+            FaultyWire::Column(first) => (column(first), on_column),
+            FaultyWire::Columns(first) => (column(first + 1), on_column),
         };
-        if let Some((what, index, last)) = wires_and_nodes.into_iter().find(|(_, index, count)| index >= count) {
+        let before_node = match self.effect {
+            FaultEffect::Open(before_node) => before_node,
+            _ => 0,
+        };
+        let all = [wire, (node, before_node, nodes)];
+        if let Some((what, index, last)) = all.into_iter().find(|(_, index, count)| index >= count) {
             return Err(FaultError::Number(what, index + 1, last));
         }
-        match self {
-            Self::OpenRow { row, .. } if !read.contains(&row) => Err(FaultError::NotRead(row + 1)),
+        match self.wire {
+            FaultyWire::Row(row) if !read.contains(&row) => Err(FaultError::NotRead(row + 1)),
             _ => Ok(()),
         }
     }
@@ -235,33 +198,26 @@ impl FaultySensor {
     ) {
         self.before_noise(read, deformation, ohms);
         noise.disturb(ohms, rng);
+        // Without current, or when it is stuck, the converter reads an end of its range without noise.
+        let (lowest_ohm, full_scale_ohm) = self.range_ohm;
+        let (from_ohm, to_ohm) = match self.fault.effect {
+            FaultEffect::Open(0) | FaultEffect::Stuck(ConverterEnd::High) => (full_scale_ohm, full_scale_ohm),
+            FaultEffect::Stuck(ConverterEnd::Low) => (lowest_ohm, lowest_ohm),
+            FaultEffect::Open(_) | FaultEffect::Gain(_) => (0.0, full_scale_ohm),
+            FaultEffect::Shorted => (0.0, f64::INFINITY),
+        };
         let columns = self.model.scale.columns();
         for (&row, ohms) in read.iter().zip(ohms.chunks_exact_mut(columns)) {
-            let affected = match self.fault {
-                Fault::OpenRow { row: open, .. } if open == row => 0..columns,
-                Fault::OpenColumn { column, .. } | Fault::Gain { column, .. } | Fault::Stuck { column, .. } => {
-                    column..column + 1
-                }
-                Fault::OpenRow { .. } | Fault::ShortedColumns { .. } => 0..0,
-            };
-            // Without current, or when it is stuck, the converter reads an end of its range without noise.
-            let (lowest_ohm, full_scale_ohm) = self.range_ohm;
-            let (from_ohm, to_ohm) = match self.fault {
-                Fault::OpenRow { before_node: 0, .. } | Fault::OpenColumn { before_node: 0, .. } => {
-                    (full_scale_ohm, full_scale_ohm)
-                }
-                Fault::Stuck {
-                    end: ConverterEnd::High,
-                    ..
-                } => (full_scale_ohm, full_scale_ohm),
-                Fault::Stuck {
-                    end: ConverterEnd::Low, ..
-                } => (lowest_ohm, lowest_ohm),
-                _ => (0.0, full_scale_ohm),
-            };
-            ohms[affected]
-                .iter_mut()
-                .for_each(|ohm| *ohm = ohm.clamp(from_ohm, to_ohm));
+            let affected = &mut ohms[self.affected(row)];
+            affected.iter_mut().for_each(|ohm| *ohm = ohm.clamp(from_ohm, to_ohm));
+        }
+    }
+
+    /// Columns whose readings of a row the fault affects.
+    fn affected(&self, row: usize) -> Range<usize> {
+        match self.fault.wire {
+            FaultyWire::Row(faulty) if faulty == row => 0..self.model.scale.columns(),
+            wire => wire.columns(),
         }
     }
 
@@ -272,33 +228,33 @@ impl FaultySensor {
         // Eq. (2) over the nodes before a break. Without any node there is no current, and the converter reads its full scale.
         let near_ohm = |row: usize, nodes: usize, column: usize, electrodes: usize| {
             let positions_mm = deformation.row_positions_mm(&self.model, row).take(nodes);
-            let sum: f64 = positions_mm
-                .flat_map(|at_mm| {
-                    let electrodes = (0..electrodes).map(move |electrode| geometry.column_node_mm(column, electrode));
-                    electrodes.map(move |electrode_mm| at_mm.distance(electrode_mm).recip())
-                })
-                .sum();
-            match sum > 0.0 {
-                true => self.model.resistivity_ohm_per_mm / sum,
-                false => self.range_ohm.1,
+            let of_node = |at_mm: DVec3| {
+                let electrodes_mm = (0..electrodes).map(move |electrode| geometry.column_node_mm(column, electrode));
+                electrodes_mm.map(move |electrode_mm| at_mm.distance(electrode_mm).recip())
+            };
+            match positions_mm.flat_map(of_node).sum::<f64>() {
+                sum if sum > 0.0 => self.model.resistivity_ohm_per_mm / sum,
+                _ => self.range_ohm.1,
             }
         };
         for (&row, ohms) in read.iter().zip(resistances_ohm.chunks_exact_mut(scale.columns())) {
-            match self.fault {
-                Fault::OpenRow { row: open, before_node } if open == row => {
-                    for (column, ohm) in ohms.iter_mut().enumerate() {
-                        *ohm = near_ohm(row, before_node, column, scale.nodes_per_column());
-                    }
+            let affected = self.affected(row);
+            match (self.fault.effect, self.fault.wire) {
+                (FaultEffect::Open(before_node), FaultyWire::Row(_)) => {
+                    affected
+                        .for_each(|column| ohms[column] = near_ohm(row, before_node, column, scale.nodes_per_column()));
                 }
-                Fault::OpenColumn { column, before_node } => {
-                    ohms[column] = near_ohm(row, scale.nodes_per_row(), column, before_node);
+                (FaultEffect::Open(before_node), _) => {
+                    affected
+                        .for_each(|column| ohms[column] = near_ohm(row, scale.nodes_per_row(), column, before_node));
                 }
-                Fault::ShortedColumns { column } => {
-                    let shared = 2.0 / (1.0 / ohms[column] + 1.0 / ohms[column + 1]);
-                    ohms[column..column + 2].fill(shared);
+                (FaultEffect::Shorted, _) => {
+                    let conductances = ohms[affected.clone()].iter().map(|ohm| ohm.recip());
+                    let shared = affected.len() as f64 / conductances.sum::<f64>();
+                    ohms[affected].fill(shared);
                 }
-                Fault::Gain { column, relative } => ohms[column] *= 1.0 + relative,
-                Fault::OpenRow { .. } | Fault::Stuck { .. } => {}
+                (FaultEffect::Gain(relative), _) => ohms[affected].iter_mut().for_each(|ohm| *ohm *= 1.0 + relative),
+                (FaultEffect::Stuck(_), _) => {}
             }
         }
     }

@@ -4,43 +4,20 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler_core::{
-    dataset::{Place, Seed},
-    scene::{Deformation, Scene},
-};
+use decoupler_core::{dataset::Place, scene::Deformation};
 
 use super::{
-    Answer, Fault, Keeping, Line, Lines, LiveArray, Motion, NextLine, Note, Replay, SessionError, SessionEvent,
-    Simulated, Source, SourceError, Tally, replay,
+    Answer, Line, Lines, NextLine, Note, Replay, SessionError, SessionEvent, Simulated, Source, SourceError, Tally,
 };
-use crate::{
-    export::NetworkFile,
-    import::{KeptCell, LineParser, ParsedLine},
-};
+use crate::import::{KeptCell, LineParser, ParsedLine};
 
 /// Source of frames.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SourcePlan {
-    /// An indenter over the array, without hardware.
-    Simulated {
-        /// Rate.
-        frames_per_second: f64,
-        /// Motion of the indenter.
-        motion: Motion,
-        /// Fault of the wires.
-        fault: Option<Fault>,
-    },
+    /// An indenter over the array, without hardware, with this number of frames per second.
+    Simulated(f64),
     /// A file, replayed.
-    Replay {
-        /// The file.
-        path: PathBuf,
-        /// Time in the recording at which to begin, in seconds.
-        at_s: f64,
-        /// Recorded seconds per second.
-        speed: f64,
-        /// False if it begins paused.
-        is_playing: bool,
-    },
+    Replay(PathBuf),
     /// Lines as they arrive.
     Stream(Source),
 }
@@ -51,7 +28,7 @@ impl SourcePlan {
     #[must_use]
     pub fn resolved(self) -> Self {
         match self {
-            Self::Replay { path, .. } if path.exists() && !path.is_file() && !path.is_dir() => {
+            Self::Replay(path) if path.exists() && !path.is_file() && !path.is_dir() => {
                 Self::Stream(Source::File(path))
             }
             other => other,
@@ -71,61 +48,6 @@ pub enum Input {
 }
 
 impl Input {
-    /// Opens `plan` for the network of `file`; `array` are its frames with the scene. `by_frame` asks for the row-wire of every
-    /// line.
-    pub(super) fn open(
-        plan: &SourcePlan,
-        file: &NetworkFile,
-        array: Option<(&LiveArray, &Scene)>,
-        by_frame: bool,
-        tally: &mut Tally,
-        is_wanted: &dyn Fn() -> bool,
-    ) -> Result<Self, SessionError> {
-        let now = Instant::now();
-        match plan {
-            SourcePlan::Simulated {
-                frames_per_second,
-                motion,
-                fault,
-            } => {
-                let (array, scene) = array.ok_or(SessionError::NoModel)?;
-                let mut source = Simulated::new(&array.sensor, scene, Seed(0), *frames_per_second)?;
-                source.set_fault(*fault)?;
-                source.set_motion(*motion);
-                Ok(Self::Simulated(Box::new(source), now))
-            }
-            SourcePlan::Replay {
-                path,
-                at_s,
-                speed,
-                is_playing,
-            } => {
-                let length = array.map(|(array, _)| array.frame_ohm.len());
-                let recording = replay::open(path, file, length, tally, is_wanted)?;
-                let mut replay = Replay::new(recording, array.is_none(), Instant::now());
-                replay.seek(*at_s, Instant::now());
-                replay.set_speed(*speed, Instant::now());
-                replay.play(*is_playing, Instant::now());
-                Ok(Self::Replay(Box::new(replay)))
-            }
-            SourcePlan::Stream(source) => {
-                let (opened, keeping) = (source.clone(), source.keeping());
-                let open = move || opened.open().map_err(io::Error::other);
-                let lines = Lines::spawn(open, keeping, source.begins_anywhere());
-                let mut lines = lines.map_err(SessionError::Reader)?;
-                // The latest line of each row-wire.
-                lines.set_kept(array.map_or(file.network.values().len(), |(array, _)| array.rows.len()));
-                Ok(Self::Lines(Box::new(LineInput {
-                    source: source.clone(),
-                    lines,
-                    parser: file.line_parser(by_frame, keeping == Keeping::All)?,
-                    begun: now,
-                    has_stepped_back: false,
-                })))
-            }
-        }
-    }
-
     /// Returns the true deformation of the last frame, if it is known.
     pub fn truth(&self) -> Option<&Deformation> {
         match self {
@@ -134,45 +56,52 @@ impl Input {
         }
     }
 
+    /// Returns the time at which the next frame of a timed source is due, `now` for a stream, and `None` while it is paused.
+    pub fn due(&self, now: Instant) -> Option<Instant> {
+        match self {
+            Self::Simulated(_, due) => Some(*due),
+            Self::Replay(replay) => replay.due(now),
+            Self::Lines(_) => Some(now),
+        }
+    }
+
     /// Writes the next readings that are there at `now` to `answer`; a stream waits for a line at most for `patience`. Returns
     /// [`SessionEvent::Answer`] if there are any.
     pub(super) fn take(
         &mut self,
-        now: Instant,
-        patience: Duration,
+        (now, patience): (Instant, Duration),
         answer: &mut Answer,
         tally: &mut Tally,
         notes: &mut Vec<Note>,
     ) -> SessionEvent {
-        match self {
-            Self::Simulated(source, due) => {
-                if now < *due {
-                    return SessionEvent::Nothing;
-                }
-                let behind = now - *due;
-                if behind > Lines::PATIENCE {
-                    // Frames that were not taken in time are dropped.
-                    let missed = (behind.as_secs_f64() * source.frames_per_second()) as u64;
-                    source.skip(missed);
-                    tally.dropped += missed;
-                    *due = now;
-                }
-                *due += Duration::from_secs_f64(1.0 / source.frames_per_second());
-                answer.readings.resize(source.readings(), 0.0);
-                match source.next_frame(&mut answer.readings) {
-                    Ok(time_s) => answer.time_s = time_s,
-                    Err(error) => return SessionEvent::End(Err(error.into())),
-                }
-                (answer.first_row, answer.read_at) = (Some(0), Some(Instant::now()));
-                SessionEvent::Answer
-            }
-            Self::Replay(replay) => replay.take(now, answer, tally),
+        let (source, due) = match self {
+            Self::Simulated(source, due) => (source, due),
+            Self::Replay(replay) => return replay.take(now, answer, tally),
             Self::Lines(lines) => {
                 let event = lines.take(patience, answer, notes);
                 tally.dropped = lines.lines.dropped();
-                event
+                return event;
             }
+        };
+        if now < *due {
+            return SessionEvent::Nothing;
         }
+        let behind = now - *due;
+        if behind > Lines::PATIENCE {
+            // Frames that were not taken in time are dropped.
+            let missed = (behind.as_secs_f64() * source.frames_per_second()) as u64;
+            source.skip(missed);
+            tally.dropped += missed;
+            *due = now;
+        }
+        *due += Duration::from_secs_f64(1.0 / source.frames_per_second());
+        answer.readings.resize(source.readings(), 0.0);
+        match source.next_frame(&mut answer.readings) {
+            Ok(time_s) => answer.time_s = time_s,
+            Err(error) => return SessionEvent::End(Err(error.into())),
+        }
+        (answer.first_row, answer.read_at) = (Some(0), Some(Instant::now()));
+        SessionEvent::Answer
     }
 }
 
@@ -188,6 +117,21 @@ pub struct LineInput {
 }
 
 impl LineInput {
+    /// Opens `source`; `parser` reads its lines, of which the latest `kept` are kept if they are not all taken.
+    pub(super) fn open(source: &Source, parser: LineParser, kept: usize) -> io::Result<Self> {
+        let opened = source.clone();
+        let open = move || opened.open().map_err(io::Error::other);
+        let mut lines = Lines::spawn(open, source.keeping(), source.begins_anywhere())?;
+        lines.set_kept(kept);
+        Ok(Self {
+            source: source.clone(),
+            lines,
+            parser,
+            begun: Instant::now(),
+            has_stepped_back: false,
+        })
+    }
+
     /// Number of bytes that have arrived since the last end of a line.
     pub fn unended(&self) -> usize {
         self.lines.unended()

@@ -56,15 +56,16 @@ pub enum Keeping {
     Latest,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Shared {
     state: Mutex<State>,
     /// Notified when lines arrive or are taken, and at the end: reader and receiver never wait at the same time.
     changed: Condvar,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct State {
+    /// Number of newest lines that are kept.
     kept: usize,
     waiting: Batch,
     /// Bytes that have arrived since the last end of a line.
@@ -96,16 +97,7 @@ impl Lines {
         keeping: Keeping,
         skips_first: bool,
     ) -> io::Result<Self> {
-        let shared = Arc::new(Shared {
-            state: Mutex::new(State {
-                kept: 1,
-                waiting: Batch::default(),
-                unended: 0,
-                end: None,
-                is_abandoned: false,
-            }),
-            changed: Condvar::new(),
-        });
+        let shared: Arc<Shared> = Arc::default();
         let reader = Arc::clone(&shared);
         thread::Builder::new().name("lines".to_owned()).spawn(move || {
             let read = || reader.read(open()?, keeping, skips_first);
@@ -125,7 +117,7 @@ impl Lines {
 
     /// Sets the number of newest lines kept when older ones are dropped: those of a whole snapshot.
     pub fn set_kept(&mut self, lines: usize) {
-        self.shared.lock().kept = lines.max(1);
+        self.shared.lock().kept = lines;
     }
 
     /// Number of lines dropped so far.
@@ -158,7 +150,7 @@ impl Lines {
         // A lock per line would wait for the reader, which holds it most of the time when lines arrive fast.
         if self.keeping == Keeping::Latest && self.batch.is_old(Instant::now()) {
             let state = self.shared.lock();
-            let kept = state.kept.saturating_sub(state.waiting.lines.len()).max(1);
+            let kept = state.kept.saturating_sub(state.waiting.lines.len());
             self.batch.drop_old(Instant::now(), kept);
         }
         let line = self.batch.lines.pop_front();
@@ -239,8 +231,6 @@ struct Entry {
     number: u64,
     /// Place in the bytes; `None` for a line that is too long.
     place: Option<Range<usize>>,
-    /// True if it looks like a header.
-    has_names: bool,
     read_at: Instant,
 }
 
@@ -254,11 +244,14 @@ impl Batch {
     /// Drops all but the newest `kept` lines if the oldest has waited too long, and counts them. The latest header is kept:
     /// without it the lines that follow would be misinterpreted.
     fn drop_old(&mut self, now: Instant, kept: usize) {
-        let before = self.lines.len();
+        let (before, kept) = (self.lines.len(), kept.max(1));
         if !self.is_old(now) || before <= kept {
             return;
         }
-        let names = self.lines.drain(..before - kept).rfind(|entry| entry.has_names);
+        let bytes = &self.bytes;
+        let text = |entry: &Entry| bytes[entry.place.clone().unwrap_or_default()].trim_ascii();
+        let has_names = |entry: &Entry| begins_like_header(text(entry)) && text(entry).contains(&b',');
+        let names = self.lines.drain(..before - kept).rfind(has_names);
         self.lines.extend(names);
         self.lines.rotate_right(self.lines.len() - kept);
         // The bytes of dropped lines are freed at once, so that the buffer never exceeds the waiting lines.
@@ -271,6 +264,10 @@ impl Batch {
         self.bytes = bytes;
         self.dropped += (before - self.lines.len()) as u64;
     }
+}
+
+fn begins_like_header(text: &[u8]) -> bool {
+    (text.first()).is_none_or(|first| first.is_ascii_alphabetic() || *first == b'"')
 }
 
 /// Splits chunks of bytes into lines.
@@ -307,15 +304,12 @@ impl Splitter {
 
     fn end_line(&mut self, read_at: Instant, batch: &mut Batch) {
         self.number += 1;
-        let text = self.partial.trim_ascii();
-        let begins_like_header = (text.first()).is_none_or(|first| first.is_ascii_alphabetic() || *first == b'"');
-        if self.number > 1 || !self.skips_first || begins_like_header {
+        if self.number > 1 || !self.skips_first || begins_like_header(self.partial.trim_ascii()) {
             let start = batch.bytes.len();
             batch.bytes.extend_from_slice(&self.partial);
             batch.lines.push_back(Entry {
                 number: self.number,
                 place: (self.length < Lines::LONGEST).then_some(start..batch.bytes.len()),
-                has_names: begins_like_header && text.contains(&b','),
                 read_at,
             });
         }

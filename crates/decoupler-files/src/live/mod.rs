@@ -17,12 +17,12 @@ mod source;
 mod tally;
 
 pub use array::{LiveArray, Watched};
-pub use fault::{ConverterEnd, Fault, FaultError, FaultySensor};
+pub use fault::{ConverterEnd, Fault, FaultEffect, FaultError, FaultySensor};
 pub use history::History;
 pub use input::{Input, LineInput, SourcePlan};
 pub use lines::{Keeping, Line, Lines, NextLine};
 pub use recording::{Recorded, Recorder};
-pub use replay::{Recording, RecordingError, Replay, ReplayState};
+pub use replay::{Recording, Replay, ReplayState};
 pub use session::{Answer, Note, Session, SessionError, SessionEvent, SessionPlan, Unit};
 pub use simulated::{Motion, Simulated};
 pub use source::{Source, SourceError};

@@ -148,17 +148,14 @@ fn new_file(folder: &Path) -> io::Result<(PathBuf, File)> {
 
 #[cfg(test)]
 mod tests {
-    use decoupler_core::scene::Rows;
-
     use super::*;
     use crate::{
-        import::LineParser,
-        live::{Recording, Tally},
+        export::NetworkFile,
+        live::{Recording, Tally, replay::tests::network},
     };
 
-    fn read(bytes: &[u8]) -> usize {
-        let parser = LineParser::of_array("2x1_1x3".parse().unwrap(), Rows::Known, true).unwrap();
-        let read = Recording::read(bytes, parser, 6, &mut Tally::default());
+    fn frames(path: &Path, network: &NetworkFile) -> usize {
+        let read = Recording::read(path, network, &mut Tally::default(), &|| true);
         read.map_or(0, |recording| recording.times_s().len())
     }
 
@@ -180,6 +177,8 @@ mod tests {
                 Ok(())
             }
         }
+        let folder = tempfile::tempdir().unwrap();
+        let (path, network) = (folder.path().join("full.csv"), network());
         let frame = |frame: u32| (0..6).map(|k| 0.1 + f64::from(10 * frame + k)).collect::<Vec<_>>();
         let mut whole = Vec::new();
         let mut recorder = Recorder::new(&mut whole, &[0, 1], 3).unwrap();
@@ -188,21 +187,21 @@ mod tests {
             let mut disk = Full(Vec::new(), room);
             let mut recorder = Recorder::new(&mut disk, &[0, 1], 3).unwrap();
             let failed = (0..4).find(|&k| recorder.record(0.1 * f64::from(k), &frame(k)).is_err());
-            let bytes = recorder.whole_bytes as usize;
-            assert_eq!(read(&whole[..bytes]) as u32, failed.unwrap(), "{room}");
+            fs::write(&path, &whole[..recorder.whole_bytes as usize]).unwrap();
+            assert_eq!(frames(&path, &network) as u32, failed.unwrap(), "{room}");
         }
     }
 
     #[test]
     fn each_recording_has_its_own_file_that_is_complete_after_every_frame() {
         let folder = tempfile::tempdir().unwrap();
-        let folder = folder.path().join("not yet there");
+        let (folder, network) = (folder.path().join("not yet there"), network());
         let [mut first, second] = [0, 1].map(|_| RecordingFile::create(&folder, &[0, 1], 3).unwrap());
         assert_ne!(first.recorded.path, second.recorded.path);
         for frame in 1..=3 {
             let frame_ohm = [1.0, 2.0, 3.0, 4.0, 5.0, f64::from(frame)];
             first.record(0.5 * f64::from(frame), &frame_ohm).unwrap();
-            assert_eq!(read(&fs::read(&first.recorded.path).unwrap()), frame as usize);
+            assert_eq!(frames(&first.recorded.path, &network), frame as usize);
         }
         assert_eq!((first.recorded.frames, first.recorded.seconds), (3, 1.0));
     }

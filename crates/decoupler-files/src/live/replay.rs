@@ -1,17 +1,16 @@
 use std::{
+    fmt::Display,
     fs::{self, File},
-    io::{self, BufRead, BufReader, Read},
+    io::{self, BufRead, BufReader},
     ops::{ControlFlow, RangeInclusive},
     path::Path,
     time::{Duration, Instant},
 };
 
-use thiserror::Error;
-
 use super::{Answer, Lines, SessionError, SessionEvent, Tally};
 use crate::{
     export::NetworkFile,
-    import::{LineError, LineParser, ParsedLine},
+    import::{LineParser, ParsedLine},
     machine::{ReadingBudget, system_cause},
 };
 
@@ -28,101 +27,158 @@ pub struct Recording {
     row_indices: Vec<usize>,
 }
 
-/// Error in a recording.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum RecordingError {
-    /// The file cannot be read.
-    #[error("{}", system_cause(.0))]
-    File(#[from] io::Error),
-    /// No line can be read.
-    #[error(transparent)]
-    Line(#[from] LineError),
-    /// There is no complete frame, perhaps because of a malformed line.
-    #[error("it contains no complete frame: record again, or choose another file{}{}", if .0.is_empty() { "" } else { "; " }, .0)]
-    Empty(String),
-}
-
 /// Rate of frames without times, per second.
 const RATE_WITHOUT_TIMES: f64 = 50.0;
+/// Memory of a byte of text that is replayed: short numbers, in a vector that has just doubled.
+const MEMORY_OF_BYTE: u64 = 8;
 
 impl Recording {
-    /// Reads the frames of an array, each with `length` readings, from lines in `parser`'s form: a file written by
-    /// [`Recorder`](super::Recorder), or another that `decode` reads. Malformed lines and rows out of order are counted in
-    /// `tally`, and their frames left out; so is a last line that is cut off in a file with times. Times are those of the file as
-    /// far as they ascend, as for samples; without any, frames come at an even rate.
+    /// Reads the file at `path` for the network of `file`.
+    ///
+    /// Frames of an array are those of a file written by [`Recorder`](super::Recorder), or of another that `decode` reads.
+    /// Malformed lines and rows out of order are counted in `tally`, and their frames left out; so is a last line that is cut off
+    /// in a file with times. Samples of other sensors are read as by `decode`, from files of any format. Times are those of the
+    /// file as far as they ascend; without any, frames come at an even rate.
     ///
     /// # Errors
-    /// If the file cannot be read, a header lacks a resistance, or there is no complete frame.
+    /// If the file cannot be read, lacks an input, or has no complete frame, or when it is no longer wanted.
     pub fn read(
-        source: impl Read,
+        path: &Path,
+        file: &NetworkFile,
+        tally: &mut Tally,
+        is_wanted: &dyn Fn() -> bool,
+    ) -> Result<Self, SessionError> {
+        let refused = |cause: &dyn Display| SessionError::Replay(path.to_owned(), cause.to_string());
+        let mut recording = match &file.problem.sensor {
+            Some(simulation) => {
+                let scale = simulation.sensor.scale;
+                let length = simulation.scene.rows.read(scale.rows())?.len() * scale.columns();
+                Self::of_array(path, file.line_parser(true, true)?, length, tally, &refused)?
+            }
+            None => Self::of_samples(path, file, is_wanted, &refused)?,
+        };
+        if recording.times_s.is_empty() {
+            let reason = tally
+                .first_bad
+                .as_ref()
+                .map_or_else(String::new, |reason| format!("; {reason}"));
+            let cause = "it contains no complete frame: record again, or choose another file";
+            return Err(refused(&format_args!("{cause}{reason}")));
+        }
+        recording.times_s = ascending(&recording.times_s);
+        Ok(recording)
+    }
+
+    /// Reads frames with `length` readings; those without a time have NaN.
+    fn of_array(
+        path: &Path,
         mut parser: LineParser,
         length: usize,
         tally: &mut Tally,
-    ) -> Result<Self, RecordingError> {
-        let mut source = BufReader::new(source);
-        let (mut times_s, mut frame_s, mut readings) = (Vec::new(), f64::NAN, Vec::new());
-        let (mut text, mut line) = (Vec::new(), 0);
-        while source.read_until(b'\n', &mut text)? > 0 {
-            line += 1;
+        refused: &dyn Fn(&dyn Display) -> SessionError,
+    ) -> Result<Self, SessionError> {
+        let system = |error: io::Error| refused(&system_cause(&error));
+        let found = fs::metadata(path).map_err(system)?;
+        if !found.is_file() {
+            return Err(refused(&"it is not a file; choose a recording"));
+        }
+        let claimed = ReadingBudget::now().claim(found.len().saturating_mul(MEMORY_OF_BYTE));
+        claimed.map_err(|over| refused(&over))?;
+        let mut source = BufReader::new(File::open(path).map_err(system)?);
+        let (mut times_s, mut readings, mut frame_s) = (Vec::new(), Vec::new(), f64::NAN);
+        let mut text = Vec::new();
+        for line in 1.. {
+            text.clear();
+            if source.read_until(b'\n', &mut text).map_err(system)? == 0 {
+                break;
+            }
             let is_ended = text.pop_if(|last| *last == b'\n').is_some();
             if !is_ended && times_s.last().is_some_and(|time_s: &f64| time_s.is_finite()) {
                 // Its last number may be cut off.
                 tally.bad(&format!("line {line}, the last, is cut off and left out"));
                 break;
             }
-            let parsed = parser.parse(line, &text);
-            // Readings of whole frames, and the place where those of the line should begin.
-            let (whole, place) = (times_s.len() * length, readings.len() - times_s.len() * length);
-            let (begin, row, time_s) = match parsed {
+            let whole = times_s.len() * length;
+            let (row_index, row, time_s) = match parser.parse(line, &text) {
                 Ok(ParsedLine::Row {
                     row_index,
                     readings: row,
                     time_s,
                     ..
-                }) => (row_index.unwrap_or(0) * row.len(), row, time_s),
+                }) => (row_index.unwrap_or(0), row, time_s),
                 Ok(ParsedLine::Snapshot(frame)) => (0, frame, None),
-                Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => (length, &[][..], None),
-                Err(error) if error.is_final() => return Err(error.into()),
+                Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => continue,
+                Err(error) if error.is_final() => return Err(refused(&error)),
                 Err(error) => {
                     readings.truncate(whole);
                     tally.bad(&error.to_string());
-                    (length, &[][..], None)
+                    continue;
                 }
             };
-            text.clear();
-            if begin != place && !row.is_empty() {
+            let expected = (readings.len() - whole) / row.len();
+            if row_index != expected {
                 // After a malformed line, the rest of its frame is left out without another word.
-                if place > 0 {
-                    let expected = place / row.len() + 1;
-                    tally.bad(&format!(
-                        "line {line}: row {expected} is expected here: each frame needs its rows in ascending order"
-                    ));
+                if expected > 0 {
+                    let cause = "each frame needs its rows in ascending order";
+                    tally.bad(&format!("line {line}: row {} is expected here: {cause}", expected + 1));
                 }
                 readings.truncate(whole);
+                if row_index > 0 {
+                    continue;
+                }
             }
-            if begin == readings.len() - whole {
-                frame_s = if begin == 0 {
-                    time_s.unwrap_or(f64::NAN)
-                } else {
-                    frame_s
-                };
-                readings.extend_from_slice(row);
+            if row_index == 0 {
+                frame_s = time_s.unwrap_or(f64::NAN);
             }
+            readings.extend_from_slice(row);
             if readings.len() == whole + length {
                 times_s.push(frame_s);
             }
         }
         readings.truncate(times_s.len() * length);
-        match times_s.is_empty() {
-            true => Err(RecordingError::Empty(tally.first_bad.clone().unwrap_or_default())),
-            false => Ok(Self {
-                times_s: ascending(&times_s),
-                readings,
-                length,
-                row_indices: Vec::new(),
-            }),
+        Ok(Self {
+            times_s,
+            readings,
+            length,
+            row_indices: Vec::new(),
+        })
+    }
+
+    /// Reads samples; those without a time have NaN.
+    fn of_samples(
+        path: &Path,
+        file: &NetworkFile,
+        is_wanted: &dyn Fn() -> bool,
+        refused: &dyn Fn(&dyn Display) -> SessionError,
+    ) -> Result<Self, SessionError> {
+        let recipe = file.recorded.as_ref().map(|recorded| recorded.plan.import.clone());
+        let watch = &mut |_| match is_wanted() {
+            true => ControlFlow::Continue(()),
+            false => ControlFlow::Break(()),
+        };
+        let has_rows = file.network.only().is_none();
+        let table = (recipe.unwrap_or_default()).read_inputs(path, &file.problem, has_rows, watch)?;
+        let mut row_indices = Vec::new();
+        if has_rows {
+            let read = file.row_wires.as_deref().unwrap_or_default();
+            let Some(of_samples) = &table.row_wires else {
+                return Err(refused(
+                    &"it has no column of row-wires, and there is a network for each",
+                ));
+            };
+            for (&row, line) in of_samples.iter().zip(&table.lines) {
+                let index = read.iter().position(|read| *read == row);
+                let unknown = || refused(&format_args!("line {line}: there is no network for row {}", row + 1));
+                row_indices.push(index.ok_or_else(unknown)?);
+            }
         }
+        let (samples, length) = table.readings.dim();
+        Ok(Self {
+            times_s: table.times_s.unwrap_or_else(|| vec![f64::NAN; samples]),
+            readings: table.readings.into_iter().collect(),
+            length,
+            row_indices,
+        })
     }
 
     /// Returns the times of the frames in seconds, in ascending order.
@@ -200,14 +256,14 @@ pub struct ReplayState {
 const SPEEDS: RangeInclusive<f64> = 0.1..=10.0;
 
 impl Replay {
-    /// Prepares a replay from the first frame, not playing.
+    /// Begins a replay from the first frame.
     pub(super) fn new(recording: Recording, keeps_all: bool, now: Instant) -> Self {
         Self {
             anchor: (recording.times_s[0], now),
             recording,
             keeps_all,
             speed: 1.0,
-            is_playing: false,
+            is_playing: true,
             next: 0,
             is_wanted: true,
             due: None,
@@ -297,67 +353,8 @@ impl Replay {
     }
 }
 
-/// Memory of a byte of text that is replayed: short numbers, in a vector that has just doubled.
-const MEMORY_OF_BYTE: u64 = 8;
-
-/// Reads the file at `path` for the network of `file`: frames of an array with `length` readings, or else samples, which come at
-/// the times of the file or, without a time column, at an even rate.
-pub(super) fn open(
-    path: &Path,
-    file: &NetworkFile,
-    length: Option<usize>,
-    tally: &mut Tally,
-    is_wanted: &dyn Fn() -> bool,
-) -> Result<Recording, SessionError> {
-    let refused = |cause: String| SessionError::Replay(path.to_owned(), cause);
-    if let Some(length) = length {
-        let found = fs::metadata(path).map_err(|error| refused(system_cause(&error)))?;
-        if !found.is_file() {
-            return Err(refused("it is not a file; choose a recording".to_owned()));
-        }
-        let claimed = ReadingBudget::now().claim(found.len().saturating_mul(MEMORY_OF_BYTE));
-        claimed.map_err(|over| refused(over.to_string()))?;
-        let parser = file.line_parser(true, true)?;
-        let opened = File::open(path).map_err(RecordingError::from);
-        let read = opened.and_then(|opened| Recording::read(opened, parser, length, tally));
-        return read.map_err(|error| refused(error.to_string()));
-    }
-    let recipe = file.recorded.as_ref().map(|recorded| recorded.plan.import.clone());
-    let watch = &mut |_| match is_wanted() {
-        true => ControlFlow::Continue(()),
-        false => ControlFlow::Break(()),
-    };
-    let has_rows = file.network.only().is_none();
-    let table = (recipe.unwrap_or_default()).read_inputs(path, &file.problem, has_rows, watch)?;
-    let row_indices = match (&file.row_wires, &table.row_wires) {
-        _ if !has_rows => Vec::new(),
-        (Some(read), Some(of_samples)) => {
-            let index = |(&row, &line): (&usize, &u64)| {
-                let index = read.iter().position(|read| *read == row);
-                index.ok_or_else(|| refused(format!("line {line}: there is no network for row {}", row + 1)))
-            };
-            let indices = of_samples.iter().zip(&table.lines).map(index);
-            indices.collect::<Result<_, _>>()?
-        }
-        _ => {
-            let reason = "it has no column of row-wires, and there is a network for each";
-            return Err(refused(reason.to_owned()));
-        }
-    };
-    let (samples, length) = table.readings.dim();
-    if samples == 0 {
-        return Err(refused(RecordingError::Empty(String::new()).to_string()));
-    }
-    Ok(Recording {
-        times_s: ascending(&table.times_s.unwrap_or_else(|| vec![f64::NAN; samples])),
-        readings: table.readings.into_iter().collect(),
-        length,
-        row_indices,
-    })
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::sync::Arc;
 
     use decoupler_core::evaluation::{Run, RunSettings};
@@ -434,7 +431,7 @@ mod tests {
     }
 
     /// A network of the rows of an array of 2 × 1 and 1 × 3 nodes.
-    fn network() -> Arc<NetworkFile> {
+    pub(in crate::live) fn network() -> Arc<NetworkFile> {
         let mut settings = RunSettings::default();
         let simulation = settings.simulation_mut().unwrap();
         simulation.sensor.scale = "2x1_1x3".parse().unwrap();
@@ -450,7 +447,7 @@ mod tests {
         let path = folder.path().join("frames.csv");
         fs::write(&path, text).unwrap();
         let mut tally = Tally::default();
-        let read = open(&path, &network(), Some(6), &mut tally, &|| true);
+        let read = Recording::read(&path, &network(), &mut tally, &|| true);
         (read.map_err(|error| error.to_string()), tally)
     }
 
@@ -477,11 +474,13 @@ mod tests {
 
     #[test]
     fn a_recording_cut_off_anywhere_keeps_its_complete_frames() {
-        let (bytes, network) = (recorded(), network());
+        let folder = tempfile::tempdir().unwrap();
+        let (path, bytes, network) = (folder.path().join("cut.csv"), recorded(), network());
         let ends: Vec<usize> = (0..bytes.len()).filter(|&place| bytes[place] == b'\n').collect();
         for length in ends[2] + 1..bytes.len() {
-            let (mut tally, parser) = (Tally::default(), network.line_parser(true, true).unwrap());
-            let recording = Recording::read(&bytes[..length], parser, 6, &mut tally).unwrap();
+            fs::write(&path, &bytes[..length]).unwrap();
+            let mut tally = Tally::default();
+            let recording = Recording::read(&path, &network, &mut tally, &|| true).unwrap();
             let whole = ends.iter().filter(|&&end| end < length).count() - 1;
             assert_eq!(recording.times_s().len(), whole / 2, "{length}");
             let is_torn = bytes[length - 1] != b'\n';
@@ -500,7 +499,10 @@ mod tests {
         for time in ["0.05", "", "x"] {
             let (recording, tally) = read(text.replace("\n0.30000000000000004,", &format!("\n{time},")).as_bytes());
             let times_s = recording.unwrap().times_s().to_vec();
-            assert!((times_s[3] - 0.3).abs() < 1e-12 && tally.bad == 0, "{time}: {times_s:?}");
+            assert!(
+                (times_s[3] - 0.3).abs() < 1e-12 && tally.bad == 0,
+                "{time}: {times_s:?}"
+            );
         }
     }
 
@@ -513,7 +515,11 @@ mod tests {
             ("\n0.1,1,10.1", "\n0.1,1,-1", 1, "line 4, column 3: '-1'"),
         ] {
             let (recording, tally) = read(text.replacen(from, to, 1).as_bytes());
-            assert_eq!((recording.unwrap().times_s(), tally.bad), (&[0.0, 0.2, 0.30000000000000004][..], bad), "{to}");
+            assert_eq!(
+                (recording.unwrap().times_s(), tally.bad),
+                (&[0.0, 0.2, 0.30000000000000004][..], bad),
+                "{to}"
+            );
             let reason = tally.first_bad.unwrap();
             assert!(reason.starts_with(expected), "{reason}");
         }
@@ -558,13 +564,7 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn what_is_no_file_is_refused_before_it_is_opened() {
-        let refused = open(
-            Path::new("/dev/zero"),
-            &network(),
-            Some(6),
-            &mut Tally::default(),
-            &|| true,
-        );
+        let refused = Recording::read(Path::new("/dev/zero"), &network(), &mut Tally::default(), &|| true);
         assert!(refused.unwrap_err().to_string().contains("it is not a file"));
     }
 

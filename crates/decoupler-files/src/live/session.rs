@@ -6,7 +6,7 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::DatasetError,
+    dataset::{DatasetError, Seed},
     decoupling::{Decoder, ProgramDecoder},
     live::{Drift, DriftMonitor, FaultEvent, FaultyWire, LiveError, ZeroGains},
     scene::{Noise, Scene, SceneError},
@@ -15,8 +15,8 @@ use decoupler_core::{
 use thiserror::Error;
 
 use super::{
-    FaultError, History, Input, Keeping, LiveArray, Recorded, ReplayState, Source, SourceError, SourcePlan, Tally,
-    Watched, recording::RecordingFile,
+    FaultError, History, Input, Keeping, LineInput, LiveArray, Recorded, Recording, Replay, ReplayState, Simulated,
+    Source, SourceError, SourcePlan, Tally, Watched, recording::RecordingFile,
 };
 use crate::{
     export::NetworkFile,
@@ -214,7 +214,6 @@ impl Session {
     /// If the source cannot be simulated or replayed, or the array has no resistance.
     pub fn open(plan: SessionPlan, is_wanted: &dyn Fn() -> bool) -> Result<Self, SessionError> {
         let (network, noise, mut tally) = (plan.network, plan.noise, Tally::default());
-        let by_frame = plan.unit == Unit::Frames;
         let sensor = network.problem.sensor.as_ref();
         let scene = sensor.map_or_else(Scene::default, |simulation| Scene {
             noise,
@@ -222,10 +221,30 @@ impl Session {
         });
         let array = sensor.map(|simulation| LiveArray::new(&simulation.sensor, &scene, plan.zero));
         let array = array.transpose()?;
-        let of_array = array.as_ref().map(|array| (array, &scene));
-        let input = Input::open(&plan.source, &network, of_array, by_frame, &mut tally, is_wanted)?;
+        let mut checks_all = false;
+        let input = match &plan.source {
+            SourcePlan::Simulated(frames_per_second) => {
+                let sensor = &array.as_ref().ok_or(SessionError::NoModel)?.sensor;
+                let source = Simulated::new(sensor, &scene, Seed(0), *frames_per_second)?;
+                Input::Simulated(Box::new(source), Instant::now())
+            }
+            SourcePlan::Replay(path) => {
+                let recording = Recording::read(path, &network, &mut tally, is_wanted)?;
+                Input::Replay(Box::new(Replay::new(recording, array.is_none(), Instant::now())))
+            }
+            SourcePlan::Stream(source) => {
+                checks_all = source.keeping() == Keeping::All;
+                let parser = network.line_parser(plan.unit == Unit::Frames, checks_all)?;
+                // The latest line of each row-wire.
+                let kept = array
+                    .as_ref()
+                    .map_or(network.network.values().len(), |array| array.rows.len());
+                let lines = LineInput::open(source, parser, kept).map_err(SessionError::Reader)?;
+                Input::Lines(Box::new(lines))
+            }
+        };
         Ok(Self {
-            checks_all: matches!(&input, Input::Lines(lines) if lines.source.keeping() == Keeping::All),
+            checks_all,
             input,
             array,
             tally,
@@ -252,7 +271,7 @@ impl Session {
             notes,
             ..
         } = self;
-        let mut event = input.take(now, patience, arrived, tally, notes);
+        let mut event = input.take((now, patience), arrived, tally, notes);
         if matches!(event, SessionEvent::Answer) {
             event = self.decode(now);
         }
@@ -366,15 +385,6 @@ impl Session {
         self.tally.good(self.last.read_at.unwrap_or(now), now, error_mm);
     }
 
-    /// Returns the time at which the next frame of a timed source is due, `now` for a stream, and `None` while it is paused.
-    pub fn due(&self, now: Instant) -> Option<Instant> {
-        match &self.input {
-            Input::Simulated(_, due) => Some(*due),
-            Input::Replay(replay) => replay.due(now),
-            Input::Lines(_) => Some(now),
-        }
-    }
-
     /// Returns `true` once, when no line of a stream has come for two seconds.
     pub fn falls_silent(&mut self, now: Instant) -> bool {
         matches!(self.input, Input::Lines(_)) && self.tally.falls_silent(now)
@@ -457,10 +467,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::{
-        import::{Plan, Recipe, Recorded as RecordedFiles, Setup},
-        live::{Fault, Motion, Replay},
-    };
+    use crate::import::{Plan, Recipe, Recorded as RecordedFiles, Setup};
 
     /// A network of a recording, trained on a file in `folder`.
     fn network(folder: &Path) -> Arc<NetworkFile> {
@@ -501,12 +508,7 @@ mod tests {
     }
 
     fn replay(path: &Path) -> SourcePlan {
-        SourcePlan::Replay {
-            path: path.to_owned(),
-            at_s: 0.0,
-            speed: 1.0,
-            is_playing: true,
-        }
+        SourcePlan::Replay(path.to_owned())
     }
 
     fn open(plan: SessionPlan) -> Session {
@@ -526,7 +528,7 @@ mod tests {
         let start = Instant::now();
         replay_of(session).seek(at_s, start);
         let mut now = start;
-        while let Some(due) = session.due(now) {
+        while let Some(due) = session.input.due(now) {
             now = due.max(now);
             assert!(matches!(session.next(now, Duration::ZERO), SessionEvent::Answer));
             session.count();
@@ -664,7 +666,7 @@ mod tests {
             let mut session = open(plan(&file, source));
             let start = Instant::now();
             for sample in 0..600 {
-                let now = session.due(start).map_or(start, |due| due.max(start));
+                let now = session.input.due(start).map_or(start, |due| due.max(start));
                 while !matches!(session.next(now, Duration::from_secs(60)), SessionEvent::Answer) {}
                 let expected = trained.set.sample_readings(sample).to_vec();
                 assert_eq!(session.last.readings, expected, "sample {sample}");
@@ -688,19 +690,12 @@ mod tests {
         let sensor = network.settings.simulation().unwrap().sensor;
         let mut session = open(SessionPlan {
             noise: Noise::relative(1e-3),
-            ..plan(
-                &network,
-                SourcePlan::Simulated {
-                    frames_per_second: 50.0,
-                    motion: Motion::Wandering,
-                    fault: None,
-                },
-            )
+            ..plan(&network, SourcePlan::Simulated(50.0))
         });
         let mut now = Instant::now();
         let mut decode = |session: &mut Session| {
             // Every frame is checked.
-            now = session.due(now).unwrap().max(now) + Duration::from_millis(20);
+            now = session.input.due(now).unwrap().max(now) + Duration::from_millis(20);
             assert!(matches!(session.next(now, Duration::ZERO), SessionEvent::Answer));
             session.count();
         };
@@ -711,10 +706,7 @@ mod tests {
         let expected = (squares.sum::<f64>() / 4.0).sqrt();
         assert!((session.array.as_ref().unwrap().residual(&session.last) / expected - 1.0).abs() < 1e-9);
 
-        let fault = Fault::OpenColumn {
-            column: 4,
-            before_node: 0,
-        };
+        let fault = "open-column:5".parse().unwrap();
         let Input::Simulated(simulated, _) = &mut session.input else {
             panic!("a simulated source");
         };

@@ -1,6 +1,6 @@
 //! The files in `assets/samples` have the contents described in their documentation.
 
-use std::{fs::File, io::BufReader, path::PathBuf};
+use std::path::PathBuf;
 
 use decoupler_core::{dataset::Seed, decoupling::Decoder, glam::DVec3};
 use decoupler_files::{
@@ -21,9 +21,7 @@ fn the_network_decodes_the_recording() {
     let source = *file.settings.simulation().unwrap();
     let (sensor, scale) = (source.sensor, source.sensor.scale);
     let rows = Vec::from_iter(0..scale.rows());
-    let reader = BufReader::new(File::open(sample("recording.csv")).unwrap());
-    let (parser, length) = (file.line_parser(true, true).unwrap(), rows.len() * scale.columns());
-    let recording = Recording::read(reader, parser, length, &mut Tally::default()).unwrap();
+    let recording = Recording::read(&sample("recording.csv"), &file, &mut Tally::default(), &|| true).unwrap();
     let mut decoder = file.network.decoder();
     let mut truth = Simulated::new(&sensor, &source.scene, Seed(0), 15.0).unwrap();
     let mut frame_ohm = vec![0.0; truth.readings()];

@@ -259,7 +259,7 @@ fn decode(
             screen.show(session, report);
             (has_news, is_drawn, may_show_at) = (false, false, now + BETWEEN_SHOWN);
         }
-        let mut until = session.due(now).unwrap_or(now + LONGEST_WAIT);
+        let mut until = session.input.due(now).unwrap_or(now + LONGEST_WAIT);
         if has_news && is_drawn {
             until = until.min(may_show_at);
         }

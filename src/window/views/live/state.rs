@@ -8,10 +8,10 @@ use std::{
     time::Instant,
 };
 
-use decoupler_core::{live::ZeroGains, scene::Noise};
+use decoupler_core::{dataset::Simulation, live::ZeroGains, scene::Noise};
 use decoupler_files::{
     export::{NetworkFile, atomic_write},
-    live::{Input, Recorded, Replay, Session, SessionError, SessionPlan, Simulated, SourcePlan, Unit},
+    live::{Input, Recorded, Replay, ReplayState, Session, SessionPlan, SourcePlan, Unit},
 };
 
 use super::{
@@ -105,7 +105,7 @@ impl LiveView {
     ///
     /// # Errors
     /// If there is no network or a setting is missing, with what to do.
-    fn plan(&self, shared: &Shared, at_s: f64) -> Result<(String, SessionPlan), String> {
+    fn plan(&self, shared: &Shared) -> Result<(String, SessionPlan), String> {
         let (name, network) = self
             .network
             .network(&shared.runs)
@@ -116,7 +116,7 @@ impl LiveView {
             }
             let plan = SessionPlan {
                 network: Arc::clone(network),
-                source: self.source.plan(None, at_s)?,
+                source: self.source.plan()?,
                 noise: Noise::default(),
                 zero: None,
                 unit: Unit::Frames,
@@ -125,13 +125,9 @@ impl LiveView {
         };
         let scale = simulation.sensor.scale;
         let read = simulation.scene.rows.read(scale.rows()).unwrap_or_default();
-        let fault = self
-            .fault
-            .fault(scale)
-            .filter(|_| self.fault.problem(scale, &read).is_none());
         let plan = SessionPlan {
             network: Arc::clone(network),
-            source: self.source.plan(fault, at_s)?,
+            source: self.source.plan()?,
             noise: Noise {
                 relative: self.source.noise(&simulation),
                 ..simulation.scene.noise.in_test()
@@ -153,12 +149,12 @@ impl LiveView {
 
     /// Returns the reason why decoding cannot begin, with what to do.
     pub(super) fn obstacle(&self, shared: &Shared) -> Option<String> {
-        self.plan(shared, 0.0).err()
+        self.plan(shared).err()
     }
 
     /// Begins to decode.
     pub(super) fn start(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        let Ok((network, plan)) = self.plan(shared, 0.0) else {
+        let Ok((network, plan)) = self.plan(shared) else {
             return;
         };
         effects.push(Effect::Settle(Matter::Live));
@@ -187,7 +183,7 @@ impl LiveView {
 
     /// Returns true if a stream has ended by itself and is still the chosen source.
     pub fn can_retry(&self, shared: &Shared) -> bool {
-        let is_same = |ended: &SourcePlan| self.plan(shared, 0.0).is_ok_and(|(_, plan)| plan.source == *ended);
+        let is_same = |ended: &SourcePlan| self.plan(shared).is_ok_and(|(_, plan)| plan.source == *ended);
         self.running.is_none() && self.ended.as_ref().is_some_and(is_same)
     }
 
@@ -200,16 +196,21 @@ impl LiveView {
 
     /// Restarts with the network that is chosen now, from the current position of a replay.
     pub(super) fn restart(&mut self, shared: &Shared) {
-        let replay = self.shown.replay;
-        let Ok((network, mut plan)) = self.plan(shared, replay.map_or(0.0, |replay| replay.at_s)) else {
-            return;
-        };
-        if let (SourcePlan::Replay { is_playing, .. }, Some(replay)) = (&mut plan.source, replay) {
-            *is_playing = replay.is_playing;
-        } else {
+        let Ok((network, plan)) = self.plan(shared) else { return };
+        let replay = self
+            .shown
+            .replay
+            .filter(|_| matches!(plan.source, SourcePlan::Replay(_)));
+        if replay.is_none() {
             self.shown = LiveShown::default();
         }
         self.begin(network, plan);
+        if let Some(ReplayState { at_s, is_playing, .. }) = replay {
+            self.control(move |replay, now| {
+                replay.seek(at_s, now);
+                replay.play(is_playing, now);
+            });
+        }
     }
 
     fn begin(&mut self, network: String, plan: SessionPlan) {
@@ -227,6 +228,9 @@ impl LiveView {
             asked: plan.source.clone(),
             commands,
         });
+        let (simulation, speed) = (plan.network.problem.sensor, self.source.speed);
+        self.simulate(simulation.as_ref());
+        self.control(move |replay, now| replay.set_speed(speed, now));
         self.job.start(
             move |report| run(plan, &incoming, report),
             |ended| LiveEvent::Ended(ended.unwrap_or_else(|error| Err(error.to_string()))),
@@ -251,15 +255,20 @@ impl LiveView {
         self.command(Command::Change(Box::new(change)));
     }
 
-    /// Changes the simulated source, if there is one.
-    pub(super) fn simulate(&self, change: impl FnOnce(&mut Simulated) -> Result<(), SessionError> + Send + 'static) {
-        self.change(|session| {
+    /// Moves the indenter of a simulated source, and breaks its wires, as in the form.
+    pub(super) fn simulate(&self, simulation: Option<&Simulation>) {
+        let Some(simulation) = simulation else { return };
+        let scale = simulation.sensor.scale;
+        let read = simulation.scene.rows.read(scale.rows()).unwrap_or_default();
+        let is_possible = self.fault.problem(scale, &read).is_none();
+        let (motion, fault) = (self.source.motion, self.fault.fault(scale).filter(|_| is_possible));
+        self.change(move |session| {
             let Input::Simulated(simulated, _) = &mut session.input else {
                 return None;
             };
-            change(simulated)
-                .err()
-                .map(|error| LiveEvent::Failed(error.to_string()))
+            simulated.set_motion(motion);
+            let broken = simulated.set_fault(fault);
+            broken.err().map(|error| LiveEvent::Failed(error.to_string()))
         });
     }
 
@@ -293,7 +302,7 @@ impl LiveView {
 
     /// Returns true if incoming frames can be recorded.
     pub(super) fn can_record(&self) -> bool {
-        let is_replay = |running: &Running| matches!(running.source, SourcePlan::Replay { .. });
+        let is_replay = |running: &Running| matches!(running.source, SourcePlan::Replay(_));
         // Frames of an array are recorded; samples of other sensors have columns of their own.
         let is_array = self.shown.targets.is_none();
         is_array && self.running.as_ref().is_some_and(|running| !is_replay(running))
