@@ -118,10 +118,11 @@ pub struct LineInput {
 
 impl LineInput {
     /// Opens `source`; `parser` reads its lines, of which the latest `kept` are kept if they are not all taken.
-    pub(super) fn open(source: &Source, parser: LineParser, kept: usize) -> io::Result<Self> {
+    pub(super) fn open(source: &Source, parser: LineParser, kept: usize) -> Result<Self, SessionError> {
         let opened = source.clone();
         let open = move || opened.open().map_err(io::Error::other);
-        let mut lines = Lines::spawn(open, source.keeping(), source.begins_anywhere())?;
+        let lines = Lines::spawn(open, source.keeping(), source.begins_anywhere());
+        let mut lines = lines.map_err(SessionError::Reader)?;
         lines.set_kept(kept);
         Ok(Self {
             source: source.clone(),
@@ -137,8 +138,13 @@ impl LineInput {
         self.lines.unended()
     }
 
-    fn take(&mut self, patience: Duration, answer: &mut Answer, notes: &mut Vec<Note>) -> SessionEvent {
-        let Line { number, text, read_at } = match self.lines.next(patience) {
+    pub(super) fn take(&mut self, patience: Duration, answer: &mut Answer, notes: &mut Vec<Note>) -> SessionEvent {
+        let Line {
+            number,
+            text,
+            is_ended,
+            read_at,
+        } = match self.lines.next(patience) {
             NextLine::Line(line) => line,
             NextLine::None => return SessionEvent::Nothing,
             NextLine::End(None) => return SessionEvent::End(Ok(())),
@@ -150,11 +156,12 @@ impl LineInput {
                 return SessionEvent::End(Err(error));
             }
         };
+        (answer.line, answer.is_ended) = (number, is_ended);
         let Some(text) = text else {
             self.parser.count_bad();
             return SessionEvent::Bad(format!("line {number}: it is longer than {} bytes", Lines::LONGEST));
         };
-        let (first_row, readings, kept) = match self.parser.parse(number, text) {
+        let (first_row, readings, kept, recorded_s) = match self.parser.parse(number, text) {
             Ok(ParsedLine::NoReadings) => return SessionEvent::Nothing,
             Ok(ParsedLine::Start { is_first }) => {
                 notes.extend(is_first.then_some(Note::Start(number)));
@@ -162,20 +169,20 @@ impl LineInput {
             }
             Ok(ParsedLine::Snapshot(readings)) => {
                 self.lines.set_kept(1);
-                (Some(0), readings, &[][..])
+                (Some(0), readings, &[][..], None)
             }
             Ok(ParsedLine::Row {
                 row_index,
                 readings,
                 place,
                 kept,
-                ..
+                time_s,
             }) => {
                 let is_step_back = matches!(place, Some(Place::AfterStepBack(_)));
                 if is_step_back && !std::mem::replace(&mut self.has_stepped_back, true) {
                     notes.push(Note::StepBack(number));
                 }
-                (row_index, readings, kept)
+                (row_index, readings, kept, time_s)
             }
             // Reading may begin in the middle of a line.
             Err(error) if error.is_final() && !(self.source.begins_anywhere() && number == 1) => {
@@ -183,7 +190,7 @@ impl LineInput {
             }
             Err(error) => return SessionEvent::Bad(error.to_string()),
         };
-        (answer.line, answer.first_row, answer.read_at) = (number, first_row, Some(read_at));
+        (answer.first_row, answer.read_at, answer.recorded_s) = (first_row, Some(read_at), recorded_s);
         answer.time_s = read_at.saturating_duration_since(self.begun).as_secs_f64();
         answer.readings.clear();
         answer.readings.extend_from_slice(readings);

@@ -32,6 +32,8 @@ pub struct Line<'a> {
     pub number: u64,
     /// Bytes without LF; `None` if the line is longer than [`Lines::LONGEST`].
     pub text: Option<&'a [u8]>,
+    /// False for a last line without a line break, which may be cut off.
+    pub is_ended: bool,
     /// Time when its last byte was read.
     pub read_at: Instant,
 }
@@ -158,6 +160,7 @@ impl Lines {
             NextLine::Line(Line {
                 number: line.number,
                 text: line.place.map(|place| &self.batch.bytes[place]),
+                is_ended: line.is_ended,
                 read_at: line.read_at,
             })
         })
@@ -194,7 +197,7 @@ impl Shared {
             };
             let read_at = Instant::now();
             let mut state = self.lock();
-            while count.is_some() && keeping == Keeping::All && !state.waiting.lines.is_empty() && !state.is_abandoned {
+            while keeping == Keeping::All && !state.waiting.lines.is_empty() && !state.is_abandoned {
                 state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
             }
             if state.is_abandoned {
@@ -231,6 +234,7 @@ struct Entry {
     number: u64,
     /// Place in the bytes; `None` for a line that is too long.
     place: Option<Range<usize>>,
+    is_ended: bool,
     read_at: Instant,
 }
 
@@ -294,15 +298,15 @@ impl Splitter {
                 self.partial.clear();
             }
             if text.len() < part.len() {
-                self.end_line(read_at, batch);
+                self.end_line(true, read_at, batch);
             }
         }
         if bytes.is_empty() && self.length > 0 {
-            self.end_line(read_at, batch);
+            self.end_line(false, read_at, batch);
         }
     }
 
-    fn end_line(&mut self, read_at: Instant, batch: &mut Batch) {
+    fn end_line(&mut self, is_ended: bool, read_at: Instant, batch: &mut Batch) {
         self.number += 1;
         if self.number > 1 || !self.skips_first || begins_like_header(self.partial.trim_ascii()) {
             let start = batch.bytes.len();
@@ -310,6 +314,7 @@ impl Splitter {
             batch.lines.push_back(Entry {
                 number: self.number,
                 place: (self.length < Lines::LONGEST).then_some(start..batch.bytes.len()),
+                is_ended,
                 read_at,
             });
         }

@@ -83,8 +83,9 @@ pub struct Recorded {
 
 /// A recording in progress: every frame is written to the file as soon as it arrives.
 #[derive(Debug)]
-pub(super) struct RecordingFile {
-    pub(super) recorded: Recorded,
+pub struct RecordingFile {
+    /// Its file and length so far.
+    pub recorded: Recorded,
     recorder: Recorder<File>,
     first_s: Option<f64>,
 }

@@ -1,16 +1,15 @@
 use std::{
     fmt::Display,
-    fs::{self, File},
-    io::{self, BufRead, BufReader},
+    fs,
     ops::{ControlFlow, RangeInclusive},
     path::Path,
     time::{Duration, Instant},
 };
 
-use super::{Answer, Lines, SessionError, SessionEvent, Tally};
+use super::{Answer, LineInput, Lines, SessionError, SessionEvent, Source, Tally};
 use crate::{
     export::NetworkFile,
-    import::{LineParser, ParsedLine},
+    import::LineParser,
     machine::{ReadingBudget, system_cause},
 };
 
@@ -72,65 +71,63 @@ impl Recording {
     /// Reads frames with `length` readings; those without a time have NaN.
     fn of_array(
         path: &Path,
-        mut parser: LineParser,
+        parser: LineParser,
         length: usize,
         tally: &mut Tally,
         refused: &dyn Fn(&dyn Display) -> SessionError,
     ) -> Result<Self, SessionError> {
-        let system = |error: io::Error| refused(&system_cause(&error));
-        let found = fs::metadata(path).map_err(system)?;
+        let found = fs::metadata(path).map_err(|error| refused(&system_cause(&error)))?;
         if !found.is_file() {
             return Err(refused(&"it is not a file; choose a recording"));
         }
         let claimed = ReadingBudget::now().claim(found.len().saturating_mul(MEMORY_OF_BYTE));
         claimed.map_err(|over| refused(&over))?;
-        let mut source = BufReader::new(File::open(path).map_err(system)?);
+        let mut lines = LineInput::open(&Source::File(path.to_owned()), parser, 0)?;
         let (mut times_s, mut readings, mut frame_s) = (Vec::new(), Vec::new(), f64::NAN);
-        let mut text = Vec::new();
-        for line in 1.. {
-            text.clear();
-            if source.read_until(b'\n', &mut text).map_err(system)? == 0 {
-                break;
-            }
-            let is_ended = text.pop_if(|last| *last == b'\n').is_some();
-            if !is_ended && times_s.last().is_some_and(|time_s: &f64| time_s.is_finite()) {
-                // Its last number may be cut off.
-                tally.bad(&format!("line {line}, the last, is cut off and left out"));
-                break;
-            }
+        let mut row = Answer::default();
+        loop {
             let whole = times_s.len() * length;
-            let (row_index, row, time_s) = match parser.parse(line, &text) {
-                Ok(ParsedLine::Row {
-                    row_index,
-                    readings: row,
-                    time_s,
-                    ..
-                }) => (row_index.unwrap_or(0), row, time_s),
-                Ok(ParsedLine::Snapshot(frame)) => (0, frame, None),
-                Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => continue,
-                Err(error) if error.is_final() => return Err(refused(&error)),
-                Err(error) => {
+            match lines.take(Lines::PATIENCE, &mut row, &mut Vec::new()) {
+                SessionEvent::Nothing => continue,
+                SessionEvent::Answer | SessionEvent::Bad(_) if !row.is_ended && frame_s.is_finite() => {
+                    // Its last number may be cut off.
+                    tally.bad(&format!("line {}, the last, is cut off and left out", row.line));
+                    break;
+                }
+                SessionEvent::Answer => {}
+                SessionEvent::Bad(reason) => {
                     readings.truncate(whole);
-                    tally.bad(&error.to_string());
+                    tally.bad(&reason);
                     continue;
                 }
-            };
-            let expected = (readings.len() - whole) / row.len();
-            if row_index != expected {
+                SessionEvent::End(end) => {
+                    end?;
+                    break;
+                }
+            }
+            let (index, expected) = (
+                row.first_row.unwrap_or(0),
+                (readings.len() - whole) / row.readings.len(),
+            );
+            if index != expected {
                 // After a malformed line, the rest of its frame is left out without another word.
                 if expected > 0 {
                     let cause = "each frame needs its rows in ascending order";
-                    tally.bad(&format!("line {line}: row {} is expected here: {cause}", expected + 1));
+                    tally.bad(&format!(
+                        "line {}: row {} is expected here: {cause}",
+                        row.line,
+                        expected + 1
+                    ));
                 }
                 readings.truncate(whole);
-                if row_index > 0 {
+                if index > 0 {
                     continue;
                 }
             }
-            if row_index == 0 {
-                frame_s = time_s.unwrap_or(f64::NAN);
+            if index == 0 {
+                frame_s = row.recorded_s.unwrap_or(f64::NAN);
             }
-            readings.extend_from_slice(row);
+            readings.extend_from_slice(&row.readings);
             if readings.len() == whole + length {
                 times_s.push(frame_s);
             }
@@ -206,18 +203,16 @@ fn ascending(times_s: &[f64]) -> Vec<f64> {
     if times_s.iter().all(|time_s| time_s.is_nan()) {
         return Vec::from_iter((0..times_s.len()).map(|frame| frame as f64 / RATE_WITHOUT_TIMES));
     }
-    let steps = times_s.windows(2).map(|pair| pair[1] - pair[0]);
-    let steps = Vec::from_iter(steps.map(|step| Some(step).filter(|step| *step >= 0.0)));
-    let mut known = Vec::from_iter(steps.iter().flatten().copied().filter(|step| *step > 0.0));
+    let steps = Vec::from_iter(times_s.windows(2).map(|pair| pair[1] - pair[0]));
+    let mut known = Vec::from_iter(steps.iter().copied().filter(|step| *step > 0.0));
     known.sort_unstable_by(f64::total_cmp);
     let usual_s = known.get(known.len() / 2).copied().unwrap_or(1.0 / RATE_WITHOUT_TIMES);
-    let first_s = times_s.first().copied().filter(|time_s| time_s.is_finite());
-    let mut time_s = first_s.unwrap_or(0.0);
-    let rest = steps.into_iter().map(|step| {
-        time_s += step.unwrap_or(usual_s);
-        time_s
+    let first_s = if times_s[0].is_finite() { times_s[0] } else { 0.0 };
+    let rest = steps.iter().scan(first_s, |time_s, &step| {
+        *time_s += if step >= 0.0 { step } else { usual_s };
+        Some(*time_s)
     });
-    std::iter::once(first_s.unwrap_or(0.0)).chain(rest).collect()
+    std::iter::once(first_s).chain(rest).collect()
 }
 
 /// Replay of a recording: its frames come at their recorded times, at an adjustable speed.
@@ -231,12 +226,12 @@ pub struct Replay {
     is_playing: bool,
     /// Recorded time at an instant, from which it advances while playing.
     anchor: (f64, Instant),
-    /// Index of the next frame by its time.
-    next: usize,
-    /// True if the next frame is due now, whatever its time.
-    is_wanted: bool,
     /// Index of the frame that is due, until it and all before it are taken.
     due: Option<usize>,
+    /// Index of the next frame after it.
+    next: usize,
+    /// Time of the frame that was taken last, in seconds.
+    at_s: f64,
     /// Number of frames that were taken in order.
     taken: usize,
 }
@@ -264,9 +259,9 @@ impl Replay {
             keeps_all,
             speed: 1.0,
             is_playing: true,
-            next: 0,
-            is_wanted: true,
-            due: None,
+            due: Some(0),
+            next: 1,
+            at_s: 0.0,
             taken: 0,
         }
     }
@@ -295,14 +290,14 @@ impl Replay {
 
     /// Seeks to a time in seconds after the first frame, and continues from there if it is playing.
     pub fn seek(&mut self, at_s: f64, now: Instant) {
-        self.next = self.recording.frame_at(self.recording.times_s[0] + at_s.max(0.0));
-        self.anchor = (self.recording.times_s[self.next], now);
-        (self.is_wanted, self.due) = (true, None);
+        let index = self.recording.frame_at(self.recording.times_s[0] + at_s.max(0.0));
+        self.anchor = (self.recording.times_s[index], now);
+        (self.due, self.next) = (Some(index), index + 1);
     }
 
     /// Returns the time at which the next frame is due; `None` while it is paused.
     pub(super) fn due(&self, now: Instant) -> Option<Instant> {
-        if self.is_wanted || self.due.is_some() {
+        if self.due.is_some() {
             return Some(now);
         }
         let time_s = self.recording.times_s.get(self.next).filter(|_| self.is_playing)?;
@@ -319,14 +314,14 @@ impl Replay {
         let due = *self.due.get_or_insert_with(|| {
             let first = self.next;
             let is_late = now_s - times_s[first] > self.speed * Lines::PATIENCE.as_secs_f64();
-            if !std::mem::take(&mut self.is_wanted) && is_late {
-                self.next = self.recording.frame_at(now_s).max(first);
-            }
-            if !self.keeps_all {
-                tally.dropped += (self.next - first) as u64;
-            }
-            self.next += 1;
-            self.next - 1
+            let due = if is_late {
+                self.recording.frame_at(now_s).max(first)
+            } else {
+                first
+            };
+            tally.dropped += if self.keeps_all { 0 } else { (due - first) as u64 };
+            self.next = due + 1;
+            due
         });
         if self.next >= times_s.len() {
             (self.anchor, self.is_playing) = ((times_s[due], now), false);
@@ -339,14 +334,15 @@ impl Replay {
         answer.readings.extend_from_slice(self.recording.frame(index));
         answer.first_row = Some(self.recording.row_indices.get(index).copied().unwrap_or(0));
         (answer.time_s, answer.read_at) = (times_s[index], Some(now));
+        self.at_s = times_s[index] - times_s[0];
         SessionEvent::Answer
     }
 
-    /// Returns the position of the frame at `time_s`.
-    pub(super) fn state(&self, time_s: f64) -> ReplayState {
+    /// Returns the position of the frame that was taken last.
+    pub fn state(&self) -> ReplayState {
         let times_s = &self.recording.times_s;
         ReplayState {
-            at_s: time_s - times_s[0],
+            at_s: self.at_s,
             length_s: times_s[times_s.len() - 1] - times_s[0],
             is_playing: self.is_playing,
         }
@@ -407,7 +403,7 @@ pub(super) mod tests {
         replay.seek(4.9, start);
         replay.play(true, start);
         assert_eq!(frames(&mut replay, start, 0..1000).0, [99, 100]);
-        let state = replay.state(4.95);
+        let state = replay.state();
         assert!(!state.is_playing && (state.length_s - 4.95).abs() < 1e-12 && replay.due(start).is_none());
         replay.play(true, start);
         assert_eq!(frames(&mut replay, start, 0..6).0, [1], "it begins again");
@@ -427,7 +423,6 @@ pub(super) mod tests {
         let found = ascending(&[5.0, 5.5, 6.0, nan, 7.0, 0.0, 0.25, 10.25]);
         assert_eq!(found, [5.0, 5.5, 6.0, 6.5, 7.0, 7.5, 7.75, 17.75]);
         assert_eq!(ascending(&[nan, nan]), [0.0, 0.02]);
-        assert_eq!(ascending(&[]), [0.0; 0]);
     }
 
     /// A network of the rows of an array of 2 × 1 and 1 × 3 nodes.

@@ -15,8 +15,8 @@ use decoupler_core::{
 use thiserror::Error;
 
 use super::{
-    FaultError, History, Input, Keeping, LineInput, LiveArray, Recorded, Recording, Replay, ReplayState, Simulated,
-    Source, SourceError, SourcePlan, Tally, Watched, recording::RecordingFile,
+    FaultError, History, Input, Keeping, LineInput, LiveArray, Recorded, Recording, RecordingFile, Replay, Simulated,
+    Source, SourceError, SourcePlan, Tally, Watched,
 };
 use crate::{
     export::NetworkFile,
@@ -62,6 +62,8 @@ pub struct Session {
     pub tally: Tally,
     /// Events besides the answers, for the caller to remove.
     pub notes: Vec<Note>,
+    /// Recording of the frames of an array in progress, which ends when it is dropped.
+    pub recording: Option<RecordingFile>,
     /// Values of a network of a recording.
     pub history: History,
     /// Smallest and largest of the values of each target so far.
@@ -72,10 +74,7 @@ pub struct Session {
     unit: Unit,
     /// Latest readings.
     arrived: Answer,
-    /// True if every frame is checked, since the source waits.
-    checks_all: bool,
     is_row_missing: bool,
-    recording: Option<RecordingFile>,
 }
 
 /// Readings of a line, sample or frame, and their answer.
@@ -97,6 +96,10 @@ pub struct Answer {
     pub left_out: Option<FaultyWire>,
     /// Time at which its last byte was read, or at which it was simulated or due.
     pub(super) read_at: Option<Instant>,
+    /// False for a last line without a line break.
+    pub(super) is_ended: bool,
+    /// Time of the line in seconds, if it has a time.
+    pub(super) recorded_s: Option<f64>,
     /// True for a sample of a replay that was answered before.
     pub(super) is_repeated: bool,
 }
@@ -221,7 +224,6 @@ impl Session {
         });
         let array = sensor.map(|simulation| LiveArray::new(&simulation.sensor, &scene, plan.zero));
         let array = array.transpose()?;
-        let mut checks_all = false;
         let input = match &plan.source {
             SourcePlan::Simulated(frames_per_second) => {
                 let sensor = &array.as_ref().ok_or(SessionError::NoModel)?.sensor;
@@ -233,18 +235,13 @@ impl Session {
                 Input::Replay(Box::new(Replay::new(recording, array.is_none(), Instant::now())))
             }
             SourcePlan::Stream(source) => {
-                checks_all = source.keeping() == Keeping::All;
-                let parser = network.line_parser(plan.unit == Unit::Frames, checks_all)?;
-                // The latest line of each row-wire.
-                let kept = array
-                    .as_ref()
-                    .map_or(network.network.values().len(), |array| array.rows.len());
-                let lines = LineInput::open(source, parser, kept).map_err(SessionError::Reader)?;
+                let parser = network.line_parser(plan.unit == Unit::Frames, source.keeping() == Keeping::All)?;
+                let rows = array.as_ref().map(|array| array.rows.len());
+                let lines = LineInput::open(source, parser, rows.unwrap_or(network.network.values().len()))?;
                 Input::Lines(Box::new(lines))
             }
         };
         Ok(Self {
-            checks_all,
             input,
             array,
             tally,
@@ -264,14 +261,8 @@ impl Session {
 
     /// Takes what the source has at `now`; a stream waits for a line at most for `patience`.
     pub fn next(&mut self, now: Instant, patience: Duration) -> SessionEvent {
-        let Self {
-            input,
-            arrived,
-            tally,
-            notes,
-            ..
-        } = self;
-        let mut event = input.take((now, patience), arrived, tally, notes);
+        let (answer, tally, notes) = (&mut self.arrived, &mut self.tally, &mut self.notes);
+        let mut event = self.input.take((now, patience), answer, tally, notes);
         if matches!(event, SessionEvent::Answer) {
             event = self.decode(now);
         }
@@ -308,7 +299,9 @@ impl Session {
                 arrived.readings.clone_from(&array.frame_ohm);
                 arrived.first_row = Some(0);
             }
-            if is_whole && let Some(event) = array.check(self.checks_all, now) {
+            // No frame is left unchecked if the source waits.
+            let waits = matches!(&self.input, Input::Lines(lines) if lines.source.keeping() == Keeping::All);
+            if is_whole && let Some(event) = array.check(waits, now) {
                 notes.push(Note::Fault(arrived.line, event));
             }
         }
@@ -345,24 +338,18 @@ impl Session {
 
     /// Takes the last answer into the monitor of drift and the history.
     fn follow(&mut self) {
-        let Answer {
-            line,
-            readings,
-            values,
-            time_s,
-            ..
-        } = &self.last;
+        let last = &self.last;
         if let Ok(monitor) = &mut self.monitor {
-            let rows = readings.chunks_exact(self.decoder.channels());
-            let drifts = rows.filter_map(|readings| monitor.take(*line, readings));
-            self.notes.extend(drifts.map(|drift| Note::Drift(*line, drift)));
+            let rows = last.readings.chunks_exact(self.decoder.channels());
+            let drifts = rows.filter_map(|readings| monitor.take(last.line, readings));
+            self.notes.extend(drifts.map(|drift| Note::Drift(last.line, drift)));
         }
         if self.unit == Unit::Frames && self.array.is_none() {
-            for ((low, high), &value) in self.ranges.iter_mut().zip(values) {
+            for ((low, high), &value) in self.ranges.iter_mut().zip(&last.values) {
                 (*low, *high) = (low.min(value), high.max(value));
             }
             let is_stream = matches!(self.input, Input::Lines(_));
-            self.history.push(*time_s, values, is_stream);
+            self.history.push(last.time_s, &last.values, is_stream);
         }
     }
 
@@ -383,11 +370,6 @@ impl Session {
         });
         let now = Instant::now();
         self.tally.good(self.last.read_at.unwrap_or(now), now, error_mm);
-    }
-
-    /// Returns `true` once, when no line of a stream has come for two seconds.
-    pub fn falls_silent(&mut self, now: Instant) -> bool {
-        matches!(self.input, Input::Lines(_)) && self.tally.falls_silent(now)
     }
 
     /// Returns the numbers of readings, except those left out, and of targets of the last answer outside the range seen in
@@ -419,38 +401,19 @@ impl Session {
         monitor.map(|monitor| monitor.drift().copied()).map_err(Clone::clone)
     }
 
-    /// Returns the position in a recording.
-    pub fn replay_state(&self) -> Option<ReplayState> {
-        match &self.input {
-            Input::Replay(replay) => self.last.read_at.map(|_| replay.state(self.last.time_s)),
-            Input::Simulated(..) | Input::Lines(_) => None,
-        }
-    }
-
-    /// Begins to record the frames of an array to a new file in `folder`, and returns it; `None` if they are recorded already.
+    /// Begins to record the frames of an array to a new file in `folder`, unless they are recorded already.
     ///
     /// # Errors
     /// If the file cannot be created, with the reason.
-    pub fn record(&mut self, folder: &Path) -> Result<Option<&Recorded>, String> {
-        let Some(array) = self.array.as_ref().filter(|_| self.recording.is_none()) else {
-            return Ok(None);
-        };
-        self.recording = Some(RecordingFile::create(
-            folder,
-            &array.rows,
-            array.sensor.scale.columns(),
-        )?);
-        Ok(self.recording())
-    }
-
-    /// Returns the recording in progress.
-    pub fn recording(&self) -> Option<&Recorded> {
-        self.recording.as_ref().map(|recording| &recording.recorded)
-    }
-
-    /// Ends the recording, if there is one.
-    pub fn end_recording(&mut self) -> Option<Recorded> {
-        self.recording.take().map(|recording| recording.recorded)
+    pub fn record(&mut self, folder: &Path) -> Result<(), String> {
+        if let (Some(array), None) = (&self.array, &self.recording) {
+            self.recording = Some(RecordingFile::create(
+                folder,
+                &array.rows,
+                array.sensor.scale.columns(),
+            )?);
+        }
+        Ok(())
     }
 }
 
@@ -554,7 +517,7 @@ mod tests {
             let length_s = time_s(rows - 1);
             let took_s = play(&mut session, 0.0);
             assert!((took_s - length_s).abs() < 1e-3, "{took_s} s instead of {length_s} s");
-            assert!((session.replay_state().unwrap().length_s - length_s).abs() < 1e-6);
+            assert!((replay_of(&mut session).state().length_s - length_s).abs() < 1e-6);
             let all = session.history.all();
             let expected_s = |row: usize| 5e3 + time_s(row as u32);
             let differences = all
@@ -614,7 +577,7 @@ mod tests {
         let mut expected = [0.0];
         network.decoder().decode_row(0, &[3.0, 2.0], &mut expected).unwrap();
         assert_eq!(session.last.values, expected);
-        let length_s = session.replay_state().unwrap().length_s;
+        let length_s = replay_of(&mut session).state().length_s;
         assert_eq!((session.tally.decoded, length_s), (1, 0.02));
         fs::write(&path, "u2,v\n1,2\n").unwrap();
         let refused = Session::open(plan(&network, replay(&path)), &|| true);

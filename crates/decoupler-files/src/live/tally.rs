@@ -66,7 +66,7 @@ impl Tally {
     }
 
     /// Returns `true` once, when no frame has come for two seconds.
-    pub(super) fn falls_silent(&mut self, now: Instant) -> bool {
+    pub fn falls_silent(&mut self, now: Instant) -> bool {
         let last = *self.last.get_or_insert(now);
         let falls = !self.is_waiting && now.saturating_duration_since(last) >= SILENCE;
         if falls {

@@ -22,7 +22,8 @@ use decoupler_files::{
     export::NetworkFile,
     figure::TargetSurface,
     live::{
-        History, LiveArray, Note, Recorded, ReplayState, Session, SessionEvent, SessionPlan, SourcePlan, Tally, Watched,
+        History, Input, LiveArray, Note, Recorded, ReplayState, Session, SessionEvent, SessionPlan, SourcePlan, Tally,
+        Watched,
     },
 };
 use glam::DVec3;
@@ -183,8 +184,10 @@ impl Screen {
             (self.shown.frame, self.shown.outside) = (frame, session.outside());
         }
         self.shown.counts = session.tally.clone();
-        self.shown.recording = session.recording().cloned();
-        self.shown.replay = session.replay_state();
+        self.shown.recording = session.recording.as_ref().map(|file| file.recorded.clone());
+        if let Input::Replay(replay) = &session.input {
+            self.shown.replay = Some(replay.state());
+        }
         report.progress(LiveEvent::Shown(Box::new(self.shown.clone())), |_, _| {});
     }
 
@@ -238,8 +241,8 @@ pub fn run(mut plan: SessionPlan, commands: &Receiver<Command>, report: &Report<
         opened => opened.map_err(|error| error.to_string())?,
     };
     let end = decode(&mut session, &mut screen, commands, report);
-    if let Some(recorded) = session.end_recording() {
-        report.send(LiveEvent::Recorded(recorded, None));
+    if let Some(file) = session.recording.take() {
+        report.send(LiveEvent::Recorded(file.recorded, None));
     }
     // The last frame stays on the screen.
     screen.show(&session, report);
@@ -279,7 +282,10 @@ fn decode(
                     // The truth is that of a frame without an answer.
                     screen.has_answer &= session.input.truth().is_none();
                 }
-                SessionEvent::Nothing => has_news |= session.falls_silent(Instant::now()),
+                SessionEvent::Nothing => {
+                    let is_stream = matches!(session.input, Input::Lines(_));
+                    has_news |= is_stream && session.tally.falls_silent(Instant::now());
+                }
                 SessionEvent::End(end) => return end.map_err(|error| error.to_string()),
             },
             Err(RecvTimeoutError::Disconnected) => break,

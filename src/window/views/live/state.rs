@@ -312,9 +312,9 @@ impl LiveView {
     pub(super) fn toggle_recording(&self, shared: &Shared) {
         let folder = folder(shared).join("recordings");
         match self.recording {
-            Some(_) => self.change(|session| Some(LiveEvent::Recorded(session.end_recording()?, None))),
+            Some(_) => self.change(|session| Some(LiveEvent::Recorded(session.recording.take()?.recorded, None))),
             None => self.change(move |session| match session.record(&folder) {
-                Ok(recorded) => Some(LiveEvent::Recording(recorded?.path.clone())),
+                Ok(()) => Some(LiveEvent::Recording(session.recording.as_ref()?.recorded.path.clone())),
                 Err(reason) => Some(LiveEvent::Failed(reason)),
             }),
         }
