@@ -229,7 +229,7 @@ impl Report {
             return;
         }
         if let Input::Lines(lines) = &session.input
-            && let unended @ 1.. = lines.unended()
+            && let unended @ 1.. = lines.lines.unended()
         {
             self.has_warned_of_ends = true;
             warn(&format_args!(

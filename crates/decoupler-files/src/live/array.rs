@@ -26,7 +26,8 @@ pub struct LiveArray {
     /// Readings without load: rows × M4, in ohm.
     rest_ohm: Vec<f64>,
     noise: NoiseSource,
-    zero: Option<ZeroGains>,
+    /// Gains of the unloaded state by which readings are divided.
+    pub zero: Option<ZeroGains>,
     /// Latest whole frames as received, for [`ZeroGains::estimate`].
     latest_ohm: VecDeque<Vec<f64>>,
     /// Latest readings of every row read, as received until the frame is whole: rows × M4.
@@ -76,18 +77,17 @@ impl LiveArray {
         let at_rest = vec![DVec3::ZERO; scale.nodes_per_row()];
         let of_rows = rows.iter().map(|&row| sensor.row_resistances(row, &at_rest));
         let rest_ohm = of_rows.collect::<Result<Vec<_>, _>>()?.concat();
-        let (watched, check) = if scene.noise.is_none() {
-            (Watched::NoNoise, None)
-        } else if !WireCheck::is_affordable(scale, scene) {
-            (Watched::TooLarge, None)
-        } else {
-            let check = WireCheck::new(sensor, scene, &rows)?;
-            (Watched::Checked(FaultEvent::Recovered), Some(check))
+        let watched = match scene.noise.is_none() {
+            true => Watched::NoNoise,
+            false if !WireCheck::is_affordable(scale, scene) => Watched::TooLarge,
+            false => Watched::Checked(FaultEvent::Recovered),
         };
-        let mut array = Self {
+        let is_checked = matches!(watched, Watched::Checked(_));
+        let check = is_checked.then(|| WireCheck::new(sensor, scene, &rows)).transpose()?;
+        Ok(Self {
             sensor: *sensor,
             noise: scene.noise.source(sensor)?,
-            zero: None,
+            zero: zero.filter(|zero| zero.is_sound(rows.len(), scale.columns())),
             latest_ohm: VecDeque::with_capacity(ZeroGains::FRAMES),
             frame_ohm: rest_ohm.clone(),
             rest_ohm,
@@ -97,9 +97,7 @@ impl LiveArray {
             checked: None,
             since_named: Default::default(),
             rows: rows.into(),
-        };
-        array.use_zero(zero);
-        Ok(array)
+        })
     }
 
     /// Takes readings of the rows from `first_row` on; returns `true` if every row now has new ones.
@@ -143,11 +141,18 @@ impl LiveArray {
         event
     }
 
-    /// Decodes rows of the latest frame without the wire of the named fault, which is returned; `None` if there is no fault, or no answer.
-    pub(super) fn decode(&mut self, first_row: usize, answer_mm: &mut [f64]) -> Option<FaultyWire> {
+    /// Decodes rows of the latest frame without the wire of the named fault, which is returned; `None` if there is no fault, or
+    /// no answer.
+    pub(super) fn decode(
+        &mut self,
+        first_row: usize,
+        readings: &[f64],
+        answer_mm: &mut Vec<f64>,
+    ) -> Option<FaultyWire> {
         let check = self.check.as_mut()?;
         let wire = check.named()?;
-        let rows = answer_mm.len() / self.sensor.scale.coordinates_per_row();
+        let rows = readings.len() / self.sensor.scale.columns();
+        answer_mm.resize(rows * self.sensor.scale.coordinates_per_row(), 0.0);
         let decoded = check.decode(&self.frame_ohm, first_row..first_row + rows, answer_mm);
         (decoded.is_ok() && answer_mm.iter().all(|mm| mm.is_finite())).then_some(wire)
     }
@@ -161,12 +166,6 @@ impl LiveArray {
         let gains = ZeroGains::estimate(&self.latest_ohm, &self.rest_ohm, columns, &self.noise)?;
         self.zero = Some(gains.clone());
         Ok(gains)
-    }
-
-    /// Divides readings by these gains from now on, if they are of this array.
-    pub fn use_zero(&mut self, zero: Option<ZeroGains>) {
-        let columns = self.sensor.scale.columns();
-        self.zero = zero.filter(|zero| zero.is_sound(self.rows.len(), columns));
     }
 
     /// Returns the mean |error| of z over all nodes of an answer for a whole frame, in millimetres.
@@ -200,22 +199,17 @@ impl LiveArray {
     /// Eq. (2) at the answer; infinite if the model has no resistance there.
     pub fn residual(&self, answer: &Answer) -> f64 {
         let scale = self.sensor.scale;
-        let (mut sum, mut count) = (0.0, 0);
+        let mut squares = Vec::with_capacity(answer.readings.len());
         let of_rows = answer.readings.chunks_exact(scale.columns());
         let of_rows = of_rows.zip(answer.values.chunks_exact(scale.coordinates_per_row()));
         for ((ohm, mm), &row) in of_rows.zip(self.rows.iter()) {
             let nodes = mm.chunks_exact(3).map(DVec3::from_slice).enumerate();
-            let displacements_mm: Vec<DVec3> = nodes
-                .map(|(node, position_mm)| self.sensor.displacement_mm(row, node, position_mm))
-                .collect();
-            let Ok(model_ohm) = self.sensor.row_resistances(row, &displacements_mm) else {
-                return f64::INFINITY;
-            };
-            for column in (0..scale.columns()).filter(|&column| !self.watched.leaves_out(row, column)) {
-                sum += (ohm[column] / model_ohm[column] - 1.0).powi(2);
-                count += 1;
-            }
+            let displacements_mm = nodes.map(|(node, at_mm)| self.sensor.displacement_mm(row, node, at_mm));
+            let modelled = self.sensor.row_resistances(row, &Vec::from_iter(displacements_mm));
+            let Ok(model_ohm) = modelled else { return f64::INFINITY };
+            let used = (0..scale.columns()).filter(|&column| !self.watched.leaves_out(row, column));
+            squares.extend(used.map(|column| (ohm[column] / model_ohm[column] - 1.0).powi(2)));
         }
-        (sum / f64::from(count.max(1))).sqrt()
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     }
 }

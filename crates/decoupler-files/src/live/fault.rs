@@ -47,9 +47,12 @@ pub enum FaultError {
          short-columns:COLUMN-COLUMN, gain:COLUMN=REL, stuck:COLUMN=low or stuck:COLUMN=high"
     )]
     Text(String),
-    /// The array, or the scene, has no such wire or node: kind, number and largest number.
+    /// The array has no such wire: kind, number and largest number.
     #[error("there is no {0} {1}; give 1 to {2}")]
-    Number(&'static str, usize, usize),
+    Wire(&'static str, usize, usize),
+    /// The wire has no such node.
+    #[error("there is no node on a {0} {1}; give 1 to {2}")]
+    Node(&'static str, usize, usize),
     /// The gain error is out of range.
     #[error("the gain error is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
     Gain(f64),
@@ -113,26 +116,19 @@ impl Fault {
     /// # Errors
     /// If a wire or node does not exist.
     pub fn check(self, scale: ArrayScale, read: &[usize]) -> Result<(), FaultError> {
-        let column = |column| ("column-wire", column, scale.columns());
-        let on_column = ("node on a column-wire", scale.nodes_per_column());
-        let (wire, (node, nodes)) = match self.wire {
-            FaultyWire::Row(row) => (
-                ("row-wire", row, scale.rows()),
-                ("node on a row-wire", scale.nodes_per_row()),
+        let (kind, wire, wires, nodes) = match self.wire {
+            FaultyWire::Row(row) => ("row-wire", row, scale.rows(), scale.nodes_per_row()),
+            wire => (
+                "column-wire",
+                wire.columns().end - 1,
+                scale.columns(),
+                scale.nodes_per_column(),
             ),
-            FaultyWire::Column(first) => (column(first), on_column),
-            FaultyWire::Columns(first) => (column(first + 1), on_column),
         };
-        let before_node = match self.effect {
-            FaultEffect::Open(before_node) => before_node,
-            _ => 0,
-        };
-        let all = [wire, (node, before_node, nodes)];
-        if let Some((what, index, last)) = all.into_iter().find(|(_, index, count)| index >= count) {
-            return Err(FaultError::Number(what, index + 1, last));
-        }
-        match self.wire {
-            FaultyWire::Row(row) if !read.contains(&row) => Err(FaultError::NotRead(row + 1)),
+        match (self.wire, self.effect) {
+            _ if wire >= wires => Err(FaultError::Wire(kind, wire + 1, wires)),
+            (_, FaultEffect::Open(node)) if node >= nodes => Err(FaultError::Node(kind, node + 1, nodes)),
+            (FaultyWire::Row(row), _) if !read.contains(&row) => Err(FaultError::NotRead(row + 1)),
             _ => Ok(()),
         }
     }

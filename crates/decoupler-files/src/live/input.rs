@@ -79,7 +79,7 @@ impl Input {
             Self::Replay(replay) => return replay.take(now, answer, tally),
             Self::Lines(lines) => {
                 let event = lines.take(patience, answer, notes);
-                tally.dropped = lines.lines.dropped();
+                tally.dropped = lines.lines.dropped;
                 return event;
             }
         };
@@ -109,7 +109,8 @@ impl Input {
 #[derive(Debug)]
 pub struct LineInput {
     pub(super) source: Source,
-    pub(super) lines: Lines,
+    /// Lines, before they are parsed.
+    pub lines: Lines,
     parser: LineParser,
     /// Time at which reading began.
     begun: Instant,
@@ -131,11 +132,6 @@ impl LineInput {
             begun: Instant::now(),
             has_stepped_back: false,
         })
-    }
-
-    /// Number of bytes that have arrived since the last end of a line.
-    pub fn unended(&self) -> usize {
-        self.lines.unended()
     }
 
     pub(super) fn take(&mut self, patience: Duration, answer: &mut Answer, notes: &mut Vec<Note>) -> SessionEvent {

@@ -21,8 +21,8 @@ pub struct Lines {
     keeping: Keeping,
     /// Lines taken from the reader, not yet returned.
     batch: Batch,
-    /// Number of lines dropped before this batch.
-    dropped: u64,
+    /// Number of lines dropped so far.
+    pub dropped: u64,
 }
 
 /// A line, its number and its time of arrival.
@@ -122,11 +122,6 @@ impl Lines {
         self.shared.lock().kept = lines;
     }
 
-    /// Number of lines dropped so far.
-    pub fn dropped(&self) -> u64 {
-        self.dropped + self.batch.dropped
-    }
-
     /// Number of bytes that have arrived since the last end of a line.
     pub fn unended(&self) -> usize {
         self.shared.lock().unended
@@ -136,7 +131,6 @@ impl Lines {
     pub fn next(&mut self, timeout: Duration) -> NextLine<'_> {
         if self.batch.lines.is_empty() {
             self.batch.bytes.clear();
-            self.dropped += std::mem::take(&mut self.batch.dropped);
             let mut state = self.shared.lock();
             if state.waiting.lines.is_empty() && state.end.is_none() {
                 let waited = self.shared.changed.wait_timeout(state, timeout);
@@ -155,6 +149,7 @@ impl Lines {
             let kept = state.kept.saturating_sub(state.waiting.lines.len());
             self.batch.drop_old(Instant::now(), kept);
         }
+        self.dropped += std::mem::take(&mut self.batch.dropped);
         let line = self.batch.lines.pop_front();
         line.map_or(NextLine::None, |line| {
             NextLine::Line(Line {

@@ -91,11 +91,12 @@ pub struct RecordingFile {
 }
 
 impl RecordingFile {
-    /// Creates a file with a unique name in `folder`, which is created if it is missing.
+    /// Creates a file with a unique name in `folder`, which is created if it is missing, for frames of these row-wires (from 0)
+    /// with this many channels.
     ///
     /// # Errors
     /// If the file cannot be created, with the reason.
-    pub(super) fn create(folder: &Path, rows: &[usize], columns: usize) -> Result<Self, String> {
+    pub fn create(folder: &Path, rows: &[usize], columns: usize) -> Result<Self, String> {
         let begin = || {
             fs::create_dir_all(folder)?;
             let (path, file) = new_file(folder)?;

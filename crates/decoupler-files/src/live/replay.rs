@@ -1,7 +1,7 @@
 use std::{
     fmt::Display,
     fs,
-    ops::{ControlFlow, RangeInclusive},
+    ops::ControlFlow,
     path::Path,
     time::{Duration, Instant},
 };
@@ -218,20 +218,19 @@ fn ascending(times_s: &[f64]) -> Vec<f64> {
 /// Replay of a recording: its frames come at their recorded times, at an adjustable speed.
 #[derive(Debug)]
 pub struct Replay {
+    /// Position of the frame that was taken last.
+    pub state: ReplayState,
     recording: Recording,
     /// True if no frame is dropped: every one is taken once and in order, also if it is not displayed.
     keeps_all: bool,
     /// Recorded seconds per second.
     speed: f64,
-    is_playing: bool,
     /// Recorded time at an instant, from which it advances while playing.
     anchor: (f64, Instant),
     /// Index of the frame that is due, until it and all before it are taken.
     due: Option<usize>,
     /// Index of the next frame after it.
     next: usize,
-    /// Time of the frame that was taken last, in seconds.
-    at_s: f64,
     /// Number of frames that were taken in order.
     taken: usize,
 }
@@ -247,21 +246,22 @@ pub struct ReplayState {
     pub is_playing: bool,
 }
 
-/// Speeds from slowest to fastest.
-const SPEEDS: RangeInclusive<f64> = 0.1..=10.0;
-
 impl Replay {
     /// Begins a replay from the first frame.
     pub(super) fn new(recording: Recording, keeps_all: bool, now: Instant) -> Self {
+        let (first_s, last_s) = (recording.times_s[0], recording.times_s[recording.times_s.len() - 1]);
         Self {
-            anchor: (recording.times_s[0], now),
+            state: ReplayState {
+                at_s: 0.0,
+                length_s: last_s - first_s,
+                is_playing: true,
+            },
             recording,
             keeps_all,
             speed: 1.0,
-            is_playing: true,
+            anchor: (first_s, now),
             due: Some(0),
             next: 1,
-            at_s: 0.0,
             taken: 0,
         }
     }
@@ -270,13 +270,18 @@ impl Replay {
     fn time_s(&self, now: Instant) -> f64 {
         let (time_s, since) = self.anchor;
         let passed = now.saturating_duration_since(since).as_secs_f64();
-        time_s + if self.is_playing { self.speed * passed } else { 0.0 }
+        time_s
+            + if self.state.is_playing {
+                self.speed * passed
+            } else {
+                0.0
+            }
     }
 
     /// Sets the number of recorded seconds per second, from 0.1 to 10.
     pub fn set_speed(&mut self, speed: f64, now: Instant) {
         self.anchor = (self.time_s(now), now);
-        self.speed = speed.clamp(*SPEEDS.start(), *SPEEDS.end());
+        self.speed = speed.clamp(0.1, 10.0);
     }
 
     /// Pauses or resumes the replay; after the end, it restarts from the beginning.
@@ -285,7 +290,7 @@ impl Replay {
             self.seek(0.0, now);
         }
         self.anchor = (self.time_s(now), now);
-        self.is_playing = is_playing;
+        self.state.is_playing = is_playing;
     }
 
     /// Seeks to a time in seconds after the first frame, and continues from there if it is playing.
@@ -300,7 +305,11 @@ impl Replay {
         if self.due.is_some() {
             return Some(now);
         }
-        let time_s = self.recording.times_s.get(self.next).filter(|_| self.is_playing)?;
+        let time_s = self
+            .recording
+            .times_s
+            .get(self.next)
+            .filter(|_| self.state.is_playing)?;
         let wait_s = (time_s - self.time_s(now)) / self.speed;
         Some(now + Duration::try_from_secs_f64(wait_s.max(0.0)).unwrap_or(Duration::MAX / 4))
     }
@@ -324,7 +333,7 @@ impl Replay {
             due
         });
         if self.next >= times_s.len() {
-            (self.anchor, self.is_playing) = ((times_s[due], now), false);
+            (self.anchor, self.state.is_playing) = ((times_s[due], now), false);
         }
         let index = if self.keeps_all { due.min(self.taken) } else { due };
         self.due = Some(due).filter(|due| index < *due);
@@ -334,18 +343,8 @@ impl Replay {
         answer.readings.extend_from_slice(self.recording.frame(index));
         answer.first_row = Some(self.recording.row_indices.get(index).copied().unwrap_or(0));
         (answer.time_s, answer.read_at) = (times_s[index], Some(now));
-        self.at_s = times_s[index] - times_s[0];
+        self.state.at_s = times_s[index] - times_s[0];
         SessionEvent::Answer
-    }
-
-    /// Returns the position of the frame that was taken last.
-    pub fn state(&self) -> ReplayState {
-        let times_s = &self.recording.times_s;
-        ReplayState {
-            at_s: self.at_s,
-            length_s: times_s[times_s.len() - 1] - times_s[0],
-            is_playing: self.is_playing,
-        }
     }
 }
 
@@ -403,7 +402,7 @@ pub(super) mod tests {
         replay.seek(4.9, start);
         replay.play(true, start);
         assert_eq!(frames(&mut replay, start, 0..1000).0, [99, 100]);
-        let state = replay.state();
+        let state = replay.state;
         assert!(!state.is_playing && (state.length_s - 4.95).abs() < 1e-12 && replay.due(start).is_none());
         replay.play(true, start);
         assert_eq!(frames(&mut replay, start, 0..6).0, [1], "it begins again");

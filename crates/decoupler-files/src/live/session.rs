@@ -1,6 +1,6 @@
 use std::{
     io,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -62,15 +62,16 @@ pub struct Session {
     pub tally: Tally,
     /// Events besides the answers, for the caller to remove.
     pub notes: Vec<Note>,
-    /// Recording of the frames of an array in progress, which ends when it is dropped.
+    /// Recording of the frames of the array in progress, which ends when it is dropped.
     pub recording: Option<RecordingFile>,
     /// Values of a network of a recording.
     pub history: History,
+    /// Monitor of the drift of the readings, or the reason why they are not monitored.
+    pub monitor: Result<DriftMonitor, LiveError>,
     /// Smallest and largest of the values of each target so far.
     pub ranges: Vec<(f64, f64)>,
     network: Arc<NetworkFile>,
     decoder: ProgramDecoder,
-    monitor: Result<DriftMonitor, LiveError>,
     unit: Unit,
     /// Latest readings.
     arrived: Answer,
@@ -283,38 +284,39 @@ impl Session {
         let Self { arrived, notes, .. } = self;
         let (channels, targets) = (self.decoder.channels(), self.network.problem.targets.len());
         arrived.left_out = None;
-        if let (Some(array), Some(first_row)) = (&mut self.array, arrived.first_row) {
-            let is_whole = array.take(first_row, &arrived.readings);
-            if self.unit == Unit::Frames {
-                if !is_whole {
-                    return SessionEvent::Nothing;
+        match (&mut self.array, arrived.first_row) {
+            (Some(array), Some(first_row)) => {
+                let is_whole = array.take(first_row, &arrived.readings);
+                if self.unit == Unit::Frames {
+                    if !is_whole {
+                        return SessionEvent::Nothing;
+                    }
+                    if let Some(recording) = &mut self.recording
+                        && let Err(reason) = recording.record(arrived.time_s, &array.frame_ohm)
+                    {
+                        notes.push(Note::RecordingEnded(recording.recorded.clone(), reason));
+                        self.recording = None;
+                    }
+                    array.whole();
+                    arrived.readings.clone_from(&array.frame_ohm);
                 }
-                if let Some(recording) = &mut self.recording
-                    && let Err(reason) = recording.record(arrived.time_s, &array.frame_ohm)
-                {
-                    notes.push(Note::RecordingEnded(recording.recorded.clone(), reason));
-                    self.recording = None;
+                // No frame is left unchecked if the source waits.
+                let waits = matches!(&self.input, Input::Lines(lines) if lines.source.keeping() == Keeping::All);
+                if is_whole && let Some(event) = array.check(waits, now) {
+                    notes.push(Note::Fault(arrived.line, event));
                 }
-                array.whole();
-                arrived.readings.clone_from(&array.frame_ohm);
-                arrived.first_row = Some(0);
+                let first_row = if self.unit == Unit::Frames { 0 } else { first_row };
+                arrived.first_row = Some(first_row);
+                arrived.left_out = array.decode(first_row, &arrived.readings, &mut arrived.values);
             }
-            // No frame is left unchecked if the source waits.
-            let waits = matches!(&self.input, Input::Lines(lines) if lines.source.keeping() == Keeping::All);
-            if is_whole && let Some(event) = array.check(waits, now) {
-                notes.push(Note::Fault(arrived.line, event));
+            (Some(array), None) if matches!(array.watched, Watched::Checked(_)) => {
+                let is_first = !std::mem::replace(&mut self.is_row_missing, true);
+                notes.extend(is_first.then_some(Note::NoRow(arrived.line)));
             }
+            _ => {}
         }
-        arrived.values.resize(arrived.readings.len() / channels * targets, 0.0);
         let first_row = arrived.first_row.unwrap_or(0);
-        if let Some(array) = &mut self.array {
-            if arrived.first_row.is_some() {
-                arrived.left_out = array.decode(first_row, &mut arrived.values);
-            } else if matches!(array.watched, Watched::Checked(_)) && !std::mem::replace(&mut self.is_row_missing, true)
-            {
-                notes.push(Note::NoRow(arrived.line));
-            }
-        }
+        arrived.values.resize(arrived.readings.len() / channels * targets, 0.0);
         let rows = arrived.readings.chunks_exact(channels);
         let mut rows = rows.zip(arrived.values.chunks_exact_mut(targets)).enumerate();
         let is_answered = arrived.left_out.is_some()
@@ -394,32 +396,11 @@ impl Session {
         }
         outside
     }
-
-    /// Returns the present drift of the readings, or the reason why they are not monitored.
-    pub fn drift(&self) -> Result<Option<Drift>, LiveError> {
-        let monitor = self.monitor.as_ref();
-        monitor.map(|monitor| monitor.drift().copied()).map_err(Clone::clone)
-    }
-
-    /// Begins to record the frames of an array to a new file in `folder`, unless they are recorded already.
-    ///
-    /// # Errors
-    /// If the file cannot be created, with the reason.
-    pub fn record(&mut self, folder: &Path) -> Result<(), String> {
-        if let (Some(array), None) = (&self.array, &self.recording) {
-            self.recording = Some(RecordingFile::create(
-                folder,
-                &array.rows,
-                array.sensor.scale.columns(),
-            )?);
-        }
-        Ok(())
-    }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::{fmt::Write as _, fs, ops::ControlFlow};
+    use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
 
     use decoupler_core::{
         dataset::{Memory, Span},
@@ -517,7 +498,7 @@ mod tests {
             let length_s = time_s(rows - 1);
             let took_s = play(&mut session, 0.0);
             assert!((took_s - length_s).abs() < 1e-3, "{took_s} s instead of {length_s} s");
-            assert!((replay_of(&mut session).state().length_s - length_s).abs() < 1e-6);
+            assert!((replay_of(&mut session).state.length_s - length_s).abs() < 1e-6);
             let all = session.history.all();
             let expected_s = |row: usize| 5e3 + time_s(row as u32);
             let differences = all
@@ -577,7 +558,7 @@ mod tests {
         let mut expected = [0.0];
         network.decoder().decode_row(0, &[3.0, 2.0], &mut expected).unwrap();
         assert_eq!(session.last.values, expected);
-        let length_s = replay_of(&mut session).state().length_s;
+        let length_s = replay_of(&mut session).state.length_s;
         assert_eq!((session.tally.decoded, length_s), (1, 0.02));
         fs::write(&path, "u2,v\n1,2\n").unwrap();
         let refused = Session::open(plan(&network, replay(&path)), &|| true);

@@ -172,10 +172,11 @@ impl Screen {
     /// Displays the last answer, if there is a new one, and the status of decoding.
     fn show(&mut self, session: &Session, report: &Report<LiveEvent>) {
         if std::mem::take(&mut self.has_answer) {
+            let drift = session.monitor.as_ref();
             let frame = session.array.as_ref().and_then(|array| self.frame(session, array));
             self.shown.targets = frame.is_none().then(|| LiveTargets {
                 network: Arc::clone(&self.network),
-                drift: session.drift(),
+                drift: drift.map(|monitor| monitor.drift().copied()).map_err(Clone::clone),
                 surface: self.targets.clone(),
                 ranges: session.ranges.clone(),
                 history: session.history.until(session.last.time_s),
@@ -186,7 +187,7 @@ impl Screen {
         self.shown.counts = session.tally.clone();
         self.shown.recording = session.recording.as_ref().map(|file| file.recorded.clone());
         if let Input::Replay(replay) = &session.input {
-            self.shown.replay = Some(replay.state());
+            self.shown.replay = Some(replay.state);
         }
         report.progress(LiveEvent::Shown(Box::new(self.shown.clone())), |_, _| {});
     }

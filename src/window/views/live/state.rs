@@ -11,7 +11,7 @@ use std::{
 use decoupler_core::{dataset::Simulation, live::ZeroGains, scene::Noise};
 use decoupler_files::{
     export::{NetworkFile, atomic_write},
-    live::{Input, Recorded, Replay, ReplayState, Session, SessionPlan, SourcePlan, Unit},
+    live::{Input, Recorded, RecordingFile, Replay, ReplayState, Session, SessionPlan, SourcePlan, Unit},
 };
 
 use super::{
@@ -295,7 +295,7 @@ impl LiveView {
     pub(super) fn clear_zero(&mut self) {
         (self.zero, self.zero_problem, self.shows_zero) = (None, None, false);
         self.change(|session| {
-            session.array.as_mut()?.use_zero(None);
+            session.array.as_mut()?.zero = None;
             None
         });
     }
@@ -313,9 +313,15 @@ impl LiveView {
         let folder = folder(shared).join("recordings");
         match self.recording {
             Some(_) => self.change(|session| Some(LiveEvent::Recorded(session.recording.take()?.recorded, None))),
-            None => self.change(move |session| match session.record(&folder) {
-                Ok(()) => Some(LiveEvent::Recording(session.recording.as_ref()?.recorded.path.clone())),
-                Err(reason) => Some(LiveEvent::Failed(reason)),
+            None => self.change(move |session| {
+                let array = session.array.as_ref().filter(|_| session.recording.is_none())?;
+                let created = RecordingFile::create(&folder, &array.rows, array.sensor.scale.columns());
+                let begin = |file: RecordingFile| {
+                    let path = file.recorded.path.clone();
+                    session.recording = Some(file);
+                    LiveEvent::Recording(path)
+                };
+                Some(created.map_or_else(LiveEvent::Failed, begin))
             }),
         }
     }
