@@ -12,7 +12,7 @@ use std::{
 };
 
 use clap::Args;
-use decoupler_core::{scene::Noise, text::counted};
+use decoupler_core::{job::Job, scene::Noise, text::counted};
 use decoupler_files::{
     export::NetworkFile,
     live::{Input, Note, Session, SessionError, SessionEvent, SessionPlan, Source, SourcePlan, Unit, Watched},
@@ -82,7 +82,7 @@ impl Follow {
             zero: None,
             unit: Unit::Lines,
         };
-        let mut session = Session::open(plan, &|| true)?;
+        let mut session = Session::open(plan, &Job::UNINTERRUPTED)?;
         let graceful = Graceful::begin();
         let mut answers = Answers::new(&file, self.format.unwrap_or_default());
         let mut report = Report::new(source);

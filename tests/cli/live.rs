@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler_core::scene::Noise;
+use decoupler_core::{job::Job, scene::Noise};
 use decoupler_files::{
     export::NetworkFile,
     live::{Session, SessionEvent, SessionPlan, Source, SourcePlan, Unit},
@@ -25,7 +25,7 @@ pub(crate) fn answers(network: &Path, input: &Path) -> [Vec<Vec<f64>>; 2] {
             zero: None,
             unit: Unit::Frames,
         };
-        let mut session = Session::open(plan, &|| true).unwrap();
+        let mut session = Session::open(plan, &Job::UNINTERRUPTED).unwrap();
         let (mut answers, mut now) = (Vec::new(), Instant::now());
         // A clock of its own, which jumps from frame to frame of a replay.
         while let Some(due) = session.input.due(now) {

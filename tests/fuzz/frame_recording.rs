@@ -2,7 +2,10 @@
 
 use std::{fs, sync::LazyLock};
 
-use decoupler_core::evaluation::{Run, RunSettings};
+use decoupler_core::{
+    evaluation::{Run, RunSettings},
+    job::Job,
+};
 use decoupler_files::{
     export::NetworkFile,
     live::{Recorder, Recording, Tally},
@@ -32,7 +35,7 @@ fn read(bytes: &[u8]) -> Option<Recording> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("frames.csv");
     fs::write(&path, bytes).unwrap();
-    match Recording::read(&path, &NETWORK, &mut Tally::default(), &|| true) {
+    match Recording::read(&path, &NETWORK, &mut Tally::default(), &Job::UNINTERRUPTED) {
         Ok(recording) => Some(recording),
         Err(error) => {
             let message = error.to_string();

@@ -13,6 +13,7 @@ use decoupler::window::Phase;
 use decoupler_core::{
     dataset::Seed,
     decoupling::Decoder,
+    job::Job,
     live::ZeroGains,
     scene::{Noise, Scene},
 };
@@ -213,7 +214,7 @@ fn recordings(folder: &Path) -> Vec<PathBuf> {
 }
 
 fn read(path: &Path, file: &NetworkFile) -> Recording {
-    Recording::read(path, file, &mut Tally::default(), &|| true).unwrap()
+    Recording::read(path, file, &mut Tally::default(), &Job::UNINTERRUPTED).unwrap()
 }
 
 #[test]

@@ -54,6 +54,7 @@ pub use positions::{PositionsError, holds_positions};
 pub use progress::{Progress, Watch};
 pub use recipe::{FileChecksum, FileSet, Joined, Recipe, Recorded, file_crc32};
 pub use sentinel::Sentinel;
+pub(crate) use setup::watch;
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
 pub use suggestion::{Meaning, suggested_plan, suggested_plan_in_order};
 pub use table::{Cells, Column, Excess, Fault, Faults, Table, Variable};

@@ -5,6 +5,7 @@ use std::{
 };
 
 use decoupler_core::{
+    dataset::DatasetError,
     live::{FaultEvent, FaultyWire, LiveError, WireCheck, ZeroGains},
     scene::{Deformation, NoiseSource, Scene},
     sensor::SensorModel,
@@ -73,7 +74,7 @@ impl LiveArray {
     /// Prepares for frames of `sensor` with the rows and the noise of `scene`.
     pub(super) fn new(sensor: &SensorModel, scene: &Scene, zero: Option<ZeroGains>) -> Result<Self, SessionError> {
         let scale = sensor.scale;
-        let rows = scene.rows.read(scale.rows())?;
+        let rows = scene.rows.read(scale.rows()).map_err(DatasetError::from)?;
         let at_rest = vec![DVec3::ZERO; scale.nodes_per_row()];
         let of_rows = rows.iter().map(|&row| sensor.row_resistances(row, &at_rest));
         let rest_ohm = of_rows.collect::<Result<Vec<_>, _>>()?.concat();

@@ -235,22 +235,21 @@ impl FaultySensor {
         };
         for (&row, ohms) in read.iter().zip(resistances_ohm.chunks_exact_mut(scale.columns())) {
             let affected = self.affected(row);
-            match (self.fault.effect, self.fault.wire) {
-                (FaultEffect::Open(before_node), FaultyWire::Row(_)) => {
-                    affected
-                        .for_each(|column| ohms[column] = near_ohm(row, before_node, column, scale.nodes_per_column()));
+            match self.fault.effect {
+                FaultEffect::Open(before_node) => {
+                    let (nodes, electrodes) = match self.fault.wire {
+                        FaultyWire::Row(_) => (before_node, scale.nodes_per_column()),
+                        _ => (scale.nodes_per_row(), before_node),
+                    };
+                    affected.for_each(|column| ohms[column] = near_ohm(row, nodes, column, electrodes));
                 }
-                (FaultEffect::Open(before_node), _) => {
-                    affected
-                        .for_each(|column| ohms[column] = near_ohm(row, scale.nodes_per_row(), column, before_node));
-                }
-                (FaultEffect::Shorted, _) => {
+                FaultEffect::Shorted => {
                     let conductances = ohms[affected.clone()].iter().map(|ohm| ohm.recip());
                     let shared = affected.len() as f64 / conductances.sum::<f64>();
                     ohms[affected].fill(shared);
                 }
-                (FaultEffect::Gain(relative), _) => ohms[affected].iter_mut().for_each(|ohm| *ohm *= 1.0 + relative),
-                (FaultEffect::Stuck(_), _) => {}
+                FaultEffect::Gain(relative) => ohms[affected].iter_mut().for_each(|ohm| *ohm *= 1.0 + relative),
+                FaultEffect::Stuck(_) => {}
             }
         }
     }

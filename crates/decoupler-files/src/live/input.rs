@@ -6,9 +6,7 @@ use std::{
 
 use decoupler_core::{dataset::Place, scene::Deformation};
 
-use super::{
-    Answer, Line, Lines, NextLine, Note, Replay, SessionError, SessionEvent, Simulated, Source, SourceError, Tally,
-};
+use super::{Answer, Lines, Note, Replay, SessionError, SessionEvent, Simulated, Source, SourceError, Tally};
 use crate::import::{KeptCell, LineParser, ParsedLine};
 
 /// Source of frames.
@@ -89,12 +87,12 @@ impl Input {
         let behind = now - *due;
         if behind > Lines::PATIENCE {
             // Frames that were not taken in time are dropped.
-            let missed = (behind.as_secs_f64() * source.frames_per_second()) as u64;
+            let missed = (behind.as_secs_f64() * source.frames_per_second) as u64;
             source.skip(missed);
             tally.dropped += missed;
             *due = now;
         }
-        *due += Duration::from_secs_f64(1.0 / source.frames_per_second());
+        *due += Duration::from_secs_f64(1.0 / source.frames_per_second);
         answer.readings.resize(source.readings(), 0.0);
         match source.next_frame(&mut answer.readings) {
             Ok(time_s) => answer.time_s = time_s,
@@ -135,16 +133,11 @@ impl LineInput {
     }
 
     pub(super) fn take(&mut self, patience: Duration, answer: &mut Answer, notes: &mut Vec<Note>) -> SessionEvent {
-        let Line {
-            number,
-            text,
-            is_ended,
-            read_at,
-        } = match self.lines.next(patience) {
-            NextLine::Line(line) => line,
-            NextLine::None => return SessionEvent::Nothing,
-            NextLine::End(None) => return SessionEvent::End(Ok(())),
-            NextLine::End(Some(error)) => {
+        let line = match self.lines.next(patience) {
+            Ok(Some(line)) => line,
+            Ok(None) => return SessionEvent::Nothing,
+            Err(None) => return SessionEvent::End(Ok(())),
+            Err(Some(error)) => {
                 let error = error.downcast::<SourceError>().map_or_else(
                     |error| SessionError::Lost(self.source.clone(), error),
                     SessionError::Source,
@@ -152,8 +145,9 @@ impl LineInput {
                 return SessionEvent::End(Err(error));
             }
         };
-        (answer.line, answer.is_ended) = (number, is_ended);
-        let Some(text) = text else {
+        let (number, read_at) = (line.number, line.read_at);
+        (answer.line, answer.is_ended) = (number, line.is_ended);
+        let Some(text) = line.text else {
             self.parser.count_bad();
             return SessionEvent::Bad(format!("line {number}: it is longer than {} bytes", Lines::LONGEST));
         };

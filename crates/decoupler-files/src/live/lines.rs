@@ -38,17 +38,6 @@ pub struct Line<'a> {
     pub read_at: Instant,
 }
 
-/// Result of [`Lines::next`].
-#[derive(Debug)]
-pub enum NextLine<'a> {
-    /// A line.
-    Line(Line<'a>),
-    /// No line arrived before the timeout.
-    None,
-    /// The source has ended, with an error unless it ended normally.
-    End(Option<io::Error>),
-}
-
 /// Overflow policy for lines that arrive faster than they are consumed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keeping {
@@ -128,7 +117,10 @@ impl Lines {
     }
 
     /// Waits for the next line, up to `timeout`.
-    pub fn next(&mut self, timeout: Duration) -> NextLine<'_> {
+    ///
+    /// # Errors
+    /// Once the source has ended, with an error unless it ended normally.
+    pub fn next(&mut self, timeout: Duration) -> Result<Option<Line<'_>>, Option<io::Error>> {
         if self.batch.lines.is_empty() {
             self.batch.bytes.clear();
             let mut state = self.shared.lock();
@@ -138,7 +130,7 @@ impl Lines {
             }
             if state.waiting.lines.is_empty() {
                 let end = state.end.as_mut().map(Option::take);
-                return end.map_or(NextLine::None, NextLine::End);
+                return end.map_or(Ok(None), Err);
             }
             std::mem::swap(&mut self.batch, &mut state.waiting);
             self.shared.changed.notify_one();
@@ -151,14 +143,12 @@ impl Lines {
         }
         self.dropped += std::mem::take(&mut self.batch.dropped);
         let line = self.batch.lines.pop_front();
-        line.map_or(NextLine::None, |line| {
-            NextLine::Line(Line {
-                number: line.number,
-                text: line.place.map(|place| &self.batch.bytes[place]),
-                is_ended: line.is_ended,
-                read_at: line.read_at,
-            })
-        })
+        Ok(line.map(|line| Line {
+            number: line.number,
+            text: line.place.map(|place| &self.batch.bytes[place]),
+            is_ended: line.is_ended,
+            read_at: line.read_at,
+        }))
     }
 }
 
@@ -327,12 +317,12 @@ mod tests {
         let mut found = Vec::new();
         loop {
             match lines.next(Duration::from_secs(60)) {
-                NextLine::Line(line) => {
+                Ok(Some(line)) => {
                     let text = line.text.map(|text| String::from_utf8_lossy(text).into_owned());
                     found.push((line.number, text));
                 }
-                NextLine::None => {}
-                NextLine::End(error) => {
+                Ok(None) => {}
+                Err(error) => {
                     assert!(error.is_none());
                     return found;
                 }
@@ -379,11 +369,11 @@ mod tests {
     fn lines_that_were_taken_over_are_returned_without_the_lock() {
         let mut lines = Lines::spawn(|| Ok(&b"1\n2\n3\n"[..]), Keeping::All, false).unwrap();
         let shared = Arc::clone(&lines.shared);
-        assert!(matches!(lines.next(Duration::from_secs(60)), NextLine::Line(_)));
+        assert!(matches!(lines.next(Duration::from_secs(60)), Ok(Some(_))));
         // The reader holds it most of the time when lines arrive fast.
         let _held = shared.lock();
         for number in 2..=3 {
-            let NextLine::Line(line) = lines.next(Duration::from_secs(60)) else {
+            let Ok(Some(line)) = lines.next(Duration::from_secs(60)) else {
                 panic!("no line {number}")
             };
             assert_eq!(line.number, number);
@@ -405,7 +395,7 @@ mod tests {
             }
         }
         let mut lines = Lines::spawn(|| Ok(Panics), Keeping::All, false).unwrap();
-        let NextLine::End(Some(error)) = lines.next(Duration::from_secs(60)) else {
+        let Err(Some(error)) = lines.next(Duration::from_secs(60)) else {
             panic!("no error")
         };
         assert!(error.to_string().contains("internal error"), "{error}");

@@ -20,7 +20,7 @@ pub use array::{LiveArray, Watched};
 pub use fault::{ConverterEnd, Fault, FaultEffect, FaultError, FaultySensor};
 pub use history::History;
 pub use input::{Input, LineInput, SourcePlan};
-pub use lines::{Keeping, Line, Lines, NextLine};
+pub use lines::{Keeping, Line, Lines};
 pub use recording::{Recorded, Recorder, RecordingFile};
 pub use replay::{Recording, Replay, ReplayState};
 pub use session::{Answer, Note, Session, SessionError, SessionEvent, SessionPlan, Unit};

@@ -150,6 +150,8 @@ fn new_file(folder: &Path) -> io::Result<(PathBuf, File)> {
 
 #[cfg(test)]
 mod tests {
+    use decoupler_core::job::Job;
+
     use super::*;
     use crate::{
         export::NetworkFile,
@@ -157,7 +159,7 @@ mod tests {
     };
 
     fn frames(path: &Path, network: &NetworkFile) -> usize {
-        let read = Recording::read(path, network, &mut Tally::default(), &|| true);
+        let read = Recording::read(path, network, &mut Tally::default(), &Job::UNINTERRUPTED);
         read.map_or(0, |recording| recording.times_s().len())
     }
 

@@ -1,15 +1,16 @@
 use std::{
     fmt::Display,
     fs,
-    ops::ControlFlow,
     path::Path,
     time::{Duration, Instant},
 };
 
+use decoupler_core::{dataset::DatasetError, job::Job};
+
 use super::{Answer, LineInput, Lines, SessionError, SessionEvent, Source, Tally};
 use crate::{
     export::NetworkFile,
-    import::LineParser,
+    import::{LineParser, watch},
     machine::{ReadingBudget, system_cause},
 };
 
@@ -41,95 +42,73 @@ impl Recording {
     ///
     /// # Errors
     /// If the file cannot be read, lacks an input, or has no complete frame, or when it is no longer wanted.
-    pub fn read(
-        path: &Path,
-        file: &NetworkFile,
-        tally: &mut Tally,
-        is_wanted: &dyn Fn() -> bool,
-    ) -> Result<Self, SessionError> {
-        let refused = |cause: &dyn Display| SessionError::Replay(path.to_owned(), cause.to_string());
+    pub fn read(path: &Path, file: &NetworkFile, tally: &mut Tally, job: &Job<'_>) -> Result<Self, SessionError> {
         let mut recording = match &file.problem.sensor {
             Some(simulation) => {
                 let scale = simulation.sensor.scale;
-                let length = simulation.scene.rows.read(scale.rows())?.len() * scale.columns();
-                Self::of_array(path, file.line_parser(true, true)?, length, tally, &refused)?
+                let rows = simulation.scene.rows.read(scale.rows()).map_err(DatasetError::from)?;
+                Self::of_array(path, file.line_parser(true, true)?, rows.len() * scale.columns(), tally)?
             }
-            None => Self::of_samples(path, file, is_wanted, &refused)?,
+            None => Self::of_samples(path, file, job)?,
         };
         if recording.times_s.is_empty() {
-            let reason = tally
-                .first_bad
-                .as_ref()
-                .map_or_else(String::new, |reason| format!("; {reason}"));
+            let reason = String::from_iter(tally.first_bad.iter().map(|reason| format!("; {reason}")));
             let cause = "it contains no complete frame: record again, or choose another file";
-            return Err(refused(&format_args!("{cause}{reason}")));
+            return Err(refused(path, format_args!("{cause}{reason}")));
         }
         recording.times_s = ascending(&recording.times_s);
         Ok(recording)
     }
 
     /// Reads frames with `length` readings; those without a time have NaN.
-    fn of_array(
-        path: &Path,
-        parser: LineParser,
-        length: usize,
-        tally: &mut Tally,
-        refused: &dyn Fn(&dyn Display) -> SessionError,
-    ) -> Result<Self, SessionError> {
-        let found = fs::metadata(path).map_err(|error| refused(&system_cause(&error)))?;
+    fn of_array(path: &Path, parser: LineParser, length: usize, tally: &mut Tally) -> Result<Self, SessionError> {
+        let found = fs::metadata(path).map_err(|error| refused(path, system_cause(&error)))?;
         if !found.is_file() {
-            return Err(refused(&"it is not a file; choose a recording"));
+            return Err(refused(path, "it is not a file; choose a recording"));
         }
         let claimed = ReadingBudget::now().claim(found.len().saturating_mul(MEMORY_OF_BYTE));
-        claimed.map_err(|over| refused(&over))?;
+        claimed.map_err(|over| refused(path, over))?;
         let mut lines = LineInput::open(&Source::File(path.to_owned()), parser, 0)?;
         let (mut times_s, mut readings, mut frame_s) = (Vec::new(), Vec::new(), f64::NAN);
         let mut row = Answer::default();
         loop {
+            let event = lines.take(Lines::PATIENCE, &mut row, &mut Vec::new());
             let whole = times_s.len() * length;
-            match lines.take(Lines::PATIENCE, &mut row, &mut Vec::new()) {
-                SessionEvent::Nothing => continue,
+            match event {
+                SessionEvent::Nothing => {}
                 SessionEvent::Answer | SessionEvent::Bad(_) if !row.is_ended && frame_s.is_finite() => {
                     // Its last number may be cut off.
                     tally.bad(&format!("line {}, the last, is cut off and left out", row.line));
                     break;
                 }
-                SessionEvent::Answer => {}
                 SessionEvent::Bad(reason) => {
+                    // The rest of its frame is left out without another word.
                     readings.truncate(whole);
                     tally.bad(&reason);
-                    continue;
+                }
+                SessionEvent::Answer => {
+                    let index = row.first_row.unwrap_or(0);
+                    let expected = (readings.len() - whole) / row.readings.len();
+                    if index != expected && expected > 0 {
+                        let (line, expected) = (row.line, expected + 1);
+                        let cause = "each frame needs its rows in ascending order";
+                        tally.bad(&format!("line {line}: row {expected} is expected here: {cause}"));
+                        readings.truncate(whole);
+                    }
+                    if index == 0 {
+                        frame_s = row.recorded_s.unwrap_or(f64::NAN);
+                    }
+                    if index == 0 || index == expected {
+                        readings.extend_from_slice(&row.readings);
+                    }
+                    if readings.len() == whole + length {
+                        times_s.push(frame_s);
+                    }
                 }
                 SessionEvent::End(end) => {
                     end?;
                     break;
                 }
-            }
-            let (index, expected) = (
-                row.first_row.unwrap_or(0),
-                (readings.len() - whole) / row.readings.len(),
-            );
-            if index != expected {
-                // After a malformed line, the rest of its frame is left out without another word.
-                if expected > 0 {
-                    let cause = "each frame needs its rows in ascending order";
-                    tally.bad(&format!(
-                        "line {}: row {} is expected here: {cause}",
-                        row.line,
-                        expected + 1
-                    ));
-                }
-                readings.truncate(whole);
-                if index > 0 {
-                    continue;
-                }
-            }
-            if index == 0 {
-                frame_s = row.recorded_s.unwrap_or(f64::NAN);
-            }
-            readings.extend_from_slice(&row.readings);
-            if readings.len() == whole + length {
-                times_s.push(frame_s);
             }
         }
         readings.truncate(times_s.len() * length);
@@ -142,30 +121,20 @@ impl Recording {
     }
 
     /// Reads samples; those without a time have NaN.
-    fn of_samples(
-        path: &Path,
-        file: &NetworkFile,
-        is_wanted: &dyn Fn() -> bool,
-        refused: &dyn Fn(&dyn Display) -> SessionError,
-    ) -> Result<Self, SessionError> {
+    fn of_samples(path: &Path, file: &NetworkFile, job: &Job<'_>) -> Result<Self, SessionError> {
         let recipe = file.recorded.as_ref().map(|recorded| recorded.plan.import.clone());
-        let watch = &mut |_| match is_wanted() {
-            true => ControlFlow::Continue(()),
-            false => ControlFlow::Break(()),
-        };
         let has_rows = file.network.only().is_none();
-        let table = (recipe.unwrap_or_default()).read_inputs(path, &file.problem, has_rows, watch)?;
+        let recipe = recipe.unwrap_or_default();
+        let table = recipe.read_inputs(path, &file.problem, has_rows, &mut watch(job, &mut |_| ()))?;
         let mut row_indices = Vec::new();
         if has_rows {
             let read = file.row_wires.as_deref().unwrap_or_default();
-            let Some(of_samples) = &table.row_wires else {
-                return Err(refused(
-                    &"it has no column of row-wires, and there is a network for each",
-                ));
-            };
+            let reason = "it has no column of row-wires, and there is a network for each";
+            let of_samples = table.row_wires.as_ref().ok_or_else(|| refused(path, reason))?;
             for (&row, line) in of_samples.iter().zip(&table.lines) {
                 let index = read.iter().position(|read| *read == row);
-                let unknown = || refused(&format_args!("line {line}: there is no network for row {}", row + 1));
+                let row = row + 1;
+                let unknown = || refused(path, format_args!("line {line}: there is no network for row {row}"));
                 row_indices.push(index.ok_or_else(unknown)?);
             }
         }
@@ -195,6 +164,10 @@ impl Recording {
     pub fn frame(&self, index: usize) -> &[f64] {
         &self.readings[index * self.length..][..self.length]
     }
+}
+
+fn refused(path: &Path, cause: impl Display) -> SessionError {
+    SessionError::Replay(path.to_owned(), cause.to_string())
 }
 
 /// Times that never step back: a frame with an earlier time than the one before, or none, comes one usual interval (median) after
@@ -441,7 +414,7 @@ pub(super) mod tests {
         let path = folder.path().join("frames.csv");
         fs::write(&path, text).unwrap();
         let mut tally = Tally::default();
-        let read = Recording::read(&path, &network(), &mut tally, &|| true);
+        let read = Recording::read(&path, &network(), &mut tally, &Job::UNINTERRUPTED);
         (read.map_err(|error| error.to_string()), tally)
     }
 
@@ -474,7 +447,7 @@ pub(super) mod tests {
         for length in ends[2] + 1..bytes.len() {
             fs::write(&path, &bytes[..length]).unwrap();
             let mut tally = Tally::default();
-            let recording = Recording::read(&path, &network, &mut tally, &|| true).unwrap();
+            let recording = Recording::read(&path, &network, &mut tally, &Job::UNINTERRUPTED).unwrap();
             let whole = ends.iter().filter(|&&end| end < length).count() - 1;
             assert_eq!(recording.times_s().len(), whole / 2, "{length}");
             let is_torn = bytes[length - 1] != b'\n';
@@ -558,7 +531,12 @@ pub(super) mod tests {
     #[cfg(unix)]
     #[test]
     fn what_is_no_file_is_refused_before_it_is_opened() {
-        let refused = Recording::read(Path::new("/dev/zero"), &network(), &mut Tally::default(), &|| true);
+        let refused = Recording::read(
+            Path::new("/dev/zero"),
+            &network(),
+            &mut Tally::default(),
+            &Job::UNINTERRUPTED,
+        );
         assert!(refused.unwrap_err().to_string().contains("it is not a file"));
     }
 

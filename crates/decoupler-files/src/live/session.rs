@@ -8,8 +8,9 @@ use std::{
 use decoupler_core::{
     dataset::{DatasetError, Seed},
     decoupling::{Decoder, ProgramDecoder},
+    job::Job,
     live::{Drift, DriftMonitor, FaultEvent, FaultyWire, LiveError, ZeroGains},
-    scene::{Noise, Scene, SceneError},
+    scene::{Noise, Scene},
     sensor::{SensorError, short},
 };
 use thiserror::Error;
@@ -198,10 +199,7 @@ pub enum SessionError {
     /// The array has no resistance.
     #[error(transparent)]
     Sensor(#[from] SensorError),
-    /// The scene is invalid, or the array does not have its rows.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The lines cannot be read for the network.
+    /// The scene is invalid, the array does not have its rows, or the lines cannot be read for the network.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
 }
@@ -212,11 +210,11 @@ const NO_ANSWER: &str =
 
 impl Session {
     /// Opens the source of `plan`. A stream is opened on its own thread, and reported as ended if that fails; reading a file to
-    /// be replayed stops when it is no longer wanted.
+    /// be replayed stops when `job` is cancelled.
     ///
     /// # Errors
     /// If the source cannot be simulated or replayed, or the array has no resistance.
-    pub fn open(plan: SessionPlan, is_wanted: &dyn Fn() -> bool) -> Result<Self, SessionError> {
+    pub fn open(plan: SessionPlan, job: &Job<'_>) -> Result<Self, SessionError> {
         let (network, noise, mut tally) = (plan.network, plan.noise, Tally::default());
         let sensor = network.problem.sensor.as_ref();
         let scene = sensor.map_or_else(Scene::default, |simulation| Scene {
@@ -232,7 +230,7 @@ impl Session {
                 Input::Simulated(Box::new(source), Instant::now())
             }
             SourcePlan::Replay(path) => {
-                let recording = Recording::read(path, &network, &mut tally, is_wanted)?;
+                let recording = Recording::read(path, &network, &mut tally, job)?;
                 Input::Replay(Box::new(Replay::new(recording, array.is_none(), Instant::now())))
             }
             SourcePlan::Stream(source) => {
@@ -299,14 +297,14 @@ impl Session {
                     }
                     array.whole();
                     arrived.readings.clone_from(&array.frame_ohm);
+                    arrived.first_row = Some(0);
                 }
                 // No frame is left unchecked if the source waits.
                 let waits = matches!(&self.input, Input::Lines(lines) if lines.source.keeping() == Keeping::All);
                 if is_whole && let Some(event) = array.check(waits, now) {
                     notes.push(Note::Fault(arrived.line, event));
                 }
-                let first_row = if self.unit == Unit::Frames { 0 } else { first_row };
-                arrived.first_row = Some(first_row);
+                let first_row = arrived.first_row.unwrap_or(first_row);
                 arrived.left_out = array.decode(first_row, &arrived.readings, &mut arrived.values);
             }
             (Some(array), None) if matches!(array.watched, Watched::Checked(_)) => {
@@ -406,7 +404,6 @@ mod tests {
         dataset::{Memory, Span},
         decoupling::{Decoder, resistance_residual},
         evaluation::{Run, RunSettings},
-        job::Job,
         scene::RowModel,
     };
 
@@ -456,7 +453,7 @@ mod tests {
     }
 
     fn open(plan: SessionPlan) -> Session {
-        Session::open(plan, &|| true).unwrap()
+        Session::open(plan, &Job::UNINTERRUPTED).unwrap()
     }
 
     fn replay_of(session: &mut Session) -> &mut Replay {
@@ -561,7 +558,7 @@ mod tests {
         let length_s = replay_of(&mut session).state.length_s;
         assert_eq!((session.tally.decoded, length_s), (1, 0.02));
         fs::write(&path, "u2,v\n1,2\n").unwrap();
-        let refused = Session::open(plan(&network, replay(&path)), &|| true);
+        let refused = Session::open(plan(&network, replay(&path)), &Job::UNINTERRUPTED);
         let message = refused.unwrap_err().to_string();
         assert!(message.contains("u1"), "{message}");
     }

@@ -1,7 +1,7 @@
 use std::f64::consts::TAU;
 
 use decoupler_core::{
-    dataset::{Seed, Stream},
+    dataset::{DatasetError, Seed, Stream},
     scene::{Deformation, Indenter, Loading, Noise, NoiseSource, Scene},
     sensor::{SensorError, SensorModel},
 };
@@ -26,9 +26,10 @@ pub struct Simulated {
     noise: Noise,
     noise_rng: ChaCha8Rng,
     fault: Option<FaultySensor>,
-    frames_per_second: f64,
+    /// Motion of the indenter from the next frame on.
+    pub motion: Motion,
+    pub(super) frames_per_second: f64,
     frames: u64,
-    motion: Motion,
     /// Number of frames during which the indenter did not move along its path.
     frames_at_rest: u64,
     deformation: Deformation,
@@ -53,7 +54,7 @@ impl Simulated {
     /// # Errors
     /// If the scene or the rate is invalid, or the array has no resistance at rest.
     pub fn new(model: &SensorModel, scene: &Scene, seed: Seed, frames_per_second: f64) -> Result<Self, SessionError> {
-        scene.check()?;
+        scene.check().map_err(DatasetError::from)?;
         if !(frames_per_second > 0.0 && frames_per_second <= 1e6) {
             return Err(SessionError::Rate(frames_per_second));
         }
@@ -65,7 +66,7 @@ impl Simulated {
         Ok(Self {
             model: *model,
             indenter,
-            rows: scene.rows.read(model.scale.rows())?,
+            rows: scene.rows.read(model.scale.rows()).map_err(DatasetError::from)?,
             stroke_mm: scene.stroke_mm(&model.geometry),
             path: PressPath::new(model, &mut seed.rng(Stream::Live)),
             source: noise.source(model)?,
@@ -88,16 +89,6 @@ impl Simulated {
     /// Returns the number of readings in a frame: rows × M4.
     pub fn readings(&self) -> usize {
         self.rows.len() * self.model.scale.columns()
-    }
-
-    /// Returns the number of frames per second.
-    pub fn frames_per_second(&self) -> f64 {
-        self.frames_per_second
-    }
-
-    /// Sets the motion of the indenter from the next frame on.
-    pub fn set_motion(&mut self, motion: Motion) {
-        self.motion = motion;
     }
 
     /// Skips `frames` frames, without drawing their noise.
@@ -218,15 +209,15 @@ mod tests {
         for frame in &path[..20] {
             assert_eq!(&next(&mut source).1, frame);
         }
-        source.set_motion(Motion::Held);
+        source.motion = Motion::Held;
         for frame in 20..25 {
             let (time_s, ohm) = next(&mut source);
             assert_eq!((time_s, &ohm), (f64::from(frame) / 50.0, &path[20]));
         }
-        source.set_motion(Motion::Lifted);
+        source.motion = Motion::Lifted;
         next(&mut source);
         assert!((0..4).all(|row| source.deformation().row_mm(row).iter().all(|u| u.length() == 0.0)));
-        source.set_motion(Motion::Wandering);
+        source.motion = Motion::Wandering;
         for frame in &path[20..] {
             assert_eq!(&next(&mut source).1, frame);
         }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use decoupler_core::{dataset::Seed, decoupling::Decoder, glam::DVec3};
+use decoupler_core::{dataset::Seed, decoupling::Decoder, glam::DVec3, job::Job};
 use decoupler_files::{
     export::NetworkFile,
     live::{Recording, Simulated, Tally},
@@ -21,7 +21,13 @@ fn the_network_decodes_the_recording() {
     let source = *file.settings.simulation().unwrap();
     let (sensor, scale) = (source.sensor, source.sensor.scale);
     let rows = Vec::from_iter(0..scale.rows());
-    let recording = Recording::read(&sample("recording.csv"), &file, &mut Tally::default(), &|| true).unwrap();
+    let recording = Recording::read(
+        &sample("recording.csv"),
+        &file,
+        &mut Tally::default(),
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
     let mut decoder = file.network.decoder();
     let mut truth = Simulated::new(&sensor, &source.scene, Seed(0), 15.0).unwrap();
     let mut frame_ohm = vec![0.0; truth.readings()];

@@ -14,6 +14,7 @@ use std::{
 };
 
 use decoupler_core::{
+    job::Job,
     live::{Drift, LiveError, ZeroGains},
     sensor::SensorModel,
     surface::SurfaceMap,
@@ -237,7 +238,7 @@ pub fn run(mut plan: SessionPlan, commands: &Receiver<Command>, report: &Report<
     plan.source = plan.source.resolved();
     report.send(LiveEvent::Source(plan.source.clone()));
     let mut screen = Screen::new(Arc::clone(&plan.network))?;
-    let mut session = match Session::open(plan, &|| !report.is_cancelled()) {
+    let mut session = match Session::open(plan, &Job::new(&|| report.is_cancelled())) {
         Err(_) if report.is_cancelled() => return Ok(()),
         opened => opened.map_err(|error| error.to_string())?,
     };

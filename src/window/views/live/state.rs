@@ -266,7 +266,7 @@ impl LiveView {
             let Input::Simulated(simulated, _) = &mut session.input else {
                 return None;
             };
-            simulated.set_motion(motion);
+            simulated.motion = motion;
             let broken = simulated.set_fault(fault);
             broken.err().map(|error| LiveEvent::Failed(error.to_string()))
         });
