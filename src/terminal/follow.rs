@@ -52,9 +52,8 @@ pub(super) struct Follow {
 
 fn seconds(text: &str) -> Result<Duration, String> {
     let seconds = text.parse().ok().filter(|seconds| *seconds > 0.0 && *seconds <= 1e9);
-    seconds
-        .map(Duration::from_secs_f64)
-        .ok_or_else(|| "give a number of seconds above 0".to_owned())
+    let seconds = seconds.ok_or("give a number of seconds above 0")?;
+    Ok(Duration::from_secs_f64(seconds))
 }
 
 /// Timeout of waiting for a line, after which requests for a report and to stop are checked.
@@ -65,9 +64,8 @@ impl Follow {
     /// on SIGUSR1, and at the end.
     pub(super) fn run(&self, input: &Path, file: NetworkFile) -> Result<(), Failure> {
         let noise = self.noise_of(&file)?;
-        let input = input
-            .to_str()
-            .ok_or_else(|| wrong("--input", "its name is not UTF-8"))?;
+        let input = input.to_str();
+        let input = input.ok_or_else(|| wrong("--input", "its name is not UTF-8"))?;
         let source: Source = input.parse().map_err(|error| wrong("--input", error))?;
         let file = Arc::new(file);
         note_unmonitored(&file);
@@ -77,28 +75,24 @@ impl Follow {
         let _ = signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&asked));
         let plan = SessionPlan {
             network: Arc::clone(&file),
-            source: SourcePlan::Stream(source.clone()),
+            source: SourcePlan::Stream(source),
             noise,
             zero: None,
             unit: Unit::Lines,
         };
         let mut session = Session::open(plan, &Job::UNINTERRUPTED)?;
+        warn_unwatched(&session);
         let graceful = Graceful::begin();
         let mut answers = Answers::new(&file, self.format.unwrap_or_default());
-        let mut report = Report::new(source);
+        let mut report = Report::new();
         let end = loop {
-            if asked.swap(false, Ordering::SeqCst) || self.report.is_some_and(|every| report.is_due(every)) {
+            if asked.swap(false, Ordering::SeqCst) || self.report.is_some_and(|every| report.last.elapsed() >= every) {
                 report.print(&session);
             }
             if graceful.is_end_requested() {
                 break Err(Failure::InterruptedFollow);
             }
             let event = session.next(Instant::now(), WAIT);
-            if let SessionEvent::End(Err(error @ SessionError::Source(_))) = event {
-                // There is nothing to report.
-                return Err(error.into());
-            }
-            report.begin(&session);
             for note in session.notes.drain(..) {
                 match note {
                     Note::Drift(line, drift) => note_drift(&file, line, &drift),
@@ -114,29 +108,29 @@ impl Follow {
                 }
                 SessionEvent::Bad(reason) => report.bad(&reason, &session),
                 SessionEvent::Nothing => report.waiting(&session),
+                // It was never open.
+                SessionEvent::End(Err(error @ SessionError::Source(_))) => return Err(error.into()),
                 SessionEvent::End(end) => break end.map_err(Failure::from),
             }
         };
         report.print(&session);
-        answers.warn();
+        answers.outside.warn();
         end
     }
 
     /// Noise assumed in fault detection.
     fn noise_of(&self, file: &NetworkFile) -> Result<Noise, Failure> {
-        let Some(simulation) = &file.problem.sensor else {
-            let reason =
-                "fault detection needs a sensor model, which the network of a recording does not have; leave it out";
-            return match self.noise {
-                Some(_) => Err(wrong("--noise", reason)),
-                None => Ok(Noise::default()),
-            };
+        let mut scene = match &file.problem.sensor {
+            Some(simulation) => simulation.scene,
+            None if self.noise.is_none() => return Ok(Noise::default()),
+            None => {
+                let reason = "fault detection needs a sensor model, which the network of a recording does not have; \
+                              leave it out";
+                return Err(wrong("--noise", reason));
+            }
         };
-        let mut scene = simulation.scene;
-        if let Some(relative) = self.noise {
-            scene.noise = Noise::relative(relative);
-            scene.check().map_err(|error| wrong("--noise", error))?;
-        }
+        scene.noise = self.noise.map_or(scene.noise, Noise::relative);
+        scene.check().map_err(|error| wrong("--noise", error))?;
         Ok(scene.noise.in_test())
     }
 }
@@ -150,16 +144,26 @@ fn warn(message: &dyn Display) {
     let _ = writeln!(messages(), "warning: {message}");
 }
 
+/// Reports why faults of the wires are not looked for, if they are not.
+fn warn_unwatched(session: &Session) {
+    let reason = match session.array.as_ref().map(|array| &array.watched) {
+        Some(Watched::NoNoise) => {
+            "fault detection needs the noise of the readings, and the network was trained without noise; give --noise REL"
+        }
+        Some(Watched::TooLarge) => "the array is too large",
+        Some(Watched::Checked(_)) | None => return,
+    };
+    warn(&format_args!("wires are not checked for faults: {reason}"));
+}
+
 /// Messages on standard error on the lines so far.
 struct Report {
-    source: Source,
     begin: Instant,
+    /// Time of the last report of rate and latency.
     last: Instant,
-    /// True once the source is open.
-    has_begun: bool,
     /// True once it was reported that no line ends.
     has_warned_of_ends: bool,
-    /// Number of bad lines since the last message.
+    /// Number of bad lines since the last message on one.
     unreported: u64,
     last_reported: Instant,
 }
@@ -167,33 +171,19 @@ struct Report {
 /// Number of bad lines that are reported individually; after them at most one per second.
 const MAX_REPORTED: u64 = 10;
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
+/// More than the time between two lines of any device.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 impl Report {
-    fn new(source: Source) -> Self {
+    fn new() -> Self {
         let now = Instant::now();
         Self {
-            source,
             begin: now,
             last: now,
-            has_begun: false,
             has_warned_of_ends: false,
             unreported: 0,
             last_reported: now,
         }
-    }
-
-    /// Reports once why faults of the wires are not looked for, if they are not.
-    fn begin(&mut self, session: &Session) {
-        let watched = session.array.as_ref().map(|array| &array.watched);
-        let reason = match watched {
-            _ if std::mem::replace(&mut self.has_begun, true) => return,
-            Some(Watched::NoNoise) => {
-                "fault detection needs the noise of the readings, and the network was trained without noise; give --noise REL"
-            }
-            Some(Watched::TooLarge) => "the array is too large",
-            Some(Watched::Checked(_)) | None => return,
-        };
-        warn(&format_args!("wires are not checked for faults: {reason}"));
     }
 
     /// Reports a bad line, unless there are too many.
@@ -206,13 +196,12 @@ impl Report {
         self.last_reported = Instant::now();
         match std::mem::take(&mut self.unreported) {
             0 => warn(&reason),
-            unreported => warn(&format_args!(
-                "{reason} ({unreported} other bad lines since the last message)"
+            others => warn(&format_args!(
+                "{reason} ({others} other bad lines since the last message)"
             )),
         }
-        if let Source::Serial(_, baud) = self.source
-            && bad == MAX_REPORTED
-            && session.tally.decoded == 0
+        if let (Input::Lines(lines), MAX_REPORTED, 0) = (&session.input, bad, session.tally.decoded)
+            && let Source::Serial(_, baud) = lines.source
         {
             warn(&format_args!(
                 "none of the first {MAX_REPORTED} lines is a frame: does the device send at {baud} baud?"
@@ -222,15 +211,12 @@ impl Report {
 
     /// Reports once that bytes arrive but no line ends.
     fn waiting(&mut self, session: &Session) {
-        /// More than the time between two lines of any device.
-        const PATIENCE: Duration = Duration::from_secs(2);
+        let Input::Lines(lines) = &session.input else { return };
         let has_lines = session.tally.decoded + session.tally.bad > 0;
         if self.has_warned_of_ends || has_lines || self.begin.elapsed() < PATIENCE {
             return;
         }
-        if let Input::Lines(lines) = &session.input
-            && let unended @ 1.. = lines.lines.unended()
-        {
+        if let unended @ 1.. = lines.lines.unended() {
             self.has_warned_of_ends = true;
             warn(&format_args!(
                 "{unended} bytes have arrived, but no line has ended: does the sender end lines with LF or CR LF?"
@@ -238,24 +224,15 @@ impl Report {
         }
     }
 
-    /// Returns `true` once per interval.
-    fn is_due(&mut self, every: Duration) -> bool {
-        let is_due = self.last.elapsed() >= every;
-        if is_due {
-            self.last = Instant::now();
-        }
-        is_due
-    }
-
     /// Prints the counts and latencies so far.
-    fn print(&self, session: &Session) {
+    fn print(&mut self, session: &Session) {
+        self.last = Instant::now();
         let (tally, seconds) = (&session.tally, self.begin.elapsed().as_secs_f64());
+        let (lines, rate) = (counted(tally.decoded, "line"), tally.decoded as f64 / seconds.max(1e-9));
         // There is no one to report to if this fails.
         let _ = writeln!(
             messages(),
-            "{} decoded in {seconds:.1} s ({:.0} per second), {} bad, {} dropped; {}",
-            counted(tally.decoded, "line"),
-            tally.decoded as f64 / seconds.max(1e-9),
+            "{lines} decoded in {seconds:.1} s ({rate:.0} per second), {} bad, {} dropped; {}",
             tally.bad,
             tally.dropped,
             tally.latencies

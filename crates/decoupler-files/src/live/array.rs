@@ -83,8 +83,7 @@ impl LiveArray {
             false if !WireCheck::is_affordable(scale, scene) => Watched::TooLarge,
             false => Watched::Checked(FaultEvent::Recovered),
         };
-        let is_checked = matches!(watched, Watched::Checked(_));
-        let check = is_checked.then(|| WireCheck::new(sensor, scene, &rows)).transpose()?;
+        let check = matches!(watched, Watched::Checked(_)).then(|| WireCheck::new(sensor, scene, &rows));
         Ok(Self {
             sensor: *sensor,
             noise: scene.noise.source(sensor)?,
@@ -94,7 +93,7 @@ impl LiveArray {
             rest_ohm,
             is_new: vec![false; rows.len()],
             watched,
-            check,
+            check: check.transpose()?,
             checked: None,
             since_named: Default::default(),
             rows: rows.into(),

@@ -7,7 +7,7 @@ use std::{
 use decoupler_core::{dataset::Place, scene::Deformation};
 
 use super::{Answer, Lines, Note, Replay, SessionError, SessionEvent, Simulated, Source, SourceError, Tally};
-use crate::import::{KeptCell, LineParser, ParsedLine};
+use crate::import::{KeptCell, LONGEST_LINE, LineParser, ParsedLine};
 
 /// Source of frames.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,7 +106,8 @@ impl Input {
 /// Lines of a stream.
 #[derive(Debug)]
 pub struct LineInput {
-    pub(super) source: Source,
+    /// The source.
+    pub source: Source,
     /// Lines, before they are parsed.
     pub lines: Lines,
     parser: LineParser,
@@ -145,11 +146,12 @@ impl LineInput {
                 return SessionEvent::End(Err(error));
             }
         };
-        let (number, read_at) = (line.number, line.read_at);
-        (answer.line, answer.is_ended) = (number, line.is_ended);
+        let number = line.number;
+        (answer.line, answer.is_ended, answer.read_at) = (number, line.is_ended, Some(line.read_at));
+        answer.time_s = line.read_at.saturating_duration_since(self.begun).as_secs_f64();
         let Some(text) = line.text else {
             self.parser.count_bad();
-            return SessionEvent::Bad(format!("line {number}: it is longer than {} bytes", Lines::LONGEST));
+            return SessionEvent::Bad(format!("line {number}: it is longer than {LONGEST_LINE} bytes"));
         };
         let (first_row, readings, kept, recorded_s) = match self.parser.parse(number, text) {
             Ok(ParsedLine::NoReadings) => return SessionEvent::Nothing,
@@ -180,8 +182,7 @@ impl LineInput {
             }
             Err(error) => return SessionEvent::Bad(error.to_string()),
         };
-        (answer.first_row, answer.read_at, answer.recorded_s) = (first_row, Some(read_at), recorded_s);
-        answer.time_s = read_at.saturating_duration_since(self.begun).as_secs_f64();
+        (answer.first_row, answer.recorded_s) = (first_row, recorded_s);
         answer.readings.clear();
         answer.readings.extend_from_slice(readings);
         answer.kept.resize_with(kept.len(), KeptCell::default);

@@ -30,7 +30,7 @@ pub struct Lines {
 pub struct Line<'a> {
     /// Number in the source, from 1; dropped lines are counted.
     pub number: u64,
-    /// Bytes without LF; `None` if the line is longer than [`Lines::LONGEST`].
+    /// Bytes without LF; `None` if the line is longer than [`LONGEST_LINE`].
     pub text: Option<&'a [u8]>,
     /// False for a last line without a line break, which may be cut off.
     pub is_ended: bool,
@@ -74,8 +74,6 @@ impl Lines {
     /// Waiting time after which a line is too old with [`Keeping::Latest`]: longer than the scheduling delays of a busy
     /// machine.
     pub const PATIENCE: Duration = Duration::from_millis(100);
-    /// Maximum length of a line in bytes, including its line break: 1 MiB, as for any file of readings.
-    pub const LONGEST: usize = LONGEST_LINE;
 
     /// Starts a thread that opens a source, which may take minutes, and reads it. With `skips_first` its first line is skipped
     /// unless it is empty or begins with a letter or a quote, like a header: reading from a device may begin in the middle of a
@@ -277,7 +275,7 @@ impl Splitter {
         for part in bytes.split_inclusive(|&byte| byte == b'\n') {
             let text = part.strip_suffix(b"\n").unwrap_or(part);
             self.length += text.len();
-            if self.length < Lines::LONGEST {
+            if self.length < LONGEST_LINE {
                 self.partial.extend_from_slice(text);
             } else {
                 self.partial.clear();
@@ -298,7 +296,7 @@ impl Splitter {
             batch.bytes.extend_from_slice(&self.partial);
             batch.lines.push_back(Entry {
                 number: self.number,
-                place: (self.length < Lines::LONGEST).then_some(start..batch.bytes.len()),
+                place: (self.length < LONGEST_LINE).then_some(start..batch.bytes.len()),
                 is_ended,
                 read_at,
             });
@@ -382,7 +380,7 @@ mod tests {
 
     #[test]
     fn a_line_without_end_is_not_kept() {
-        let long = io::Cursor::new(vec![b'x'; 3 * Lines::LONGEST]).chain(&b"\nshort\n"[..]);
+        let long = io::Cursor::new(vec![b'x'; 3 * LONGEST_LINE]).chain(&b"\nshort\n"[..]);
         assert_eq!(all(long, false), [(1, None), (2, Some("short".to_owned()))]);
     }
 

@@ -361,10 +361,8 @@ impl Session {
             let mut by_all_mm = vec![0.0; values.len()];
             if self.last.left_out.is_some() && self.decoder.decode(readings, &mut by_all_mm).is_ok() {
                 let ([by_all, left_out], count) = array.since_named;
-                array.since_named = (
-                    [by_all + array.error_mm(&by_all_mm, truth), left_out + error_mm],
-                    count + 1,
-                );
+                let by_all = by_all + array.error_mm(&by_all_mm, truth);
+                array.since_named = ([by_all, left_out + error_mm], count + 1);
             }
             error_mm
         });

@@ -161,10 +161,8 @@ const FREQUENCIES_HZ: [[f64; 2]; 3] = [[0.11, 0.29], [0.13, 0.31], [0.37, 0.89]]
 impl PressPath {
     fn new(model: &SensorModel, rng: &mut impl Rng) -> Self {
         let (geometry, scale) = (&model.geometry, model.scale);
-        let first_mm = geometry.row_node_mm(scale, 0, 0).truncate();
-        let last_mm = geometry
-            .row_node_mm(scale, scale.rows() - 1, scale.nodes_per_row() - 1)
-            .truncate();
+        let node_mm = |row, node| geometry.row_node_mm(scale, row, node).truncate();
+        let (first_mm, last_mm) = (node_mm(0, 0), node_mm(scale.rows() - 1, scale.nodes_per_row() - 1));
         Self {
             middle_mm: 0.5 * (first_mm + last_mm),
             reach_mm: 0.5 * (last_mm - first_mm),
