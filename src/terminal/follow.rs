@@ -84,7 +84,14 @@ impl Follow {
         warn_unwatched(&session);
         let graceful = Graceful::begin();
         let mut answers = Answers::new(&file, self.format.unwrap_or_default());
-        let mut report = Report::new();
+        let begin = Instant::now();
+        let mut report = Report {
+            begin,
+            last: begin,
+            has_warned_of_ends: false,
+            unreported: 0,
+            last_reported: begin,
+        };
         let end = loop {
             if asked.swap(false, Ordering::SeqCst) || self.report.is_some_and(|every| report.last.elapsed() >= every) {
                 report.print(&session);
@@ -175,17 +182,6 @@ const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 const PATIENCE: Duration = Duration::from_secs(2);
 
 impl Report {
-    fn new() -> Self {
-        let now = Instant::now();
-        Self {
-            begin: now,
-            last: now,
-            has_warned_of_ends: false,
-            unreported: 0,
-            last_reported: now,
-        }
-    }
-
     /// Reports a bad line, unless there are too many.
     fn bad(&mut self, reason: &str, session: &Session) {
         let bad = session.tally.bad;

@@ -242,26 +242,14 @@ pub fn run(mut plan: SessionPlan, commands: &Receiver<Command>, report: &Report<
         Err(_) if report.is_cancelled() => return Ok(()),
         opened => opened.map_err(|error| error.to_string())?,
     };
-    let end = decode(&mut session, &mut screen, commands, report);
-    if let Some(file) = session.recording.take() {
-        report.send(LiveEvent::Recorded(file.recorded, None));
-    }
-    // The last frame stays on the screen.
-    screen.show(&session, report);
-    end
-}
-
-fn decode(
-    session: &mut Session,
-    screen: &mut Screen,
-    commands: &Receiver<Command>,
-    report: &Report<LiveEvent>,
-) -> Result<(), String> {
     let (mut is_drawn, mut has_news, mut may_show_at) = (true, false, Instant::now());
-    while !report.is_cancelled() {
+    let end = loop {
+        if report.is_cancelled() {
+            break Ok(());
+        }
         let now = Instant::now();
         if has_news && is_drawn && may_show_at <= now {
-            screen.show(session, report);
+            screen.show(&session, report);
             (has_news, is_drawn, may_show_at) = (false, false, now + BETWEEN_SHOWN);
         }
         let mut until = session.input.due(now).unwrap_or(now + LONGEST_WAIT);
@@ -272,7 +260,7 @@ fn decode(
             Ok(Command::Drawn) => is_drawn = true,
             Ok(Command::Change(change)) => {
                 has_news = true;
-                change(session).into_iter().for_each(|event| report.send(event));
+                change(&mut session).into_iter().for_each(|event| report.send(event));
             }
             Err(RecvTimeoutError::Timeout) => match session.next(Instant::now(), BETWEEN_LOOKS) {
                 SessionEvent::Answer => {
@@ -288,15 +276,20 @@ fn decode(
                     let is_stream = matches!(session.input, Input::Lines(_));
                     has_news |= is_stream && session.tally.falls_silent(Instant::now());
                 }
-                SessionEvent::End(end) => return end.map_err(|error| error.to_string()),
+                SessionEvent::End(end) => break end.map_err(|error| error.to_string()),
             },
-            Err(RecvTimeoutError::Disconnected) => break,
+            Err(RecvTimeoutError::Disconnected) => break Ok(()),
         }
         for note in session.notes.drain(..) {
             if let Note::RecordingEnded(recorded, reason) = note {
                 report.send(LiveEvent::Recorded(recorded, Some(reason)));
             }
         }
+    };
+    if let Some(file) = session.recording.take() {
+        report.send(LiveEvent::Recorded(file.recorded, None));
     }
-    Ok(())
+    // The last frame stays on the screen.
+    screen.show(&session, report);
+    end
 }
