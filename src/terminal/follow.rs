@@ -39,14 +39,19 @@ pub(super) struct Follow {
     #[arg(long, conflicts_with = "output")]
     pub(super) follow: bool,
     /// With --follow: output format [default: csv]
-    #[arg(long, value_name = "csv|jsonl", hide_possible_values = true, requires = "follow")]
+    #[arg(
+        long,
+        value_name = "csv|jsonl",
+        hide_possible_values = true,
+        conflicts_with = "output"
+    )]
     format: Option<Form>,
     /// With --follow: report rate and latency on standard error every N seconds; always at the end, and on SIGUSR1
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, requires = "follow")]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "output")]
     report: Option<Duration>,
     /// With --follow: relative noise of the readings (standard deviation) assumed in fault detection [default: that of
     /// the network's scene]
-    #[arg(long, value_name = "REL", value_parser = number, requires = "follow")]
+    #[arg(long, value_name = "REL", value_parser = number, conflicts_with = "output")]
     noise: Option<f64>,
 }
 
