@@ -77,10 +77,7 @@ impl Decode {
         }
         let file = NetworkFile::load(&self.network)?;
         match (&self.input, &self.output) {
-            (Some(input), Some(output)) if !self.follow.follow => {
-                self.follow.check_unused()?;
-                decode_file(&file, input, output)
-            }
+            (Some(input), Some(output)) if !self.follow.follow => decode_file(&file, input, output),
             (input, _) => {
                 let standard_input = Path::new("-");
                 self.follow.run(input.as_deref().unwrap_or(standard_input), file)

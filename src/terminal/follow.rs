@@ -12,10 +12,10 @@ use std::{
 };
 
 use clap::Args;
-use decoupler_core::{live::FaultEvent, scene::Noise, text::counted};
+use decoupler_core::{job::Job, scene::Noise, text::counted};
 use decoupler_files::{
     export::NetworkFile,
-    live::{Note, Session, SessionEvent, SessionPlan, Source, SourcePlan, Unit, Unwatched, Watched},
+    live::{Input, Note, Session, SessionError, SessionEvent, SessionPlan, Source, SourcePlan, Unit, Watched},
 };
 
 use super::{
@@ -39,39 +39,39 @@ pub(super) struct Follow {
     #[arg(long, conflicts_with = "output")]
     pub(super) follow: bool,
     /// With --follow: output format [default: csv]
-    #[arg(long, value_name = "csv|jsonl", hide_possible_values = true)]
+    #[arg(
+        long,
+        value_name = "csv|jsonl",
+        hide_possible_values = true,
+        conflicts_with = "output"
+    )]
     format: Option<Form>,
     /// With --follow: report rate and latency on standard error every N seconds; always at the end, and on SIGUSR1
-    #[arg(long, value_name = "SECONDS", value_parser = number)]
-    report: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "output")]
+    report: Option<Duration>,
     /// With --follow: relative noise of the readings (standard deviation) assumed in fault detection [default: that of
     /// the network's scene]
-    #[arg(long, value_name = "REL", value_parser = number)]
+    #[arg(long, value_name = "REL", value_parser = number, conflicts_with = "output")]
     noise: Option<f64>,
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse().ok().filter(|seconds| *seconds > 0.0 && *seconds <= 1e9);
+    let seconds = seconds.ok_or("give a number of seconds above 0")?;
+    Ok(Duration::from_secs_f64(seconds))
 }
 
 /// Timeout of waiting for a line, after which requests for a report and to stop are checked.
 const WAIT: Duration = Duration::from_millis(100);
 
 impl Follow {
-    /// Refuses arguments that only --follow uses.
-    pub(super) fn check_unused(&self) -> Result<(), Failure> {
-        let given = [
-            (self.format.is_some(), "--format"),
-            (self.report.is_some(), "--report"),
-            (self.noise.is_some(), "--noise"),
-        ];
-        match given.into_iter().find(|(is_given, _)| *is_given) {
-            Some((_, argument)) => Err(wrong(argument, "it needs --follow")),
-            None => Ok(()),
-        }
-    }
-
     /// Decodes `input` with the network of `file` until it ends, or until a request to stop. Reports at the requested interval,
     /// on SIGUSR1, and at the end.
     pub(super) fn run(&self, input: &Path, file: NetworkFile) -> Result<(), Failure> {
         let noise = self.noise_of(&file)?;
-        let source = self.source(input)?;
+        let input = input.to_str();
+        let input = input.ok_or_else(|| wrong("--input", "its name is not UTF-8"))?;
+        let source: Source = input.parse().map_err(|error| wrong("--input", error))?;
         let file = Arc::new(file);
         note_unmonitored(&file);
         let asked = Arc::new(AtomicBool::new(false));
@@ -80,75 +80,70 @@ impl Follow {
         let _ = signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&asked));
         let plan = SessionPlan {
             network: Arc::clone(&file),
-            source: SourcePlan::Stream(source.clone()),
+            source: SourcePlan::Stream(source),
             noise,
             zero: None,
             unit: Unit::Lines,
         };
-        let Some(mut session) = Session::open(plan, &|| true)? else {
-            return Ok(());
-        };
+        let mut session = Session::open(plan, &Job::UNINTERRUPTED)?;
         warn_unwatched(&session);
         let graceful = Graceful::begin();
         let mut answers = Answers::new(&file, self.format.unwrap_or_default());
-        let mut report = Report::new(source);
-        let every = self.report.map(Duration::from_secs_f64);
+        let begin = Instant::now();
+        let mut report = Report {
+            begin,
+            last: begin,
+            has_warned_of_ends: false,
+            unreported: 0,
+            last_reported: begin,
+        };
         let end = loop {
-            if asked.swap(false, Ordering::SeqCst) || every.is_some_and(|every| report.is_due(every)) {
+            if asked.swap(false, Ordering::SeqCst) || self.report.is_some_and(|every| report.last.elapsed() >= every) {
                 report.print(&session);
             }
             if graceful.is_end_requested() {
                 break Err(Failure::InterruptedFollow);
             }
             let event = session.next(Instant::now(), WAIT);
-            for note in session.notes() {
-                print_note(&file, &note);
+            for note in session.notes.drain(..) {
+                match note {
+                    Note::Drift(line, drift) => note_drift(&file, line, &drift),
+                    other => warn(&other),
+                }
             }
             match event {
                 SessionEvent::Answer => {
-                    if let Err(error) = answers.write(&session) {
+                    if let Err(error) = answers.write(&session.last) {
                         break Err(Failure::Output(error));
                     }
                     session.count();
                 }
                 SessionEvent::Bad(reason) => report.bad(&reason, &session),
                 SessionEvent::Nothing => report.waiting(&session),
+                // It was never open.
+                SessionEvent::End(Err(error @ SessionError::Source(_))) => return Err(error.into()),
                 SessionEvent::End(end) => break end.map_err(Failure::from),
             }
         };
         report.print(&session);
-        answers.warn();
+        answers.outside.warn();
         end
     }
 
     /// Noise assumed in fault detection.
     fn noise_of(&self, file: &NetworkFile) -> Result<Noise, Failure> {
-        let Some(simulation) = &file.problem.sensor else {
-            let reason =
-                "fault detection needs a sensor model, which the network of a recording does not have; leave it out";
-            return match self.noise {
-                Some(_) => Err(wrong("--noise", reason)),
-                None => Ok(Noise::default()),
-            };
+        let mut scene = match &file.problem.sensor {
+            Some(simulation) => simulation.scene,
+            None if self.noise.is_none() => return Ok(Noise::default()),
+            None => {
+                let reason = "fault detection needs a sensor model, which the network of a recording does not have; \
+                              leave it out";
+                return Err(wrong("--noise", reason));
+            }
         };
-        let mut scene = simulation.scene;
-        if let Some(relative) = self.noise {
-            scene.noise = Noise::relative(relative);
-            scene.check().map_err(|error| wrong("--noise", error))?;
-        }
+        scene.noise = self.noise.map_or(scene.noise, Noise::relative);
+        scene.check().map_err(|error| wrong("--noise", error))?;
         Ok(scene.noise.in_test())
-    }
-
-    /// Source named by `input`, after a check of the other arguments.
-    fn source(&self, input: &Path) -> Result<Source, Failure> {
-        let input = input
-            .to_str()
-            .ok_or_else(|| wrong("--input", "its name is not UTF-8"))?;
-        let source: Source = input.parse().map_err(|error| wrong("--input", error))?;
-        if self.report.is_some_and(|seconds| !(seconds > 0.0 && seconds <= 1e9)) {
-            return Err(wrong("--report", "give a number of seconds above 0"));
-        }
-        Ok(source)
     }
 }
 
@@ -163,56 +158,24 @@ fn warn(message: &dyn Display) {
 
 /// Reports why faults of the wires are not looked for, if they are not.
 fn warn_unwatched(session: &Session) {
-    let Some(Watched::Off(reason)) = session.array().map(|array| &array.watched) else {
-        return;
-    };
-    let reason = match reason {
-        Unwatched::NoNoise => {
+    let reason = match session.array.as_ref().map(|array| &array.watched) {
+        Some(Watched::NoNoise) => {
             "fault detection needs the noise of the readings, and the network was trained without noise; give --noise REL"
         }
-        Unwatched::TooLarge => "the array is too large",
+        Some(Watched::TooLarge) => "the array is too large",
+        Some(Watched::Checked(_)) | None => return,
     };
     warn(&format_args!("wires are not checked for faults: {reason}"));
 }
 
-fn print_note(file: &NetworkFile, note: &Note) {
-    match note {
-        Note::Start(line) => warn(&format_args!(
-            "line {line}: the lines at the start give the means of derived columns and are not decoded"
-        )),
-        Note::StepBack(line) => warn(&format_args!(
-            "line {line}: the time steps back: the history of readings restarts here and at every further step back; \
-             send the lines in order of time"
-        )),
-        Note::NoRow(line) => warn(&format_args!(
-            "line {line}: wires are not checked for faults, because the line has no row number; add a column named row, \
-             or send whole snapshots in one line"
-        )),
-        Note::Fault(line, fault @ FaultEvent::Named { .. }) => warn(&format_args!(
-            "line {line}: {fault}; left out from here on; frames are decoded from the other readings by the Gauss-Newton \
-             method"
-        )),
-        Note::Fault(line, FaultEvent::Unexplained) => warn(&format_args!(
-            "line {line}: the readings contradict Eq. (2), and no single-wire fault explains them: the answers may be \
-             wrong; check the wiring, the geometry and the order of the rows"
-        )),
-        Note::Fault(line, FaultEvent::Recovered) => warn(&format_args!(
-            "line {line}: {}; all wires are used",
-            FaultEvent::Recovered
-        )),
-        Note::Drift(line, drift) => note_drift(file, *line, drift),
-        Note::RecordingEnded(..) => {}
-    }
-}
-
 /// Messages on standard error on the lines so far.
 struct Report {
-    source: Source,
     begin: Instant,
+    /// Time of the last report of rate and latency.
     last: Instant,
     /// True once it was reported that no line ends.
     has_warned_of_ends: bool,
-    /// Number of bad lines since the last message.
+    /// Number of bad lines since the last message on one.
     unreported: u64,
     last_reported: Instant,
 }
@@ -220,23 +183,13 @@ struct Report {
 /// Number of bad lines that are reported individually; after them at most one per second.
 const MAX_REPORTED: u64 = 10;
 const REPORT_INTERVAL: Duration = Duration::from_secs(1);
+/// More than the time between two lines of any device.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 impl Report {
-    fn new(source: Source) -> Self {
-        let now = Instant::now();
-        Self {
-            source,
-            begin: now,
-            last: now,
-            has_warned_of_ends: false,
-            unreported: 0,
-            last_reported: now,
-        }
-    }
-
     /// Reports a bad line, unless there are too many.
     fn bad(&mut self, reason: &str, session: &Session) {
-        let bad = session.bad_lines();
+        let bad = session.tally.bad;
         if bad > MAX_REPORTED && self.last_reported.elapsed() < REPORT_INTERVAL {
             self.unreported += 1;
             return;
@@ -244,13 +197,12 @@ impl Report {
         self.last_reported = Instant::now();
         match std::mem::take(&mut self.unreported) {
             0 => warn(&reason),
-            unreported => warn(&format_args!(
-                "{reason} ({unreported} other bad lines since the last message)"
+            others => warn(&format_args!(
+                "{reason} ({others} other bad lines since the last message)"
             )),
         }
-        if let Source::Serial { baud, .. } = self.source
-            && bad == MAX_REPORTED
-            && session.latencies().count() == 0
+        if let (Input::Lines(lines), MAX_REPORTED, 0) = (&session.input, bad, session.tally.decoded)
+            && let Source::Serial(_, baud) = lines.source
         {
             warn(&format_args!(
                 "none of the first {MAX_REPORTED} lines is a frame: does the device send at {baud} baud?"
@@ -260,14 +212,12 @@ impl Report {
 
     /// Reports once that bytes arrive but no line ends.
     fn waiting(&mut self, session: &Session) {
-        /// More than the time between two lines of any device.
-        const PATIENCE: Duration = Duration::from_secs(2);
-        if self.has_warned_of_ends || self.begin.elapsed() < PATIENCE {
+        let Input::Lines(lines) = &session.input else { return };
+        let has_lines = session.tally.decoded + session.tally.bad > 0;
+        if self.has_warned_of_ends || has_lines || self.begin.elapsed() < PATIENCE {
             return;
         }
-        let has_lines = session.latencies().count() + session.bad_lines() > 0;
-        let unended = if has_lines { 0 } else { session.unended() };
-        if unended > 0 {
+        if let unended @ 1.. = lines.lines.unended() {
             self.has_warned_of_ends = true;
             warn(&format_args!(
                 "{unended} bytes have arrived, but no line has ended: does the sender end lines with LF or CR LF?"
@@ -275,27 +225,18 @@ impl Report {
         }
     }
 
-    /// Returns `true` once per interval.
-    fn is_due(&mut self, every: Duration) -> bool {
-        let is_due = self.last.elapsed() >= every;
-        if is_due {
-            self.last = Instant::now();
-        }
-        is_due
-    }
-
     /// Prints the counts and latencies so far.
-    fn print(&self, session: &Session) {
-        let (counts, latencies) = (session.counts(), session.latencies());
-        let (decoded, seconds) = (latencies.count(), self.begin.elapsed().as_secs_f64());
+    fn print(&mut self, session: &Session) {
+        self.last = Instant::now();
+        let (tally, seconds) = (&session.tally, self.begin.elapsed().as_secs_f64());
+        let (lines, rate) = (counted(tally.decoded, "line"), tally.decoded as f64 / seconds.max(1e-9));
         // There is no one to report to if this fails.
         let _ = writeln!(
             messages(),
-            "{} decoded in {seconds:.1} s ({:.0} per second), {} bad, {} dropped; {latencies}",
-            counted(decoded, "line"),
-            decoded as f64 / seconds.max(1e-9),
-            counts.bad,
-            counts.dropped
+            "{lines} decoded in {seconds:.1} s ({rate:.0} per second), {} bad, {} dropped; {}",
+            tally.bad,
+            tally.dropped,
+            tally.latencies
         );
     }
 }

@@ -3,10 +3,10 @@ use std::io::{self, BufWriter, StdoutLock, Write, stdout};
 use clap::ValueEnum;
 use decoupler_files::{
     export::{NetworkFile, write_decoded},
-    live::Session,
+    live::Answer,
 };
 use ndarray::ArrayView1;
-use serde_json::{Map, Value, json};
+use serde_json::{Map, json};
 
 use super::decode::{OutsideTraining, with_half_widths, write_cell, write_heading};
 
@@ -25,7 +25,7 @@ pub(super) struct Answers<'a> {
     file: &'a NetworkFile,
     /// Answers with the half-widths of their intervals.
     values: Vec<f64>,
-    outside: OutsideTraining<'a>,
+    pub(super) outside: OutsideTraining<'a>,
     form: Form,
     has_heading: bool,
     output: BufWriter<StdoutLock<'static>>,
@@ -43,84 +43,67 @@ impl<'a> Answers<'a> {
         }
     }
 
-    /// Writes and flushes the last answer of `session`, after the cells kept from its line.
-    pub(super) fn write(&mut self, session: &Session) -> io::Result<()> {
-        let problem = &self.file.problem;
-        let (line, answer, kept) = (session.line(), session.values(), session.kept());
-        let first_row = session.first_row();
-        let rows = answer.len() / problem.targets.len();
+    /// Writes and flushes an answer, after the cells kept from its line.
+    pub(super) fn write(&mut self, answer: &Answer) -> io::Result<()> {
+        let (problem, output) = (&self.file.problem, &mut self.output);
+        let (line, values, kept) = (answer.line, &answer.values, &answer.kept);
+        let rows = values.len() / problem.targets.len();
         let (mut readings_outside, mut targets_outside) = (Some(0), 0);
-        let of_rows = session.readings().chunks_exact(session.readings().len() / rows);
-        for (row, (readings, answer)) in of_rows.zip(answer.chunks_exact(problem.targets.len())).enumerate() {
-            let network = self.file.network.at(first_row + row);
-            let of_row = self.outside.count(network, line, readings, answer);
+        let of_rows = answer.readings.chunks_exact(answer.readings.len() / rows);
+        let of_rows = of_rows.zip(values.chunks_exact(problem.targets.len()));
+        for (row, (readings, values)) in (answer.first_row.unwrap_or(0)..).zip(of_rows) {
+            let of_row = self.outside.count(self.file.network.at(row), line, readings, values);
             readings_outside = readings_outside.zip(of_row.readings).map(|(sum, count)| sum + count);
             targets_outside += of_row.targets;
         }
         if !self.has_heading {
             let titles = Vec::from_iter(kept.iter().map(|kept| kept.title.clone()));
-            write_heading(self.file, &titles, rows, &mut self.output)?;
+            write_heading(self.file, &titles, rows, output)?;
             self.has_heading = true;
         }
         match self.form {
             Form::Csv => {
                 for cell in kept {
-                    write_cell(&cell.text, &mut self.output)?;
+                    write_cell(&cell.text, output)?;
                 }
-                with_half_widths(self.file, answer, &mut self.values);
-                write_decoded(
-                    ArrayView1::from(&self.values),
-                    readings_outside,
-                    targets_outside,
-                    &mut self.output,
-                )?;
+                with_half_widths(self.file, values, &mut self.values);
+                let values = ArrayView1::from(&self.values);
+                write_decoded(values, readings_outside, targets_outside, output)?;
             }
             Form::Jsonl if problem.has_nodes() => {
-                write!(self.output, "{{\"line\":{line},\"coordinates_mm\":[")?;
-                for (index, coordinate) in answer.iter().enumerate() {
+                write!(output, "{{\"line\":{line},\"coordinates_mm\":[")?;
+                for (index, coordinate) in values.iter().enumerate() {
                     let separator = if index == 0 { "" } else { "," };
-                    write!(self.output, "{separator}{coordinate:?}")?;
+                    write!(output, "{separator}{coordinate:?}")?;
                 }
-                match readings_outside {
-                    Some(count) => write!(self.output, "],\"readings_outside\":{count}")?,
-                    None => write!(self.output, "],\"readings_outside\":null")?,
-                }
-                write!(self.output, ",\"coordinates_outside\":{targets_outside}")?;
-                match session.left_out() {
-                    Some(wire) => writeln!(self.output, ",\"left_out\":\"{wire}\"}}")?,
-                    None => writeln!(self.output, ",\"left_out\":null}}")?,
-                }
+                let outside = json!(readings_outside);
+                let left_out = json!(answer.left_out.map(|wire| wire.to_string()));
+                write!(output, "],\"readings_outside\":{outside},\"coordinates_outside\":")?;
+                writeln!(output, "{targets_outside},\"left_out\":{left_out}}}")?;
             }
             Form::Jsonl => {
-                let targets = problem.targets.iter().zip(answer);
-                let targets = targets.map(|(target, value)| (target.name.clone(), (*value).into()));
-                let half_widths = problem.targets.iter().zip(answer).enumerate();
-                let half_widths = half_widths.filter_map(|(index, (target, value))| {
+                let named = || problem.targets.iter().map(|target| target.name.clone()).zip(values);
+                let half_width = |(index, (name, value)): (usize, (String, &f64))| {
                     let half_width = self.file.intervals.as_ref()?.half_width(index, *value)?;
-                    Some((target.name.clone(), half_width.into()))
-                });
-                let half_widths = half_widths.collect::<Map<String, Value>>();
-                let mut answer = json!({
+                    Some((name, json!(half_width)))
+                };
+                let half_widths = Map::from_iter(named().enumerate().filter_map(half_width));
+                let mut object = json!({
                     "line": line,
-                    "targets": targets.collect::<Map<String, Value>>(),
+                    "targets": Map::from_iter(named().map(|(name, value)| (name, json!(value)))),
                     "readings_outside": readings_outside,
                     "targets_outside": targets_outside,
                 });
                 if !kept.is_empty() {
-                    let cells = kept.iter().map(|kept| (kept.title.clone(), kept.text.clone().into()));
-                    answer["columns"] = cells.collect::<Map<String, Value>>().into();
+                    let cells = kept.iter().map(|kept| (kept.title.clone(), json!(kept.text)));
+                    object["columns"] = Map::from_iter(cells).into();
                 }
                 if !half_widths.is_empty() {
-                    answer["half_widths_90"] = half_widths.into();
+                    object["half_widths_90"] = half_widths.into();
                 }
-                writeln!(self.output, "{answer}")?;
+                writeln!(output, "{object}")?;
             }
         }
-        self.output.flush()
-    }
-
-    /// Warns of lines outside the range seen in training.
-    pub(super) fn warn(&self) {
-        self.outside.warn();
+        output.flush()
     }
 }

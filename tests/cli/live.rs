@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler_core::scene::Noise;
+use decoupler_core::{job::Job, scene::Noise};
 use decoupler_files::{
     export::NetworkFile,
     live::{Session, SessionEvent, SessionPlan, Source, SourcePlan, Unit},
@@ -15,12 +15,7 @@ use decoupler_files::{
 /// Returns the answers for a file that is replayed, and for the same file as a stream.
 pub(crate) fn answers(network: &Path, input: &Path) -> [Vec<Vec<f64>>; 2] {
     let network = Arc::new(NetworkFile::load(network).unwrap());
-    let replay = SourcePlan::Replay {
-        path: input.to_owned(),
-        at_s: 0.0,
-        speed: 1.0,
-        is_playing: true,
-    };
+    let replay = SourcePlan::Replay(input.to_owned());
     let stream = SourcePlan::Stream(Source::File(input.to_owned()));
     [replay, stream].map(|source| {
         let plan = SessionPlan {
@@ -30,15 +25,15 @@ pub(crate) fn answers(network: &Path, input: &Path) -> [Vec<Vec<f64>>; 2] {
             zero: None,
             unit: Unit::Frames,
         };
-        let mut session = Session::open(plan, &|| true).unwrap().unwrap();
+        let mut session = Session::open(plan, &Job::UNINTERRUPTED).unwrap();
         let (mut answers, mut now) = (Vec::new(), Instant::now());
         // A clock of its own, which jumps from frame to frame of a replay.
-        while let Some(due) = session.due(now) {
+        while let Some(due) = session.input.due(now) {
             now = due.max(now);
             match session.next(now, Duration::from_secs(60)) {
                 SessionEvent::Answer => {
                     session.count();
-                    answers.push(session.values().to_vec());
+                    answers.push(session.last.values.clone());
                 }
                 SessionEvent::End(end) => {
                     end.unwrap();

@@ -52,7 +52,7 @@ fn check_all(text: &str) -> bool {
         check::<Condition>(text),
         check::<Span>(text),
         check::<Name<SplitBy>>(text),
-        check::<Fault>(text),
+        text.parse::<Fault>().is_ok(),
         check::<Name<Combination>>(text),
         check::<Name<Initialization>>(text),
         check::<Separator>(text),

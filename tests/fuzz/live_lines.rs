@@ -8,7 +8,7 @@ use std::{
 use decoupler_core::scene::Rows;
 use decoupler_files::{
     import::{LineParser, ParsedLine},
-    live::{Keeping, Lines, NextLine},
+    live::{Keeping, Lines},
 };
 use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng};
 
@@ -43,13 +43,13 @@ fn split(bytes: &[u8], rng: &mut impl Rng) -> Vec<(u64, Vec<u8>)> {
         bytes: Cursor::new(bytes.to_vec()),
         rng: ChaCha8Rng::seed_from_u64(rng.random()),
     };
-    let mut lines = Lines::spawn(source, Keeping::All, false).unwrap();
+    let mut lines = Lines::spawn(|| Ok(source), Keeping::All, false).unwrap();
     let mut found = Vec::new();
     loop {
         match lines.next(Duration::from_secs(5)) {
-            NextLine::Line(line) => found.push((line.number, line.text.unwrap().to_vec())),
-            NextLine::None => panic!("no line and no end"),
-            NextLine::End(error) => {
+            Ok(Some(line)) => found.push((line.number, line.text.unwrap().to_vec())),
+            Ok(None) => panic!("no line and no end"),
+            Err(error) => {
                 assert!(error.is_none());
                 break;
             }

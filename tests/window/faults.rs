@@ -281,6 +281,7 @@ fn recordings_at_every_fault() {
             .live
             .shown
             .recording
-            .is_some_and(|(frames, _)| frames > 2)
+            .as_ref()
+            .is_some_and(|recorded| recorded.frames > 2)
     });
 }

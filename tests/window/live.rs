@@ -3,8 +3,8 @@
 use std::{
     cell::RefCell,
     collections::BTreeMap,
-    fs::{self, File},
-    io::{BufReader, Write},
+    fs,
+    io::Write,
     net::TcpListener,
     path::{Path, PathBuf},
 };
@@ -13,12 +13,13 @@ use decoupler::window::Phase;
 use decoupler_core::{
     dataset::Seed,
     decoupling::Decoder,
+    job::Job,
     live::ZeroGains,
     scene::{Noise, Scene},
 };
 use decoupler_files::{
     export::NetworkFile,
-    live::{Recording, Simulated},
+    live::{Recording, Simulated, Tally},
 };
 use eframe::egui::{Key, Modifiers, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, Queryable as _};
@@ -147,8 +148,8 @@ fn a_broken_wire_is_reported_left_out_and_cleared_once_it_is_repaired() {
     driver.wait("the name of the wire", |driver| driver.has("Fault: column-wire 7"));
     assert!(driver.says("Column-wire 7: open") && driver.says("Its readings are left out"));
     wait_for_frames(&mut driver, 20);
-    let errors = driver.views().live.shown.frame.as_ref().unwrap().errors.unwrap();
-    let [by_all, left_out] = errors.since_named_mm.unwrap();
+    let frame = driver.views().live.shown.frame.clone().unwrap();
+    let [by_all, left_out] = frame.since_named_mm.unwrap();
     assert!(left_out < 0.5 * by_all, "{left_out} mm instead of {by_all} mm");
     let residual = driver.views().live.shown.frame.as_ref().unwrap().residual;
     assert!(residual < 5e-3, "{residual}: the broken wire's readings do not count");
@@ -212,9 +213,8 @@ fn recordings(folder: &Path) -> Vec<PathBuf> {
     entries.map(|entry| entry.unwrap().path()).collect()
 }
 
-fn read(path: &Path) -> Recording {
-    let rows = Vec::from_iter(0..10);
-    Recording::read(BufReader::new(File::open(path).unwrap()), &rows, 10, 18).unwrap()
+fn read(path: &Path, file: &NetworkFile) -> Recording {
+    Recording::read(path, file, &mut Tally::default(), &Job::UNINTERRUPTED).unwrap()
 }
 
 #[test]
@@ -235,11 +235,12 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
             .live
             .shown
             .recording
-            .is_some_and(|(frames, _)| frames >= 40)
+            .as_ref()
+            .is_some_and(|recorded| recorded.frames >= 40)
     });
     driver.press_with(Modifiers::COMMAND, Key::R);
     driver.wait("its end", |driver| driver.says("Recorded "));
-    let recording = read(&recordings(folder.path())[0]);
+    let recording = read(&recordings(folder.path())[0], &driver.kept(1));
 
     driver.click("Replay recording");
     let ended = |driver: &Driver| {
@@ -249,10 +250,11 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
     let replayed = collect(&mut driver, "the end of the replay", ended);
     assert!(driver.becomes_idle(), "a replay that is paused");
     let file = driver.kept(1);
-    let answers = recording.times_s().iter().enumerate().map(|(frame, time_s)| {
-        let frame_ohm: Vec<f64> = recording.frame_ohm(frame).iter().copied().collect();
-        (time_s.to_bits(), by_library(&file, &frame_ohm))
-    });
+    let answers = recording
+        .times_s()
+        .iter()
+        .enumerate()
+        .map(|(frame, time_s)| (time_s.to_bits(), by_library(&file, recording.frame(frame))));
     let answers: BTreeMap<_, _> = answers.collect();
     for (shown, least) in [(&live, 1), (&replayed, 2)] {
         let recorded: Vec<_> = shown.iter().filter(|(time, _)| answers.contains_key(time)).collect();
@@ -262,8 +264,7 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
     let check = |driver: &Driver, place: usize| {
         let (time_s, nodes) = displayed(driver).unwrap();
         let frame = recording.frame_at(time_s);
-        let frame_ohm: Vec<f64> = recording.frame_ohm(frame).iter().copied().collect();
-        assert_eq!(nodes, by_library(&driver.kept(place), &frame_ohm));
+        assert_eq!(nodes, by_library(&driver.kept(place), recording.frame(frame)));
         (frame, recording.times_s().len() - 1)
     };
     let (frame, last) = check(&driver, 1);
@@ -295,7 +296,7 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
     driver.settle();
     let copy = folder.path().join("copy.csv");
     driver.save("Save recording…", &copy);
-    assert_eq!(read(&copy), recording);
+    assert_eq!(read(&copy, &file), recording);
 }
 
 #[test]
@@ -333,12 +334,14 @@ fn closing_the_window_while_it_records_ends_at_once_and_loses_no_frame() {
             .live
             .shown
             .recording
-            .is_some_and(|(frames, _)| frames >= 5)
+            .as_ref()
+            .is_some_and(|recorded| recorded.frames >= 5)
     });
     assert!(driver.close());
-    let (frames, _) = driver.views().live.shown.recording.unwrap();
+    let frames = driver.views().live.shown.recording.as_ref().unwrap().frames;
+    let file = driver.kept(0);
     drop(driver);
-    let recording = read(&recordings(folder.path())[0]);
+    let recording = read(&recordings(folder.path())[0], &file);
     assert!(recording.times_s().len() >= frames as usize);
 }
 

@@ -14,7 +14,7 @@ use decoupler_core::{
     scene::{Indenter, Loading, Noise},
     sensor::ArrayScale,
 };
-use decoupler_files::live::{ConverterEnd, Fault, Simulated};
+use decoupler_files::live::{ConverterEnd, Fault, FaultEffect, Simulated};
 
 const KINDS: [&str; 5] = ["open row", "open column", "short columns", "gain", "stuck"];
 /// Number of frames between presses that are decoded, and in all with each fault.
@@ -53,15 +53,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut rng = Seed(1).rng(Stream::Live);
     for trial in 0..faults {
         let kind = trial % KINDS.len();
-        let (fault, wire) = draw(kind, source.sensor.scale, &mut rng);
-        examine(
-            &source,
-            Seed(trial as u64),
-            fault,
-            wire,
-            &mut network,
-            &mut tallies[kind],
-        )?;
+        let fault = draw(kind, source.sensor.scale, &mut rng);
+        examine(&source, Seed(trial as u64), fault, &mut network, &mut tallies[kind])?;
     }
     println!("fault           right  wrong  of    frames  error: intact faulty  left out (mm)");
     for (name, tally) in KINDS.iter().zip(&tallies) {
@@ -81,27 +74,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Draws a fault of one kind, with the wires that should be named. Gain errors are 1 to 20 %.
-fn draw(kind: usize, scale: ArrayScale, rng: &mut impl Rng) -> (Fault, FaultyWire) {
+/// Draws a fault of one kind. Gain errors are 1 to 20 %.
+fn draw(kind: usize, scale: ArrayScale, rng: &mut impl Rng) -> Fault {
     let mut below = |count: usize| rng.random_range(0..count);
     let (row, column) = (below(scale.rows()), below(scale.columns()));
-    match kind {
-        0 => {
-            let before_node = below(scale.nodes_per_row());
-            (Fault::OpenRow { row, before_node }, FaultyWire::Row(row))
-        }
+    let (wire, effect) = match kind {
+        0 => (FaultyWire::Row(row), FaultEffect::Open(below(scale.nodes_per_row()))),
         1 => {
             let before_node = below(scale.nodes_per_column());
-            (Fault::OpenColumn { column, before_node }, FaultyWire::Column(column))
+            (FaultyWire::Column(column), FaultEffect::Open(before_node))
         }
-        2 => {
-            let column = below(scale.columns() - 1);
-            (Fault::ShortedColumns { column }, FaultyWire::Columns(column))
-        }
+        2 => (FaultyWire::Columns(below(scale.columns() - 1)), FaultEffect::Shorted),
         3 => {
             let sign = if below(2) == 0 { 1.0 } else { -1.0 };
             let relative = sign * 0.01 * 20.0_f64.powf(rng.random());
-            (Fault::Gain { column, relative }, FaultyWire::Column(column))
+            (FaultyWire::Column(column), FaultEffect::Gain(relative))
         }
         _ => {
             let end = if below(2) == 0 {
@@ -109,9 +96,10 @@ fn draw(kind: usize, scale: ArrayScale, rng: &mut impl Rng) -> (Fault, FaultyWir
             } else {
                 ConverterEnd::High
             };
-            (Fault::Stuck { column, end }, FaultyWire::Column(column))
+            (FaultyWire::Column(column), FaultEffect::Stuck(end))
         }
-    }
+    };
+    Fault { wire, effect }
 }
 
 /// Runs the source with the fault until it is named, and decodes frames with and without the wire.
@@ -119,7 +107,6 @@ fn examine(
     simulation: &Simulation,
     seed: Seed,
     fault: Fault,
-    wire: FaultyWire,
     network: &mut dyn Decoder,
     tally: &mut Tally,
 ) -> Result<(), Box<dyn Error>> {
@@ -137,12 +124,12 @@ fn examine(
         source.next_frame(&mut frame_ohm)?;
         if let Some(event @ FaultEvent::Named { wire: found, .. }) = check.check(&frame_ohm) {
             is_named = true;
-            if found == wire {
+            if found == fault.wire {
                 tally.right += 1;
                 tally.frames += frame + 1;
             } else {
                 tally.wrong += 1;
-                println!("{fault}: {event}");
+                println!("{fault:?}: {event}");
             }
         }
         if check.named().is_none() {
@@ -168,7 +155,7 @@ fn examine(
         tally.values += source.rows().len() * sensor.scale.nodes_per_row();
     }
     if !is_named {
-        println!("{fault}: not named");
+        println!("{fault:?}: not named");
     }
     Ok(())
 }

@@ -10,7 +10,7 @@ use decoupler_core::{
     scene::{Deformation, Indenter, Loading, Noise, Scene},
     sensor::SensorModel,
 };
-use decoupler_files::live::{Fault, FaultySensor, Simulated};
+use decoupler_files::live::{ConverterEnd, Fault, FaultEffect, FaultySensor, Simulated};
 use glam::DVec3;
 use rand::RngExt;
 
@@ -39,16 +39,16 @@ impl Network {
         let (near_row, near_column) = (|row: usize| 2 * row, |column: usize| 2 * (rows + column));
         for wire in 0..rows + columns {
             network.to_ground[2 * wire] = 1.0 / DRIVER_OHM;
-            let is_open = match fault {
-                Fault::OpenRow { row, .. } => wire == row,
-                Fault::OpenColumn { column, .. } => wire == rows + column,
+            let is_open = match (fault.wire, fault.effect) {
+                (FaultyWire::Row(row), FaultEffect::Open(_)) => wire == row,
+                (FaultyWire::Column(column), FaultEffect::Open(_)) => wire == rows + column,
                 _ => false,
             };
             if !is_open {
                 network.join(2 * wire, 2 * wire + 1, JOINT_OHM);
             }
         }
-        if let Fault::ShortedColumns { column } = fault {
+        if let FaultyWire::Columns(column) = fault.wire {
             network.join(near_column(column), near_column(column + 1), JOINT_OHM);
         }
         let beyond = |node: usize, break_at: Option<usize>| usize::from(break_at.is_some_and(|at| node >= at));
@@ -58,17 +58,12 @@ impl Network {
                     for electrode in 0..scale.nodes_per_column() {
                         let at_mm = model.displaced_mm(row, node, deformation.row_mm(row)[node]);
                         let apart_mm = (at_mm - model.geometry.column_node_mm(column, electrode)).length();
-                        let row_break = match fault {
-                            Fault::OpenRow { row: open, before_node } if open == row => Some(before_node),
+                        let break_of = |wire| match fault.effect {
+                            FaultEffect::Open(before_node) if fault.wire == wire => Some(before_node),
                             _ => None,
                         };
-                        let column_break = match fault {
-                            Fault::OpenColumn {
-                                column: open,
-                                before_node,
-                            } if open == column => Some(before_node),
-                            _ => None,
-                        };
+                        let (row_break, column_break) =
+                            (break_of(FaultyWire::Row(row)), break_of(FaultyWire::Column(column)));
                         let one = near_row(row) + beyond(node, row_break);
                         let other = near_column(column) + beyond(electrode, column_break);
                         network.join(one, other, model.resistivity_ohm_per_mm * apart_mm);
@@ -380,12 +375,9 @@ fn frames(
         for (&row, ohm) in rows.iter().zip(frame_ohm.chunks_exact_mut(columns)) {
             sensor.row_resistances_into(row, deformation.row_mm(row), ohm).unwrap();
         }
-        if let Some(faulty) = &faulty {
-            faulty.before_noise(&rows, &deformation, &mut frame_ohm);
-        }
-        source.disturb(&mut frame_ohm, &mut noise_rng);
-        if let Some(faulty) = &faulty {
-            faulty.after_noise(&rows, &mut frame_ohm);
+        match &faulty {
+            Some(faulty) => faulty.disturb_snapshot((&rows, &deformation), &mut frame_ohm, &source, &mut noise_rng),
+            None => source.disturb(&mut frame_ohm, &mut noise_rng),
         }
         take(&frame_ohm, &deformation);
     }
@@ -542,16 +534,24 @@ fn leaving_the_wire_out_restores_the_answer() {
 }
 
 #[test]
-fn faults_round_trip_as_text_and_invalid_ones_are_refused() {
-    for text in [
-        "open-row:3@1",
-        "open-column:30@5",
-        "short-columns:1-2",
-        "gain:7=-0.05",
-        "stuck:1=low",
-        "stuck:1=high",
+fn faults_are_parsed_and_invalid_ones_are_refused() {
+    for (text, wire, effect) in [
+        ("open-row:3@1", FaultyWire::Row(2), FaultEffect::Open(0)),
+        ("open-column:30@5", FaultyWire::Column(29), FaultEffect::Open(4)),
+        ("short-columns:1-2", FaultyWire::Columns(0), FaultEffect::Shorted),
+        ("gain:7=-0.05", FaultyWire::Column(6), FaultEffect::Gain(-0.05)),
+        (
+            "stuck:1=low",
+            FaultyWire::Column(0),
+            FaultEffect::Stuck(ConverterEnd::Low),
+        ),
+        (
+            "stuck:1=high",
+            FaultyWire::Column(0),
+            FaultEffect::Stuck(ConverterEnd::High),
+        ),
     ] {
-        assert_eq!(text.parse::<Fault>().unwrap().to_string(), text);
+        assert_eq!(text.parse(), Ok(Fault { wire, effect }));
     }
     assert_eq!("open-row:3".parse::<Fault>(), "open-row:3@1".parse());
     for text in [

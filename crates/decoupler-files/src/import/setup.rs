@@ -215,7 +215,7 @@ pub(super) fn unless_cancelled<T>(job: &Job<'_>, read: Result<T, ImportError>) -
 }
 
 /// Returns a callback that reports progress and ends the import once the job is cancelled.
-pub(super) fn watch(job: &Job<'_>, on_progress: &mut dyn FnMut(Progress)) -> impl FnMut(Progress) -> ControlFlow<()> {
+pub(crate) fn watch(job: &Job<'_>, on_progress: &mut dyn FnMut(Progress)) -> impl FnMut(Progress) -> ControlFlow<()> {
     move |progress| {
         on_progress(progress);
         if job.is_cancelled() {

@@ -1,8 +1,9 @@
-use std::{fmt, str::FromStr};
+use std::{ops::Range, str::FromStr};
 
 use decoupler_core::{
     dataset::Dataset,
-    scene::{Deformation, Noise},
+    live::FaultyWire,
+    scene::{Deformation, Noise, NoiseSource},
     sensor::{ArrayScale, SensorError, SensorModel, short},
 };
 use glam::DVec3;
@@ -16,40 +17,24 @@ use thiserror::Error;
 /// break a wire floats, and its nodes carry no current into an amplifier. Two touching column-wires share the measured
 /// current equally: both read 2/(1/R + 1/R′).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Fault {
-    /// A row-wire is broken before node `before_node`, counted from 0; at its connector if this is 0.
-    OpenRow {
-        /// Row-wire, from 0.
-        row: usize,
-        /// First node that is cut off.
-        before_node: usize,
-    },
-    /// A column-wire is broken before node `before_node`, counted from 0; at its connector if this is 0.
-    OpenColumn {
-        /// Column-wire, from 0.
-        column: usize,
-        /// First node that is cut off.
-        before_node: usize,
-    },
-    /// Column-wires `column` and `column` + 1 touch.
-    ShortedColumns {
-        /// First of the two, from 0.
-        column: usize,
-    },
-    /// The amplifier of a column-wire has a gain error: its readings are 1 + `relative` times the resistances.
-    Gain {
-        /// Column-wire, from 0.
-        column: usize,
-        /// Relative error of its readings, above −1.
-        relative: f64,
-    },
-    /// The converter of a column-wire is stuck at an end of its range.
-    Stuck {
-        /// Column-wire, from 0.
-        column: usize,
-        /// End at which it is stuck.
-        end: ConverterEnd,
-    },
+pub struct Fault {
+    /// Faulty wire, or its amplifier or converter.
+    pub wire: FaultyWire,
+    /// Effect on its readings.
+    pub effect: FaultEffect,
+}
+
+/// Effect of a [`Fault`] on the readings of its wire.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaultEffect {
+    /// Broken before this node, counted from 0; at its connector if this is 0.
+    Open(usize),
+    /// Column-wires touch.
+    Shorted,
+    /// The amplifier has this gain error, above −1: readings are 1 + error times the resistances.
+    Gain(f64),
+    /// The converter is stuck at this end of its range.
+    Stuck(ConverterEnd),
 }
 
 /// Invalid fault.
@@ -62,16 +47,12 @@ pub enum FaultError {
          short-columns:COLUMN-COLUMN, gain:COLUMN=REL, stuck:COLUMN=low or stuck:COLUMN=high"
     )]
     Text(String),
-    /// The array, or the scene, has no such wire or node.
-    #[error("there is no {what} {number}; give 1 to {last}")]
-    Number {
-        /// Kind of wire or node.
-        what: &'static str,
-        /// Number, from 1.
-        number: usize,
-        /// Largest number.
-        last: usize,
-    },
+    /// The array has no such wire: kind, number and largest number.
+    #[error("there is no {0} {1}; give 1 to {2}")]
+    Wire(&'static str, usize, usize),
+    /// The wire has no such node.
+    #[error("there is no node on a {0} {1}; give 1 to {2}")]
+    Node(&'static str, usize, usize),
     /// The gain error is out of range.
     #[error("the gain error is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
     Gain(f64),
@@ -94,63 +75,38 @@ impl FromStr for Fault {
 
     fn from_str(text: &str) -> Result<Self, FaultError> {
         let unknown = || FaultError::Text(text.to_owned());
-        let number = |text: &str| match text.parse::<usize>() {
+        let index = |text: &str| match text.parse::<usize>() {
             Ok(number @ 1..) => Ok(number - 1),
             _ => Err(unknown()),
         };
-        let place = |text: &str| match text.split_once('@') {
-            Some((wire, node)) => Ok((number(wire)?, number(node)?)),
-            None => Ok((number(text)?, 0)),
-        };
         let (kind, rest) = text.trim().split_once(':').ok_or_else(unknown)?;
-        let value = || rest.split_once('=').ok_or_else(unknown);
-        match kind {
-            "open-row" => place(rest).map(|(row, before_node)| Self::OpenRow { row, before_node }),
-            "open-column" => place(rest).map(|(column, before_node)| Self::OpenColumn { column, before_node }),
-            "short-columns" => {
-                let (first, second) = rest.split_once('-').ok_or_else(unknown)?;
-                let (column, next) = (number(first)?, number(second)?);
-                let short = (next == column + 1).then_some(Self::ShortedColumns { column });
-                short.ok_or_else(unknown)
+        let separator = match kind {
+            "short-columns" => '-',
+            "gain" | "stuck" => '=',
+            _ => '@',
+        };
+        let (wire, value) = match rest.split_once(separator) {
+            Some((wire, value)) => (index(wire)?, Some(value)),
+            None => (index(rest)?, None),
+        };
+        let column = FaultyWire::Column(wire);
+        let (wire, effect) = match (kind, value) {
+            ("open-row", node) => (FaultyWire::Row(wire), FaultEffect::Open(node.map_or(Ok(0), index)?)),
+            ("open-column", node) => (column, FaultEffect::Open(node.map_or(Ok(0), index)?)),
+            ("short-columns", Some(next)) if index(next)? == wire + 1 => {
+                (FaultyWire::Columns(wire), FaultEffect::Shorted)
             }
-            "gain" => {
-                let (column, relative) = value()?;
-                let relative: f64 = relative.parse().map_err(|_| unknown())?;
-                if relative > -1.0 && relative <= 10.0 && relative != 0.0 {
-                    number(column).map(|column| Self::Gain { column, relative })
-                } else {
-                    Err(FaultError::Gain(relative))
+            ("gain", Some(relative)) => match relative.parse().map_err(|_| unknown())? {
+                relative if relative > -1.0 && relative <= 10.0 && relative != 0.0 => {
+                    (column, FaultEffect::Gain(relative))
                 }
-            }
-            "stuck" => {
-                let (column, end) = value()?;
-                let end = match end {
-                    "low" => ConverterEnd::Low,
-                    "high" => ConverterEnd::High,
-                    _ => return Err(unknown()),
-                };
-                number(column).map(|column| Self::Stuck { column, end })
-            }
-            _ => Err(unknown()),
-        }
-    }
-}
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::OpenRow { row, before_node } => write!(f, "open-row:{}@{}", row + 1, before_node + 1),
-            Self::OpenColumn { column, before_node } => write!(f, "open-column:{}@{}", column + 1, before_node + 1),
-            Self::ShortedColumns { column } => write!(f, "short-columns:{}-{}", column + 1, column + 2),
-            Self::Gain { column, relative } => write!(f, "gain:{}={relative}", column + 1),
-            Self::Stuck { column, end } => {
-                let end = match end {
-                    ConverterEnd::Low => "low",
-                    ConverterEnd::High => "high",
-                };
-                write!(f, "stuck:{}={end}", column + 1)
-            }
-        }
+                relative => return Err(FaultError::Gain(relative)),
+            },
+            ("stuck", Some("low")) => (column, FaultEffect::Stuck(ConverterEnd::Low)),
+            ("stuck", Some("high")) => (column, FaultEffect::Stuck(ConverterEnd::High)),
+            _ => return Err(unknown()),
+        };
+        Ok(Self { wire, effect })
     }
 }
 
@@ -160,24 +116,19 @@ impl Fault {
     /// # Errors
     /// If a wire or node does not exist.
     pub fn check(self, scale: ArrayScale, read: &[usize]) -> Result<(), FaultError> {
-        let wires_and_nodes = match self {
-            Self::OpenRow { row, before_node } => [
-                ("row-wire", row, scale.rows()),
-                ("node on a row-wire", before_node, scale.nodes_per_row()),
-            ],
-            Self::OpenColumn { column, before_node } => [
-                ("column-wire", column, scale.columns()),
-                ("node on a column-wire", before_node, scale.nodes_per_column()),
-            ],
-            Self::ShortedColumns { column } => [("column-wire", column + 1, scale.columns()); 2],
-            Self::Gain { column, .. } | Self::Stuck { column, .. } => [("column-wire", column, scale.columns()); 2],
+        let (kind, wire, wires, nodes) = match self.wire {
+            FaultyWire::Row(row) => ("row-wire", row, scale.rows(), scale.nodes_per_row()),
+            wire => (
+                "column-wire",
+                wire.columns().end - 1,
+                scale.columns(),
+                scale.nodes_per_column(),
+            ),
         };
-        if let Some((what, index, last)) = wires_and_nodes.into_iter().find(|(_, index, count)| index >= count) {
-            let number = index + 1;
-            return Err(FaultError::Number { what, number, last });
-        }
-        match self {
-            Self::OpenRow { row, .. } if !read.contains(&row) => Err(FaultError::NotRead(row + 1)),
+        match (self.wire, self.effect) {
+            _ if wire >= wires => Err(FaultError::Wire(kind, wire + 1, wires)),
+            (_, FaultEffect::Open(node)) if node >= nodes => Err(FaultError::Node(kind, node + 1, nodes)),
+            (FaultyWire::Row(row), _) if !read.contains(&row) => Err(FaultError::NotRead(row + 1)),
             _ => Ok(()),
         }
     }
@@ -206,114 +157,100 @@ impl FaultySensor {
         })
     }
 
-    /// Replaces the readings of simulated snapshots by those of the faulty sensor with noise: its wires and amplifiers
-    /// come before the noise, its converter after.
+    /// Replaces the readings of simulated snapshots by those of the faulty sensor with noise.
     ///
     /// # Errors
-    /// See [`Dataset::disturb`].
+    /// If the undeformed sensor has no resistance.
     pub fn disturb(&self, set: &mut Dataset, noise: &Noise, rng: &mut impl Rng) -> Result<(), SensorError> {
+        let source = noise.source(&self.model)?;
         let read = set.row_wires_read().map_or_else(Vec::new, <[usize]>::to_vec);
-        let simulated = set.clone();
-        change_snapshots(set, |snapshot, ohms| {
+        let mut readings = set.readings().to_owned();
+        let all = readings
+            .as_slice_mut()
+            .expect("a set has its readings in standard layout");
+        for (snapshot, ohms) in all.chunks_exact_mut(set.row_count() * set.channels()).enumerate() {
             // Row-wires that are not read are at rest.
             let deformation = Deformation::from_fn(self.model.scale, |row, node| {
                 let index = read.iter().position(|&other| other == row);
                 index.map_or(DVec3::ZERO, |index| {
-                    let coordinates_mm = &simulated.sample_targets(snapshot * read.len() + index)[3 * node..];
+                    let coordinates_mm = &set.sample_targets(snapshot * read.len() + index)[3 * node..];
                     self.model.displacement_mm(row, node, DVec3::from_slice(coordinates_mm))
                 })
             });
-            self.before_noise(&read, &deformation, ohms);
-        });
-        set.disturb(&self.model, noise, rng)?;
-        change_snapshots(set, |_, ohms| self.after_noise(&read, ohms));
+            self.disturb_snapshot((&read, &deformation), ohms, &source, rng);
+        }
+        *set = set.with_readings(readings);
         Ok(())
+    }
+
+    /// Applies the fault and the noise to the resistances of one snapshot (rows `read`, row by row), which belong to
+    /// `deformation`: wires and amplifiers come before the noise, the converter after.
+    pub fn disturb_snapshot(
+        &self,
+        (read, deformation): (&[usize], &Deformation),
+        ohms: &mut [f64],
+        noise: &NoiseSource,
+        rng: &mut impl Rng,
+    ) {
+        self.before_noise(read, deformation, ohms);
+        noise.disturb(ohms, rng);
+        // Without current, or when it is stuck, the converter reads an end of its range without noise.
+        let (lowest_ohm, full_scale_ohm) = self.range_ohm;
+        let (from_ohm, to_ohm) = match self.fault.effect {
+            FaultEffect::Open(0) | FaultEffect::Stuck(ConverterEnd::High) => (full_scale_ohm, full_scale_ohm),
+            FaultEffect::Stuck(ConverterEnd::Low) => (lowest_ohm, lowest_ohm),
+            FaultEffect::Open(_) | FaultEffect::Gain(_) => (0.0, full_scale_ohm),
+            FaultEffect::Shorted => (0.0, f64::INFINITY),
+        };
+        let columns = self.model.scale.columns();
+        for (&row, ohms) in read.iter().zip(ohms.chunks_exact_mut(columns)) {
+            let affected = &mut ohms[self.affected(row)];
+            affected.iter_mut().for_each(|ohm| *ohm = ohm.clamp(from_ohm, to_ohm));
+        }
+    }
+
+    /// Columns whose readings of a row the fault affects.
+    fn affected(&self, row: usize) -> Range<usize> {
+        match self.fault.wire {
+            FaultyWire::Row(faulty) if faulty == row => 0..self.model.scale.columns(),
+            wire => wire.columns(),
+        }
     }
 
     /// Applies faults of wires and amplifiers to the resistances of one snapshot (rows `read`, row by row), which belong
     /// to `deformation`.
     pub fn before_noise(&self, read: &[usize], deformation: &Deformation, resistances_ohm: &mut [f64]) {
-        let scale = self.model.scale;
-        let (columns, full_scale_ohm) = (scale.columns(), self.range_ohm.1);
-        // Eq. (2) over the nodes before a break.
+        let (scale, geometry) = (self.model.scale, &self.model.geometry);
+        // Eq. (2) over the nodes before a break. Without any node there is no current, and the converter reads its full scale.
         let near_ohm = |row: usize, nodes: usize, column: usize, electrodes: usize| {
             let positions_mm = deformation.row_positions_mm(&self.model, row).take(nodes);
-            let reciprocals = positions_mm.flat_map(|at_mm| {
-                let electrodes = 0..electrodes;
-                electrodes.map(move |electrode| {
-                    let electrode_mm = self.model.geometry.column_node_mm(column, electrode);
-                    at_mm.distance(electrode_mm).recip()
-                })
-            });
-            // Without any node there is no current, and the converter reads its full scale.
-            let sum: f64 = reciprocals.sum();
-            if sum > 0.0 {
-                self.model.resistivity_ohm_per_mm / sum
-            } else {
-                full_scale_ohm
+            let of_node = |at_mm: DVec3| {
+                let electrodes_mm = (0..electrodes).map(move |electrode| geometry.column_node_mm(column, electrode));
+                electrodes_mm.map(move |electrode_mm| at_mm.distance(electrode_mm).recip())
+            };
+            match positions_mm.flat_map(of_node).sum::<f64>() {
+                sum if sum > 0.0 => self.model.resistivity_ohm_per_mm / sum,
+                _ => self.range_ohm.1,
             }
         };
-        for (&row, ohms) in read.iter().zip(resistances_ohm.chunks_exact_mut(columns)) {
-            match self.fault {
-                Fault::OpenRow { row: open, before_node } if open == row => {
-                    for (column, ohm) in ohms.iter_mut().enumerate() {
-                        *ohm = near_ohm(row, before_node, column, scale.nodes_per_column());
-                    }
+        for (&row, ohms) in read.iter().zip(resistances_ohm.chunks_exact_mut(scale.columns())) {
+            let affected = self.affected(row);
+            match self.fault.effect {
+                FaultEffect::Open(before_node) => {
+                    let (nodes, electrodes) = match self.fault.wire {
+                        FaultyWire::Row(_) => (before_node, scale.nodes_per_column()),
+                        _ => (scale.nodes_per_row(), before_node),
+                    };
+                    affected.for_each(|column| ohms[column] = near_ohm(row, nodes, column, electrodes));
                 }
-                Fault::OpenColumn { column, before_node } => {
-                    ohms[column] = near_ohm(row, scale.nodes_per_row(), column, before_node);
+                FaultEffect::Shorted => {
+                    let conductances = ohms[affected.clone()].iter().map(|ohm| ohm.recip());
+                    let shared = affected.len() as f64 / conductances.sum::<f64>();
+                    ohms[affected].fill(shared);
                 }
-                Fault::ShortedColumns { column } => {
-                    let shared = 2.0 / (1.0 / ohms[column] + 1.0 / ohms[column + 1]);
-                    ohms[column..column + 2].fill(shared);
-                }
-                Fault::Gain { column, relative } => ohms[column] *= 1.0 + relative,
-                Fault::OpenRow { .. } | Fault::Stuck { .. } => {}
+                FaultEffect::Gain(relative) => ohms[affected].iter_mut().for_each(|ohm| *ohm *= 1.0 + relative),
+                FaultEffect::Stuck(_) => {}
             }
         }
     }
-
-    /// Applies faults of the converter to the readings of one snapshot: without current, or when it is stuck, it reads an
-    /// end of its range without noise.
-    pub fn after_noise(&self, read: &[usize], readings_ohm: &mut [f64]) {
-        let (lowest_ohm, full_scale_ohm) = self.range_ohm;
-        for (&row, ohms) in read
-            .iter()
-            .zip(readings_ohm.chunks_exact_mut(self.model.scale.columns()))
-        {
-            let affected = match self.fault {
-                Fault::OpenRow { row: open, .. } if open == row => ohms,
-                Fault::OpenColumn { column, .. } | Fault::Gain { column, .. } | Fault::Stuck { column, .. } => {
-                    &mut ohms[column..=column]
-                }
-                Fault::OpenRow { .. } | Fault::ShortedColumns { .. } => continue,
-            };
-            for ohm in affected {
-                *ohm = match self.fault {
-                    Fault::OpenRow { before_node: 0, .. }
-                    | Fault::OpenColumn { before_node: 0, .. }
-                    | Fault::Stuck {
-                        end: ConverterEnd::High,
-                        ..
-                    } => full_scale_ohm,
-                    Fault::Stuck {
-                        end: ConverterEnd::Low, ..
-                    } => lowest_ohm,
-                    _ => ohm.min(full_scale_ohm),
-                };
-            }
-        }
-    }
-}
-
-/// Changes the readings of each snapshot (rows × M4), given its index.
-fn change_snapshots(set: &mut Dataset, mut change: impl FnMut(usize, &mut [f64])) {
-    let mut readings = set.readings().to_owned();
-    let all = readings
-        .as_slice_mut()
-        .expect("a set has its readings in standard layout");
-    for (snapshot, ohms) in all.chunks_exact_mut(set.row_count() * set.channels()).enumerate() {
-        change(snapshot, ohms);
-    }
-    *set = set.with_readings(readings);
 }

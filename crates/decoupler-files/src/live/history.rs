@@ -1,5 +1,6 @@
 use std::{
     collections::VecDeque,
+    ops::Range,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
@@ -29,7 +30,7 @@ impl History {
         let mut entries = self.lock();
         entries.push_back((time_s, values.into()));
         if is_stream {
-            let begin = begin_of_last(&entries, time_s);
+            let begin = shown(&entries, time_s).start;
             entries.drain(..begin);
         }
     }
@@ -37,16 +38,7 @@ impl History {
     /// Returns the values up to a time that are displayed together, the latest last.
     pub fn until(&self, time_s: f64) -> Vec<(f64, Arc<[f64]>)> {
         let entries = self.lock();
-        let begin = begin_of_last(&entries, time_s);
-        let end = end_at(&entries, time_s);
-        entries.range(begin..end).cloned().collect()
-    }
-
-    /// Returns the last values at or before a time.
-    pub(super) fn at(&self, time_s: f64) -> Option<(f64, Arc<[f64]>)> {
-        let entries = self.lock();
-        let end = end_at(&entries, time_s);
-        entries.get(end.checked_sub(1)?).cloned()
+        entries.range(shown(&entries, time_s)).cloned().collect()
     }
 
     /// Returns all values.
@@ -55,16 +47,12 @@ impl History {
     }
 }
 
-fn end_at(entries: &VecDeque<Entry>, time_s: f64) -> usize {
-    entries.partition_point(|(other_s, _)| *other_s <= time_s)
-}
-
-/// Index of the first of the entries that are displayed together with the last at or before `time_s`.
-fn begin_of_last(entries: &VecDeque<Entry>, time_s: f64) -> usize {
-    let end = end_at(entries, time_s);
+/// Places of the entries that are displayed together: the last at or before `time_s`, and those of the seconds before.
+fn shown(entries: &VecDeque<Entry>, time_s: f64) -> Range<usize> {
+    let end = entries.partition_point(|(other_s, _)| *other_s <= time_s);
     let targets = entries.front().map_or(1, |(_, values)| values.len().max(1));
     let few = end.saturating_sub((MAX_VALUES / targets).max(2));
-    few.max(entries.partition_point(|(other_s, _)| *other_s < time_s - LENGTH_S))
+    few.max(entries.partition_point(|(other_s, _)| *other_s < time_s - LENGTH_S))..end
 }
 
 #[cfg(test)]
@@ -84,8 +72,7 @@ mod tests {
         assert_eq!(times(recording.all()), (0.0, 2999.0, 3000));
         // 20 s up to a moment in the middle.
         assert_eq!(times(recording.until(100.05)), (801.0, 1000.0, 200));
-        assert_eq!(recording.at(0.15).unwrap().1[0], 1.0);
-        assert!(recording.at(-1.0).is_none() && recording.until(-1.0).is_empty());
+        assert!(recording.until(-1.0).is_empty());
     }
 
     #[test]

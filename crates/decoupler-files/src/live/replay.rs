@@ -1,43 +1,211 @@
 use std::{
-    fs::{self, File},
-    io::{BufRead, BufReader, Seek, SeekFrom},
-    ops::{ControlFlow, RangeInclusive},
+    fmt::Display,
+    fs,
     path::Path,
     time::{Duration, Instant},
 };
 
-use ndarray::Array3;
+use decoupler_core::{dataset::DatasetError, job::Job};
 
-use super::{Lines, Recording, SessionError, tally::Tally};
+use super::{Answer, LineInput, Lines, SessionError, SessionEvent, Source, Tally};
 use crate::{
     export::NetworkFile,
-    import::ParsedLine,
+    import::{LineParser, watch},
     machine::{ReadingBudget, system_cause},
 };
+
+/// Frames of an array, or samples of another sensor, for replay.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Time of each frame in seconds, in ascending order.
+    times_s: Vec<f64>,
+    /// Frames × readings of a frame.
+    readings: Vec<f64>,
+    /// Number of readings of a frame.
+    length: usize,
+    /// Index of the network of each sample; empty if a frame has all row-wires.
+    row_indices: Vec<usize>,
+}
+
+/// Rate of frames without times, per second.
+const RATE_WITHOUT_TIMES: f64 = 50.0;
+/// Memory of a byte of text that is replayed: short numbers, in a vector that has just doubled.
+const MEMORY_OF_BYTE: u64 = 8;
+
+impl Recording {
+    /// Reads the file at `path` for the network of `file`.
+    ///
+    /// Frames of an array are those of a file written by [`Recorder`](super::Recorder), or of another that `decode` reads.
+    /// Malformed lines and rows out of order are counted in `tally`, and their frames left out; so is a last line that is cut off
+    /// in a file with times. Samples of other sensors are read as by `decode`, from files of any format. Times are those of the
+    /// file as far as they ascend; without any, frames come at an even rate.
+    ///
+    /// # Errors
+    /// If the file cannot be read, lacks an input, or has no complete frame, or when it is no longer wanted.
+    pub fn read(path: &Path, file: &NetworkFile, tally: &mut Tally, job: &Job<'_>) -> Result<Self, SessionError> {
+        let mut recording = match &file.problem.sensor {
+            Some(simulation) => {
+                let scale = simulation.sensor.scale;
+                let rows = simulation.scene.rows.read(scale.rows()).map_err(DatasetError::from)?;
+                Self::of_array(path, file.line_parser(true, true)?, rows.len() * scale.columns(), tally)?
+            }
+            None => Self::of_samples(path, file, job)?,
+        };
+        if recording.times_s.is_empty() {
+            let reason = String::from_iter(tally.first_bad.iter().map(|reason| format!("; {reason}")));
+            let cause = "it contains no complete frame: record again, or choose another file";
+            return Err(refused(path, format_args!("{cause}{reason}")));
+        }
+        recording.times_s = ascending(&recording.times_s);
+        Ok(recording)
+    }
+
+    /// Reads frames with `length` readings; those without a time have NaN.
+    fn of_array(path: &Path, parser: LineParser, length: usize, tally: &mut Tally) -> Result<Self, SessionError> {
+        let found = fs::metadata(path).map_err(|error| refused(path, system_cause(&error)))?;
+        if !found.is_file() {
+            return Err(refused(path, "it is not a file; choose a recording"));
+        }
+        let claimed = ReadingBudget::now().claim(found.len().saturating_mul(MEMORY_OF_BYTE));
+        claimed.map_err(|over| refused(path, over))?;
+        let mut lines = LineInput::open(&Source::File(path.to_owned()), parser, 0)?;
+        let (mut times_s, mut readings, mut frame_s) = (Vec::new(), Vec::new(), f64::NAN);
+        let mut row = Answer::default();
+        loop {
+            let event = lines.take(Lines::PATIENCE, &mut row, &mut Vec::new());
+            let whole = times_s.len() * length;
+            match event {
+                SessionEvent::Nothing => {}
+                SessionEvent::Answer | SessionEvent::Bad(_) if !row.is_ended && frame_s.is_finite() => {
+                    // Its last number may be cut off.
+                    tally.bad(&format!("line {}, the last, is cut off and left out", row.line));
+                    break;
+                }
+                SessionEvent::Bad(reason) => {
+                    // The rest of its frame is left out without another word.
+                    readings.truncate(whole);
+                    tally.bad(&reason);
+                }
+                SessionEvent::Answer => {
+                    let index = row.first_row.unwrap_or(0);
+                    let expected = (readings.len() - whole) / row.readings.len();
+                    if index != expected && expected > 0 {
+                        let (line, expected) = (row.line, expected + 1);
+                        let cause = "each frame needs its rows in ascending order";
+                        tally.bad(&format!("line {line}: row {expected} is expected here: {cause}"));
+                        readings.truncate(whole);
+                    }
+                    if index == 0 {
+                        frame_s = row.recorded_s.unwrap_or(f64::NAN);
+                    }
+                    if index == 0 || index == expected {
+                        readings.extend_from_slice(&row.readings);
+                    }
+                    if readings.len() == whole + length {
+                        times_s.push(frame_s);
+                    }
+                }
+                SessionEvent::End(end) => {
+                    end?;
+                    break;
+                }
+            }
+        }
+        readings.truncate(times_s.len() * length);
+        Ok(Self {
+            times_s,
+            readings,
+            length,
+            row_indices: Vec::new(),
+        })
+    }
+
+    /// Reads samples; those without a time have NaN.
+    fn of_samples(path: &Path, file: &NetworkFile, job: &Job<'_>) -> Result<Self, SessionError> {
+        let recipe = file.recorded.as_ref().map(|recorded| recorded.plan.import.clone());
+        let has_rows = file.network.only().is_none();
+        let recipe = recipe.unwrap_or_default();
+        let table = recipe.read_inputs(path, &file.problem, has_rows, &mut watch(job, &mut |_| ()))?;
+        let mut row_indices = Vec::new();
+        if has_rows {
+            let read = file.row_wires.as_deref().unwrap_or_default();
+            let reason = "it has no column of row-wires, and there is a network for each";
+            let of_samples = table.row_wires.as_ref().ok_or_else(|| refused(path, reason))?;
+            for (&row, line) in of_samples.iter().zip(&table.lines) {
+                let index = read.iter().position(|read| *read == row);
+                let row = row + 1;
+                let unknown = || refused(path, format_args!("line {line}: there is no network for row {row}"));
+                row_indices.push(index.ok_or_else(unknown)?);
+            }
+        }
+        let (samples, length) = table.readings.dim();
+        Ok(Self {
+            times_s: table.times_s.unwrap_or_else(|| vec![f64::NAN; samples]),
+            readings: table.readings.into_iter().collect(),
+            length,
+            row_indices,
+        })
+    }
+
+    /// Returns the times of the frames in seconds, in ascending order.
+    pub fn times_s(&self) -> &[f64] {
+        &self.times_s
+    }
+
+    /// Returns the index of the last frame at or before a time; 0 before the first frame.
+    pub fn frame_at(&self, time_s: f64) -> usize {
+        self.times_s.partition_point(|other| *other <= time_s).saturating_sub(1)
+    }
+
+    /// Returns the readings of a frame: those of an array in ohm, row by row.
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    pub fn frame(&self, index: usize) -> &[f64] {
+        &self.readings[index * self.length..][..self.length]
+    }
+}
+
+fn refused(path: &Path, cause: impl Display) -> SessionError {
+    SessionError::Replay(path.to_owned(), cause.to_string())
+}
+
+/// Times that never step back: a frame with an earlier time than the one before, or none, comes one usual interval (median) after
+/// it, and the following ones at their distances. Without any time, frames come at an even rate.
+fn ascending(times_s: &[f64]) -> Vec<f64> {
+    if times_s.iter().all(|time_s| time_s.is_nan()) {
+        return Vec::from_iter((0..times_s.len()).map(|frame| frame as f64 / RATE_WITHOUT_TIMES));
+    }
+    let steps = Vec::from_iter(times_s.windows(2).map(|pair| pair[1] - pair[0]));
+    let mut known = Vec::from_iter(steps.iter().copied().filter(|step| *step > 0.0));
+    known.sort_unstable_by(f64::total_cmp);
+    let usual_s = known.get(known.len() / 2).copied().unwrap_or(1.0 / RATE_WITHOUT_TIMES);
+    let first_s = if times_s[0].is_finite() { times_s[0] } else { 0.0 };
+    let rest = steps.iter().scan(first_s, |time_s, &step| {
+        *time_s += if step >= 0.0 { step } else { usual_s };
+        Some(*time_s)
+    });
+    std::iter::once(first_s).chain(rest).collect()
+}
 
 /// Replay of a recording: its frames come at their recorded times, at an adjustable speed.
 #[derive(Debug)]
 pub struct Replay {
+    /// Position of the frame that was taken last.
+    pub state: ReplayState,
     recording: Recording,
-    /// Index of the network of each sample; empty if a frame has all row-wires.
-    row_indices: Vec<usize>,
+    /// True if no frame is dropped: every one is taken once and in order, also if it is not displayed.
+    keeps_all: bool,
     /// Recorded seconds per second.
     speed: f64,
-    is_playing: bool,
     /// Recorded time at an instant, from which it advances while playing.
     anchor: (f64, Instant),
-    /// Index of the next frame.
+    /// Index of the frame that is due, until it and all before it are taken.
+    due: Option<usize>,
+    /// Index of the next frame after it.
     next: usize,
-    /// True if the next frame is due now, whatever its time.
-    is_wanted: bool,
-}
-
-/// A frame that is due.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Due {
-    pub(super) index: usize,
-    /// Number of frames before it that were not taken in time.
-    pub(super) missed: usize,
+    /// Number of frames that were taken in order.
+    taken: usize,
 }
 
 /// Position in a recording.
@@ -51,275 +219,110 @@ pub struct ReplayState {
     pub is_playing: bool,
 }
 
-/// Speeds from slowest to fastest.
-const SPEEDS: RangeInclusive<f64> = 0.1..=10.0;
-
 impl Replay {
-    /// Prepares the replay of the file at `path` for the network of `file`, from the first frame, not playing. Malformed
-    /// lines of an array are counted in `tally`.
-    ///
-    /// # Errors
-    /// If the file cannot be read, or has no complete frame.
-    pub(super) fn open(
-        path: &Path,
-        file: &NetworkFile,
-        tally: &mut Tally,
-        is_wanted: &dyn Fn() -> bool,
-        now: Instant,
-    ) -> Result<Self, SessionError> {
-        let (recording, row_indices) = match &file.problem.sensor {
-            Some(_) => (read_frames(path, file, tally)?, Vec::new()),
-            None => read_samples(path, file, is_wanted)?,
-        };
-        Ok(Self::new(recording, row_indices, now))
-    }
-
-    fn new(recording: Recording, row_indices: Vec<usize>, now: Instant) -> Self {
+    /// Begins a replay from the first frame.
+    pub(super) fn new(recording: Recording, keeps_all: bool, now: Instant) -> Self {
+        let (first_s, last_s) = (recording.times_s[0], recording.times_s[recording.times_s.len() - 1]);
         Self {
-            anchor: (recording.times_s()[0], now),
+            state: ReplayState {
+                at_s: 0.0,
+                length_s: last_s - first_s,
+                is_playing: true,
+            },
             recording,
-            row_indices,
+            keeps_all,
             speed: 1.0,
-            is_playing: false,
-            next: 0,
-            is_wanted: true,
+            anchor: (first_s, now),
+            due: Some(0),
+            next: 1,
+            taken: 0,
         }
-    }
-
-    /// Returns the time of a frame in seconds.
-    pub(super) fn frame_time_s(&self, index: usize) -> f64 {
-        self.recording.times_s()[index]
-    }
-
-    /// Writes the readings of a frame, and returns the index of the row-wire with which it begins.
-    pub(super) fn read(&self, index: usize, readings: &mut Vec<f64>) -> usize {
-        readings.clear();
-        readings.extend(self.recording.frame_ohm(index));
-        self.row_indices.get(index).copied().unwrap_or(0)
-    }
-
-    fn first_s(&self) -> f64 {
-        self.recording.times_s()[0]
-    }
-
-    fn frames(&self) -> usize {
-        self.recording.times_s().len()
     }
 
     /// Returns the recorded time at `now`.
     fn time_s(&self, now: Instant) -> f64 {
         let (time_s, since) = self.anchor;
-        if self.is_playing {
-            time_s + self.speed * now.saturating_duration_since(since).as_secs_f64()
-        } else {
-            time_s
-        }
+        let passed = now.saturating_duration_since(since).as_secs_f64();
+        time_s
+            + if self.state.is_playing {
+                self.speed * passed
+            } else {
+                0.0
+            }
     }
 
     /// Sets the number of recorded seconds per second, from 0.1 to 10.
     pub fn set_speed(&mut self, speed: f64, now: Instant) {
         self.anchor = (self.time_s(now), now);
-        self.speed = speed.clamp(*SPEEDS.start(), *SPEEDS.end());
+        self.speed = speed.clamp(0.1, 10.0);
     }
 
     /// Pauses or resumes the replay; after the end, it restarts from the beginning.
     pub fn play(&mut self, is_playing: bool, now: Instant) {
-        if is_playing && self.next >= self.frames() {
+        if is_playing && self.next >= self.recording.times_s.len() {
             self.seek(0.0, now);
         }
         self.anchor = (self.time_s(now), now);
-        self.is_playing = is_playing;
+        self.state.is_playing = is_playing;
     }
 
     /// Seeks to a time in seconds after the first frame, and continues from there if it is playing.
     pub fn seek(&mut self, at_s: f64, now: Instant) {
-        let time_s = self.first_s() + at_s.max(0.0);
-        self.next = self.recording.frame_at(time_s);
-        self.anchor = (self.recording.times_s()[self.next], now);
-        self.is_wanted = true;
+        let index = self.recording.frame_at(self.recording.times_s[0] + at_s.max(0.0));
+        self.anchor = (self.recording.times_s[index], now);
+        (self.due, self.next) = (Some(index), index + 1);
     }
 
     /// Returns the time at which the next frame is due; `None` while it is paused.
     pub(super) fn due(&self, now: Instant) -> Option<Instant> {
-        if self.is_wanted {
+        if self.due.is_some() {
             return Some(now);
         }
-        let time_s = self.recording.times_s().get(self.next).filter(|_| self.is_playing)?;
+        let time_s = self
+            .recording
+            .times_s
+            .get(self.next)
+            .filter(|_| self.state.is_playing)?;
         let wait_s = (time_s - self.time_s(now)) / self.speed;
         Some(now + Duration::try_from_secs_f64(wait_s.max(0.0)).unwrap_or(Duration::MAX / 4))
     }
 
-    /// Takes the next frame, if it is due. Frames that were not taken in time are missed.
-    pub(super) fn take(&mut self, now: Instant) -> Option<Due> {
-        if self.due(now)? > now {
-            return None;
+    /// Takes the next frame, if it is due. Of an array, frames that were not taken in time are dropped.
+    pub(super) fn take(&mut self, now: Instant, answer: &mut Answer, tally: &mut Tally) -> SessionEvent {
+        if self.due(now).is_none_or(|due| due > now) {
+            return SessionEvent::Nothing;
         }
-        let mut missed = 0;
-        if !std::mem::take(&mut self.is_wanted) {
-            let latest = self.recording.frame_at(self.time_s(now));
-            let late_s = (self.time_s(now) - self.frame_time_s(self.next)) / self.speed;
-            if late_s > Lines::PATIENCE.as_secs_f64() && latest > self.next {
-                missed = latest - self.next;
-            }
-        }
-        let index = self.next + missed;
-        self.next = index + 1;
-        if self.next >= self.frames() {
-            self.anchor = (self.frame_time_s(index), now);
-            self.is_playing = false;
-        }
-        Some(Due { index, missed })
-    }
-
-    /// Returns the position of the frame at `time_s`.
-    pub(super) fn state(&self, time_s: f64) -> ReplayState {
-        let last_s = self.recording.times_s().last().copied().unwrap_or_default();
-        ReplayState {
-            at_s: time_s - self.first_s(),
-            length_s: last_s - self.first_s(),
-            is_playing: self.is_playing,
-        }
-    }
-}
-
-/// Memory of a byte of text that is replayed: short numbers, in a vector that has just doubled.
-const MEMORY_OF_BYTE: u64 = 8;
-/// Rate of frames without times, per second.
-const RATE_WITHOUT_TIMES: f64 = 50.0;
-
-/// Reads the frames of an array from a file: a recording with a time for each frame, or else lines as `decode` reads them, at
-/// an even rate. Malformed lines are counted in `tally`, and incomplete frames are skipped.
-fn read_frames(path: &Path, file: &NetworkFile, tally: &mut Tally) -> Result<Recording, SessionError> {
-    let simulation = file.problem.sensor.as_ref().ok_or(SessionError::NoModel)?;
-    let (scale, scene) = (simulation.sensor.scale, &simulation.scene);
-    let read = scene.rows.read(scale.rows())?;
-    let refused = |cause: &dyn std::fmt::Display| SessionError::Replay(path.to_owned(), cause.to_string());
-    let system = |error: std::io::Error| refused(&system_cause(&error));
-    let found = fs::metadata(path).map_err(system)?;
-    if !found.is_file() {
-        return Err(refused(&"it is not a file; choose a recording"));
-    }
-    let claimed = ReadingBudget::now().claim(found.len().saturating_mul(MEMORY_OF_BYTE));
-    claimed.map_err(|over| refused(&over))?;
-    let mut opened = File::open(path).map_err(system)?;
-    let mut first = Vec::new();
-    BufReader::new(&opened).read_until(b'\n', &mut first).map_err(system)?;
-    opened.seek(SeekFrom::Start(0)).map_err(system)?;
-    let reader = BufReader::new(opened);
-    let has_times = first
-        .split(|&byte| byte == b',')
-        .any(|name| name.trim_ascii() == b"time_s");
-    if has_times {
-        let recording =
-            Recording::read(reader, &read, scale.rows(), scale.columns()).map_err(|error| refused(&error))?;
-        if let Some(line) = recording.torn_line() {
-            tally.bad(&format!("line {line}, the last, is cut off and left out"));
-        }
-        return Ok(recording);
-    }
-    let mut lines = file.line_parser(true, true)?;
-    let (columns, length) = (scale.columns(), read.len() * scale.columns());
-    let mut all_ohm: Vec<f64> = Vec::new();
-    let mut frame_ohm: Vec<f64> = Vec::with_capacity(length);
-    for (line, number) in reader.split(b'\n').zip(1..) {
-        match lines.parse(number, &line.map_err(system)?) {
-            Ok(ParsedLine::Snapshot(readings)) => all_ohm.extend_from_slice(readings),
-            Ok(ParsedLine::Row {
-                row_index, readings, ..
-            }) => {
-                let begin = row_index.unwrap_or(0) * columns;
-                if begin != frame_ohm.len() {
-                    frame_ohm.clear();
-                }
-                // Otherwise an earlier row is missing, and the frame is incomplete.
-                if begin == frame_ohm.len() {
-                    frame_ohm.extend_from_slice(readings);
-                }
-                if frame_ohm.len() == length {
-                    all_ohm.append(&mut frame_ohm);
-                }
-            }
-            Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => {}
-            Err(error) if error.is_final() => return Err(refused(&error)),
-            Err(error) => tally.bad(&error.to_string()),
-        }
-    }
-    let frames = all_ohm.len() / length;
-    let frames_ohm = Array3::from_shape_vec((frames, read.len(), columns), all_ohm);
-    let frames_ohm = frames_ohm.expect("every frame has all readings");
-    let recording = Recording::at_rate(frames_ohm, RATE_WITHOUT_TIMES);
-    recording.map_err(|error| match &tally.counts.first_bad {
-        Some(reason) => refused(&format_args!("{error}; {reason}")),
-        None => refused(&error),
-    })
-}
-
-/// Reads the samples for a network of a recording from a file, with the index of the network of each. They come at the times of
-/// the file or, without a time column, at an even rate.
-fn read_samples(
-    path: &Path,
-    file: &NetworkFile,
-    is_wanted: &dyn Fn() -> bool,
-) -> Result<(Recording, Vec<usize>), SessionError> {
-    let refused = |cause: &dyn std::fmt::Display| SessionError::Replay(path.to_owned(), cause.to_string());
-    let recipe = file.recorded.as_ref().map(|recorded| recorded.plan.import.clone());
-    let watch = &mut |_| match is_wanted() {
-        true => ControlFlow::Continue(()),
-        false => ControlFlow::Break(()),
-    };
-    let has_rows = file.network.only().is_none();
-    let table = recipe
-        .unwrap_or_default()
-        .read_inputs(path, &file.problem, has_rows, watch)?;
-    let row_indices = match (&file.row_wires, &table.row_wires) {
-        _ if !has_rows => Vec::new(),
-        (Some(read), Some(of_samples)) => {
-            let index = |(&row, &line): (&usize, &u64)| {
-                let index = read.iter().position(|read| *read == row);
-                index.ok_or_else(|| refused(&format_args!("line {line}: there is no network for row {}", row + 1)))
+        let (now_s, times_s) = (self.time_s(now), &self.recording.times_s);
+        let due = *self.due.get_or_insert_with(|| {
+            let first = self.next;
+            let is_late = now_s - times_s[first] > self.speed * Lines::PATIENCE.as_secs_f64();
+            let due = if is_late {
+                self.recording.frame_at(now_s).max(first)
+            } else {
+                first
             };
-            let indices = of_samples.iter().zip(&table.lines).map(index);
-            indices.collect::<Result<_, _>>()?
+            tally.dropped += if self.keeps_all { 0 } else { (due - first) as u64 };
+            self.next = due + 1;
+            due
+        });
+        if self.next >= times_s.len() {
+            (self.anchor, self.state.is_playing) = ((times_s[due], now), false);
         }
-        _ => {
-            return Err(refused(
-                &"it has no column of row-wires, and there is a network for each",
-            ));
-        }
-    };
-    let (samples, inputs) = table.readings.dim();
-    let readings = table.readings.into_shape_with_order((samples, 1, inputs));
-    let readings = readings.expect("each sample is a frame of one row");
-    let recording = match table.times_s {
-        Some(times_s) => Recording::at_times(ascending(&times_s), readings),
-        None => Recording::at_rate(readings, RATE_WITHOUT_TIMES),
-    };
-    Ok((recording.map_err(|error| refused(&error))?, row_indices))
-}
-
-/// Times that never step back: a sample with an earlier time than the one before, or none, comes one usual interval (median) after
-/// it, and the following ones at their distances.
-fn ascending(times_s: &[f64]) -> Vec<f64> {
-    let steps = times_s.windows(2).map(|pair| pair[1] - pair[0]);
-    let steps = Vec::from_iter(steps.map(|step| Some(step).filter(|step| *step >= 0.0)));
-    let mut known = Vec::from_iter(steps.iter().flatten().copied().filter(|step| *step > 0.0));
-    known.sort_unstable_by(f64::total_cmp);
-    let usual_s = known.get(known.len() / 2).copied().unwrap_or(1.0 / RATE_WITHOUT_TIMES);
-    let first_s = times_s
-        .first()
-        .copied()
-        .filter(|time_s| time_s.is_finite())
-        .unwrap_or(0.0);
-    let mut time_s = first_s;
-    let rest = steps.into_iter().map(|step| {
-        time_s += step.unwrap_or(usual_s);
-        time_s
-    });
-    std::iter::once(first_s).chain(rest).take(times_s.len()).collect()
+        let index = if self.keeps_all { due.min(self.taken) } else { due };
+        self.due = Some(due).filter(|due| index < *due);
+        answer.is_repeated = self.keeps_all && index < self.taken;
+        self.taken = self.taken.max(index + 1);
+        answer.readings.clear();
+        answer.readings.extend_from_slice(self.recording.frame(index));
+        answer.first_row = Some(self.recording.row_indices.get(index).copied().unwrap_or(0));
+        (answer.time_s, answer.read_at) = (times_s[index], Some(now));
+        self.state.at_s = times_s[index] - times_s[0];
+        SessionEvent::Answer
+    }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::sync::Arc;
 
     use decoupler_core::evaluation::{Run, RunSettings};
@@ -328,23 +331,28 @@ mod tests {
     use crate::live::Recorder;
 
     fn replay(speed: f64, start: Instant) -> Replay {
-        let frames = Array3::from_shape_fn((100, 1, 1), |(frame, ..)| frame as f64 + 1.0);
-        let mut replay = Replay::new(Recording::at_rate(frames, 20.0).unwrap(), Vec::new(), start);
+        let recording = Recording {
+            times_s: (0..100).map(|frame| f64::from(frame) / 20.0).collect(),
+            readings: (1..=100).map(f64::from).collect(),
+            length: 1,
+            row_indices: Vec::new(),
+        };
+        let mut replay = Replay::new(recording, false, start);
         replay.set_speed(speed, start);
         replay.play(true, start);
         replay
     }
 
     /// Returns the numbers of the frames, from 1, that come in `millis` after the start, polled every 5 ms, and of those missed.
-    fn frames(replay: &mut Replay, start: Instant, millis: std::ops::Range<u64>) -> (Vec<usize>, usize) {
-        let (mut received, mut missed) = (Vec::new(), 0);
+    fn frames(replay: &mut Replay, start: Instant, millis: std::ops::Range<u64>) -> (Vec<usize>, u64) {
+        let (mut received, mut tally, mut answer) = (Vec::new(), Tally::default(), Answer::default());
         for k in millis.step_by(5) {
-            while let Some(due) = replay.take(start + Duration::from_millis(k)) {
-                received.push(due.index + 1);
-                missed += due.missed;
+            let now = start + Duration::from_millis(k);
+            while matches!(replay.take(now, &mut answer, &mut tally), SessionEvent::Answer) {
+                received.push(answer.readings[0] as usize);
             }
         }
-        (received, missed)
+        (received, tally.dropped)
     }
 
     #[test]
@@ -367,7 +375,7 @@ mod tests {
         replay.seek(4.9, start);
         replay.play(true, start);
         assert_eq!(frames(&mut replay, start, 0..1000).0, [99, 100]);
-        let state = replay.state(4.95);
+        let state = replay.state;
         assert!(!state.is_playing && (state.length_s - 4.95).abs() < 1e-12 && replay.due(start).is_none());
         replay.play(true, start);
         assert_eq!(frames(&mut replay, start, 0..6).0, [1], "it begins again");
@@ -386,12 +394,11 @@ mod tests {
         let nan = f64::NAN;
         let found = ascending(&[5.0, 5.5, 6.0, nan, 7.0, 0.0, 0.25, 10.25]);
         assert_eq!(found, [5.0, 5.5, 6.0, 6.5, 7.0, 7.5, 7.75, 17.75]);
-        assert_eq!(ascending(&[nan]), [0.0]);
-        assert_eq!(ascending(&[]), [0.0; 0]);
+        assert_eq!(ascending(&[nan, nan]), [0.0, 0.02]);
     }
 
     /// A network of the rows of an array of 2 × 1 and 1 × 3 nodes.
-    fn network() -> Arc<NetworkFile> {
+    pub(in crate::live) fn network() -> Arc<NetworkFile> {
         let mut settings = RunSettings::default();
         let simulation = settings.simulation_mut().unwrap();
         simulation.sensor.scale = "2x1_1x3".parse().unwrap();
@@ -406,9 +413,83 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("frames.csv");
         fs::write(&path, text).unwrap();
-        let mut tally = Tally::new(Instant::now());
-        let read = read_frames(&path, &network(), &mut tally);
+        let mut tally = Tally::default();
+        let read = Recording::read(&path, &network(), &mut tally, &Job::UNINTERRUPTED);
         (read.map_err(|error| error.to_string()), tally)
+    }
+
+    /// Four frames of two rows with three channels.
+    fn recorded() -> Vec<u8> {
+        let mut file = Vec::new();
+        let mut recorder = Recorder::new(&mut file, &[0, 1], 3).unwrap();
+        for frame in 0..4 {
+            let frame_ohm: Vec<f64> = (0..6).map(|k| 0.1 + f64::from(10 * frame + k)).collect();
+            recorder.record(0.1 * f64::from(frame), &frame_ohm).unwrap();
+        }
+        file
+    }
+
+    #[test]
+    fn recorded_frames_are_replayed_bit_for_bit() {
+        let recording = read(&recorded()).0.unwrap();
+        assert_eq!(recording.times_s(), [0.0, 0.1, 0.2, 0.1 * 3.0]);
+        assert_eq!(recording.frame(2), [20.1, 21.1, 22.1, 23.1, 24.1, 25.1]);
+        for (time_s, frame) in [(-1.0, 0), (0.0, 0), (0.15, 1), (0.2, 2), (99.0, 3)] {
+            assert_eq!(recording.frame_at(time_s), frame, "{time_s}");
+        }
+    }
+
+    #[test]
+    fn a_recording_cut_off_anywhere_keeps_its_complete_frames() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, bytes, network) = (folder.path().join("cut.csv"), recorded(), network());
+        let ends: Vec<usize> = (0..bytes.len()).filter(|&place| bytes[place] == b'\n').collect();
+        for length in ends[2] + 1..bytes.len() {
+            fs::write(&path, &bytes[..length]).unwrap();
+            let mut tally = Tally::default();
+            let recording = Recording::read(&path, &network, &mut tally, &Job::UNINTERRUPTED).unwrap();
+            let whole = ends.iter().filter(|&&end| end < length).count() - 1;
+            assert_eq!(recording.times_s().len(), whole / 2, "{length}");
+            let is_torn = bytes[length - 1] != b'\n';
+            let torn = format!("line {}, the last, is cut off and left out", whole + 2);
+            assert_eq!(tally.last_bad, is_torn.then_some(torn), "{length}");
+            assert_eq!(recording.frame(0), [0.1, 1.1, 2.1, 3.1, 4.1, 5.1]);
+        }
+        let message = read(&bytes[..=ends[1]]).0.unwrap_err();
+        assert!(message.contains("no complete frame"), "{message}");
+    }
+
+    /// As when two recordings are joined, or a time is lost.
+    #[test]
+    fn times_that_do_not_ascend_continue_at_the_usual_interval() {
+        let text = String::from_utf8(recorded()).unwrap();
+        for time in ["0.05", "", "x"] {
+            let (recording, tally) = read(text.replace("\n0.30000000000000004,", &format!("\n{time},")).as_bytes());
+            let times_s = recording.unwrap().times_s().to_vec();
+            assert!(
+                (times_s[3] - 0.3).abs() < 1e-12 && tally.bad == 0,
+                "{time}: {times_s:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn frames_with_rows_out_of_order_or_malformed_cells_are_left_out_and_the_line_reported() {
+        let text = String::from_utf8(recorded()).unwrap();
+        for (from, to, bad, expected) in [
+            // The next frame finds the row of this line, too.
+            ("\n0.1,2,", "\n0.1,1,", 2, "line 5: row 2 is expected here"),
+            ("\n0.1,1,10.1", "\n0.1,1,-1", 1, "line 4, column 3: '-1'"),
+        ] {
+            let (recording, tally) = read(text.replacen(from, to, 1).as_bytes());
+            assert_eq!(
+                (recording.unwrap().times_s(), tally.bad),
+                (&[0.0, 0.2, 0.30000000000000004][..], bad),
+                "{to}"
+            );
+            let reason = tally.first_bad.unwrap();
+            assert!(reason.starts_with(expected), "{reason}");
+        }
     }
 
     #[test]
@@ -430,10 +511,7 @@ mod tests {
         for text in texts {
             let recording = read(text).0.unwrap();
             assert_eq!(recording.times_s(), [0.0, 0.02], "{}", String::from_utf8_lossy(text));
-            assert_eq!(
-                recording.frame_ohm(1),
-                ndarray::array![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
-            );
+            assert_eq!(recording.frame(1), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         }
     }
 
@@ -446,15 +524,19 @@ mod tests {
         }
         let (recording, tally) = read(&recorded[..recorded.len() - 3]);
         assert_eq!(recording.unwrap().times_s(), [0.5]);
-        let reason = tally.counts().last_bad.unwrap();
+        let reason = tally.last_bad.unwrap();
         assert!(reason.contains("line 5, the last, is cut off"), "{reason}");
     }
 
     #[cfg(unix)]
     #[test]
     fn what_is_no_file_is_refused_before_it_is_opened() {
-        let mut tally = Tally::new(Instant::now());
-        let refused = read_frames(Path::new("/dev/zero"), &network(), &mut tally);
+        let refused = Recording::read(
+            Path::new("/dev/zero"),
+            &network(),
+            &mut Tally::default(),
+            &Job::UNINTERRUPTED,
+        );
         assert!(refused.unwrap_err().to_string().contains("it is not a file"));
     }
 
@@ -468,8 +550,7 @@ mod tests {
     fn a_frame_with_a_bad_line_is_left_out_and_the_line_reported() {
         let (recording, tally) = read(b"1,2,3\n4,#,6\n1,2,3\n4,5,6\n");
         assert_eq!(recording.unwrap().times_s().len(), 1);
-        let counts = tally.counts();
-        assert!(counts.bad == 1 && counts.last_bad.unwrap().starts_with("line 2"));
+        assert!(tally.bad == 1 && tally.last_bad.unwrap().starts_with("line 2"));
         let message = read(b"1,2\n").0.unwrap_err();
         assert!(
             message.contains("frames.csv") && message.contains("line 1"),

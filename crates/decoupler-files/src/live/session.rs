@@ -1,26 +1,23 @@
 use std::{
     io,
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::Arc,
     time::{Duration, Instant},
 };
 
 use decoupler_core::{
-    dataset::DatasetError,
-    live::{Drift, FaultEvent, FaultyWire, LiveError, ZeroGains},
-    scene::{Deformation, Noise, Scene, SceneError},
-    sensor::SensorError,
+    dataset::{DatasetError, Seed},
+    decoupling::{Decoder, ProgramDecoder},
+    job::Job,
+    live::{Drift, DriftMonitor, FaultEvent, FaultyWire, LiveError, ZeroGains},
+    scene::{Noise, Scene},
+    sensor::{SensorError, short},
 };
 use thiserror::Error;
 
 use super::{
-    Counts, History, Keeping, Latencies, LiveArray, Recorded, Replay, ReplayState, Simulated, SimulatedError, Source,
-    SourceError, SourcePlan, TruthErrors, Watched,
-    decoding::{Decoding, NO_ANSWER},
-    input::{Arrived, Input, Taken},
-    recording_file::RecordingFile,
-    replay::Due,
-    tally::Tally,
+    FaultError, History, Input, Keeping, LineInput, LiveArray, Recorded, Recording, RecordingFile, Replay, Simulated,
+    Source, SourceError, SourcePlan, Tally, Watched,
 };
 use crate::{
     export::NetworkFile,
@@ -37,7 +34,7 @@ pub struct SessionPlan {
     pub source: SourcePlan,
     /// Noise of the readings of an array: a simulated source adds it, and fault detection needs it.
     pub noise: Noise,
-    /// Gains of the unloaded state by which the readings of an array are divided, if it was taken before.
+    /// Gains of the unloaded state by which the readings of whole frames are divided, if it was taken before.
     pub zero: Option<ZeroGains>,
     /// What is answered.
     pub unit: Unit,
@@ -56,27 +53,57 @@ pub enum Unit {
 /// recording of its frames.
 #[derive(Debug)]
 pub struct Session {
-    input: Input,
+    /// The source.
+    pub input: Input,
+    /// The array whose frames are decoded; `None` for a network of a recording.
+    pub array: Option<LiveArray>,
+    /// The last answer, which later readings without one leave as it is.
+    pub last: Answer,
+    /// Number of answers, and their times.
+    pub tally: Tally,
+    /// Events besides the answers, for the caller to remove.
+    pub notes: Vec<Note>,
+    /// Recording of the frames of the array in progress, which ends when it is dropped.
+    pub recording: Option<RecordingFile>,
+    /// Values of a network of a recording.
+    pub history: History,
+    /// Monitor of the drift of the readings, or the reason why they are not monitored.
+    pub monitor: Result<DriftMonitor, LiveError>,
+    /// Smallest and largest of the values of each target so far.
+    pub ranges: Vec<(f64, f64)>,
+    network: Arc<NetworkFile>,
+    decoder: ProgramDecoder,
     unit: Unit,
-    arrived: Arrived,
-    decoding: Decoding,
-    /// The array; `None` for a network of a recording.
-    array: Option<LiveArray>,
-    /// True if every frame is checked, since the source waits.
-    checks_all: bool,
+    /// Latest readings.
+    arrived: Answer,
     is_row_missing: bool,
-    tally: Tally,
-    notes: Vec<Note>,
-    history: History,
-    /// Smallest and largest value of each target so far.
-    ranges: Vec<(f64, f64)>,
-    /// Number of frames of a replay that were decoded for the history.
-    replayed: usize,
-    /// Time of the last answer in seconds.
-    answered_s: Option<f64>,
-    /// True unless the last readings had no answer.
-    is_answered: bool,
-    recording: Option<RecordingFile>,
+}
+
+/// Readings of a line, sample or frame, and their answer.
+#[derive(Clone, Debug, Default)]
+pub struct Answer {
+    /// Number of the line, from 1; 0 if it is not of a stream.
+    pub line: u64,
+    /// Index of the row-wire or network with which the readings begin; `None` if it is unknown.
+    pub first_row: Option<usize>,
+    /// Readings: rows × channels.
+    pub readings: Vec<f64>,
+    /// Cells of the line that are copied to the output.
+    pub kept: Vec<KeptCell>,
+    /// Time in its source, in seconds.
+    pub time_s: f64,
+    /// The answer: rows × targets.
+    pub values: Vec<f64>,
+    /// Wire that it was decoded without.
+    pub left_out: Option<FaultyWire>,
+    /// Time at which its last byte was read, or at which it was simulated or due.
+    pub(super) read_at: Option<Instant>,
+    /// False for a last line without a line break.
+    pub(super) is_ended: bool,
+    /// Time of the line in seconds, if it has a time.
+    pub(super) recorded_s: Option<f64>,
+    /// True for a sample of a replay that was answered before.
+    pub(super) is_repeated: bool,
 }
 
 /// Event of a session.
@@ -93,20 +120,46 @@ pub enum SessionEvent {
 }
 
 /// Something to be noted besides the answers, with the number of the line, from 1.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Error)]
 pub enum Note {
-    /// The lines from here on give the means of derived columns and are not decoded.
+    /// Lines from here on are not decoded.
+    #[error("line {0}: the lines at the start give the means of derived columns and are not decoded")]
     Start(u64),
     /// The time steps back for the first time.
+    #[error(
+        "line {0}: the time steps back: the history of readings restarts here and at every further step back; send the lines \
+         in order of time"
+    )]
     StepBack(u64),
-    /// The wires cannot be checked, because the line has no row number.
+    /// The wires cannot be checked.
+    #[error(
+        "line {0}: wires are not checked for faults, because the line has no row number; add a column named row, or send \
+         whole snapshots in one line"
+    )]
     NoRow(u64),
     /// The state of the wires has changed.
+    #[error("line {0}: {1}{after}", after = consequence(.1))]
     Fault(u64, FaultEvent),
     /// A drift has begun or ended.
+    #[error("line {0}: the drift of the readings has changed")]
     Drift(u64, Drift),
-    /// The recording has ended by itself, with the reason.
+    /// The recording has ended by itself.
+    #[error("{1}")]
     RecordingEnded(Recorded, String),
+}
+
+/// Returns what follows from a fault for the answers.
+fn consequence(event: &FaultEvent) -> &'static str {
+    match event {
+        FaultEvent::Named { .. } => {
+            "; left out from here on; frames are decoded from the other readings by the Gauss-Newton method"
+        }
+        FaultEvent::Unexplained => {
+            ", and no single-wire fault explains them: the answers may be wrong; check the wiring, the geometry and the \
+             order of the rows"
+        }
+        FaultEvent::Recovered => "; all wires are used",
+    }
 }
 
 /// Reason why a session cannot begin or continue.
@@ -116,9 +169,6 @@ pub enum SessionError {
     /// The source cannot be opened.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// Opening the source failed in an unknown way.
-    #[error("opening {0} failed unexpectedly")]
-    NotOpened(Source),
     /// No thread could be started.
     #[error("cannot start reading: {}", system_cause(.0))]
     Reader(io::Error),
@@ -140,433 +190,223 @@ pub enum SessionError {
     /// The network has no sensor model.
     #[error("a recording has no model to simulate: choose a file or a device as the source")]
     NoModel,
-    /// The frames cannot be simulated.
+    /// The array does not have the wires of a simulated fault.
     #[error(transparent)]
-    Simulated(#[from] SimulatedError),
+    Fault(#[from] FaultError),
+    /// The rate of a simulated source is out of range.
+    #[error("{} frames per second: give a number above 0 and at most 1000000", short(*.0))]
+    Rate(f64),
     /// The array has no resistance.
     #[error(transparent)]
     Sensor(#[from] SensorError),
-    /// The array does not have the rows of the scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The lines cannot be read for the network.
+    /// The scene is invalid, the array does not have its rows, or the lines cannot be read for the network.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
 }
 
+/// Readings so far from the training range that they have no answer.
+const NO_ANSWER: &str =
+    "the readings are so far outside the training range that the network's output is not a finite number";
+
 impl Session {
-    /// Opens the source of `plan`; `None` if that is no longer wanted.
+    /// Opens the source of `plan`. A stream is opened on its own thread, and reported as ended if that fails; reading a file to
+    /// be replayed stops when `job` is cancelled.
     ///
     /// # Errors
-    /// If the source cannot be opened, or the array has no resistance.
-    pub fn open(plan: SessionPlan, is_wanted: &dyn Fn() -> bool) -> Result<Option<Self>, SessionError> {
-        let file = plan.network;
-        let now = Instant::now();
-        let scene = file.problem.sensor.as_ref().map(|simulation| Scene {
-            noise: plan.noise,
+    /// If the source cannot be simulated or replayed, or the array has no resistance.
+    pub fn open(plan: SessionPlan, job: &Job<'_>) -> Result<Self, SessionError> {
+        let (network, noise, mut tally) = (plan.network, plan.noise, Tally::default());
+        let sensor = network.problem.sensor.as_ref();
+        let scene = sensor.map_or_else(Scene::default, |simulation| Scene {
+            noise,
             ..simulation.scene
         });
-        let array = file.problem.sensor.as_ref().zip(scene.as_ref());
-        let array = array.map(|(simulation, scene)| (&simulation.sensor, scene));
-        let checked = array.map(|(sensor, scene)| LiveArray::new(sensor, scene, plan.zero.clone()));
-        let checked = checked.transpose()?;
-        let mut tally = Tally::new(now);
-        let by_frame = plan.unit == Unit::Frames;
-        let input = Input::open(&plan.source, &file, array, by_frame, &mut tally, is_wanted)?;
-        let Some(input) = input else { return Ok(None) };
-        Ok(Some(Self {
-            checks_all: matches!(&input, Input::Lines(lines) if lines.source().keeping() == Keeping::All),
+        let array = sensor.map(|simulation| LiveArray::new(&simulation.sensor, &scene, plan.zero));
+        let array = array.transpose()?;
+        let input = match &plan.source {
+            SourcePlan::Simulated(frames_per_second) => {
+                let sensor = &array.as_ref().ok_or(SessionError::NoModel)?.sensor;
+                let source = Simulated::new(sensor, &scene, Seed(0), *frames_per_second)?;
+                Input::Simulated(Box::new(source), Instant::now())
+            }
+            SourcePlan::Replay(path) => {
+                let recording = Recording::read(path, &network, &mut tally, job)?;
+                Input::Replay(Box::new(Replay::new(recording, array.is_none(), Instant::now())))
+            }
+            SourcePlan::Stream(source) => {
+                let parser = network.line_parser(plan.unit == Unit::Frames, source.keeping() == Keeping::All)?;
+                let rows = array.as_ref().map(|array| array.rows.len());
+                let lines = LineInput::open(source, parser, rows.unwrap_or(network.network.values().len()))?;
+                Input::Lines(Box::new(lines))
+            }
+        };
+        Ok(Self {
             input,
-            unit: plan.unit,
-            arrived: Arrived {
-                line: 0,
-                first_row: None,
-                readings: Vec::new(),
-                kept: Vec::new(),
-                time_s: 0.0,
-                read_at: now,
-            },
-            ranges: vec![(f64::INFINITY, f64::NEG_INFINITY); file.problem.targets.len()],
-            decoding: Decoding::new(file),
-            array: checked,
-            is_row_missing: false,
+            array,
             tally,
             notes: Vec::new(),
             history: History::default(),
-            replayed: 0,
-            answered_s: None,
-            is_answered: false,
+            ranges: vec![(f64::INFINITY, f64::NEG_INFINITY); network.problem.targets.len()],
+            decoder: network.decoder(),
+            monitor: network.drift.clone().map(DriftMonitor::new),
+            network,
+            unit: plan.unit,
+            arrived: Answer::default(),
+            last: Answer::default(),
+            is_row_missing: false,
             recording: None,
-        }))
+        })
     }
 
     /// Takes what the source has at `now`; a stream waits for a line at most for `patience`.
     pub fn next(&mut self, now: Instant, patience: Duration) -> SessionEvent {
-        let Self {
-            input,
-            arrived,
-            tally,
-            notes,
-            ..
-        } = self;
-        match input.take(now, patience, arrived, tally, notes) {
-            Taken::Readings => self.answer(now),
-            Taken::Replayed(due) => self.replay(due, now),
-            Taken::Bad(reason) => self.bad(reason),
-            Taken::Nothing => SessionEvent::Nothing,
-            Taken::End(Ok(())) if self.tally.counts.decoded == 0 => {
-                let reason = self.tally.counts.first_bad.clone();
+        let (answer, tally, notes) = (&mut self.arrived, &mut self.tally, &mut self.notes);
+        let mut event = self.input.take((now, patience), answer, tally, notes);
+        if matches!(event, SessionEvent::Answer) {
+            event = self.decode(now);
+        }
+        match (&event, &self.input) {
+            (SessionEvent::Bad(reason), _) => self.tally.bad(reason),
+            (SessionEvent::End(Ok(())), Input::Lines(lines)) if self.tally.decoded == 0 => {
+                let reason = self.tally.first_bad.clone();
                 let reason = reason.unwrap_or_else(|| "it has no line of readings".to_owned());
-                let source = match &self.input {
-                    Input::Lines(lines) => lines.source().clone(),
-                    Input::Simulated(_) | Input::Replay(_) => return SessionEvent::End(Ok(())),
-                };
-                SessionEvent::End(Err(SessionError::NothingDecoded(source, reason)))
+                return SessionEvent::End(Err(SessionError::NothingDecoded(lines.source.clone(), reason)));
             }
-            Taken::End(end) => SessionEvent::End(end),
+            _ => {}
         }
-    }
-
-    fn bad(&mut self, reason: String) -> SessionEvent {
-        self.tally.bad(&reason);
-        SessionEvent::Bad(reason)
-    }
-
-    /// Answers a frame of a replay. The samples for a network of a recording are decoded once and in order, including those that
-    /// were not displayed.
-    fn replay(&mut self, due: Due, now: Instant) -> SessionEvent {
-        let Input::Replay(replay) = &self.input else {
-            return SessionEvent::Nothing;
-        };
-        let keeps = self.array.is_none();
-        let last_s = replay.frame_time_s(due.index);
-        let first = if keeps {
-            self.replayed.min(due.index)
-        } else {
-            self.tally.counts.dropped += due.missed as u64;
-            due.index
-        };
-        let mut event = SessionEvent::Nothing;
-        for index in first..=due.index {
-            let Input::Replay(replay) = &self.input else { break };
-            self.arrived.first_row = Some(replay.read(index, &mut self.arrived.readings));
-            (self.arrived.time_s, self.arrived.read_at) = (replay.frame_time_s(index), now);
-            if keeps && index < self.replayed {
-                // It has been displayed before.
-                if let Some((_, values)) = self.history.at(last_s) {
-                    self.decoding.values.clear();
-                    self.decoding.values.extend_from_slice(&values);
-                }
-                (self.answered_s, self.is_answered) = (Some(last_s), true);
-                return SessionEvent::Answer;
-            }
-            event = self.answer(now);
-            // The last is counted by the caller.
-            if index < due.index && matches!(event, SessionEvent::Answer) {
-                self.answered(None);
-            }
-        }
-        self.replayed = self.replayed.max(due.index + 1);
         event
     }
 
     /// Decodes the readings that have arrived.
-    fn answer(&mut self, now: Instant) -> SessionEvent {
-        let (line, time_s) = (self.arrived.line, self.arrived.time_s);
-        let by_frame = self.is_by_frame();
-        let mut is_left_out = false;
-        if let Some(array) = &mut self.array {
-            let readings = &self.arrived.readings;
-            // By frames, every line has its row.
-            let first_row = self.arrived.first_row.or(by_frame.then_some(0));
-            if let Some(first_row) = first_row {
-                let is_whole = array.take(first_row, readings, by_frame);
-                if by_frame && !is_whole {
-                    return SessionEvent::Nothing;
+    fn decode(&mut self, now: Instant) -> SessionEvent {
+        let Self { arrived, notes, .. } = self;
+        let (channels, targets) = (self.decoder.channels(), self.network.problem.targets.len());
+        arrived.left_out = None;
+        match (&mut self.array, arrived.first_row) {
+            (Some(array), Some(first_row)) => {
+                let is_whole = array.take(first_row, &arrived.readings);
+                if self.unit == Unit::Frames {
+                    if !is_whole {
+                        return SessionEvent::Nothing;
+                    }
+                    if let Some(recording) = &mut self.recording
+                        && let Err(reason) = recording.record(arrived.time_s, &array.frame_ohm)
+                    {
+                        notes.push(Note::RecordingEnded(recording.recorded.clone(), reason));
+                        self.recording = None;
+                    }
+                    array.whole();
+                    arrived.readings.clone_from(&array.frame_ohm);
+                    arrived.first_row = Some(0);
                 }
-                if by_frame {
-                    array.remember();
-                    record(&mut self.recording, time_s, &array.raw_ohm, &mut self.notes);
+                // No frame is left unchecked if the source waits.
+                let waits = matches!(&self.input, Input::Lines(lines) if lines.source.keeping() == Keeping::All);
+                if is_whole && let Some(event) = array.check(waits, now) {
+                    notes.push(Note::Fault(arrived.line, event));
                 }
-                if is_whole && let Some(event) = array.check(self.checks_all, now) {
-                    self.notes.push(Note::Fault(line, event));
-                }
-                let (first_row, rows) = match by_frame {
-                    true => (0, array.rows.len()),
-                    false => (first_row, readings.len() / self.decoding.channels()),
-                };
-                is_left_out = self.decoding.leave_out(first_row, rows, array);
-            } else if matches!(array.watched, Watched::Checked(_)) && !std::mem::replace(&mut self.is_row_missing, true)
-            {
-                self.notes.push(Note::NoRow(line));
+                let first_row = arrived.first_row.unwrap_or(first_row);
+                arrived.left_out = array.decode(first_row, &arrived.readings, &mut arrived.values);
             }
-        }
-        let (first_row, readings) = match &self.array {
-            Some(array) if by_frame => (0, &array.frame_ohm),
-            _ => (self.arrived.first_row.unwrap_or(0), &self.arrived.readings),
-        };
-        self.is_answered = is_left_out || self.decoding.decode(first_row, readings);
-        if !self.is_answered {
-            let reason = match (&self.input, &self.array) {
-                (Input::Lines(_), _) => format!("line {line}: {NO_ANSWER}"),
-                (_, Some(_)) => format!("frame at {time_s:.3} s: {NO_ANSWER}"),
-                (_, None) => format!("sample at {time_s:.3} s: {NO_ANSWER}"),
-            };
-            return self.bad(reason);
-        }
-        let channels = self.decoding.channels();
-        if let Ok(monitor) = &mut self.decoding.drift {
-            for readings in readings.chunks_exact(channels) {
-                if let Some(drift) = monitor.take(line, readings) {
-                    self.notes.push(Note::Drift(line, drift));
-                }
+            (Some(array), None) if matches!(array.watched, Watched::Checked(_)) => {
+                let is_first = !std::mem::replace(&mut self.is_row_missing, true);
+                notes.extend(is_first.then_some(Note::NoRow(arrived.line)));
             }
+            _ => {}
         }
-        if self.unit == Unit::Frames && self.array.is_none() {
-            let values = &self.decoding.values;
-            for ((low, high), &value) in self.ranges.iter_mut().zip(values) {
-                (*low, *high) = (low.min(value), high.max(value));
-            }
-            self.history.push(time_s, values, self.is_stream());
+        let first_row = arrived.first_row.unwrap_or(0);
+        arrived.values.resize(arrived.readings.len() / channels * targets, 0.0);
+        let rows = arrived.readings.chunks_exact(channels);
+        let mut rows = rows.zip(arrived.values.chunks_exact_mut(targets)).enumerate();
+        let is_answered = arrived.left_out.is_some()
+            || rows.all(|(row, (readings, values))| {
+                let decoded = self.decoder.decode_row(first_row + row, readings, values);
+                decoded.is_ok() && values.iter().all(|value| value.is_finite())
+            });
+        if !is_answered {
+            return SessionEvent::Bad(match (&self.input, &self.array) {
+                (Input::Lines(_), _) => format!("line {}: {NO_ANSWER}", arrived.line),
+                (_, Some(_)) => format!("frame at {:.3} s: {NO_ANSWER}", arrived.time_s),
+                (_, None) => format!("sample at {:.3} s: {NO_ANSWER}", arrived.time_s),
+            });
         }
-        self.answered_s = Some(time_s);
+        std::mem::swap(&mut self.arrived, &mut self.last);
+        if !self.last.is_repeated {
+            self.follow();
+        }
         SessionEvent::Answer
     }
 
-    /// Returns `true` if only whole frames are decoded.
-    fn is_by_frame(&self) -> bool {
-        self.unit == Unit::Frames && self.array.is_some()
+    /// Takes the last answer into the monitor of drift and the history.
+    fn follow(&mut self) {
+        let last = &self.last;
+        if let Ok(monitor) = &mut self.monitor {
+            let rows = last.readings.chunks_exact(self.decoder.channels());
+            let drifts = rows.filter_map(|readings| monitor.take(last.line, readings));
+            self.notes.extend(drifts.map(|drift| Note::Drift(last.line, drift)));
+        }
+        if self.unit == Unit::Frames && self.array.is_none() {
+            for ((low, high), &value) in self.ranges.iter_mut().zip(&last.values) {
+                (*low, *high) = (low.min(value), high.max(value));
+            }
+            let is_stream = matches!(self.input, Input::Lines(_));
+            self.history.push(last.time_s, &last.values, is_stream);
+        }
     }
 
     /// Counts the answer, which has now been used.
     pub fn count(&mut self) {
-        let truth = self.input.truth();
-        let error_mm = truth.zip(self.array.as_mut());
-        let error_mm = error_mm.map(|(truth, array)| array.compare(&mut self.decoding, truth));
-        self.answered(error_mm);
-    }
-
-    fn answered(&mut self, error_mm: Option<f64>) {
-        self.tally.good(self.arrived.read_at, Instant::now(), error_mm);
-    }
-
-    /// Returns the time at which the next frame of a timed source is due, `now` for a stream, and `None` while it is paused.
-    pub fn due(&self, now: Instant) -> Option<Instant> {
-        self.input.due(now)
-    }
-
-    /// Returns `true` for a stream, whose lines are waited for.
-    pub fn is_stream(&self) -> bool {
-        matches!(self.input, Input::Lines(_))
-    }
-
-    /// Returns `true` once, when no line of a stream has come for two seconds.
-    pub fn falls_silent(&mut self, now: Instant) -> bool {
-        self.is_stream() && self.tally.falls_silent(now)
-    }
-
-    /// Returns the number of bytes that have arrived since the last end of a line.
-    pub fn unended(&self) -> usize {
-        match &self.input {
-            Input::Lines(lines) => lines.lines.unended(),
-            Input::Simulated(_) | Input::Replay(_) => 0,
-        }
-    }
-
-    /// Removes the notes since the last call.
-    pub fn notes(&mut self) -> Vec<Note> {
-        std::mem::take(&mut self.notes)
-    }
-
-    /// Returns the number of answers, and the times.
-    pub fn counts(&self) -> Counts {
-        let mut counts = self.tally.counts();
-        if let Input::Lines(lines) = &self.input {
-            counts.dropped = lines.lines.dropped();
-        }
-        counts
-    }
-
-    /// Returns the number of malformed lines, and of frames that could not be decoded.
-    pub fn bad_lines(&self) -> u64 {
-        self.tally.counts.bad
-    }
-
-    /// Returns the times from reading to answering.
-    pub fn latencies(&self) -> &Latencies {
-        &self.tally.latencies
-    }
-
-    /// Returns the number of the line of the last answer, from 1.
-    pub fn line(&self) -> u64 {
-        self.arrived.line
-    }
-
-    /// Returns the time of the last answer in its source, in seconds; `None` before the first.
-    pub fn time_s(&self) -> Option<f64> {
-        self.answered_s
-    }
-
-    /// Returns `true` if there is an answer, and no later readings without one.
-    pub fn has_answer(&self) -> bool {
-        self.is_answered
-    }
-
-    /// Returns the index of the row-wire or network with which the last answer begins, 0 if it is unknown.
-    pub fn first_row(&self) -> usize {
-        match self.is_by_frame() {
-            true => 0,
-            false => self.arrived.first_row.unwrap_or(0),
-        }
-    }
-
-    /// Returns the readings of the last answer: rows × channels.
-    pub fn readings(&self) -> &[f64] {
-        match &self.array {
-            Some(array) if self.is_by_frame() => &array.frame_ohm,
-            _ => &self.arrived.readings,
-        }
-    }
-
-    /// Returns the last answer: rows × targets.
-    pub fn values(&self) -> &[f64] {
-        &self.decoding.values
-    }
-
-    /// Returns the cells of its line that are copied to the output.
-    pub fn kept(&self) -> &[KeptCell] {
-        &self.arrived.kept
-    }
-
-    /// Returns the wire that it was decoded without.
-    pub fn left_out(&self) -> Option<FaultyWire> {
-        self.decoding.left_out
+        let (truth, Answer { readings, values, .. }) = (self.input.truth(), &self.last);
+        let error_mm = truth.zip(self.array.as_mut()).map(|(truth, array)| {
+            let error_mm = array.error_mm(values, truth);
+            let mut by_all_mm = vec![0.0; values.len()];
+            if self.last.left_out.is_some() && self.decoder.decode(readings, &mut by_all_mm).is_ok() {
+                let ([by_all, left_out], count) = array.since_named;
+                let by_all = by_all + array.error_mm(&by_all_mm, truth);
+                array.since_named = ([by_all, left_out + error_mm], count + 1);
+            }
+            error_mm
+        });
+        let now = Instant::now();
+        self.tally.good(self.last.read_at.unwrap_or(now), now, error_mm);
     }
 
     /// Returns the numbers of readings, except those left out, and of targets of the last answer outside the range seen in
     /// training; the first is `None` if that range is not known.
     pub fn outside(&self) -> (Option<usize>, usize) {
-        let is_left_out = |row: usize, channel| {
-            (self.array.as_ref()).is_some_and(|array| array.watched.leaves_out(array.rows[row], channel))
-        };
-        self.decoding
-            .outside(self.first_row(), self.readings(), self.values(), is_left_out)
-    }
-
-    /// Returns the values of a network of a recording.
-    pub fn history(&self) -> &History {
-        &self.history
-    }
-
-    /// Returns the smallest and largest value of each target so far.
-    pub fn ranges(&self) -> &[(f64, f64)] {
-        &self.ranges
-    }
-
-    /// Returns the present drift of the readings, or the reason why they are not monitored.
-    pub fn drift(&self) -> Result<Option<Drift>, LiveError> {
-        let monitor = self.decoding.drift.as_ref();
-        monitor.map(|monitor| monitor.drift().copied()).map_err(Clone::clone)
-    }
-
-    /// Returns the array whose frames are decoded; `None` for a network of a recording.
-    pub fn array(&self) -> Option<&LiveArray> {
-        self.array.as_ref()
-    }
-
-    /// Returns the array, to re-zero it.
-    pub fn array_mut(&mut self) -> Option<&mut LiveArray> {
-        self.array.as_mut()
-    }
-
-    /// Returns the true deformation of the last frame, if it is known.
-    pub fn truth(&self) -> Option<&Deformation> {
-        self.input.truth()
-    }
-
-    /// Returns the errors of the answers, if the truth is known.
-    pub fn truth_errors(&self) -> Option<TruthErrors> {
-        let array = self.array.as_ref().filter(|_| self.truth().is_some())?;
-        Some(array.truth_errors(self.tally.error_mm()))
-    }
-
-    /// Returns the position in a recording.
-    pub fn replay_state(&self) -> Option<ReplayState> {
-        match &self.input {
-            Input::Replay(replay) => Some(replay.state(self.answered_s?)),
-            Input::Simulated(_) | Input::Lines(_) => None,
+        let answer = &self.last;
+        let mut outside = (Some(0), 0);
+        let rows = answer.readings.chunks_exact(self.decoder.channels());
+        let rows = rows.zip(answer.values.chunks_exact(self.network.problem.targets.len()));
+        for (row, (readings, values)) in (answer.first_row.unwrap_or(0)..).zip(rows) {
+            let network = self.network.network.at(row);
+            let is_used = |channel: &usize| {
+                let array = self.array.as_ref();
+                array.is_none_or(|array| !array.watched.leaves_out(array.rows[row], *channel))
+            };
+            let inputs = network.inputs();
+            let of_row = inputs
+                .range()
+                .map(|range| range.outside(inputs.quantity(), readings).filter(is_used).count());
+            outside.0 = outside.0.zip(of_row).map(|(sum, count)| sum + count);
+            outside.1 += network.outputs().far_outside(values).count();
         }
-    }
-
-    /// Returns the simulated source, to change its motion and fault.
-    pub fn simulated(&mut self) -> Option<&mut Simulated> {
-        match &mut self.input {
-            Input::Simulated(simulated) => Some(&mut simulated.source),
-            Input::Replay(_) | Input::Lines(_) => None,
-        }
-    }
-
-    /// Returns the replay, to seek, pause or change its speed.
-    pub fn replay_mut(&mut self) -> Option<&mut Replay> {
-        match &mut self.input {
-            Input::Replay(replay) => Some(replay),
-            Input::Simulated(_) | Input::Lines(_) => None,
-        }
-    }
-
-    /// Begins to record the frames of an array to a new file in `folder`, and returns its path; `None` if they are recorded
-    /// already.
-    ///
-    /// # Errors
-    /// If the file cannot be created, with the reason.
-    pub fn record(&mut self, folder: &Path) -> Result<Option<PathBuf>, String> {
-        let Some(array) = self.array.as_ref().filter(|_| self.recording.is_none()) else {
-            return Ok(None);
-        };
-        let recording = RecordingFile::create(folder, &array.rows, array.sensor.scale.columns())?;
-        let path = recording.path().to_owned();
-        self.recording = Some(recording);
-        Ok(Some(path))
-    }
-
-    /// Returns the number of frames recorded, and the time from the first to the last, in seconds.
-    pub fn recording(&self) -> Option<(u64, f64)> {
-        self.recording.as_ref().map(RecordingFile::length)
-    }
-
-    /// Ends the recording, if there is one.
-    pub fn end_recording(&mut self) -> Option<Recorded> {
-        self.recording.take().map(RecordingFile::end)
-    }
-}
-
-/// Records a frame; if that fails, the recording ends.
-fn record(recording: &mut Option<RecordingFile>, time_s: f64, frame_ohm: &[f64], notes: &mut Vec<Note>) {
-    let Some(open) = recording else { return };
-    if let Err(reason) = open.record(time_s, frame_ohm)
-        && let Some(ended) = recording.take()
-    {
-        notes.push(Note::RecordingEnded(ended.end(), reason));
+        outside
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::{fmt::Write as _, fs, ops::ControlFlow};
+    use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
 
     use decoupler_core::{
         dataset::{Memory, Span},
         decoupling::{Decoder, resistance_residual},
         evaluation::{Run, RunSettings},
-        job::Job,
         scene::RowModel,
     };
 
     use super::*;
-    use crate::{
-        import::{Plan, Recipe, Recorded as RecordedFiles, Setup},
-        live::{Fault, Motion},
-    };
+    use crate::import::{Plan, Recipe, Recorded as RecordedFiles, Setup};
 
     /// A network of a recording, trained on a file in `folder`.
     fn network(folder: &Path) -> Arc<NetworkFile> {
@@ -607,25 +447,27 @@ mod tests {
     }
 
     fn replay(path: &Path) -> SourcePlan {
-        SourcePlan::Replay {
-            path: path.to_owned(),
-            at_s: 0.0,
-            speed: 1.0,
-            is_playing: true,
-        }
+        SourcePlan::Replay(path.to_owned())
     }
 
     fn open(plan: SessionPlan) -> Session {
-        Session::open(plan, &|| true).unwrap().unwrap()
+        Session::open(plan, &Job::UNINTERRUPTED).unwrap()
+    }
+
+    fn replay_of(session: &mut Session) -> &mut Replay {
+        match &mut session.input {
+            Input::Replay(replay) => replay,
+            other => panic!("{other:?}"),
+        }
     }
 
     /// Goes to a time of the recording and replays from there, on a clock of its own, which jumps from frame to frame; returns
     /// the seconds that it took.
     fn play(session: &mut Session, at_s: f64) -> f64 {
         let start = Instant::now();
-        session.replay_mut().unwrap().seek(at_s, start);
+        replay_of(session).seek(at_s, start);
         let mut now = start;
-        while let Some(due) = session.due(now) {
+        while let Some(due) = session.input.due(now) {
             now = due.max(now);
             assert!(matches!(session.next(now, Duration::ZERO), SessionEvent::Answer));
             session.count();
@@ -651,15 +493,15 @@ mod tests {
             let length_s = time_s(rows - 1);
             let took_s = play(&mut session, 0.0);
             assert!((took_s - length_s).abs() < 1e-3, "{took_s} s instead of {length_s} s");
-            assert!((session.replay_state().unwrap().length_s - length_s).abs() < 1e-6);
-            let all = session.history().all();
+            assert!((replay_of(&mut session).state.length_s - length_s).abs() < 1e-6);
+            let all = session.history.all();
             let expected_s = |row: usize| 5e3 + time_s(row as u32);
             let differences = all
                 .iter()
                 .enumerate()
                 .map(|(row, (found_s, _))| (found_s - expected_s(row)).abs());
             assert!(all.len() == rows as usize && differences.fold(0.0, f64::max) < 1e-6);
-            assert_eq!(session.counts().decoded, u64::from(rows));
+            assert_eq!(session.tally.decoded, u64::from(rows));
         }
     }
 
@@ -672,14 +514,14 @@ mod tests {
         let rows = (0..100).map(|row| format!("{row},{},{}\n", row % 7, row % 5));
         fs::write(&path, format!("time,u1,u2\n{}", rows.collect::<String>())).unwrap();
         let mut session = open(plan(&network, replay(&path)));
-        session.replay_mut().unwrap().play(false, Instant::now());
+        replay_of(&mut session).play(false, Instant::now());
         let mut shown = Vec::new();
         for (at_s, decoded) in [(60.0, 61), (10.0, 61), (61.0, 62), (99.0, 100)] {
             play(&mut session, at_s);
-            assert_eq!((session.time_s(), session.history().all().len()), (Some(at_s), decoded));
-            shown.push((at_s, session.values().to_vec()));
+            assert_eq!((session.last.time_s, session.history.all().len()), (at_s, decoded));
+            shown.push((at_s, session.last.values.clone()));
         }
-        let history = session.history().all();
+        let history = session.history.all();
         let mut decoder = network.decoder();
         for (row, (time_s, values)) in history.iter().enumerate() {
             let mut expected = [0.0];
@@ -710,11 +552,11 @@ mod tests {
         session.count();
         let mut expected = [0.0];
         network.decoder().decode_row(0, &[3.0, 2.0], &mut expected).unwrap();
-        assert_eq!(session.values(), expected);
-        let length_s = session.replay_state().unwrap().length_s;
-        assert_eq!((session.counts().decoded, length_s), (1, 0.02));
+        assert_eq!(session.last.values, expected);
+        let length_s = replay_of(&mut session).state.length_s;
+        assert_eq!((session.tally.decoded, length_s), (1, 0.02));
         fs::write(&path, "u2,v\n1,2\n").unwrap();
-        let refused = Session::open(plan(&network, replay(&path)), &|| true);
+        let refused = Session::open(plan(&network, replay(&path)), &Job::UNINTERRUPTED);
         let message = refused.unwrap_err().to_string();
         assert!(message.contains("u1"), "{message}");
     }
@@ -763,10 +605,10 @@ mod tests {
             let mut session = open(plan(&file, source));
             let start = Instant::now();
             for sample in 0..600 {
-                let now = session.due(start).map_or(start, |due| due.max(start));
+                let now = session.input.due(start).map_or(start, |due| due.max(start));
                 while !matches!(session.next(now, Duration::from_secs(60)), SessionEvent::Answer) {}
                 let expected = trained.set.sample_readings(sample).to_vec();
-                assert_eq!(session.readings(), expected, "sample {sample}");
+                assert_eq!(session.last.readings, expected, "sample {sample}");
             }
         }
     }
@@ -787,42 +629,33 @@ mod tests {
         let sensor = network.settings.simulation().unwrap().sensor;
         let mut session = open(SessionPlan {
             noise: Noise::relative(1e-3),
-            ..plan(
-                &network,
-                SourcePlan::Simulated {
-                    frames_per_second: 50.0,
-                    motion: Motion::Wandering,
-                    fault: None,
-                },
-            )
+            ..plan(&network, SourcePlan::Simulated(50.0))
         });
         let mut now = Instant::now();
         let mut decode = |session: &mut Session| {
             // Every frame is checked.
-            now = session.due(now).unwrap().max(now) + Duration::from_millis(20);
+            now = session.input.due(now).unwrap().max(now) + Duration::from_millis(20);
             assert!(matches!(session.next(now, Duration::ZERO), SessionEvent::Answer));
             session.count();
         };
         decode(&mut session);
-        let rows = session
-            .readings()
-            .chunks_exact(12)
-            .zip(session.values().chunks_exact(12));
+        let rows = session.last.readings.chunks_exact(12);
+        let rows = rows.zip(session.last.values.chunks_exact(12));
         let squares = rows.map(|(ohm, mm)| resistance_residual(&sensor, ohm, mm).powi(2));
         let expected = (squares.sum::<f64>() / 4.0).sqrt();
-        assert!((session.array().unwrap().residual(session.values()) / expected - 1.0).abs() < 1e-9);
+        assert!((session.array.as_ref().unwrap().residual(&session.last) / expected - 1.0).abs() < 1e-9);
 
-        let fault = Fault::OpenColumn {
-            column: 4,
-            before_node: 0,
+        let fault = "open-column:5".parse().unwrap();
+        let Input::Simulated(simulated, _) = &mut session.input else {
+            panic!("a simulated source");
         };
-        session.simulated().unwrap().set_fault(Some(fault)).unwrap();
+        simulated.set_fault(Some(fault)).unwrap();
         (1..20).for_each(|_| decode(&mut session));
-        let array = session.array().unwrap();
+        let array = session.array.as_ref().unwrap();
         assert!(array.watched.wire().is_some(), "{:?}", array.watched);
-        let residual = array.residual(session.values());
+        let residual = array.residual(&session.last);
         assert!(residual < 3e-3, "{residual}");
-        let [by_all, left_out] = session.truth_errors().unwrap().since_named_mm.unwrap();
+        let [by_all, left_out] = array.since_named_mm().unwrap();
         assert!(left_out < by_all, "{left_out} and {by_all}");
     }
 }

@@ -1,15 +1,14 @@
 use std::f64::consts::TAU;
 
 use decoupler_core::{
-    dataset::{Seed, Stream},
-    scene::{Deformation, Indenter, Loading, NoiseSource, Scene, SceneError},
-    sensor::{SensorError, SensorModel, short},
+    dataset::{DatasetError, Seed, Stream},
+    scene::{Deformation, Indenter, Loading, Noise, NoiseSource, Scene},
+    sensor::{SensorError, SensorModel},
 };
 use glam::{DVec2, DVec3};
 use rand::{Rng, RngExt, rngs::ChaCha8Rng};
-use thiserror::Error;
 
-use super::{Fault, FaultError, FaultySensor};
+use super::{Fault, FaultySensor, SessionError};
 
 /// Source of frames without hardware: an indenter that moves over the array, pressing and lifting.
 ///
@@ -24,12 +23,13 @@ pub struct Simulated {
     stroke_mm: f64,
     path: PressPath,
     source: NoiseSource,
-    scene: Scene,
+    noise: Noise,
     noise_rng: ChaCha8Rng,
     fault: Option<FaultySensor>,
-    frames_per_second: f64,
+    /// Motion of the indenter from the next frame on.
+    pub motion: Motion,
+    pub(super) frames_per_second: f64,
     frames: u64,
-    motion: Motion,
     /// Number of frames during which the indenter did not move along its path.
     frames_at_rest: u64,
     deformation: Deformation,
@@ -47,34 +47,16 @@ pub enum Motion {
     Lifted,
 }
 
-/// Error in setting up a simulated source.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum SimulatedError {
-    /// The scene is invalid.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The array does not have the wires of the fault.
-    #[error(transparent)]
-    Fault(#[from] FaultError),
-    /// The array has no resistance at rest.
-    #[error(transparent)]
-    Sensor(#[from] SensorError),
-    /// The rate is out of range.
-    #[error("{} frames per second: give a number above 0 and at most 1000000", short(*.0))]
-    Rate(f64),
-}
-
 impl Simulated {
     /// Prepares frames of `model` with the rows, stroke and noise of `scene`, and its indenter, or a ball if it has
     /// another loading.
     ///
     /// # Errors
     /// If the scene or the rate is invalid, or the array has no resistance at rest.
-    pub fn new(model: &SensorModel, scene: &Scene, seed: Seed, frames_per_second: f64) -> Result<Self, SimulatedError> {
-        scene.check()?;
+    pub fn new(model: &SensorModel, scene: &Scene, seed: Seed, frames_per_second: f64) -> Result<Self, SessionError> {
+        scene.check().map_err(DatasetError::from)?;
         if !(frames_per_second > 0.0 && frames_per_second <= 1e6) {
-            return Err(SimulatedError::Rate(frames_per_second));
+            return Err(SessionError::Rate(frames_per_second));
         }
         let noise = scene.noise.in_test();
         let indenter = match scene.loading {
@@ -84,11 +66,11 @@ impl Simulated {
         Ok(Self {
             model: *model,
             indenter,
-            rows: scene.rows.read(model.scale.rows())?,
+            rows: scene.rows.read(model.scale.rows()).map_err(DatasetError::from)?,
             stroke_mm: scene.stroke_mm(&model.geometry),
             path: PressPath::new(model, &mut seed.rng(Stream::Live)),
             source: noise.source(model)?,
-            scene: *scene,
+            noise,
             noise_rng: seed.rng(Stream::LiveNoise),
             fault: None,
             frames_per_second,
@@ -109,11 +91,6 @@ impl Simulated {
         self.rows.len() * self.model.scale.columns()
     }
 
-    /// Sets the motion of the indenter from the next frame on.
-    pub fn set_motion(&mut self, motion: Motion) {
-        self.motion = motion;
-    }
-
     /// Skips `frames` frames, without drawing their noise.
     pub fn skip(&mut self, frames: u64) {
         self.frames += frames;
@@ -126,13 +103,12 @@ impl Simulated {
     ///
     /// # Errors
     /// If the array does not have its wires.
-    pub fn set_fault(&mut self, fault: Option<Fault>) -> Result<(), SimulatedError> {
-        let prepared = |fault: Fault| {
+    pub fn set_fault(&mut self, fault: Option<Fault>) -> Result<(), SessionError> {
+        if let Some(fault) = fault {
             fault.check(self.model.scale, &self.rows)?;
-            let faulty = FaultySensor::new(&self.model, self.scene.noise.in_test(), fault)?;
-            Ok::<_, SimulatedError>(faulty)
-        };
-        self.fault = fault.map(prepared).transpose()?;
+        }
+        let prepared = fault.map(|fault| FaultySensor::new(&self.model, self.noise, fault));
+        self.fault = prepared.transpose()?;
         Ok(())
     }
 
@@ -156,12 +132,10 @@ impl Simulated {
             self.model
                 .row_resistances_into(row, self.deformation.row_mm(row), readings_ohm)?;
         }
-        if let Some(fault) = &self.fault {
-            fault.before_noise(&self.rows, &self.deformation, readings_ohm);
-        }
-        self.source.disturb(readings_ohm, &mut self.noise_rng);
-        if let Some(fault) = &self.fault {
-            fault.after_noise(&self.rows, readings_ohm);
+        let at = (&*self.rows, &self.deformation);
+        match &self.fault {
+            Some(fault) => fault.disturb_snapshot(at, readings_ohm, &self.source, &mut self.noise_rng),
+            None => self.source.disturb(readings_ohm, &mut self.noise_rng),
         }
         Ok(time_s)
     }
@@ -187,10 +161,8 @@ const FREQUENCIES_HZ: [[f64; 2]; 3] = [[0.11, 0.29], [0.13, 0.31], [0.37, 0.89]]
 impl PressPath {
     fn new(model: &SensorModel, rng: &mut impl Rng) -> Self {
         let (geometry, scale) = (&model.geometry, model.scale);
-        let first_mm = geometry.row_node_mm(scale, 0, 0).truncate();
-        let last_mm = geometry
-            .row_node_mm(scale, scale.rows() - 1, scale.nodes_per_row() - 1)
-            .truncate();
+        let node_mm = |row, node| geometry.row_node_mm(scale, row, node).truncate();
+        let (first_mm, last_mm) = (node_mm(0, 0), node_mm(scale.rows() - 1, scale.nodes_per_row() - 1));
         Self {
             middle_mm: 0.5 * (first_mm + last_mm),
             reach_mm: 0.5 * (last_mm - first_mm),
@@ -213,8 +185,6 @@ impl PressPath {
 
 #[cfg(test)]
 mod tests {
-    use decoupler_core::scene::Noise;
-
     use super::*;
 
     fn source() -> Simulated {
@@ -237,15 +207,15 @@ mod tests {
         for frame in &path[..20] {
             assert_eq!(&next(&mut source).1, frame);
         }
-        source.set_motion(Motion::Held);
+        source.motion = Motion::Held;
         for frame in 20..25 {
             let (time_s, ohm) = next(&mut source);
             assert_eq!((time_s, &ohm), (f64::from(frame) / 50.0, &path[20]));
         }
-        source.set_motion(Motion::Lifted);
+        source.motion = Motion::Lifted;
         next(&mut source);
         assert!((0..4).all(|row| source.deformation().row_mm(row).iter().all(|u| u.length() == 0.0)));
-        source.set_motion(Motion::Wandering);
+        source.motion = Motion::Wandering;
         for frame in &path[20..] {
             assert_eq!(&next(&mut source).1, frame);
         }

@@ -21,12 +21,7 @@ pub enum Source {
     /// A file or a named pipe.
     File(PathBuf),
     /// A serial port with its baud rate, 8 data bits, no parity, 1 stop bit.
-    Serial {
-        /// Device.
-        path: String,
-        /// Baud rate.
-        baud: u32,
-    },
+    Serial(String, u32),
     /// A TCP socket to connect to, as `HOST:PORT`.
     Tcp(String),
 }
@@ -54,31 +49,14 @@ pub enum SourceError {
     #[error("'{0}' is in use: close the other program that reads it")]
     InUse(String),
     /// The device does not support the baud rate.
-    #[error("'{path}' does not support {baud} baud: {cause}; give a rate that it supports, for example 9600 or 115200")]
-    Device {
-        /// Device.
-        path: String,
-        /// Given rate.
-        baud: u32,
-        /// Message of the operating system.
-        cause: String,
-    },
+    #[error("'{0}' does not support {1} baud: {2}; give a rate that it supports, for example 9600 or 115200")]
+    Device(String, u32, String),
     /// The connection failed.
-    #[error("cannot connect to 'tcp:{address}': {}; check that the sender listens there", system_words(.source))]
-    Connect {
-        /// Given address.
-        address: String,
-        /// Error of the operating system.
-        source: io::Error,
-    },
+    #[error("cannot connect to 'tcp:{0}': {cause}; check that the sender listens there", cause = system_words(.1))]
+    Connect(String, io::Error),
     /// The file cannot be opened.
-    #[error("cannot open '{}': {}", .path.display(), system_cause(.source))]
-    File {
-        /// Given file.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: io::Error,
-    },
+    #[error("cannot open '{}': {}", .0.display(), system_cause(.1))]
+    File(PathBuf, io::Error),
 }
 
 impl FromStr for Source {
@@ -101,8 +79,7 @@ impl FromStr for Source {
             && let Ok(baud @ 1..) = baud.parse()
             && (is_port(path) || path.starts_with("/dev/") || Path::new(path).exists())
         {
-            let path = path.to_owned();
-            return Ok(Self::Serial { path, baud });
+            return Ok(Self::Serial(path.to_owned(), baud));
         }
         if is_port(text) && !Path::new(text).is_file() {
             return Err(SourceError::NoBaud(text.to_owned()));
@@ -116,7 +93,7 @@ impl fmt::Display for Source {
         match self {
             Self::StandardInput => f.write_str("standard input"),
             Self::File(path) => write!(f, "'{}'", path.display()),
-            Self::Serial { path, baud } => write!(f, "'{path}:{baud}'"),
+            Self::Serial(path, baud) => write!(f, "'{path}:{baud}'"),
             Self::Tcp(address) => write!(f, "'tcp:{address}'"),
         }
     }
@@ -127,20 +104,20 @@ impl Source {
     pub fn keeping(&self) -> Keeping {
         match self {
             Self::StandardInput | Self::File(_) => Keeping::All,
-            Self::Serial { .. } | Self::Tcp(_) => Keeping::Latest,
+            Self::Serial(..) | Self::Tcp(_) => Keeping::Latest,
         }
     }
 
     /// Returns `true` if reading may begin in the middle of a line.
     pub fn begins_anywhere(&self) -> bool {
-        matches!(self, Self::Serial { .. })
+        matches!(self, Self::Serial(..))
     }
 
     /// Returns the message on an error that ends the reading of this source.
     pub fn lost(&self, error: &io::Error) -> String {
         let cause = match (self, error.kind()) {
             // The system reports an unplugged device like a pipe without a reader.
-            (Self::Serial { .. }, io::ErrorKind::BrokenPipe | io::ErrorKind::NotFound) => {
+            (Self::Serial(..), io::ErrorKind::BrokenPipe | io::ErrorKind::NotFound) => {
                 "the device was unplugged or switched off".to_owned()
             }
             (Self::Tcp(_), _) => system_words(error),
@@ -156,23 +133,15 @@ impl Source {
     pub fn open(&self) -> Result<Box<dyn Read + Send>, SourceError> {
         match self {
             Self::StandardInput => Ok(Box::new(stdin())),
-            Self::File(path) => {
-                let file = File::open(path).map_err(|source| SourceError::File {
-                    path: path.clone(),
-                    source,
-                })?;
-                Ok(Box::new(file))
-            }
-            Self::Serial { path, baud } => open_serial(path, *baud),
+            Self::File(path) => match File::open(path) {
+                Ok(file) => Ok(Box::new(file)),
+                Err(error) => Err(SourceError::File(path.clone(), error)),
+            },
+            Self::Serial(path, baud) => open_serial(path, *baud),
             Self::Tcp(address) => {
-                let connected = TcpStream::connect(address).and_then(|stream| {
-                    stream.set_read_timeout(Some(TIMEOUT))?;
-                    Ok(stream)
-                });
-                let stream = connected.map_err(|source| SourceError::Connect {
-                    address: address.clone(),
-                    source,
-                })?;
+                let connected = TcpStream::connect(address);
+                let ready = connected.and_then(|stream| stream.set_read_timeout(Some(TIMEOUT)).map(|()| stream));
+                let stream = ready.map_err(|error| SourceError::Connect(address.clone(), error))?;
                 Ok(Box::new(stream))
             }
         }
@@ -203,11 +172,7 @@ fn open_serial(path: &str, baud: u32) -> Result<Box<dyn Read + Send>, SourceErro
         ErrorKind::Io(io::ErrorKind::WouldBlock) => SourceError::InUse(path.to_owned()),
         ErrorKind::NoDevice if Path::new(path).exists() => SourceError::InUse(path.to_owned()),
         ErrorKind::NoDevice => SourceError::NoDevice(path.to_owned()),
-        _ => SourceError::Device {
-            path: path.to_owned(),
-            baud,
-            cause: error.description,
-        },
+        _ => SourceError::Device(path.to_owned(), baud, error.description),
     };
     let port = serialport::new(path, baud).timeout(TIMEOUT).open().map_err(refused)?;
     Ok(Box::new(port))
@@ -220,8 +185,7 @@ mod tests {
     #[test]
     fn an_unplugged_device_is_no_pipe_without_a_reader() {
         let broken = io::Error::from(io::ErrorKind::BrokenPipe);
-        let (path, baud) = ("/dev/ttyUSB0".to_owned(), 9600);
-        let device = Source::Serial { path, baud }.lost(&broken);
+        let device = Source::Serial("/dev/ttyUSB0".to_owned(), 9600).lost(&broken);
         assert_eq!(
             device,
             "'/dev/ttyUSB0:9600' is lost: the device was unplugged or switched off; connect it again"
@@ -234,10 +198,7 @@ mod tests {
 
     #[test]
     fn sources_are_distinguished_by_their_names() {
-        let serial = |path: &str, baud| Source::Serial {
-            path: path.to_owned(),
-            baud,
-        };
+        let serial = |path: &str, baud| Source::Serial(path.to_owned(), baud);
         for (text, expected) in [
             ("-", Source::StandardInput),
             ("frames.csv", Source::File("frames.csv".into())),

@@ -1,11 +1,11 @@
 //! The files in `assets/samples` have the contents described in their documentation.
 
-use std::{fs::File, io::BufReader, path::PathBuf};
+use std::path::PathBuf;
 
-use decoupler_core::{dataset::Seed, decoupling::Decoder, glam::DVec3};
+use decoupler_core::{dataset::Seed, decoupling::Decoder, glam::DVec3, job::Job};
 use decoupler_files::{
     export::NetworkFile,
-    live::{Recording, Simulated},
+    live::{Recording, Simulated, Tally},
 };
 
 fn sample(name: &str) -> PathBuf {
@@ -21,8 +21,13 @@ fn the_network_decodes_the_recording() {
     let source = *file.settings.simulation().unwrap();
     let (sensor, scale) = (source.sensor, source.sensor.scale);
     let rows = Vec::from_iter(0..scale.rows());
-    let reader = BufReader::new(File::open(sample("recording.csv")).unwrap());
-    let recording = Recording::read(reader, &rows, scale.rows(), scale.columns()).unwrap();
+    let recording = Recording::read(
+        &sample("recording.csv"),
+        &file,
+        &mut Tally::default(),
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
     let mut decoder = file.network.decoder();
     let mut truth = Simulated::new(&sensor, &source.scene, Seed(0), 15.0).unwrap();
     let mut frame_ohm = vec![0.0; truth.readings()];
@@ -30,8 +35,7 @@ fn the_network_decodes_the_recording() {
     let (mut errors_mm, mut depths_mm, mut count) = (0.0, 0.0, 0.0);
     for (index, time_s) in recording.times_s().iter().enumerate() {
         assert!((truth.next_frame(&mut frame_ohm).unwrap() - time_s).abs() < 1e-5);
-        let frame = recording.frame_ohm(index);
-        decoder.decode(frame.as_slice().unwrap(), &mut coordinates_mm).unwrap();
+        decoder.decode(recording.frame(index), &mut coordinates_mm).unwrap();
         for (row, coordinates_mm) in rows.iter().zip(coordinates_mm.chunks_exact(decoder.outputs())) {
             for (node, depth) in truth.deformation().row_mm(*row).iter().enumerate() {
                 let height_mm = sensor.geometry.height_mm - depth.z;

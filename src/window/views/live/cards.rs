@@ -11,7 +11,7 @@ use decoupler_files::{
         surface::{Quantity, Surface, SurfaceFigure},
         zero_gains_figure,
     },
-    live::{ConverterEnd, Fault, SourcePlan, Watched},
+    live::{ConverterEnd, Fault, FaultEffect, SourcePlan, Watched},
 };
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
 use ndarray::Array2;
@@ -201,8 +201,8 @@ fn words(view: &LiveView, shared: &Shared) -> (String, String) {
     let (counts, network) = (&view.shown.counts, view.network.network(&shared.runs));
     if let Some(running) = &view.running {
         let source = match &running.source {
-            SourcePlan::Simulated { .. } => "the simulated source".to_owned(),
-            SourcePlan::Replay { path, .. } => format!("'{}'", path.display()),
+            SourcePlan::Simulated(_) => "the simulated source".to_owned(),
+            SourcePlan::Replay(path) => format!("'{}'", path.display()),
             SourcePlan::Stream(source) => source.to_string(),
         };
         let text = match &counts.last_bad {
@@ -330,26 +330,19 @@ impl FaultForm {
     pub fn fault(&self, scale: ArrayScale) -> Option<Fault> {
         let last = self.kind?.wires(scale);
         let (wire, node) = (self.wire.clamp(1, last.max(1)) - 1, self.node.max(1) - 1);
-        Some(match self.kind? {
-            FaultKind::BrokenRow => Fault::OpenRow {
-                row: wire,
-                before_node: node.min(scale.nodes_per_row() - 1),
-            },
-            FaultKind::BrokenColumn => Fault::OpenColumn {
-                column: wire,
-                before_node: node.min(scale.nodes_per_column() - 1),
-            },
-            FaultKind::ShortedColumns => Fault::ShortedColumns { column: wire },
+        let column = FaultyWire::Column(wire);
+        let (wire, effect) = match self.kind? {
+            FaultKind::BrokenRow => (
+                FaultyWire::Row(wire),
+                FaultEffect::Open(node.min(scale.nodes_per_row() - 1)),
+            ),
+            FaultKind::BrokenColumn => (column, FaultEffect::Open(node.min(scale.nodes_per_column() - 1))),
+            FaultKind::ShortedColumns => (FaultyWire::Columns(wire), FaultEffect::Shorted),
             FaultKind::Gain if self.gain_percent == 0.0 => return None,
-            FaultKind::Gain => Fault::Gain {
-                column: wire,
-                relative: self.gain_percent / 100.0,
-            },
-            FaultKind::Saturated => Fault::Stuck {
-                column: wire,
-                end: self.end,
-            },
-        })
+            FaultKind::Gain => (column, FaultEffect::Gain(self.gain_percent / 100.0)),
+            FaultKind::Saturated => (column, FaultEffect::Stuck(self.end)),
+        };
+        Some(Fault { wire, effect })
     }
 
     /// Shows the form for an array of this scale in which these row-wires are read.

@@ -56,7 +56,7 @@ fn warnings_ui(ui: &mut Ui, frame: &LiveFrame) {
                  Check the wiring, the geometry, the order of the rows, and the relative noise on the left.",
             );
         }
-        Watched::Off(_) | Watched::Checked(FaultEvent::Recovered) => {}
+        Watched::NoNoise | Watched::TooLarge | Watched::Checked(FaultEvent::Recovered) => {}
     }
 }
 
@@ -69,10 +69,10 @@ pub fn stream_ui(ui: &mut Ui, view: &LiveView) {
         format!("{:.0} frames per second", counts.frames_per_second)
     };
     fact_ui(ui, "Rate", "Frames per second (recent).", &rate);
-    let latency = counts.latency.map_or_else(
-        || format_number(None),
-        |[median, high]| format!("p50 {}, p99 {}", format_duration(median), format_duration(high)),
-    );
+    let latency = match [0.5, 0.99].map(|share| counts.latencies.quantile(share)) {
+        [Some(median), Some(high)] => format!("p50 {}, p99 {}", format_duration(median), format_duration(high)),
+        _ => format_number(None),
+    };
     let hint = "Time from reading a frame to its answer: median, and the 99th percentile, which one frame in a hundred \
                 exceeds.";
     fact_ui(ui, "Latency", hint, &latency);
@@ -103,24 +103,34 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
         glossary::RESIDUAL.hint
     );
     fact_ui(ui, "Residual of Eq. (2)", &hint, &residual);
-    outside_ui(ui, frame);
+    let hint = "Readings beyond the range seen in training by more than a tenth of it, and coordinates beyond by more \
+                than all of it. There the network extrapolates: check these readings, or train with a scene that covers \
+                them, for the simulated source with an indenter as the loading.";
+    outside_ui(ui, view.shown.outside, frame.drops_percent.len(), "coordinate", hint);
     let hint = glossary::WIRE_FAULT.hint;
     match &frame.watched {
-        Watched::Off(reason) => {
-            dim_ui(ui, &format!("Faults of wires are {reason}."));
+        Watched::NoNoise => {
+            let reason = "without noise, deviations cannot be judged; give the noise of a reading";
+            dim_ui(ui, &format!("Faults of wires are not looked for: {reason}."));
+        }
+        Watched::TooLarge => {
+            let reason = "the array is too large to check every frame";
+            dim_ui(ui, &format!("Faults of wires are not looked for: {reason}."));
         }
         Watched::Checked(FaultEvent::Recovered) => fact_ui(ui, "Fault", hint, "none"),
         Watched::Checked(FaultEvent::Unexplained) => fact_ui(ui, "Fault", hint, "not a single-wire fault"),
         Watched::Checked(FaultEvent::Named { wire, .. }) => fact_ui(ui, "Fault", hint, &wire.to_string()),
     }
-    let Some(errors) = frame.errors else { return };
+    if frame.actual.is_none() {
+        return;
+    }
     let in_mm = |mm: Option<f64>| match mm {
         Some(mm) => format!("{} mm", format_number(mm)),
         None => format_number(None),
     };
     let hint = "Mean |error| of z over all nodes, compared with the simulated truth, over the latest frames.";
-    fact_ui(ui, "Error", hint, &in_mm(errors.shown_mm));
-    if let Some([by_all, left_out]) = errors.since_named_mm {
+    fact_ui(ui, "Error", hint, &in_mm(view.shown.counts.error_mm));
+    if let Some([by_all, left_out]) = frame.since_named_mm {
         let hint = "Mean |error| of z since the fault was named, by the network with all wires.";
         fact_ui(ui, "Error with all wires", hint, &in_mm(Some(by_all)));
         let hint = "Mean |error| of z since the fault was named, without the faulty wires.";
@@ -128,22 +138,20 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
     }
 }
 
-fn outside_ui(ui: &mut Ui, frame: &LiveFrame) {
-    let (readings, coordinates) = (frame.readings_outside, frame.coordinates_outside);
-    let hint = "Readings beyond the range seen in training by more than a tenth of it, and coordinates beyond by more \
-                than all of it. There the network extrapolates: check these readings, or train with a scene that covers \
-                them, for the simulated source with an indenter as the loading.";
+/// Shows how many of `of` readings, and of the targets, are outside the range seen in training.
+pub fn outside_ui(ui: &mut Ui, outside: (Option<usize>, usize), of: usize, target: &str, hint: &str) {
+    let (readings, targets) = outside;
     let value = match readings {
         None => "readings not known".to_owned(),
-        Some(0) if coordinates == 0 => "none".to_owned(),
-        Some(readings) => format!("{} of {}", counted(readings, "reading"), frame.drops_percent.len()),
+        Some(0) if targets == 0 => "none".to_owned(),
+        Some(readings) => format!("{} of {of}", counted(readings, "reading")),
     };
-    let is_outside = readings.unwrap_or(0) + coordinates > 0;
-    let value = match coordinates {
+    let value = match targets {
         0 => value,
-        number => format!("{value}, {}", counted(number, "coordinate")),
+        number => format!("{value}, {}", counted(number, target)),
     };
     let palette = Theme::of(ui).palette;
+    let is_outside = readings.unwrap_or(0) + targets > 0;
     let colour = if is_outside { palette.warning } else { palette.text };
     coloured_fact_ui(ui, "Outside training", hint, &value, colour);
 }
@@ -194,9 +202,9 @@ fn format_gains(zero: &ZeroGains) -> String {
 }
 
 fn recording_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    if let Some((frames, seconds)) = view.shown.recording.filter(|_| view.recording.is_some()) {
+    if let Some(recorded) = view.shown.recording.as_ref().filter(|_| view.recording.is_some()) {
         let palette = Theme::of(ui).palette;
-        let text = format!("● {}, {seconds:.1} s", counted(frames, "frame"));
+        let text = format!("● {}, {:.1} s", counted(recorded.frames, "frame"), recorded.seconds);
         ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
         return;
     }

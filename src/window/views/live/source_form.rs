@@ -9,11 +9,11 @@ use std::{
 use decoupler_core::{dataset::Simulation, scene::Rows};
 use decoupler_files::{
     export::{NetworkFile, format_percent},
-    live::{Fault, Motion, Source, SourcePlan},
+    live::{Motion, Source, SourcePlan},
 };
 use eframe::egui::{ComboBox, TextEdit, Ui, vec2};
 
-use super::{LiveView, engine::Command, tools::LiveFile};
+use super::{LiveView, tools::LiveFile};
 use crate::window::{
     job::{Background, Wake},
     shared::{Effect, RunList, Shared},
@@ -94,38 +94,27 @@ impl SourceForm {
         self.noise.unwrap_or(of_scene)
     }
 
-    /// Returns the source; a replay begins at `at_s`. This is called in every frame and does not access the file
-    /// system.
+    /// Returns the source. This is called in every frame and does not access the file system.
     ///
     /// # Errors
     /// If a field is empty or invalid, with what to do.
-    pub fn plan(&self, fault: Option<Fault>, at_s: f64) -> Result<SourcePlan, String> {
+    pub fn plan(&self) -> Result<SourcePlan, String> {
         let filled = |text: &str, todo: &str| match text.trim() {
             "" => Err(todo.to_owned()),
             text => Ok(text.to_owned()),
         };
         Ok(match self.kind {
-            SourceKind::Simulated => SourcePlan::Simulated {
-                frames_per_second: self.frames_per_second,
-                motion: self.motion,
-                fault,
-            },
+            SourceKind::Simulated => SourcePlan::Simulated(self.frames_per_second),
             SourceKind::Replay => {
-                let path = PathBuf::from(filled(&self.path, "Choose a file of frames, or record one.")?);
-                SourcePlan::Replay {
-                    path,
-                    at_s,
-                    speed: self.speed,
-                    is_playing: true,
-                }
+                SourcePlan::Replay(filled(&self.path, "Choose a file of frames, or record one.")?.into())
             }
-            SourceKind::Serial => SourcePlan::Stream(Source::Serial {
-                path: filled(
+            SourceKind::Serial => SourcePlan::Stream(Source::Serial(
+                filled(
                     &self.port,
                     "Give the name of the serial port, for example /dev/ttyUSB0 or COM3.",
                 )?,
-                baud: u32::try_from(self.baud).unwrap_or(u32::MAX),
-            }),
+                u32::try_from(self.baud).unwrap_or(u32::MAX),
+            )),
             SourceKind::Tcp => {
                 let address = filled(
                     &self.address,
@@ -275,22 +264,14 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         let has_sensor = view.has_sensor(shared);
         view.source
             .form_ui(ui, simulation.as_ref(), has_sensor, view.running.is_some(), effects);
-        if view.source.motion != motion {
-            view.command(Command::Move(view.source.motion));
-        }
-        if let (SourceKind::Simulated, Some(simulation)) = (view.source.kind, simulation) {
+        let fault = view.fault;
+        if let (SourceKind::Simulated, Some(simulation)) = (view.source.kind, &simulation) {
             let scale = simulation.sensor.scale;
             let read = simulation.scene.rows.read(scale.rows()).unwrap_or_default();
-            let fault = |view: &LiveView| {
-                let is_possible = view.fault.problem(scale, &read).is_none();
-                view.fault.fault(scale).filter(|_| is_possible)
-            };
-            let before = fault(view);
             view.fault.form_ui(ui, scale, &read);
-            let after = fault(view);
-            if after != before {
-                view.command(Command::Break(after));
-            }
+        }
+        if (view.source.motion, view.fault) != (motion, fault) {
+            view.simulate(simulation.as_ref());
         }
         if let (Some(obstacle), true) = (view.obstacle(shared), network.is_some()) {
             ui.add_space(space(1));

@@ -5,17 +5,18 @@ use std::{
         Arc,
         mpsc::{Sender, channel},
     },
+    time::Instant,
 };
 
-use decoupler_core::{live::ZeroGains, scene::Noise};
+use decoupler_core::{dataset::Simulation, live::ZeroGains, scene::Noise};
 use decoupler_files::{
     export::{NetworkFile, atomic_write},
-    live::{Recorded, SessionPlan, SourcePlan, Unit},
+    live::{Input, Recorded, RecordingFile, Replay, ReplayState, Session, SessionPlan, SourcePlan, Unit},
 };
 
 use super::{
     cards::{DropScale, FaultForm},
-    engine::{Command, LiveEvent, LivePlan, LiveShown, run},
+    engine::{Command, LiveEvent, LiveShown, run},
     source_form::{NetworkChoice, SourceForm, SourceKind},
 };
 use crate::window::{
@@ -104,7 +105,7 @@ impl LiveView {
     ///
     /// # Errors
     /// If there is no network or a setting is missing, with what to do.
-    fn plan(&self, shared: &Shared, at_s: f64) -> Result<(String, LivePlan), String> {
+    fn plan(&self, shared: &Shared) -> Result<(String, SessionPlan), String> {
         let (name, network) = self
             .network
             .network(&shared.runs)
@@ -113,25 +114,20 @@ impl LiveView {
             if self.source.kind == SourceKind::Simulated {
                 return Err(NOTHING_TO_SIMULATE.to_owned());
             }
-            let session = SessionPlan {
+            let plan = SessionPlan {
                 network: Arc::clone(network),
-                source: self.source.plan(None, at_s)?,
+                source: self.source.plan()?,
                 noise: Noise::default(),
                 zero: None,
                 unit: Unit::Frames,
             };
-            let recordings = PathBuf::new();
-            return Ok((name.to_owned(), LivePlan { session, recordings }));
+            return Ok((name.to_owned(), plan));
         };
         let scale = simulation.sensor.scale;
         let read = simulation.scene.rows.read(scale.rows()).unwrap_or_default();
-        let fault = self
-            .fault
-            .fault(scale)
-            .filter(|_| self.fault.problem(scale, &read).is_none());
-        let session = SessionPlan {
+        let plan = SessionPlan {
             network: Arc::clone(network),
-            source: self.source.plan(fault, at_s)?,
+            source: self.source.plan()?,
             noise: Noise {
                 relative: self.source.noise(&simulation),
                 ..simulation.scene.noise.in_test()
@@ -142,8 +138,7 @@ impl LiveView {
                 .filter(|zero| zero.is_sound(read.len(), scale.columns())),
             unit: Unit::Frames,
         };
-        let recordings = folder(shared).join("recordings");
-        Ok((name.to_owned(), LivePlan { session, recordings }))
+        Ok((name.to_owned(), plan))
     }
 
     /// Returns true if the network is that of an array, whose sensor model simulates, re-zeroes and finds faults.
@@ -154,12 +149,12 @@ impl LiveView {
 
     /// Returns the reason why decoding cannot begin, with what to do.
     pub(super) fn obstacle(&self, shared: &Shared) -> Option<String> {
-        self.plan(shared, 0.0).err()
+        self.plan(shared).err()
     }
 
     /// Begins to decode.
     pub(super) fn start(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        let Ok((network, plan)) = self.plan(shared, 0.0) else {
+        let Ok((network, plan)) = self.plan(shared) else {
             return;
         };
         effects.push(Effect::Settle(Matter::Live));
@@ -188,10 +183,7 @@ impl LiveView {
 
     /// Returns true if a stream has ended by itself and is still the chosen source.
     pub fn can_retry(&self, shared: &Shared) -> bool {
-        let is_same = |ended: &SourcePlan| {
-            self.plan(shared, 0.0)
-                .is_ok_and(|(_, plan)| plan.session.source == *ended)
-        };
+        let is_same = |ended: &SourcePlan| self.plan(shared).is_ok_and(|(_, plan)| plan.source == *ended);
         self.running.is_none() && self.ended.as_ref().is_some_and(is_same)
     }
 
@@ -204,21 +196,26 @@ impl LiveView {
 
     /// Restarts with the network that is chosen now, from the current position of a replay.
     pub(super) fn restart(&mut self, shared: &Shared) {
-        let replay = self.shown.replay;
-        let Ok((network, mut plan)) = self.plan(shared, replay.map_or(0.0, |replay| replay.at_s)) else {
-            return;
-        };
-        if let (SourcePlan::Replay { is_playing, .. }, Some(replay)) = (&mut plan.session.source, replay) {
-            *is_playing = replay.is_playing;
-        } else {
+        let Ok((network, plan)) = self.plan(shared) else { return };
+        let replay = self
+            .shown
+            .replay
+            .filter(|_| matches!(plan.source, SourcePlan::Replay(_)));
+        if replay.is_none() {
             self.shown = LiveShown::default();
         }
         self.begin(network, plan);
+        if let Some(ReplayState { at_s, is_playing, .. }) = replay {
+            self.control(move |replay, now| {
+                replay.seek(at_s, now);
+                replay.play(is_playing, now);
+            });
+        }
     }
 
-    fn begin(&mut self, network: String, plan: LivePlan) {
+    fn begin(&mut self, network: String, plan: SessionPlan) {
         self.keep_recording();
-        self.zero.clone_from(&plan.session.zero);
+        self.zero.clone_from(&plan.zero);
         self.shows_zero &= self.zero.is_some();
         self.zero_problem = None;
         self.drops = DropScale::default();
@@ -227,10 +224,13 @@ impl LiveView {
         let (commands, incoming) = channel();
         self.running = Some(Running {
             network,
-            source: plan.session.source.clone(),
-            asked: plan.session.source.clone(),
+            source: plan.source.clone(),
+            asked: plan.source.clone(),
             commands,
         });
+        let (simulation, speed) = (plan.network.problem.sensor, self.source.speed);
+        self.simulate(simulation.as_ref());
+        self.control(move |replay, now| replay.set_speed(speed, now));
         self.job.start(
             move |report| run(plan, &incoming, report),
             |ended| LiveEvent::Ended(ended.unwrap_or_else(|error| Err(error.to_string()))),
@@ -243,40 +243,87 @@ impl LiveView {
         self.running = None;
     }
 
-    /// Sends a command to the thread, if it is running.
-    pub(super) fn command(&self, command: Command) {
+    fn command(&self, command: Command) {
         if let Some(running) = &self.running {
             // A thread that has just ended ignores commands.
             let _ = running.commands.send(command);
         }
     }
 
+    /// Changes the session on its thread, if it is running; the event that `change` returns comes back.
+    fn change(&self, change: impl FnOnce(&mut Session) -> Option<LiveEvent> + Send + 'static) {
+        self.command(Command::Change(Box::new(change)));
+    }
+
+    /// Moves the indenter of a simulated source, and breaks its wires, as in the form.
+    pub(super) fn simulate(&self, simulation: Option<&Simulation>) {
+        let Some(simulation) = simulation else { return };
+        let scale = simulation.sensor.scale;
+        let read = simulation.scene.rows.read(scale.rows()).unwrap_or_default();
+        let is_possible = self.fault.problem(scale, &read).is_none();
+        let (motion, fault) = (self.source.motion, self.fault.fault(scale).filter(|_| is_possible));
+        self.change(move |session| {
+            let Input::Simulated(simulated, _) = &mut session.input else {
+                return None;
+            };
+            simulated.motion = motion;
+            let broken = simulated.set_fault(fault);
+            broken.err().map(|error| LiveEvent::Failed(error.to_string()))
+        });
+    }
+
+    /// Changes the replay, if there is one.
+    pub(super) fn control(&self, change: impl FnOnce(&mut Replay, Instant) + Send + 'static) {
+        self.change(|session| {
+            if let Input::Replay(replay) = &mut session.input {
+                change(replay, Instant::now());
+            }
+            None
+        });
+    }
+
     /// Takes the latest frames as the unloaded state.
     pub(super) fn re_zero(&mut self) {
         self.zero_problem = None;
-        self.command(Command::Zero);
+        self.change(|session| {
+            let zero = session.array.as_mut()?.take_zero();
+            Some(LiveEvent::Zeroed(zero.map_err(|error| error.to_string())))
+        });
     }
 
     /// Stops dividing readings by gains.
     pub(super) fn clear_zero(&mut self) {
         (self.zero, self.zero_problem, self.shows_zero) = (None, None, false);
-        self.command(Command::UseZero(None));
+        self.change(|session| {
+            session.array.as_mut()?.zero = None;
+            None
+        });
     }
 
     /// Returns true if incoming frames can be recorded.
     pub(super) fn can_record(&self) -> bool {
-        let is_replay = |running: &Running| matches!(running.source, SourcePlan::Replay { .. });
+        let is_replay = |running: &Running| matches!(running.source, SourcePlan::Replay(_));
         // Frames of an array are recorded; samples of other sensors have columns of their own.
         let is_array = self.shown.targets.is_none();
         is_array && self.running.as_ref().is_some_and(|running| !is_replay(running))
     }
 
     /// Begins a recording, or ends it.
-    pub(super) fn toggle_recording(&self) {
-        self.command(match self.recording {
-            None => Command::Record,
-            Some(_) => Command::EndRecording,
-        });
+    pub(super) fn toggle_recording(&self, shared: &Shared) {
+        let folder = folder(shared).join("recordings");
+        match self.recording {
+            Some(_) => self.change(|session| Some(LiveEvent::Recorded(session.recording.take()?.recorded, None))),
+            None => self.change(move |session| {
+                let array = session.array.as_ref().filter(|_| session.recording.is_none())?;
+                let created = RecordingFile::create(&folder, &array.rows, array.sensor.scale.columns());
+                let begin = |file: RecordingFile| {
+                    let path = file.recorded.path.clone();
+                    session.recording = Some(file);
+                    LiveEvent::Recording(path)
+                };
+                Some(created.map_or_else(LiveEvent::Failed, begin))
+            }),
+        }
     }
 
     /// Replays the last recording.
@@ -290,9 +337,9 @@ impl LiveView {
 
     /// Keeps the recording of a thread that has ended without reporting it.
     fn keep_recording(&mut self) {
-        let Some(path) = self.recording.take() else { return };
-        let (frames, seconds) = self.shown.recording.unwrap_or_default();
-        self.recorded = Some(Recorded { path, frames, seconds });
+        if self.recording.take().is_some() {
+            self.recorded = self.shown.recording.clone();
+        }
     }
 
     /// Takes the events of the thread.
@@ -315,7 +362,7 @@ impl LiveView {
                 LiveEvent::Zeroed(Ok(gains)) => (self.zero, self.zero_problem) = (Some(gains), None),
                 LiveEvent::Zeroed(Err(reason)) => self.zero_problem = Some(reason),
                 LiveEvent::Recording(path) => self.recording = Some(path),
-                LiveEvent::NotRecorded(reason) => notify(Notice::Failed(reason)),
+                LiveEvent::Failed(reason) => notify(Notice::Failed(reason)),
                 LiveEvent::Recorded(recorded, reason) => {
                     (self.recording, self.recorded) = (None, Some(recorded));
                     if let Some(reason) = reason {

@@ -1,6 +1,10 @@
 use eframe::egui::{Align, Layout, Rect, RichText, Ui};
 
-use super::{LiveView, engine::LiveTargets, figures_card::stream_ui};
+use super::{
+    LiveView,
+    engine::LiveTargets,
+    figures_card::{outside_ui, stream_ui},
+};
 use crate::window::{
     plotting::titled_plots_ui,
     shared::{Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
@@ -9,7 +13,7 @@ use crate::window::{
     theme::{Theme, semibold, space, type_size},
     widgets::{card_ui, coloured_fact_ui, fact_ui, scrolled_ui, section_heading_ui},
 };
-use decoupler_core::text::{capitalised, counted};
+use decoupler_core::text::capitalised;
 use decoupler_files::{
     export::format_number,
     figure::{
@@ -46,7 +50,7 @@ pub fn targets_ui(ui: &mut Ui, whole: Rect, view: &mut LiveView, shared: &Shared
     card_ui(ui, left.with_max_x(left.right() - gap), |ui| {
         scrolled_ui(ui, "live targets", |ui| {
             section_heading_ui(ui, "Targets");
-            for (index, (target, value)) in targets.problem.targets.iter().zip(targets.values()).enumerate() {
+            for (index, (target, value)) in targets.network.problem.targets.iter().zip(targets.values()).enumerate() {
                 match intervals.and_then(|intervals| intervals.half_width(index, *value)) {
                     Some(half_width) => fact_ui(
                         ui,
@@ -62,7 +66,11 @@ pub fn targets_ui(ui: &mut Ui, whole: Rect, view: &mut LiveView, shared: &Shared
     card_ui(ui, right, |ui| {
         scrolled_ui(ui, "live stream", |ui| {
             section_heading_ui(ui, "Confidence");
-            outside_ui(ui, &targets);
+            let hint = "Readings beyond the range seen in training by more than a tenth of it, and targets beyond by more than \
+                        all of it. There the network extrapolates: check these readings, or train on a recording that covers \
+                        them.";
+            let features = targets.network.problem.feature_count();
+            outside_ui(ui, view.shown.outside, features, "target", hint);
             drift_ui(ui, &targets);
             section_heading_ui(ui, "Stream");
             stream_ui(ui, view);
@@ -73,7 +81,7 @@ pub fn targets_ui(ui: &mut Ui, whole: Rect, view: &mut LiveView, shared: &Shared
 /// Returns the chart of the values of all targets over time.
 pub fn chart(targets: &LiveTargets) -> PlotFigure {
     let intervals = targets.network.intervals.as_ref();
-    targets_over_time_figure(&targets.problem.targets, &targets.history, intervals)
+    targets_over_time_figure(&targets.network.problem.targets, &targets.history, intervals)
 }
 
 /// Returns the surface through the latest values; `None` if the targets have no positions.
@@ -131,7 +139,7 @@ fn surface_ui(
         let at = targets.surface.as_ref().and_then(|through| through.nodes().get(node));
         let target = at.and_then(|at| {
             Some((
-                targets.problem.targets.get(at.target)?,
+                targets.network.problem.targets.get(at.target)?,
                 targets.values().get(at.target)?,
             ))
         });
@@ -141,28 +149,6 @@ fn surface_ui(
         }
     });
     colour_scale_ui(ui, scale, &surface.scale(), &figure.note(), look, effects);
-}
-
-fn outside_ui(ui: &mut Ui, targets: &LiveTargets) {
-    let hint = "Readings beyond the range seen in training by more than a tenth of it, and targets beyond by more than all \
-                of it. There the network extrapolates: check these readings, or train on a recording that covers them.";
-    let readings = match targets.readings_outside {
-        None => "readings not known".to_owned(),
-        Some(0) if targets.targets_outside == 0 => "none".to_owned(),
-        Some(readings) => format!(
-            "{} of {}",
-            counted(readings, "reading"),
-            targets.problem.feature_count()
-        ),
-    };
-    let value = match targets.targets_outside {
-        0 => readings,
-        number => format!("{readings}, {}", counted(number, "target")),
-    };
-    let is_outside = targets.readings_outside.unwrap_or(0) + targets.targets_outside > 0;
-    let palette = Theme::of(ui).palette;
-    let colour = if is_outside { palette.warning } else { palette.text };
-    coloured_fact_ui(ui, "Outside training", hint, &value, colour);
 }
 
 fn drift_ui(ui: &mut Ui, targets: &LiveTargets) {
@@ -181,7 +167,10 @@ fn drift_ui(ui: &mut Ui, targets: &LiveTargets) {
                 normal. In readings like those of the training, a false alarm occurs on average at most once in 10 000 \
                 blocks of readings, each at least five times as long as neighbouring readings are correlated.";
     let (value, colour) = match drift {
-        Some(drift) => (capitalised(&drift.describe(&targets.problem.inputs)), palette.warning),
+        Some(drift) => (
+            capitalised(&drift.describe(&targets.network.problem.inputs)),
+            palette.warning,
+        ),
         None => ("none".to_owned(), palette.text),
     };
     coloured_fact_ui(ui, NAME, hint, &value, colour);

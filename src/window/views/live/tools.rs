@@ -18,7 +18,7 @@ use eframe::egui::{Align, Button, Key, Label, Layout, Modifiers, RichText, Slide
 use super::{
     LiveView,
     cards::{figure_of, surface_figure},
-    engine::{Command, LiveTargets},
+    engine::LiveTargets,
     targets_card,
 };
 use crate::window::{
@@ -59,7 +59,7 @@ pub fn tools_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut
     if !view.has_sensor(shared) {
         return;
     }
-    record_ui(ui, view);
+    record_ui(ui, view, shared);
     let zero = ui.add_enabled(is_running, ghost_button("Re-zero"));
     let hint = glossary::UNLOADED_STATE.hint;
     if zero.on_hover_text(hint).clicked() {
@@ -67,7 +67,7 @@ pub fn tools_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut
     }
 }
 
-fn record_ui(ui: &mut Ui, view: &LiveView) {
+fn record_ui(ui: &mut Ui, view: &LiveView, shared: &Shared) {
     let is_recording = view.recording.is_some();
     let text = if is_recording {
         "■ End recording"
@@ -93,7 +93,7 @@ fn record_ui(ui: &mut Ui, view: &LiveView) {
         .on_disabled_hover_text(why_not)
         .clicked()
     {
-        view.toggle_recording();
+        view.toggle_recording(shared);
     }
 }
 
@@ -108,7 +108,7 @@ pub fn offer_actions(view: &mut LiveView, offers: &mut Offers<'_>, shared: &Shar
         view.stop();
     }
     if offers.offer_keys("Start or end recording", Modifiers::COMMAND, Key::R, view.can_record()) {
-        view.toggle_recording();
+        view.toggle_recording(shared);
     }
     if offers.offer("Re-zero", is_running && view.has_sensor(shared)) {
         view.re_zero();
@@ -116,7 +116,7 @@ pub fn offer_actions(view: &mut LiveView, offers: &mut Offers<'_>, shared: &Shar
     let replay = view.shown.replay;
     let is_pressed = offers.offer_keys("Pause or resume replay", Modifiers::COMMAND, Key::P, replay.is_some());
     if let Some(replay) = replay.filter(|_| is_pressed) {
-        view.command(Command::Play(!replay.is_playing));
+        view.control(move |control, now| control.play(!replay.is_playing, now));
     }
 }
 
@@ -135,7 +135,7 @@ pub fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView) {
                 .on_hover_text(with_shortcut(ui, "Plays or pauses the recording", Key::P))
                 .clicked()
             {
-                view.command(Command::Play(!replay.is_playing));
+                view.control(move |control, now| control.play(!replay.is_playing, now));
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 speed_ui(ui, view);
@@ -148,9 +148,9 @@ pub fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView) {
                 let slider = slider_ui(ui, slider, width);
                 slider.widget_info(|| WidgetInfo::slider(is_running, replay.at_s, "Replay position"));
                 if slider.double_clicked() {
-                    view.command(Command::Seek(0.0));
+                    view.control(|control, now| control.seek(0.0, now));
                 } else if slider.changed() {
-                    view.command(Command::Seek(at_s));
+                    view.control(move |control, now| control.seek(at_s, now));
                 }
             });
         });
@@ -173,7 +173,8 @@ fn speed_ui(ui: &mut Ui, view: &mut LiveView) {
     slider.widget_info(|| WidgetInfo::slider(true, before, "Replay speed"));
     slider.on_hover_text("Recorded seconds per second, from 0.1 to 10. A double click sets it to 1.");
     if view.source.speed != before {
-        view.command(Command::Speed(view.source.speed));
+        let speed = view.source.speed;
+        view.control(move |control, now| control.set_speed(speed, now));
     }
     dim_ui(ui, "Speed");
 }
@@ -233,7 +234,7 @@ fn target_exports<'a>(targets: &'a LiveTargets, shared: &'a Shared) -> Vec<Expor
 }
 
 fn values_table(targets: &LiveTargets) -> Table {
-    let names = targets.problem.targets.iter().map(Channel::title);
+    let names = targets.network.problem.targets.iter().map(Channel::title);
     let row = |(time_s, values): &(f64, Arc<[f64]>)| {
         let values = std::iter::once(time_s).chain(values.iter());
         values.map(|&value| Cell::from(value)).collect()

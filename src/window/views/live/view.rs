@@ -36,7 +36,7 @@ impl View for LiveView {
 
     fn files_in_use(&self) -> Vec<FileInUse> {
         let replayed = self.running.as_ref().and_then(|running| match &running.source {
-            SourcePlan::Replay { path, .. } => Some(FileInUse::Recording(path.clone())),
+            SourcePlan::Replay(path) => Some(FileInUse::Recording(path.clone())),
             _ => None,
         });
         let recorded = self.recording.clone().map(FileInUse::Recorded);
@@ -123,10 +123,8 @@ fn status_ui(ui: &mut Ui, view: &LiveView) {
             (palette.warning, "The readings contradict Eq. (2)".to_owned())
         }
         (Some(running), _) => match (&running.source, view.shown.replay) {
-            (SourcePlan::Replay { .. }, Some(replay)) if !replay.is_playing => {
-                (palette.dim, "Replay paused".to_owned())
-            }
-            (SourcePlan::Replay { .. }, _) => (palette.good, "Replaying".to_owned()),
+            (SourcePlan::Replay(_), Some(replay)) if !replay.is_playing => (palette.dim, "Replay paused".to_owned()),
+            (SourcePlan::Replay(_), _) => (palette.good, "Replaying".to_owned()),
             _ => (palette.good, "Live".to_owned()),
         },
     };
@@ -135,8 +133,8 @@ fn status_ui(ui: &mut Ui, view: &LiveView) {
         let dim = |ui: &mut Ui, text: String| ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
         if let Some(running) = &view.running {
             let source = match &running.source {
-                SourcePlan::Simulated { .. } => "simulated".to_owned(),
-                SourcePlan::Replay { path, .. } => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+                SourcePlan::Simulated(_) => "simulated".to_owned(),
+                SourcePlan::Replay(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
                 SourcePlan::Stream(source) => source.to_string(),
             };
             dim(ui, format!("{}, {source}", running.network));
@@ -144,8 +142,9 @@ fn status_ui(ui: &mut Ui, view: &LiveView) {
                 dim(ui, format!("{:.0} frames per second", counts.frames_per_second));
             }
         }
-        if let Some((frames, seconds)) = view.shown.recording.filter(|_| view.recording.is_some()) {
-            let text = format!("● Recording: {}, {seconds:.1} s", counted(frames, "frame"));
+        if let Some(recorded) = view.shown.recording.as_ref().filter(|_| view.recording.is_some()) {
+            let frames = counted(recorded.frames, "frame");
+            let text = format!("● Recording: {frames}, {:.1} s", recorded.seconds);
             ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
         }
     });

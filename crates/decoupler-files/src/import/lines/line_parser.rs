@@ -152,12 +152,6 @@ impl LineParser {
         ))
     }
 
-    /// Returns a parser of the resistances of numbered row-wires, those in `read`, of an array with `last` row-wires.
-    pub(crate) fn of_numbered_rows(channels: usize, read: Vec<usize>, last: usize) -> Self {
-        let unnumbered = Unnumbered::Refused;
-        Self::of_resistances(channels, RowWires { read, last, unnumbered })
-    }
-
     fn of_resistances(channels: usize, rows: RowWires) -> Self {
         let inputs = (1..=channels).map(|channel| Channel::new(format!("r_{channel}"), None));
         let others = OtherColumns {
