@@ -27,13 +27,12 @@ pub use drawing::{Align, Bounds, Colour, Ink, Measure, Shape, Stroke};
 pub use heat_map::{HeatMap, HeatMapDrawing};
 pub use of_epochs::{EpochOutline, compared_losses_figure, loss_figure, training_state_figure};
 pub use of_errors::{
-    ErrorBins, RegressionLine, error_histogram_figure, pair_sample, regression_figure, target_histogram_figure,
-    target_pairs, target_regression_figure,
+    Decoded, ErrorBins, RegressionLine, histogram_figure, pair_address, pair_sample, regression_figure, value_pairs,
 };
 pub use of_experiment::experiment_figure;
 pub use of_live::{readings_figure, targets_over_time_figure, zero_gains_figure};
 pub use of_recorded::{TargetSurface, hysteresis_figure, position_error_map};
-pub use of_sample::{node_figure, pair_address, sample_figure, singular_values_figure, starts_figure, z_pairs_mm};
+pub use of_sample::{node_figure, sample_figure, singular_values_figure, starts_figure};
 pub use of_section::{SectionNodes, section_figure};
 pub use of_trade_off::{
     TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure, training_time,
@@ -155,38 +154,48 @@ pub struct Look {
 impl Look {
     /// A line without symbols.
     pub fn line(hue: Hue, style: LineStyle) -> Self {
-        Self {
-            hue,
-            line: Some(style),
-            marker: None,
-        }
+        let (line, marker) = (Some(style), None);
+        Self { hue, line, marker }
     }
 
     /// Symbols without a line.
     pub fn marker(hue: Hue, marker: Marker) -> Self {
-        Self {
-            hue,
-            line: None,
-            marker: Some(marker),
-        }
+        let (line, marker) = (None, Some(marker));
+        Self { hue, line, marker }
     }
 
-    /// Symbols joined by a solid line.
-    pub fn joined(self) -> Self {
-        Self {
-            line: Some(LineStyle::Solid),
-            ..self
-        }
+    /// Symbols joined by a line.
+    pub fn joined(mut self, style: LineStyle) -> Self {
+        self.line = Some(style);
+        self
     }
 
     /// A filled area: the bars of a histogram or a span of an axis.
     pub fn area(hue: Hue) -> Self {
-        Self {
-            hue,
-            line: None,
-            marker: None,
+        let (line, marker) = (None, None);
+        Self { hue, line, marker }
+    }
+}
+
+/// Returns the first of the items with each key.
+fn unique_by<T, K: PartialEq>(items: impl Iterator<Item = T>, key: impl Fn(&T) -> K) -> Vec<T> {
+    let mut unique: Vec<T> = Vec::new();
+    for item in items {
+        if unique.iter().all(|other| key(other) != key(&item)) {
+            unique.push(item);
         }
     }
+    unique
+}
+
+/// Returns a name with its unit in brackets, if there is one.
+fn titled(name: &str, unit: Option<&str>) -> String {
+    unit.map_or_else(|| name.to_owned(), |unit| format!("{name} ({unit})"))
+}
+
+/// Returns a value with its unit behind it, if there is one.
+fn with_unit(value: impl std::fmt::Display, unit: Option<&str>) -> String {
+    unit.map_or_else(|| value.to_string(), |unit| format!("{value} {unit}"))
 }
 
 #[cfg(test)]

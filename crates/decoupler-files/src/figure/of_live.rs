@@ -11,6 +11,7 @@ use super::{
     colour_map::SequentialMap,
     heat_map::HeatMap,
     plot::{Plot, PlotFigure, Series},
+    titled, unique_by,
 };
 
 const HUES: [Hue; 6] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Violet, Hue::Cyan, Hue::Red];
@@ -24,54 +25,39 @@ pub fn targets_over_time_figure(
     history: &[(f64, Arc<[f64]>)],
     intervals: Option<&Intervals>,
 ) -> PlotFigure {
-    let mut units: Vec<&Option<String>> = Vec::new();
-    for target in targets {
-        if !units.contains(&&target.unit) {
-            units.push(&target.unit);
-        }
-    }
     let has_names = targets.len() <= MAX_NAMES;
-    let look = |target: usize| {
+    let hue = |target: usize| HUES[target % HUES.len()];
+    let series = |target: usize| {
         let style = match target / HUES.len() {
             _ if !has_names => LineStyle::Fine,
             0 => LineStyle::Solid,
             _ => LineStyle::Dashed,
         };
-        Look::line(HUES[target % HUES.len()], style)
-    };
-    let series = |target: usize| {
         let points = history.iter().map(|(time_s, values)| [*time_s, values[target]]);
-        let series = Series::new(targets[target].name.clone(), look(target), points);
+        let series = Series::new(&targets[target].name, Look::line(hue(target), style), points);
         series.listed(has_names.then(|| targets[target].title()).as_deref())
     };
-    let limit = |target: usize, sign: f64| {
-        let intervals = intervals.filter(|intervals| has_names && intervals.half_width(target, 0.0).is_some())?;
-        let points = history.iter().filter_map(move |(time_s, values)| {
-            let half_width = intervals.half_width(target, values[target])?;
+    let intervals = intervals.filter(|_| has_names);
+    let limit = |target: usize, side: &str, sign: f64| {
+        let points = history.iter().filter_map(|(time_s, values)| {
+            let half_width = intervals?.half_width(target, values[target])?;
             Some([*time_s, values[target] + sign * half_width])
         });
-        let side = if sign < 0.0 { "lower" } else { "upper" };
         let name = format!("{}, {side} limit of the 90 % interval", targets[target].name);
-        let look = Look::line(HUES[target % HUES.len()], LineStyle::Fine);
-        Some(Series::new(name, look, points).listed(None))
+        Series::new(name, Look::line(hue(target), LineStyle::Fine), points).listed(None)
     };
-    let limits = |target: usize| [-1.0, 1.0].into_iter().filter_map(move |sign| limit(target, sign));
-    let plot = |unit: &Option<String>| {
-        let of_unit = (0..targets.len()).filter(|&target| targets[target].unit == *unit);
-        let name = match unit {
-            Some(unit) => format!("decoded value ({unit})"),
-            None => "decoded value".to_owned(),
-        };
+    let units = unique_by(targets.iter().map(|target| target.unit.as_deref()), |unit| *unit);
+    let plots = units.into_iter().map(|unit| {
+        let of_unit = (0..targets.len()).filter(|&target| targets[target].unit.as_deref() == unit);
+        let limits = |target: usize| [limit(target, "lower", -1.0), limit(target, "upper", 1.0)];
+        let series = of_unit.clone().map(series).chain(of_unit.flat_map(limits));
         Plot::new(
             PlotAxis::linear("time (s)"),
-            PlotAxis::linear(name),
-            of_unit.clone().map(series).chain(of_unit.flat_map(limits)).collect(),
+            PlotAxis::linear(titled("decoded value", unit)),
+            series,
         )
-    };
-    PlotFigure {
-        plots: units.into_iter().map(plot).collect(),
-        notes: Vec::new(),
-    }
+    });
+    PlotFigure::new(plots, [])
 }
 
 /// Readings of a frame, rows × columns, as their drop below the unloaded state.

@@ -14,52 +14,46 @@ use ndarray::{Array2, ArrayView2};
 
 use super::{
     Hue, LineStyle, Look,
-    axis::{PlotAxis, step_for, tick_text},
+    axis::{PlotAxis, ends, step_for, tick_text},
     colour_map::SequentialMap,
     heat_map::HeatMap,
     of_errors::decoded_against_actual,
     plot::{Plot, PlotFigure, Series},
     surface::{Quantity, Surface},
+    titled, with_unit,
 };
 
 /// Mean decoded against actual values of `target` while it rises and while it falls, with the line on which they would be
 /// equal; next to it their differences from the actual values, which show a narrow loop.
 pub fn hysteresis_figure(found: &HysteresisLoop, target: &Channel) -> PlotFigure {
-    let branch = |name: &str, hue, style, of: &dyn Fn(f64, f64, f64) -> f64| {
-        let levels = found.levels.iter();
-        let points = levels.map(|&[actual, loading, unloading]| [actual, of(actual, loading, unloading)]);
-        Series::new(name, Look::line(hue, style), points)
-    };
     let named = |name: &str, rmse| format!("{name}, RMSE {}", format_number(rmse));
-    let (loading, unloading) = (
-        named("loading", found.loading.rmse),
-        named("unloading", found.unloading.rmse),
-    );
-    let branches = |is_difference: bool| {
-        let less = move |value: f64, actual: f64| if is_difference { value - actual } else { value };
-        vec![
-            branch("equal", Hue::Ink, LineStyle::Dashed, &|actual, _, _| {
-                less(actual, actual)
-            }),
-            branch(&loading, Hue::Blue, LineStyle::Solid, &|actual, loading, _| {
-                less(loading, actual)
-            }),
-            branch(&unloading, Hue::Orange, LineStyle::Solid, &|actual, _, unloading| {
-                less(unloading, actual)
-            }),
-        ]
+    // Values at a level: the actual one, and the mean ones of loading and unloading.
+    let branches = [
+        ("equal".to_owned(), Look::line(Hue::Ink, LineStyle::Dashed)),
+        (
+            named("loading", found.loading.rmse),
+            Look::line(Hue::Blue, LineStyle::Solid),
+        ),
+        (
+            named("unloading", found.unloading.rmse),
+            Look::line(Hue::Orange, LineStyle::Solid),
+        ),
+    ];
+    let series = |is_difference: bool| {
+        let branches = branches.iter().enumerate().map(|(branch, (name, look))| {
+            let points = found.levels.iter().map(|level| match is_difference {
+                true => [level[0], level[branch] - level[0]],
+                false => [level[0], level[branch]],
+            });
+            Series::new(name, *look, points)
+        });
+        branches.collect()
     };
+    let (title, unit) = (target.title(), target.unit.as_deref());
     let note = format!("Hysteresis {:.1} % of the range", found.percent_of_range);
-    let mut figure = decoded_against_actual(&target.title(), "decoded", branches(false), vec![note]);
-    let unit = target
-        .unit
-        .as_ref()
-        .map_or_else(String::new, |unit| format!(" ({unit})"));
-    figure.plots.push(Plot::new(
-        PlotAxis::linear(format!("actual {}", target.title())),
-        PlotAxis::linear(format!("decoded − actual{unit}")),
-        branches(true),
-    ));
+    let mut figure = decoded_against_actual(&title, "decoded", series(false), vec![note]);
+    let [x, y] = [format!("actual {title}"), titled("decoded − actual", unit)].map(PlotAxis::linear);
+    figure.plots.push(Plot::new(x, y, Vec::from_iter(series(true))));
     figure
 }
 
@@ -95,38 +89,25 @@ pub fn position_error_map(
         0 => f64::NAN,
         count => (squares[cell] / count as f64).sqrt(),
     });
-    let with_unit = |text: String| unit.map_or(text.clone(), |unit| format!("{text} {unit}"));
     let notes = Array2::from_shape_fn(values.dim(), |(row, column)| {
-        let of = |name: &str, range: RangeInclusive<f64>| {
-            let width = range.end() - range.start();
-            let ends = [range.start(), range.end()]
-                .map(|end| tick_text(*end, width))
-                .join(" to ");
-            format!("{name} {}", with_unit(ends))
-        };
-        let place = format!(
-            "{}, {}",
-            of(names[0], across.range(column)),
-            of(names[1], up.range(up.count - 1 - row))
-        );
+        let [x, y] = [across.range_text(column), up.range_text(up.count - 1 - row)].map(|range| with_unit(range, unit));
+        let place = format!("{} {x}, {} {y}", names[0], names[1]);
         match counts[[row, column]] {
             0 => format!("{place}: no test sample"),
-            count => format!(
-                "{place}: error {} over {}",
-                with_unit(format_number(values[[row, column]])),
-                counted(count, "test sample")
-            ),
+            count => {
+                let error = with_unit(format_number(values[[row, column]]), unit);
+                format!("{place}: error {error} over {}", counted(count, "test sample"))
+            }
         }
     });
-    let title = |name: &str| unit.map_or(name.to_owned(), |unit| format!("{name} ({unit})"));
     Some(HeatMap {
-        x_name: title(names[0]),
-        y_name: title(names[1]),
+        x_name: titled(names[0], unit),
+        y_name: titled(names[1], unit),
         columns: (0..across.count).map(|cell| across.centre_text(cell)).collect(),
         rows: (0..up.count).rev().map(|cell| up.centre_text(cell)).collect(),
         values,
         notes,
-        value_axis: PlotAxis::linear(title("error in both targets")).including([0.0]),
+        value_axis: PlotAxis::linear(titled("error in both targets", unit)).including([0.0]),
         colours: SequentialMap::default(),
     })
 }
@@ -141,9 +122,7 @@ struct Cells {
 impl Cells {
     /// Returns `None` if the values do not vary, or if their range overflows.
     fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-            (low.min(value), high.max(value))
-        });
+        let (low, high) = ends(values);
         if low >= high || !(high - low).is_finite() {
             return None;
         }
@@ -157,9 +136,9 @@ impl Cells {
         (((value - self.first) / self.width) as usize).min(self.count - 1)
     }
 
-    fn range(&self, cell: usize) -> RangeInclusive<f64> {
-        let low = self.first + self.width * cell as f64;
-        low..=low + self.width
+    fn range_text(&self, cell: usize) -> String {
+        let ends = [cell, cell + 1].map(|end| self.first + self.width * end as f64);
+        ends.map(|end| tick_text(end, self.width)).join(" to ")
     }
 
     fn centre_text(&self, cell: usize) -> String {
@@ -210,17 +189,12 @@ impl TargetSurface {
     /// entry for each target, `range` is that of the values.
     pub fn surfaces(&self, actual: &[f64], decoded: &[f64], range: RangeInclusive<f64>) -> [Surface; 3] {
         let errors = Vec::from_iter(decoded.iter().zip(actual).map(|(decoded, actual)| decoded - actual));
-        let largest = self
-            .values(&errors)
-            .map(f64::abs)
-            .filter(|error| error.is_finite())
-            .fold(0.0, f64::max);
+        let of_nodes = self.nodes.iter().map(|node| errors[node.target].abs());
+        let largest = of_nodes.filter(|error| error.is_finite()).fold(0.0, f64::max);
         // Rounding errors are not distinguished by colour.
         let largest = largest.max(1e-9 * (range.end() - range.start()));
-        let (value, error) = (
-            Quantity::Target(self.unit.clone()),
-            Quantity::TargetError(self.unit.clone()),
-        );
+        let value = Quantity::Target(self.unit.clone());
+        let error = Quantity::TargetError(self.unit.clone());
         [
             self.surface("Actual", actual, value.clone(), range.clone()),
             self.surface("Decoded", decoded, value, range),
@@ -230,19 +204,13 @@ impl TargetSurface {
 
     /// Returns the range of the targets at the nodes; `ranges` are the minimum and maximum of each target.
     pub fn range_of(&self, ranges: &[(f64, f64)]) -> RangeInclusive<f64> {
-        let of_nodes = || self.nodes.iter().map(|node| ranges[node.target]);
-        let low = of_nodes().map(|(low, _)| low).fold(f64::INFINITY, f64::min);
-        low..=of_nodes().map(|(_, high)| high).fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// Returns the values at the nodes from `of_targets`, which has one for each target.
-    fn values(&self, of_targets: &[f64]) -> impl Iterator<Item = f64> {
-        self.nodes.iter().map(|node| of_targets[node.target])
+        let (low, high) = ends(self.nodes.iter().flat_map(|node| <[f64; 2]>::from(ranges[node.target])));
+        low..=high
     }
 
     fn surface(&self, title: &str, of_targets: &[f64], quantity: Quantity, range: RangeInclusive<f64>) -> Surface {
-        let nodes = self.nodes.iter().zip(self.values(of_targets));
-        let nodes = nodes.map(|(node, value)| DVec3::new(node.x_mm, node.y_mm, value));
+        let nodes = self.nodes.iter();
+        let nodes = nodes.map(|node| DVec3::new(node.x_mm, node.y_mm, of_targets[node.target]));
         Surface::through(title, &self.map, nodes.collect::<Vec<_>>(), quantity, range)
     }
 }

@@ -38,68 +38,44 @@ pub fn section_figure(
         SectionLine::RowWire(_) => ("y", |place| place.y),
         SectionLine::ColumnWire(_) => ("x", |place| place.x),
     };
-    let looks = [
-        ("actual", Look::line(Hue::Grey, LineStyle::Solid), Marker::Square),
-        ("decoupled", Look::line(Hue::Blue, LineStyle::Solid), Marker::Disc),
-    ];
-    let surfaces = [Some(actual), decoupled];
     let shown = || {
-        looks
-            .into_iter()
-            .zip(surfaces)
-            .filter_map(|(look, surface)| Some((look, surface?)))
+        let decoupled = decoupled.map(|surface| ("decoupled", Hue::Blue, Marker::Disc, surface));
+        std::iter::once(("actual", Hue::Grey, Marker::Square, actual)).chain(decoupled)
     };
-    let curves = shown().map(|((name, look, _), surface)| {
+    let curves = shown().map(|(name, hue, _, surface)| {
         let curve = section.curve_mm(map.grid(), surface.values_mm);
-        Series::new(name, look, curve.iter().map(|at| [place(at), at.z]))
-    });
-    let curves: Vec<Series> = curves.filter(|curve| !curve.points.is_empty()).collect();
-    let nodes = shown().filter_map(|((name, look, marker), surface)| {
-        let on = on_wire(section.line, rows, surface.nodes_mm)?;
-        let points = on.map(|(node, of_row, at)| PlotPoint {
-            note: Some(format!(
-                "{}, node {}\n{name} z: {} mm",
-                capitalised(&section.line.name()),
-                of_row + 1,
-                format_number(at.z)
-            )),
-            ..PlotPoint::from([place(at), at.z]).of_item(node)
-        });
-        let series = Series::new(format!("{name} nodes"), Look::marker(look.hue, marker), points);
-        Some(series.listed(None))
+        let curve = curve.iter().map(|at| [place(at), at.z]);
+        Series::new(name, Look::line(hue, LineStyle::Solid), curve)
     });
     let name = section.line.name();
-    let (spans, notes) = match curves.is_empty() {
-        false => (beyond(section.line, map), Vec::new()),
+    let title = capitalised(&name);
+    let nodes = shown().map(|(name, hue, marker, surface)| {
+        let points = on_wire(section.line, rows, surface.nodes_mm).map(|(node, of_row)| {
+            let at = surface.nodes_mm[node];
+            let note = format!("{title}, node {}\n{name} z: {} mm", of_row + 1, format_number(at.z));
+            PlotPoint::from([place(&at), at.z]).of_item(node).noted(note)
+        });
+        Series::new(format!("{name} nodes"), Look::marker(hue, marker), points).listed(None)
+    });
+    let x = PlotAxis::linear(format!("{axis} along {name} (mm)"));
+    let y = PlotAxis::linear("z (mm)").including([*heights_mm.start(), *heights_mm.end()]);
+    let plot = Plot::new(x, y, curves.chain(nodes));
+    match plot.keys().is_empty() {
         true => {
-            let note = "lies beyond the nodes: there is no surface above it.";
-            (Vec::new(), vec![format!("{} {note}", capitalised(&name))])
+            let note = format!("{title} lies beyond the nodes: there is no surface above it.");
+            PlotFigure::new([plot], [note])
         }
-    };
-    let plot = Plot::new(
-        PlotAxis::linear(format!("{axis} along {name} (mm)")),
-        PlotAxis::linear("z (mm)").including([*heights_mm.start(), *heights_mm.end()]),
-        curves.iter().cloned().chain(nodes).collect(),
-    );
-    PlotFigure {
-        plots: vec![Plot { spans, ..plot }],
-        notes,
+        false => plot.with_spans(beyond(section.line, map)).into(),
     }
 }
 
-/// The nodes on a row-wire: their numbers among all and on the wire, and their places. `None` for a column-wire, which
-/// passes below the surface between them.
-fn on_wire<'a>(
-    line: SectionLine,
-    rows: &[usize],
-    nodes_mm: &'a [DVec3],
-) -> Option<impl Iterator<Item = (usize, usize, &'a DVec3)> + use<'a>> {
-    let SectionLine::RowWire(wire) = line else { return None };
-    let row = rows.iter().position(|row| *row == wire)?;
-    let per_row = nodes_mm.len() / rows.len();
-    let first = row * per_row;
-    let of_row = nodes_mm[first..first + per_row].iter().enumerate();
-    Some(of_row.map(move |(of_row, at)| (first + of_row, of_row, at)))
+/// The nodes on a row-wire: their numbers among all and on the wire. None for a column-wire, which passes below the surface
+/// between them.
+fn on_wire(line: SectionLine, rows: &[usize], nodes_mm: &[DVec3]) -> impl Iterator<Item = (usize, usize)> + use<> {
+    let row = rows.iter().position(|&row| line == SectionLine::RowWire(row));
+    let per_row = nodes_mm.len() / rows.len().max(1);
+    let on_wire = row.map(|row| (0..per_row).map(move |of_row| (row * per_row + of_row, of_row)));
+    on_wire.into_iter().flatten()
 }
 
 /// The stretches on which the surface is extrapolated.
@@ -111,11 +87,8 @@ fn beyond(line: SectionLine, map: &SurfaceMap) -> Vec<Span> {
     };
     let last = points_mm.len() - 1;
     let ends = [(0, *inside.start()), (*inside.end(), last)];
-    let spans = ends.into_iter().filter(|(from, to)| from < to).map(|(from, to)| Span {
-        name: "beyond the nodes".to_owned(),
-        hue: Hue::Grey,
-        range: points_mm[from]..=points_mm[to],
-    });
+    let spans = ends.into_iter().filter(|(from, to)| from < to);
+    let spans = spans.map(|(from, to)| Span::new("beyond the nodes", Hue::Grey, points_mm[from]..=points_mm[to]));
     spans.collect()
 }
 

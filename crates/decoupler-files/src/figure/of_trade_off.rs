@@ -94,25 +94,20 @@ impl TradeOffLevel {
 /// answers to the two questions with their limits.
 pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotFigure {
     let has = |is_so: &dyn Fn(&TradeOffPoint) -> bool| level.points.iter().any(is_so);
+    let of_preset = |preset| has(&|point| point.preset == Some(preset));
+    let is_single = has(&|point| point.report.precision == Precision::Single);
     let marks = [
-        (has(&|point| point.preset == Some(Preset::Paper)), "discs: paper preset"),
-        (
-            has(&|point| point.preset == Some(Preset::Best)),
-            "diamonds: best preset",
-        ),
-        (
-            has(&|point| point.report.precision == Precision::Single),
-            "hollow: 32 bits",
-        ),
+        (of_preset(Preset::Paper), "discs: paper preset"),
+        (of_preset(Preset::Best), "diamonds: best preset"),
+        (is_single, "hollow: 32 bits"),
     ];
     let marks = marks
         .into_iter()
-        .filter_map(|(is_there, mark)| is_there.then_some(mark));
+        .filter(|(is_there, _)| *is_there)
+        .map(|(_, mark)| mark);
     let note = capitalised(&Vec::from_iter(marks).join(", "));
-    PlotFigure {
-        plots: TradeOffCost::ALL.map(|cost| plot(level, limits, cost)).into(),
-        notes: (!note.is_empty()).then(|| format!("{note}.")).into_iter().collect(),
-    }
+    let plots = TradeOffCost::ALL.map(|cost| plot(level, limits, cost));
+    PlotFigure::new(plots, (!note.is_empty()).then(|| format!("{note}.")))
 }
 
 fn marker(preset: Option<Preset>, precision: Precision) -> Marker {
@@ -125,32 +120,35 @@ fn marker(preset: Option<Preset>, precision: Precision) -> Marker {
 }
 
 fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> Plot {
-    let at = |point: &TradeOffPoint| {
-        let (x, y) = cost.of(point);
-        [x, y]
-    };
+    let at = |point: &TradeOffPoint| <[f64; 2]>::from(cost.of(point));
     let is_on_front = level.front(cost);
-    let front = Look::line(Hue::Grey, LineStyle::Solid);
-    let mut series = vec![Series::new("Pareto front", front, self::front(level, cost))];
+    let points = || level.points.iter().zip(&is_on_front);
+    let front = points()
+        .filter(|(_, is_on_front)| **is_on_front)
+        .map(|(point, _)| at(point));
+    let mut series = vec![Series::new(
+        "Pareto front",
+        Look::line(Hue::Grey, LineStyle::Solid),
+        steps(front),
+    )];
     for kind in DecoderKind::ALL {
         for &precision in kind.precisions() {
             for preset in Preset::ALL.into_iter().map(Some).chain([None]) {
                 let is_of = |(point, _): &(&TradeOffPoint, &bool)| {
                     (point.report.kind, point.report.precision, point.preset) == (kind, precision, preset)
                 };
-                let points = level.points.iter().zip(&is_on_front).filter(is_of);
-                let points = points.map(|(point, is_on_front)| PlotPoint {
-                    note: Some(format!("{}\n{}", point_name(point), point_facts(point).join("\n"))),
-                    label: is_on_front.then(|| point_label(point)),
-                    ..PlotPoint::from(at(point))
+                let points = points().filter(is_of).map(|(point, is_on_front)| {
+                    let note = format!("{}\n{}", point_name(point), point_facts(point).join("\n"));
+                    let mut drawn = PlotPoint::from(at(point)).noted(note);
+                    drawn.label = is_on_front.then(|| point_label(point));
+                    drawn
                 });
                 let look = Look::marker(Hue::of_decoder(kind), marker(preset, precision));
-                let name = match preset {
-                    Some(preset) => format!("{}, {preset} preset", kind.name(precision)),
-                    None => kind.name(precision).to_owned(),
-                };
-                let of_kind = Series::new(name, look, points);
-                series.push(of_kind.listed(Some(kind.name(Precision::Double))));
+                let mut name = kind.name(precision).to_owned();
+                if let Some(preset) = preset {
+                    name += &format!(", {preset} preset");
+                }
+                series.push(Series::new(name, look, points).listed(Some(kind.name(Precision::Double))));
             }
         }
     }
@@ -158,72 +156,53 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         format!("fastest under {}", format_percent(limits.percent)),
         format!("most accurate under {}", frame_time(limits.microseconds)),
     ];
+    // The questions and their limits are about decoding.
+    let is_decoding = cost == TradeOffCost::Decoding;
     for (answer, name) in level.answers(limits).into_iter().zip(questions) {
-        let Some(answer) = answer.and_then(|answer| level.points.get(answer)) else {
-            continue;
-        };
-        let point = PlotPoint {
-            // The questions are about decoding.
-            label: (cost == TradeOffCost::Decoding).then(|| name.clone()),
-            ..PlotPoint::from(at(answer))
-        };
-        let look = Look::marker(Hue::Blue, Marker::Halo);
-        series.push(Series::new(name, look, [point]).listed(None));
+        if let Some(answer) = answer.and_then(|answer| level.points.get(answer)) {
+            let mut point = PlotPoint::from(at(answer));
+            point.label = is_decoding.then(|| name.clone());
+            series.push(Series::new(name, Look::marker(Hue::Blue, Marker::Halo), [point]).listed(None));
+        }
     }
-    series.retain(|series| !series.points.is_empty());
-    let mut plot = Plot::new(
-        PlotAxis::logarithmic(cost.name()),
-        PlotAxis::logarithmic(if level.noise.is_some() {
-            "Z error (%)"
-        } else {
-            "mean absolute error (% of range)"
-        }),
-        series,
-    );
+    let error = match level.noise {
+        Some(_) => "Z error (%)",
+        None => "mean absolute error (% of range)",
+    };
+    let plot = Plot::new(PlotAxis::logarithmic(cost.name()), PlotAxis::logarithmic(error), series);
     let model_based = level.points.first().and_then(|point| point.model_based);
     let model_based = model_based.filter(|errors| !errors.is_rounding());
-    if let Some(percent) = model_based.and_then(|errors| errors.z_percent) {
+    let model_based = model_based.and_then(|errors| errors.z_percent).map(|percent| {
         let at = LineAt::Y(percent);
-        let line = ReferenceLine::new("model-based", at, Hue::Ink, LineStyle::Dashed);
-        plot.lines.push(line);
-    }
-    // The limits apply to decoding and are shown if they are within the range of the points.
-    let places = level.points.iter().map(at);
-    let places: Vec<[f64; 2]> = places.filter(|[x, y]| plot.place(*x, *y).is_some()).collect();
+        ReferenceLine::new("model-based", at, Hue::Ink, LineStyle::Dashed)
+    });
+    // Limits are shown if they are within the range of the points.
+    let places = level
+        .points
+        .iter()
+        .map(at)
+        .filter(|[x, y]| plot.place(*x, *y).is_some());
+    let places: Vec<[f64; 2]> = places.collect();
     let is_among = |limit: f64, axis: usize| {
         places.iter().any(|place| place[axis] <= limit) && places.iter().any(|place| place[axis] >= limit)
     };
-    let limit_lines = [
-        (
-            is_among(limits.microseconds, 0),
-            "longest time",
-            LineAt::X(limits.microseconds),
-        ),
-        (is_among(limits.percent, 1), "largest error", LineAt::Y(limits.percent)),
+    let [time, percent] = [limits.microseconds, limits.percent];
+    let limits = [
+        (is_among(time, 0), "longest time", LineAt::X(time)),
+        (is_among(percent, 1), "largest error", LineAt::Y(percent)),
     ];
-    for (is_shown, name, at) in limit_lines {
-        if is_shown && cost == TradeOffCost::Decoding {
-            let line = ReferenceLine::new(name, at, Hue::Blue, LineStyle::Dotted);
-            plot.lines.push(line.listed(Some("limits asked for")));
-        }
-    }
-    plot
-}
-
-/// Returns the line through the points that no other point beats.
-fn front(level: &TradeOffLevel, cost: TradeOffCost) -> Vec<[f64; 2]> {
-    let chosen = level.points.iter().zip(level.front(cost));
-    steps(chosen.filter(|(_, is_chosen)| *is_chosen).map(|(point, _)| {
-        let (x, y) = cost.of(point);
-        [x, y]
-    }))
+    let shown = limits.into_iter().filter(|(is_shown, ..)| *is_shown && is_decoding);
+    let shown = shown.map(|(_, name, at)| {
+        let line = ReferenceLine::new(name, at, Hue::Blue, LineStyle::Dotted);
+        line.listed(Some("limits asked for"))
+    });
+    plot.with_lines(model_based.into_iter().chain(shown))
 }
 
 /// Joins the points of a Pareto front by steps: nothing better was measured between them.
-pub(super) fn steps(places: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
-    let mut places: Vec<[f64; 2]> = places
-        .filter(|place| place.iter().all(|part| part.is_finite()))
-        .collect();
+fn steps(places: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
+    let finite = places.filter(|place| place.iter().all(|part| part.is_finite()));
+    let mut places: Vec<[f64; 2]> = finite.collect();
     places.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let mut steps: Vec<[f64; 2]> = Vec::new();
     for place in places {
@@ -250,7 +229,7 @@ pub fn point_name(point: &TradeOffPoint) -> String {
 }
 
 /// `Network f32, 12 hidden`, next to a point whose mark shows the preset.
-pub fn point_label(point: &TradeOffPoint) -> String {
+fn point_label(point: &TradeOffPoint) -> String {
     let name = point.report.kind.name(point.report.precision).to_owned();
     match point.hidden() {
         Some(hidden) => format!("{name}, {hidden} hidden"),

@@ -5,7 +5,8 @@ use glam::Vec2;
 use super::{
     Hue, LineStyle, Look, Marker,
     axis::PlotAxis,
-    drawing::{Align, Bounds, Ink, Measure, Shape},
+    drawing::{Bounds, Labels, Measure, Shape},
+    unique_by,
 };
 
 /// A plot of series of points: curves, scatter, bars.
@@ -107,11 +108,16 @@ impl From<[f64; 2]> for PlotPoint {
 impl PlotPoint {
     /// The point of an item that other figures share.
     #[must_use]
-    pub fn of_item(self, item: usize) -> Self {
-        Self {
-            item: Some(item),
-            ..self
-        }
+    pub fn of_item(mut self, item: usize) -> Self {
+        self.item = Some(item);
+        self
+    }
+
+    /// The point with a note instead of its coordinates.
+    #[must_use]
+    pub fn noted(mut self, note: String) -> Self {
+        self.note = Some(note);
+        self
     }
 }
 
@@ -130,11 +136,17 @@ impl Series {
 
     /// The series with this name in the legend, or none.
     #[must_use]
-    pub fn listed(self, key: Option<&str>) -> Self {
-        Self {
-            key: key.map(str::to_owned),
-            ..self
-        }
+    pub fn listed(mut self, key: Option<&str>) -> Self {
+        self.key = key.map(str::to_owned);
+        self
+    }
+}
+
+impl Span {
+    /// The stretch `range`, listed in the legend by its name.
+    pub fn new(name: impl Into<String>, hue: Hue, range: RangeInclusive<f64>) -> Self {
+        let name = name.into();
+        Self { name, hue, range }
     }
 }
 
@@ -154,44 +166,45 @@ impl ReferenceLine {
 
     /// The line with this name in the legend, or none.
     #[must_use]
-    pub fn listed(self, key: Option<&str>) -> Self {
-        Self {
-            key: key.map(str::to_owned),
-            ..self
-        }
+    pub fn listed(mut self, key: Option<&str>) -> Self {
+        self.key = key.map(str::to_owned);
+        self
     }
 
     /// The line with a label instead of an entry in the legend.
     #[must_use]
-    pub fn labelled(self, label: &str) -> Self {
-        Self {
-            key: None,
-            label: Some(label.to_owned()),
-            ..self
-        }
+    pub fn labelled(mut self, label: &str) -> Self {
+        self.label = Some(label.to_owned());
+        self.listed(None)
     }
 }
 
 impl Plot {
-    /// A plot of these series.
-    pub fn new(x: PlotAxis, y: PlotAxis, series: Vec<Series>) -> Self {
+    /// A plot of those of these series that have points.
+    pub fn new(x: PlotAxis, y: PlotAxis, series: impl IntoIterator<Item = Series>) -> Self {
+        let series = series.into_iter().filter(|series| !series.points.is_empty());
         Self {
             x,
             y,
             spans: Vec::new(),
             lines: Vec::new(),
-            series,
+            series: series.collect(),
             has_equal_scales: false,
         }
     }
 
     /// The plot with these reference lines.
     #[must_use]
-    pub fn with_lines(self, lines: impl IntoIterator<Item = ReferenceLine>) -> Self {
-        Self {
-            lines: lines.into_iter().collect(),
-            ..self
-        }
+    pub fn with_lines(mut self, lines: impl IntoIterator<Item = ReferenceLine>) -> Self {
+        self.lines.extend(lines);
+        self
+    }
+
+    /// The plot with these marked stretches of the x axis.
+    #[must_use]
+    pub fn with_spans(mut self, spans: impl IntoIterator<Item = Span>) -> Self {
+        self.spans.extend(spans);
+        self
     }
 
     /// Returns the place of a point on both axes; `None` if one of the axes has no place for it.
@@ -208,11 +221,7 @@ impl Plot {
     /// Returns the stretches of the line of a series: a missing point leaves a gap.
     pub fn stretches(&self, series: &Series) -> Vec<Vec<[f64; 2]>> {
         let places = series.points.iter().map(|point| self.place(point.x, point.y));
-        let places: Vec<Option<[f64; 2]>> = places.collect();
-        let stretches = places.split(Option::is_none).filter(|stretch| stretch.len() > 1);
-        stretches
-            .map(|stretch| stretch.iter().copied().flatten().collect())
-            .collect()
+        unbroken(places).collect()
     }
 
     /// Returns the places of the ends of an error bar. Values without a place on a logarithmic axis are below its lower
@@ -233,9 +242,11 @@ impl Plot {
                 ys.extend(series.bar_width.map(|_| 0.0));
             }
         }
-        for span in &self.spans {
-            xs.extend([*span.range.start(), *span.range.end()]);
-        }
+        xs.extend(
+            self.spans
+                .iter()
+                .flat_map(|span| [*span.range.start(), *span.range.end()]),
+        );
         for line in &self.lines {
             match line.at {
                 LineAt::X(x) => xs.push(x),
@@ -266,33 +277,36 @@ impl Plot {
 
     /// Returns the entries of the legend with their looks.
     pub fn keys(&self) -> Vec<(&str, Look)> {
-        let series = self.series.iter().filter(|series| !series.points.is_empty());
-        let of_series = series.map(|series| (series.key.as_deref(), series.look));
+        let of_series = self.series.iter().map(|series| (series.key.as_deref(), series.look));
         let lines = self.lines.iter();
         let of_lines = lines.map(|line| (line.key.as_deref(), Look::line(line.hue, line.style)));
         let spans = self.spans.iter();
         let of_spans = spans.map(|span| (Some(&*span.name), Look::area(span.hue)));
         let keys = of_series.chain(of_lines).chain(of_spans);
-        each_once(keys.filter_map(|(key, look)| Some((key.filter(|key| !key.is_empty())?, look))))
+        let named = keys.filter_map(|(key, look)| Some((key.filter(|key| !key.is_empty())?, look)));
+        unique_by(named, |(key, _)| *key)
     }
 
-    /// Lays out the labels of points and of vertical lines in `frame`, where `at` gives the point of a place; those without
-    /// room are left out.
+    /// Lays out the labels of points and of vertical lines in `frame`, where `at` gives the point of a place: next to their
+    /// point, clear of each other and, if possible, of everything else. Those without room are left out; earlier ones are
+    /// shown where points are crowded.
     pub fn lay_out_labels(&self, frame: Bounds, at: impl Fn([f64; 2]) -> Vec2, measure: Measure<'_>) -> Vec<Shape> {
-        let mut labels: Vec<(Vec2, &str)> = Vec::new();
+        /// Room between a point and its label.
+        const GAP: f32 = 5.0;
+        let mut wanted: Vec<(Vec2, &str)> = Vec::new();
         for line in &self.lines {
             if let (LineAt::X(x), Some(label)) = (line.at, &line.label)
                 && let Some(x) = self.x.place(x)
             {
-                labels.push((Vec2::new(at([x, 0.0]).x, frame.min.y), label));
+                wanted.push((Vec2::new(at([x, 0.0]).x, frame.min.y), label));
             }
         }
         for series in &self.series {
-            let labelled = self.placed(series);
-            labels.extend(labelled.filter_map(|(point, place)| Some((at(place), point.label.as_deref()?))));
+            let placed = self.placed(series);
+            wanted.extend(placed.filter_map(|(point, place)| Some((at(place), point.label.as_deref()?))));
         }
         // Most plots have none.
-        if labels.is_empty() {
+        if wanted.is_empty() {
             return Vec::new();
         }
         let mut marks = Vec::new();
@@ -303,19 +317,31 @@ impl Plot {
                 None => marks.extend(points),
             }
         }
-        let sizes: Vec<(Vec2, Vec2)> = labels.iter().map(|(at, label)| (*at, measure(label))).collect();
-        let placed = place_labels(&sizes, &marks, frame).into_iter().zip(labels);
-        placed
-            .filter_map(|(bounds, (_, label))| {
-                let left = Vec2::new(bounds?.min.x, bounds?.middle().y);
-                Some(Shape::text(left, Align::Start, Ink::Label, label))
-            })
-            .collect()
+        // To the right of the point if possible, else to the left, above or below.
+        let sides = [1.0, -1.0, 0.0]
+            .into_iter()
+            .flat_map(|x| [-1.0, 0.0, 1.0].map(|y| Vec2::new(x, y)));
+        let mut labels = Labels::new(measure);
+        for (at, text) in wanted {
+            let (sides, size) = (sides.clone().filter(|side| *side != Vec2::ZERO), labels.size(text));
+            let middles = sides.map(|side| at + side * (GAP + 0.5 * size));
+            labels.place(text, -1e-3, middles, |place| {
+                let is_within = frame.contains(place.min) && frame.contains(place.max);
+                let covered = || marks.iter().filter(|mark| place.grown(2.0).contains(**mark)).count();
+                is_within.then(covered)
+            });
+        }
+        labels.shapes().collect()
     }
 }
 
-/// Room between a mark and its label.
-const GAP: f32 = 5.0;
+/// Returns the stretches of at least two neighbours without a gap.
+pub(super) fn unbroken<T: Clone>(items: impl Iterator<Item = Option<T>>) -> impl Iterator<Item = Vec<T>> {
+    let items: Vec<Option<T>> = items.collect();
+    let stretches = items.split(Option::is_none).filter(|stretch| stretch.len() > 1);
+    let stretches = stretches.map(|stretch| stretch.iter().flatten().cloned().collect());
+    stretches.collect::<Vec<_>>().into_iter()
+}
 
 /// Returns places along a line, which labels should avoid.
 fn along(line: &[Vec2]) -> impl Iterator<Item = Vec2> {
@@ -325,41 +351,6 @@ fn along(line: &[Vec2]) -> impl Iterator<Item = Vec2> {
         let steps = (from.distance(to) / STEP).ceil().clamp(1.0, 1000.0);
         (0..=steps as usize).map(move |step| from.lerp(to, step as f32 / steps))
     })
-}
-
-/// Returns the rectangle of each label, given by its point and its size: next to the point, clear of the other labels and, if
-/// possible, of `marks`, the places of everything else that is drawn; `None` if there is no room in `frame`.
-///
-/// Labels are placed in order, each at its best free place, so earlier ones are shown where points are crowded.
-fn place_labels(labels: &[(Vec2, Vec2)], marks: &[Vec2], frame: Bounds) -> Vec<Option<Bounds>> {
-    /// To the right of the point if possible, else to the left, above or below.
-    const SIDES: [[f32; 2]; 8] = [
-        [1.0, -1.0],
-        [1.0, 0.0],
-        [1.0, 1.0],
-        [-1.0, -1.0],
-        [-1.0, 0.0],
-        [-1.0, 1.0],
-        [0.0, -1.0],
-        [0.0, 1.0],
-    ];
-    let mut placed: Vec<Bounds> = Vec::new();
-    let mut place = |&(at, size): &(Vec2, Vec2)| {
-        let places = SIDES.map(|side| {
-            let side = Vec2::from(side);
-            Bounds::centred(at + side * (GAP + 0.5 * size), size)
-        });
-        let is_free = |bounds: &Bounds| {
-            frame.contains(bounds.min)
-                && frame.contains(bounds.max)
-                && placed.iter().all(|other| !other.grown(-1e-3).intersects(bounds))
-        };
-        let covered = |bounds: &Bounds| marks.iter().filter(|mark| bounds.grown(2.0).contains(**mark)).count();
-        let best = places.into_iter().filter(is_free).min_by_key(covered)?;
-        placed.push(best);
-        Some(best)
-    };
-    labels.iter().map(&mut place).collect()
 }
 
 /// Plots side by side.
@@ -373,17 +364,22 @@ pub struct PlotFigure {
 
 impl From<Plot> for PlotFigure {
     fn from(plot: Plot) -> Self {
-        Self {
-            plots: vec![plot],
-            notes: Vec::new(),
-        }
+        Self::new([plot], [])
     }
 }
 
 impl PlotFigure {
+    /// Plots with notes.
+    pub fn new(plots: impl IntoIterator<Item = Plot>, notes: impl IntoIterator<Item = String>) -> Self {
+        Self {
+            plots: plots.into_iter().collect(),
+            notes: notes.into_iter().collect(),
+        }
+    }
+
     /// Returns the entries of the legends of all plots, each once.
     pub fn keys(&self) -> Vec<(&str, Look)> {
-        each_once(self.plots.iter().flat_map(Plot::keys))
+        unique_by(self.plots.iter().flat_map(Plot::keys), |(key, _)| *key)
     }
 
     /// Returns the figure with a halo around the points of one of these items, and around `others`.
@@ -403,27 +399,12 @@ impl PlotFigure {
     }
 }
 
-/// Returns the first of the entries with each name.
-fn each_once<'a>(entries: impl Iterator<Item = (&'a str, Look)>) -> Vec<(&'a str, Look)> {
-    let mut keys: Vec<(&str, Look)> = Vec::new();
-    for key in entries {
-        if keys.iter().all(|(other, _)| *other != key.0) {
-            keys.push(key);
-        }
-    }
-    keys
-}
-
-/// Maximum number of dots drawn for one cloud; more would not be visible.
-const MAX_POINTS: usize = 2000;
-
-/// Returns evenly spaced indices, at most [`MAX_POINTS`] and the last one.
+/// Returns evenly spaced indices, at most 2000 and the last one: more dots of one cloud would not be visible.
 pub(super) fn thinned_places(count: usize) -> impl Iterator<Item = usize> {
-    let stride = count.div_ceil(MAX_POINTS).max(1);
+    let stride = count.div_ceil(2000).max(1);
     let last = count.checked_sub(1);
-    (0..count)
-        .step_by(stride)
-        .chain(last.filter(|last| !last.is_multiple_of(stride)))
+    let last = last.filter(|last| !last.is_multiple_of(stride));
+    (0..count).step_by(stride).chain(last)
 }
 
 #[cfg(test)]
@@ -478,42 +459,62 @@ mod tests {
     };
     const SIZE: Vec2 = Vec2::new(60.0, 12.0);
 
-    fn placed(points: &[[f32; 2]]) -> Vec<Option<Bounds>> {
-        let marks: Vec<Vec2> = points.iter().map(|&point| point.into()).collect();
-        let labels: Vec<(Vec2, Vec2)> = marks.iter().map(|&at| (at, SIZE)).collect();
-        place_labels(&labels, &marks, FRAME)
+    /// A plot in which each point has a label.
+    fn labelled(look: Look, points: &[[f64; 2]]) -> Plot {
+        let points = points.iter().map(|&point| PlotPoint {
+            label: Some("label".to_owned()),
+            ..point.into()
+        });
+        let series = Series::new("", look, points);
+        Plot::new(PlotAxis::linear(""), PlotAxis::linear(""), [series])
     }
+
+    fn labels(plot: &Plot) -> Vec<Bounds> {
+        let at = |[x, y]: [f64; 2]| Vec2::new(x as f32, y as f32);
+        let bounds = |shape| match shape {
+            Shape::Text(at, ..) => Bounds::centred(at, SIZE),
+            _ => panic!("not a label: {shape:?}"),
+        };
+        let shapes = plot.lay_out_labels(FRAME, at, &|_| SIZE).into_iter();
+        shapes.map(bounds).collect()
+    }
+
+    const DISC: Look = Look {
+        hue: Hue::Blue,
+        line: None,
+        marker: Some(Marker::Disc),
+    };
 
     #[test]
     fn labels_are_in_the_plot_and_clear_of_each_other_and_of_marks() {
         let points = [[10.0, 50.0], [12.0, 54.0], [190.0, 95.0], [198.0, 4.0], [100.0, 50.0]];
-        let labels: Vec<Bounds> = placed(&points).into_iter().map(Option::unwrap).collect();
+        let labels = labels(&labelled(DISC, &points));
+        assert_eq!(labels.len(), points.len());
         for (index, label) in labels.iter().enumerate() {
             assert!(FRAME.contains(label.min) && FRAME.contains(label.max), "{label:?}");
-            assert_eq!(label.size(), SIZE);
             for other in &labels[..index] {
                 assert!(!other.grown(-1e-3).intersects(label), "{label:?} {other:?}");
             }
-            for &point in &points {
-                assert!(!label.grown(1.0).contains(point.into()), "{label:?} {point:?}");
+            for [x, y] in points {
+                let point = Vec2::new(x as f32, y as f32);
+                assert!(!label.grown(1.0).contains(point), "{label:?} {point:?}");
             }
         }
     }
 
     #[test]
     fn a_label_keeps_clear_of_a_line_through_its_point() {
-        let (at, line) = (Vec2::new(100.0, 6.0), [Vec2::new(20.0, 6.0), Vec2::new(180.0, 6.0)]);
-        let marks: Vec<Vec2> = along(&line).collect();
-        assert_eq!((marks[0], *marks.last().unwrap()), (line[0], line[1]));
-        let label = place_labels(&[(at, SIZE)], &marks, FRAME)[0].unwrap();
+        let mut plot = labelled(DISC, &[[100.0, 6.0]]);
+        let line = Look::line(Hue::Blue, LineStyle::Solid);
+        plot.series.push(Series::new("", line, [[20.0, 6.0], [180.0, 6.0]]));
+        let label = labels(&plot)[0];
         assert!(label.min.y > 6.0, "below, because there is no room above: {label:?}");
     }
 
     #[test]
     fn a_label_without_room_is_left_out() {
-        let crowd = vec![[100.0, 50.0]; 30];
-        let labels = placed(&crowd);
-        assert!(labels[0].is_some() && labels[29].is_none());
+        let labels = labels(&labelled(DISC, &[[100.0, 50.0]; 30]));
+        assert!((1..29).contains(&labels.len()), "{}", labels.len());
     }
 
     #[test]
@@ -546,7 +547,7 @@ mod tests {
     #[test]
     fn thinning_keeps_both_ends() {
         let thin: Vec<usize> = thinned_places(12_345).collect();
-        assert!(thin.len() <= MAX_POINTS + 1);
+        assert!(thin.len() <= 2001);
         assert_eq!((thin[0], thin[thin.len() - 1]), (0, 12_344));
         assert_eq!(thinned_places(1).collect::<Vec<_>>(), [0]);
         assert_eq!(thinned_places(0).count(), 0);

@@ -9,6 +9,12 @@ use super::{
 };
 use decoupler_core::text::{counted, format_number};
 
+/// Returns the items with the smallest and the largest value.
+fn extremes<T: Copy>(items: impl Iterator<Item = T> + Clone, value: impl Fn(&T) -> f64) -> Option<(T, T)> {
+    let by_value = |one: &T, other: &T| value(one).total_cmp(&value(other));
+    Some((items.clone().min_by(by_value)?, items.max_by(by_value)?))
+}
+
 impl PlotFigure {
     /// Describes the figure in one sentence per plot, followed by its notes.
     pub fn summary(&self) -> String {
@@ -21,39 +27,26 @@ impl Plot {
     /// Describes the plot in a sentence: its axes, the course of each curve, the extent of each cloud of points,
     /// the highest bar.
     pub fn summary(&self) -> String {
-        let on_logarithmic = if self.y.scale == AxisScale::Logarithmic {
-            " on a logarithmic scale"
-        } else {
-            ""
+        let scale = match self.y.scale {
+            AxisScale::Logarithmic => " on a logarithmic scale",
+            AxisScale::Linear => "",
         };
-        let mut parts: Vec<String> = self
-            .series
-            .iter()
-            .filter_map(|series| self.words_about(series))
-            .collect();
-        parts.extend(self.lines.iter().map(|line| match line.at {
+        let series = self.series.iter().filter_map(|series| self.words_about(series));
+        let lines = self.lines.iter().map(|line| match line.at {
             LineAt::X(x) if line.name.contains(&self.x.value_text(x)) => line.name.clone(),
             LineAt::X(x) => format!("{} at {}", line.name, self.x.value_text(x)),
             LineAt::Y(y) => format!("{} at {}", line.name, self.y.value_text(y)),
-        }));
-        let head = format!("{}{on_logarithmic} against {}", self.y.name, self.x.name);
-        if parts.is_empty() {
-            format!("{head}: nothing to show.")
-        } else {
-            format!("{head}: {}.", parts.join("; "))
-        }
+        });
+        let parts = Vec::from_iter(series.chain(lines)).join("; ");
+        let parts = if parts.is_empty() { "nothing to show" } else { &parts };
+        format!("{}{scale} against {}: {parts}.", self.y.name, self.x.name)
     }
 
     /// Describes a series; `None` if no point of it is drawn.
     fn words_about(&self, series: &Series) -> Option<String> {
         let points: Vec<&PlotPoint> = self.placed(series).map(|(point, _)| point).collect();
         let (first, last) = (points.first()?, points.last()?);
-        let of = |pick: fn(&PlotPoint) -> f64| {
-            let by_value = |one: &&&PlotPoint, other: &&&PlotPoint| pick(one).total_cmp(&pick(other));
-            let (least, largest) = (points.iter().min_by(by_value), points.iter().max_by(by_value));
-            Some((*least?, *largest?))
-        };
-        let ((lowest, highest), (leftmost, rightmost)) = (of(|point| point.y)?, of(|point| point.x)?);
+        let (lowest, highest) = extremes(points.iter(), |point| point.y)?;
         // An axis without values only keeps the points apart.
         let has_values = self.y.ticks != TickRule::Nothing;
         let at = |point: &PlotPoint| match has_values {
@@ -63,27 +56,23 @@ impl Plot {
         let name = &series.name;
         Some(if series.bar_width.is_some() {
             format!("{}, the highest {}", counted(points.len(), "bar"), at(highest))
-        } else if series.look.line.is_some_and(|style| style != LineStyle::Fine) && points.len() > 1 {
-            let inner = |point: &PlotPoint| point.y != first.y && point.y != last.y;
-            let extremes = [("lowest", lowest), ("highest", highest)].into_iter();
-            let extremes = extremes.filter(|(_, point)| inner(point));
-            let extremes: String = extremes
-                .map(|(what, point)| format!(", {what} {}", at(point)))
-                .collect();
-            format!("{name} from {} to {}{extremes}", at(first), at(last))
         } else if points.len() == 1 {
             format!("{name}: {}", at(first))
+        } else if series.look.line.is_some_and(|style| style != LineStyle::Fine) {
+            let extremes = [("lowest", lowest), ("highest", highest)].into_iter();
+            let inner = extremes.filter(|(_, point)| point.y != first.y && point.y != last.y);
+            let inner: String = inner.map(|(what, point)| format!(", {what} {}", at(point))).collect();
+            format!("{name} from {} to {}{inner}", at(first), at(last))
         } else {
             let range = |axis: &PlotAxis, low: f64, high: f64| {
                 format!(", {} {} to {}", axis.name, axis.value_text(low), axis.value_text(high))
             };
-            let heights = has_values.then(|| range(&self.y, lowest.y, highest.y));
-            format!(
-                "{} of {name}{}{}",
-                counted(points.len(), "point"),
-                heights.unwrap_or_default(),
-                range(&self.x, leftmost.x, rightmost.x)
-            )
+            let (leftmost, rightmost) = extremes(points.iter(), |point| point.x)?;
+            let mut words = format!("{} of {name}", counted(points.len(), "point"));
+            if has_values {
+                words += &range(&self.y, lowest.y, highest.y);
+            }
+            words + &range(&self.x, leftmost.x, rightmost.x)
         })
     }
 }
@@ -91,61 +80,58 @@ impl Plot {
 impl HeatMap {
     /// Describes the map in a sentence: its values, and the places of their minimum and maximum.
     pub fn summary(&self) -> String {
-        let (rows, columns) = self.values.dim();
+        let ((rows, columns), [x_name, y_name]) = (self.values.dim(), [&self.x_name, &self.y_name]);
         let head = format!(
-            "{} over {} and {}, {rows} × {columns}",
-            self.value_axis.name, self.y_name, self.x_name
+            "{} over {y_name} and {x_name}, {rows} × {columns}",
+            self.value_axis.name
         );
-        let finite = || self.values.indexed_iter().filter(|(_, value)| value.is_finite());
-        let least = finite().min_by(|one, other| one.1.total_cmp(other.1));
-        let largest = finite().max_by(|one, other| one.1.total_cmp(other.1));
-        let Some((least, largest)) = least.zip(largest) else {
+        let finite = self.values.indexed_iter().filter(|(_, value)| value.is_finite());
+        let Some((least, largest)) = extremes(finite, |(_, value)| **value) else {
             return format!("{head}: no values.");
         };
         let at = |((row, column), value): ((usize, usize), &f64)| {
-            format!(
-                "{} at {} {}, {} {}",
+            let (value, row, column) = (
                 self.value_axis.value_text(*value),
-                self.y_name,
-                self.rows[row],
-                self.x_name,
-                self.columns[column]
-            )
+                &self.rows[row],
+                &self.columns[column],
+            );
+            format!("{value} at {y_name} {row}, {x_name} {column}")
         };
         format!("{head}: from {} to {}.", at(least), at(largest))
     }
 }
 
 impl Surface {
+    /// Returns the range of its nodes: "z 4.00 to 5.00 mm".
+    pub fn range_text(&self) -> String {
+        let nodes = self.nodes.iter().filter(|node| node.is_finite());
+        let range = extremes(nodes, |node| node.z);
+        range.map_or_else(
+            || "no values".to_owned(),
+            |(low, high)| self.quantity.range_text(low.z, high.z),
+        )
+    }
+
     /// Describes the surface: the range of its nodes, and the place furthest from rest.
     pub fn summary(&self) -> String {
-        let finite = || self.nodes.iter().filter(|node| node.is_finite());
-        let lowest = finite().min_by(|one, other| one.z.total_cmp(&other.z));
-        let highest = finite().max_by(|one, other| one.z.total_cmp(&other.z));
-        let Some((lowest, highest)) = lowest.zip(highest) else {
-            return "no values".to_owned();
+        let (range, nodes) = (self.range_text(), counted(self.nodes.len(), "node"));
+        let finite = self.nodes.iter().filter(|node| node.is_finite());
+        let Some((lowest, highest)) = extremes(finite, |node| node.z) else {
+            return range;
         };
-        let hundredths = |value: f64| format!("{value:.2}").replace('-', "−");
-        let number = |value: f64| format_number(value).replace('-', "−");
-        let (low, high) = (lowest.z, highest.z);
-        let range = self.quantity.range_text((low, high), hundredths, number);
+        if lowest.z == highest.z {
+            return format!("{range}, the same at {nodes}");
+        }
         let (what, furthest) = match self.quantity {
             Quantity::Height => ("lowest", lowest),
             Quantity::Sensitivity | Quantity::Target(_) => ("largest", highest),
-            Quantity::Error | Quantity::Pattern | Quantity::TargetError(_) if -low > high => {
-                ("furthest from zero", lowest)
+            Quantity::Error | Quantity::Pattern | Quantity::TargetError(_) => {
+                let furthest = if -lowest.z > highest.z { lowest } else { highest };
+                ("furthest from zero", furthest)
             }
-            Quantity::Error | Quantity::Pattern | Quantity::TargetError(_) => ("furthest from zero", highest),
         };
-        let nodes = counted(self.nodes.len(), "node");
-        if low == high {
-            return format!("{range}, the same at {nodes}");
-        }
-        format!(
-            "{range} over {nodes}, {what} at x {}, y {} mm",
-            number(furthest.x),
-            number(furthest.y)
-        )
+        let [x, y] = [furthest.x, furthest.y].map(|place_mm| format_number(place_mm).replace('-', "−"));
+        format!("{range} over {nodes}, {what} at x {x}, y {y} mm")
     }
 }
 
@@ -158,7 +144,7 @@ mod tests {
 
     use super::*;
     use crate::figure::{
-        Hue, Look, Marker, ReferenceLine, SequentialMap, error_histogram_figure, node_figure, readings_figure,
+        Decoded, Hue, Look, Marker, ReferenceLine, SequentialMap, histogram_figure, node_figure, readings_figure,
         surface::ViewMode,
     };
     use decoupler_core::surface::SurfaceMap;
@@ -194,7 +180,7 @@ mod tests {
     #[test]
     fn bars_and_clouds_of_points_are_described_by_their_extent() {
         let pairs: Vec<(f64, f64)> = [-0.2, 0.0, 0.0, 0.2].map(|error| (4.0, 4.0 + error)).into();
-        let histogram = error_histogram_figure(&pairs, None).summary();
+        let histogram = histogram_figure(&pairs, None, Decoded::Nodes).summary();
         assert_eq!(
             histogram,
             "nodes of the test set against error of z (mm), decoupled − actual: 41 bars, the highest 2 at 0; no error at 0."

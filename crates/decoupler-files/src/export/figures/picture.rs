@@ -154,49 +154,42 @@ fn fonts() -> Arc<usvg::fontdb::Database> {
     Arc::clone(FONTS.get_or_init(load))
 }
 
-/// The roles of colours, each in print and on a dark background.
-fn pairs() -> [(Ink, Rgb); 12] {
-    [
-        (Ink::Ground, [0x1b, 0x1e, 0x24]),
-        (Ink::Hue(Hue::Ink), [0xe7, 0xea, 0xf0]),
-        (Ink::Hue(Hue::Grey), [0x98, 0xa2, 0xb3]),
-        (Ink::Grid, [0x2c, 0x32, 0x3c]),
-        (Ink::Edge, [0x5b, 0x64, 0x72]),
-        (Ink::Missing, [0x24, 0x29, 0x32]),
-        (Ink::Hue(Hue::Blue), [0x5b, 0x9d, 0xff]),
-        (Ink::Hue(Hue::Red), [0xf0, 0x6a, 0x6a]),
-        (Ink::Hue(Hue::Green), [0x4c, 0xc3, 0x8a]),
-        (Ink::Hue(Hue::Orange), [0xf0, 0xa8, 0x3c]),
-        (Ink::Hue(Hue::Violet), [0xb5, 0x8a, 0xe6]),
-        (Ink::Hue(Hue::Cyan), [0x4f, 0xc3, 0xd9]),
-    ]
+/// The roles of colours: each in print, dark enough for paper, and on a dark background.
+const PALETTE: [(Ink, Rgb, Rgb); 12] = [
+    (Ink::Ground, [0xff; 3], [0x1b, 0x1e, 0x24]),
+    (Ink::Hue(Hue::Ink), [0x1b, 0x24, 0x30], [0xe7, 0xea, 0xf0]),
+    (Ink::Hue(Hue::Grey), [0x5b, 0x64, 0x72], [0x98, 0xa2, 0xb3]),
+    (Ink::Grid, [0xe3, 0xe7, 0xee], [0x2c, 0x32, 0x3c]),
+    (Ink::Edge, [0xa2, 0xa9, 0xb4], [0x5b, 0x64, 0x72]),
+    (Ink::Missing, [0xf3, 0xf5, 0xf8], [0x24, 0x29, 0x32]),
+    (Ink::Hue(Hue::Blue), [0x1f, 0x6f, 0xeb], [0x5b, 0x9d, 0xff]),
+    (Ink::Hue(Hue::Red), [0xc6, 0x2f, 0x2f], [0xf0, 0x6a, 0x6a]),
+    (Ink::Hue(Hue::Green), [0x1a, 0x7f, 0x4b], [0x4c, 0xc3, 0x8a]),
+    (Ink::Hue(Hue::Orange), [0xa8, 0x64, 0x00], [0xf0, 0xa8, 0x3c]),
+    (Ink::Hue(Hue::Violet), [0x7a, 0x3e, 0xb1], [0xb5, 0x8a, 0xe6]),
+    (Ink::Hue(Hue::Cyan), [0x0b, 0x76, 0x8c], [0x4f, 0xc3, 0xd9]),
+];
+
+/// Returns a colour in print.
+pub(super) fn rgb(ink: Ink) -> Rgb {
+    match ink {
+        Ink::Rgb(colour) => colour,
+        Ink::Label => rgb(Ink::Hue(Hue::Ink)),
+        _ => {
+            let entry = PALETTE.iter().find(|(role, ..)| *role == ink);
+            entry.expect("every role is in the palette").1
+        }
+    }
 }
 
-/// Returns a colour in print, dark enough for paper.
-pub(super) fn rgb(ink: Ink) -> Rgb {
-    const INK: Rgb = [0x1b, 0x24, 0x30];
-    match ink {
-        Ink::Hue(Hue::Blue) => [0x1f, 0x6f, 0xeb],
-        Ink::Hue(Hue::Red) => [0xc6, 0x2f, 0x2f],
-        Ink::Hue(Hue::Green) => [0x1a, 0x7f, 0x4b],
-        Ink::Hue(Hue::Orange) => [0xa8, 0x64, 0x00],
-        Ink::Hue(Hue::Violet) => [0x7a, 0x3e, 0xb1],
-        Ink::Hue(Hue::Cyan) => [0x0b, 0x76, 0x8c],
-        Ink::Hue(Hue::Grey) => [0x5b, 0x64, 0x72],
-        Ink::Hue(Hue::Ink) | Ink::Label => INK,
-        Ink::Grid => [0xe3, 0xe7, 0xee],
-        Ink::Edge => [0xa2, 0xa9, 0xb4],
-        Ink::Ground => [0xff; 3],
-        Ink::Missing => [0xf3, 0xf5, 0xf8],
-        Ink::Rgb(colour) => colour,
-    }
+pub(super) fn hex_of([red, green, blue]: Rgb) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
 /// Style rules that show the figures of a page on a dark background if the reader prefers a dark theme.
 pub(crate) fn dark_style() -> String {
-    let hex = |[red, green, blue]: Rgb| format!("#{red:02x}{green:02x}{blue:02x}");
-    let rules = pairs().map(|(ink, dark)| {
-        let (print, dark) = (hex(rgb(ink)), hex(dark));
+    let rules = PALETTE.map(|(ink, print, dark)| {
+        let (print, dark) = (hex_of(print), hex_of(dark));
         // White dots mark nodes, and white cells errors of zero, on any background.
         let (of_circles, areas) = match ink {
             Ink::Ground => (":not(circle)", String::new()),

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use decoupler_core::text::is_unprintable;
 use glam::Vec2;
 
-use super::picture::{Picture, rgb};
-use crate::figure::{Align, Bounds, Colour, Rgb, Shape, Stroke};
+use super::picture::{Picture, hex_of, rgb};
+use crate::figure::{Align, Bounds, Colour, Ink, Shape, Stroke};
 
 /// Size of all text in the layout.
 pub(super) const TEXT: f32 = 11.0;
@@ -53,47 +53,36 @@ impl Canvas {
             match &shapes[0] {
                 Shape::Line(_, stroke) => self.draw_lines(shapes, stroke),
                 Shape::Area(..) => self.draw_areas(shapes),
-                &Shape::Circle {
-                    at,
-                    radius,
-                    ring,
-                    colour,
-                } => {
-                    let style = match ring {
-                        Some(width) => format!("fill=\"none\" {}", stroke_style(&Stroke::new(colour, width))),
-                        None => format!("fill=\"{}\"{}", hex(rgb(colour.ink)), opacity("fill", colour)),
-                    };
-                    let ([x, y], radius) = (at.to_array().map(number), number(radius));
-                    self.put(&format!(r#"<circle cx="{x}" cy="{y}" r="{radius}" {style}/>"#));
+                &Shape::Disc(at, radius, colour) => {
+                    let style = format!("fill=\"{}\"{}", hex(colour.ink), opacity("fill", colour));
+                    self.draw_circle(at, radius, &style);
                 }
-                Shape::Text {
-                    at,
-                    align,
-                    ink,
-                    is_upright,
-                    text,
-                } => {
-                    let align = match align {
-                        Align::Start => "start",
-                        Align::Middle => "middle",
-                        Align::End => "end",
-                    };
+                Shape::Ring(at, radius, stroke) => {
+                    self.draw_circle(*at, *radius, &format!("fill=\"none\" {}", stroke_style(stroke)));
+                }
+                Shape::Text(at, align, ink, text) => {
                     // From the middle of the height to the base line.
                     let below = 0.36 * TEXT;
-                    let place = if *is_upright {
-                        let [x, y] = [at.x + below, at.y].map(number);
-                        format!(r#"transform="translate({x} {y}) rotate(-90)""#)
-                    } else {
-                        let [x, y] = [at.x, at.y + below].map(number);
-                        format!(r#"x="{x}" y="{y}""#)
+                    let [x, right, y, down] = [at.x, at.x + below, at.y, at.y + below].map(number);
+                    let beside = |anchor: &str| format!(r#"x="{x}" y="{down}" text-anchor="{anchor}""#);
+                    let place = match align {
+                        Align::Start => beside("start"),
+                        Align::Middle => beside("middle"),
+                        Align::End => beside("end"),
+                        Align::Upright => {
+                            format!(r#"transform="translate({right} {y}) rotate(-90)" text-anchor="middle""#)
+                        }
                     };
-                    let (fill, text) = (hex(rgb(*ink)), escaped(text));
-                    self.put(&format!(
-                        r#"<text {place} text-anchor="{align}" fill="{fill}">{text}</text>"#
-                    ));
+                    let (fill, text) = (hex(*ink), escaped(text));
+                    self.put(&format!(r#"<text {place} fill="{fill}">{text}</text>"#));
                 }
             }
         }
+    }
+
+    fn draw_circle(&mut self, at: Vec2, radius: f32, style: &str) {
+        let [x, y, radius] = [at.x, at.y, radius].map(number);
+        self.put(&format!(r#"<circle cx="{x}" cy="{y}" r="{radius}" {style}/>"#));
     }
 
     /// Draws shapes, clipped to `area`.
@@ -114,13 +103,11 @@ impl Canvas {
     }
 
     fn draw_lines(&mut self, lines: &[Shape], stroke: &Stroke) {
-        let mut path = String::new();
-        for line in lines {
-            if let Shape::Line(points, _) = line {
-                path += &format!("M{}", coordinates(points));
-            }
-        }
-        let style = stroke_style(stroke);
+        let points = lines.iter().filter_map(|line| match line {
+            Shape::Line(points, _) => Some(format!("M{}", coordinates(points))),
+            _ => None,
+        });
+        let (path, style) = (points.collect::<String>(), stroke_style(stroke));
         self.put(&format!(r#"<path d="{path}" fill="none" {style}/>"#));
     }
 
@@ -134,7 +121,7 @@ impl Canvas {
                 opaque if opaque.is_empty() => opaque,
                 opacity => format!(r#"{opacity} stroke="none" shape-rendering="crispEdges""#),
             };
-            let (colour, path) = (hex(rgb(colour.ink)), coordinates(corners));
+            let (colour, path) = (hex(colour.ink), coordinates(corners));
             self.put(&format!(r#"<path color="{colour}" d="M{path}z"{style}/>"#));
         }
         self.put("</g>");
@@ -173,8 +160,8 @@ fn coordinates(points: &[Vec2]) -> String {
     text
 }
 
-fn hex([red, green, blue]: Rgb) -> String {
-    format!("#{red:02x}{green:02x}{blue:02x}")
+fn hex(ink: Ink) -> String {
+    hex_of(rgb(ink))
 }
 
 fn opacity(of: &str, colour: Colour) -> String {
@@ -185,7 +172,7 @@ fn opacity(of: &str, colour: Colour) -> String {
 }
 
 fn stroke_style(stroke: &Stroke) -> String {
-    let (colour, width) = (hex(rgb(stroke.colour.ink)), number(stroke.width));
+    let (colour, width) = (hex(stroke.colour.ink), number(stroke.width));
     let dashes = stroke.dashes.map_or_else(String::new, |dashes| {
         format!(r#" stroke-dasharray="{}""#, dashes.map(number).join(" "))
     });

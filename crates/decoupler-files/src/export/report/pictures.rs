@@ -6,10 +6,10 @@ use ndarray::{Array2, ArrayView2};
 use crate::{
     export::NetworkFile,
     figure::{
-        Figure, RegressionLine, TargetSurface, error_histogram_figure, hysteresis_figure, loss_figure,
+        Decoded, Figure, RegressionLine, TargetSurface, histogram_figure, hysteresis_figure, loss_figure,
         regression_figure,
         surface::{Quantity, Surface, SurfaceFigure, ViewMode},
-        target_histogram_figure, target_pairs, target_regression_figure, training_state_figure, z_pairs_mm,
+        training_state_figure, value_pairs,
     },
 };
 use decoupler_core::{
@@ -65,15 +65,16 @@ pub(super) fn pictures(
 
 /// Errors of the nodes of an array.
 fn array_errors(test: &Dataset, decoupled_mm: &Array2<f64>) -> [(String, Figure); 2] {
-    let pairs_mm = z_pairs_mm(test, decoupled_mm);
+    let pairs_mm = value_pairs(test, decoupled_mm, None);
+    let line = RegressionLine::of(pairs_mm.iter().copied());
     [
         (
             "Distribution of the z errors of the test set.".to_owned(),
-            error_histogram_figure(&pairs_mm, None).into(),
+            histogram_figure(&pairs_mm, None, Decoded::Nodes).into(),
         ),
         (
             "Decoupled against actual z of the nodes of the test set.".to_owned(),
-            regression_figure(&pairs_mm).into(),
+            regression_figure((pairs_mm.len(), &|pair| pairs_mm[pair]), &line, Decoded::Nodes).into(),
         ),
     ]
 }
@@ -82,17 +83,17 @@ fn array_errors(test: &Dataset, decoupled_mm: &Array2<f64>) -> [(String, Figure)
 fn target_errors(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) -> Vec<(String, Figure)> {
     let targets = file.problem.targets.iter().enumerate().take(MAX_TARGETS);
     let of_target = |(index, target): (usize, &Channel)| {
-        let pairs = target_pairs(test, answers, index);
+        let pairs = value_pairs(test, answers, Some(index));
         let line = RegressionLine::of(pairs.iter().copied());
-        let (name, unit) = (&target.name, target.unit.as_deref());
+        let (name, of) = (&target.name, Decoded::Target(target));
         [
             (
                 format!("Decoded against actual values of {name} in the test set."),
-                target_regression_figure((pairs.len(), &|sample| pairs[sample]), &line, name, unit).into(),
+                regression_figure((pairs.len(), &|sample| pairs[sample]), &line, of).into(),
             ),
             (
                 format!("Distribution of the errors of {name} in the test set."),
-                target_histogram_figure(&pairs, None, target).into(),
+                histogram_figure(&pairs, None, of).into(),
             ),
         ]
     };

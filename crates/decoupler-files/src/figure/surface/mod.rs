@@ -1,28 +1,28 @@
 //! Surfaces in space or from above.
 //!
-//! A [`SurfaceFigure`] describes a picture of surfaces. Each [`Surface`] of it lays itself out in a [`Card`] as a
+//! A [`SurfaceFigure`] describes a picture of surfaces. Each [`Surface`] of it lays itself out in a card as a
 //! [`Drawing`]: shapes and a mesh in the order of painting. A renderer only has to paint them.
 //!
-//! `camera` maps millimetres to points on the screen and back; `box_axes` lays out the axes with their ticks, and `drawing`
-//! places the labels. `field` is the surface on its grid and `mesh` the same with contour lines, from far to near; `cut`
-//! cuts it at the ends of the value axis and along a wire. `nodes` are the dots on it, and `pick` finds the place on the
-//! surface under a point of the screen.
+//! `camera` maps millimetres to points on the screen and back; `axes` lays out the axes with their ticks and labels.
+//! `field` is the surface on its grid and `mesh` the same with contour lines, from far to near; `section` cuts it along a
+//! wire. `nodes` are the dots on it, and `pick` finds the place on the surface under a point of the screen.
 
-mod box_axes;
+mod axes;
 mod camera;
-mod cut;
 mod drawing;
 mod field;
 mod mesh;
 mod nodes;
 mod pick;
+mod quantity;
+mod section;
 
 pub use camera::{OrbitCamera, Ray, Sight};
-pub use cut::{Section, SectionLine};
-pub use drawing::{Card, Drawing};
-pub use field::{ColourScale, Quantity};
-pub use mesh::{ContourLine, Mesh, Vertex};
+pub use drawing::Drawing;
+pub use mesh::{Mesh, Piece, Vertex};
 pub use nodes::Dots;
+pub use quantity::{ColourScale, Quantity};
+pub use section::{Section, SectionLine};
 
 use std::{ops::RangeInclusive, sync::Arc};
 
@@ -30,7 +30,7 @@ use decoupler_core::surface::SurfaceMap;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use crate::figure::colour_map::SequentialMap;
+use crate::figure::{colour_map::SequentialMap, unique_by};
 
 /// View of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -128,33 +128,22 @@ impl SurfaceFigure {
         let scales = self.scales();
         for surface in &mut self.surfaces {
             let alike = scales.iter().filter(|scale| scale.quantity == surface.quantity);
-            let union =
-                |a: RangeInclusive<f64>, b: RangeInclusive<f64>| a.start().min(*b.start())..=a.end().max(*b.end());
-            let range = alike.map(|scale| scale.range.clone()).reduce(union);
-            surface.range = range.unwrap_or(0.0..=1.0);
+            for ColourScale { range, .. } in alike {
+                let low = surface.range.start().min(*range.start());
+                surface.range = low..=surface.range.end().max(*range.end());
+            }
         }
         self
     }
 
     /// Returns the different colour scales, from left to right.
     pub fn scales(&self) -> Vec<ColourScale> {
-        let mut scales: Vec<ColourScale> = Vec::new();
-        for scale in self.surfaces.iter().map(Surface::scale) {
-            if !scales.contains(&scale) {
-                scales.push(scale);
-            }
-        }
-        scales
+        unique_by(self.surfaces.iter().map(Surface::scale), Clone::clone)
     }
 
     /// Returns the note common to all surfaces: "Between the nodes: bilinear."
     pub fn note(&self) -> String {
-        let mut kinds: Vec<&str> = Vec::new();
-        for kind in self.surfaces.iter().map(|surface| surface.map.interpolation()) {
-            if !kinds.contains(&kind) {
-                kinds.push(kind);
-            }
-        }
-        format!("Between the nodes: {}.", kinds.join("; "))
+        let kinds = self.surfaces.iter().map(|surface| surface.map.interpolation());
+        format!("Between the nodes: {}.", unique_by(kinds, |kind| *kind).join("; "))
     }
 }

@@ -3,13 +3,13 @@
 use glam::{DVec3, Vec2};
 
 use super::{
-    Surface,
+    ViewMode,
     camera::{Ray, Sight},
     field::Field,
 };
 use crate::figure::{
     Hue,
-    drawing::{Bounds, Ink, Shape},
+    drawing::{Bounds, Ink, Shape, Stroke},
 };
 
 /// Distance within which the pointer selects a node, in points.
@@ -30,105 +30,90 @@ struct Dot {
 
 /// The nodes of a surface as dots. Nodes without a value have no dot.
 #[derive(Clone, Debug, Default)]
-pub struct Dots {
-    dots: Vec<Option<Dot>>,
-}
+pub struct Dots(Vec<Option<Dot>>);
 
 impl Dots {
-    pub(super) fn new(surface: &Surface, field: &Field<'_>, sight: &Sight) -> Self {
-        let (low, high) = field.box_mm();
+    pub(super) fn new(field: &Field<'_>, sight: &Sight) -> Self {
+        let [low, high] = field.box_mm();
         let dot = |node: &DVec3| {
-            node.is_finite().then(|| {
-                let within = node.clamp(low, high);
-                let is_beyond = match sight.is_above {
-                    false => within != *node,
-                    true => within.truncate() != node.truncate(),
-                };
-                Dot {
-                    at: sight.drawn(within),
-                    is_hidden: !sight.is_above && is_hidden(within, surface, field, sight),
-                    is_beyond,
-                }
+            let within = node.clamp(low, high);
+            let is_map = field.surface.mode == ViewMode::Top;
+            node.is_finite().then(|| Dot {
+                at: sight.drawn(within),
+                is_hidden: !is_map && is_hidden(within, field, sight),
+                is_beyond: within.truncate() != node.truncate() || (!is_map && within.z != node.z),
             })
         };
-        Self {
-            dots: surface.nodes.iter().map(dot).collect(),
-        }
+        Self(field.surface.nodes.iter().map(dot).collect())
     }
 
     /// Number of nodes beyond the axes, which are drawn at their edge.
     pub(super) fn beyond(&self) -> usize {
-        self.dots.iter().flatten().filter(|dot| dot.is_beyond).count()
+        self.0.iter().flatten().filter(|dot| dot.is_beyond).count()
     }
 
     /// Returns the visible node nearest to `place`, if it is near.
     pub fn nearest(&self, place: Vec2) -> Option<usize> {
-        let visible = |(node, dot): (usize, &Option<Dot>)| {
-            let dot = dot.filter(|dot| !dot.is_hidden)?;
-            Some((node, dot.at.distance(place)))
-        };
-        let near = self.dots.iter().enumerate().filter_map(visible);
-        near.filter(|(_, distance)| *distance <= REACH)
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(node, _)| node)
+        let distance = |dot: &Option<Dot>| Some(dot.filter(|dot| !dot.is_hidden)?.at.distance(place));
+        let nodes = self.0.iter().enumerate();
+        let near = nodes.filter_map(|(node, dot)| Some((node, distance(dot).filter(|it| *it <= REACH)?)));
+        near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(node, _)| node)
     }
 
     /// Returns the position of a node on the screen.
     pub fn position(&self, node: usize) -> Option<Vec2> {
-        self.dots.get(node).copied().flatten().map(|dot| dot.at)
+        Some((*self.0.get(node)?)?.at)
     }
 
     /// Returns the dots in the order of painting, with rings around the nodes `lit` and a mark around one node.
     pub fn shapes(&self, marked: Option<usize>, lit: &[usize]) -> Vec<Shape> {
         let mut shapes = Vec::new();
-        let mut circle = |at, radius, ring, ink: Ink, opacity| {
-            let colour = ink.at(opacity);
-            shapes.push(Shape::Circle {
-                at,
-                radius,
-                ring,
-                colour,
-            });
+        let accent = Ink::Hue(Hue::Blue);
+        let ring = |at, radius, width: [f32; 2], ink: Ink| {
+            let under = Stroke::new(Ink::Ground.at(0.8), width[0]);
+            [
+                Shape::Ring(at, radius, under),
+                Shape::Ring(at, radius, Stroke::new(ink, width[1])),
+            ]
         };
-        let (accent, warning) = (Ink::Hue(Hue::Blue), Ink::Hue(Hue::Orange));
         let radius = self.radius();
-        for dot in self.dots.iter().flatten().filter(|_| radius > 0.0) {
+        for dot in self.0.iter().flatten().filter(|_| radius > 0.0) {
             let opacity = if dot.is_hidden { HIDDEN_OPACITY } else { 1.0 };
-            let ink = if dot.is_beyond { warning } else { Ink::WHITE };
-            circle(dot.at, radius + 0.75, None, Ink::BLACK, 0.45 * opacity);
-            circle(dot.at, radius, None, ink, opacity);
+            let ink = if dot.is_beyond {
+                Ink::Hue(Hue::Orange)
+            } else {
+                Ink::WHITE
+            };
+            shapes.push(Shape::Disc(dot.at, radius + 0.75, Ink::BLACK.at(0.45 * opacity)));
+            shapes.push(Shape::Disc(dot.at, radius, ink.at(opacity)));
         }
         for at in lit.iter().filter_map(|&node| self.position(node)) {
-            circle(at, 4.5, Some(2.5), Ink::Ground, 0.8);
-            circle(at, 4.5, Some(1.5), accent, 1.0);
+            shapes.extend(ring(at, 4.5, [2.5, 1.5], accent));
         }
         if let Some(at) = marked.and_then(|node| self.position(node)) {
-            circle(at, 3.0, None, accent, 1.0);
-            circle(at, 6.5, Some(3.5), Ink::Ground, 0.8);
-            circle(at, 6.5, Some(1.5), Ink::Hue(Hue::Ink), 1.0);
+            shapes.push(Shape::Disc(at, 3.0, accent.into()));
+            shapes.extend(ring(at, 6.5, [3.5, 1.5], Ink::Hue(Hue::Ink)));
         }
         shapes
     }
 
     /// Dots shrink if there are many of them, and disappear if they would cover the surface.
     fn radius(&self) -> f32 {
-        let size = Bounds::of(self.dots.iter().flatten().map(|dot| dot.at)).size();
-        let spacing = (size.x * size.y / self.dots.len().max(1) as f32).sqrt();
-        if self.dots.len() > CROWD && spacing < CROWDED {
-            0.0
-        } else {
-            (0.07 * spacing).clamp(0.8, 1.8)
+        let size = Bounds::of(self.0.iter().flatten().map(|dot| dot.at)).size();
+        let spacing = (size.x * size.y / self.0.len().max(1) as f32).sqrt();
+        match self.0.len() > CROWD && spacing < CROWDED {
+            true => 0.0,
+            false => (0.07 * spacing).clamp(0.8, 1.8),
         }
     }
 }
 
 /// Returns true if the surface is in the line of sight from the eye to a node.
-fn is_hidden(node: DVec3, surface: &Surface, field: &Field<'_>, sight: &Sight) -> bool {
-    let shown = field.shown();
+fn is_hidden(node: DVec3, field: &Field<'_>, sight: &Sight) -> bool {
     // From a little above: nodes on a crest stay visible although the grid is coarser than the surface.
-    let from_mm = node + DVec3::Z * (0.01 * (shown.end() - shown.start()));
+    let from_mm = node + DVec3::Z * (0.01 * (field.shown[1] - field.shown[0]));
     let direction = sight.eye_mm() - from_mm;
-    surface.pick(&Ray { from_mm, direction }).is_some()
+    field.surface.pick(&Ray { from_mm, direction }).is_some()
 }
 
 #[cfg(test)]
@@ -140,7 +125,7 @@ mod tests {
     use super::*;
     use crate::figure::{
         SequentialMap,
-        surface::{OrbitCamera, Quantity, ViewMode, camera::PlotBox},
+        surface::{OrbitCamera, Quantity, Surface, camera::PlotBox},
     };
 
     #[test]
@@ -167,10 +152,9 @@ mod tests {
                 colours: SequentialMap::default(),
             };
             let field = Field::new(&surface);
-            let (min_mm, max_mm) = field.box_mm();
             let screen = Bounds::of([Vec2::ZERO, Vec2::splat(400.0)]);
-            let sight = Sight::fit(PlotBox::new(min_mm, max_mm, 1.0), Some(camera), screen);
-            is_hidden(DVec3::new(1.0, 1.0, 4.2), &surface, &field, &sight)
+            let sight = Sight::fit(PlotBox::new(field.box_mm(), 1.0), Some(camera), screen);
+            is_hidden(DVec3::new(1.0, 1.0, 4.2), &field, &sight)
         };
         assert!(hidden(5.0), "walls around it hide it");
         assert!(!hidden(f64::NAN), "nothing does");

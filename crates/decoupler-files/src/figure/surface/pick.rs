@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::{
     Surface,
     camera::Ray,
-    field::{CellPart, Field},
+    field::{Field, cell},
 };
 
 /// Tolerance, as a fraction of a triangle, that keeps rays from slipping between two triangles.
@@ -15,98 +15,40 @@ impl Surface {
     /// Returns the place where `ray` first hits the surface as it is drawn; `None` if it misses it.
     pub fn pick(&self, ray: &Ray) -> Option<DVec3> {
         let field = Field::new(self);
-        if field.values.is_empty() {
-            return None;
-        }
-        let crossings = crossings(&field, ray)?;
-        crossings.windows(2).find_map(|pair| {
-            let middle = ray.from_mm + ray.direction * (0.5 * (pair[0] + pair[1]));
+        crossings(&field, ray).windows(2).find_map(|pair| {
+            let middle = ray.at(0.5 * (pair[0] + pair[1]));
             let (ix, iy) = (cell(field.grid.x_mm(), middle.x)?, cell(field.grid.y_mm(), middle.y)?);
-            let (low, high) = (*field.shown().start(), *field.shown().end());
-            let corners = match field.part(ix, iy) {
-                CellPart::Nothing => return None,
-                CellPart::Cut => field.corners_mm(ix, iy),
-                CellPart::Whole | CellPart::Plateau => field
-                    .corners_mm(ix, iy)
-                    .map(|corner| corner.with_z(corner.z.clamp(low, high))),
-            };
+            let corners @ [a, b, c, d] = field.cell_mm(ix, iy)?.map(|corner| field.drawn(corner));
             // Most cells are well above or below the ray.
-            let heights = corners.map(|corner| corner.z.clamp(low, high));
-            let least = heights.into_iter().fold(f64::MAX, f64::min) - CRACK;
-            let most = heights.into_iter().fold(f64::MIN, f64::max) + CRACK;
-            let [here, there] = [pair[0], pair[1]].map(|share| ray.from_mm.z + ray.direction.z * share);
-            let is_vertical = ray.direction.truncate() == glam::DVec2::ZERO;
-            if !is_vertical && (here.max(there) < least || here.min(there) > most) {
+            let [here, there] = [pair[0], pair[1]].map(|share| ray.at(share).z);
+            let is_below = corners.iter().all(|corner| corner.z + CRACK < here.min(there));
+            let is_above = corners.iter().all(|corner| corner.z - CRACK > here.max(there));
+            if (is_below || is_above) && !ray.is_vertical() {
                 return None;
             }
-            let [a, b, c, d] = corners;
-            let met = [[a, b, c], [a, c, d]].map(|corners| share_at(ray, corners));
-            let places = met
+            let hits = [[a, b, c], [a, c, d]]
                 .into_iter()
-                .flatten()
-                .map(|share| (share, ray.from_mm + ray.direction * share));
-            let shown = places.filter(|(_, place)| (low - CRACK..=high + CRACK).contains(&place.z));
-            let plateaus = [(low, -1.0), (high, 1.0)].into_iter().filter_map(|(level, side)| {
-                let share = (level - ray.from_mm.z) / ray.direction.z;
-                let place = ray.at_level(level).filter(|_| field.keeps_plateau(ix, iy))?;
-                (side * (height_at(corners, place)? - level) > 0.0).then_some((share, place))
-            });
-            let shown = shown.chain(plateaus);
-            Some(shown.min_by(|(one, _), (other, _)| one.total_cmp(other))?.1)
+                .filter_map(|corners| share_at(ray, corners));
+            hits.min_by(f64::total_cmp).map(|share| ray.at(share))
         })
     }
 }
 
-/// Returns the cell of an axis that contains a place.
-fn cell(points_mm: &[f64], at_mm: f64) -> Option<usize> {
-    let after = points_mm.partition_point(|point| *point <= at_mm);
-    (after > 0 && at_mm <= points_mm[points_mm.len() - 1]).then(|| (after - 1).min(points_mm.len() - 2))
-}
-
-/// Parameters of the ray at which, seen from above, it crosses the lines of the grid, in ascending order; `None`
-/// outside the grid.
-fn crossings(field: &Field<'_>, ray: &Ray) -> Option<Vec<f64>> {
-    if ray.direction.truncate() == glam::DVec2::ZERO {
-        // A vertical ray stays over one cell.
-        return Some(vec![-1.0, 1.0]);
+/// Parameters of the ray at its origin and where, seen from above, it crosses the lines of the grid, in ascending order.
+fn crossings(field: &Field<'_>, ray: &Ray) -> Vec<f64> {
+    if ray.is_vertical() {
+        // It stays over one cell.
+        return vec![-1.0, 1.0];
     }
-    let axes = [(field.grid.x_mm(), 0), (field.grid.y_mm(), 1)];
-    let share = |line: f64, axis: usize| (line - ray.from_mm[axis]) / ray.direction[axis];
-    let (mut from, mut to) = (0.0_f64, f64::INFINITY);
-    for (points_mm, axis) in axes {
-        let (low, high) = (points_mm[0], points_mm[points_mm.len() - 1]);
-        if ray.direction[axis] == 0.0 {
-            if !(low..=high).contains(&ray.from_mm[axis]) {
-                return None;
-            }
-        } else {
-            let (one, other) = (share(low, axis), share(high, axis));
-            (from, to) = (from.max(one.min(other)), to.min(one.max(other)));
-        }
-    }
-    if from >= to {
-        return None;
-    }
-    let lines = axes
-        .into_iter()
-        .flat_map(|(points_mm, axis)| points_mm.iter().map(move |&line| share(line, axis)));
-    let mut crossings: Vec<f64> = lines.filter(|share| *share > from && *share < to).collect();
-    crossings.extend([from, to]);
+    let axes = [(field.grid.x_mm(), 0), (field.grid.y_mm(), 1)].into_iter();
+    let shares = axes.flat_map(|(points_mm, axis)| {
+        let lines = points_mm.iter();
+        lines.map(move |line| (line - ray.from_mm[axis]) / ray.direction[axis])
+    });
+    let ahead = shares.filter(|share| *share > 0.0 && share.is_finite());
+    let mut crossings: Vec<f64> = ahead.chain([0.0]).collect();
     crossings.sort_by(f64::total_cmp);
-    Some(crossings)
-}
-
-/// Returns the height of the two triangles of a cell at a place; `None` outside it.
-fn height_at([a, b, c, d]: [DVec3; 4], place: DVec3) -> Option<f64> {
-    let along = |from: f64, to: f64, at: f64| (at - from) / (to - from);
-    let (x, y) = (along(a.x, c.x, place.x), along(a.y, c.y, place.y));
-    let is_inside = [x, y].iter().all(|share| (0.0..=1.0).contains(share));
-    let height = if y <= x {
-        a.z + x * (b.z - a.z) + y * (c.z - b.z)
-    } else {
-        a.z + y * (d.z - a.z) + x * (c.z - d.z)
-    };
-    is_inside.then_some(height)
+    crossings
 }
 
 /// Returns the parameter of the ray at which it hits a triangle (Möller and Trumbore 1997).
@@ -130,7 +72,7 @@ mod tests {
     use super::*;
     use crate::figure::{
         Bounds, SequentialMap,
-        surface::{Card, OrbitCamera, Quantity, Sight, ViewMode},
+        surface::{OrbitCamera, Quantity, Sight, ViewMode},
     };
     use decoupler_core::surface::SurfaceMap;
 
@@ -157,17 +99,9 @@ mod tests {
     }
 
     fn sight(surface: &Surface, camera: OrbitCamera) -> (Sight, super::super::Dots) {
-        let drawing = surface.lay_out(
-            camera,
-            &Card {
-                bounds: Bounds {
-                    min: Vec2::new(10.0, 20.0),
-                    max: Vec2::new(370.0, 400.0),
-                },
-                measure: &|text| Vec2::new(6.0 * text.chars().count() as f32, 14.0),
-                colours: SequentialMap::default().colours(),
-            },
-        );
+        let card = Bounds::of_size(Vec2::new(10.0, 20.0), Vec2::new(360.0, 380.0));
+        let measure = |text: &str| Vec2::new(6.0 * text.chars().count() as f32, 14.0);
+        let drawing = surface.lay_out(camera, card, &measure, SequentialMap::default().colours());
         (drawing.sight, drawing.dots)
     }
 
@@ -292,8 +226,9 @@ mod tests {
         for camera in cameras().filter(|camera| camera.pitch > 0.6) {
             let (sight, _) = sight(&surface, camera);
             for step in 0..50 {
+                // The rim is at 10.967, and the slope to it ends at the next point of the grid.
                 let place = DVec3::new(
-                    10.97 + 0.02 * f64::from(step),
+                    11.05 + 0.02 * f64::from(step),
                     3.1 + 0.11 * f64::from(step * 7 % 50),
                     5.08,
                 );
