@@ -37,7 +37,7 @@ pub use of_section::{SectionNodes, section_figure};
 pub use of_trade_off::{
     TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure, training_time,
 };
-pub use plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, Span};
+pub use plot::{Form, LineAt, Plot, PlotFigure, PlotPoint, Series};
 
 use decoupler_core::decoupling::DecoderKind;
 use surface::SurfaceFigure;
@@ -170,7 +170,7 @@ impl Look {
         self
     }
 
-    /// A filled area: the bars of a histogram or a span of an axis.
+    /// A filled area: the bars of a histogram.
     pub fn area(hue: Hue) -> Self {
         let (line, marker) = (None, None);
         Self { hue, line, marker }

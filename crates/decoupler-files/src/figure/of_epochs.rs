@@ -7,7 +7,7 @@ use decoupler_core::training::{EpochRecord, Stage};
 use super::{
     Hue, LineStyle, Look,
     axis::PlotAxis,
-    plot::{LineAt, Plot, PlotFigure, ReferenceLine, Series},
+    plot::{LineAt, Plot, PlotFigure, Series},
 };
 
 /// Learning rates, dampings and scales beyond these are drawn at the edge.
@@ -47,12 +47,12 @@ fn over_epochs(y: PlotAxis, series: impl IntoIterator<Item = Series>) -> Plot {
 }
 
 /// A line where the method changed, with the short name of the next method.
-fn stage_lines(stages: &[Stage]) -> impl Iterator<Item = ReferenceLine> {
+fn stage_lines(stages: &[Stage]) -> impl Iterator<Item = Series> {
     stages.iter().skip(1).map(|stage| {
         // The next method continues from the last weights of the previous one.
         let changed = stage.first_epoch.saturating_sub(1);
         let name = format!("{} from epoch {changed}", stage.method.name());
-        let line = ReferenceLine::new(name, LineAt::X(changed as f64), Hue::Grey, LineStyle::Fine);
+        let line = Series::across(name, LineAt::X(changed as f64), Hue::Grey, LineStyle::Fine);
         line.labelled(stage.method.short_name())
     })
 }
@@ -71,9 +71,9 @@ pub fn loss_figure(history: &[EpochRecord], stages: &[Stage], best_epoch: usize)
         format!("best weights, epoch {best_epoch}"),
         LineAt::X(best_epoch as f64),
     );
-    let best = ReferenceLine::new(name, at, Hue::Grey, LineStyle::Dashed).listed(Some("best weights"));
-    let plot = over_epochs(bounded("mse (scaled)", history, TRAINING), curves);
-    plot.with_lines(stage_lines(stages).chain([best])).into()
+    let best = Series::across(name, at, Hue::Grey, LineStyle::Dashed).listed(Some("best weights"));
+    let series = curves.into_iter().chain(stage_lines(stages)).chain([best]);
+    over_epochs(bounded("mse (scaled)", history, TRAINING), series).into()
 }
 
 /// Length of the gradient, damping or learning rate, and validation failures against epoch.
@@ -85,10 +85,11 @@ pub fn training_state_figure(history: &[EpochRecord], stages: &[Stage]) -> PlotF
     let failures = PlotAxis::linear("validation failures").including([-0.1, 1.1]).whole();
     let plot = |y: PlotAxis, hue: Hue, of: OfEpoch| {
         let curve = curve(y.name.clone(), hue, LineStyle::Solid, drawn, of);
-        over_epochs(y, [curve.listed(None)]).with_lines(stage_lines(stages))
+        let series = std::iter::once(curve.listed(None)).chain(stage_lines(stages));
+        over_epochs(y, series)
     };
     let mut failures = plot(failures, Hue::Green, FAILURES);
-    for curve in &mut failures.series {
+    for curve in failures.series.iter_mut().take(1) {
         curve.points = failure_steps(drawn).into_iter().map(Into::into).collect();
     }
     let plots = [
@@ -252,7 +253,7 @@ mod tests {
         let figure = loss_figure(&[epoch(0, 1.0, 0)], &[], 0);
         let keys: Vec<&str> = figure.keys().into_iter().map(|(key, _)| key).collect();
         assert_eq!(keys, ["training", "best weights"]);
-        assert_eq!(figure.plots[0].series.len(), 1);
+        assert_eq!(figure.plots[0].series.len(), 2);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use ndarray::Array2;
 use super::{
     Hue, LineStyle, Look, Marker,
     axis::PlotAxis,
-    plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, thinned_places},
+    plot::{Form, LineAt, Plot, PlotFigure, PlotPoint, Series, thinned_places},
     titled, with_unit,
 };
 
@@ -122,16 +122,14 @@ pub fn histogram_figure(pairs: &[(f64, f64)], chosen: Option<usize>, of: Decoded
             PlotPoint::from([middle, counts[bin] as f64]).of_item(bin)
         });
         let mut series = Series::new(name, Look::area(hue), points).listed(None);
-        series.bar_width = Some(0.92 * bins.width);
+        series.form = Form::Bars(0.92 * bins.width);
         series
     };
     let x = PlotAxis::linear(format!("error of {}, {answer} − actual", titled(name, unit)));
     let y = PlotAxis::linear(format!("{samples} of the test set")).including([0.0]);
     let chosen = bars(&format!("chosen {samples}"), Hue::Orange, true);
-    let no_error = ReferenceLine::new("no error", LineAt::X(0.0), Hue::Grey, LineStyle::Dashed);
-    Plot::new(x, y, [bars(samples, Hue::Blue, false), chosen])
-        .with_lines([no_error])
-        .into()
+    let no_error = Series::across("no error", LineAt::X(0.0), Hue::Grey, LineStyle::Dashed);
+    Plot::new(x, y, [bars(samples, Hue::Blue, false), chosen, no_error]).into()
 }
 
 /// Least-squares line through pairs of actual and decoded values, and the range of the actual ones. A regression figure

@@ -7,7 +7,7 @@ use super::{
     axis::{PlotAxis, TickRule},
     colour_map::SequentialMap,
     heat_map::HeatMap,
-    plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, Span},
+    plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
     titled,
 };
 use decoupler_core::{
@@ -133,14 +133,17 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
     });
     let (error, unit) = error_name(results);
     let y = PlotAxis::linear(titled(error, Some(unit))).including([0.0, 1.0]);
-    let mut plot = Plot::new(x, y, series);
-    if let Some(problem) = results.problem.as_ref().filter(|_| is_number) {
-        // The suggestions of Eq. (12) and (13).
+    // The suggestions of Eq. (12) and (13).
+    let suggestions = results.problem.as_ref().filter(|_| is_number).map(|problem| {
         let (root, logarithm) = suggested_hidden(problem.feature_count(), problem.targets.len());
-        let line = ReferenceLine::new("Eq. (13)", LineAt::X(logarithm as f64), Hue::Orange, LineStyle::Solid);
-        let span = Span::new("Eq. (12)", Hue::Orange, *root.start() as f64..=*root.end() as f64);
-        plot = plot.with_spans([span]).with_lines([line.labelled("Eq. (13)")]);
-    }
+        let root = LineAt::Between([root.start(), root.end()].map(|end| *end as f64));
+        let logarithm = Series::across("Eq. (13)", LineAt::X(logarithm as f64), Hue::Orange, LineStyle::Solid);
+        [
+            Series::across("Eq. (12)", root, Hue::Orange, None),
+            logarithm.labelled("Eq. (13)"),
+        ]
+    });
+    let plot = Plot::new(x, y, series.into_iter().chain(suggestions.into_iter().flatten()));
     PlotFigure::new(std::iter::once(plot).chain(r2), [])
 }
 
@@ -183,15 +186,15 @@ fn repeats(results: &ExperimentResults) -> PlotFigure {
         });
         let lines = of_cells().filter_map(|(cell, (name, hue))| {
             let at = LineAt::Y(published(cell)?);
-            let line = ReferenceLine::new(format!("{name}, published"), at, *hue, LineStyle::Dashed);
+            let line = Series::across(format!("{name}, published"), at, *hue, LineStyle::Dashed);
             Some(line.listed(Some(name)))
         });
         let x = x.including([0.5, trials as f64 + 0.5]).whole();
-        Plot::new(x, y, series).with_lines(lines)
+        Plot::new(x, y, series.chain(lines))
     });
     let median = |cell: &Cell| cell.error(ErrorMeasure::YPercent)?.median;
     let has_zero = results.cells.iter().any(|cell| median(cell) == Some(0.0));
-    let has_lines = plots.iter().any(|plot| !plot.lines.is_empty());
+    let has_lines = plots.iter().any(|plot| plot.lines_across().next().is_some());
     let notes = [
         has_lines.then_some("Dashed lines: published."),
         has_zero.then_some("Y is constant: its error is 0 and lies below the axis."),
@@ -284,7 +287,7 @@ mod tests {
         let repeats = plots_of(PaperTable::CrossValidation);
         assert_eq!(keys(&repeats), ["1000 samples", "100 samples"]);
         assert_eq!(repeats.notes, ["Dashed lines: published."]);
-        let published = |plot: &Plot| plot.lines.iter().map(|line| line.at).collect::<Vec<_>>();
+        let published = |plot: &Plot| plot.lines_across().map(|(_, at)| at).collect::<Vec<_>>();
         assert_eq!(published(&repeats.plots[0]), [LineAt::Y(2.01), LineAt::Y(3.35)]);
         let arrays = plots_of(PaperTable::ArrayScales);
         assert!(matches!(&arrays.plots[0].x.ticks, TickRule::Names(names) if names[1] == "10×8_4×24"));

@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::{
     Hue, LineStyle, Look, Marker,
     axis::{PlotAxis, TickRule},
-    plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, Span},
+    plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
     titled, with_unit,
 };
 
@@ -81,14 +81,12 @@ pub fn singular_values_figure(rows: &[Identifiability], worst: usize, hidden_bel
     let strongest = rows.get(worst).map(|row| series(row, ", worst", strong, "worst row"));
     let noise = (hidden_below_per_mm > 0.0).then(|| {
         let at = LineAt::Y(hidden_below_per_mm);
-        ReferenceLine::new("noise hides values below", at, Hue::Orange, LineStyle::Dashed)
+        Series::across("noise hides values below", at, Hue::Orange, LineStyle::Dashed)
     });
     let unknowns = rows.get(worst).map_or(1, Identifiability::unknowns);
     let x = PlotAxis::linear("deformation pattern, best seen first").including([0.5, unknowns as f64 + 0.5]);
     let y = PlotAxis::logarithmic("singular value of ∂ ln R/∂u (1/mm)");
-    Plot::new(x.whole(), y, others.chain(strongest))
-        .with_lines(noise)
-        .into()
+    Plot::new(x.whole(), y, others.chain(strongest).chain(noise)).into()
 }
 
 /// The paper's Fig. 6: z of the nodes at these positions, row by row; actual as squares, decoupled as discs, each with a
@@ -135,17 +133,17 @@ pub fn starts_figure(axis: &str, results: &[Option<f64>], kept: usize, spread: &
         });
         Series::new(name, Look::marker(hue, Marker::Disc), points).listed(None)
     };
-    let dots = [
-        dots("other starts", Hue::Grey, false),
-        dots("kept start", Hue::Blue, true),
-    ];
     let y = PlotAxis::linear("starts")
         .ticked(TickRule::Nothing)
         .including([-1.0, 3.0]);
-    let median = ReferenceLine::new("median", LineAt::X(spread.median), Hue::Grey, LineStyle::Solid).listed(None);
-    let quartiles = Span::new("", Hue::Grey, spread.lower_quartile..=spread.upper_quartile);
-    let plot = Plot::new(PlotAxis::linear(axis), y, dots);
-    plot.with_lines([median]).with_spans([quartiles]).into()
+    let quartiles = LineAt::Between([spread.lower_quartile, spread.upper_quartile]);
+    let series = [
+        dots("other starts", Hue::Grey, false),
+        dots("kept start", Hue::Blue, true),
+        Series::across("quartiles", quartiles, Hue::Grey, None).listed(None),
+        Series::across("median", LineAt::X(spread.median), Hue::Grey, LineStyle::Solid).listed(None),
+    ];
+    Plot::new(PlotAxis::linear(axis), y, series).into()
 }
 
 #[cfg(test)]
@@ -206,7 +204,7 @@ mod tests {
         let points = &quiet.plots[0].series[0].points;
         assert_eq!((row.unknowns(), points.len()), (6, 4));
         assert_eq!([points[0].x, points[0].y], [1.0, row.singular_values_per_mm[0]]);
-        assert_eq!((quiet.keys().len(), quiet.plots[0].lines.len()), (1, 0));
+        assert_eq!((quiet.keys().len(), quiet.plots[0].series.len()), (1, 1));
         assert_eq!(singular_values_figure(&[row.clone(), row], 1, 0.1).keys().len(), 3);
         assert!(singular_values_figure(&[], 0, 0.0).plots[0].series.is_empty());
     }

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{
     Hue, LineStyle, Look, Marker,
     axis::PlotAxis,
-    plot::{Plot, PlotFigure, PlotPoint, Series, Span},
+    plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
     surface::{Section, SectionLine},
 };
 use decoupler_core::{
@@ -59,14 +59,13 @@ pub fn section_figure(
     });
     let x = PlotAxis::linear(format!("{axis} along {name} (mm)"));
     let y = PlotAxis::linear("z (mm)").including([*heights_mm.start(), *heights_mm.end()]);
-    let plot = Plot::new(x, y, curves.chain(nodes));
-    match plot.keys().is_empty() {
-        true => {
-            let note = format!("{title} lies beyond the nodes: there is no surface above it.");
-            PlotFigure::new([plot], [note])
-        }
-        false => plot.with_spans(beyond(section.line, map)).into(),
+    let mut plot = Plot::new(x, y, curves.chain(nodes));
+    if plot.keys().is_empty() {
+        let note = format!("{title} lies beyond the nodes: there is no surface above it.");
+        return PlotFigure::new([plot], [note]);
     }
+    plot.series.extend(beyond(section.line, map));
+    plot.into()
 }
 
 /// The nodes on a row-wire: their numbers among all and on the wire. None for a column-wire, which passes below the surface
@@ -79,7 +78,7 @@ fn on_wire(line: SectionLine, rows: &[usize], nodes_mm: &[DVec3]) -> impl Iterat
 }
 
 /// The stretches on which the surface is extrapolated.
-fn beyond(line: SectionLine, map: &SurfaceMap) -> Vec<Span> {
+fn beyond(line: SectionLine, map: &SurfaceMap) -> impl Iterator<Item = Series> {
     let grid = map.grid();
     let (points_mm, inside) = match line {
         SectionLine::RowWire(_) => (grid.y_mm(), grid.inside_y()),
@@ -87,9 +86,11 @@ fn beyond(line: SectionLine, map: &SurfaceMap) -> Vec<Span> {
     };
     let last = points_mm.len() - 1;
     let ends = [(0, *inside.start()), (*inside.end(), last)];
-    let spans = ends.into_iter().filter(|(from, to)| from < to);
-    let spans = spans.map(|(from, to)| Span::new("beyond the nodes", Hue::Grey, points_mm[from]..=points_mm[to]));
-    spans.collect()
+    let bands = ends.into_iter().filter(|(from, to)| from < to);
+    bands.map(|(from, to)| {
+        let at = LineAt::Between([points_mm[from], points_mm[to]]);
+        Series::across("beyond the nodes", at, Hue::Grey, None)
+    })
 }
 
 #[cfg(test)]
@@ -130,7 +131,17 @@ mod tests {
         let figure = figure(SectionLine::RowWire(4), 9.0);
         let [plot] = &figure.plots[..] else { panic!() };
         let names: Vec<&str> = plot.series.iter().map(|series| &*series.name).collect();
-        assert_eq!(names, ["actual", "decoupled", "actual nodes", "decoupled nodes"]);
+        assert_eq!(
+            names,
+            [
+                "actual",
+                "decoupled",
+                "actual nodes",
+                "decoupled nodes",
+                "beyond the nodes",
+                "beyond the nodes"
+            ]
+        );
         for (curve, nodes) in [(0, 2), (1, 3)] {
             for (point, y) in plot.series[nodes].points.iter().zip(Y) {
                 assert_eq!(point.x, y);
@@ -141,8 +152,8 @@ mod tests {
         let node = &plot.series[3].points[2];
         assert_eq!(node.item, Some(6), "the third node of the second row read");
         assert_eq!(node.note.as_deref(), Some("Row-wire 5, node 3\ndecoupled z: 4.43 mm"));
-        let beyond: Vec<_> = plot.spans.iter().map(|span| span.range.clone()).collect();
-        assert_eq!(beyond, [2.0..=3.0, 9.0..=10.0]);
+        let beyond: Vec<_> = plot.lines_across().map(|(_, at)| at).collect();
+        assert_eq!(beyond, [[2.0, 3.0], [9.0, 10.0]].map(LineAt::Between));
     }
 
     #[test]
@@ -150,7 +161,7 @@ mod tests {
         let along = figure(SectionLine::ColumnWire(3), 4.0);
         let points = &along.plots[0].series[0].points;
         assert!(points.iter().all(|at| (at.y - (4.0 + 0.05 * at.x - 0.08)).abs() < 1e-9));
-        assert_eq!(along.plots[0].series.len(), 2);
+        assert_eq!(along.keys().len(), 3, "the curves and the stretches beyond the nodes");
         assert_eq!(along.plots[0].x.name, "x along column-wire 4 (mm)");
         let outside = figure(SectionLine::ColumnWire(11), 12.0);
         assert!(outside.plots[0].series.is_empty() && outside.keys().is_empty());

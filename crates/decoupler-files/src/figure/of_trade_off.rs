@@ -11,7 +11,7 @@ use decoupler_core::{
 use super::{
     Hue, LineStyle, Look, Marker,
     axis::PlotAxis,
-    plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series},
+    plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
 };
 
 /// Cost that is plotted against the error.
@@ -169,20 +169,20 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         Some(_) => "Z error (%)",
         None => "mean absolute error (% of range)",
     };
-    let plot = Plot::new(PlotAxis::logarithmic(cost.name()), PlotAxis::logarithmic(error), series);
     let model_based = level.points.first().and_then(|point| point.model_based);
     let model_based = model_based.filter(|errors| !errors.is_rounding());
     let model_based = model_based.and_then(|errors| errors.z_percent).map(|percent| {
         let at = LineAt::Y(percent);
-        ReferenceLine::new("model-based", at, Hue::Ink, LineStyle::Dashed)
+        Series::across("model-based", at, Hue::Ink, LineStyle::Dashed)
     });
+    series.extend(model_based);
     // Limits are shown if they are within the range of the points.
-    let places = level
+    let places: Vec<[f64; 2]> = level
         .points
         .iter()
         .map(at)
-        .filter(|[x, y]| plot.place(*x, *y).is_some());
-    let places: Vec<[f64; 2]> = places.collect();
+        .filter(|place| place.iter().all(|it| it.log10().is_finite()))
+        .collect();
     let is_among = |limit: f64, axis: usize| {
         places.iter().any(|place| place[axis] <= limit) && places.iter().any(|place| place[axis] >= limit)
     };
@@ -192,11 +192,11 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         (is_among(percent, 1), "largest error", LineAt::Y(percent)),
     ];
     let shown = limits.into_iter().filter(|(is_shown, ..)| *is_shown && is_decoding);
-    let shown = shown.map(|(_, name, at)| {
-        let line = ReferenceLine::new(name, at, Hue::Blue, LineStyle::Dotted);
+    series.extend(shown.map(|(_, name, at)| {
+        let line = Series::across(name, at, Hue::Blue, LineStyle::Dotted);
         line.listed(Some("limits asked for"))
-    });
-    plot.with_lines(model_based.into_iter().chain(shown))
+    }));
+    Plot::new(PlotAxis::logarithmic(cost.name()), PlotAxis::logarithmic(error), series)
 }
 
 /// Joins the points of a Pareto front by steps: nothing better was measured between them.

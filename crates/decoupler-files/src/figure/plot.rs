@@ -16,10 +16,6 @@ pub struct Plot {
     pub x: PlotAxis,
     /// Vertical.
     pub y: PlotAxis,
-    /// Marked stretches of the x axis, behind everything.
-    pub spans: Vec<Span>,
-    /// Reference lines, behind the series.
-    pub lines: Vec<ReferenceLine>,
     /// Drawn in this order.
     pub series: Vec<Series>,
     /// Gives both axes the same scale.
@@ -35,8 +31,10 @@ pub struct Series {
     pub key: Option<String>,
     /// Appearance.
     pub look: Look,
-    /// Width of a bar from 0 to each point, for histograms.
-    pub bar_width: Option<f64>,
+    /// What is drawn.
+    pub form: Form,
+    /// Label at the upper end of a vertical line.
+    pub label: Option<String>,
     /// In the order in which the line runs.
     pub points: Vec<PlotPoint>,
 }
@@ -58,41 +56,26 @@ pub struct PlotPoint {
     pub item: Option<usize>,
 }
 
-/// A marked stretch of the x axis; listed in the legend if it has a name.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Span {
-    /// Meaning.
-    pub name: String,
-    /// Colour that is tinted.
-    pub hue: Hue,
-    /// Its ends.
-    pub range: RangeInclusive<f64>,
+/// What a series draws.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    /// Symbols at the points, a line through them, or both: as its look says.
+    Points,
+    /// Bars of this width from 0 to each point.
+    Bars(f64),
+    /// No points, but a line across the whole plot or a band, behind everything else.
+    Across(LineAt),
 }
 
-/// Position of a reference line.
+/// Position of a line across a plot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LineAt {
     /// Vertical, at this value of x.
     X(f64),
     /// Horizontal, at this value of y.
     Y(f64),
-}
-
-/// A line across the whole plot.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ReferenceLine {
-    /// Meaning.
-    pub name: String,
-    /// Name in the legend; `None` if it is not listed.
-    pub key: Option<String>,
-    /// Position.
-    pub at: LineAt,
-    /// Colour.
-    pub hue: Hue,
-    /// Style.
-    pub style: LineStyle,
-    /// Label at the upper end of a vertical line.
-    pub label: Option<String>,
+    /// A band between these values of x.
+    Between([f64; 2]),
 }
 
 impl From<[f64; 2]> for PlotPoint {
@@ -129,9 +112,25 @@ impl Series {
             key: Some(name.clone()),
             name,
             look,
-            bar_width: None,
+            form: Form::Points,
+            label: None,
             points: points.into_iter().map(Into::into).collect(),
         }
+    }
+
+    /// A line across the whole plot, or a band if it has no style; listed in the legend by its name.
+    pub fn across(name: impl Into<String>, at: LineAt, hue: Hue, style: impl Into<Option<LineStyle>>) -> Self {
+        let (line, marker) = (style.into(), None);
+        let mut series = Self::new(name, Look { hue, line, marker }, [[0.0; 2]; 0]);
+        series.form = Form::Across(at);
+        series
+    }
+
+    /// A vertical line with a label instead of an entry in the legend.
+    #[must_use]
+    pub fn labelled(mut self, label: &str) -> Self {
+        self.label = Some(label.to_owned());
+        self.listed(None)
     }
 
     /// The series with this name in the legend, or none.
@@ -142,69 +141,24 @@ impl Series {
     }
 }
 
-impl Span {
-    /// The stretch `range`, listed in the legend by its name.
-    pub fn new(name: impl Into<String>, hue: Hue, range: RangeInclusive<f64>) -> Self {
-        let name = name.into();
-        Self { name, hue, range }
-    }
-}
-
-impl ReferenceLine {
-    /// A line without a label, listed in the legend by its name.
-    pub fn new(name: impl Into<String>, at: LineAt, hue: Hue, style: LineStyle) -> Self {
-        let name = name.into();
-        Self {
-            key: Some(name.clone()),
-            name,
-            at,
-            hue,
-            style,
-            label: None,
-        }
-    }
-
-    /// The line with this name in the legend, or none.
-    #[must_use]
-    pub fn listed(mut self, key: Option<&str>) -> Self {
-        self.key = key.map(str::to_owned);
-        self
-    }
-
-    /// The line with a label instead of an entry in the legend.
-    #[must_use]
-    pub fn labelled(mut self, label: &str) -> Self {
-        self.label = Some(label.to_owned());
-        self.listed(None)
-    }
-}
-
 impl Plot {
-    /// A plot of those of these series that have points.
+    /// A plot of those of these series that have something to draw.
     pub fn new(x: PlotAxis, y: PlotAxis, series: impl IntoIterator<Item = Series>) -> Self {
-        let series = series.into_iter().filter(|series| !series.points.is_empty());
+        let is_drawn = |series: &Series| !series.points.is_empty() || matches!(series.form, Form::Across(_));
         Self {
             x,
             y,
-            spans: Vec::new(),
-            lines: Vec::new(),
-            series: series.collect(),
+            series: series.into_iter().filter(is_drawn).collect(),
             has_equal_scales: false,
         }
     }
 
-    /// The plot with these reference lines.
-    #[must_use]
-    pub fn with_lines(mut self, lines: impl IntoIterator<Item = ReferenceLine>) -> Self {
-        self.lines.extend(lines);
-        self
-    }
-
-    /// The plot with these marked stretches of the x axis.
-    #[must_use]
-    pub fn with_spans(mut self, spans: impl IntoIterator<Item = Span>) -> Self {
-        self.spans.extend(spans);
-        self
+    /// Returns the lines across the plot.
+    pub fn lines_across(&self) -> impl Iterator<Item = (&Series, LineAt)> {
+        self.series.iter().filter_map(|series| match series.form {
+            Form::Across(at) => Some((series, at)),
+            _ => None,
+        })
     }
 
     /// Returns the place of a point on both axes; `None` if one of the axes has no place for it.
@@ -234,23 +188,21 @@ impl Plot {
     pub fn ranges(&self) -> [RangeInclusive<f64>; 2] {
         let (mut xs, mut ys) = (Vec::new(), Vec::new());
         for series in &self.series {
+            let mut half = 0.0;
+            match series.form {
+                Form::Points => {}
+                Form::Bars(width) => {
+                    half = 0.5 * width;
+                    ys.push(0.0);
+                }
+                Form::Across(LineAt::X(x)) => xs.push(x),
+                Form::Across(LineAt::Y(y)) => ys.push(y),
+                Form::Across(LineAt::Between(ends)) => xs.extend(ends),
+            }
             for (point, _) in self.placed(series) {
-                let half = 0.5 * series.bar_width.unwrap_or(0.0);
                 xs.extend([point.x - half, point.x + half]);
                 ys.push(point.y);
                 ys.extend(point.bar.into_iter().flatten());
-                ys.extend(series.bar_width.map(|_| 0.0));
-            }
-        }
-        xs.extend(
-            self.spans
-                .iter()
-                .flat_map(|span| [*span.range.start(), *span.range.end()]),
-        );
-        for line in &self.lines {
-            match line.at {
-                LineAt::X(x) => xs.push(x),
-                LineAt::Y(y) => ys.push(y),
             }
         }
         let x = self.x.range(xs.into_iter().filter_map(|value| self.x.place(value)));
@@ -277,13 +229,10 @@ impl Plot {
 
     /// Returns the entries of the legend with their looks.
     pub fn keys(&self) -> Vec<(&str, Look)> {
-        let of_series = self.series.iter().map(|series| (series.key.as_deref(), series.look));
-        let lines = self.lines.iter();
-        let of_lines = lines.map(|line| (line.key.as_deref(), Look::line(line.hue, line.style)));
-        let spans = self.spans.iter();
-        let of_spans = spans.map(|span| (Some(&*span.name), Look::area(span.hue)));
-        let keys = of_series.chain(of_lines).chain(of_spans);
-        let named = keys.filter_map(|(key, look)| Some((key.filter(|key| !key.is_empty())?, look)));
+        let named = self.series.iter().filter_map(|series| {
+            let key = series.key.as_deref().filter(|key| !key.is_empty())?;
+            Some((key, series.look))
+        });
         unique_by(named, |(key, _)| *key)
     }
 
@@ -294,14 +243,12 @@ impl Plot {
         /// Room between a point and its label.
         const GAP: f32 = 5.0;
         let mut wanted: Vec<(Vec2, &str)> = Vec::new();
-        for line in &self.lines {
-            if let (LineAt::X(x), Some(label)) = (line.at, &line.label)
+        for series in &self.series {
+            if let (Form::Across(LineAt::X(x)), Some(label)) = (series.form, &series.label)
                 && let Some(x) = self.x.place(x)
             {
                 wanted.push((Vec2::new(at([x, 0.0]).x, frame.min.y), label));
             }
-        }
-        for series in &self.series {
             let placed = self.placed(series);
             wanted.extend(placed.filter_map(|(point, place)| Some((at(place), point.label.as_deref()?))));
         }
@@ -386,7 +333,7 @@ impl PlotFigure {
     #[must_use]
     pub fn lighting(mut self, is_lit: impl Fn(usize) -> bool, others: &[[f64; 2]]) -> Self {
         for plot in &mut self.plots {
-            let points = plot.series.iter().filter(|series| series.bar_width.is_none());
+            let points = plot.series.iter().filter(|series| series.form == Form::Points);
             let lit = points.flat_map(|series| &series.points);
             let lit = lit.filter(|point| point.item.is_some_and(&is_lit)).cloned();
             let points: Vec<PlotPoint> = lit.chain(others.iter().copied().map(PlotPoint::from)).collect();
@@ -437,16 +384,17 @@ mod tests {
     fn everything_that_is_drawn_is_in_view() {
         let look = Look::area(Hue::Blue);
         let series = Series {
-            bar_width: Some(2.0),
+            form: Form::Bars(2.0),
             ..Series::new("bars", look, [[1.0, 5.0]])
         };
         let mut plot = Plot::new(PlotAxis::linear(""), PlotAxis::linear(""), vec![series]);
-        plot.lines = vec![
-            ReferenceLine::new("x", LineAt::X(9.0), Hue::Grey, LineStyle::Dashed),
-            ReferenceLine::new("y", LineAt::Y(-3.0), Hue::Grey, LineStyle::Dashed),
-        ];
+        plot.series.extend([
+            Series::across("x", LineAt::X(9.0), Hue::Grey, LineStyle::Dashed),
+            Series::across("y", LineAt::Y(-3.0), Hue::Grey, LineStyle::Dashed),
+            Series::across("band", LineAt::Between([-4.0, 3.0]), Hue::Grey, None),
+        ]);
         let [x, y] = plot.ranges();
-        assert!([0.0, 2.0, 9.0].iter().all(|value| x.contains(value)), "{x:?}");
+        assert!([0.0, 2.0, 9.0, -4.0].iter().all(|value| x.contains(value)), "{x:?}");
         assert!([0.0, 5.0, -3.0].iter().all(|value| y.contains(value)), "{y:?}");
         plot.has_equal_scales = true;
         let [x, y] = plot.ranges();
@@ -520,17 +468,15 @@ mod tests {
     #[test]
     fn a_legend_lists_series_that_look_alike_once() {
         let series = |name: &str, key| Series::new(name, Look::area(Hue::Blue), [[0.0, 1.0]]).listed(key);
-        let plot = Plot::new(
-            PlotAxis::linear(""),
-            PlotAxis::linear(""),
-            vec![
-                series("row 1", Some("rows")),
-                series("row 2", Some("rows")),
-                series("lit", None),
-            ],
-        );
-        let line = ReferenceLine::new("limit", LineAt::Y(1.0), Hue::Grey, LineStyle::Dashed);
-        let plot = plot.with_lines([line.clone(), line.labelled("here")]);
+        let line = Series::across("limit", LineAt::Y(1.0), Hue::Grey, LineStyle::Dashed);
+        let all = [
+            series("row 1", Some("rows")),
+            series("row 2", Some("rows")),
+            series("lit", None),
+            line.clone(),
+            line.labelled("here"),
+        ];
+        let plot = Plot::new(PlotAxis::linear(""), PlotAxis::linear(""), all);
         let figure = PlotFigure {
             plots: vec![plot.clone(), plot],
             notes: Vec::new(),

@@ -4,7 +4,7 @@ use super::{
     LineStyle,
     axis::{AxisScale, PlotAxis, TickRule},
     heat_map::HeatMap,
-    plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
+    plot::{Form, LineAt, Plot, PlotFigure, PlotPoint, Series},
     surface::{Quantity, Surface},
 };
 use decoupler_core::text::{counted, format_number};
@@ -32,18 +32,21 @@ impl Plot {
             AxisScale::Linear => "",
         };
         let series = self.series.iter().filter_map(|series| self.words_about(series));
-        let lines = self.lines.iter().map(|line| match line.at {
-            LineAt::X(x) if line.name.contains(&self.x.value_text(x)) => line.name.clone(),
-            LineAt::X(x) => format!("{} at {}", line.name, self.x.value_text(x)),
-            LineAt::Y(y) => format!("{} at {}", line.name, self.y.value_text(y)),
-        });
-        let parts = Vec::from_iter(series.chain(lines)).join("; ");
+        let parts = Vec::from_iter(series).join("; ");
         let parts = if parts.is_empty() { "nothing to show" } else { &parts };
         format!("{}{scale} against {}: {parts}.", self.y.name, self.x.name)
     }
 
     /// Describes a series; `None` if no point of it is drawn.
     fn words_about(&self, series: &Series) -> Option<String> {
+        let name = &series.name;
+        match series.form {
+            Form::Across(LineAt::X(x)) if name.contains(&self.x.value_text(x)) => return Some(name.clone()),
+            Form::Across(LineAt::X(x)) => return Some(format!("{name} at {}", self.x.value_text(x))),
+            Form::Across(LineAt::Y(y)) => return Some(format!("{name} at {}", self.y.value_text(y))),
+            Form::Across(LineAt::Between(_)) => return None,
+            Form::Points | Form::Bars(_) => {}
+        }
         let points: Vec<&PlotPoint> = self.placed(series).map(|(point, _)| point).collect();
         let (first, last) = (points.first()?, points.last()?);
         let (lowest, highest) = extremes(points.iter(), |point| point.y)?;
@@ -53,8 +56,7 @@ impl Plot {
             true => format!("{} at {}", self.y.value_text(point.y), self.x.value_text(point.x)),
             false => self.x.value_text(point.x),
         };
-        let name = &series.name;
-        Some(if series.bar_width.is_some() {
+        Some(if series.form != Form::Points {
             format!("{}, the highest {}", counted(points.len(), "bar"), at(highest))
         } else if points.len() == 1 {
             format!("{name}: {}", at(first))
@@ -144,8 +146,7 @@ mod tests {
 
     use super::*;
     use crate::figure::{
-        Decoded, Hue, Look, Marker, ReferenceLine, SequentialMap, histogram_figure, node_figure, readings_figure,
-        surface::ViewMode,
+        Decoded, Hue, Look, Marker, SequentialMap, histogram_figure, node_figure, readings_figure, surface::ViewMode,
     };
     use decoupler_core::surface::SurfaceMap;
 
@@ -161,8 +162,9 @@ mod tests {
             PlotAxis::logarithmic("mse (scaled)"),
             vec![curve],
         );
-        let line = |name: &str| ReferenceLine::new(name, LineAt::X(2.0), Hue::Grey, LineStyle::Dashed);
-        plot.lines = vec![line("best weights, epoch 2"), line("displayed network")];
+        let line = |name: &str| Series::across(name, LineAt::X(2.0), Hue::Grey, LineStyle::Dashed);
+        plot.series
+            .extend([line("best weights, epoch 2"), line("displayed network")]);
         // A zero has no place on a logarithmic axis and is left out.
         assert_eq!(
             plot.summary(),
@@ -170,7 +172,6 @@ mod tests {
              highest 2.50 at 1; best weights, epoch 2; displayed network at 2."
         );
         plot.series.clear();
-        plot.lines.clear();
         assert_eq!(
             plot.summary(),
             "mse (scaled) on a logarithmic scale against epoch: nothing to show."

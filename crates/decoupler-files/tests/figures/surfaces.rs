@@ -210,7 +210,7 @@ fn fills(picture: &Picture) -> Vec<String> {
     let cells = cards
         .flat_map(|card| card.descendants())
         .filter(|node| node.has_tag_name("path"));
-    for fill in cells.filter_map(|cell| cell.attribute("color")) {
+    for fill in cells.filter_map(|cell| cell.attribute("fill").filter(|fill| *fill != "none")) {
         *counts.entry(fill.to_owned()).or_insert(0) += 1;
     }
     let mut fills: Vec<_> = counts.into_iter().collect();

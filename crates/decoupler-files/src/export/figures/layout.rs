@@ -9,7 +9,8 @@ use super::{
     svg::{Canvas, PAGE_WIDTH, TEXT, measure},
 };
 use crate::figure::{
-    Align, Bounds, ColourMap, Figure, HeatMap, Hue, Ink, LineAt, Plot, PlotFigure, Rgb, Shape, Stroke, share,
+    Align, Bounds, ColourMap, Figure, Form, HeatMap, Hue, Ink, LineAt, Plot, PlotFigure, Rgb, Series, Shape, Stroke,
+    share,
     surface::{ColourScale, Surface, SurfaceFigure},
 };
 
@@ -86,15 +87,18 @@ fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
         min: Vec2::new(at([left, 0.0]).x, area.min.y),
         max: Vec2::new(at([right, 0.0]).x, area.max.y),
     };
-    canvas.draw(plot.spans.iter().filter_map(|span| {
-        let ends = plot.x.place(*span.range.start()).zip(plot.x.place(*span.range.end()))?;
-        Some(upright(ends.into()).area(Ink::Hue(span.hue).at(0.12)))
+    canvas.draw(plot.lines_across().filter_map(|(band, at)| match at {
+        LineAt::Between([low, high]) => {
+            let ends = [plot.x.place(low)?, plot.x.place(high)?];
+            Some(upright(ends).area(Ink::Hue(band.look.hue).at(0.12)))
+        }
+        LineAt::X(_) | LineAt::Y(_) => None,
     }));
     canvas.draw(axes(plot, area, ranges));
 
     let mut shapes = Vec::new();
     for series in &plot.series {
-        let Some(width) = series.bar_width else { continue };
+        let Form::Bars(width) = series.form else { continue };
         let placed = plot
             .placed(series)
             .map(|(_, [x, y])| (at([x, y]), [x - 0.5 * width, x + 0.5 * width]));
@@ -104,15 +108,20 @@ fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
             shapes.push(bar.area(series.look.hue));
         }
     }
-    for line in &plot.lines {
-        let ends = match line.at {
+    for (Series { look, .. }, at_value) in plot.lines_across() {
+        let ends = match at_value {
+            LineAt::Between(_) => None,
             LineAt::X(x) => plot.x.place(x).map(|x| upright([x, x])),
             LineAt::Y(y) => plot.y.place(y).map(|y| Bounds {
                 min: Vec2::new(area.min.x, at([0.0, y]).y),
                 max: Vec2::new(area.max.x, at([0.0, y]).y),
             }),
         };
-        shapes.extend(ends.map(|ends| Shape::Line(vec![ends.min, ends.max], line.style.stroke(line.hue))));
+        let stroke = look.line.map(|style| style.stroke(look.hue));
+        shapes.extend(
+            ends.zip(stroke)
+                .map(|(ends, stroke)| Shape::Line(vec![ends.min, ends.max], stroke)),
+        );
     }
     for series in &plot.series {
         if let Some(style) = series.look.line {

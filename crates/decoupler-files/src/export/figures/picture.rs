@@ -182,27 +182,25 @@ pub(super) fn rgb(ink: Ink) -> Rgb {
     }
 }
 
-pub(super) fn hex_of([red, green, blue]: Rgb) -> String {
+pub(super) fn hex([red, green, blue]: Rgb) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
 /// Style rules that show the figures of a page on a dark background if the reader prefers a dark theme.
 pub(crate) fn dark_style() -> String {
     let rules = PALETTE.map(|(ink, print, dark)| {
-        let (print, dark) = (hex_of(print), hex_of(dark));
+        let (print, dark) = (hex(print), hex(dark));
         // White dots mark nodes, and white cells errors of zero, on any background.
-        let (of_circles, areas) = match ink {
-            Ink::Ground => (":not(circle)", String::new()),
-            _ => ("", format!("  svg [color=\"{print}\"] {{ color: {dark}; }}\n")),
+        let [areas, lines] = if ink == Ink::Ground {
+            ["rect", "[fill=none]"]
+        } else {
+            [""; 2]
         };
-        format!(
-            "  svg [fill=\"{print}\"]{of_circles} {{ fill: {dark}; }}\n  svg [stroke=\"{print}\"] {{ stroke: {dark}; }}\n{areas}"
-        )
+        let fill = format!("  svg {areas}[fill=\"{print}\"] {{ fill: {dark}; }}\n");
+        format!("{fill}  svg {lines}[stroke=\"{print}\"] {{ stroke: {dark}; }}\n")
     });
-    format!(
-        "@media screen and (prefers-color-scheme: dark) {{\n{}}}\n",
-        rules.concat()
-    )
+    let rules = rules.concat();
+    format!("@media screen and (prefers-color-scheme: dark) {{\n{rules}}}\n")
 }
 
 impl Picture {

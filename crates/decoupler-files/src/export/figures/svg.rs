@@ -1,12 +1,10 @@
 //! Shapes written as SVG. Lengths are points of a layout with text of size [`TEXT`]; the page is scaled to the size in print.
 
-use std::fmt::Write as _;
-
 use decoupler_core::text::is_unprintable;
 use glam::Vec2;
 
-use super::picture::{Picture, hex_of, rgb};
-use crate::figure::{Align, Bounds, Colour, Ink, Shape, Stroke};
+use super::picture::{Picture, hex, rgb};
+use crate::figure::{Align, Bounds, Colour, Shape, Stroke};
 
 /// Size of all text in the layout.
 pub(super) const TEXT: f32 = 11.0;
@@ -41,48 +39,50 @@ impl Canvas {
         }
     }
 
-    /// Draws shapes in their order. Neighbours that look alike become one element.
+    /// Draws shapes in their order.
     pub fn draw(&mut self, shapes: impl IntoIterator<Item = Shape>) {
-        let shapes = Vec::from_iter(shapes);
-        let are_alike = |one: &Shape, other: &Shape| match (one, other) {
-            (Shape::Line(_, one), Shape::Line(_, other)) => one == other,
-            (Shape::Area(..), Shape::Area(..)) => true,
-            _ => false,
-        };
-        for shapes in shapes.chunk_by(are_alike) {
-            match &shapes[0] {
-                Shape::Line(_, stroke) => self.draw_lines(shapes, stroke),
-                Shape::Area(..) => self.draw_areas(shapes),
-                &Shape::Disc(at, radius, colour) => {
-                    let style = format!("fill=\"{}\"{}", hex(colour.ink), opacity("fill", colour));
-                    self.draw_circle(at, radius, &style);
+        for shape in shapes {
+            let element = match shape {
+                Shape::Line(points, stroke) => {
+                    format!(
+                        r#"<path d="M{}" fill="none"{}/>"#,
+                        coordinates(&points),
+                        stroke_style(&stroke)
+                    )
                 }
+                Shape::Area(corners, colour) => {
+                    // A hairline in its own colour closes the seam of an area to its neighbours; a translucent area has crisp
+                    // edges instead, because the hairlines would be visible.
+                    let edge = match colour.opacity < 1.0 {
+                        true => r#" shape-rendering="crispEdges""#.to_owned(),
+                        false => format!(r#" stroke="{}""#, hex(rgb(colour.ink))),
+                    };
+                    format!(
+                        r#"<path d="M{}z"{}{edge}/>"#,
+                        coordinates(&corners),
+                        paint("fill", colour)
+                    )
+                }
+                Shape::Disc(at, radius, colour) => circle(at, radius, &paint("fill", colour)),
                 Shape::Ring(at, radius, stroke) => {
-                    self.draw_circle(*at, *radius, &format!("fill=\"none\" {}", stroke_style(stroke)));
+                    circle(at, radius, &format!(r#" fill="none"{}"#, stroke_style(&stroke)))
                 }
                 Shape::Text(at, align, ink, text) => {
                     // From the middle of the height to the base line.
                     let below = 0.36 * TEXT;
                     let [x, right, y, down] = [at.x, at.x + below, at.y, at.y + below].map(number);
-                    let beside = |anchor: &str| format!(r#"x="{x}" y="{down}" text-anchor="{anchor}""#);
-                    let place = match align {
-                        Align::Start => beside("start"),
-                        Align::Middle => beside("middle"),
-                        Align::End => beside("end"),
-                        Align::Upright => {
-                            format!(r#"transform="translate({right} {y}) rotate(-90)" text-anchor="middle""#)
-                        }
+                    let (place, anchor) = match align {
+                        Align::Upright => (format!(r#"transform="translate({right} {y}) rotate(-90)""#), "middle"),
+                        Align::Start => (format!(r#"x="{x}" y="{down}""#), "start"),
+                        Align::Middle => (format!(r#"x="{x}" y="{down}""#), "middle"),
+                        Align::End => (format!(r#"x="{x}" y="{down}""#), "end"),
                     };
-                    let (fill, text) = (hex(*ink), escaped(text));
-                    self.put(&format!(r#"<text {place} fill="{fill}">{text}</text>"#));
+                    let (fill, text) = (paint("fill", ink.into()), escaped(&text));
+                    format!(r#"<text {place} text-anchor="{anchor}"{fill}>{text}</text>"#)
                 }
-            }
+            };
+            self.put(&element);
         }
-    }
-
-    fn draw_circle(&mut self, at: Vec2, radius: f32, style: &str) {
-        let [x, y, radius] = [at.x, at.y, radius].map(number);
-        self.put(&format!(r#"<circle cx="{x}" cy="{y}" r="{radius}" {style}/>"#));
     }
 
     /// Draws shapes, clipped to `area`.
@@ -102,38 +102,13 @@ impl Canvas {
         self.body.push('\n');
     }
 
-    fn draw_lines(&mut self, lines: &[Shape], stroke: &Stroke) {
-        let points = lines.iter().filter_map(|line| match line {
-            Shape::Line(points, _) => Some(format!("M{}", coordinates(points))),
-            _ => None,
-        });
-        let (path, style) = (points.collect::<String>(), stroke_style(stroke));
-        self.put(&format!(r#"<path d="{path}" fill="none" {style}/>"#));
-    }
-
-    /// A hairline in its own colour closes the seam of an area to its neighbours; a translucent area has crisp edges
-    /// instead, because the hairlines would be visible.
-    fn draw_areas(&mut self, areas: &[Shape]) {
-        self.put(r#"<g fill="currentColor" stroke="currentColor" stroke-width=".4">"#);
-        for area in areas {
-            let Shape::Area(corners, colour) = area else { continue };
-            let style = match opacity("fill", *colour) {
-                opaque if opaque.is_empty() => opaque,
-                opacity => format!(r#"{opacity} stroke="none" shape-rendering="crispEdges""#),
-            };
-            let (colour, path) = (hex(colour.ink), coordinates(corners));
-            self.put(&format!(r#"<path color="{colour}" d="M{path}z"{style}/>"#));
-        }
-        self.put("</g>");
-    }
-
     pub fn finish(self) -> Picture {
         let [width, height] = self.size.to_array().map(number);
         let print = self.size * SCALE;
         let [print_width, print_height] = print.to_array().map(number);
         let body = self.body;
         let svg = format!(
-            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{print_width}pt" height="{print_height}pt" viewBox="0 0 {width} {height}" font-family="'Inter Tabular', Inter, Helvetica, Arial, sans-serif" font-size="{TEXT}" stroke-linejoin="round">
+            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{print_width}pt" height="{print_height}pt" viewBox="0 0 {width} {height}" font-family="'Inter Tabular', Inter, Helvetica, Arial, sans-serif" font-size="{TEXT}" stroke-width=".4" stroke-linejoin="round">
 <rect width="{width}" height="{height}" fill="#ffffff"/>
 {body}</svg>
 "##
@@ -150,34 +125,30 @@ fn number(value: f32) -> String {
 }
 
 fn coordinates(points: &[Vec2]) -> String {
-    let mut text = String::with_capacity(12 * points.len());
-    for point in points {
-        let [x, y] = point.to_array().map(number);
-        let between = if text.is_empty() { "" } else { " " };
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{between}{x},{y}");
-    }
-    text
+    let points = points.iter().map(|point| point.to_array().map(number).join(","));
+    Vec::from_iter(points).join(" ")
 }
 
-fn hex(ink: Ink) -> String {
-    hex_of(rgb(ink))
+fn circle(at: Vec2, radius: f32, style: &str) -> String {
+    let [x, y, radius] = [at.x, at.y, radius].map(number);
+    format!(r#"<circle cx="{x}" cy="{y}" r="{radius}"{style}/>"#)
 }
 
-fn opacity(of: &str, colour: Colour) -> String {
-    match number(colour.opacity) {
-        opaque if opaque == "1" => String::new(),
-        opacity => format!(r#" {of}-opacity="{opacity}""#),
+/// Attributes that paint the fill or the stroke.
+fn paint(what: &str, colour: Colour) -> String {
+    let (hex, opacity) = (hex(rgb(colour.ink)), number(colour.opacity));
+    match &*opacity {
+        "1" => format!(r#" {what}="{hex}""#),
+        _ => format!(r#" {what}="{hex}" {what}-opacity="{opacity}""#),
     }
 }
 
 fn stroke_style(stroke: &Stroke) -> String {
-    let (colour, width) = (hex(stroke.colour.ink), number(stroke.width));
+    let (paint, width) = (paint("stroke", stroke.colour), number(stroke.width));
     let dashes = stroke.dashes.map_or_else(String::new, |dashes| {
         format!(r#" stroke-dasharray="{}""#, dashes.map(number).join(" "))
     });
-    let opacity = opacity("stroke", stroke.colour);
-    format!(r#"stroke="{colour}" stroke-width="{width}"{dashes}{opacity}"#)
+    format!(r#"{paint} stroke-width="{width}"{dashes}"#)
 }
 
 pub(super) fn escaped(text: &str) -> String {
