@@ -11,6 +11,7 @@ use super::{
     axis::{PlotAxis, ends, share},
     colour_map::{SequentialMap, is_light},
     drawing::{Align, Bounds, Ink, Measure, Shape, lay_out_scale},
+    extremes,
 };
 
 /// A heat map: values over two axes as colours, with the number in each cell.
@@ -172,5 +173,27 @@ impl HeatMap {
         let scale = lay_out_scale(scale, &self.value_axis, &range, colours, measure);
         drawing.shapes.extend(scale);
         drawing
+    }
+
+    /// Describes the map in a sentence: its values, and the places of their minimum and maximum.
+    pub fn summary(&self) -> String {
+        let ((rows, columns), [x_name, y_name]) = (self.values.dim(), [&self.x_name, &self.y_name]);
+        let head = format!(
+            "{} over {y_name} and {x_name}, {rows} × {columns}",
+            self.value_axis.name
+        );
+        let finite = self.values.indexed_iter().filter(|(_, value)| value.is_finite());
+        let Some((least, largest)) = extremes(finite, |(_, value)| **value) else {
+            return format!("{head}: no values.");
+        };
+        let at = |((row, column), value): ((usize, usize), &f64)| {
+            let (value, row, column) = (
+                self.value_axis.value_text(*value),
+                &self.rows[row],
+                &self.columns[column],
+            );
+            format!("{value} at {y_name} {row}, {x_name} {column}")
+        };
+        format!("{head}: from {} to {}.", at(least), at(largest))
     }
 }

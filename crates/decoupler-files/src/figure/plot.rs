@@ -1,12 +1,13 @@
 use std::ops::RangeInclusive;
 
+use decoupler_core::text::counted;
 use glam::Vec2;
 
 use super::{
     Hue, LineStyle, Look, Marker,
-    axis::PlotAxis,
+    axis::{AxisScale, PlotAxis, TickRule},
     drawing::{Bounds, Labels, Measure, Shape},
-    unique_by,
+    extremes, unique_by,
 };
 
 /// A plot of series of points: curves, scatter, bars.
@@ -236,6 +237,60 @@ impl Plot {
         unique_by(named, |(key, _)| *key)
     }
 
+    /// Describes the plot in a sentence: its axes, the course of each curve, the extent of each cloud of points,
+    /// the highest bar.
+    pub fn summary(&self) -> String {
+        let scale = match self.y.scale {
+            AxisScale::Logarithmic => " on a logarithmic scale",
+            AxisScale::Linear => "",
+        };
+        let series = self.series.iter().filter_map(|series| self.words_about(series));
+        let parts = Vec::from_iter(series).join("; ");
+        let parts = if parts.is_empty() { "nothing to show" } else { &parts };
+        format!("{}{scale} against {}: {parts}.", self.y.name, self.x.name)
+    }
+
+    /// Describes a series; `None` if no point of it is drawn.
+    fn words_about(&self, series: &Series) -> Option<String> {
+        let name = &series.name;
+        match series.form {
+            Form::Across(LineAt::X(x)) if name.contains(&self.x.value_text(x)) => return Some(name.clone()),
+            Form::Across(LineAt::X(x)) => return Some(format!("{name} at {}", self.x.value_text(x))),
+            Form::Across(LineAt::Y(y)) => return Some(format!("{name} at {}", self.y.value_text(y))),
+            Form::Across(LineAt::Between(_)) => return None,
+            Form::Points | Form::Bars(_) => {}
+        }
+        let points: Vec<&PlotPoint> = self.placed(series).map(|(point, _)| point).collect();
+        let (first, last) = (points.first()?, points.last()?);
+        let (lowest, highest) = extremes(points.iter(), |point| point.y)?;
+        // An axis without values only keeps the points apart.
+        let has_values = self.y.ticks != TickRule::Nothing;
+        let at = |point: &PlotPoint| match has_values {
+            true => format!("{} at {}", self.y.value_text(point.y), self.x.value_text(point.x)),
+            false => self.x.value_text(point.x),
+        };
+        Some(if series.form != Form::Points {
+            format!("{}, the highest {}", counted(points.len(), "bar"), at(highest))
+        } else if points.len() == 1 {
+            format!("{name}: {}", at(first))
+        } else if series.look.line.is_some_and(|style| style != LineStyle::Fine) {
+            let extremes = [("lowest", lowest), ("highest", highest)].into_iter();
+            let inner = extremes.filter(|(_, point)| point.y != first.y && point.y != last.y);
+            let inner: String = inner.map(|(what, point)| format!(", {what} {}", at(point))).collect();
+            format!("{name} from {} to {}{inner}", at(first), at(last))
+        } else {
+            let range = |axis: &PlotAxis, low: f64, high: f64| {
+                format!(", {} {} to {}", axis.name, axis.value_text(low), axis.value_text(high))
+            };
+            let (leftmost, rightmost) = extremes(points.iter(), |point| point.x)?;
+            let mut words = format!("{} of {name}", counted(points.len(), "point"));
+            if has_values {
+                words += &range(&self.y, lowest.y, highest.y);
+            }
+            words + &range(&self.x, leftmost.x, rightmost.x)
+        })
+    }
+
     /// Lays out the labels of points and of vertical lines in `frame`, where `at` gives the point of a place: next to their
     /// point, clear of each other and, if possible, of everything else. Those without room are left out; earlier ones are
     /// shown where points are crowded.
@@ -327,6 +382,12 @@ impl PlotFigure {
     /// Returns the entries of the legends of all plots, each once.
     pub fn keys(&self) -> Vec<(&str, Look)> {
         unique_by(self.plots.iter().flat_map(Plot::keys), |(key, _)| *key)
+    }
+
+    /// Describes the figure in one sentence per plot, followed by its notes.
+    pub fn summary(&self) -> String {
+        let plots = self.plots.iter().map(Plot::summary);
+        plots.chain(self.notes.iter().cloned()).collect::<Vec<_>>().join(" ")
     }
 
     /// Returns the figure with a halo around the points of one of these items, and around `others`.

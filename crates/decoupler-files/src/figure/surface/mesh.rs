@@ -4,11 +4,7 @@ use std::ops::RangeInclusive;
 
 use glam::{DVec3, Vec2};
 
-use super::{
-    ViewMode,
-    camera::Sight,
-    field::{Field, corners},
-};
+use super::{Surface, ViewMode, camera::Sight};
 use crate::figure::{
     axis::{multiples, step_for},
     colour_map::{ColourMap, Rgb, is_light},
@@ -55,39 +51,41 @@ pub enum Piece {
 
 impl Mesh {
     /// The surface in the colours of `map`.
-    pub(super) fn new(field: &Field<'_>, sight: &Sight, map: &ColourMap) -> Self {
-        let (x_mm, y_mm, eye_mm) = (field.grid.x_mm(), field.grid.y_mm(), sight.eye_mm());
+    pub(super) fn new(surface: &Surface, sight: &Sight, map: &ColourMap) -> Self {
+        let (x_mm, y_mm, eye_mm) = (surface.map.grid().x_mm(), surface.map.grid().y_mm(), sight.eye_mm());
         let mut mesh = Self {
-            vertices: vertices(field, sight, map),
+            vertices: vertices(surface, sight, map),
             ..Self::default()
         };
-        let (rows, levels) = (far_to_near(y_mm, eye_mm.y), contour_levels(&field.range));
+        let (rows, levels) = (far_to_near(y_mm, eye_mm.y), contour_levels(&surface.usable_range()));
         // Lines are painted one strip late; the next strip would cover half of their width otherwise.
         let mut late = Vec::new();
         for ix in far_to_near(x_mm, eye_mm.x) {
             let mut lines = Vec::new();
             for &iy in &rows {
-                let Some(cell_mm) = field.cell_mm(ix, iy) else { continue };
-                let cell = corners(ix, iy).map(|[ix, iy]| field.grid.index(ix, iy));
+                let Some(cell_mm) = surface.cell_mm(ix, iy) else {
+                    continue;
+                };
+                let cell = corners(ix, iy).map(|[ix, iy]| surface.map.grid().index(ix, iy));
                 mesh.pieces.push(Piece::Cell(cell));
                 let opacity = cell.map(|corner| mesh.vertices[corner].opacity);
                 let opacity = opacity.into_iter().fold(1.0, f32::min);
                 let mut draw = |ends: [DVec3; 2], strength: f32| {
-                    let is_black = is_light(map.at(field.share(ends[0].z)));
+                    let is_black = is_light(map.at(surface.share(ends[0].z)));
                     let ink = if is_black { Ink::BLACK } else { Ink::WHITE };
-                    let ends = ends.map(|end| sight.drawn(field.drawn(end)));
+                    let ends = ends.map(|end| sight.drawn(surface.drawn(end)));
                     lines.push(Piece::Line(ends, ink.at(strength * opacity)));
                 };
-                let drawn_mm = cell_mm.map(|corner| field.drawn(corner));
+                let drawn_mm = cell_mm.map(|corner| surface.drawn(corner));
                 for &level in &levels {
                     crossings(drawn_mm, level, |ends| draw(ends, CONTOUR_OPACITY));
                 }
-                if field.surface.mode == ViewMode::ThreeD {
+                if surface.mode == ViewMode::ThreeD {
                     // Along the diagonals of every few cells; diagonals of neighbours meet.
                     let stride = (x_mm.len().max(y_mm.len()) / HATCHES).max(1);
                     let diagonal = [cell_mm[1], cell_mm[3]];
                     let is_hatched = (ix + iy).is_multiple_of(stride);
-                    for (end, side) in field.shown.into_iter().zip([-1.0, 1.0]) {
+                    for (end, side) in surface.shown().into_iter().zip([-1.0, 1.0]) {
                         let is_beyond = |corner: &DVec3| side * (corner.z - end) > 0.0;
                         mesh.has_plateau |= cell_mm.iter().any(is_beyond);
                         crossings(cell_mm, end, |ends| draw(ends, HATCH_OPACITY));
@@ -117,6 +115,11 @@ impl Mesh {
             Piece::Line([from, to], colour) => Shape::line(from, to, colour, 1.0),
         })
     }
+}
+
+/// The grid points at the corners of a cell, going round it.
+pub(super) fn corners(ix: usize, iy: usize) -> [[usize; 2]; 4] {
+    [[ix, iy], [ix + 1, iy], [ix + 1, iy + 1], [ix, iy + 1]]
 }
 
 /// Calls `draw` with the ends of each piece of the contour line at `level` in a cell whose corners go round it (marching
@@ -165,13 +168,13 @@ fn far_to_near(points_mm: &[f64], eye_mm: f64) -> Vec<usize> {
 }
 
 /// One vertex for every grid point, in their order.
-fn vertices(field: &Field<'_>, sight: &Sight, map: &ColourMap) -> Vec<Vertex> {
+fn vertices(surface: &Surface, sight: &Sight, map: &ColourMap) -> Vec<Vertex> {
     /// Brightness in the shade, and what the light adds.
     const LIGHT: [f32; 2] = [0.66, 0.38];
     /// Opacity at the start of the extrapolated margin; it fades to 0 at the rim.
     const MARGIN_OPACITY: f32 = 0.6;
-    let (nx, ny) = (field.grid.x_mm().len(), field.grid.y_mm().len());
-    let drawn = |ix: usize, iy: usize| field.drawn(field.place_mm([ix, iy]));
+    let (nx, ny) = (surface.map.grid().x_mm().len(), surface.map.grid().y_mm().len());
+    let drawn = |ix: usize, iy: usize| surface.drawn(surface.place_mm([ix, iy]));
     // The light follows the viewer: from above, over the left shoulder.
     let towards_eye = sight.eye.with_z(0.0).normalize_or(DVec3::X);
     let left = DVec3::new(towards_eye.y, -towards_eye.x, 0.0);
@@ -188,8 +191,8 @@ fn vertices(field: &Field<'_>, sight: &Sight, map: &ColourMap) -> Vec<Vertex> {
     let vertex = |index: usize| {
         let (ix, iy) = (index / ny, index % ny);
         let light = if sight.is_above { 1.0 } else { lit(ix, iy) };
-        let beyond = field.surface.map.beyond(ix, iy) as f32;
-        let colour = map.at(field.share(field.place_mm([ix, iy]).z));
+        let beyond = surface.map.beyond(ix, iy) as f32;
+        let colour = map.at(surface.share(surface.place_mm([ix, iy]).z));
         Vertex {
             at: sight.drawn(drawn(ix, iy)),
             colour: colour.map(|part| (f32::from(part) * light) as u8),
@@ -210,7 +213,7 @@ mod tests {
 
     use super::*;
     use crate::figure::drawing::Bounds;
-    use crate::figure::surface::{Drawing, OrbitCamera, Quantity, Surface, camera::PlotBox};
+    use crate::figure::surface::{Drawing, OrbitCamera, Quantity, camera::PlotBox};
 
     /// Returns the distance from the eye to a triangle at a place on the screen; `None` outside it.
     fn distance_at(place: Vec2, corners: [(Vec2, f32); 3]) -> Option<f32> {
@@ -246,17 +249,17 @@ mod tests {
             mode: ViewMode::ThreeD,
             colours: Default::default(),
         };
-        let (field, colours) = (Field::new(&surface), surface.colours.colours());
-        let [min_mm, max_mm] = field.box_mm();
+        let colours = surface.colours.colours();
+        let [min_mm, max_mm] = surface.box_mm();
         let plot_box = PlotBox::new([min_mm, max_mm], 1.0);
         let screen = Bounds::of([Vec2::ZERO, Vec2::splat(400.0)]);
         let mut hidden = 0;
         for turn in 0..6 {
             let camera = OrbitCamera::default().dragged(140.0 * turn as f32, 12.0 * turn as f32 - 40.0);
             let sight = Sight::fit(plot_box, Some(camera), screen);
-            let mesh = Mesh::new(&field, &sight, colours);
+            let mesh = Mesh::new(&surface, &sight, colours);
             let distance = |index: usize| {
-                let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
+                let (x_mm, y_mm) = (surface.map.grid().x_mm(), surface.map.grid().y_mm());
                 let z = surface.values[index].clamp(min_mm.z, max_mm.z);
                 let place = DVec3::new(x_mm[index / y_mm.len()], y_mm[index % y_mm.len()], z);
                 plot_box.unit(place).distance(sight.eye) as f32
