@@ -17,7 +17,7 @@ use eframe::egui::{
 
 use crate::window::{
     plotting::{bounds, colour, measure, paint, to_egui},
-    theme::{Palette, Theme, rgb},
+    theme::{Palette, Theme},
 };
 
 /// Nodes that are marked or highlighted.
@@ -101,13 +101,7 @@ fn mesh(drawn: &surface::Mesh, palette: &Palette) -> Mesh {
     let mut mesh = Mesh::default();
     mesh.reserve_triangles(2 * drawn.pieces.len());
     for vertex in &drawn.vertices {
-        let colour = rgb(vertex.colour);
-        let colour = if vertex.opacity < 1.0 {
-            colour.gamma_multiply(vertex.opacity)
-        } else {
-            colour
-        };
-        mesh.colored_vertex(to_egui(vertex.at), colour);
+        mesh.colored_vertex(to_egui(vertex.at), colour(vertex.colour, palette));
     }
     for piece in &drawn.pieces {
         match piece {

@@ -146,7 +146,7 @@ impl Bounds {
     }
 
     /// Returns the bounding rectangle of all points.
-    pub(super) fn of(points: impl IntoIterator<Item = Vec2>) -> Self {
+    pub fn of(points: impl IntoIterator<Item = Vec2>) -> Self {
         let [min, max] = [Vec2::INFINITY, Vec2::NEG_INFINITY];
         points.into_iter().fold(Self { min, max }, |bounds, point| Self {
             min: bounds.min.min(point),
@@ -155,10 +155,7 @@ impl Bounds {
     }
 
     pub(super) fn grown(self, by: f32) -> Self {
-        Self {
-            min: self.min - by,
-            max: self.max + by,
-        }
+        Self::centred(self.middle(), self.size() + 2.0 * by)
     }
 
     pub(super) fn intersects(&self, other: &Self) -> bool {
@@ -295,8 +292,7 @@ const BAR_STEPS: usize = 128;
 const BAR_NUMBER: f32 = 26.0;
 
 /// Lays out a colour scale in `area`: a bar from the lowest value at the bottom to the highest at the top, with the numbers
-/// of `axis` on its right. The name is above it, or upright beyond the numbers if it is longer than `area` is wide. Empty if
-/// there is no room or no range.
+/// and the name of `axis` on its right. Empty if there is no room or no range.
 pub(super) fn lay_out_scale(
     area: Bounds,
     axis: &PlotAxis,
@@ -304,13 +300,7 @@ pub(super) fn lay_out_scale(
     colours: &ColourMap,
     measure: Measure<'_>,
 ) -> Vec<Shape> {
-    let name = measure(&axis.name);
-    let is_above = name.x <= area.size().x;
-    let top = area.min.y + if is_above { name.y + 12.0 } else { 0.0 };
-    let bar = Bounds {
-        min: Vec2::new(area.min.x + 8.0, top),
-        max: Vec2::new(area.min.x + 8.0 + BAR_WIDTH, area.max.y),
-    };
+    let bar = Bounds::of_size(area.min + Vec2::new(8.0, 0.0), Vec2::new(BAR_WIDTH, area.size().y));
     let (height, width) = (bar.size().y, range.end() - range.start());
     if height < 20.0 || !(width.is_finite() && width > 0.0) {
         return Vec::new();
@@ -330,12 +320,7 @@ pub(super) fn lay_out_scale(
         let text = axis.tick_text(place, ticks.step);
         shapes.push(Shape::text(at + Vec2::new(7.0, 0.0), Align::Start, Ink::Label, text));
     }
-    shapes.push(if is_above {
-        let at = Vec2::new(area.min.x + 4.0, area.min.y + 0.5 * name.y);
-        Shape::text(at, Align::Start, Ink::Label, &*axis.name)
-    } else {
-        let at = Vec2::new(area.max.x - 0.5 * name.y, bar.middle().y);
-        Shape::text(at, Align::Upright, Ink::Label, &*axis.name)
-    });
+    let beyond = Vec2::new(area.max.x - 0.5 * measure(&axis.name).y, bar.middle().y);
+    shapes.push(Shape::text(beyond, Align::Upright, Ink::Label, &*axis.name));
     shapes
 }

@@ -110,11 +110,8 @@ impl HeatMap {
         let is_upright = column_name + GAP > pitch && !are_numbers;
         let below = if is_upright { column_name } else { line } + line + 2.0 * GAP;
         let bottom = (area.max.y - below).max(area.min.y + line);
-        let grid = Bounds {
-            // The uppermost number of the scale is centred on its end.
-            min: Vec2::new(left, area.min.y + 0.5 * line),
-            max: Vec2::new(right, bottom),
-        };
+        // The uppermost number of the scale is centred on its end.
+        let grid = Bounds::of([Vec2::new(left, area.min.y + 0.5 * line), Vec2::new(right, bottom)]);
         let cell = grid.size() / Vec2::new(columns.max(1) as f32, rows.max(1) as f32);
         let mut drawing = HeatMapDrawing {
             shapes: Vec::with_capacity(self.values.len()),
@@ -166,10 +163,7 @@ impl HeatMap {
             &self.y_name,
         );
         drawing.shapes.extend(texts);
-        let scale = Bounds {
-            min: Vec2::new(grid.max.x, grid.min.y),
-            max: Vec2::new(area.max.x, grid.max.y),
-        };
+        let scale = Bounds::of([Vec2::new(grid.max.x, grid.min.y), Vec2::new(area.max.x, grid.max.y)]);
         let scale = lay_out_scale(scale, &self.value_axis, &range, colours, measure);
         drawing.shapes.extend(scale);
         drawing

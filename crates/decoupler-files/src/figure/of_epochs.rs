@@ -79,24 +79,20 @@ pub fn loss_figure(history: &[EpochRecord], stages: &[Stage], best_epoch: usize)
 /// Length of the gradient, damping or learning rate, and validation failures against epoch.
 pub fn training_state_figure(history: &[EpochRecord], stages: &[Stage]) -> PlotFigure {
     let drawn = &*outlined(history);
-    let gradient = bounded("gradient", history, GRADIENT);
-    let parameter = PlotAxis::logarithmic(parameter_name(stages)).limited(PARAMETERS);
     // A little more than from 0 to 1: lines do not coincide with the frame.
-    let failures = PlotAxis::linear("validation failures").including([-0.1, 1.1]).whole();
-    let plot = |y: PlotAxis, hue: Hue, of: OfEpoch| {
-        let curve = curve(y.name.clone(), hue, LineStyle::Solid, drawn, of);
-        let series = std::iter::once(curve.listed(None)).chain(stage_lines(stages));
-        over_epochs(y, series)
-    };
-    let mut failures = plot(failures, Hue::Green, FAILURES);
-    for curve in failures.series.iter_mut().take(1) {
-        curve.points = failure_steps(drawn).into_iter().map(Into::into).collect();
-    }
+    let failures = PlotAxis::linear("validation failures").including([-0.1, 1.1]);
+    let parameter = PlotAxis::logarithmic(parameter_name(stages)).limited(PARAMETERS);
+    let curve = |hue: Hue, of: OfEpoch| curve("", hue, LineStyle::Solid, drawn, of).listed(None);
     let plots = [
-        plot(gradient, Hue::Blue, GRADIENT),
-        plot(parameter, Hue::Orange, PARAMETER),
+        (bounded("gradient", history, GRADIENT), curve(Hue::Blue, GRADIENT)),
+        (parameter, curve(Hue::Orange, PARAMETER)),
+        (failures.whole(), curve(Hue::Green, FAILURES).stepped()),
     ];
-    PlotFigure::new(plots.into_iter().chain([failures]), [])
+    let plots = plots.map(|(y, mut curve)| {
+        curve.name.clone_from(&y.name);
+        over_epochs(y, std::iter::once(curve).chain(stage_lines(stages)))
+    });
+    PlotFigure::new(plots, [])
 }
 
 /// Training and test error against epoch of two runs, by their names, in one plot.
@@ -118,24 +114,8 @@ pub fn compared_losses_figure(runs: [Option<(&str, &[EpochRecord])>; 2]) -> Plot
 fn parameter_name(stages: &[Stage]) -> &'static str {
     let mut names = stages.iter().map(|stage| stage.method.parameter_name());
     let first = names.next().unwrap_or("parameter");
-    if names.all(|name| name == first) {
-        first
-    } else {
-        "rate or damping"
-    }
-}
-
-/// Validation failures are constant from one epoch to the next: returns `[epoch, failures]` at both ends of each step.
-fn failure_steps(history: &[EpochRecord]) -> Vec<[f64; 2]> {
-    let mut points: Vec<[f64; 2]> = Vec::new();
-    for epoch in history {
-        let (at, failures) = (epoch.epoch as f64, epoch.validation_failures as f64);
-        if let Some(&[_, before]) = points.last().filter(|[_, before]| *before != failures) {
-            points.push([at, before]);
-        }
-        points.push([at, failures]);
-    }
-    points
+    let is_common = names.all(|name| name == first);
+    if is_common { first } else { "rate or damping" }
 }
 
 /// Quantities whose extremes are kept.
@@ -198,15 +178,17 @@ fn outlined(history: &[EpochRecord]) -> Cow<'_, [EpochRecord]> {
 fn extremes(stretch: &[EpochRecord]) -> Vec<EpochRecord> {
     let mut places = vec![0, stretch.len() - 1];
     for of in QUANTITIES {
-        let value = |place: &usize| of(&stretch[*place]).filter(|value| value.is_finite());
-        let (with, without): (Vec<usize>, Vec<usize>) = (0..stretch.len()).partition(|place| value(place).is_some());
-        let by_value = |one: &&usize, other: &&usize| value(one).unwrap_or(0.0).total_cmp(&value(other).unwrap_or(0.0));
-        let ends = [
-            with.iter().min_by(by_value),
-            with.iter().max_by(by_value),
-            without.first(),
-        ];
-        places.extend(ends.into_iter().flatten());
+        let values = stretch.iter().map(of).enumerate();
+        let values = values.map(|(place, value)| (place, value.filter(|value| value.is_finite())));
+        let finite = values.clone().filter_map(|(place, value)| Some((place, value?)));
+        let ends = super::extremes(finite, |(_, value)| *value);
+        places.extend(ends.into_iter().flat_map(|(lowest, highest)| [lowest.0, highest.0]));
+        places.extend(
+            values
+                .filter(|(_, value)| value.is_none())
+                .map(|(place, _)| place)
+                .next(),
+        );
     }
     places.sort_unstable();
     places.dedup();
@@ -260,8 +242,10 @@ mod tests {
     fn failures_rise_in_vertical_steps() {
         let history = [epoch(0, 1.0, 0), epoch(1, 1.0, 1), epoch(2, 1.0, 1), epoch(3, 1.0, 0)];
         let expected = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [3.0, 1.0], [3.0, 0.0]];
-        assert_eq!(failure_steps(&history), expected);
-        assert!(failure_steps(&[]).is_empty());
+        let figure = training_state_figure(&history, &[]);
+        let steps = &figure.plots[2].series[0].points;
+        assert_eq!(Vec::from_iter(steps.iter().map(|point| [point.x, point.y])), expected);
+        assert!(training_state_figure(&[], &[]).plots[2].series.is_empty());
     }
 
     fn epoch_of(epoch: usize, training_mse: f64) -> EpochRecord {

@@ -26,34 +26,26 @@ use super::{
 /// Mean decoded against actual values of `target` while it rises and while it falls, with the line on which they would be
 /// equal; next to it their differences from the actual values, which show a narrow loop.
 pub fn hysteresis_figure(found: &HysteresisLoop, target: &Channel) -> PlotFigure {
+    // The actual value at each level, and the mean ones of loading and unloading.
     let named = |name: &str, rmse| format!("{name}, RMSE {}", format_number(rmse));
-    // Values at a level: the actual one, and the mean ones of loading and unloading.
     let branches = [
-        ("equal".to_owned(), Look::line(Hue::Ink, LineStyle::Dashed)),
-        (
-            named("loading", found.loading.rmse),
-            Look::line(Hue::Blue, LineStyle::Solid),
-        ),
-        (
-            named("unloading", found.unloading.rmse),
-            Look::line(Hue::Orange, LineStyle::Solid),
-        ),
+        ("equal".to_owned(), Hue::Ink, LineStyle::Dashed),
+        (named("loading", found.loading.rmse), Hue::Blue, LineStyle::Solid),
+        (named("unloading", found.unloading.rmse), Hue::Orange, LineStyle::Solid),
     ];
     let series = |is_difference: bool| {
-        let branches = branches.iter().enumerate().map(|(branch, (name, look))| {
-            let points = found.levels.iter().map(|level| match is_difference {
-                true => [level[0], level[branch] - level[0]],
-                false => [level[0], level[branch]],
-            });
-            Series::new(name, *look, points)
+        let branches = branches.iter().enumerate().map(|(branch, (name, hue, style))| {
+            let less = |level: &[f64; 3]| if is_difference { level[0] } else { 0.0 };
+            let points = found.levels.iter().map(|level| [level[0], level[branch] - less(level)]);
+            Series::new(name, Look::line(*hue, *style), points)
         });
-        branches.collect()
+        Vec::from_iter(branches)
     };
     let (title, unit) = (target.title(), target.unit.as_deref());
     let note = format!("Hysteresis {:.1} % of the range", found.percent_of_range);
     let mut figure = decoded_against_actual(&title, "decoded", series(false), vec![note]);
     let [x, y] = [format!("actual {title}"), titled("decoded − actual", unit)].map(PlotAxis::linear);
-    figure.plots.push(Plot::new(x, y, Vec::from_iter(series(true))));
+    figure.plots.push(Plot::new(x, y, series(true)));
     figure
 }
 
@@ -75,30 +67,23 @@ pub fn position_error_map(
     }
     let [across, up] = [0, 1].map(|axis| Cells::of(targets.column(axis).iter().copied()));
     let (across, up) = (across?, up?);
-    let (mut squares, mut counts) = (
-        Array2::<f64>::zeros((up.count, across.count)),
-        Array2::<usize>::zeros((up.count, across.count)),
-    );
+    // The first row is at the top.
+    let row = |cell: usize| up.count - 1 - cell;
+    let mut cells = Array2::from_elem((up.count, across.count), (0.0, 0_usize));
     for (target, answer) in targets.rows().into_iter().zip(answers.rows()) {
-        // The first row is at the top.
-        let cell = [up.count - 1 - up.place(target[1]), across.place(target[0])];
-        squares[cell] += (answer[0] - target[0]).powi(2) + (answer[1] - target[1]).powi(2);
-        counts[cell] += 1;
+        let (squares, count) = &mut cells[[row(up.place(target[1])), across.place(target[0])]];
+        *squares += (answer[0] - target[0]).powi(2) + (answer[1] - target[1]).powi(2);
+        *count += 1;
     }
-    let values = Array2::from_shape_fn(squares.dim(), |cell| match counts[cell] {
-        0 => f64::NAN,
-        count => (squares[cell] / count as f64).sqrt(),
-    });
-    let notes = Array2::from_shape_fn(values.dim(), |(row, column)| {
-        let [x, y] = [across.range_text(column), up.range_text(up.count - 1 - row)].map(|range| with_unit(range, unit));
-        let place = format!("{} {x}, {} {y}", names[0], names[1]);
-        match counts[[row, column]] {
-            0 => format!("{place}: no test sample"),
-            count => {
-                let error = with_unit(format_number(values[[row, column]]), unit);
-                format!("{place}: error {error} over {}", counted(count, "test sample"))
-            }
-        }
+    let values = cells.map(|&(squares, count)| (squares / count as f64).sqrt());
+    let notes = Array2::from_shape_fn(cells.dim(), |at| {
+        let [x, y] = [across.range_text(at.1), up.range_text(row(at.0))].map(|range| with_unit(range, unit));
+        let error = with_unit(format_number(values[at]), unit);
+        let found = match cells[at].1 {
+            0 => "no test sample".to_owned(),
+            count => format!("error {error} over {}", counted(count, "test sample")),
+        };
+        format!("{} {x}, {} {y}: {found}", names[0], names[1])
     });
     Some(HeatMap {
         x_name: titled(names[0], unit),
@@ -163,21 +148,18 @@ impl TargetSurface {
     /// [`SurfaceError`] if no surface goes through them: see [`SurfaceMap::scattered`].
     pub fn new(positions: &[TargetPosition], targets: &[Channel]) -> Result<Self, SurfaceError> {
         let first = positions.first().and_then(|first| targets.get(first.target));
+        let unit = first.and_then(|first| first.unit.as_deref()).map(Arc::from);
         let (map, nodes) = match TargetPosition::lattice(positions) {
-            Some(([x_mm, y_mm], order)) => (
-                SurfaceMap::shared(&x_mm, &y_mm)?,
-                order.iter().map(|&place| positions[place]).collect(),
-            ),
-            None => (
-                Arc::new(SurfaceMap::scattered(&TargetPosition::places_mm(positions))?),
-                positions.to_vec(),
-            ),
+            Some(([x_mm, y_mm], order)) => {
+                let nodes = order.iter().map(|&place| positions[place]);
+                (SurfaceMap::shared(&x_mm, &y_mm)?, nodes.collect())
+            }
+            None => {
+                let map = SurfaceMap::scattered(&TargetPosition::places_mm(positions))?;
+                (Arc::new(map), positions.to_vec())
+            }
         };
-        Ok(Self {
-            map,
-            nodes,
-            unit: first.and_then(|first| first.unit.as_deref()).map(Arc::from),
-        })
+        Ok(Self { map, nodes, unit })
     }
 
     /// The targets at the nodes, in the order of [`Surface::nodes`].

@@ -57,10 +57,8 @@ pub struct TradeOffLimits {
 
 impl Default for TradeOffLimits {
     fn default() -> Self {
-        Self {
-            percent: 1.0,
-            microseconds: 10.0,
-        }
+        let (percent, microseconds) = (1.0, 10.0);
+        Self { percent, microseconds }
     }
 }
 
@@ -123,14 +121,12 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
     let at = |point: &TradeOffPoint| <[f64; 2]>::from(cost.of(point));
     let is_on_front = level.front(cost);
     let points = || level.points.iter().zip(&is_on_front);
-    let front = points()
-        .filter(|(_, is_on_front)| **is_on_front)
-        .map(|(point, _)| at(point));
-    let mut series = vec![Series::new(
-        "Pareto front",
-        Look::line(Hue::Grey, LineStyle::Solid),
-        steps(front),
-    )];
+    let front = points().filter(|(point, is_on_front)| **is_on_front && point.percent().is_finite());
+    let mut front: Vec<[f64; 2]> = front.map(|(point, _)| at(point)).collect();
+    front.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    // Nothing better was measured between two points of the front.
+    let front = Series::new("Pareto front", Look::line(Hue::Grey, LineStyle::Solid), front).stepped();
+    let mut series = vec![front];
     for kind in DecoderKind::ALL {
         for &precision in kind.precisions() {
             for preset in Preset::ALL.into_iter().map(Some).chain([None]) {
@@ -140,7 +136,7 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
                 let points = points().filter(is_of).map(|(point, is_on_front)| {
                     let note = format!("{}\n{}", point_name(point), point_facts(point).join("\n"));
                     let mut drawn = PlotPoint::from(at(point)).noted(note);
-                    drawn.label = is_on_front.then(|| point_label(point));
+                    drawn.label = is_on_front.then(|| named(point, ""));
                     drawn
                 });
                 let look = Look::marker(Hue::of_decoder(kind), marker(preset, precision));
@@ -176,65 +172,34 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         Series::across("model-based", at, Hue::Ink, LineStyle::Dashed)
     });
     series.extend(model_based);
-    // Limits are shown if they are within the range of the points.
-    let places: Vec<[f64; 2]> = level
-        .points
-        .iter()
-        .map(at)
-        .filter(|place| place.iter().all(|it| it.log10().is_finite()))
-        .collect();
-    let is_among = |limit: f64, axis: usize| {
-        places.iter().any(|place| place[axis] <= limit) && places.iter().any(|place| place[axis] >= limit)
-    };
-    let [time, percent] = [limits.microseconds, limits.percent];
     let limits = [
-        (is_among(time, 0), "longest time", LineAt::X(time)),
-        (is_among(percent, 1), "largest error", LineAt::Y(percent)),
+        ("longest time", LineAt::X(limits.microseconds)),
+        ("largest error", LineAt::Y(limits.percent)),
     ];
-    let shown = limits.into_iter().filter(|(is_shown, ..)| *is_shown && is_decoding);
-    series.extend(shown.map(|(_, name, at)| {
+    series.extend(limits.into_iter().filter(|_| is_decoding).map(|(name, at)| {
         let line = Series::across(name, at, Hue::Blue, LineStyle::Dotted);
         line.listed(Some("limits asked for"))
     }));
     Plot::new(PlotAxis::logarithmic(cost.name()), PlotAxis::logarithmic(error), series)
 }
 
-/// Joins the points of a Pareto front by steps: nothing better was measured between them.
-fn steps(places: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
-    let finite = places.filter(|place| place.iter().all(|part| part.is_finite()));
-    let mut places: Vec<[f64; 2]> = finite.collect();
-    places.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let mut steps: Vec<[f64; 2]> = Vec::new();
-    for place in places {
-        if let Some(&[_, y]) = steps.last() {
-            steps.push([place[0], y]);
-        }
-        steps.push(place);
-    }
-    steps
-}
-
 /// `Network f32, best preset, 12 hidden`.
 pub fn point_name(point: &TradeOffPoint) -> String {
-    let mut name = point.report.kind.name(point.report.precision).to_owned();
-    if let Some(preset) = point.preset {
-        name += &format!(", {preset} preset");
-    } else if let Some(method) = point.method() {
-        name += &format!(", {}", method.short_name());
-    }
-    if let Some(hidden) = point.hidden() {
-        name += &format!(", {hidden} hidden");
-    }
-    name
+    let how = match (point.preset, point.method()) {
+        (Some(preset), _) => format!(", {preset} preset"),
+        (None, Some(method)) => format!(", {}", method.short_name()),
+        (None, None) => String::new(),
+    };
+    named(point, &how)
 }
 
-/// `Network f32, 12 hidden`, next to a point whose mark shows the preset.
-fn point_label(point: &TradeOffPoint) -> String {
-    let name = point.report.kind.name(point.report.precision).to_owned();
-    match point.hidden() {
-        Some(hidden) => format!("{name}, {hidden} hidden"),
-        None => name,
-    }
+/// The decoder of a point with its hidden nodes, and `how` it was trained.
+fn named(point: &TradeOffPoint, how: &str) -> String {
+    let name = point.report.kind.name(point.report.precision);
+    let hidden = point
+        .hidden()
+        .map_or_else(String::new, |hidden| format!(", {hidden} hidden"));
+    format!("{name}{how}{hidden}")
 }
 
 /// `3.59 µs`, `1.94 ms`.

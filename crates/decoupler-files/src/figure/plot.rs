@@ -127,6 +127,20 @@ impl Series {
         series
     }
 
+    /// The series with a value that is constant up to the next point.
+    #[must_use]
+    pub fn stepped(mut self) -> Self {
+        let (mut steps, mut height) = (Vec::<PlotPoint>::new(), None);
+        for point in self.points {
+            let corner = height.filter(|height| *height != point.y);
+            steps.extend(corner.map(|height| PlotPoint::from([point.x, height])));
+            height = Some(point.y);
+            steps.push(point);
+        }
+        self.points = steps;
+        self
+    }
+
     /// A vertical line with a label instead of an entry in the legend.
     #[must_use]
     pub fn labelled(mut self, label: &str) -> Self {

@@ -83,9 +83,9 @@ fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
         area.min + Vec2::new(right, up) * area.size()
     };
     // Between two places of x, from the upper to the lower end of the plot.
-    let upright = |[left, right]: [f64; 2]| Bounds {
-        min: Vec2::new(at([left, 0.0]).x, area.min.y),
-        max: Vec2::new(at([right, 0.0]).x, area.max.y),
+    let upright = |[left, right]: [f64; 2]| {
+        let [left, right] = [left, right].map(|x| at([x, 0.0]).x);
+        Bounds::of([Vec2::new(left, area.min.y), Vec2::new(right, area.max.y)])
     };
     canvas.draw(plot.lines_across().filter_map(|(band, at)| match at {
         LineAt::Between([low, high]) => {
@@ -108,13 +108,13 @@ fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
             shapes.push(bar.area(series.look.hue));
         }
     }
-    for (Series { look, .. }, at_value) in plot.lines_across() {
-        let ends = match at_value {
+    for (Series { look, .. }, line) in plot.lines_across() {
+        let ends = match line {
             LineAt::Between(_) => None,
             LineAt::X(x) => plot.x.place(x).map(|x| upright([x, x])),
-            LineAt::Y(y) => plot.y.place(y).map(|y| Bounds {
-                min: Vec2::new(area.min.x, at([0.0, y]).y),
-                max: Vec2::new(area.max.x, at([0.0, y]).y),
+            LineAt::Y(y) => plot.y.place(y).map(|y| {
+                let y = at([0.0, y]).y;
+                Bounds::of([Vec2::new(area.min.x, y), Vec2::new(area.max.x, y)])
             }),
         };
         let stroke = look.line.map(|style| style.stroke(look.hue));

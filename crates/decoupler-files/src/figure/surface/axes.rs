@@ -71,7 +71,6 @@ impl<'a> Axes<'a> {
             const CLEARANCE: f32 = 4.0;
             labels.place(text, CLEARANCE, middles, |_| Some(0))
         };
-        let mut reaches = [0.0_f32; 3];
         let edges = [0, 1, 2].map(|axis| {
             let range = match axis {
                 2 => z_range.clone(),
@@ -80,9 +79,7 @@ impl<'a> Axes<'a> {
             let edge = Edge::new(&sight, axis, starts[axis], &range, measure);
             for &value in &edge.ticks.places {
                 let text = tick_text(value, edge.ticks.step);
-                if put(edge.point(&sight, value), edge.away, TICK + GAP, 0, &text) {
-                    reaches[axis] = reaches[axis].max(edge.away.abs().dot(measure(&text)));
-                }
+                put(edge.point(&sight, value), edge.away, TICK + GAP, 0, &text);
             }
             edge
         });
@@ -92,9 +89,9 @@ impl<'a> Axes<'a> {
             let middle = 0.5 * (plot_box.min_mm[axis] + high);
             let (value, away, gap) = match axis == 2 || (sight.is_above && axis == 1) {
                 true => (high, Vec2::NEG_Y, GAP + 1.0),
-                false => (middle, edge.away, TICK + 2.0 * GAP + reaches[axis]),
+                false => (middle, edge.away, TICK + 2.0 * GAP),
             };
-            put(edge.point(&sight, value), away, gap, 10, names[axis]);
+            put(edge.point(&sight, value), away, gap, 20, names[axis]);
         }
         Self {
             sight,

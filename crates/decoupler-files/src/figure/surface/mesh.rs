@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2};
 use super::{Surface, ViewMode, camera::Sight};
 use crate::figure::{
     axis::{multiples, step_for},
-    colour_map::{ColourMap, Rgb, is_light},
+    colour_map::{ColourMap, is_light},
     drawing::{Colour, Ink, Shape},
 };
 
@@ -34,10 +34,8 @@ pub struct Mesh {
 pub struct Vertex {
     /// Position on the screen.
     pub at: Vec2,
-    /// Its colour under the light.
-    pub colour: Rgb,
-    /// 1 within the nodes' rectangle; fades towards the rim of the extrapolated margin.
-    pub opacity: f32,
+    /// Its colour under the light: opaque within the nodes' rectangle, fading towards the rim of the extrapolated margin.
+    pub colour: Colour,
 }
 
 /// A part of a mesh.
@@ -68,7 +66,7 @@ impl Mesh {
                 };
                 let cell = corners(ix, iy).map(|[ix, iy]| surface.map.grid().index(ix, iy));
                 mesh.pieces.push(Piece::Cell(cell));
-                let opacity = cell.map(|corner| mesh.vertices[corner].opacity);
+                let opacity = cell.map(|corner| mesh.vertices[corner].colour.opacity);
                 let opacity = opacity.into_iter().fold(1.0, f32::min);
                 let mut draw = |ends: [DVec3; 2], strength: f32| {
                     let is_black = is_light(map.at(surface.share(ends[0].z)));
@@ -102,15 +100,12 @@ impl Mesh {
         mesh
     }
 
-    /// Returns the cells, each in the mean colour of its corners, and the lines, in the order of painting.
+    /// Returns the cells, each in the colour of its first corner, and the lines, in the order of painting.
     pub fn shapes(&self) -> impl Iterator<Item = Shape> {
         self.pieces.iter().map(|piece| match *piece {
             Piece::Cell(cell) => {
                 let corners = cell.map(|corner| self.vertices[corner]);
-                let part = |part: usize| corners.iter().map(|corner| u16::from(corner.colour[part])).sum::<u16>() / 4;
-                let colour = Ink::Rgb([0, 1, 2].map(|at| part(at) as u8));
-                let opacity = corners.iter().map(|corner| corner.opacity).sum::<f32>() / 4.0;
-                Shape::Area(corners.map(|corner| corner.at).into(), colour.at(opacity))
+                Shape::Area(corners.map(|corner| corner.at).into(), corners[0].colour)
             }
             Piece::Line([from, to], colour) => Shape::line(from, to, colour, 1.0),
         })
@@ -193,14 +188,13 @@ fn vertices(surface: &Surface, sight: &Sight, map: &ColourMap) -> Vec<Vertex> {
         let light = if sight.is_above { 1.0 } else { lit(ix, iy) };
         let beyond = surface.map.beyond(ix, iy) as f32;
         let colour = map.at(surface.share(surface.place_mm([ix, iy]).z));
-        Vertex {
-            at: sight.drawn(drawn(ix, iy)),
-            colour: colour.map(|part| (f32::from(part) * light) as u8),
-            opacity: match beyond > 0.0 {
-                true => MARGIN_OPACITY * (1.0 - beyond).max(0.0).powf(1.3),
-                false => 1.0,
-            },
-        }
+        let opacity = match beyond > 0.0 {
+            true => MARGIN_OPACITY * (1.0 - beyond).max(0.0).powf(1.3),
+            false => 1.0,
+        };
+        let colour = Ink::Rgb(colour.map(|part| (f32::from(part) * light) as u8)).at(opacity);
+        let at = sight.drawn(drawn(ix, iy));
+        Vertex { at, colour }
     };
     (0..nx * ny).map(vertex).collect()
 }

@@ -316,11 +316,12 @@ pub struct ColourScale {
 
 impl ColourScale {
     /// Width of the bar with its numbers, in points.
-    pub const WIDTH: f32 = 64.0;
+    pub const WIDTH: f32 = 72.0;
 
     /// Lays the scale out in `area` in the colours of `map`; empty if the area or the range is too small.
-    pub fn lay_out(&self, mut area: Bounds, map: &ColourMap, measure: Measure<'_>) -> Vec<Shape> {
-        area.max -= Vec2::new(0.0, 14.0);
+    pub fn lay_out(&self, area: Bounds, map: &ColourMap, measure: Measure<'_>) -> Vec<Shape> {
+        let margin = Vec2::new(0.0, 14.0);
+        let area = Bounds::of([area.min + margin, area.max - margin]);
         let axis = PlotAxis::linear(self.quantity.axis_name());
         lay_out_scale(area, &axis, &self.range, map, measure)
     }
