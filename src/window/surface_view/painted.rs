@@ -8,7 +8,7 @@ use decoupler_files::{
     export::format_number,
     figure::{
         Shape,
-        surface::{self, ColourScale, Dots, OrbitCamera, Piece, Section, Sight, Surface, ViewMode},
+        surface::{self, Dots, OrbitCamera, Piece, Section, Sight, Surface, ViewMode},
     },
 };
 use eframe::egui::{
@@ -144,14 +144,14 @@ fn add_line(mesh: &mut Mesh, from: Pos2, to: Pos2, colour: Color32) {
 #[derive(Clone, Debug)]
 pub struct ColourBar<'a> {
     /// Scale of the values.
-    pub scale: &'a ColourScale,
+    pub scale: &'a Surface,
     /// Dark or light theme.
     pub theme: &'a Theme,
 }
 
 impl ColourBar<'_> {
     /// Width of the bar with its numbers, in points.
-    pub const WIDTH: f32 = ColourScale::WIDTH;
+    pub const WIDTH: f32 = Surface::SCALE_WIDTH;
 
     /// Draws the bar `height` points high.
     pub fn show(self, ui: &mut Ui, height: f32) -> Response {
@@ -179,7 +179,9 @@ impl ColourBar<'_> {
         }
         let painter = ui.painter_at(rect);
         let map = self.theme.colours(&self.scale.quantity, self.scale.colours);
-        let shapes = self.scale.lay_out(bounds(rect), map, &|text| measure(&painter, text));
+        let shapes = self
+            .scale
+            .lay_out_scale(bounds(rect), map, &|text| measure(&painter, text));
         paint(&painter, &self.theme.palette, &shapes);
         response
     }

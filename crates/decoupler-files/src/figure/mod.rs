@@ -12,7 +12,6 @@ mod heat_map;
 mod of_epochs;
 mod of_errors;
 mod of_experiment;
-mod of_live;
 mod of_recorded;
 mod of_sample;
 mod of_trade_off;
@@ -28,9 +27,11 @@ pub use of_errors::{
     Decoded, ErrorBins, RegressionLine, histogram_figure, pair_address, pair_sample, regression_figure, value_pairs,
 };
 pub use of_experiment::experiment_figure;
-pub use of_live::{readings_figure, targets_over_time_figure, zero_gains_figure};
 pub use of_recorded::{TargetSurface, hysteresis_figure, position_error_map};
-pub use of_sample::{node_figure, sample_figure, singular_values_figure, starts_figure};
+pub use of_sample::{
+    node_figure, readings_figure, sample_figure, singular_values_figure, starts_figure, targets_over_time_figure,
+    zero_gains_figure,
+};
 pub use of_trade_off::{
     TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure, training_time,
 };

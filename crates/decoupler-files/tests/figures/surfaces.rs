@@ -197,9 +197,12 @@ fn scales_are_made_common_by_quantity() {
         range: 3.0..=4.5,
         ..dent("B")
     };
-    let scales = figure(vec![dent("A"), lower, error()]).with_common_scales().scales();
-    let scales: Vec<_> = scales.into_iter().map(|scale| (scale.quantity, scale.range)).collect();
-    assert_eq!(scales, [(Quantity::Height, 3.0..=5.0), (Quantity::Error, -0.5..=0.5)]);
+    let figure = figure(vec![dent("A"), lower, error()]).with_common_scales();
+    let scales = figure.scales().into_iter();
+    let scales: Vec<_> = scales
+        .map(|surface| (&surface.quantity, surface.range.clone()))
+        .collect();
+    assert_eq!(scales, [(&Quantity::Height, 3.0..=5.0), (&Quantity::Error, -0.5..=0.5)]);
 }
 
 /// Fills of the cells of a picture, the most frequent first.

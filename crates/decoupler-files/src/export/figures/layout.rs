@@ -4,14 +4,11 @@ use std::sync::OnceLock;
 
 use glam::Vec2;
 
-use super::{
-    picture::Picture,
-    svg::{Canvas, PAGE_WIDTH, TEXT, measure},
-};
+use super::picture::{Canvas, PAGE_WIDTH, Picture, TEXT, measure};
 use crate::figure::{
     Align, Bounds, ColourMap, Figure, Form, HeatMap, Hue, Ink, LineAt, Plot, PlotFigure, Rgb, Series, Shape, Stroke,
     share,
-    surface::{ColourScale, Surface, SurfaceFigure},
+    surface::{Surface, SurfaceFigure},
 };
 
 impl Figure {
@@ -193,17 +190,18 @@ const TITLE: f32 = 22.0;
 
 /// Draws surfaces side by side, as wide as a page. A colour bar is drawn to the right of the last card that it belongs to.
 fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
-    let scales: Vec<ColourScale> = figure.surfaces.iter().map(Surface::scale).collect();
+    const KEY: f32 = Surface::SCALE_WIDTH;
+    let scales: Vec<_> = figure.surfaces.iter().map(Surface::scale).collect();
     let has_key = |card: usize| scales.get(card + 1) != Some(&scales[card]);
     let keys = (0..scales.len()).filter(|&card| has_key(card)).count();
-    let width = (PAGE_WIDTH - keys as f32 * ColourScale::WIDTH) / scales.len().max(1) as f32;
+    let width = (PAGE_WIDTH - keys as f32 * KEY) / scales.len().max(1) as f32;
     let height = (0.98 * width).clamp(206.0, 400.0);
     let (mut cards, mut corner) = (Vec::new(), Vec2::new(0.0, TITLE));
     for (card, surface) in figure.surfaces.iter().enumerate() {
         let bounds = Bounds::of_size(corner, Vec2::new(width, height));
         let drawing = surface.lay_out(figure.camera, bounds, &measure, colours(surface));
         cards.push((bounds, surface, drawing));
-        corner.x += width + if has_key(card) { ColourScale::WIDTH } else { 0.0 };
+        corner.x += width + if has_key(card) { KEY } else { 0.0 };
     }
     let below = TITLE + height + 0.5 * LINE;
     let has_notes = cards.iter().any(|(_, _, drawing)| drawing.note.is_some());
@@ -218,8 +216,8 @@ fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
         canvas.draw_clipped(bounds, shapes.chain(section.into_iter().flatten()).chain(dots));
         if has_key(card) {
             let corner = Vec2::new(bounds.max.x, bounds.min.y);
-            let area = Bounds::of_size(corner, Vec2::new(ColourScale::WIDTH, height));
-            canvas.draw(scales[card].lay_out(area, colours(surface), &measure));
+            let area = Bounds::of_size(corner, Vec2::new(KEY, height));
+            canvas.draw(surface.lay_out_scale(area, colours(surface), &measure));
         }
         let at = Vec2::new(bounds.min.x + 16.0, below);
         canvas.draw(

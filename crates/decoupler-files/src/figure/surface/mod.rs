@@ -91,13 +91,20 @@ impl Surface {
         }
     }
 
-    /// Colours of the values.
-    pub fn scale(&self) -> ColourScale {
-        ColourScale {
-            quantity: self.quantity.clone(),
-            range: self.range.clone(),
-            colours: self.colours,
-        }
+    /// Width of a colour scale with its numbers, in points.
+    pub const SCALE_WIDTH: f32 = 72.0;
+
+    /// Lays the colour scale out in `area` in the colours of `map`; empty if the area or the range is too small.
+    pub fn lay_out_scale(&self, area: Bounds, map: &ColourMap, measure: Measure<'_>) -> Vec<Shape> {
+        let margin = Vec2::new(0.0, 14.0);
+        let area = Bounds::of([area.min + margin, area.max - margin]);
+        let axis = PlotAxis::linear(self.quantity.axis_name());
+        lay_out_scale(area, &axis, &self.range, map, measure)
+    }
+
+    /// Returns what determines the colour of a value.
+    pub fn scale(&self) -> (&Quantity, &RangeInclusive<f64>, SequentialMap) {
+        (&self.quantity, &self.range, self.colours)
     }
 
     /// Returns `true` if both look the same. Values are compared by their address in memory, which is fast.
@@ -280,10 +287,10 @@ impl SurfaceFigure {
     /// Gives surfaces of the same quantity a common scale, which makes colours and heights comparable.
     #[must_use]
     pub fn with_common_scales(mut self) -> Self {
-        let scales = self.scales();
+        let surfaces = self.surfaces.clone();
         for surface in &mut self.surfaces {
-            let alike = scales.iter().filter(|scale| scale.quantity == surface.quantity);
-            for ColourScale { range, .. } in alike {
+            let alike = surfaces.iter().filter(|other| other.quantity == surface.quantity);
+            for Surface { range, .. } in alike {
                 let low = surface.range.start().min(*range.start());
                 surface.range = low..=surface.range.end().max(*range.end());
             }
@@ -291,39 +298,15 @@ impl SurfaceFigure {
         self
     }
 
-    /// Returns the different colour scales, from left to right.
-    pub fn scales(&self) -> Vec<ColourScale> {
-        unique_by(self.surfaces.iter().map(Surface::scale), Clone::clone)
+    /// Returns the first surface with each colour scale, from left to right.
+    pub fn scales(&self) -> Vec<&Surface> {
+        unique_by(self.surfaces.iter(), |surface| surface.scale())
     }
 
     /// Returns the note common to all surfaces: "Between the nodes: bilinear."
     pub fn note(&self) -> String {
         let kinds = self.surfaces.iter().map(|surface| surface.map.interpolation());
         format!("Between the nodes: {}.", unique_by(kinds, |kind| *kind).join("; "))
-    }
-}
-
-/// Scale of colours: a quantity and its range.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ColourScale {
-    /// Quantity of the values.
-    pub quantity: Quantity,
-    /// Values at both ends.
-    pub range: RangeInclusive<f64>,
-    /// Colours of values that do not diverge.
-    pub colours: SequentialMap,
-}
-
-impl ColourScale {
-    /// Width of the bar with its numbers, in points.
-    pub const WIDTH: f32 = 72.0;
-
-    /// Lays the scale out in `area` in the colours of `map`; empty if the area or the range is too small.
-    pub fn lay_out(&self, area: Bounds, map: &ColourMap, measure: Measure<'_>) -> Vec<Shape> {
-        let margin = Vec2::new(0.0, 14.0);
-        let area = Bounds::of([area.min + margin, area.max - margin]);
-        let axis = PlotAxis::linear(self.quantity.axis_name());
-        lay_out_scale(area, &axis, &self.range, map, measure)
     }
 }
 

@@ -48,6 +48,7 @@ impl Section {
     /// Returns the curve in which the plane cuts the surface of these `values` on a grid, linear between its points as the
     /// surface is drawn; empty if it misses the grid.
     pub fn curve_mm(&self, grid: &Grid, values: &[f64]) -> Vec<DVec3> {
+        // Of a row-wire, x is across and y along the curve.
         let is_row = matches!(self.line, SectionLine::RowWire(_));
         let (across, along) = match is_row {
             true => (grid.x_mm(), grid.y_mm()),
@@ -57,10 +58,13 @@ impl Section {
             return Vec::new();
         };
         let share = (self.at_mm - across[before]) / (across[before + 1] - across[before]);
-        let points = along.iter().enumerate().map(|(index, &at_mm)| {
-            let value = |across: usize| match is_row {
-                true => values[grid.index(across, index)],
-                false => values[grid.index(index, across)],
+        let points = along.iter().enumerate().map(|(at, &at_mm)| {
+            let value = |across| {
+                values[if is_row {
+                    grid.index(across, at)
+                } else {
+                    grid.index(at, across)
+                }]
             };
             // At a grid point, where a wire through the nodes is up to rounding, a gap next to it does not matter.
             let height = match share {
@@ -68,10 +72,12 @@ impl Section {
                 0.999_999_999.. => value(before + 1),
                 _ => (1.0 - share) * value(before) + share * value(before + 1),
             };
-            match is_row {
-                true => DVec3::new(self.at_mm, at_mm, height),
-                false => DVec3::new(at_mm, self.at_mm, height),
-            }
+            let [x, y] = if is_row {
+                [self.at_mm, at_mm]
+            } else {
+                [at_mm, self.at_mm]
+            };
+            DVec3::new(x, y, height)
         });
         points.collect()
     }
