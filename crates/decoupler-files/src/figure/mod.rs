@@ -158,7 +158,7 @@ impl Look {
     }
 
     /// Symbols without a line.
-    pub fn marker(hue: Hue, marker: Marker) -> Self {
+    pub const fn marker(hue: Hue, marker: Marker) -> Self {
         let (line, marker) = (None, Some(marker));
         Self { hue, line, marker }
     }

@@ -22,16 +22,8 @@ use super::{
 };
 
 /// Looks of actual and of decoded values next to each other.
-const ACTUAL: Look = Look {
-    hue: Hue::Grey,
-    line: None,
-    marker: Some(Marker::Square),
-};
-const DECODED: Look = Look {
-    hue: Hue::Blue,
-    line: None,
-    marker: Some(Marker::Disc),
-};
+const ACTUAL: Look = Look::marker(Hue::Grey, Marker::Square);
+const DECODED: Look = Look::marker(Hue::Blue, Marker::Disc);
 
 /// Maximum number of targets whose names fit below the axis.
 const MAX_NAMES: usize = 12;

@@ -176,6 +176,16 @@ impl Plot {
         })
     }
 
+    /// Returns two opposite corners of a line or band across these ranges, as places; `None` if an axis has none for it.
+    pub(crate) fn corners(&self, line: LineAt, [x, y]: &[RangeInclusive<f64>; 2]) -> Option<[[f64; 2]; 2]> {
+        let ([left, right], [low, high]) = match line {
+            LineAt::X(at) => ([self.x.place(at)?; 2], [*y.start(), *y.end()]),
+            LineAt::Y(at) => ([*x.start(), *x.end()], [self.y.place(at)?; 2]),
+            LineAt::Between([from, to]) => ([self.x.place(from)?, self.x.place(to)?], [*y.start(), *y.end()]),
+        };
+        Some([[left, low], [right, high]])
+    }
+
     /// Returns the place of a point on both axes; `None` if one of the axes has no place for it.
     pub fn place(&self, x: f64, y: f64) -> Option<[f64; 2]> {
         Some([self.x.place(x)?, self.y.place(y)?])

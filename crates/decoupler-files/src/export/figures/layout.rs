@@ -6,8 +6,7 @@ use glam::Vec2;
 
 use super::picture::{Canvas, PAGE_WIDTH, Picture, TEXT, measure};
 use crate::figure::{
-    Align, Bounds, ColourMap, Figure, Form, HeatMap, Hue, Ink, LineAt, Plot, PlotFigure, Rgb, Series, Shape, Stroke,
-    share,
+    Align, Bounds, ColourMap, Figure, Form, HeatMap, Hue, Ink, Plot, PlotFigure, Rgb, Series, Shape, Stroke, share,
     surface::{Surface, SurfaceFigure},
 };
 
@@ -79,47 +78,30 @@ fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
         let [right, up] = [share(x, x_range), 1.0 - share(y, y_range)].map(|share| share as f32);
         area.min + Vec2::new(right, up) * area.size()
     };
-    // Between two places of x, from the upper to the lower end of the plot.
-    let upright = |[left, right]: [f64; 2]| {
-        let [left, right] = [left, right].map(|x| at([x, 0.0]).x);
-        Bounds::of([Vec2::new(left, area.min.y), Vec2::new(right, area.max.y)])
-    };
-    canvas.draw(plot.lines_across().filter_map(|(band, at)| match at {
-        LineAt::Between([low, high]) => {
-            let ends = [plot.x.place(low)?, plot.x.place(high)?];
-            Some(upright(ends).area(Ink::Hue(band.look.hue).at(0.12)))
+    let (mut bands, mut lines, mut shapes) = (Vec::new(), Vec::new(), Vec::new());
+    for (Series { look, .. }, line) in plot.lines_across() {
+        let Some(corners) = plot.corners(line, ranges) else {
+            continue;
+        };
+        let [from, to] = corners.map(at);
+        match look.line {
+            Some(style) => lines.push(Shape::Line(vec![from, to], style.stroke(look.hue))),
+            None => bands.push(Bounds::of([from, to]).area(Ink::Hue(look.hue).at(0.12))),
         }
-        LineAt::X(_) | LineAt::Y(_) => None,
-    }));
+    }
+    canvas.draw(bands);
     canvas.draw(axes(plot, area, ranges));
-
-    let mut shapes = Vec::new();
     for series in &plot.series {
         let Form::Bars(width) = series.form else { continue };
-        let placed = plot
-            .placed(series)
-            .map(|(_, [x, y])| (at([x, y]), [x - 0.5 * width, x + 0.5 * width]));
-        for (top, ends) in placed.filter(|(top, _)| top.y < area.max.y) {
-            let mut bar = upright(ends);
-            bar.min.y = top.y;
-            shapes.push(bar.area(series.look.hue));
+        for (_, [x, y]) in plot.placed(series) {
+            let [left, right] = [-0.5, 0.5].map(|half| at([x + half * width, y]));
+            if left.y < area.max.y {
+                let bar = Bounds::of([left, Vec2::new(right.x, area.max.y)]);
+                shapes.push(bar.area(series.look.hue));
+            }
         }
     }
-    for (Series { look, .. }, line) in plot.lines_across() {
-        let ends = match line {
-            LineAt::Between(_) => None,
-            LineAt::X(x) => plot.x.place(x).map(|x| upright([x, x])),
-            LineAt::Y(y) => plot.y.place(y).map(|y| {
-                let y = at([0.0, y]).y;
-                Bounds::of([Vec2::new(area.min.x, y), Vec2::new(area.max.x, y)])
-            }),
-        };
-        let stroke = look.line.map(|style| style.stroke(look.hue));
-        shapes.extend(
-            ends.zip(stroke)
-                .map(|(ends, stroke)| Shape::Line(vec![ends.min, ends.max], stroke)),
-        );
-    }
+    shapes.extend(lines);
     for series in &plot.series {
         if let Some(style) = series.look.line {
             let stretches = plot.stretches(series).into_iter();
@@ -149,14 +131,12 @@ fn axes(plot: &Plot, area: Bounds, ranges: &[std::ops::RangeInclusive<f64>; 2]) 
     let (right, up) = (Vec2::new(size.x, 0.0), Vec2::new(0.0, -size.y));
     // Each with the room for a number, the directions along and across it, that of its ticks, and the place of numbers.
     let axes = [
-        (&plot.x, 50.0, right, up, Vec2::Y, 15.0, Align::Middle),
+        (&plot.x, 50.0_f32, right, up, Vec2::Y, 15.0, Align::Middle),
         (&plot.y, 28.0, up, right, Vec2::NEG_X, 7.0, Align::End),
     ];
     for ((axis, number, along, across, away, beyond, align), range) in axes.into_iter().zip(ranges) {
-        let ticks = axis.ticks(
-            range,
-            (range.end() - range.start()) * f64::from(number / along.length()),
-        );
+        let number = f64::from(number / along.length());
+        let ticks = axis.ticks(range, number * (range.end() - range.start()));
         for &place in &ticks.places {
             let from = corner + along * share(place, range) as f32;
             let text = axis.tick_text(place, ticks.step);

@@ -14,6 +14,8 @@ use crate::figure::{
 const TICK: f32 = 4.0;
 /// Room between a tick and its number, in points.
 const GAP: f32 = 3.0;
+/// Room kept free around every label, in points.
+const CLEARANCE: f32 = 4.0;
 /// Axes seen end-on have no ticks.
 const SHORTEST_AXIS: f32 = 36.0;
 
@@ -21,9 +23,8 @@ const SHORTEST_AXIS: f32 = 36.0;
 pub(super) struct Axes<'a> {
     pub(super) sight: Sight,
     pub(super) labels: Labels<'a>,
-    edges: [Edge; 3],
-    /// Number of the vertical edge nearest to the eye: that of its lower corner.
-    near: usize,
+    /// Everything behind the surface.
+    pub(super) lines: Vec<Shape>,
 }
 
 impl<'a> Axes<'a> {
@@ -67,8 +68,6 @@ impl<'a> Axes<'a> {
         let mut put = |anchor: Vec2, away: Vec2, gap: f32, slide: usize, text: &str| {
             let reach = gap + 0.5 * away.abs().dot(measure(text));
             let middles = (0..=slide).map(|step| anchor + away * (reach + 4.0 * step as f32));
-            /// Room kept free around every label.
-            const CLEARANCE: f32 = 4.0;
             labels.place(text, CLEARANCE, middles, |_| Some(0))
         };
         let edges = [0, 1, 2].map(|axis| {
@@ -93,54 +92,37 @@ impl<'a> Axes<'a> {
             };
             put(edge.point(&sight, value), away, gap, 20, names[axis]);
         }
-        Self {
-            sight,
-            labels,
-            edges,
-            near: near_x | near_y,
-        }
-    }
-
-    /// Returns everything behind the surface.
-    pub(super) fn lines(&self) -> Vec<Shape> {
-        let plot_box = self.sight.plot_box;
+        let near = near_x | near_y;
         let mut lines = Vec::new();
         let mut segment = |ends: [DVec3; 2], ink: Ink| {
-            let [from, to] = ends.map(|place| self.sight.drawn(place));
+            let [from, to] = ends.map(|place| sight.drawn(place));
             lines.push(Shape::line(from, to, ink, 1.0));
         };
-        let back = plot_box.corner_mm(3 - self.near);
+        let back = plot_box.corner_mm(3 - near);
         // At each tick of x and y, a line across the floor and one up a back wall; at each tick of z, one across each wall.
-        for edge in self.edges.iter().filter(|_| !self.sight.is_above) {
+        for edge in edges.iter().filter(|_| !sight.is_above) {
             let [one, other] = [[1, 2], [0, 2], [0, 1]][edge.axis];
             for &value in &edge.ticks.places {
                 for (along, fixed) in [(one, other), (other, one)] {
-                    let mut from = plot_box.min_mm;
-                    (from[edge.axis], from[fixed]) = (value, back[fixed]);
-                    let mut to = from;
-                    to[along] = plot_box.max_mm[along];
-                    segment([from, to], Ink::Grid);
+                    let from = moved(moved(plot_box.min_mm, edge.axis, value), fixed, back[fixed]);
+                    segment([from, moved(from, along, plot_box.max_mm[along])], Ink::Grid);
                 }
             }
         }
         // The outline of the floor and of both back walls: without the edges at the upper corner near the eye.
-        let hidden = self.near | 4;
+        let hidden = near | 4;
         for (from, axis) in (0..8).flat_map(|corner| [0, 1, 2].map(|axis| (corner, axis))) {
             let to = from | (1 << axis);
-            let is_drawn = if self.sight.is_above {
-                to < 4
-            } else {
-                from != hidden && to != hidden
-            };
-            if to != from && is_drawn {
+            let is_hidden = from == hidden || to == hidden || (sight.is_above && to >= 4);
+            if to != from && !is_hidden {
                 segment([from, to].map(|corner| plot_box.corner_mm(corner)), Ink::Edge);
             }
         }
-        for edge in &self.edges {
-            let ticks = edge.ticks.places.iter().map(|&value| edge.point(&self.sight, value));
+        for edge in &edges {
+            let ticks = edge.ticks.places.iter().map(|&value| edge.point(&sight, value));
             lines.extend(ticks.map(|from| Shape::line(from, from + edge.away * TICK, Ink::Edge, 1.0)));
         }
-        lines
+        Self { sight, labels, lines }
     }
 }
 
@@ -156,34 +138,34 @@ struct Edge {
 
 impl Edge {
     fn new(sight: &Sight, axis: usize, from_mm: DVec3, range: &RangeInclusive<f64>, measure: Measure<'_>) -> Self {
-        let (away, ticks) = (Vec2::ZERO, Ticks::default());
-        let mut edge = Self {
-            axis,
-            from_mm,
-            away,
-            ticks,
-        };
-        let [start, end] = [range.start(), range.end()].map(|end| edge.point(sight, *end));
+        let ends = [range.start(), range.end()];
+        let [start, end] = ends.map(|end| sight.drawn(moved(from_mm, axis, *end)));
         let (length, along) = ((end - start).length(), (end - start).normalize_or_zero());
         let across = Vec2::new(along.y, -along.x);
         let is_outwards = across.dot(0.5 * (start + end) - sight.bounds().middle()) >= 0.0;
-        edge.away = if is_outwards { across } else { -across };
-        if length >= SHORTEST_AXIS {
-            let sizes = [range.start(), range.end()].map(|end| measure(&tick_text(*end, step_for(range, 8))));
-            let size = sizes[0].max(sizes[1]) + Vec2::new(8.0, 5.0);
-            let apart = (size / along.abs().max(Vec2::splat(1e-3))).min_element().max(20.0);
-            // In perspective, the far end of an edge is shorter than the average.
-            let apart_mm = f64::from(apart / (0.8 * length)) * (range.end() - range.start());
-            edge.ticks = PlotAxis::linear("").ticks(range, apart_mm);
+        let sizes = ends.map(|end| measure(&tick_text(*end, step_for(range, 8))));
+        let size = sizes[0].max(sizes[1]) + Vec2::new(8.0, 5.0);
+        let apart = (size / along.abs().max(Vec2::splat(1e-3))).min_element().max(20.0);
+        // In perspective, the far end of an edge is shorter than the average.
+        let apart_mm = f64::from(apart / (0.8 * length)) * (range.end() - range.start());
+        let ticks = (length >= SHORTEST_AXIS).then(|| PlotAxis::linear("").ticks(range, apart_mm));
+        Self {
+            axis,
+            from_mm,
+            away: if is_outwards { across } else { -across },
+            ticks: ticks.unwrap_or_default(),
         }
-        edge
     }
 
     fn point(&self, sight: &Sight, value: f64) -> Vec2 {
-        let mut place_mm = self.from_mm;
-        place_mm[self.axis] = value;
-        sight.drawn(place_mm)
+        sight.drawn(moved(self.from_mm, self.axis, value))
     }
+}
+
+/// The place with this coordinate on an axis.
+fn moved(mut place_mm: DVec3, axis: usize, value: f64) -> DVec3 {
+    place_mm[axis] = value;
+    place_mm
 }
 
 #[cfg(test)]

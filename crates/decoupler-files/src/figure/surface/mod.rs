@@ -172,7 +172,7 @@ impl Surface {
             true => (Mesh::new(self, &sight, colours), Dots::new(self, &sight)),
             false => Default::default(),
         };
-        let mut frame = axes.lines();
+        let mut frame = axes.lines;
         frame.extend(axes.labels.shapes());
         let note = match (mesh.has_plateau, dots.beyond()) {
             (false, 0) => None,

@@ -69,21 +69,15 @@ impl Dots {
     pub fn shapes(&self, marked: Option<usize>, lit: &[usize]) -> Vec<Shape> {
         let mut shapes = Vec::new();
         let accent = Ink::Hue(Hue::Blue);
-        let ring = |at, radius, width: [f32; 2], ink: Ink| {
-            let under = Stroke::new(Ink::Ground.at(0.8), width[0]);
-            [
-                Shape::Ring(at, radius, under),
-                Shape::Ring(at, radius, Stroke::new(ink, width[1])),
-            ]
+        let ring = |at, radius, [under, over]: [f32; 2], ink: Ink| {
+            let strokes = [Stroke::new(Ink::Ground.at(0.8), under), Stroke::new(ink, over)];
+            strokes.map(|stroke| Shape::Ring(at, radius, stroke))
         };
         let radius = self.radius();
         for dot in self.0.iter().flatten().filter(|_| radius > 0.0) {
             let opacity = if dot.is_hidden { HIDDEN_OPACITY } else { 1.0 };
-            let ink = if dot.is_beyond {
-                Ink::Hue(Hue::Orange)
-            } else {
-                Ink::WHITE
-            };
+            let warning = Ink::Hue(Hue::Orange);
+            let ink = if dot.is_beyond { warning } else { Ink::WHITE };
             shapes.push(Shape::Disc(dot.at, radius + 0.75, Ink::BLACK.at(0.45 * opacity)));
             shapes.push(Shape::Disc(dot.at, radius, ink.at(opacity)));
         }
