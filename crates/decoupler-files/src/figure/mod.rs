@@ -164,8 +164,8 @@ impl Look {
     }
 
     /// Symbols joined by a line.
-    pub fn joined(mut self, style: LineStyle) -> Self {
-        self.line = Some(style);
+    pub fn joined(mut self, style: impl Into<Option<LineStyle>>) -> Self {
+        self.line = style.into();
         self
     }
 

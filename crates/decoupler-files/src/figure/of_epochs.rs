@@ -25,9 +25,8 @@ const FAILURES: OfEpoch = |epoch| Some(epoch.validation_failures as f64);
 
 /// The curve of a quantity over the epochs.
 fn curve(name: impl Into<String>, hue: Hue, style: LineStyle, history: &[EpochRecord], of: OfEpoch) -> Series {
-    let points = history
-        .iter()
-        .filter_map(|epoch| Some([epoch.epoch as f64, of(epoch)?]));
+    let point = |epoch: &EpochRecord| Some([epoch.epoch as f64, of(epoch)?]);
+    let points = history.iter().filter_map(point);
     Series::new(name, Look::line(hue, style), points)
 }
 
@@ -150,10 +149,8 @@ impl EpochOutline {
             self.kept.extend_from_slice(epochs);
             if self.kept.len() > MAX_EPOCHS {
                 let width = self.kept[self.kept.len() - 1].epoch / STRETCHES + 1;
-                let stretches = self
-                    .kept
-                    .chunk_by(|one, other| one.epoch / width == other.epoch / width);
-                self.kept = stretches.flat_map(extremes).collect();
+                let are_near = |one: &EpochRecord, other: &EpochRecord| one.epoch / width == other.epoch / width;
+                self.kept = self.kept.chunk_by(are_near).flat_map(extremes).collect();
             }
         }
     }
@@ -183,12 +180,8 @@ fn extremes(stretch: &[EpochRecord]) -> Vec<EpochRecord> {
         let finite = values.clone().filter_map(|(place, value)| Some((place, value?)));
         let ends = super::extremes(finite, |(_, value)| *value);
         places.extend(ends.into_iter().flat_map(|(lowest, highest)| [lowest.0, highest.0]));
-        places.extend(
-            values
-                .filter(|(_, value)| value.is_none())
-                .map(|(place, _)| place)
-                .next(),
-        );
+        let mut missing = values.filter(|(_, value)| value.is_none());
+        places.extend(missing.next().map(|(place, _)| place));
     }
     places.sort_unstable();
     places.dedup();

@@ -150,10 +150,7 @@ impl RegressionLine {
     pub fn of(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Self {
         let pairs = pairs.map(DVec2::from);
         let actual = pairs.clone().map(|pair| pair.x);
-        let (count, sum) = pairs
-            .clone()
-            .fold((0.0, DVec2::ZERO), |(count, sum), pair| (count + 1.0, sum + pair));
-        let mean = sum / count;
+        let mean = pairs.clone().sum::<DVec2>() / pairs.clone().count() as f64;
         let (mut squares, mut product) = (DVec2::ZERO, 0.0);
         for deviation in pairs.map(|pair| pair - mean) {
             squares += deviation * deviation;

@@ -93,13 +93,14 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
     let discs = Look::marker(Hue::Blue, Marker::Disc);
     let squares = Look::marker(Hue::Ink, Marker::Square);
     // Categories are not joined by lines.
-    let (ours_look, reference, published) = match is_number {
-        true => (
-            discs.joined(LineStyle::Solid),
-            Look::line(Hue::Grey, LineStyle::Dashed),
-            squares.joined(LineStyle::Fine),
-        ),
-        false => (discs, Look::marker(Hue::Grey, Marker::Ring), squares),
+    let join = |style: LineStyle| is_number.then_some(style);
+    let (ours_look, published) = (
+        discs.joined(join(LineStyle::Solid)),
+        squares.joined(join(LineStyle::Fine)),
+    );
+    let reference = match is_number {
+        true => Look::line(Hue::Grey, LineStyle::Dashed),
+        false => Look::marker(Hue::Grey, Marker::Ring),
     };
     let linear = match results.experiment.recording {
         None => "linear map",
@@ -120,10 +121,8 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
         }
     };
     // R² along the axis, which nodes of an array do not have.
-    let r2 = cells
-        .iter()
-        .map(|(x, cell)| Some(median_point(*x, &cell.error(ErrorMeasure::R2)?)));
-    let r2 = r2.collect::<Option<Vec<_>>>().map(|points| {
+    let r2 = |(x, cell): &(f64, &Cell)| Some(median_point(*x, &cell.error(ErrorMeasure::R2)?));
+    let r2 = cells.iter().map(r2).collect::<Option<Vec<_>>>().map(|points| {
         let series = Series::new("R²", ours_look, points.into_iter().flatten());
         Plot::new(
             x.clone(),

@@ -125,10 +125,8 @@ pub fn node_figure(
 /// lower to the upper quartile, with a line at the median. Starts without a result have no dot.
 pub fn starts_figure(axis: &str, results: &[Option<f64>], kept: usize, spread: &Spread) -> PlotFigure {
     let dots = |name: &str, hue: Hue, is_kept: bool| {
-        let shown = results
-            .iter()
-            .enumerate()
-            .filter(|(start, _)| (*start == kept) == is_kept);
+        let all = results.iter().enumerate();
+        let shown = all.filter(|(start, _)| (*start == kept) == is_kept);
         let points = shown.filter_map(|(start, result)| {
             let note = format!("Start {}: {}", start + 1, format_number((*result)?));
             // Three heights separate the dots of similar values.
@@ -136,9 +134,7 @@ pub fn starts_figure(axis: &str, results: &[Option<f64>], kept: usize, spread: &
         });
         Series::new(name, Look::marker(hue, Marker::Disc), points).listed(None)
     };
-    let y = PlotAxis::linear("starts")
-        .ticked(TickRule::Nothing)
-        .including([-1.0, 3.0]);
+    let y = PlotAxis::linear("starts").including([-1.0, 3.0]);
     let quartiles = LineAt::Between([spread.lower_quartile, spread.upper_quartile]);
     let series = [
         dots("other starts", Hue::Grey, false),
@@ -146,7 +142,7 @@ pub fn starts_figure(axis: &str, results: &[Option<f64>], kept: usize, spread: &
         Series::across("quartiles", quartiles, Hue::Grey, None).listed(None),
         Series::across("median", LineAt::X(spread.median), Hue::Grey, LineStyle::Solid).listed(None),
     ];
-    Plot::new(PlotAxis::linear(axis), y, series).into()
+    Plot::new(PlotAxis::linear(axis), y.ticked(TickRule::Nothing), series).into()
 }
 
 const HUES: [Hue; 6] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Violet, Hue::Cyan, Hue::Red];
@@ -186,11 +182,8 @@ pub fn targets_over_time_figure(
         let of_unit = (0..targets.len()).filter(|&target| targets[target].unit.as_deref() == unit);
         let limits = |target: usize| [limit(target, "lower", -1.0), limit(target, "upper", 1.0)];
         let series = of_unit.clone().map(series).chain(of_unit.flat_map(limits));
-        Plot::new(
-            PlotAxis::linear("time (s)"),
-            PlotAxis::linear(titled("decoded value", unit)),
-            series,
-        )
+        let y = PlotAxis::linear(titled("decoded value", unit));
+        Plot::new(PlotAxis::linear("time (s)"), y, series)
     });
     PlotFigure::new(plots, [])
 }

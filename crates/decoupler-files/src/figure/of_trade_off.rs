@@ -101,8 +101,7 @@ pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotF
     ];
     let marks = marks
         .into_iter()
-        .filter(|(is_there, _)| *is_there)
-        .map(|(_, mark)| mark);
+        .filter_map(|(is_there, mark)| is_there.then_some(mark));
     let note = capitalised(&Vec::from_iter(marks).join(", "));
     let plots = TradeOffCost::ALL.map(|cost| plot(level, limits, cost));
     PlotFigure::new(plots, (!note.is_empty()).then(|| format!("{note}.")))
@@ -196,10 +195,10 @@ pub fn point_name(point: &TradeOffPoint) -> String {
 /// The decoder of a point with its hidden nodes, and `how` it was trained.
 fn named(point: &TradeOffPoint, how: &str) -> String {
     let name = point.report.kind.name(point.report.precision);
-    let hidden = point
-        .hidden()
-        .map_or_else(String::new, |hidden| format!(", {hidden} hidden"));
-    format!("{name}{how}{hidden}")
+    match point.hidden() {
+        Some(hidden) => format!("{name}{how}, {hidden} hidden"),
+        None => format!("{name}{how}"),
+    }
 }
 
 /// `3.59 µs`, `1.94 ms`.

@@ -344,12 +344,13 @@ impl Plot {
             }
         }
         // To the right of the point if possible, else to the left, above or below.
-        let sides = [1.0, -1.0, 0.0]
-            .into_iter()
-            .flat_map(|x| [-1.0, 0.0, 1.0].map(|y| Vec2::new(x, y)));
+        let sides = [1.0, -1.0, 0.0].map(|x| [-1.0, 0.0, 1.0].map(|y| Vec2::new(x, y)));
         let mut labels = Labels::new(measure);
         for (at, text) in wanted {
-            let (sides, size) = (sides.clone().filter(|side| *side != Vec2::ZERO), labels.size(text));
+            let (sides, size) = (
+                sides.iter().flatten().filter(|side| **side != Vec2::ZERO),
+                labels.size(text),
+            );
             let middles = sides.map(|side| at + side * (GAP + 0.5 * size));
             labels.place(text, -1e-3, middles, |place| {
                 let is_within = frame.contains(place.min) && frame.contains(place.max);

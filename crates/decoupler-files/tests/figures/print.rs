@@ -275,7 +275,7 @@ fn hollow_marks_of_the_trade_off_mean_32_bits_and_nothing_else() {
         .filter(|line| line.first() == line.last());
     // Each in both plots.
     assert_eq!((hollow_discs, closed.count()), (2, 2), "discs and diamonds");
-    let areas = elements(&picture, "path", |path| path.attribute("color").is_some());
+    let areas = elements(&picture, "path", |path| path.attribute("fill") != Some("none"));
     let diamonds = areas.into_iter().filter(|is_area| *is_area).count();
     let filled_marks = (rings.len() - hollow_discs) + diamonds;
     // In the legend each decoder has one.

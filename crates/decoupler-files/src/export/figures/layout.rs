@@ -200,11 +200,8 @@ fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
             canvas.draw(surface.lay_out_scale(area, colours(surface), &measure));
         }
         let at = Vec2::new(bounds.min.x + 16.0, below);
-        canvas.draw(
-            drawing
-                .note
-                .map(|note| Shape::text(at, Align::Start, Ink::Hue(Hue::Orange), note)),
-        );
+        let write = |note| Shape::text(at, Align::Start, Ink::Hue(Hue::Orange), note);
+        canvas.draw(drawing.note.map(write));
     }
     canvas.draw([Shape::text(Vec2::new(16.0, last), Align::Start, DIM, figure.note())]);
     canvas.finish()

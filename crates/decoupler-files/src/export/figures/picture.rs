@@ -34,16 +34,6 @@ pub enum PictureFormat {
     Png,
 }
 
-impl PictureFormat {
-    /// File name extension, without the dot.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Self::Svg => "svg",
-            Self::Png => "png",
-        }
-    }
-}
-
 /// Errors of writing a figure.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -60,6 +50,14 @@ pub enum PictureError {
 }
 
 impl PictureFormat {
+    /// File name extension, without the dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Svg => "svg",
+            Self::Png => "png",
+        }
+    }
+
     /// Returns the format given by the extension of `path`.
     ///
     /// # Errors
@@ -204,10 +202,9 @@ pub(crate) fn dark_style() -> String {
     let rules = PALETTE.map(|(ink, print, dark)| {
         let (print, dark) = (hex(print), hex(dark));
         // White dots mark nodes, and white cells errors of zero, on any background.
-        let [areas, lines] = if ink == Ink::Ground {
-            ["rect", "[fill=none]"]
-        } else {
-            [""; 2]
+        let [areas, lines] = match ink {
+            Ink::Ground => ["rect", "[fill=none]"],
+            _ => [""; 2],
         };
         let fill = format!("  svg {areas}[fill=\"{print}\"] {{ fill: {dark}; }}\n");
         format!("{fill}  svg {lines}[stroke=\"{print}\"] {{ stroke: {dark}; }}\n")
@@ -242,11 +239,8 @@ pub(super) struct Canvas {
 
 impl Canvas {
     pub fn new(size: Vec2) -> Self {
-        Self {
-            size,
-            body: String::new(),
-            clips: 0,
-        }
+        let (body, clips) = (String::new(), 0);
+        Self { size, body, clips }
     }
 
     /// Draws shapes in their order.
@@ -254,24 +248,18 @@ impl Canvas {
         for shape in shapes {
             let element = match shape {
                 Shape::Line(points, stroke) => {
-                    format!(
-                        r#"<path d="M{}" fill="none"{}/>"#,
-                        coordinates(&points),
-                        stroke_style(&stroke)
-                    )
+                    let (path, style) = (coordinates(&points), stroke_style(&stroke));
+                    format!(r#"<path d="M{path}" fill="none"{style}/>"#)
                 }
                 Shape::Area(corners, colour) => {
                     // A hairline in its own colour closes the seam of an area to its neighbours; a translucent area has crisp
                     // edges instead, because the hairlines would be visible.
                     let edge = match colour.opacity < 1.0 {
                         true => r#" shape-rendering="crispEdges""#.to_owned(),
-                        false => format!(r#" stroke="{}""#, hex(rgb(colour.ink))),
+                        false => paint("stroke", colour),
                     };
-                    format!(
-                        r#"<path d="M{}z"{}{edge}/>"#,
-                        coordinates(&corners),
-                        paint("fill", colour)
-                    )
+                    let (path, fill) = (coordinates(&corners), paint("fill", colour));
+                    format!(r#"<path d="M{path}z"{fill}{edge}/>"#)
                 }
                 Shape::Disc(at, radius, colour) => circle(at, radius, &paint("fill", colour)),
                 Shape::Ring(at, radius, stroke) => {

@@ -128,10 +128,9 @@ impl Surface {
             if (is_below || is_above) && !ray.is_vertical() {
                 return None;
             }
-            let hits = [[a, b, c], [a, c, d]]
-                .into_iter()
-                .filter_map(|corners| share_at(ray, corners));
-            hits.min_by(f64::total_cmp).map(|share| ray.at(share))
+            let hits = [[a, b, c], [a, c, d]].map(|corners| share_at(ray, corners));
+            let nearest = hits.into_iter().flatten().min_by(f64::total_cmp);
+            nearest.map(|share| ray.at(share))
         })
     }
 }
