@@ -12,7 +12,7 @@ use super::{
 };
 use decoupler_core::{
     evaluation::{
-        ErrorMeasure, TestErrors,
+        ErrorMeasure,
         experiments::{Axis, AxisKind, Cell, Experiment, ExperimentResults, Figure as Measured, Trial},
     },
     network::suggested_hidden,
@@ -94,10 +94,8 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
     let squares = Look::marker(Hue::Ink, Marker::Square);
     // Categories are not joined by lines.
     let join = |style: LineStyle| is_number.then_some(style);
-    let (ours_look, published) = (
-        discs.joined(join(LineStyle::Solid)),
-        squares.joined(join(LineStyle::Fine)),
-    );
+    let ours_look = discs.joined(join(LineStyle::Solid));
+    let published = squares.joined(join(LineStyle::Fine));
     let reference = match is_number {
         true => Look::line(Hue::Grey, LineStyle::Dashed),
         false => Look::marker(Hue::Grey, Marker::Ring),
@@ -123,12 +121,8 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
     // R² along the axis, which nodes of an array do not have.
     let r2 = |(x, cell): &(f64, &Cell)| Some(median_point(*x, &cell.error(ErrorMeasure::R2)?));
     let r2 = cells.iter().map(r2).collect::<Option<Vec<_>>>().map(|points| {
-        let series = Series::new("R²", ours_look, points.into_iter().flatten());
-        Plot::new(
-            x.clone(),
-            PlotAxis::linear("R²").including([1.0]),
-            [series.listed(None)],
-        )
+        let series = Series::new("R²", ours_look, points.into_iter().flatten()).listed(None);
+        Plot::new(x.clone(), PlotAxis::linear("R²").including([1.0]), [series])
     });
     let (error, unit) = error_name(results);
     let y = PlotAxis::linear(titled(error, Some(unit))).including([0.0, 1.0]);
@@ -137,60 +131,50 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
         let (root, logarithm) = suggested_hidden(problem.feature_count(), problem.targets.len());
         let root = LineAt::Between([root.start(), root.end()].map(|end| *end as f64));
         let logarithm = Series::across("Eq. (13)", LineAt::X(logarithm as f64), Hue::Orange, LineStyle::Solid);
-        [
-            Series::across("Eq. (12)", root, Hue::Orange, None),
-            logarithm.labelled("Eq. (13)"),
-        ]
+        let root = Series::across("Eq. (12)", root, Hue::Orange, None);
+        [root, logarithm.labelled("Eq. (13)")]
     });
     let plot = Plot::new(x, y, series.into_iter().chain(suggestions.into_iter().flatten()));
     PlotFigure::new(std::iter::once(plot).chain(r2), [])
 }
 
-type TrialError = fn(&TestErrors) -> Option<f64>;
-
-/// The errors of every trial, one plot each for Z, X and Y.
+/// The errors of every trial, one plot each for Z, X and Y; of a recording, the mean absolute error.
 fn repeats(results: &ExperimentResults) -> PlotFigure {
     const HUES: [Hue; 4] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Grey];
     let experiment = &results.experiment;
-    let published = |cell: &Cell, measure| cell.error(measure)?.published;
     let linear = |name: &str| PlotAxis::linear(name).including([0.0]);
-    let errors: [(PlotAxis, &dyn Fn(&Cell) -> Option<f64>, TrialError); 3] = [
-        (
-            linear("Z error (%)"),
-            &|cell| cell.percent().published,
-            TestErrors::percent,
-        ),
-        (
-            linear("X error (%)"),
-            &|cell| published(cell, ErrorMeasure::XPercent),
-            |errors| errors.nodes()?.x_percent,
-        ),
+    let ranked = match experiment.recording {
+        None => ErrorMeasure::ZPercent,
+        Some(_) => ErrorMeasure::RangePercent,
+    };
+    let (error, unit) = error_name(results);
+    let errors = [
+        (linear(&titled(error, Some(unit))), ranked),
+        (linear("X error (%)"), ErrorMeasure::XPercent),
         // Y is constant, so its error may be exactly 0 or of the size of rounding errors.
-        (
-            PlotAxis::logarithmic("Y error (%)"),
-            &|cell| published(cell, ErrorMeasure::YPercent),
-            |errors| errors.nodes()?.y_percent,
-        ),
+        (PlotAxis::logarithmic("Y error (%)"), ErrorMeasure::YPercent),
     ];
     let trials = results.cells.iter().map(|cell| cell.expected).max().unwrap_or(1);
     let names = labels(&experiment.axis).into_iter();
     let names = names.map(|label| format!("{label} {}", experiment.axis.kind.name()));
     let cells: Vec<(String, Hue)> = names.zip(HUES.into_iter().cycle()).collect();
-    let plots = errors.map(|(y, published, measured)| {
+    let count = if experiment.recording.is_some() { 1 } else { 3 };
+    let plots = errors.into_iter().take(count).map(|(y, measure)| {
         let x = PlotAxis::linear(if experiment.seeds == 1 { "repeat" } else { "trial" });
         let of_cells = || results.cells.iter().zip(&cells);
         let series = of_cells().map(|(cell, (name, hue))| {
-            let points = trial_points(experiment, cell, measured);
+            let points = trial_points(experiment, cell, measure);
             Series::new(name, Look::marker(*hue, Marker::Disc), points)
         });
         let lines = of_cells().filter_map(|(cell, (name, hue))| {
-            let at = LineAt::Y(published(cell)?);
+            let at = LineAt::Y(cell.error(measure)?.published?);
             let line = Series::across(format!("{name}, published"), at, *hue, LineStyle::Dashed);
             Some(line.listed(Some(name)))
         });
         let x = x.including([0.5, trials as f64 + 0.5]).whole();
         Plot::new(x, y, series.chain(lines))
     });
+    let plots = Vec::from_iter(plots);
     let median = |cell: &Cell| cell.error(ErrorMeasure::YPercent)?.median;
     let has_zero = results.cells.iter().any(|cell| median(cell) == Some(0.0));
     let has_lines = plots.iter().any(|plot| plot.lines_across().next().is_some());
@@ -202,16 +186,14 @@ fn repeats(results: &ExperimentResults) -> PlotFigure {
 }
 
 /// Error of each trial of a cell against the number of the trial, counted from 1 through all seeds (Fig. 5).
-fn trial_points(experiment: &Experiment, cell: &Cell, error: TrialError) -> Vec<[f64; 2]> {
+fn trial_points(experiment: &Experiment, cell: &Cell, measure: ErrorMeasure) -> Vec<[f64; 2]> {
     let repeats = experiment.cross_validation.map_or(1, |validation| validation.repeats);
     let number = |trial: &Trial| {
         let seeds_before = trial.seed.0.wrapping_sub(cell.settings.seed.0) as f64;
         seeds_before * repeats as f64 + trial.repeat as f64 + 1.0
     };
-    let points = cell.trials.iter();
-    points
-        .filter_map(|trial| Some([number(trial), error(&trial.scores.network)?]))
-        .collect()
+    let point = |trial: &Trial| Some([number(trial), trial.scores.network.figure(measure)?]);
+    cell.trials.iter().filter_map(point).collect()
 }
 
 #[cfg(test)]
@@ -256,7 +238,7 @@ mod tests {
         for trial in finished.into_iter().rev().take(3) {
             results.record(trial.cell, trial.outcome);
         }
-        let points = trial_points(&experiment, &results.cells[0], TestErrors::percent);
+        let points = trial_points(&experiment, &results.cells[0], ErrorMeasure::ZPercent);
         assert_eq!(points.iter().map(|point| point[0]).collect::<Vec<_>>(), [4.0, 5.0, 6.0]);
     }
 

@@ -109,29 +109,31 @@ impl Surface {
 
     /// Returns `true` if both look the same. Values are compared by their address in memory, which is fast.
     pub fn looks_like(&self, other: &Self) -> bool {
-        let bits = |surface: &Self| [*surface.range.start(), *surface.range.end()].map(f64::to_bits);
         Arc::ptr_eq(&self.map, &other.map)
             && Arc::ptr_eq(&self.values, &other.values)
             && Arc::ptr_eq(&self.nodes, &other.nodes)
-            && self.quantity == other.quantity
-            && (self.mode, self.colours, bits(self)) == (other.mode, other.colours, bits(other))
+            && (self.mode, self.usable_range()) == (other.mode, other.usable_range())
+            && (self.colours, &self.quantity) == (other.colours, &other.quantity)
     }
 
     /// Returns the range of its nodes: "z 4.00 to 5.00 mm".
     pub fn range_text(&self) -> String {
-        let nodes = self.nodes.iter().filter(|node| node.is_finite());
-        let range = extremes(nodes, |node| node.z);
-        range.map_or_else(
-            || "no values".to_owned(),
-            |(low, high)| self.quantity.range_text(low.z, high.z),
-        )
+        match self.extremes() {
+            Some((low, high)) => self.quantity.range_text(low.z, high.z),
+            None => "no values".to_owned(),
+        }
+    }
+
+    /// Returns the lowest and the highest node.
+    fn extremes(&self) -> Option<(&DVec3, &DVec3)> {
+        let finite = self.nodes.iter().filter(|node| node.is_finite());
+        extremes(finite, |node| node.z)
     }
 
     /// Describes the surface: the range of its nodes, and the place furthest from rest.
     pub fn summary(&self) -> String {
         let (range, nodes) = (self.range_text(), counted(self.nodes.len(), "node"));
-        let finite = self.nodes.iter().filter(|node| node.is_finite());
-        let Some((lowest, highest)) = extremes(finite, |node| node.z) else {
+        let Some((lowest, highest)) = self.extremes() else {
             return range;
         };
         if lowest.z == highest.z {
@@ -159,14 +161,8 @@ impl Surface {
             ViewMode::Top => (PlotBox::flat(self.box_mm()), None),
         };
         let names = ["x (mm)", "y (mm)", &self.quantity.axis_name()];
-        let axes = Axes::new(
-            measure,
-            card.grown(-EDGE),
-            plot_box,
-            camera,
-            &self.usable_range(),
-            names,
-        );
+        let (inner, range) = (card.grown(-EDGE), self.usable_range());
+        let axes = Axes::new(measure, inner, plot_box, camera, &range, names);
         let sight = axes.sight;
         let (mesh, dots) = match self.values.len() == self.map.grid().len() {
             true => (Mesh::new(self, &sight, colours), Dots::new(self, &sight)),
@@ -209,11 +205,9 @@ impl Surface {
     /// Returns two corners of the box: the extent of the grid, and the range of values.
     pub(super) fn box_mm(&self) -> [DVec3; 2] {
         let (x_mm, y_mm) = (self.map.grid().x_mm(), self.map.grid().y_mm());
+        let (last_x, last_y) = (x_mm[x_mm.len() - 1], y_mm[y_mm.len() - 1]);
         let [low, high] = self.shown();
-        [
-            DVec3::new(x_mm[0], y_mm[0], low),
-            DVec3::new(x_mm[x_mm.len() - 1], y_mm[y_mm.len() - 1], high),
-        ]
+        [DVec3::new(x_mm[0], y_mm[0], low), DVec3::new(last_x, last_y, high)]
     }
 
     /// Position of a value on the scale of colours.
@@ -233,12 +227,9 @@ impl Surface {
 
     /// Returns the place of a grid point; its value is NaN in a gap.
     pub(super) fn place_mm(&self, [ix, iy]: [usize; 2]) -> DVec3 {
-        let value = self.values.get(self.map.grid().index(ix, iy));
-        DVec3::new(
-            self.map.grid().x_mm()[ix],
-            self.map.grid().y_mm()[iy],
-            value.copied().unwrap_or(f64::NAN),
-        )
+        let grid = self.map.grid();
+        let value = self.values.get(grid.index(ix, iy)).copied();
+        DVec3::new(grid.x_mm()[ix], grid.y_mm()[iy], value.unwrap_or(f64::NAN))
     }
 
     /// Returns the places of the corners of a cell, going round it; `None` in a gap.

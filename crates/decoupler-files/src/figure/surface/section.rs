@@ -48,23 +48,16 @@ impl Section {
     /// Returns the curve in which the plane cuts the surface of these `values` on a grid, linear between its points as the
     /// surface is drawn; empty if it misses the grid.
     pub fn curve_mm(&self, grid: &Grid, values: &[f64]) -> Vec<DVec3> {
-        // Of a row-wire, x is across and y along the curve.
         let is_row = matches!(self.line, SectionLine::RowWire(_));
-        let (across, along) = match is_row {
-            true => (grid.x_mm(), grid.y_mm()),
-            false => (grid.y_mm(), grid.x_mm()),
-        };
+        let (across, along) = across_and_along(is_row, grid.x_mm(), grid.y_mm());
         let Some(before) = cell(across, self.at_mm).filter(|_| values.len() == grid.len()) else {
             return Vec::new();
         };
         let share = (self.at_mm - across[before]) / (across[before + 1] - across[before]);
         let points = along.iter().enumerate().map(|(at, &at_mm)| {
             let value = |across| {
-                values[if is_row {
-                    grid.index(across, at)
-                } else {
-                    grid.index(at, across)
-                }]
+                let (ix, iy) = across_and_along(is_row, across, at);
+                values[grid.index(ix, iy)]
             };
             // At a grid point, where a wire through the nodes is up to rounding, a gap next to it does not matter.
             let height = match share {
@@ -72,11 +65,7 @@ impl Section {
                 0.999_999_999.. => value(before + 1),
                 _ => (1.0 - share) * value(before) + share * value(before + 1),
             };
-            let [x, y] = if is_row {
-                [self.at_mm, at_mm]
-            } else {
-                [at_mm, self.at_mm]
-            };
+            let (x, y) = across_and_along(is_row, self.at_mm, at_mm);
             DVec3::new(x, y, height)
         });
         points.collect()
@@ -93,6 +82,11 @@ impl Section {
         });
         shapes.collect()
     }
+}
+
+/// Returns what is across and what is along the curve, given x and y; or the other way round.
+fn across_and_along<T>(is_row: bool, x: T, y: T) -> (T, T) {
+    if is_row { (x, y) } else { (y, x) }
 }
 
 /// Returns the cell of an ascending axis that contains a place; `None` outside it.
