@@ -10,7 +10,7 @@ use decoupler_core::{
 
 use super::{
     Hue, LineStyle, Look, Marker,
-    axis::PlotAxis,
+    axis::{PlotAxis, ends},
     plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
 };
 
@@ -171,14 +171,26 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         Series::across("model-based", at, Hue::Ink, LineStyle::Dashed)
     });
     series.extend(model_based);
+    // Limits are shown if they are within the range of the points.
+    let is_among = |limit: f64, axis: usize| {
+        let values = level.points.iter().map(|point| at(point)[axis]);
+        let (low, high) = ends(values.filter(|value| value.log10().is_finite()));
+        is_decoding && (low..=high).contains(&limit)
+    };
+    let [time, percent] = [limits.microseconds, limits.percent];
     let limits = [
-        ("longest time", LineAt::X(limits.microseconds)),
-        ("largest error", LineAt::Y(limits.percent)),
+        (is_among(time, 0), "longest time", LineAt::X(time)),
+        (is_among(percent, 1), "largest error", LineAt::Y(percent)),
     ];
-    series.extend(limits.into_iter().filter(|_| is_decoding).map(|(name, at)| {
-        let line = Series::across(name, at, Hue::Blue, LineStyle::Dotted);
-        line.listed(Some("limits asked for"))
-    }));
+    series.extend(
+        limits
+            .into_iter()
+            .filter(|(is_shown, ..)| *is_shown)
+            .map(|(_, name, at)| {
+                let line = Series::across(name, at, Hue::Blue, LineStyle::Dotted);
+                line.listed(Some("limits asked for"))
+            }),
+    );
     Plot::new(PlotAxis::logarithmic(cost.name()), PlotAxis::logarithmic(error), series)
 }
 

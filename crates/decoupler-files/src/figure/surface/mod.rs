@@ -333,8 +333,10 @@ impl Quantity {
 
     /// Name of the value axis, with its unit.
     pub fn axis_name(&self) -> String {
-        let (name, unit) = self.name_and_unit();
-        titled(name, unit)
+        match (self, self.name_and_unit()) {
+            (Self::Sensitivity, _) => "1/mm".to_owned(),
+            (_, (name, unit)) => titled(name, unit),
+        }
     }
 
     /// Returns the range from `low` to `high` as text, with the unit: "z 4.00 to 5.00 mm".
