@@ -23,7 +23,8 @@ pub fn hue_colour(hue: Hue, palette: &Palette) -> Color32 {
     }
 }
 
-fn colour(Colour { ink, opacity }: Colour, palette: &Palette) -> Color32 {
+/// Returns a colour of a figure in the theme.
+pub fn colour(Colour { ink, opacity }: Colour, palette: &Palette) -> Color32 {
     let colour = match ink {
         Ink::Hue(hue) => hue_colour(hue, palette),
         Ink::Grid => palette.line,
@@ -75,41 +76,29 @@ pub fn paint(painter: &Painter, palette: &Palette, shapes: &[Shape]) {
                 }
                 painter.add(mesh);
             }
-            &Shape::Circle {
-                at,
-                radius,
-                ring,
-                colour: fill,
-            } => {
-                let (at, colour) = (to_egui(at), colour(fill, palette));
-                match ring {
-                    Some(width) => painter.circle_stroke(at, radius, egui::Stroke::new(width, colour)),
-                    None => painter.circle_filled(at, radius, colour),
-                };
+            &Shape::Disc(at, radius, fill) => {
+                painter.circle_filled(to_egui(at), radius, colour(fill, palette));
             }
-            Shape::Text {
-                at,
-                align,
-                ink,
-                is_upright,
-                text,
-            } => {
+            Shape::Ring(at, radius, line) => {
+                painter.circle_stroke(to_egui(*at), *radius, stroke(line, palette));
+            }
+            Shape::Text(at, align, ink, text) => {
                 let colour = colour((*ink).into(), palette);
                 let galley = painter.layout_no_wrap(text.clone(), font(), colour);
                 let size = galley.size();
-                if *is_upright {
-                    let place = to_egui(*at) + egui::vec2(-0.5 * size.y, 0.5 * size.x);
-                    painter.add(TextShape::new(place, galley, colour).with_angle(-std::f32::consts::FRAC_PI_2));
-                } else {
-                    let left = match align {
-                        Align::Start => 0.0,
-                        Align::Middle => 0.5 * size.x,
-                        Align::End => size.x,
-                    };
-                    let pixel = painter.pixels_per_point();
-                    let corner = *at - Vec2::new(left, 0.5 * size.y);
-                    painter.galley(to_egui((corner * pixel).round() / pixel), galley, colour);
-                }
+                let left = match align {
+                    Align::Start => 0.0,
+                    Align::Middle => 0.5 * size.x,
+                    Align::End => size.x,
+                    Align::Upright => {
+                        let place = to_egui(*at) + egui::vec2(-0.5 * size.y, 0.5 * size.x);
+                        painter.add(TextShape::new(place, galley, colour).with_angle(-std::f32::consts::FRAC_PI_2));
+                        continue;
+                    }
+                };
+                let pixel = painter.pixels_per_point();
+                let corner = *at - Vec2::new(left, 0.5 * size.y);
+                painter.galley(to_egui((corner * pixel).round() / pixel), galley, colour);
             }
         }
     }

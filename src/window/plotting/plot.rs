@@ -1,7 +1,7 @@
 //! Plots drawn by `egui_plot`, with its axes, grid, zoom and tooltips, in places of the axes: a logarithmic axis is
 //! linear in the logarithm.
 
-use decoupler_files::figure::{Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PlotFigure, Series, TickRule};
+use decoupler_files::figure::{Form, Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PlotFigure, Series, TickRule};
 use eframe::egui::{
     Color32, FontId, Id, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, Ui, UiBuilder, Vec2, WidgetInfo,
     accesskit::Role,
@@ -64,11 +64,11 @@ impl DrawnPlot<'_> {
         for series in &self.plot.series {
             for (point, [x, y]) in self.plot.placed(series) {
                 let Some(item) = point.item else { continue };
-                let distance = match series.bar_width {
+                let distance = match series.form {
                     // Even a low bar is hit anywhere above its base.
-                    Some(width) if (x - value.x).abs() <= 0.5 * width => 0.0,
-                    Some(_) => continue,
-                    None => self.transform.position_from_point(&Place::new(x, y)).distance(at),
+                    Form::Bars(width) if (x - value.x).abs() <= 0.5 * width => 0.0,
+                    Form::Bars(_) => continue,
+                    _ => self.transform.position_from_point(&Place::new(x, y)).distance(at),
                 };
                 if distance <= REACH && nearest.is_none_or(|(least, _)| distance < least) {
                     nearest = Some((distance, item));
@@ -208,7 +208,8 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform
         }
     });
     shown.response.widget_info(|| {
-        let names: Vec<&str> = plot.series.iter().map(|series| &*series.name).collect();
+        let drawn = plot.series.iter().filter(|series| !series.points.is_empty());
+        let names: Vec<&str> = drawn.map(|series| &*series.name).collect();
         let label = format!("{} against {}: {}", plot.y.name, plot.x.name, names.join(", "));
         WidgetInfo::labeled(Role::Image, true, label)
     });
@@ -237,7 +238,7 @@ fn tooltip_at(plot: &Plot, position: &HoverPosition<'_>) -> Option<String> {
     let HoverPosition::NearDataPoint { position, .. } = position else {
         return None;
     };
-    let series = plot.series.iter().filter(|series| series.bar_width.is_none());
+    let series = plot.series.iter().filter(|series| series.form == Form::Points);
     let points = series.flat_map(|series| plot.placed(series).map(move |(point, place)| (series, point, place)));
     let distance = |[x, y]: [f64; 2]| (x - position.x).abs() + (y - position.y).abs();
     let (series, point, _) = points.min_by(|a, b| distance(a.2).total_cmp(&distance(b.2)))?;
@@ -256,17 +257,16 @@ fn stroke(hue: Hue, style: LineStyle, palette: &Palette) -> (Stroke, DrawnStyle)
 
 /// Draws spans and reference lines.
 fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
-    for span in &plot.spans {
-        if let [Some(from), Some(to)] = [span.range.start(), span.range.end()].map(|end| plot.x.place(*end)) {
-            let fill = hue_colour(span.hue, palette).gamma_multiply(SPAN_TINT);
-            let drawn = Span::new(&*span.name, from..=to).fill(fill);
-            plot_ui.span(drawn.border_color(Color32::TRANSPARENT));
-        }
-    }
-    for line in &plot.lines {
-        let (stroke, style) = stroke(line.hue, line.style, palette);
-        let name = &*line.name;
-        match line.at {
+    for (Series { name, look, .. }, at) in plot.lines_across() {
+        let (stroke, style) = stroke(look.hue, look.line.unwrap_or(LineStyle::Solid), palette);
+        match at {
+            LineAt::Between(ends) => {
+                if let [Some(from), Some(to)] = ends.map(|end| plot.x.place(end)) {
+                    let fill = hue_colour(look.hue, palette).gamma_multiply(SPAN_TINT);
+                    let band = Span::new(name, from..=to).fill(fill);
+                    plot_ui.span(band.border_color(Color32::TRANSPARENT));
+                }
+            }
             LineAt::X(value) => {
                 if let Some(place) = plot.x.place(value) {
                     plot_ui.vline(VLine::new(name, place).stroke(stroke).style(style));
@@ -286,13 +286,13 @@ fn draw_series(plot_ui: &mut PlotUi<'_>, plot: &Plot, series: &Series, palette: 
     let colour = hue_colour(series.look.hue, palette);
     let [x_range, y_range] = plot.ranges();
     let (width, height) = (x_range.end() - x_range.start(), y_range.end() - y_range.start());
-    if let Some(bar_width) = series.bar_width {
+    if let Form::Bars(bar_width) = series.form {
         let placed = plot.placed(series);
         let bars = placed.map(|(point, [x, y])| Bar::new(x, y).width(bar_width).name(plot.words(series, point)));
         let chart = BarChart::new(name, bars.collect()).color(colour);
         plot_ui.bar_chart(chart.element_formatter(Box::new(|bar, _| bar.name.clone())));
     }
-    if let Some(style) = series.look.line {
+    if let (Form::Points, Some(style)) = (series.form, series.look.line) {
         let (stroke, style) = stroke(series.look.hue, style, palette);
         for mut stretch in plot.stretches(series) {
             let is_stepped = stretch.windows(2).any(|ends| ends[0][0] == ends[1][0]);

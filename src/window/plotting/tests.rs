@@ -22,9 +22,9 @@ use decoupler_core::{
     training::EpochRecord,
 };
 use decoupler_files::figure::{
-    EpochOutline, Figure, TradeOffLevel, TradeOffLimits, compared_losses_figure, error_histogram_figure,
-    experiment_figure, loss_figure, node_figure, regression_figure, singular_values_figure, trade_off_figure,
-    training_state_figure, z_pairs_mm,
+    Decoded, EpochOutline, Figure, RegressionLine, TradeOffLevel, TradeOffLimits, compared_losses_figure,
+    experiment_figure, histogram_figure, loss_figure, node_figure, regression_figure, singular_values_figure,
+    trade_off_figure, training_state_figure, value_pairs,
 };
 
 /// Texts and numbers of marks in a picture.
@@ -177,9 +177,13 @@ fn figures_of_a_training_are_the_same_on_screen_and_in_print() {
     assert!(compared.words.contains("B: second run, test"), "{compared:?}");
 
     let decoupled_mm = run.decouple_test();
-    let pairs_mm = z_pairs_mm(run.test(), &decoupled_mm);
-    same("histogram", error_histogram_figure(&pairs_mm, None));
-    let regression = same("regression", regression_figure(&pairs_mm));
+    let pairs_mm = value_pairs(run.test(), &decoupled_mm, None);
+    let line = RegressionLine::of(pairs_mm.iter().copied());
+    same("histogram", histogram_figure(&pairs_mm, None, Decoded::Nodes));
+    let regression = same(
+        "regression",
+        regression_figure((pairs_mm.len(), &|pair| pairs_mm[pair]), &line, Decoded::Nodes),
+    );
     // One dot per node, and one in the legend.
     assert_eq!(regression.circles, pairs_mm.len() + 1);
     assert!(regression.words.iter().any(|word| word.starts_with("Correlation R = ")));

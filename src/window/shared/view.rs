@@ -7,7 +7,7 @@ use decoupler_files::{
     export::format_number,
     figure::{
         ColourMap, SequentialMap,
-        surface::{ColourScale, OrbitCamera, Quantity, ViewMode},
+        surface::{OrbitCamera, Quantity, Surface, ViewMode},
     },
 };
 use eframe::egui::{
@@ -186,14 +186,7 @@ const PIECES: usize = 32;
 
 /// The colour scale in `slot`. A click opens its options: the colour map, and whether the scale is locked. `note` is shown
 /// under the pointer.
-pub fn colour_scale_ui(
-    ui: &mut Ui,
-    slot: Rect,
-    scale: &ColourScale,
-    note: &str,
-    look: Look,
-    effects: &mut Vec<Effect>,
-) {
+pub fn colour_scale_ui(ui: &mut Ui, slot: Rect, scale: &Surface, note: &str, look: Look, effects: &mut Vec<Effect>) {
     let mut slot_ui = ui.new_child(UiBuilder::new().max_rect(slot));
     let theme = Theme::of(ui);
     let bar = ColourBar { scale, theme }.show(&mut slot_ui, slot.height());
@@ -220,7 +213,7 @@ pub fn colour_scale_ui(
 }
 
 /// The options of a colour scale; changes `look`.
-fn choices_ui(ui: &mut Ui, scale: &ColourScale, look: Look, changed: &mut Look) {
+fn choices_ui(ui: &mut Ui, scale: &Surface, look: Look, changed: &mut Look) {
     let theme = Theme::of(ui);
     if scale.quantity.is_diverging() {
         let text = "Errors have the colour of the card at zero, blue below and orange above.";

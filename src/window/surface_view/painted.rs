@@ -8,7 +8,7 @@ use decoupler_files::{
     export::format_number,
     figure::{
         Shape,
-        surface::{self, Card, ColourScale, Dots, OrbitCamera, Section, Sight, Surface, ViewMode},
+        surface::{self, Dots, OrbitCamera, Piece, Section, Sight, Surface, ViewMode},
     },
 };
 use eframe::egui::{
@@ -16,8 +16,8 @@ use eframe::egui::{
 };
 
 use crate::window::{
-    plotting::{bounds, measure, paint, to_egui},
-    theme::{Palette, Theme, rgb},
+    plotting::{bounds, colour, measure, paint, to_egui},
+    theme::{Palette, Theme},
 };
 
 /// Nodes that are marked or highlighted.
@@ -62,14 +62,9 @@ impl Painted {
     }
 
     fn new(surface: &Surface, theme: &Theme, ui: &Ui, rect: Rect, camera: OrbitCamera) -> Self {
-        let drawing = surface.lay_out(
-            camera,
-            &Card {
-                bounds: bounds(rect),
-                measure: &|text| measure(ui.painter(), text),
-                colours: theme.colours(&surface.quantity, surface.colours),
-            },
-        );
+        let colours = theme.colours(&surface.quantity, surface.colours);
+        let measure = |text: &str| measure(ui.painter(), text);
+        let drawing = surface.lay_out(camera, bounds(rect), &measure, colours);
         Self {
             surface: surface.clone(),
             camera,
@@ -77,7 +72,7 @@ impl Painted {
             pixels_per_point: ui.pixels_per_point(),
             is_dark: theme.is_dark,
             frame: drawing.frame,
-            mesh: Arc::new(mesh(&drawing.mesh)),
+            mesh: Arc::new(mesh(&drawing.mesh, &theme.palette)),
             dots: drawing.dots,
             sight: drawing.sight,
             note: drawing.note,
@@ -102,30 +97,22 @@ impl Painted {
     }
 }
 
-fn mesh(drawn: &surface::Mesh) -> Mesh {
-    let [cells, lines] = drawn.counts();
+fn mesh(drawn: &surface::Mesh, palette: &Palette) -> Mesh {
     let mut mesh = Mesh::default();
-    mesh.reserve_vertices(drawn.vertices.len() + VERTICES * lines);
-    mesh.reserve_triangles(2 * cells + TRIANGLES * lines);
+    mesh.reserve_triangles(2 * drawn.pieces.len());
     for vertex in &drawn.vertices {
-        let colour = rgb(vertex.colour);
-        let colour = if vertex.opacity < 1.0 {
-            colour.gamma_multiply(vertex.opacity)
-        } else {
-            colour
-        };
-        mesh.colored_vertex(to_egui(vertex.at), colour);
+        mesh.colored_vertex(to_egui(vertex.at), colour(vertex.colour, palette));
     }
-    for (cells, lines) in drawn.strips() {
-        for cell in cells {
-            let [a, b, c, d] = cell.map(|corner| corner as u32);
-            mesh.add_triangle(a, b, c);
-            mesh.add_triangle(a, c, d);
-        }
-        for line in lines {
-            let colour = if line.is_black { Color32::BLACK } else { Color32::WHITE };
-            let colour = colour.gamma_multiply(line.opacity);
-            add_line(&mut mesh, to_egui(line.from), to_egui(line.to), colour);
+    for piece in &drawn.pieces {
+        match piece {
+            Piece::Cell(cell) => {
+                let [a, b, c, d] = cell.map(|corner| corner as u32);
+                mesh.add_triangle(a, b, c);
+                mesh.add_triangle(a, c, d);
+            }
+            Piece::Line([from, to], line) => {
+                add_line(&mut mesh, to_egui(*from), to_egui(*to), colour(*line, palette));
+            }
         }
     }
     mesh
@@ -134,12 +121,8 @@ fn mesh(drawn: &surface::Mesh) -> Mesh {
 /// Half the width over which the edge of a line fades out, in points.
 const REACH: f32 = 1.0;
 
-/// Number of vertices and triangles per line.
-pub(super) const VERTICES: usize = 6;
-pub(super) const TRIANGLES: usize = 4;
-
 /// Appends a line about one point wide whose colour fades out at both edges.
-pub(super) fn add_line(mesh: &mut Mesh, from: Pos2, to: Pos2, colour: Color32) {
+fn add_line(mesh: &mut Mesh, from: Pos2, to: Pos2, colour: Color32) {
     let along = to - from;
     let length = along.length();
     if length < 1e-3 || !length.is_finite() {
@@ -161,14 +144,14 @@ pub(super) fn add_line(mesh: &mut Mesh, from: Pos2, to: Pos2, colour: Color32) {
 #[derive(Clone, Debug)]
 pub struct ColourBar<'a> {
     /// Scale of the values.
-    pub scale: &'a ColourScale,
+    pub scale: &'a Surface,
     /// Dark or light theme.
     pub theme: &'a Theme,
 }
 
 impl ColourBar<'_> {
     /// Width of the bar with its numbers, in points.
-    pub const WIDTH: f32 = ColourScale::WIDTH;
+    pub const WIDTH: f32 = Surface::SCALE_WIDTH;
 
     /// Draws the bar `height` points high.
     pub fn show(self, ui: &mut Ui, height: f32) -> Response {
@@ -196,7 +179,9 @@ impl ColourBar<'_> {
         }
         let painter = ui.painter_at(rect);
         let map = self.theme.colours(&self.scale.quantity, self.scale.colours);
-        let shapes = self.scale.lay_out(bounds(rect), map, &|text| measure(&painter, text));
+        let shapes = self
+            .scale
+            .lay_out_scale(bounds(rect), map, &|text| measure(&painter, text));
         paint(&painter, &self.theme.palette, &shapes);
         response
     }

@@ -10,13 +10,12 @@ use crate::window::{
     plotting::{to_egui, to_glam},
     theme::{Theme, type_size},
 };
-use decoupler_files::{
-    export::format_number,
-    figure::{
-        surface::{OrbitCamera, Section, Sight, Surface, ViewMode},
-        tick_text,
-    },
-};
+use decoupler_files::figure::surface::{OrbitCamera, Section, Sight, Surface, ViewMode};
+
+/// Points of a drag that one press of an arrow key is worth.
+const POINTS_PER_KEY: f32 = 12.5;
+const ZOOM_PER_KEY: f32 = 1.15;
+const ZOOM_PER_POINT: f32 = 0.0025;
 
 /// Surface plot that fills the available space.
 #[derive(Clone, Debug)]
@@ -138,16 +137,7 @@ impl SurfaceView<'_> {
         response.widget_info(|| WidgetInfo::labeled(egui::accesskit::Role::Image, true, self.label));
         ui.ctx().accesskit_node_builder(response.id, |node| {
             node.set_description(self.surface.summary());
-            let values = self.surface.nodes.iter().map(|node| node.z);
-            let finite = values.filter(|value| value.is_finite());
-            let (low, high) = finite.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
-            let millimetres = |value: f64| tick_text(value, 0.01);
-            node.set_value(if low <= high {
-                let quantity = &self.surface.quantity;
-                quantity.range_text((low, high), millimetres, format_number)
-            } else {
-                "no values".to_owned()
-            });
+            node.set_value(self.surface.range_text());
         });
     }
 }
@@ -187,7 +177,7 @@ fn operate(ui: &Ui, response: &Response, camera: OrbitCamera, hand: Hand) -> Orb
             (scroll.y, input.zoom_delta())
         });
         if scroll != 0.0 || pinch != 1.0 {
-            camera = camera.scrolled(scroll).zoomed(pinch);
+            camera = camera.zoomed((scroll * ZOOM_PER_POINT).exp() * pinch);
         }
     }
     if response.has_focus() {
@@ -203,7 +193,8 @@ fn operate(ui: &Ui, response: &Response, camera: OrbitCamera, hand: Hand) -> Orb
             let down = presses(Key::ArrowDown) - presses(Key::ArrowUp);
             let nearer = presses(Key::Plus) + presses(Key::Equals) - presses(Key::Minus);
             if right != 0.0 || down != 0.0 || nearer != 0.0 {
-                camera = camera.stepped(right, down).zoomed_by_keys(nearer);
+                let turned = camera.dragged(right * POINTS_PER_KEY, down * POINTS_PER_KEY);
+                camera = turned.zoomed(ZOOM_PER_KEY.powf(nearer));
             }
             if presses(Key::Home) > 0.0 {
                 camera = OrbitCamera::default();

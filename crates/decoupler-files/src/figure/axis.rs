@@ -23,9 +23,7 @@ pub enum AxisScale {
 pub enum TickRule {
     /// Round numbers; on a logarithmic axis decades, and 2 and 5 between them where there is room.
     Round,
-    /// Integers.
-    Whole,
-    /// Multiples of this number.
+    /// Multiples of this number; of 1, for integers.
     Every(f64),
     /// The values 0, 1, 2 … with these names.
     Names(Vec<String>),
@@ -49,7 +47,7 @@ pub struct PlotAxis {
 }
 
 /// Ticks of an axis.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ticks {
     /// Their places, ascending.
     pub places: Vec<f64>,
@@ -79,40 +77,39 @@ impl PlotAxis {
 
     /// The axis with these values always in view.
     #[must_use]
-    pub fn including(self, values: impl IntoIterator<Item = f64>) -> Self {
-        Self {
-            includes: values.into_iter().collect(),
-            ..self
-        }
+    pub fn including(mut self, values: impl IntoIterator<Item = f64>) -> Self {
+        self.includes.extend(values);
+        self
     }
 
     /// The axis with ticks by this rule.
     #[must_use]
-    pub fn ticked(self, ticks: TickRule) -> Self {
-        Self { ticks, ..self }
+    pub fn ticked(mut self, ticks: TickRule) -> Self {
+        self.ticks = ticks;
+        self
+    }
+
+    /// The axis with ticks at integers only.
+    #[must_use]
+    pub fn whole(self) -> Self {
+        self.ticked(TickRule::Every(1.0))
     }
 
     /// The axis on which values beyond `limits` are drawn at the ends of that range.
     #[must_use]
-    pub fn limited(self, limits: RangeInclusive<f64>) -> Self {
-        Self {
-            limits: Some(limits),
-            ..self
-        }
+    pub fn limited(mut self, limits: RangeInclusive<f64>) -> Self {
+        self.limits = Some(limits);
+        self
     }
 
     /// Returns the place of a value; `None` if it has none.
     pub fn place(&self, value: f64) -> Option<f64> {
-        if self.scale == AxisScale::Logarithmic && value <= 0.0 {
-            return None;
-        }
-        let value = match &self.limits {
-            Some(limits) => value.max(*limits.start()).min(*limits.end()),
-            None => value,
-        };
+        let limits = self.limits.as_ref();
+        let within = limits.map_or(value, |limits| value.max(*limits.start()).min(*limits.end()));
         let place = match self.scale {
-            AxisScale::Linear => value,
-            AxisScale::Logarithmic => value.log10(),
+            AxisScale::Linear => within,
+            AxisScale::Logarithmic if value > 0.0 => within.log10(),
+            AxisScale::Logarithmic => return None,
         };
         (place.abs() < LARGEST).then_some(place)
     }
@@ -128,13 +125,8 @@ impl PlotAxis {
 
     /// Returns the range of places that contains all `places`, with a margin.
     pub(crate) fn range(&self, places: impl Iterator<Item = f64>) -> RangeInclusive<f64> {
-        let hull = |places: &mut dyn Iterator<Item = f64>| {
-            places.fold((f64::MAX, f64::MIN), |(low, high), place| {
-                (low.min(place), high.max(place))
-            })
-        };
-        let (data_low, data_high) = hull(&mut places.into_iter());
-        let (fixed_low, fixed_high) = hull(&mut self.includes.iter().filter_map(|&value| self.place(value)));
+        let (data_low, data_high) = ends(places);
+        let (fixed_low, fixed_high) = ends(self.includes.iter().filter_map(|&value| self.place(value)));
         let (low, high) = (data_low.min(fixed_low), data_high.max(fixed_high));
         if low > high {
             return 0.0..=1.0;
@@ -142,41 +134,29 @@ impl PlotAxis {
         // A single value, or values that differ only by rounding, still have a range.
         let width = (high - low).max(1e-9 * low.abs().max(high.abs())).max(1e-12);
         let margin = if high > low { 0.05 * width } else { 0.5 };
-        let below = if fixed_low == low && high > low { 0.0 } else { margin };
-        let above = if fixed_high == high && high > low { 0.0 } else { margin };
-        low - below..=high + above
+        let beyond = |end: f64, fixed: f64| if fixed == end && high > low { 0.0 } else { margin };
+        low - beyond(low, fixed_low)..=high + beyond(high, fixed_high)
     }
 
     /// Returns the ticks within a range of places, separated by at least `apart`, the width of a number.
     pub fn ticks(&self, range: &RangeInclusive<f64>, apart: f64) -> Ticks {
         let width = range.end() - range.start();
         if !(width.is_finite() && width > 0.0) {
-            return Ticks {
-                places: Vec::new(),
-                step: 1.0,
-            };
+            return Ticks::default();
         }
-        let parts = (width / apart).clamp(1.0, MAX_PARTS) as usize;
-        let multiples_of = |step: f64| Ticks {
-            places: multiples(range, step),
-            step,
-        };
+        let least = apart.max(width / MAX_PARTS);
         match (&self.ticks, self.scale) {
-            (TickRule::Round, AxisScale::Linear) => multiples_of(step_for(range, parts)),
-            (TickRule::Round, AxisScale::Logarithmic) => logarithmic_ticks(range, apart, parts),
-            (TickRule::Whole, _) => multiples_of(step_for(range, parts).max(1.0)),
-            (TickRule::Nothing, _) => Ticks {
-                places: Vec::new(),
-                step: 1.0,
-            },
-            (TickRule::Every(step), _) => multiples_of(step * (apart / step).ceil().max(1.0)),
+            (TickRule::Nothing, _) => Ticks::default(),
+            (TickRule::Round, AxisScale::Linear) => Ticks::at_multiples(range, round_step(least)),
+            (TickRule::Round, AxisScale::Logarithmic) => logarithmic_ticks(range, apart, least),
+            (TickRule::Every(unit), _) => Ticks::at_multiples(range, unit * round_step(least / unit).max(1.0)),
             (TickRule::Names(names), _) => {
                 // The width is that of a number of six characters.
                 let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
                 let needed = apart * (longest + 2) as f64 / 6.0;
-                let Ticks { mut places, step } = multiples_of(needed.ceil().max(1.0));
-                places.retain(|place| (0.0..names.len() as f64).contains(place));
-                Ticks { places, step }
+                let mut ticks = Ticks::at_multiples(range, needed.ceil().max(1.0));
+                ticks.places.retain(|place| (0.0..names.len() as f64).contains(place));
+                ticks
             }
         }
     }
@@ -191,42 +171,47 @@ impl PlotAxis {
     }
 }
 
+impl Ticks {
+    fn at_multiples(range: &RangeInclusive<f64>, step: f64) -> Self {
+        let places = multiples(range, step);
+        Self { places, step }
+    }
+}
+
+/// Returns the minimum and maximum; without values, the first is larger than the second.
+pub(super) fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    })
+}
+
 /// Returns the position of `place` in its range, from 0 to 1.
 pub fn share(place: f64, range: &RangeInclusive<f64>) -> f64 {
     (place - range.start()) / (range.end() - range.start())
 }
 
 /// Whole decades; 2 and 5 between them where there is room; round numbers within less than a decade.
-fn logarithmic_ticks(range: &RangeInclusive<f64>, apart: f64, parts: usize) -> Ticks {
-    let (low, high) = (*range.start(), *range.end());
+fn logarithmic_ticks(range: &RangeInclusive<f64>, apart: f64, least: f64) -> Ticks {
+    let (low, high, two) = (*range.start(), *range.end(), 2.0_f64.log10());
     if high - low < 0.9 {
-        return ticks_within_a_decade(range, apart);
+        let [low, top] = [low, high].map(|end| 10.0_f64.powf(end));
+        // The upper end is more crowded.
+        let number = top - 10.0_f64.powf(high - apart);
+        let step = round_step(number.max((top - low) / MAX_PARTS));
+        let places = multiples(&(low..=top), step).into_iter().map(f64::log10);
+        return Ticks {
+            places: places.filter(|place| place.is_finite()).collect(),
+            step: (1.0 + step / top).log10(),
+        };
     }
-    let has_room = 2.0_f64.log10() > apart && high - low < 4.0;
-    let factors: &[f64] = if has_room { &[1.0, 2.0, 5.0] } else { &[1.0] };
-    let stride = if has_room {
-        1.0
-    } else {
-        step_for(range, parts).max(1.0).ceil()
-    };
-    let decades = multiples(&(low - stride..=high), stride).into_iter();
-    let places = decades.flat_map(|decade| factors.iter().map(move |factor| decade + factor.log10()));
+    if two <= apart || high - low >= 4.0 {
+        return Ticks::at_multiples(range, round_step(least).max(1.0));
+    }
+    let places = multiples(&(low - 1.0..=high), 1.0).into_iter();
+    let places = places.flat_map(|decade| [0.0, two, 1.0 - two].map(|part| decade + part));
     Ticks {
         places: places.filter(|place| range.contains(place)).collect(),
-        step: if has_room { 2.0_f64.log10() } else { stride },
-    }
-}
-
-fn ticks_within_a_decade(range: &RangeInclusive<f64>, apart: f64) -> Ticks {
-    let [low, high] = [range.start(), range.end()].map(|end| 10.0_f64.powf(*end));
-    // The upper end is more crowded.
-    let number = high - 10.0_f64.powf(range.end() - apart);
-    let parts = ((high - low) / number).clamp(1.0, MAX_PARTS) as usize;
-    let step = step_for(&(low..=high), parts);
-    let places = multiples(&(low..=high), step).into_iter().map(f64::log10);
-    Ticks {
-        places: places.filter(|place| place.is_finite()).collect(),
-        step: (1.0 + step / high).log10(),
+        step: two,
     }
 }
 
@@ -246,39 +231,35 @@ fn power_text(log: f64) -> String {
     }
 }
 
-/// Steps of 1, 2 and 5 times a power of ten, ascending from at least `smallest`.
-pub(crate) fn round_steps(smallest: f64) -> impl Iterator<Item = f64> {
-    let decade = smallest.log10().floor() as i32;
-    (decade..decade + 20)
-        .flat_map(|power| [1.0, 2.0, 5.0].map(|factor| factor * 10_f64.powi(power)))
-        .filter(move |step| *step >= smallest * (1.0 - 1e-9))
+/// Returns 1, 2 or 5 times a power of ten, at least `smallest`.
+fn round_step(smallest: f64) -> f64 {
+    let decade = 10_f64.powi(smallest.log10().floor() as i32);
+    let steps = [1.0, 2.0, 5.0].map(|factor| factor * decade).into_iter();
+    let mut large = steps.filter(|step| *step >= smallest * (1.0 - 1e-9));
+    large.next().unwrap_or(10.0 * decade)
 }
 
 /// The multiples of `step` in a range.
-pub fn multiples(range: &RangeInclusive<f64>, step: f64) -> Vec<f64> {
+pub(super) fn multiples(range: &RangeInclusive<f64>, step: f64) -> Vec<f64> {
     let first = (range.start() / step - 1e-6).ceil() as i64;
     let last = (range.end() / step + 1e-6).floor() as i64;
     (first..=last).map(|multiple| multiple as f64 * step).collect()
 }
 
 /// A round step that divides a range into at most `parts`.
-pub fn step_for(range: &RangeInclusive<f64>, parts: usize) -> f64 {
+pub(super) fn step_for(range: &RangeInclusive<f64>, parts: usize) -> f64 {
     let width = range.end() - range.start();
-    if width > 0.0 && width.is_finite() {
-        round_steps(width / parts as f64).next().unwrap_or(width)
-    } else {
-        1.0
+    match width > 0.0 && width.is_finite() {
+        true => round_step(width / parts as f64),
+        false => 1.0,
     }
 }
 
 /// Returns the number at a tick, with as many decimals as its step needs and a true minus sign.
 pub fn tick_text(value: f64, step: f64) -> String {
     let decimals = (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
-    let value = if value.abs() < 0.5 * 10_f64.powi(-(decimals as i32)) {
-        0.0
-    } else {
-        value
-    };
+    let rounds_to_zero = value.abs() < 0.5 * 10_f64.powi(-(decimals as i32));
+    let value = if rounds_to_zero { 0.0 } else { value };
     format!("{value:.decimals$}").replace('-', "−")
 }
 
@@ -332,7 +313,7 @@ mod tests {
 
     #[test]
     fn counts_have_no_ticks_between_integers() {
-        let axis = PlotAxis::linear("").ticked(TickRule::Whole);
+        let axis = PlotAxis::linear("").whole();
         assert_eq!(texts(&axis, [-0.08, 1.08], 150.0, 16.0), ["0", "1"]);
         assert_eq!(
             texts(&axis, [-0.08, 6.4], 150.0, 16.0),
@@ -376,7 +357,7 @@ mod tests {
 
     #[test]
     fn steps_are_round() {
-        assert_eq!(round_steps(0.13).take(3).collect::<Vec<_>>(), [0.2, 0.5, 1.0]);
+        assert_eq!([0.13, 0.2, 0.21, 0.51].map(round_step), [0.2, 0.2, 0.5, 1.0]);
         assert_eq!(step_for(&(4.0..=5.0), 10), 0.1);
         assert_eq!(step_for(&(3.0..=3.0), 10), 1.0);
     }

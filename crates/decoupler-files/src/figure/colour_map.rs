@@ -47,15 +47,16 @@ impl SequentialMap {
 
     /// Its colours.
     pub fn colours(self) -> &'static ColourMap {
+        use colorgrad::preset::{cividis, inferno, viridis};
         static MAPS: OnceLock<[ColourMap; 3]> = OnceLock::new();
-        let maps = MAPS.get_or_init(|| {
+        let bake = || {
             [
-                ColourMap::bake(&colorgrad::preset::viridis()),
-                ColourMap::bake(&colorgrad::preset::cividis()),
-                ColourMap::bake(&colorgrad::preset::inferno()),
+                ColourMap::bake(&viridis()),
+                ColourMap::bake(&cividis()),
+                ColourMap::bake(&inferno()),
             ]
-        });
-        &maps[self as usize]
+        };
+        &MAPS.get_or_init(bake)[self as usize]
     }
 }
 
@@ -69,11 +70,8 @@ impl ColourMap {
     /// From most negative to most positive, blended in Oklab so that equal values of either sign look equally strong.
     pub fn diverging(stops: [Rgb; 5]) -> Self {
         let colours = stops.map(|[red, green, blue]| Color::from_rgba8(red, green, blue, u8::MAX));
-        let gradient: LinearGradient = GradientBuilder::new()
-            .colors(&colours)
-            .mode(BlendMode::Oklab)
-            .build()
-            .expect("five stops make a gradient");
+        let gradient = GradientBuilder::new().colors(&colours).mode(BlendMode::Oklab).build();
+        let gradient: LinearGradient = gradient.expect("five stops make a gradient");
         let mut map = Self::bake(&gradient);
         // With 256 entries there is no middle one; both entries next to zero get its exact colour.
         map.entries[ENTRIES / 2 - 1] = stops[2];

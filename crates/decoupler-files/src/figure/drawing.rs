@@ -95,6 +95,8 @@ pub enum Align {
     Middle,
     /// It ends there.
     End,
+    /// Its middle is there, and it reads upwards.
+    Upright,
 }
 
 /// A shape of a drawing.
@@ -104,30 +106,12 @@ pub enum Shape {
     Line(Vec<Vec2>, Stroke),
     /// A filled polygon.
     Area(Vec<Vec2>, Colour),
-    /// A filled circle, or a ring.
-    Circle {
-        /// Its centre.
-        at: Vec2,
-        /// Its radius; of a ring, in the middle of its line.
-        radius: f32,
-        /// Width of the line of a ring; `None` for a filled circle.
-        ring: Option<f32>,
-        /// Colour.
-        colour: Colour,
-    },
-    /// A line of text.
-    Text {
-        /// Its position, in the middle of its height.
-        at: Vec2,
-        /// Its side there.
-        align: Align,
-        /// Colour.
-        ink: Ink,
-        /// True if it reads upwards.
-        is_upright: bool,
-        /// The text.
-        text: String,
-    },
+    /// A filled circle: its centre and radius.
+    Disc(Vec2, f32, Colour),
+    /// A circle: its centre, and its radius in the middle of the line.
+    Ring(Vec2, f32, Stroke),
+    /// A line of text: its position in the middle of its height, and its side there.
+    Text(Vec2, Align, Ink, String),
 }
 
 impl Shape {
@@ -136,26 +120,9 @@ impl Shape {
         Self::Line(vec![from, to], Stroke::new(colour, width))
     }
 
-    /// A horizontal text.
+    /// A text.
     pub fn text(at: Vec2, align: Align, ink: Ink, text: impl Into<String>) -> Self {
-        Self::Text {
-            at,
-            align,
-            ink,
-            is_upright: false,
-            text: text.into(),
-        }
-    }
-
-    /// A text that reads upwards, with its middle at `at`.
-    pub fn upright(at: Vec2, ink: Ink, text: impl Into<String>) -> Self {
-        Self::Text {
-            at,
-            align: Align::Middle,
-            ink,
-            is_upright: true,
-            text: text.into(),
-        }
+        Self::Text(at, align, ink, text.into())
     }
 }
 
@@ -169,12 +136,6 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// An empty rectangle.
-    pub(super) const NOTHING: Self = Self {
-        min: Vec2::INFINITY,
-        max: Vec2::NEG_INFINITY,
-    };
-
     /// The rectangle with this corner and size.
     pub fn of_size(min: Vec2, size: Vec2) -> Self {
         Self { min, max: min + size }
@@ -185,25 +146,16 @@ impl Bounds {
     }
 
     /// Returns the bounding rectangle of all points.
-    pub(super) fn of(points: impl IntoIterator<Item = Vec2>) -> Self {
-        points.into_iter().fold(Self::NOTHING, |bounds, point| Self {
+    pub fn of(points: impl IntoIterator<Item = Vec2>) -> Self {
+        let [min, max] = [Vec2::INFINITY, Vec2::NEG_INFINITY];
+        points.into_iter().fold(Self { min, max }, |bounds, point| Self {
             min: bounds.min.min(point),
             max: bounds.max.max(point),
         })
     }
 
-    pub(super) fn union(self, other: Self) -> Self {
-        Self {
-            min: self.min.min(other.min),
-            max: self.max.max(other.max),
-        }
-    }
-
     pub(super) fn grown(self, by: f32) -> Self {
-        Self {
-            min: self.min - by,
-            max: self.max + by,
-        }
+        Self::centred(self.middle(), self.size() + 2.0 * by)
     }
 
     pub(super) fn intersects(&self, other: &Self) -> bool {
@@ -263,39 +215,74 @@ impl LineStyle {
 impl Look {
     /// Returns the symbol at a point.
     pub(crate) fn mark(self, at: Vec2) -> Option<Shape> {
-        let colour = Colour::from(self.hue);
-        let edge = Stroke::new(colour, 1.4);
-        let circle = |radius, ring| {
-            Some(Shape::Circle {
-                at,
-                radius,
-                ring,
-                colour,
-            })
-        };
+        let (colour, edge) = (Colour::from(self.hue), Stroke::new(self.hue, 1.4));
         let diamond = [[0.0, -4.4], [4.4, 0.0], [0.0, 4.4], [-4.4, 0.0]].map(|corner| at + Vec2::from(corner));
-        match self.marker? {
-            Marker::Dot => circle(1.25, None),
-            Marker::Disc => circle(2.9, None),
-            Marker::Ring => circle(2.9, Some(1.4)),
-            Marker::Halo => circle(6.3, Some(1.4)),
-            Marker::Square => Some(Bounds::of_size(at - 3.6, Vec2::splat(7.2)).outline(edge)),
-            Marker::Diamond => Some(Shape::Area(diamond.into(), colour)),
-            Marker::HollowDiamond => Some(Shape::Line([&diamond[..], &diamond[..1]].concat(), edge)),
-        }
+        Some(match self.marker? {
+            Marker::Dot => Shape::Disc(at, 1.25, colour),
+            Marker::Disc => Shape::Disc(at, 2.9, colour),
+            Marker::Ring => Shape::Ring(at, 2.9, edge),
+            Marker::Halo => Shape::Ring(at, 6.3, edge),
+            Marker::Square => Bounds::of_size(at - 3.6, Vec2::splat(7.2)).outline(edge),
+            Marker::Diamond => Shape::Area(diamond.into(), colour),
+            Marker::HollowDiamond => Shape::Line([&diamond[..], &diamond[..1]].concat(), edge),
+        })
     }
 
     /// Returns the sample in a legend, from its left end.
     pub fn sample(self, left: Vec2, width: f32) -> Vec<Shape> {
         let right = left + Vec2::new(width, 0.0);
-        let line = self
-            .line
-            .map(|style| Shape::Line(vec![left, right], style.stroke(self.hue)));
-        let is_area = self.line.is_none() && self.marker.is_none();
-        let area = is_area.then(|| Bounds::of_size(left - Vec2::new(0.0, 4.0), Vec2::new(width, 8.0)));
-        let area = area.map(|area| area.area(Ink::Hue(self.hue).at(0.3)));
-        let mark = self.mark(0.5 * (left + right));
-        line.into_iter().chain(area).chain(mark).collect()
+        let area = Bounds::of_size(left - Vec2::new(0.0, 4.0), Vec2::new(width, 8.0));
+        let behind = match (self.line, self.marker) {
+            (Some(style), _) => Some(Shape::Line(vec![left, right], style.stroke(self.hue))),
+            (None, None) => Some(area.area(Ink::Hue(self.hue).at(0.3))),
+            (None, Some(_)) => None,
+        };
+        behind.into_iter().chain(self.mark(0.5 * (left + right))).collect()
+    }
+}
+
+/// Texts in a drawing, placed without overlap.
+pub(super) struct Labels<'a> {
+    measure: Measure<'a>,
+    placed: Vec<(Bounds, String)>,
+}
+
+impl<'a> Labels<'a> {
+    pub(super) fn new(measure: Measure<'a>) -> Self {
+        let placed = Vec::new();
+        Self { measure, placed }
+    }
+
+    /// Returns the size of a text.
+    pub(super) fn size(&self, text: &str) -> Vec2 {
+        (self.measure)(text)
+    }
+
+    /// Puts a text at the first of the best of these places for its middle, with this clearance to the other texts. `cost`
+    /// rates a place; `None` rules it out. Returns false if there is no room.
+    pub(super) fn place(
+        &mut self,
+        text: &str,
+        clearance: f32,
+        middles: impl Iterator<Item = Vec2>,
+        cost: impl Fn(&Bounds) -> Option<usize>,
+    ) -> bool {
+        let size = self.size(text);
+        let places = middles.map(|middle| Bounds::centred(middle, size));
+        let free = places.filter(|place| self.bounds().all(|other| !other.grown(clearance).intersects(place)));
+        let rated = free.filter_map(|place| Some((cost(&place)?, place)));
+        let best = rated.min_by_key(|(cost, _)| *cost);
+        self.placed.extend(best.map(|(_, place)| (place, text.to_owned())));
+        best.is_some()
+    }
+
+    pub(super) fn bounds(&self) -> impl Iterator<Item = Bounds> {
+        self.placed.iter().map(|(bounds, _)| *bounds)
+    }
+
+    pub(super) fn shapes(self) -> impl Iterator<Item = Shape> {
+        let texts = self.placed.into_iter();
+        texts.map(|(bounds, text)| Shape::text(bounds.middle(), Align::Middle, Ink::Label, text))
     }
 }
 
@@ -305,8 +292,7 @@ const BAR_STEPS: usize = 128;
 const BAR_NUMBER: f32 = 26.0;
 
 /// Lays out a colour scale in `area`: a bar from the lowest value at the bottom to the highest at the top, with the numbers
-/// of `axis` on its right. The name is above it, or upright beyond the numbers if it is longer than `area` is wide. Empty if
-/// there is no room or no range.
+/// and the name of `axis` on its right. Empty if there is no room or no range.
 pub(super) fn lay_out_scale(
     area: Bounds,
     axis: &PlotAxis,
@@ -314,13 +300,7 @@ pub(super) fn lay_out_scale(
     colours: &ColourMap,
     measure: Measure<'_>,
 ) -> Vec<Shape> {
-    let name = measure(&axis.name);
-    let is_above = name.x <= area.size().x;
-    let top = area.min.y + if is_above { name.y + 12.0 } else { 0.0 };
-    let bar = Bounds {
-        min: Vec2::new(area.min.x + 8.0, top),
-        max: Vec2::new(area.min.x + 8.0 + BAR_WIDTH, area.max.y),
-    };
+    let bar = Bounds::of_size(area.min + Vec2::new(8.0, 0.0), Vec2::new(BAR_WIDTH, area.size().y));
     let (height, width) = (bar.size().y, range.end() - range.start());
     if height < 20.0 || !(width.is_finite() && width > 0.0) {
         return Vec::new();
@@ -340,12 +320,7 @@ pub(super) fn lay_out_scale(
         let text = axis.tick_text(place, ticks.step);
         shapes.push(Shape::text(at + Vec2::new(7.0, 0.0), Align::Start, Ink::Label, text));
     }
-    shapes.push(if is_above {
-        let at = Vec2::new(area.min.x + 4.0, area.min.y + 0.5 * name.y);
-        Shape::text(at, Align::Start, Ink::Label, &*axis.name)
-    } else {
-        let at = Vec2::new(area.max.x - 0.5 * name.y, bar.middle().y);
-        Shape::upright(at, Ink::Label, &*axis.name)
-    });
+    let beyond = Vec2::new(area.max.x - 0.5 * measure(&axis.name).y, bar.middle().y);
+    shapes.push(Shape::text(beyond, Align::Upright, Ink::Label, &*axis.name));
     shapes
 }

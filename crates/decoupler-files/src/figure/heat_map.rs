@@ -8,9 +8,10 @@ use ndarray::Array2;
 
 use super::{
     Hue,
-    axis::{PlotAxis, share},
+    axis::{PlotAxis, ends, share},
     colour_map::{SequentialMap, is_light},
     drawing::{Align, Bounds, Ink, Measure, Shape, lay_out_scale},
+    extremes,
 };
 
 /// A heat map: values over two axes as colours, with the number in each cell.
@@ -69,8 +70,9 @@ const GAP: f32 = 6.0;
 impl HeatMap {
     /// The map in these colours.
     #[must_use]
-    pub fn coloured(self, colours: SequentialMap) -> Self {
-        Self { colours, ..self }
+    pub fn coloured(mut self, colours: SequentialMap) -> Self {
+        self.colours = colours;
+        self
     }
 
     /// Returns the position of a value on the scale of colours over `range`, from 0 to 1; `None` for no value.
@@ -87,13 +89,10 @@ impl HeatMap {
     pub fn range(&self) -> RangeInclusive<f64> {
         let values = self.values.iter().chain(&self.value_axis.includes);
         let places = values.filter_map(|&value| self.value_axis.place(value));
-        let (low, high) = places.fold((f64::MAX, f64::MIN), |(low, high), place| {
-            (low.min(place), high.max(place))
-        });
-        match low < high {
-            true => low..=high,
-            false if low == high => low - 0.5..=high + 0.5,
-            false => 0.0..=1.0,
+        match ends(places) {
+            (low, high) if low < high => low..=high,
+            (low, high) if low == high => low - 0.5..=high + 0.5,
+            _ => 0.0..=1.0,
         }
     }
 
@@ -111,11 +110,8 @@ impl HeatMap {
         let is_upright = column_name + GAP > pitch && !are_numbers;
         let below = if is_upright { column_name } else { line } + line + 2.0 * GAP;
         let bottom = (area.max.y - below).max(area.min.y + line);
-        let grid = Bounds {
-            // The uppermost number of the scale is centred on its end.
-            min: Vec2::new(left, area.min.y + 0.5 * line),
-            max: Vec2::new(right, bottom),
-        };
+        // The uppermost number of the scale is centred on its end.
+        let grid = Bounds::of([Vec2::new(left, area.min.y + 0.5 * line), Vec2::new(right, bottom)]);
         let cell = grid.size() / Vec2::new(columns.max(1) as f32, rows.max(1) as f32);
         let mut drawing = HeatMapDrawing {
             shapes: Vec::with_capacity(self.values.len()),
@@ -128,44 +124,70 @@ impl HeatMap {
         let gap = if cell.min_element() > 4.0 { 0.5 } else { 0.0 };
         let (range, colours) = (self.range(), self.colours.colours());
         let mut texts = Vec::new();
+        let mut write = |x: f32, y: f32, align, ink, text: &str| {
+            texts.push(Shape::text(Vec2::new(x, y), align, ink, text));
+        };
         for (((row, column), &value), number) in self.values.indexed_iter().zip(numbers) {
             let bounds = drawing.cells([row, 1], [column, 1]).grown(-gap);
             let fill = self.colour_share(value, &range).map(|share| colours.at(share as f32));
             drawing.shapes.push(bounds.area(fill.map_or(Ink::Missing, Ink::Rgb)));
+            let ink = match fill {
+                Some(fill) if is_light(fill) => Ink::BLACK,
+                Some(_) => Ink::WHITE,
+                None => Ink::Hue(Hue::Grey),
+            };
             if has_room {
-                let ink = match fill {
-                    Some(fill) if is_light(fill) => Ink::BLACK,
-                    Some(_) => Ink::WHITE,
-                    None => Ink::Hue(Hue::Grey),
-                };
-                texts.push(Shape::text(bounds.middle(), Align::Middle, ink, number));
+                write(bounds.middle().x, bounds.middle().y, Align::Middle, ink, &number);
             }
         }
         let every = |step: f32, needed: f32| ((needed / step).ceil() as usize).max(1);
-        let needed = if is_upright { line } else { column_name + GAP };
+        let (align, height, needed) = match is_upright {
+            true => (Align::Upright, column_name, line),
+            false => (Align::Middle, line, column_name + GAP),
+        };
         for (at, name) in self.columns.iter().enumerate().step_by(every(cell.x, needed)) {
             let x = grid.min.x + (at as f32 + 0.5) * cell.x;
-            let y = |height: f32| grid.max.y + GAP + 0.5 * height;
-            texts.push(match is_upright {
-                true => Shape::upright(Vec2::new(x, y(column_name)), Ink::Label, &**name),
-                false => Shape::text(Vec2::new(x, y(line)), Align::Middle, Ink::Label, &**name),
-            });
+            write(x, grid.max.y + GAP + 0.5 * height, align, Ink::Label, name);
         }
         for (at, name) in self.rows.iter().enumerate().step_by(every(cell.y, line)) {
-            let place = Vec2::new(grid.min.x - GAP, grid.min.y + (at as f32 + 0.5) * cell.y);
-            texts.push(Shape::text(place, Align::End, Ink::Label, &**name));
+            let y = grid.min.y + (at as f32 + 0.5) * cell.y;
+            write(grid.min.x - GAP, y, Align::End, Ink::Label, name);
         }
-        let name_at = Vec2::new(grid.middle().x, area.max.y - 0.5 * line);
-        texts.push(Shape::text(name_at, Align::Middle, Ink::Label, &*self.x_name));
-        let name_at = Vec2::new(area.min.x + 0.5 * line, grid.middle().y);
-        texts.push(Shape::upright(name_at, Ink::Label, &*self.y_name));
-        let scale = Bounds {
-            min: Vec2::new(grid.max.x, grid.min.y),
-            max: Vec2::new(area.max.x, grid.max.y),
-        };
+        let (middle, bottom) = (grid.middle(), area.max.y - 0.5 * line);
+        write(middle.x, bottom, Align::Middle, Ink::Label, &self.x_name);
+        write(
+            area.min.x + 0.5 * line,
+            middle.y,
+            Align::Upright,
+            Ink::Label,
+            &self.y_name,
+        );
         drawing.shapes.extend(texts);
+        let scale = Bounds::of([Vec2::new(grid.max.x, grid.min.y), Vec2::new(area.max.x, grid.max.y)]);
         let scale = lay_out_scale(scale, &self.value_axis, &range, colours, measure);
         drawing.shapes.extend(scale);
         drawing
+    }
+
+    /// Describes the map in a sentence: its values, and the places of their minimum and maximum.
+    pub fn summary(&self) -> String {
+        let ((rows, columns), [x_name, y_name]) = (self.values.dim(), [&self.x_name, &self.y_name]);
+        let head = format!(
+            "{} over {y_name} and {x_name}, {rows} × {columns}",
+            self.value_axis.name
+        );
+        let finite = self.values.indexed_iter().filter(|(_, value)| value.is_finite());
+        let Some((least, largest)) = extremes(finite, |(_, value)| **value) else {
+            return format!("{head}: no values.");
+        };
+        let at = |((row, column), value): ((usize, usize), &f64)| {
+            let (value, row, column) = (
+                self.value_axis.value_text(*value),
+                &self.rows[row],
+                &self.columns[column],
+            );
+            format!("{value} at {y_name} {row}, {x_name} {column}")
+        };
+        format!("{head}: from {} to {}.", at(least), at(largest))
     }
 }

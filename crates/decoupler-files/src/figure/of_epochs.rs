@@ -6,165 +6,119 @@ use decoupler_core::training::{EpochRecord, Stage};
 
 use super::{
     Hue, LineStyle, Look,
-    axis::{PlotAxis, TickRule},
-    plot::{LineAt, Plot, PlotFigure, ReferenceLine, Series},
+    axis::PlotAxis,
+    plot::{LineAt, Plot, PlotFigure, Series},
 };
 
-/// Factor above the initial error or gradient from which a curve is drawn at the upper edge, which keeps the curves of
-/// a diverged training readable.
-const MAX_GROWTH: f64 = 1e3;
 /// Learning rates, dampings and scales beyond these are drawn at the edge.
 const PARAMETERS: std::ops::RangeInclusive<f64> = 1e-20..=1e12;
-
-const MSE: &str = "mse (scaled)";
 
 /// Picks one of an epoch's quantities.
 type OfEpoch = fn(&EpochRecord) -> Option<f64>;
 
+const TRAINING: OfEpoch = |epoch| Some(epoch.training_mse);
+const VALIDATION: OfEpoch = |epoch| epoch.validation_mse;
+const TEST: OfEpoch = |epoch| epoch.test_mse;
+const GRADIENT: OfEpoch = |epoch| Some(epoch.gradient_norm);
+const PARAMETER: OfEpoch = |epoch| Some(epoch.parameter);
+const FAILURES: OfEpoch = |epoch| Some(epoch.validation_failures as f64);
+
 /// The curve of a quantity over the epochs.
 fn curve(name: impl Into<String>, hue: Hue, style: LineStyle, history: &[EpochRecord], of: OfEpoch) -> Series {
-    let points = history
-        .iter()
-        .filter_map(|epoch| Some([epoch.epoch as f64, of(epoch)?]));
+    let point = |epoch: &EpochRecord| Some([epoch.epoch as f64, of(epoch)?]);
+    let points = history.iter().filter_map(point);
     Series::new(name, Look::line(hue, style), points)
 }
 
-/// Limits a logarithmic axis: values far above the initial one are drawn at the upper edge.
-fn bounded(axis: PlotAxis, at_start: Option<f64>) -> PlotAxis {
-    let highest = MAX_GROWTH * at_start.unwrap_or(0.0);
-    if highest > 0.0 {
-        axis.limited(0.0..=highest)
-    } else {
-        axis
+/// A logarithmic axis that keeps the curves of a diverged training readable: values far above the initial one are drawn at
+/// the upper edge.
+fn bounded(name: &str, history: &[EpochRecord], of: OfEpoch) -> PlotAxis {
+    let axis = PlotAxis::logarithmic(name);
+    match history.first().and_then(of) {
+        Some(start) if start > 0.0 => axis.limited(0.0..=1e3 * start),
+        _ => axis,
     }
 }
 
+/// A plot against the epoch.
+fn over_epochs(y: PlotAxis, series: impl IntoIterator<Item = Series>) -> Plot {
+    Plot::new(PlotAxis::linear("epoch"), y, series)
+}
+
 /// A line where the method changed, with the short name of the next method.
-fn stage_lines(stages: &[Stage]) -> Vec<ReferenceLine> {
-    let changes = stages.iter().skip(1).map(|stage| {
+fn stage_lines(stages: &[Stage]) -> impl Iterator<Item = Series> {
+    stages.iter().skip(1).map(|stage| {
         // The next method continues from the last weights of the previous one.
         let changed = stage.first_epoch.saturating_sub(1);
         let name = format!("{} from epoch {changed}", stage.method.name());
-        let line = ReferenceLine::new(name, LineAt::X(changed as f64), Hue::Grey, LineStyle::Fine);
+        let line = Series::across(name, LineAt::X(changed as f64), Hue::Grey, LineStyle::Fine);
         line.labelled(stage.method.short_name())
-    });
-    changes.collect()
+    })
 }
 
 /// Training, validation and test error against epoch, the epoch of the best weights, and each change of method. Errors
 /// far above the initial one are drawn at the upper edge.
 pub fn loss_figure(history: &[EpochRecord], stages: &[Stage], best_epoch: usize) -> PlotFigure {
-    let curves: [(&str, Hue, OfEpoch); 3] = [
-        ("training", Hue::Blue, |epoch| Some(epoch.training_mse)),
-        ("validation", Hue::Green, |epoch| epoch.validation_mse),
-        ("test", Hue::Orange, |epoch| epoch.test_mse),
+    let drawn = &*outlined(history);
+    let curves = [
+        ("training", Hue::Blue, TRAINING),
+        ("validation", Hue::Green, VALIDATION),
+        ("test", Hue::Orange, TEST),
     ];
-    let at_start = history.first().map(|start| start.training_mse);
-    let history = &*outlined(history);
-    let series = curves.map(|(name, hue, of)| curve(name, hue, LineStyle::Solid, history, of));
-    let name = format!("best weights, epoch {best_epoch}");
-    let best = ReferenceLine::new(name, LineAt::X(best_epoch as f64), Hue::Grey, LineStyle::Dashed);
-    Plot::new(
-        PlotAxis::linear("epoch"),
-        bounded(PlotAxis::logarithmic(MSE), at_start),
-        series.into_iter().filter(|curve| !curve.points.is_empty()).collect(),
-    )
-    .with_lines(
-        stage_lines(stages)
-            .into_iter()
-            .chain([best.listed(Some("best weights"))]),
-    )
-    .into()
+    let curves = curves.map(|(name, hue, of)| curve(name, hue, LineStyle::Solid, drawn, of));
+    let (name, at) = (
+        format!("best weights, epoch {best_epoch}"),
+        LineAt::X(best_epoch as f64),
+    );
+    let best = Series::across(name, at, Hue::Grey, LineStyle::Dashed).listed(Some("best weights"));
+    let series = curves.into_iter().chain(stage_lines(stages)).chain([best]);
+    over_epochs(bounded("mse (scaled)", history, TRAINING), series).into()
 }
 
 /// Length of the gradient, damping or learning rate, and validation failures against epoch.
 pub fn training_state_figure(history: &[EpochRecord], stages: &[Stage]) -> PlotFigure {
-    let gradient = bounded(
-        PlotAxis::logarithmic("gradient"),
-        history.first().map(|start| start.gradient_norm),
-    );
-    let history = &*outlined(history);
-    let parameter = PlotAxis::logarithmic(parameter_name(stages)).limited(PARAMETERS);
+    let drawn = &*outlined(history);
     // A little more than from 0 to 1: lines do not coincide with the frame.
-    let failures = PlotAxis::linear("validation failures")
-        .including([-0.1, 1.1])
-        .ticked(TickRule::Whole);
-    let plot = |y: PlotAxis, series: Series| {
-        let name = y.name.clone();
-        let series = Series { name, ..series };
-        Plot::new(PlotAxis::linear("epoch"), y, vec![series.listed(None)]).with_lines(stage_lines(stages))
-    };
-    let solid = LineStyle::Solid;
-    PlotFigure {
-        plots: vec![
-            plot(
-                gradient,
-                curve("", Hue::Blue, solid, history, |epoch| Some(epoch.gradient_norm)),
-            ),
-            plot(
-                parameter,
-                curve("", Hue::Orange, solid, history, |epoch| Some(epoch.parameter)),
-            ),
-            plot(
-                failures,
-                Series::new("", Look::line(Hue::Green, solid), failure_steps(history)),
-            ),
-        ],
-        notes: Vec::new(),
-    }
+    let failures = PlotAxis::linear("validation failures").including([-0.1, 1.1]);
+    let parameter = PlotAxis::logarithmic(parameter_name(stages)).limited(PARAMETERS);
+    let curve = |hue: Hue, of: OfEpoch| curve("", hue, LineStyle::Solid, drawn, of).listed(None);
+    let plots = [
+        (bounded("gradient", history, GRADIENT), curve(Hue::Blue, GRADIENT)),
+        (parameter, curve(Hue::Orange, PARAMETER)),
+        (failures.whole(), curve(Hue::Green, FAILURES).stepped()),
+    ];
+    let plots = plots.map(|(y, mut curve)| {
+        curve.name.clone_from(&y.name);
+        over_epochs(y, std::iter::once(curve).chain(stage_lines(stages)))
+    });
+    PlotFigure::new(plots, [])
 }
 
 /// Training and test error against epoch of two runs, by their names, in one plot.
 pub fn compared_losses_figure(runs: [Option<(&str, &[EpochRecord])>; 2]) -> PlotFigure {
-    let curves: [(&str, LineStyle, OfEpoch); 2] = [
-        ("training", LineStyle::Dashed, |epoch| Some(epoch.training_mse)),
-        ("test", LineStyle::Solid, |epoch| epoch.test_mse),
+    let curves = [
+        ("training", LineStyle::Dashed, TRAINING),
+        ("test", LineStyle::Solid, TEST),
     ];
-    let mut series = Vec::new();
-    for (run, hue) in runs.into_iter().zip([Hue::Blue, Hue::Orange]) {
-        let Some((name, history)) = run else { continue };
-        let history = &*outlined(history);
-        let of_run = curves.map(|(error, style, of)| curve(format!("{name}, {error}"), hue, style, history, of));
-        series.extend(of_run.into_iter().filter(|curve| !curve.points.is_empty()));
-    }
-    let mut figure: PlotFigure = Plot::new(PlotAxis::linear("epoch"), PlotAxis::logarithmic(MSE), series).into();
-    figure.notes = vec!["Dashed: training; solid: test.".to_owned()];
-    figure
+    let runs = runs.into_iter().zip([Hue::Blue, Hue::Orange]);
+    let series = runs.filter_map(|(run, hue)| run.map(|(name, history)| (name, outlined(history), hue)));
+    let series = series.flat_map(|(run, drawn, hue)| {
+        curves.map(|(name, style, of)| curve(format!("{run}, {name}"), hue, style, &drawn, of))
+    });
+    let plot = over_epochs(PlotAxis::logarithmic("mse (scaled)"), series);
+    PlotFigure::new([plot], ["Dashed: training; solid: test.".to_owned()])
 }
 
 /// Returns the name of [`EpochRecord::parameter`] in all methods of a training.
 fn parameter_name(stages: &[Stage]) -> &'static str {
     let mut names = stages.iter().map(|stage| stage.method.parameter_name());
     let first = names.next().unwrap_or("parameter");
-    if names.all(|name| name == first) {
-        first
-    } else {
-        "rate or damping"
-    }
-}
-
-/// Validation failures are constant from one epoch to the next: returns `[epoch, failures]` at both ends of each step.
-fn failure_steps(history: &[EpochRecord]) -> Vec<[f64; 2]> {
-    let mut points: Vec<[f64; 2]> = Vec::new();
-    for epoch in history {
-        let (at, failures) = (epoch.epoch as f64, epoch.validation_failures as f64);
-        if let Some(&[_, before]) = points.last().filter(|[_, before]| *before != failures) {
-            points.push([at, before]);
-        }
-        points.push([at, failures]);
-    }
-    points
+    let is_common = names.all(|name| name == first);
+    if is_common { first } else { "rate or damping" }
 }
 
 /// Quantities whose extremes are kept.
-const QUANTITIES: [OfEpoch; 6] = [
-    |epoch| Some(epoch.training_mse),
-    |epoch| epoch.validation_mse,
-    |epoch| epoch.test_mse,
-    |epoch| Some(epoch.gradient_norm),
-    |epoch| Some(epoch.parameter),
-    |epoch| Some(epoch.validation_failures as f64),
-];
+const QUANTITIES: [OfEpoch; 6] = [TRAINING, VALIDATION, TEST, GRADIENT, PARAMETER, FAILURES];
 
 /// Number of stretches into which a long training is divided: about one for each pixel of a chart.
 const STRETCHES: usize = 1024;
@@ -194,12 +148,9 @@ impl EpochOutline {
         for epochs in epochs.chunks(MAX_EPOCHS / 2) {
             self.kept.extend_from_slice(epochs);
             if self.kept.len() > MAX_EPOCHS {
-                let epochs = self.kept.last().map_or(0, |last| last.epoch);
-                let width = epochs / STRETCHES + 1;
-                let stretches = self
-                    .kept
-                    .chunk_by(|one, other| one.epoch / width == other.epoch / width);
-                self.kept = stretches.flat_map(extremes).collect();
+                let width = self.kept[self.kept.len() - 1].epoch / STRETCHES + 1;
+                let are_near = |one: &EpochRecord, other: &EpochRecord| one.epoch / width == other.epoch / width;
+                self.kept = self.kept.chunk_by(are_near).flat_map(extremes).collect();
             }
         }
     }
@@ -224,17 +175,13 @@ fn outlined(history: &[EpochRecord]) -> Cow<'_, [EpochRecord]> {
 fn extremes(stretch: &[EpochRecord]) -> Vec<EpochRecord> {
     let mut places = vec![0, stretch.len() - 1];
     for of in QUANTITIES {
-        let value = |place: usize| of(&stretch[place]).filter(|value| value.is_finite());
-        let (with, without): (Vec<usize>, Vec<usize>) = (0..stretch.len()).partition(|&place| value(place).is_some());
-        let by_value = |one: &usize, other: &usize| {
-            let [one, other] = [*one, *other].map(|place| value(place).unwrap_or(0.0));
-            one.total_cmp(&other)
-        };
-        let ends = [
-            with.iter().copied().min_by(by_value),
-            with.iter().copied().max_by(by_value),
-        ];
-        places.extend(ends.into_iter().flatten().chain(without.first().copied()));
+        let values = stretch.iter().map(of).enumerate();
+        let values = values.map(|(place, value)| (place, value.filter(|value| value.is_finite())));
+        let finite = values.clone().filter_map(|(place, value)| Some((place, value?)));
+        let ends = super::extremes(finite, |(_, value)| *value);
+        places.extend(ends.into_iter().flat_map(|(lowest, highest)| [lowest.0, highest.0]));
+        let mut missing = values.filter(|(_, value)| value.is_none());
+        places.extend(missing.next().map(|(place, _)| place));
     }
     places.sort_unstable();
     places.dedup();
@@ -281,15 +228,17 @@ mod tests {
         let figure = loss_figure(&[epoch(0, 1.0, 0)], &[], 0);
         let keys: Vec<&str> = figure.keys().into_iter().map(|(key, _)| key).collect();
         assert_eq!(keys, ["training", "best weights"]);
-        assert_eq!(figure.plots[0].series.len(), 1);
+        assert_eq!(figure.plots[0].series.len(), 2);
     }
 
     #[test]
     fn failures_rise_in_vertical_steps() {
         let history = [epoch(0, 1.0, 0), epoch(1, 1.0, 1), epoch(2, 1.0, 1), epoch(3, 1.0, 0)];
         let expected = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [3.0, 1.0], [3.0, 0.0]];
-        assert_eq!(failure_steps(&history), expected);
-        assert!(failure_steps(&[]).is_empty());
+        let figure = training_state_figure(&history, &[]);
+        let steps = &figure.plots[2].series[0].points;
+        assert_eq!(Vec::from_iter(steps.iter().map(|point| [point.x, point.y])), expected);
+        assert!(training_state_figure(&[], &[]).plots[2].series.is_empty());
     }
 
     fn epoch_of(epoch: usize, training_mse: f64) -> EpochRecord {

@@ -1,37 +1,64 @@
 //! Distribution of the errors of nodes or of a target of a recording, and decoded against actual values with the fitted
 //! line.
 
-use decoupler_core::{dataset::Dataset, problem::Channel, text::format_number};
+use decoupler_core::{dataset::Dataset, evaluation::NodeAddress, problem::Channel, text::format_number};
+use glam::DVec2;
 use ndarray::Array2;
 
 use super::{
     Hue, LineStyle, Look, Marker,
-    axis::PlotAxis,
-    plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, thinned_places},
+    axis::{PlotAxis, ends},
+    plot::{Form, LineAt, Plot, PlotFigure, PlotPoint, Series, thinned_places},
+    titled, with_unit,
 };
 
 const BINS: usize = 41;
 
-/// Maximum number of samples of a recording used in a figure; from a larger test set, evenly spaced samples are used.
-const MAX_PAIRS: usize = 20_000;
-
-/// Returns the spacing of the samples that are used.
-fn stride(test: &Dataset) -> usize {
-    test.samples().div_ceil(MAX_PAIRS).max(1)
+/// Values that a network decodes.
+#[derive(Clone, Copy, Debug)]
+pub enum Decoded<'a> {
+    /// z of the nodes of an array, in millimetres.
+    Nodes,
+    /// A target of a recording, in its unit.
+    Target(&'a Channel),
 }
 
-/// Returns actual and decoded values of a target, in its unit. `answers` has the shape of the targets of `test`.
-pub fn target_pairs(test: &Dataset, answers: &Array2<f64>, target: usize) -> Vec<(f64, f64)> {
+impl Decoded<'_> {
+    /// Returns the name of a value, its unit, the name of the network's answer, and that of many samples.
+    fn words(&self) -> (&str, Option<&str>, [&'static str; 2]) {
+        match self {
+            Self::Nodes => ("z", Some("mm"), ["decoupled", "nodes"]),
+            Self::Target(target) => (&target.name, target.unit.as_deref(), ["decoded", "samples"]),
+        }
+    }
+}
+
+/// Returns the spacing of the values used in a figure: from a larger test set, at most 20 000 evenly spaced ones.
+fn stride(values: usize) -> usize {
+    values.div_ceil(20_000).max(1)
+}
+
+/// Returns actual and decoded values of a test set: those of a target in its unit, or z of all nodes of an array in
+/// millimetres. `answers` has the shape of the targets of `test`.
+pub fn value_pairs(test: &Dataset, answers: &Array2<f64>, target: Option<usize>) -> Vec<(f64, f64)> {
     let actual = test.targets();
-    (0..test.samples())
-        .step_by(stride(test))
-        .map(|sample| (actual[[sample, target]], answers[[sample, target]]))
-        .collect()
+    let (first, step) = target.map_or((2, 3), |target| (target, test.outputs()));
+    let pairs = actual.iter().copied().zip(answers.iter().copied());
+    let stride = stride(actual.len() / step.max(1));
+    pairs.skip(first).step_by(step.max(1) * stride).collect()
 }
 
-/// Returns the sample that one of [`target_pairs`] belongs to; `None` beyond the last.
+/// Returns the sample that one of the [`value_pairs`] of a target belongs to; `None` beyond the last.
 pub fn pair_sample(test: &Dataset, pair: usize) -> Option<usize> {
-    Some(pair * stride(test)).filter(|&sample| sample < test.samples())
+    Some(pair * stride(test.samples())).filter(|&sample| sample < test.samples())
+}
+
+/// Returns the node that one of the [`value_pairs`] of an array belongs to; `None` beyond the last.
+pub fn pair_address(test: &Dataset, pair: usize) -> Option<NodeAddress> {
+    let (place, per_sample) = (pair * stride(test.targets().len() / 3), (test.outputs() / 3).max(1));
+    let (sample, node) = (place / per_sample, place % per_sample);
+    let (snapshot, row) = (*test.groups().get(sample)?, test.row_wire(sample).unwrap_or(0));
+    Some(NodeAddress { snapshot, row, node })
 }
 
 /// Bins of a histogram of errors, symmetric about 0, with the same number on either side of the middle one.
@@ -42,18 +69,18 @@ pub struct ErrorBins {
 }
 
 impl ErrorBins {
+    /// Number of bins.
+    pub const COUNT: usize = BINS;
+
     /// Returns the bins that contain all finite errors of these pairs of actual and decoded values.
     pub fn new(pairs: &[(f64, f64)]) -> Self {
         let errors = pairs.iter().map(|(actual, decoded)| (decoded - actual).abs());
         let largest = errors.filter(|error| error.is_finite()).fold(0.0, f64::max);
-        Self {
-            // Without errors, any width will do.
-            width: if largest > 0.0 { largest } else { 1.0 } / (BINS / 2) as f64,
-        }
+        // Without errors, any width will do.
+        let half = if largest > 0.0 { largest } else { 1.0 };
+        let width = half / (BINS / 2) as f64;
+        Self { width }
     }
-
-    /// Number of bins.
-    pub const COUNT: usize = BINS;
 
     /// Returns the bin of an error; `None` if it is not a number or beyond them.
     pub fn bin(&self, error: f64) -> Option<usize> {
@@ -69,9 +96,8 @@ impl ErrorBins {
     /// Returns the pairs in a bin, those with the largest error first.
     pub fn pairs_in(&self, bin: usize, pairs: &[(f64, f64)]) -> Vec<usize> {
         let error = |pair: usize| pairs[pair].1 - pairs[pair].0;
-        let mut found: Vec<usize> = (0..pairs.len())
-            .filter(|&pair| self.bin(error(pair)) == Some(bin))
-            .collect();
+        let in_bin = (0..pairs.len()).filter(|&pair| self.bin(error(pair)) == Some(bin));
+        let mut found: Vec<usize> = in_bin.collect();
         found.sort_by(|&one, &other| error(other).abs().total_cmp(&error(one).abs()));
         found
     }
@@ -84,58 +110,35 @@ impl ErrorBins {
     }
 }
 
-/// Distribution of the errors of z (decoupled − actual) of nodes, in [`ErrorBins`]; the bar `chosen` is highlighted.
-pub fn error_histogram_figure(pairs_mm: &[(f64, f64)], chosen: Option<usize>) -> PlotFigure {
-    histogram(pairs_mm, chosen, "error of z (mm), decoupled − actual", "nodes")
-}
-
-/// Distribution of the errors of a target (decoded − actual), in [`ErrorBins`]; the bar `chosen` is highlighted.
-pub fn target_histogram_figure(pairs: &[(f64, f64)], chosen: Option<usize>, target: &Channel) -> PlotFigure {
-    let axis = format!("error of {}, decoded − actual", target.title());
-    histogram(pairs, chosen, &axis, "samples")
-}
-
-/// The histogram of this many `counted`.
-fn histogram(pairs: &[(f64, f64)], chosen: Option<usize>, axis: &str, counted: &str) -> PlotFigure {
+/// Distribution of the errors (decoded − actual), in [`ErrorBins`]; the bar `chosen` is highlighted.
+pub fn histogram_figure(pairs: &[(f64, f64)], chosen: Option<usize>, of: Decoded<'_>) -> PlotFigure {
+    let (name, unit, [answer, samples]) = of.words();
     let bins = ErrorBins::new(pairs);
     let counts = bins.counts(pairs);
-    let bars = |name: &str, hue: Hue, is_shown: &dyn Fn(usize) -> bool| {
-        let points = (0..BINS).filter(|&bin| is_shown(bin)).map(|bin| {
+    let bars = |name: &str, hue: Hue, is_chosen: bool| {
+        let shown = (0..BINS).filter(|&bin| (Some(bin) == chosen) == is_chosen);
+        let points = shown.map(|bin| {
             let middle = bins.width * (bin as f64 - (BINS / 2) as f64);
             PlotPoint::from([middle, counts[bin] as f64]).of_item(bin)
         });
-        Series {
-            bar_width: Some(0.92 * bins.width),
-            ..Series::new(name, Look::area(hue), points).listed(None)
-        }
+        let mut series = Series::new(name, Look::area(hue), points).listed(None);
+        series.form = Form::Bars(0.92 * bins.width);
+        series
     };
-    let mut series = vec![bars(counted, Hue::Blue, &|bin| Some(bin) != chosen)];
-    if let Some(chosen) = chosen {
-        series.push(bars(&format!("chosen {counted}"), Hue::Orange, &|bin| bin == chosen));
-    }
-    let no_error = ReferenceLine::new("no error", LineAt::X(0.0), Hue::Grey, LineStyle::Dashed);
-    Plot::new(
-        PlotAxis::linear(axis),
-        PlotAxis::linear(format!("{counted} of the test set")).including([0.0]),
-        series,
-    )
-    .with_lines([no_error])
-    .into()
+    let x = PlotAxis::linear(format!("error of {}, {answer} − actual", titled(name, unit)));
+    let y = PlotAxis::linear(format!("{samples} of the test set")).including([0.0]);
+    let chosen = bars(&format!("chosen {samples}"), Hue::Orange, true);
+    let no_error = Series::across("no error", LineAt::X(0.0), Hue::Grey, LineStyle::Dashed);
+    Plot::new(x, y, [bars(samples, Hue::Blue, false), chosen, no_error]).into()
 }
 
 /// Least-squares line through pairs of actual and decoded values, and the range of the actual ones. A regression figure
 /// needs both for all pairs, so they are computed once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegressionLine {
-    /// Smallest and largest finite actual value.
-    ends: Option<[f64; 2]>,
-    fit: Option<Fit>,
-}
-
-/// The line, if both sides vary.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Fit {
-    /// Pearson's correlation coefficient.
+    /// Smallest and largest finite actual value; infinite without one.
+    ends: [f64; 2],
+    /// Pearson's correlation coefficient. Like the line, it is NaN or infinite unless both sides vary.
     correlation: f64,
     slope: f64,
     /// In the unit of the values.
@@ -145,112 +148,66 @@ struct Fit {
 impl RegressionLine {
     /// Fits the line to pairs of actual and decoded values.
     pub fn of(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Self {
-        let actual = || pairs.clone().map(|pair| pair.0).filter(|value| value.is_finite());
-        let ends = actual().reduce(f64::min).zip(actual().reduce(f64::max));
+        let pairs = pairs.map(DVec2::from);
+        let actual = pairs.clone().map(|pair| pair.x);
+        let mean = pairs.clone().sum::<DVec2>() / pairs.clone().count() as f64;
+        let (mut squares, mut product) = (DVec2::ZERO, 0.0);
+        for deviation in pairs.map(|pair| pair - mean) {
+            squares += deviation * deviation;
+            product += deviation.x * deviation.y;
+        }
+        let slope = product / squares.x;
         Self {
-            ends: ends.map(|(low, high)| [low, high]),
-            fit: Fit::of(pairs),
-        }
-    }
-}
-
-impl Fit {
-    /// Returns the line, or `None` if one side does not vary.
-    fn of(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Self> {
-        let (mut count, mut sum_a, mut sum_d) = (0.0, 0.0, 0.0);
-        for (a, d) in pairs.clone() {
-            count += 1.0;
-            sum_a += a;
-            sum_d += d;
-        }
-        let (mean_a, mean_d) = (sum_a / count, sum_d / count);
-        let (mut aa, mut dd, mut ad) = (0.0, 0.0, 0.0);
-        for (a, d) in pairs {
-            aa += (a - mean_a).powi(2);
-            dd += (d - mean_d).powi(2);
-            ad += (a - mean_a) * (d - mean_d);
-        }
-        let slope = ad / aa;
-        let fit = Self {
-            correlation: ad / (aa * dd).sqrt(),
+            ends: ends(actual.filter(|value| value.is_finite())).into(),
+            correlation: product / (squares.x * squares.y).sqrt(),
             slope,
-            offset: mean_d - slope * mean_a,
-        };
-        let is_finite = fit.correlation.is_finite() && fit.offset.is_finite();
-        is_finite.then_some(fit)
+            offset: mean.y - slope * mean.x,
+        }
     }
 }
 
-/// Decoupled against actual z, with the line on which they would be equal and the line fitted to them.
-pub fn regression_figure(pairs_mm: &[(f64, f64)]) -> PlotFigure {
-    let line = RegressionLine::of(pairs_mm.iter().copied());
-    let what = ["decoupled", "nodes of the test set"];
-    regression((pairs_mm.len(), &|pair| pairs_mm[pair]), &line, ("z", Some("mm")), what)
-}
-
-/// Decoded against actual values of the target of this name and unit, with the line on which they would be equal and `line`
-/// through all of them. `pair` is called only for the samples that are drawn.
-pub fn target_regression_figure(
-    samples: (usize, &dyn Fn(usize) -> (f64, f64)),
-    line: &RegressionLine,
-    name: &str,
-    unit: Option<&str>,
-) -> PlotFigure {
-    regression(samples, line, (name, unit), ["decoded", "samples of the test set"])
-}
-
-/// Values decoded by a network, called `answer`, against actual values of a quantity (its name and unit), in pairs of
-/// `what`.
-fn regression(
+/// Decoded against actual values, with the line on which they would be equal and `fitted` through all of them. `pair` is
+/// called only for the samples that are drawn.
+pub fn regression_figure(
     (count, pair): (usize, &dyn Fn(usize) -> (f64, f64)),
     fitted: &RegressionLine,
-    (name, unit): (&str, Option<&str>),
-    [answer, what]: [&str; 2],
+    of: Decoded<'_>,
 ) -> PlotFigure {
+    let (name, unit, [answer, samples]) = of.words();
     let dots = thinned_places(count).map(|place| {
         let (actual, decoded) = pair(place);
         PlotPoint::from([actual, decoded]).of_item(place)
     });
     let line = |name: &str, look: Look, of: &dyn Fn(f64) -> f64| {
-        let ends = fitted.ends.into_iter().flatten();
+        let ends = fitted.ends.into_iter().filter(|end| end.is_finite());
         Series::new(name, look, ends.map(|actual| [actual, of(actual)]))
     };
-    let mut series = vec![
-        Series::new(what, Look::marker(Hue::Blue, Marker::Dot), dots),
-        line("equal", Look::line(Hue::Ink, LineStyle::Dashed), &|actual| actual),
-    ];
-    let mut notes = Vec::new();
-    if let Some(fit) = fitted.fit {
+    let dots = Series::new(
+        format!("{samples} of the test set"),
+        Look::marker(Hue::Blue, Marker::Dot),
+        dots,
+    );
+    let equal = line("equal", Look::line(Hue::Ink, LineStyle::Dashed), &|actual| actual);
+    let (mut series, mut notes) = (vec![dots, equal], Vec::new());
+    let fit = *fitted;
+    if fit.correlation.is_finite() && fit.offset.is_finite() {
         let look = Look::line(Hue::Orange, LineStyle::Solid);
         series.push(line("fitted line", look, &|actual| fit.slope * actual + fit.offset));
         let sign = if fit.offset < 0.0 { '−' } else { '+' };
         let [slope, offset] = [fit.slope, fit.offset.abs()].map(format_number);
-        let unit = unit.map_or_else(String::new, |unit| format!(" {unit}"));
-        notes = vec![
-            format!("Correlation R = {}", format_number(fit.correlation)),
-            format!("Fitted line: {answer} = {slope} · actual {sign} {offset}{unit}"),
-        ];
+        let offset = with_unit(offset, unit);
+        notes.push(format!("Correlation R = {}", format_number(fit.correlation)));
+        notes.push(format!("Fitted line: {answer} = {slope} · actual {sign} {offset}"));
     }
-    let title = match unit {
-        Some(unit) => format!("{name} ({unit})"),
-        None => name.to_owned(),
-    };
-    decoded_against_actual(&title, answer, series, notes)
+    decoded_against_actual(&titled(name, unit), answer, series, notes)
 }
 
 /// One plot of `series` with equal scales: decoded values, called `answer`, against actual values of the quantity `title`.
 pub(super) fn decoded_against_actual(title: &str, answer: &str, series: Vec<Series>, notes: Vec<String>) -> PlotFigure {
-    PlotFigure {
-        plots: vec![Plot {
-            has_equal_scales: true,
-            ..Plot::new(
-                PlotAxis::linear(format!("actual {title}")),
-                PlotAxis::linear(format!("{answer} {title}")),
-                series,
-            )
-        }],
-        notes,
-    }
+    let [x, y] = ["actual", answer].map(|what| PlotAxis::linear(format!("{what} {title}")));
+    let mut plot = Plot::new(x, y, series);
+    plot.has_equal_scales = true;
+    PlotFigure::new([plot], notes)
 }
 
 #[cfg(test)]
@@ -291,10 +248,11 @@ mod tests {
             );
         }
         assert_eq!(held, pairs.len());
-        let figure = error_histogram_figure(&pairs, Some(3));
+        let figure = histogram_figure(&pairs, Some(3), Decoded::Nodes);
         let bars = figure.plots[0]
             .series
             .iter()
+            .filter(|series| matches!(series.form, Form::Bars(_)))
             .map(|series| series.points.len())
             .collect::<Vec<_>>();
         assert_eq!(bars, [ErrorBins::COUNT - 1, 1]);
@@ -307,42 +265,69 @@ mod tests {
         let test = Dataset::new(actual.clone(), actual.clone(), None, (0..SAMPLES).collect()).unwrap();
         let mut answers = actual;
         answers[[30_000, 1]] += 2.0;
-        let pairs = target_pairs(&test, &answers, 1);
-        assert!(pairs.len() <= MAX_PAIRS, "{}", pairs.len());
+        let pairs = value_pairs(&test, &answers, Some(1));
+        assert!(pairs.len() <= 20_000, "{}", pairs.len());
         let off = pairs.iter().position(|(actual, decoded)| actual != decoded).unwrap();
         assert_eq!(pair_sample(&test, off), Some(30_000));
         assert_eq!(pair_sample(&test, pairs.len()), None);
         let force = Channel::new("force", Some("N"));
-        let figure = target_histogram_figure(&pairs, ErrorBins::new(&pairs).bin(2.0), &force);
+        let figure = histogram_figure(&pairs, ErrorBins::new(&pairs).bin(2.0), Decoded::Target(&force));
         let plot = &figure.plots[0];
         assert_eq!(plot.x.name, "error of force (N), decoded − actual");
         assert_eq!((plot.series[1].points[0].x, plot.series[1].points[0].y), (2.0, 1.0));
     }
 
     #[test]
+    fn a_pair_leads_back_to_its_node() {
+        use decoupler_core::{
+            dataset::{Seed, Stream},
+            scene::Scene,
+            sensor::SensorModel,
+        };
+        let sensor = SensorModel::new("10x6_3x18".parse().unwrap());
+        let test = Dataset::simulate(&sensor, &Scene::default(), 20, &mut Seed(0).rng(Stream::Test)).unwrap();
+        let mut decoupled = test.targets().to_owned();
+        // The third node of row-wire 4 in the second snapshot.
+        decoupled[[13, 8]] += 0.25;
+        let pairs = value_pairs(&test, &decoupled, None);
+        let off = pairs
+            .iter()
+            .position(|(actual, decoupled)| actual != decoupled)
+            .unwrap();
+        let expected = NodeAddress {
+            snapshot: 1,
+            row: 3,
+            node: 2,
+        };
+        assert_eq!(pair_address(&test, off), Some(expected));
+        assert_eq!(pair_address(&test, pairs.len()), None);
+    }
+
+    fn of_nodes(pairs: &[(f64, f64)]) -> PlotFigure {
+        let line = RegressionLine::of(pairs.iter().copied());
+        regression_figure((pairs.len(), &|pair| pairs[pair]), &line, Decoded::Nodes)
+    }
+
+    #[test]
     fn the_fit_finds_a_line_unless_values_are_constant() {
-        let fit = |pairs: &[(f64, f64)]| RegressionLine::of(pairs.iter().copied()).fit;
+        let fit = |pairs: &[(f64, f64)]| RegressionLine::of(pairs.iter().copied());
         let line: Vec<_> = (0..9).map(|i| (f64::from(i), 3.0 * f64::from(i) - 1.0)).collect();
-        let found = fit(&line).unwrap();
+        let found = fit(&line);
         assert!((found.correlation - 1.0).abs() < 1e-15);
         assert!((found.slope - 3.0).abs() < 1e-14 && (found.offset + 1.0).abs() < 1e-13);
-        assert_eq!(fit(&[(1.0, 2.0), (1.0, 3.0)]), None);
-        assert_eq!(fit(&[]), None);
-        assert_eq!(
-            regression_figure(&[(1.0, 2.0), (1.0, 3.0)]).keys().len(),
-            2,
-            "no fitted line"
-        );
+        assert!(of_nodes(&[]).keys().is_empty());
+        assert_eq!(of_nodes(&[(1.0, 2.0), (1.0, 3.0)]).keys().len(), 2, "no fitted line");
     }
 
     #[test]
     fn the_regression_names_its_target_with_the_unit_if_there_is_one() {
         let pairs = [(0.0, 1.0), (1.0, 3.0), (2.0, 5.0)];
         let line = RegressionLine::of(pairs.into_iter());
-        let figure = target_regression_figure((3, &|sample| pairs[sample]), &line, "force", Some("N"));
+        let (force, unnamed) = (Channel::new("force", Some("N")), Channel::new("c2", None));
+        let figure = regression_figure((3, &|sample| pairs[sample]), &line, Decoded::Target(&force));
         assert_eq!(figure.plots[0].x.name, "actual force (N)");
         assert_eq!(figure.notes[1], "Fitted line: decoded = 2.00 · actual + 1.00 N");
-        let without = target_regression_figure((3, &|sample| pairs[sample]), &line, "c2", None);
+        let without = regression_figure((3, &|sample| pairs[sample]), &line, Decoded::Target(&unnamed));
         assert_eq!(without.plots[0].y.name, "decoded c2");
     }
 
@@ -361,11 +346,10 @@ mod tests {
             asked.set(asked.get() + 1);
             pair(sample)
         };
-        let figure = target_regression_figure((SAMPLES, &counted), &line, "x", None);
+        let figure = regression_figure((SAMPLES, &counted), &line, Decoded::Target(&Channel::new("x", None)));
         assert!(asked.get() <= 2001, "{} samples used", asked.get());
         assert_eq!(figure.plots[0].series[0].points.len(), asked.get());
         // Least squares: the slope is 1 − 2 · 0.001 for actual values that are independent of the sample.
-        let fit = line.fit.unwrap();
-        assert!((fit.slope - 0.998).abs() < 2e-5, "{fit:?}");
+        assert!((line.slope - 0.998).abs() < 2e-5, "{line:?}");
     }
 }

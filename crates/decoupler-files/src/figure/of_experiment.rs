@@ -3,16 +3,16 @@
 use ndarray::Array2;
 
 use super::{
-    Hue, LineStyle, Look, Marker,
+    Figure, Hue, LineStyle, Look, Marker,
     axis::{PlotAxis, TickRule},
     colour_map::SequentialMap,
     heat_map::HeatMap,
-    plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, Span},
+    plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
+    titled,
 };
-use crate::figure::Figure;
 use decoupler_core::{
     evaluation::{
-        ErrorMeasure, TestErrors,
+        ErrorMeasure,
         experiments::{Axis, AxisKind, Cell, Experiment, ExperimentResults, Figure as Measured, Trial},
     },
     network::suggested_hidden,
@@ -32,19 +32,11 @@ pub fn experiment_figure(results: &ExperimentResults) -> Figure {
     }
 }
 
-/// Name of the error in percent by which cells are ranked.
-fn error_name(results: &ExperimentResults) -> &'static str {
+/// Name and unit of the error by which cells are ranked.
+fn error_name(results: &ExperimentResults) -> (&'static str, &'static str) {
     match results.experiment.recording {
-        None => "Z error",
-        Some(_) => "mean absolute error",
-    }
-}
-
-/// Name of the axis of that error.
-fn error_axis(results: &ExperimentResults) -> &'static str {
-    match results.experiment.recording {
-        None => "Z error (%)",
-        Some(_) => "mean absolute error (% of range)",
+        None => ("Z error", "%"),
+        Some(_) => ("mean absolute error", "% of range"),
     }
 }
 
@@ -53,7 +45,7 @@ fn labels(axis: &Axis) -> Vec<String> {
 }
 
 fn heat_map(results: &ExperimentResults, rows: &Axis) -> HeatMap {
-    let columns = &results.experiment.axis;
+    let (columns, (error, unit)) = (&results.experiment.axis, error_name(results));
     let shape = [rows.values.len(), columns.values.len()];
     let mut values = Array2::from_elem(shape, f64::NAN);
     let mut notes = Array2::from_elem(shape, String::new());
@@ -62,7 +54,7 @@ fn heat_map(results: &ExperimentResults, rows: &Axis) -> HeatMap {
         let Measured { median, min, max, .. } = cell.percent();
         values[at] = median.unwrap_or(f64::NAN);
         let name = results.cell_labels(cell).join(", ");
-        notes[at] = format!("{name}: median {} {}", error_name(results), format_percent(median));
+        notes[at] = format!("{name}: median {error} {}", format_percent(median));
         if let Some((least, largest)) = min.zip(max) {
             notes[at] += &format!("\n{} to {}", format_percent(least), format_percent(largest));
         }
@@ -75,187 +67,133 @@ fn heat_map(results: &ExperimentResults, rows: &Axis) -> HeatMap {
         rows: labels(rows),
         values,
         notes,
-        value_axis: PlotAxis::logarithmic(format!("median {}", error_axis(results))),
-    }
-}
-
-/// Position of a cell on the axis: the value itself, or its index in the list.
-fn position(axis: &Axis, index: usize, cell: &Cell) -> f64 {
-    match axis.kind {
-        AxisKind::Hidden => cell.settings.hidden as f64,
-        _ => index as f64,
+        value_axis: PlotAxis::logarithmic(titled(&format!("median {error}"), Some(unit))),
     }
 }
 
 /// A point at the median of a figure, with a bar from the smallest to the largest.
 fn median_point(x: f64, figure: &Measured) -> Option<PlotPoint> {
-    let Measured { median, min, max, .. } = figure;
-    Some(PlotPoint {
-        bar: min.zip(*max).map(|(least, largest)| [least, largest]),
-        ..PlotPoint::from([x, (*median)?])
-    })
+    let mut point = PlotPoint::from([x, figure.median?]);
+    point.bar = figure.min.zip(figure.max).map(<[f64; 2]>::from);
+    Some(point)
 }
 
 fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
     let axis = &results.experiment.axis;
     let is_number = axis.kind == AxisKind::Hidden;
+    // The value itself, or its index in the list.
+    let position = |index: usize, cell: &Cell| if is_number { cell.settings.hidden } else { index } as f64;
     let cells = results.cells.iter().enumerate();
-    let mut cells: Vec<(f64, &Cell)> = cells.map(|(index, cell)| (position(axis, index, cell), cell)).collect();
+    let mut cells: Vec<(f64, &Cell)> = cells.map(|(index, cell)| (position(index, cell), cell)).collect();
     cells.sort_by(|one, other| one.0.total_cmp(&other.0));
     let points = |value: fn(&Cell) -> Option<f64>| {
-        let points = cells.iter().filter_map(move |(x, cell)| Some([*x, value(cell)?]));
-        points.collect::<Vec<_>>()
+        let points = cells.iter().filter_map(|(x, cell)| Some([*x, value(cell)?]));
+        Vec::from_iter(points)
     };
+    let discs = Look::marker(Hue::Blue, Marker::Disc);
+    let squares = Look::marker(Hue::Ink, Marker::Square);
     // Categories are not joined by lines.
-    let ours_look = match is_number {
-        true => Look::marker(Hue::Blue, Marker::Disc).joined(),
-        false => Look::marker(Hue::Blue, Marker::Disc),
-    };
+    let join = |style: LineStyle| is_number.then_some(style);
+    let ours_look = discs.joined(join(LineStyle::Solid));
+    let published = squares.joined(join(LineStyle::Fine));
     let reference = match is_number {
         true => Look::line(Hue::Grey, LineStyle::Dashed),
         false => Look::marker(Hue::Grey, Marker::Ring),
-    };
-    let published = Look {
-        line: is_number.then_some(LineStyle::Fine),
-        ..Look::marker(Hue::Ink, Marker::Square)
     };
     let linear = match results.experiment.recording {
         None => "linear map",
         Some(_) => "ridge",
     };
     let ours = cells.iter().filter_map(|(x, cell)| median_point(*x, &cell.percent()));
-    let mut series = vec![
+    let series = [
         Series::new(linear, reference, points(Cell::linear_percent)),
         Series::new("published", published, points(|cell| cell.percent().published)),
         Series::new("ours: median, smallest to largest", ours_look, ours),
     ];
-    series.retain(|series| !series.points.is_empty());
     let x = PlotAxis::linear(axis.kind.name());
     let x = match is_number {
-        true => x.ticked(TickRule::Whole),
-        false => x
-            .ticked(TickRule::Names(labels(axis)))
-            .including([-0.5, axis.values.len() as f64 - 0.5]),
+        true => x.whole(),
+        false => {
+            let names = x.ticked(TickRule::Names(labels(axis)));
+            names.including([-0.5, axis.values.len() as f64 - 0.5])
+        }
     };
-    let r2 = r2_plot(x.clone(), &cells, ours_look);
-    let mut plot = Plot::new(x, PlotAxis::linear(error_axis(results)).including([0.0, 1.0]), series);
-    if let Some(problem) = results.problem.as_ref().filter(|_| is_number) {
-        // The suggestions of Eq. (12) and (13).
+    // R² along the axis, which nodes of an array do not have.
+    let r2 = |(x, cell): &(f64, &Cell)| Some(median_point(*x, &cell.error(ErrorMeasure::R2)?));
+    let r2 = cells.iter().map(r2).collect::<Option<Vec<_>>>().map(|points| {
+        let series = Series::new("R²", ours_look, points.into_iter().flatten()).listed(None);
+        Plot::new(x.clone(), PlotAxis::linear("R²").including([1.0]), [series])
+    });
+    let (error, unit) = error_name(results);
+    let y = PlotAxis::linear(titled(error, Some(unit))).including([0.0, 1.0]);
+    // The suggestions of Eq. (12) and (13).
+    let suggestions = results.problem.as_ref().filter(|_| is_number).map(|problem| {
         let (root, logarithm) = suggested_hidden(problem.feature_count(), problem.targets.len());
-        plot.spans.push(Span {
-            name: "Eq. (12)".to_owned(),
-            hue: Hue::Orange,
-            range: *root.start() as f64..=*root.end() as f64,
-        });
-        let at = LineAt::X(logarithm as f64);
-        let line = ReferenceLine::new("Eq. (13)", at, Hue::Orange, LineStyle::Solid);
-        plot.lines.push(line.labelled("Eq. (13)"));
-    }
-    PlotFigure {
-        plots: std::iter::once(plot).chain(r2).collect(),
-        notes: Vec::new(),
-    }
+        let root = LineAt::Between([root.start(), root.end()].map(|end| *end as f64));
+        let logarithm = Series::across("Eq. (13)", LineAt::X(logarithm as f64), Hue::Orange, LineStyle::Solid);
+        let root = Series::across("Eq. (12)", root, Hue::Orange, None);
+        [root, logarithm.labelled("Eq. (13)")]
+    });
+    let plot = Plot::new(x, y, series.into_iter().chain(suggestions.into_iter().flatten()));
+    PlotFigure::new(std::iter::once(plot).chain(r2), [])
 }
 
-/// R² of the networks along the axis; `None` for the nodes of an array.
-fn r2_plot(x: PlotAxis, cells: &[(f64, &Cell)], look: Look) -> Option<Plot> {
-    let points = cells
-        .iter()
-        .map(|(x, cell)| Some(median_point(*x, &cell.error(ErrorMeasure::R2)?)));
-    let points: Vec<Option<PlotPoint>> = points.collect::<Option<_>>()?;
-    let series = Series::new("R²", look, points.into_iter().flatten()).listed(None);
-    Some(Plot::new(x, PlotAxis::linear("R²").including([1.0]), vec![series]))
-}
-
-type PublishedError = fn(&Cell) -> Option<f64>;
-type TrialError = fn(&TestErrors) -> Option<f64>;
-
-/// The errors of every trial, one plot each for Z, X and Y.
+/// The errors of every trial, one plot each for Z, X and Y; of a recording, the mean absolute error.
 fn repeats(results: &ExperimentResults) -> PlotFigure {
     const HUES: [Hue; 4] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Grey];
     let experiment = &results.experiment;
-    let axis = &experiment.axis;
     let linear = |name: &str| PlotAxis::linear(name).including([0.0]);
-    let errors: [(PlotAxis, PublishedError, TrialError); 3] = [
-        (
-            linear("Z error (%)"),
-            |cell| cell.percent().published,
-            TestErrors::percent,
-        ),
-        (
-            linear("X error (%)"),
-            |cell| cell.error(ErrorMeasure::XPercent)?.published,
-            |errors| errors.nodes()?.x_percent,
-        ),
+    let ranked = match experiment.recording {
+        None => ErrorMeasure::ZPercent,
+        Some(_) => ErrorMeasure::RangePercent,
+    };
+    let (error, unit) = error_name(results);
+    let errors = [
+        (linear(&titled(error, Some(unit))), ranked),
+        (linear("X error (%)"), ErrorMeasure::XPercent),
         // Y is constant, so its error may be exactly 0 or of the size of rounding errors.
-        (
-            PlotAxis::logarithmic("Y error (%)"),
-            |cell| cell.error(ErrorMeasure::YPercent)?.published,
-            |errors| errors.nodes()?.y_percent,
-        ),
+        (PlotAxis::logarithmic("Y error (%)"), ErrorMeasure::YPercent),
     ];
     let trials = results.cells.iter().map(|cell| cell.expected).max().unwrap_or(1);
-    let names = labels(axis)
-        .into_iter()
-        .map(|label| format!("{label} {}", axis.kind.name()));
+    let names = labels(&experiment.axis).into_iter();
+    let names = names.map(|label| format!("{label} {}", experiment.axis.kind.name()));
     let cells: Vec<(String, Hue)> = names.zip(HUES.into_iter().cycle()).collect();
-    let plots = errors.map(|(y, published, measured)| {
-        let x = PlotAxis::linear(repeat_name(results)).including([0.5, trials as f64 + 0.5]);
+    let count = if experiment.recording.is_some() { 1 } else { 3 };
+    let plots = errors.into_iter().take(count).map(|(y, measure)| {
+        let x = PlotAxis::linear(if experiment.seeds == 1 { "repeat" } else { "trial" });
         let of_cells = || results.cells.iter().zip(&cells);
         let series = of_cells().map(|(cell, (name, hue))| {
-            let look = Look::marker(*hue, Marker::Disc);
-            Series::new(name, look, trial_points(experiment, cell, measured))
+            let points = trial_points(experiment, cell, measure);
+            Series::new(name, Look::marker(*hue, Marker::Disc), points)
         });
         let lines = of_cells().filter_map(|(cell, (name, hue))| {
-            let at = LineAt::Y(published(cell)?);
-            let line = ReferenceLine::new(format!("{name}, published"), at, *hue, LineStyle::Dashed);
+            let at = LineAt::Y(cell.error(measure)?.published?);
+            let line = Series::across(format!("{name}, published"), at, *hue, LineStyle::Dashed);
             Some(line.listed(Some(name)))
         });
-        Plot::new(x.ticked(TickRule::Whole), y, series.collect()).with_lines(lines)
+        let x = x.including([0.5, trials as f64 + 0.5]).whole();
+        Plot::new(x, y, series.chain(lines))
     });
-    let is_zero = |cell: &Cell| {
-        cell.error(ErrorMeasure::YPercent)
-            .is_some_and(|y| y.median == Some(0.0))
-    };
+    let plots = Vec::from_iter(plots);
+    let median = |cell: &Cell| cell.error(ErrorMeasure::YPercent)?.median;
+    let has_zero = results.cells.iter().any(|cell| median(cell) == Some(0.0));
+    let has_lines = plots.iter().any(|plot| plot.lines_across().next().is_some());
     let notes = [
-        (
-            plots.iter().any(|plot| !plot.lines.is_empty()),
-            "Dashed lines: published.",
-        ),
-        (
-            results.cells.iter().any(is_zero),
-            "Y is constant: its error is 0 and lies below the axis.",
-        ),
+        has_lines.then_some("Dashed lines: published."),
+        has_zero.then_some("Y is constant: its error is 0 and lies below the axis."),
     ];
-    let notes = notes
-        .into_iter()
-        .filter(|(applies, _)| *applies)
-        .map(|(_, note)| note.to_owned());
-    PlotFigure {
-        plots: plots.into(),
-        notes: notes.collect(),
-    }
+    PlotFigure::new(plots, notes.into_iter().flatten().map(str::to_owned))
 }
 
 /// Error of each trial of a cell against the number of the trial, counted from 1 through all seeds (Fig. 5).
-fn trial_points(experiment: &Experiment, cell: &Cell, error: TrialError) -> Vec<[f64; 2]> {
+fn trial_points(experiment: &Experiment, cell: &Cell, measure: ErrorMeasure) -> Vec<[f64; 2]> {
     let repeats = experiment.cross_validation.map_or(1, |validation| validation.repeats);
     let number = |trial: &Trial| {
         let seeds_before = trial.seed.0.wrapping_sub(cell.settings.seed.0) as f64;
         seeds_before * repeats as f64 + trial.repeat as f64 + 1.0
     };
-    let points = cell.trials.iter();
-    points
-        .filter_map(|trial| Some([number(trial), error(&trial.scores.network)?]))
-        .collect()
-}
-
-/// Returns the name of the trial axis of a cross-validation.
-fn repeat_name(results: &ExperimentResults) -> &'static str {
-    match results.experiment.seeds {
-        1 => "repeat",
-        _ => "trial",
-    }
+    let point = |trial: &Trial| Some([number(trial), trial.scores.network.figure(measure)?]);
+    cell.trials.iter().filter_map(point).collect()
 }
 
 #[cfg(test)]
@@ -300,7 +238,7 @@ mod tests {
         for trial in finished.into_iter().rev().take(3) {
             results.record(trial.cell, trial.outcome);
         }
-        let points = trial_points(&experiment, &results.cells[0], TestErrors::percent);
+        let points = trial_points(&experiment, &results.cells[0], ErrorMeasure::ZPercent);
         assert_eq!(points.iter().map(|point| point[0]).collect::<Vec<_>>(), [4.0, 5.0, 6.0]);
     }
 
@@ -330,7 +268,7 @@ mod tests {
         let repeats = plots_of(PaperTable::CrossValidation);
         assert_eq!(keys(&repeats), ["1000 samples", "100 samples"]);
         assert_eq!(repeats.notes, ["Dashed lines: published."]);
-        let published = |plot: &Plot| plot.lines.iter().map(|line| line.at).collect::<Vec<_>>();
+        let published = |plot: &Plot| plot.lines_across().map(|(_, at)| at).collect::<Vec<_>>();
         assert_eq!(published(&repeats.plots[0]), [LineAt::Y(2.01), LineAt::Y(3.35)]);
         let arrays = plots_of(PaperTable::ArrayScales);
         assert!(matches!(&arrays.plots[0].x.ticks, TickRule::Names(names) if names[1] == "10×8_4×24"));

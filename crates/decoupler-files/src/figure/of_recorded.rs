@@ -14,52 +14,38 @@ use ndarray::{Array2, ArrayView2};
 
 use super::{
     Hue, LineStyle, Look,
-    axis::{PlotAxis, step_for, tick_text},
+    axis::{PlotAxis, ends, step_for, tick_text},
     colour_map::SequentialMap,
     heat_map::HeatMap,
     of_errors::decoded_against_actual,
     plot::{Plot, PlotFigure, Series},
     surface::{Quantity, Surface},
+    titled, with_unit,
 };
 
 /// Mean decoded against actual values of `target` while it rises and while it falls, with the line on which they would be
 /// equal; next to it their differences from the actual values, which show a narrow loop.
 pub fn hysteresis_figure(found: &HysteresisLoop, target: &Channel) -> PlotFigure {
-    let branch = |name: &str, hue, style, of: &dyn Fn(f64, f64, f64) -> f64| {
-        let levels = found.levels.iter();
-        let points = levels.map(|&[actual, loading, unloading]| [actual, of(actual, loading, unloading)]);
-        Series::new(name, Look::line(hue, style), points)
-    };
+    // The actual value at each level, and the mean ones of loading and unloading.
     let named = |name: &str, rmse| format!("{name}, RMSE {}", format_number(rmse));
-    let (loading, unloading) = (
-        named("loading", found.loading.rmse),
-        named("unloading", found.unloading.rmse),
-    );
-    let branches = |is_difference: bool| {
-        let less = move |value: f64, actual: f64| if is_difference { value - actual } else { value };
-        vec![
-            branch("equal", Hue::Ink, LineStyle::Dashed, &|actual, _, _| {
-                less(actual, actual)
-            }),
-            branch(&loading, Hue::Blue, LineStyle::Solid, &|actual, loading, _| {
-                less(loading, actual)
-            }),
-            branch(&unloading, Hue::Orange, LineStyle::Solid, &|actual, _, unloading| {
-                less(unloading, actual)
-            }),
-        ]
+    let branches = [
+        ("equal".to_owned(), Hue::Ink, LineStyle::Dashed),
+        (named("loading", found.loading.rmse), Hue::Blue, LineStyle::Solid),
+        (named("unloading", found.unloading.rmse), Hue::Orange, LineStyle::Solid),
+    ];
+    let series = |is_difference: bool| {
+        let branches = branches.iter().enumerate().map(|(branch, (name, hue, style))| {
+            let less = |level: &[f64; 3]| if is_difference { level[0] } else { 0.0 };
+            let points = found.levels.iter().map(|level| [level[0], level[branch] - less(level)]);
+            Series::new(name, Look::line(*hue, *style), points)
+        });
+        Vec::from_iter(branches)
     };
+    let (title, unit) = (target.title(), target.unit.as_deref());
     let note = format!("Hysteresis {:.1} % of the range", found.percent_of_range);
-    let mut figure = decoded_against_actual(&target.title(), "decoded", branches(false), vec![note]);
-    let unit = target
-        .unit
-        .as_ref()
-        .map_or_else(String::new, |unit| format!(" ({unit})"));
-    figure.plots.push(Plot::new(
-        PlotAxis::linear(format!("actual {}", target.title())),
-        PlotAxis::linear(format!("decoded − actual{unit}")),
-        branches(true),
-    ));
+    let mut figure = decoded_against_actual(&title, "decoded", series(false), vec![note]);
+    let [x, y] = [format!("actual {title}"), titled("decoded − actual", unit)].map(PlotAxis::linear);
+    figure.plots.push(Plot::new(x, y, series(true)));
     figure
 }
 
@@ -81,52 +67,32 @@ pub fn position_error_map(
     }
     let [across, up] = [0, 1].map(|axis| Cells::of(targets.column(axis).iter().copied()));
     let (across, up) = (across?, up?);
-    let (mut squares, mut counts) = (
-        Array2::<f64>::zeros((up.count, across.count)),
-        Array2::<usize>::zeros((up.count, across.count)),
-    );
+    // The first row is at the top.
+    let row = |cell: usize| up.count - 1 - cell;
+    let mut cells = Array2::from_elem((up.count, across.count), (0.0, 0_usize));
     for (target, answer) in targets.rows().into_iter().zip(answers.rows()) {
-        // The first row is at the top.
-        let cell = [up.count - 1 - up.place(target[1]), across.place(target[0])];
-        squares[cell] += (answer[0] - target[0]).powi(2) + (answer[1] - target[1]).powi(2);
-        counts[cell] += 1;
+        let (squares, count) = &mut cells[[row(up.place(target[1])), across.place(target[0])]];
+        *squares += (answer[0] - target[0]).powi(2) + (answer[1] - target[1]).powi(2);
+        *count += 1;
     }
-    let values = Array2::from_shape_fn(squares.dim(), |cell| match counts[cell] {
-        0 => f64::NAN,
-        count => (squares[cell] / count as f64).sqrt(),
-    });
-    let with_unit = |text: String| unit.map_or(text.clone(), |unit| format!("{text} {unit}"));
-    let notes = Array2::from_shape_fn(values.dim(), |(row, column)| {
-        let of = |name: &str, range: RangeInclusive<f64>| {
-            let width = range.end() - range.start();
-            let ends = [range.start(), range.end()]
-                .map(|end| tick_text(*end, width))
-                .join(" to ");
-            format!("{name} {}", with_unit(ends))
+    let values = cells.map(|&(squares, count)| (squares / count as f64).sqrt());
+    let notes = Array2::from_shape_fn(cells.dim(), |at| {
+        let [x, y] = [across.range_text(at.1), up.range_text(row(at.0))].map(|range| with_unit(range, unit));
+        let error = with_unit(format_number(values[at]), unit);
+        let found = match cells[at].1 {
+            0 => "no test sample".to_owned(),
+            count => format!("error {error} over {}", counted(count, "test sample")),
         };
-        let place = format!(
-            "{}, {}",
-            of(names[0], across.range(column)),
-            of(names[1], up.range(up.count - 1 - row))
-        );
-        match counts[[row, column]] {
-            0 => format!("{place}: no test sample"),
-            count => format!(
-                "{place}: error {} over {}",
-                with_unit(format_number(values[[row, column]])),
-                counted(count, "test sample")
-            ),
-        }
+        format!("{} {x}, {} {y}: {found}", names[0], names[1])
     });
-    let title = |name: &str| unit.map_or(name.to_owned(), |unit| format!("{name} ({unit})"));
     Some(HeatMap {
-        x_name: title(names[0]),
-        y_name: title(names[1]),
+        x_name: titled(names[0], unit),
+        y_name: titled(names[1], unit),
         columns: (0..across.count).map(|cell| across.centre_text(cell)).collect(),
         rows: (0..up.count).rev().map(|cell| up.centre_text(cell)).collect(),
         values,
         notes,
-        value_axis: PlotAxis::linear(title("error in both targets")).including([0.0]),
+        value_axis: PlotAxis::linear(titled("error in both targets", unit)).including([0.0]),
         colours: SequentialMap::default(),
     })
 }
@@ -141,9 +107,7 @@ struct Cells {
 impl Cells {
     /// Returns `None` if the values do not vary, or if their range overflows.
     fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-            (low.min(value), high.max(value))
-        });
+        let (low, high) = ends(values);
         if low >= high || !(high - low).is_finite() {
             return None;
         }
@@ -157,9 +121,9 @@ impl Cells {
         (((value - self.first) / self.width) as usize).min(self.count - 1)
     }
 
-    fn range(&self, cell: usize) -> RangeInclusive<f64> {
-        let low = self.first + self.width * cell as f64;
-        low..=low + self.width
+    fn range_text(&self, cell: usize) -> String {
+        let ends = [cell, cell + 1].map(|end| self.first + self.width * end as f64);
+        ends.map(|end| tick_text(end, self.width)).join(" to ")
     }
 
     fn centre_text(&self, cell: usize) -> String {
@@ -184,21 +148,18 @@ impl TargetSurface {
     /// [`SurfaceError`] if no surface goes through them: see [`SurfaceMap::scattered`].
     pub fn new(positions: &[TargetPosition], targets: &[Channel]) -> Result<Self, SurfaceError> {
         let first = positions.first().and_then(|first| targets.get(first.target));
+        let unit = first.and_then(|first| first.unit.as_deref()).map(Arc::from);
         let (map, nodes) = match TargetPosition::lattice(positions) {
-            Some(([x_mm, y_mm], order)) => (
-                SurfaceMap::shared(&x_mm, &y_mm)?,
-                order.iter().map(|&place| positions[place]).collect(),
-            ),
-            None => (
-                Arc::new(SurfaceMap::scattered(&TargetPosition::places_mm(positions))?),
-                positions.to_vec(),
-            ),
+            Some(([x_mm, y_mm], order)) => {
+                let nodes = order.iter().map(|&place| positions[place]);
+                (SurfaceMap::shared(&x_mm, &y_mm)?, nodes.collect())
+            }
+            None => {
+                let map = SurfaceMap::scattered(&TargetPosition::places_mm(positions))?;
+                (Arc::new(map), positions.to_vec())
+            }
         };
-        Ok(Self {
-            map,
-            nodes,
-            unit: first.and_then(|first| first.unit.as_deref()).map(Arc::from),
-        })
+        Ok(Self { map, nodes, unit })
     }
 
     /// The targets at the nodes, in the order of [`Surface::nodes`].
@@ -210,17 +171,12 @@ impl TargetSurface {
     /// entry for each target, `range` is that of the values.
     pub fn surfaces(&self, actual: &[f64], decoded: &[f64], range: RangeInclusive<f64>) -> [Surface; 3] {
         let errors = Vec::from_iter(decoded.iter().zip(actual).map(|(decoded, actual)| decoded - actual));
-        let largest = self
-            .values(&errors)
-            .map(f64::abs)
-            .filter(|error| error.is_finite())
-            .fold(0.0, f64::max);
+        let of_nodes = self.nodes.iter().map(|node| errors[node.target].abs());
+        let largest = of_nodes.filter(|error| error.is_finite()).fold(0.0, f64::max);
         // Rounding errors are not distinguished by colour.
         let largest = largest.max(1e-9 * (range.end() - range.start()));
-        let (value, error) = (
-            Quantity::Target(self.unit.clone()),
-            Quantity::TargetError(self.unit.clone()),
-        );
+        let value = Quantity::Target(self.unit.clone());
+        let error = Quantity::TargetError(self.unit.clone());
         [
             self.surface("Actual", actual, value.clone(), range.clone()),
             self.surface("Decoded", decoded, value, range),
@@ -230,19 +186,13 @@ impl TargetSurface {
 
     /// Returns the range of the targets at the nodes; `ranges` are the minimum and maximum of each target.
     pub fn range_of(&self, ranges: &[(f64, f64)]) -> RangeInclusive<f64> {
-        let of_nodes = || self.nodes.iter().map(|node| ranges[node.target]);
-        let low = of_nodes().map(|(low, _)| low).fold(f64::INFINITY, f64::min);
-        low..=of_nodes().map(|(_, high)| high).fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// Returns the values at the nodes from `of_targets`, which has one for each target.
-    fn values(&self, of_targets: &[f64]) -> impl Iterator<Item = f64> {
-        self.nodes.iter().map(|node| of_targets[node.target])
+        let (low, high) = ends(self.nodes.iter().flat_map(|node| <[f64; 2]>::from(ranges[node.target])));
+        low..=high
     }
 
     fn surface(&self, title: &str, of_targets: &[f64], quantity: Quantity, range: RangeInclusive<f64>) -> Surface {
-        let nodes = self.nodes.iter().zip(self.values(of_targets));
-        let nodes = nodes.map(|(node, value)| DVec3::new(node.x_mm, node.y_mm, value));
+        let nodes = self.nodes.iter();
+        let nodes = nodes.map(|node| DVec3::new(node.x_mm, node.y_mm, of_targets[node.target]));
         Surface::through(title, &self.map, nodes.collect::<Vec<_>>(), quantity, range)
     }
 }

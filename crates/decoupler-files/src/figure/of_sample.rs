@@ -1,8 +1,10 @@
-//! Figures of all targets of one sample, of the singular values of each row, and of decoupled next to actual nodes.
+//! Figures of all targets of one sample or over time, of decoupled next to actual nodes, of the singular values of each row,
+//! and of the readings of a frame.
+
+use std::sync::Arc;
 
 use decoupler_core::{
-    dataset::Dataset,
-    evaluation::{NodeAddress, Spread},
+    evaluation::{Intervals, Spread},
     identifiability::Identifiability,
     problem::Channel,
     text::format_number,
@@ -13,8 +15,15 @@ use ndarray::Array2;
 use super::{
     Hue, LineStyle, Look, Marker,
     axis::{PlotAxis, TickRule},
-    plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, Span},
+    colour_map::SequentialMap,
+    heat_map::HeatMap,
+    plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
+    titled, unique_by, with_unit,
 };
+
+/// Looks of actual and of decoded values next to each other.
+const ACTUAL: Look = Look::marker(Hue::Grey, Marker::Square);
+const DECODED: Look = Look::marker(Hue::Blue, Marker::Disc);
 
 /// Maximum number of targets whose names fit below the axis.
 const MAX_NAMES: usize = 12;
@@ -22,44 +31,35 @@ const MAX_NAMES: usize = 12;
 /// All targets of a sample in their order: actual as squares, decoded as discs. Targets of one unit share its axis;
 /// with several units, each is shown in percent of its range; `ranges` are the minimum and maximum of each.
 pub fn sample_figure(targets: &[Channel], actual: &[f64], decoded: &[f64], ranges: &[(f64, f64)]) -> PlotFigure {
-    let has_one_unit = targets.iter().all(|target| target.unit == targets[0].unit);
-    let place = |target: usize, value: f64| {
-        let (low, high) = ranges[target];
-        if has_one_unit {
-            value
-        } else {
-            100.0 * (value - low) / (high - low)
-        }
+    let unit = targets.first().and_then(|target| target.unit.as_deref());
+    let has_one_unit = targets.iter().all(|target| target.unit.as_deref() == unit);
+    let place = |(low, high): (f64, f64), value: f64| match has_one_unit {
+        true => value,
+        false => 100.0 * (value - low) / (high - low),
     };
     let has_names = targets.len() <= MAX_NAMES;
     // Targets without names are counted from 1.
     let first = if has_names { 0.0 } else { 1.0 };
     let series = |name: &str, look: Look, values: &[f64]| {
-        let points = values.iter().enumerate().map(|(target, &value)| {
-            let Channel { name: of, unit, .. } = &targets[target];
-            let unit = unit.as_ref().map_or_else(String::new, |unit| format!(" {unit}"));
-            PlotPoint {
-                note: Some(format!("{of}\n{name}: {}{unit}", format_number(value))),
-                ..PlotPoint::from([first + target as f64, place(target, value)]).of_item(target)
-            }
+        let points = values.iter().enumerate().map(|(number, &value)| {
+            let (target, y) = (&targets[number], place(ranges[number], value));
+            let value = with_unit(format_number(value), target.unit.as_deref());
+            let point = PlotPoint::from([first + number as f64, y]).of_item(number);
+            point.noted(format!("{}\n{name}: {value}", target.name))
         });
         Series::new(name, look, points)
     };
-    let y = match targets.first().and_then(|target| target.unit.as_ref()) {
-        _ if !has_one_unit => "% of the target's range".to_owned(),
-        Some(unit) => format!("value ({unit})"),
-        None => "value".to_owned(),
+    let y = match has_one_unit {
+        true => titled("value", unit),
+        false => "% of the target's range".to_owned(),
     };
     let ticks = match has_names {
         true => TickRule::Names(targets.iter().map(|target| target.name.clone()).collect()),
-        false => TickRule::Whole,
+        false => TickRule::Every(1.0),
     };
     let ends = [first - 0.5, first + targets.len() as f64 - 0.5];
     let x = PlotAxis::linear("target").ticked(ticks).including(ends);
-    let series = vec![
-        series("actual", Look::marker(Hue::Grey, Marker::Square), actual),
-        series("decoded", Look::marker(Hue::Blue, Marker::Disc), decoded),
-    ];
+    let series = [series("actual", ACTUAL, actual), series("decoded", DECODED, decoded)];
     Plot::new(x, PlotAxis::linear(y), series).into()
 }
 
@@ -69,65 +69,27 @@ const ROUNDING: f64 = 1e-16;
 /// Singular values of every row, from the best-seen deformation pattern to the worst. `worst` is the index of the row
 /// drawn strongest; noise hides the patterns whose value is below `hidden_below_per_mm`, 0 without noise.
 pub fn singular_values_figure(rows: &[Identifiability], worst: usize, hidden_below_per_mm: f64) -> PlotFigure {
+    let series = |row: &Identifiability, more: &str, look: Look, key: &str| {
+        // Numbered from 1, without rounding errors.
+        let values = &row.singular_values_per_mm;
+        let least = ROUNDING * values.first().copied().unwrap_or(0.0);
+        let numbered = values.iter().enumerate().filter(|&(_, &value)| value > least);
+        let points = numbered.map(|(number, value)| [number as f64 + 1.0, *value]);
+        Series::new(format!("row {}{more}", row.row + 1), look, points).listed(Some(key))
+    };
     let pale = Look::line(Hue::Grey, LineStyle::Fine);
     let others = rows.iter().enumerate().filter(|(index, _)| *index != worst);
-    let others = others.map(|(_, row)| {
-        let series = Series::new(format!("row {}", row.row + 1), pale, numbered(row));
-        series.listed(Some("other rows"))
-    });
-    let strongest = rows.get(worst).map(|row| {
-        let look = Look::marker(Hue::Blue, Marker::Disc).joined();
-        let series = Series::new(format!("row {}, worst", row.row + 1), look, numbered(row));
-        series.listed(Some("worst row"))
-    });
-    let series = others.chain(strongest).collect();
+    let others = others.map(|(_, row)| series(row, "", pale, "other rows"));
+    let strong = DECODED.joined(LineStyle::Solid);
+    let strongest = rows.get(worst).map(|row| series(row, ", worst", strong, "worst row"));
     let noise = (hidden_below_per_mm > 0.0).then(|| {
         let at = LineAt::Y(hidden_below_per_mm);
-        ReferenceLine::new("noise hides values below", at, Hue::Orange, LineStyle::Dashed)
+        Series::across("noise hides values below", at, Hue::Orange, LineStyle::Dashed)
     });
     let unknowns = rows.get(worst).map_or(1, Identifiability::unknowns);
     let x = PlotAxis::linear("deformation pattern, best seen first").including([0.5, unknowns as f64 + 0.5]);
     let y = PlotAxis::logarithmic("singular value of ∂ ln R/∂u (1/mm)");
-    Plot::new(x.ticked(TickRule::Whole), y, series).with_lines(noise).into()
-}
-
-/// Number of each pattern from 1, and its value, without rounding errors.
-fn numbered(row: &Identifiability) -> Vec<[f64; 2]> {
-    let values = &row.singular_values_per_mm;
-    let least = ROUNDING * values.first().copied().unwrap_or(0.0);
-    let numbered = values.iter().enumerate().filter(|&(_, &value)| value > least);
-    numbered.map(|(number, value)| [number as f64 + 1.0, *value]).collect()
-}
-
-/// Maximum number of nodes used in a figure; from a larger test set, evenly spaced nodes are used.
-const MAX_PAIRS: usize = 20_000;
-
-/// Returns the spacing of the nodes of a test set that are used.
-fn stride(test: &Dataset) -> usize {
-    (test.targets().len() / 3).div_ceil(MAX_PAIRS).max(1)
-}
-
-/// Returns actual and decoupled z of the nodes of a test set, in millimetres. `decoupled_mm` has the shape of its
-/// targets.
-pub fn z_pairs_mm(test: &Dataset, decoupled_mm: &Array2<f64>) -> Vec<(f64, f64)> {
-    let actual = test.targets();
-    let every_z = actual.iter().zip(decoupled_mm).skip(2).step_by(3);
-    every_z
-        .step_by(stride(test))
-        .map(|(actual, decoupled)| (*actual, *decoupled))
-        .collect()
-}
-
-/// Returns the node that one of [`z_pairs_mm`] belongs to; `None` beyond the last.
-pub fn pair_address(test: &Dataset, pair: usize) -> Option<NodeAddress> {
-    let per_sample = test.outputs() / 3;
-    let place = pair * stride(test);
-    let (sample, node) = (place / per_sample.max(1), place % per_sample.max(1));
-    Some(NodeAddress {
-        snapshot: *test.groups().get(sample)?,
-        row: test.row_wire(sample).unwrap_or(0),
-        node,
-    })
+    Plot::new(x.whole(), y, others.chain(strongest).chain(noise)).into()
 }
 
 /// The paper's Fig. 6: z of the nodes at these positions, row by row; actual as squares, decoupled as discs, each with a
@@ -140,66 +102,118 @@ pub fn node_figure(
 ) -> PlotFigure {
     let nodes_per_row = nodes_per_row.max(1);
     let series = |name: &str, look: Look, nodes_mm: &[DVec3], spread_mm: &[f64]| {
-        let points = nodes_mm.iter().enumerate().map(|(node, place)| {
+        let points = nodes_mm.iter().enumerate().map(|(node, &DVec3 { z, .. })| {
             let (row, of_row) = (node / nodes_per_row + 1, node % nodes_per_row + 1);
             let spread = spread_mm.get(node);
             let more = spread.map_or_else(String::new, |spread| format!(" ± {} mm", format_number(*spread)));
-            PlotPoint {
-                bar: spread.map(|spread| [place.z - spread, place.z + spread]),
-                note: Some(format!(
-                    "Row {row}, node {of_row}\n{name} z: {} mm{more}",
-                    format_number(place.z)
-                )),
-                ..PlotPoint::from([(node + 1) as f64, place.z]).of_item(node)
-            }
+            let note = format!("Row {row}, node {of_row}\n{name} z: {} mm{more}", format_number(z));
+            let mut point = PlotPoint::from([(node + 1) as f64, z]).of_item(node).noted(note);
+            point.bar = spread.map(|spread| [z - spread, z + spread]);
+            point
         });
         Series::new(name, look, points)
     };
-    let actual = series("actual", Look::marker(Hue::Grey, Marker::Square), actual_mm, &[]);
-    let decoupled = decoupled_mm.map(|nodes_mm| {
-        let look = Look::marker(Hue::Blue, Marker::Disc);
-        series("decoupled", look, nodes_mm, spread_mm.unwrap_or_default())
-    });
+    let decoupled_mm = decoupled_mm.unwrap_or_default();
+    let actual = series("actual", ACTUAL, actual_mm, &[]);
+    let decoupled = series("decoupled", DECODED, decoupled_mm, spread_mm.unwrap_or_default());
     // A tick at the last node of a row.
     let x = PlotAxis::linear("node, row by row").ticked(TickRule::Every(nodes_per_row as f64));
-    let series = std::iter::once(actual).chain(decoupled).collect();
-    Plot::new(x, PlotAxis::linear("z (mm)"), series).into()
+    Plot::new(x, PlotAxis::linear("z (mm)"), [actual, decoupled]).into()
 }
 
 /// Results of several starts of a training, as dots over `axis`: the start `kept` is highlighted, and a box reaches from the
 /// lower to the upper quartile, with a line at the median. Starts without a result have no dot.
 pub fn starts_figure(axis: &str, results: &[Option<f64>], kept: usize, spread: &Spread) -> PlotFigure {
-    let dots = |name: &str, hue: Hue, is_shown: &dyn Fn(usize) -> bool| {
-        let shown = results.iter().enumerate().filter(|(start, _)| is_shown(*start));
+    let dots = |name: &str, hue: Hue, is_kept: bool| {
+        let all = results.iter().enumerate();
+        let shown = all.filter(|(start, _)| (*start == kept) == is_kept);
         let points = shown.filter_map(|(start, result)| {
-            let result = (*result)?;
+            let note = format!("Start {}: {}", start + 1, format_number((*result)?));
             // Three heights separate the dots of similar values.
-            Some(PlotPoint {
-                note: Some(format!("Start {}: {}", start + 1, format_number(result))),
-                ..PlotPoint::from([result, (start % 3) as f64])
-            })
+            Some(PlotPoint::from([(*result)?, (start % 3) as f64]).noted(note))
         });
         Series::new(name, Look::marker(hue, Marker::Disc), points).listed(None)
     };
-    let series = vec![
-        dots("other starts", Hue::Grey, &|start| start != kept),
-        dots("kept start", Hue::Blue, &|start| start == kept),
+    let y = PlotAxis::linear("starts").including([-1.0, 3.0]);
+    let quartiles = LineAt::Between([spread.lower_quartile, spread.upper_quartile]);
+    let series = [
+        dots("other starts", Hue::Grey, false),
+        dots("kept start", Hue::Blue, true),
+        Series::across("quartiles", quartiles, Hue::Grey, None).listed(None),
+        Series::across("median", LineAt::X(spread.median), Hue::Grey, LineStyle::Solid).listed(None),
     ];
-    let y = PlotAxis::linear("starts")
-        .ticked(TickRule::Nothing)
-        .including([-1.0, 3.0]);
-    let median = ReferenceLine::new("median", LineAt::X(spread.median), Hue::Grey, LineStyle::Solid).listed(None);
-    let plot = Plot::new(PlotAxis::linear(axis), y, series).with_lines([median]);
-    let quartiles = Span {
-        name: String::new(),
-        hue: Hue::Grey,
-        range: spread.lower_quartile..=spread.upper_quartile,
+    Plot::new(PlotAxis::linear(axis), y.ticked(TickRule::Nothing), series).into()
+}
+
+const HUES: [Hue; 6] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Violet, Hue::Cyan, Hue::Red];
+/// Maximum number of targets with their own colours and names; more targets are all drawn as fine lines.
+const MAX_CURVES: usize = 2 * HUES.len();
+
+/// Values of all targets over time, one plot per unit; `history` has times in seconds with a value for each target. Fine
+/// lines limit the band of the 90 % `intervals`, if there are any and targets have their own colours.
+pub fn targets_over_time_figure(
+    targets: &[Channel],
+    history: &[(f64, Arc<[f64]>)],
+    intervals: Option<&Intervals>,
+) -> PlotFigure {
+    let has_names = targets.len() <= MAX_CURVES;
+    let hue = |target: usize| HUES[target % HUES.len()];
+    let series = |target: usize| {
+        let style = match target / HUES.len() {
+            _ if !has_names => LineStyle::Fine,
+            0 => LineStyle::Solid,
+            _ => LineStyle::Dashed,
+        };
+        let points = history.iter().map(|(time_s, values)| [*time_s, values[target]]);
+        let series = Series::new(&targets[target].name, Look::line(hue(target), style), points);
+        series.listed(has_names.then(|| targets[target].title()).as_deref())
     };
-    Plot {
-        spans: vec![quartiles],
-        ..plot
+    let intervals = intervals.filter(|_| has_names);
+    let limit = |target: usize, side: &str, sign: f64| {
+        let points = history.iter().filter_map(|(time_s, values)| {
+            let half_width = intervals?.half_width(target, values[target])?;
+            Some([*time_s, values[target] + sign * half_width])
+        });
+        let name = format!("{}, {side} limit of the 90 % interval", targets[target].name);
+        Series::new(name, Look::line(hue(target), LineStyle::Fine), points).listed(None)
+    };
+    let units = unique_by(targets.iter().map(|target| target.unit.as_deref()), |unit| *unit);
+    let plots = units.into_iter().map(|unit| {
+        let of_unit = (0..targets.len()).filter(|&target| targets[target].unit.as_deref() == unit);
+        let limits = |target: usize| [limit(target, "lower", -1.0), limit(target, "upper", 1.0)];
+        let series = of_unit.clone().map(series).chain(of_unit.flat_map(limits));
+        let y = PlotAxis::linear(titled("decoded value", unit));
+        Plot::new(PlotAxis::linear("time (s)"), y, series)
+    });
+    PlotFigure::new(plots, [])
+}
+
+/// Readings of a frame, rows × columns, as their drop below the unloaded state.
+///
+/// `drops_percent` is 100 (1 − R/R₀), in percent of the unloaded resistance; `rows` are the row-wires read, from 0.
+/// Colours span 0 to `largest_percent` and are comparable between frames; larger values have the colour of the end.
+pub fn readings_figure(drops_percent: Array2<f64>, rows: &[usize], largest_percent: f64) -> HeatMap {
+    let axis = PlotAxis::linear("drop from unloaded (%)").including([0.0, largest_percent]);
+    of_wires(drops_percent, rows, axis.limited(0.0..=largest_percent))
+}
+
+/// Gains of the unloaded state, rows × columns, as their difference from 1 in percent; `rows` as for [`readings_figure`].
+pub fn zero_gains_figure(gains: &Array2<f64>, rows: &[usize]) -> HeatMap {
+    let percent = gains.mapv(|gain| 100.0 * (gain - 1.0));
+    of_wires(percent, rows, PlotAxis::linear("gain − 1, unloaded (%)"))
+}
+
+fn of_wires(values: Array2<f64>, rows: &[usize], value_axis: PlotAxis) -> HeatMap {
+    HeatMap {
+        colours: SequentialMap::default(),
+        x_name: "column-wire".to_owned(),
+        y_name: "row-wire".to_owned(),
+        columns: (1..=values.ncols()).map(|column| column.to_string()).collect(),
+        rows: rows.iter().map(|row| (row + 1).to_string()).collect(),
+        notes: Array2::default(values.dim()),
+        values,
+        value_axis,
     }
-    .into()
 }
 
 #[cfg(test)]
@@ -256,39 +270,13 @@ mod tests {
     fn patterns_without_effect_are_not_on_a_logarithmic_axis() {
         let model = SensorModel::new("2x6_3x4".parse().unwrap());
         let row = Identifiability::of_row(&model, 0, &[DVec3::ZERO; 6], Axes::Z, RelativeNoise::default()).unwrap();
-        let points = numbered(&row);
-        assert_eq!((row.unknowns(), points.len()), (6, 4));
-        assert_eq!(points[0], [1.0, row.singular_values_per_mm[0]]);
         let quiet = singular_values_figure(std::slice::from_ref(&row), 0, 0.0);
-        assert_eq!((quiet.keys().len(), quiet.plots[0].lines.len()), (1, 0));
+        let points = &quiet.plots[0].series[0].points;
+        assert_eq!((row.unknowns(), points.len()), (6, 4));
+        assert_eq!([points[0].x, points[0].y], [1.0, row.singular_values_per_mm[0]]);
+        assert_eq!((quiet.keys().len(), quiet.plots[0].series.len()), (1, 1));
         assert_eq!(singular_values_figure(&[row.clone(), row], 1, 0.1).keys().len(), 3);
         assert!(singular_values_figure(&[], 0, 0.0).plots[0].series.is_empty());
-    }
-
-    #[test]
-    fn a_pair_leads_back_to_its_node() {
-        use decoupler_core::{
-            dataset::{Seed, Stream},
-            scene::Scene,
-            sensor::SensorModel,
-        };
-        let sensor = SensorModel::new("10x6_3x18".parse().unwrap());
-        let test = Dataset::simulate(&sensor, &Scene::default(), 20, &mut Seed(0).rng(Stream::Test)).unwrap();
-        let mut decoupled = test.targets().to_owned();
-        // The third node of row-wire 4 in the second snapshot.
-        decoupled[[13, 8]] += 0.25;
-        let pairs = z_pairs_mm(&test, &decoupled);
-        let off = pairs
-            .iter()
-            .position(|(actual, decoupled)| actual != decoupled)
-            .unwrap();
-        let expected = NodeAddress {
-            snapshot: 1,
-            row: 3,
-            node: 2,
-        };
-        assert_eq!(pair_address(&test, off), Some(expected));
-        assert_eq!(pair_address(&test, pairs.len()), None);
     }
 
     #[test]
@@ -317,5 +305,67 @@ mod tests {
             1,
             "nothing decoupled yet"
         );
+    }
+}
+
+#[cfg(test)]
+mod live_tests {
+    use decoupler_core::evaluation::HalfWidth;
+    use ndarray::array;
+
+    use super::*;
+
+    #[test]
+    fn targets_of_one_unit_share_a_plot() {
+        let channel = |name: &str, unit: &str| Channel::new(name, Some(unit));
+        let targets = [channel("x", "mm"), channel("force", "N"), channel("y", "mm")];
+        let history = [(0.0, Arc::from([1.0, 2.0, 3.0])), (0.5, Arc::from([4.0, 5.0, 6.0]))];
+        let figure = targets_over_time_figure(&targets, &history, None);
+        let names = |plot: &Plot| Vec::from_iter(plot.series.iter().map(|series| series.name.clone()));
+        assert_eq!(
+            figure.plots.iter().map(names).collect::<Vec<_>>(),
+            [vec!["x", "y"], vec!["force"]]
+        );
+        let last = &figure.plots[0].series[1].points[1];
+        assert_eq!([last.x, last.y], [0.5, 6.0]);
+        assert_eq!(figure.keys().len(), 3);
+    }
+
+    #[test]
+    fn intervals_limit_a_band_around_the_values() {
+        let target = Channel::new("force", None);
+        let history = [(0.0, Arc::from([1.0])), (0.5, Arc::from([4.0]))];
+        let half_width = HalfWidth {
+            constant: 0.5,
+            by_answer: Vec::new(),
+            samples: 100,
+            effective_samples: 100.0,
+        };
+        let intervals = Intervals {
+            targets: vec![Some(half_width)],
+        };
+        let figure = targets_over_time_figure(&[target], &history, Some(&intervals));
+        let last = |series: &Series| series.points.last().map(|point| point.y);
+        let last = Vec::from_iter(figure.plots[0].series.iter().filter_map(last));
+        assert_eq!(last, [4.0, 3.5, 4.5]);
+    }
+
+    #[test]
+    fn colours_of_readings_are_comparable_between_frames() {
+        let [slight, strong] = [0.4, 30.0].map(|drop| readings_figure(array![[0.0, drop], [-1.0, 2.0]], &[0, 4], 5.0));
+        assert_eq!((slight.range(), strong.range()), (0.0..=5.0, 0.0..=5.0));
+        assert_eq!(strong.colour_share(30.0, &strong.range()), Some(1.0));
+        assert_eq!(strong.colour_share(-1.0, &strong.range()), Some(0.0));
+        assert_eq!(
+            (slight.rows, slight.columns),
+            (vec!["1".into(), "5".into()], vec!["1".into(), "2".into()])
+        );
+    }
+
+    #[test]
+    fn gains_are_shown_by_their_difference_from_one() {
+        let figure = zero_gains_figure(&array![[1.02, 0.99]], &[0]);
+        assert!((figure.values[[0, 0]] - 2.0).abs() < 1e-12 && (figure.values[[0, 1]] + 1.0).abs() < 1e-12);
+        assert_eq!(figure.range(), figure.values[[0, 1]]..=figure.values[[0, 0]]);
     }
 }

@@ -10,8 +10,8 @@ use decoupler_core::{
 
 use super::{
     Hue, LineStyle, Look, Marker,
-    axis::PlotAxis,
-    plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series},
+    axis::{PlotAxis, ends},
+    plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
 };
 
 /// Cost that is plotted against the error.
@@ -57,10 +57,8 @@ pub struct TradeOffLimits {
 
 impl Default for TradeOffLimits {
     fn default() -> Self {
-        Self {
-            percent: 1.0,
-            microseconds: 10.0,
-        }
+        let (percent, microseconds) = (1.0, 10.0);
+        Self { percent, microseconds }
     }
 }
 
@@ -94,25 +92,19 @@ impl TradeOffLevel {
 /// answers to the two questions with their limits.
 pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotFigure {
     let has = |is_so: &dyn Fn(&TradeOffPoint) -> bool| level.points.iter().any(is_so);
+    let of_preset = |preset| has(&|point| point.preset == Some(preset));
+    let is_single = has(&|point| point.report.precision == Precision::Single);
     let marks = [
-        (has(&|point| point.preset == Some(Preset::Paper)), "discs: paper preset"),
-        (
-            has(&|point| point.preset == Some(Preset::Best)),
-            "diamonds: best preset",
-        ),
-        (
-            has(&|point| point.report.precision == Precision::Single),
-            "hollow: 32 bits",
-        ),
+        (of_preset(Preset::Paper), "discs: paper preset"),
+        (of_preset(Preset::Best), "diamonds: best preset"),
+        (is_single, "hollow: 32 bits"),
     ];
     let marks = marks
         .into_iter()
         .filter_map(|(is_there, mark)| is_there.then_some(mark));
     let note = capitalised(&Vec::from_iter(marks).join(", "));
-    PlotFigure {
-        plots: TradeOffCost::ALL.map(|cost| plot(level, limits, cost)).into(),
-        notes: (!note.is_empty()).then(|| format!("{note}.")).into_iter().collect(),
-    }
+    let plots = TradeOffCost::ALL.map(|cost| plot(level, limits, cost));
+    PlotFigure::new(plots, (!note.is_empty()).then(|| format!("{note}.")))
 }
 
 fn marker(preset: Option<Preset>, precision: Precision) -> Marker {
@@ -125,32 +117,33 @@ fn marker(preset: Option<Preset>, precision: Precision) -> Marker {
 }
 
 fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> Plot {
-    let at = |point: &TradeOffPoint| {
-        let (x, y) = cost.of(point);
-        [x, y]
-    };
+    let at = |point: &TradeOffPoint| <[f64; 2]>::from(cost.of(point));
     let is_on_front = level.front(cost);
-    let front = Look::line(Hue::Grey, LineStyle::Solid);
-    let mut series = vec![Series::new("Pareto front", front, self::front(level, cost))];
+    let points = || level.points.iter().zip(&is_on_front);
+    let front = points().filter(|(point, is_on_front)| **is_on_front && point.percent().is_finite());
+    let mut front: Vec<[f64; 2]> = front.map(|(point, _)| at(point)).collect();
+    front.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    // Nothing better was measured between two points of the front.
+    let front = Series::new("Pareto front", Look::line(Hue::Grey, LineStyle::Solid), front).stepped();
+    let mut series = vec![front];
     for kind in DecoderKind::ALL {
         for &precision in kind.precisions() {
             for preset in Preset::ALL.into_iter().map(Some).chain([None]) {
                 let is_of = |(point, _): &(&TradeOffPoint, &bool)| {
                     (point.report.kind, point.report.precision, point.preset) == (kind, precision, preset)
                 };
-                let points = level.points.iter().zip(&is_on_front).filter(is_of);
-                let points = points.map(|(point, is_on_front)| PlotPoint {
-                    note: Some(format!("{}\n{}", point_name(point), point_facts(point).join("\n"))),
-                    label: is_on_front.then(|| point_label(point)),
-                    ..PlotPoint::from(at(point))
+                let points = points().filter(is_of).map(|(point, is_on_front)| {
+                    let note = format!("{}\n{}", point_name(point), point_facts(point).join("\n"));
+                    let mut drawn = PlotPoint::from(at(point)).noted(note);
+                    drawn.label = is_on_front.then(|| named(point, ""));
+                    drawn
                 });
                 let look = Look::marker(Hue::of_decoder(kind), marker(preset, precision));
-                let name = match preset {
-                    Some(preset) => format!("{}, {preset} preset", kind.name(precision)),
-                    None => kind.name(precision).to_owned(),
-                };
-                let of_kind = Series::new(name, look, points);
-                series.push(of_kind.listed(Some(kind.name(Precision::Double))));
+                let mut name = kind.name(precision).to_owned();
+                if let Some(preset) = preset {
+                    name += &format!(", {preset} preset");
+                }
+                series.push(Series::new(name, look, points).listed(Some(kind.name(Precision::Double))));
             }
         }
     }
@@ -158,103 +151,65 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         format!("fastest under {}", format_percent(limits.percent)),
         format!("most accurate under {}", frame_time(limits.microseconds)),
     ];
+    // The questions and their limits are about decoding.
+    let is_decoding = cost == TradeOffCost::Decoding;
     for (answer, name) in level.answers(limits).into_iter().zip(questions) {
-        let Some(answer) = answer.and_then(|answer| level.points.get(answer)) else {
-            continue;
-        };
-        let point = PlotPoint {
-            // The questions are about decoding.
-            label: (cost == TradeOffCost::Decoding).then(|| name.clone()),
-            ..PlotPoint::from(at(answer))
-        };
-        let look = Look::marker(Hue::Blue, Marker::Halo);
-        series.push(Series::new(name, look, [point]).listed(None));
+        if let Some(answer) = answer.and_then(|answer| level.points.get(answer)) {
+            let mut point = PlotPoint::from(at(answer));
+            point.label = is_decoding.then(|| name.clone());
+            series.push(Series::new(name, Look::marker(Hue::Blue, Marker::Halo), [point]).listed(None));
+        }
     }
-    series.retain(|series| !series.points.is_empty());
-    let mut plot = Plot::new(
-        PlotAxis::logarithmic(cost.name()),
-        PlotAxis::logarithmic(if level.noise.is_some() {
-            "Z error (%)"
-        } else {
-            "mean absolute error (% of range)"
-        }),
-        series,
-    );
+    let error = match level.noise {
+        Some(_) => "Z error (%)",
+        None => "mean absolute error (% of range)",
+    };
     let model_based = level.points.first().and_then(|point| point.model_based);
     let model_based = model_based.filter(|errors| !errors.is_rounding());
-    if let Some(percent) = model_based.and_then(|errors| errors.z_percent) {
+    let model_based = model_based.and_then(|errors| errors.z_percent).map(|percent| {
         let at = LineAt::Y(percent);
-        let line = ReferenceLine::new("model-based", at, Hue::Ink, LineStyle::Dashed);
-        plot.lines.push(line);
-    }
-    // The limits apply to decoding and are shown if they are within the range of the points.
-    let places = level.points.iter().map(at);
-    let places: Vec<[f64; 2]> = places.filter(|[x, y]| plot.place(*x, *y).is_some()).collect();
+        Series::across("model-based", at, Hue::Ink, LineStyle::Dashed)
+    });
+    series.extend(model_based);
+    // Limits are shown if they are within the range of the points.
     let is_among = |limit: f64, axis: usize| {
-        places.iter().any(|place| place[axis] <= limit) && places.iter().any(|place| place[axis] >= limit)
+        let values = level.points.iter().map(|point| at(point)[axis]);
+        let (low, high) = ends(values.filter(|value| value.log10().is_finite()));
+        is_decoding && (low..=high).contains(&limit)
     };
-    let limit_lines = [
-        (
-            is_among(limits.microseconds, 0),
-            "longest time",
-            LineAt::X(limits.microseconds),
-        ),
-        (is_among(limits.percent, 1), "largest error", LineAt::Y(limits.percent)),
+    let [time, percent] = [limits.microseconds, limits.percent];
+    let limits = [
+        (is_among(time, 0), "longest time", LineAt::X(time)),
+        (is_among(percent, 1), "largest error", LineAt::Y(percent)),
     ];
-    for (is_shown, name, at) in limit_lines {
-        if is_shown && cost == TradeOffCost::Decoding {
-            let line = ReferenceLine::new(name, at, Hue::Blue, LineStyle::Dotted);
-            plot.lines.push(line.listed(Some("limits asked for")));
-        }
-    }
-    plot
-}
-
-/// Returns the line through the points that no other point beats.
-fn front(level: &TradeOffLevel, cost: TradeOffCost) -> Vec<[f64; 2]> {
-    let chosen = level.points.iter().zip(level.front(cost));
-    steps(chosen.filter(|(_, is_chosen)| *is_chosen).map(|(point, _)| {
-        let (x, y) = cost.of(point);
-        [x, y]
-    }))
-}
-
-/// Joins the points of a Pareto front by steps: nothing better was measured between them.
-pub(super) fn steps(places: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
-    let mut places: Vec<[f64; 2]> = places
-        .filter(|place| place.iter().all(|part| part.is_finite()))
-        .collect();
-    places.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let mut steps: Vec<[f64; 2]> = Vec::new();
-    for place in places {
-        if let Some(&[_, y]) = steps.last() {
-            steps.push([place[0], y]);
-        }
-        steps.push(place);
-    }
-    steps
+    series.extend(
+        limits
+            .into_iter()
+            .filter(|(is_shown, ..)| *is_shown)
+            .map(|(_, name, at)| {
+                let line = Series::across(name, at, Hue::Blue, LineStyle::Dotted);
+                line.listed(Some("limits asked for"))
+            }),
+    );
+    Plot::new(PlotAxis::logarithmic(cost.name()), PlotAxis::logarithmic(error), series)
 }
 
 /// `Network f32, best preset, 12 hidden`.
 pub fn point_name(point: &TradeOffPoint) -> String {
-    let mut name = point.report.kind.name(point.report.precision).to_owned();
-    if let Some(preset) = point.preset {
-        name += &format!(", {preset} preset");
-    } else if let Some(method) = point.method() {
-        name += &format!(", {}", method.short_name());
-    }
-    if let Some(hidden) = point.hidden() {
-        name += &format!(", {hidden} hidden");
-    }
-    name
+    let how = match (point.preset, point.method()) {
+        (Some(preset), _) => format!(", {preset} preset"),
+        (None, Some(method)) => format!(", {}", method.short_name()),
+        (None, None) => String::new(),
+    };
+    named(point, &how)
 }
 
-/// `Network f32, 12 hidden`, next to a point whose mark shows the preset.
-pub fn point_label(point: &TradeOffPoint) -> String {
-    let name = point.report.kind.name(point.report.precision).to_owned();
+/// The decoder of a point with its hidden nodes, and `how` it was trained.
+fn named(point: &TradeOffPoint, how: &str) -> String {
+    let name = point.report.kind.name(point.report.precision);
     match point.hidden() {
-        Some(hidden) => format!("{name}, {hidden} hidden"),
-        None => name,
+        Some(hidden) => format!("{name}{how}, {hidden} hidden"),
+        None => format!("{name}{how}"),
     }
 }
 

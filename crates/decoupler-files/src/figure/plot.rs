@@ -1,11 +1,13 @@
 use std::ops::RangeInclusive;
 
+use decoupler_core::text::counted;
 use glam::Vec2;
 
 use super::{
     Hue, LineStyle, Look, Marker,
-    axis::PlotAxis,
-    drawing::{Align, Bounds, Ink, Measure, Shape},
+    axis::{AxisScale, PlotAxis, TickRule},
+    drawing::{Bounds, Labels, Measure, Shape},
+    extremes, unique_by,
 };
 
 /// A plot of series of points: curves, scatter, bars.
@@ -15,10 +17,6 @@ pub struct Plot {
     pub x: PlotAxis,
     /// Vertical.
     pub y: PlotAxis,
-    /// Marked stretches of the x axis, behind everything.
-    pub spans: Vec<Span>,
-    /// Reference lines, behind the series.
-    pub lines: Vec<ReferenceLine>,
     /// Drawn in this order.
     pub series: Vec<Series>,
     /// Gives both axes the same scale.
@@ -34,8 +32,10 @@ pub struct Series {
     pub key: Option<String>,
     /// Appearance.
     pub look: Look,
-    /// Width of a bar from 0 to each point, for histograms.
-    pub bar_width: Option<f64>,
+    /// What is drawn.
+    pub form: Form,
+    /// Label at the upper end of a vertical line.
+    pub label: Option<String>,
     /// In the order in which the line runs.
     pub points: Vec<PlotPoint>,
 }
@@ -57,41 +57,26 @@ pub struct PlotPoint {
     pub item: Option<usize>,
 }
 
-/// A marked stretch of the x axis; listed in the legend if it has a name.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Span {
-    /// Meaning.
-    pub name: String,
-    /// Colour that is tinted.
-    pub hue: Hue,
-    /// Its ends.
-    pub range: RangeInclusive<f64>,
+/// What a series draws.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    /// Symbols at the points, a line through them, or both: as its look says.
+    Points,
+    /// Bars of this width from 0 to each point.
+    Bars(f64),
+    /// No points, but a line across the whole plot or a band, behind everything else.
+    Across(LineAt),
 }
 
-/// Position of a reference line.
+/// Position of a line across a plot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LineAt {
     /// Vertical, at this value of x.
     X(f64),
     /// Horizontal, at this value of y.
     Y(f64),
-}
-
-/// A line across the whole plot.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ReferenceLine {
-    /// Meaning.
-    pub name: String,
-    /// Name in the legend; `None` if it is not listed.
-    pub key: Option<String>,
-    /// Position.
-    pub at: LineAt,
-    /// Colour.
-    pub hue: Hue,
-    /// Style.
-    pub style: LineStyle,
-    /// Label at the upper end of a vertical line.
-    pub label: Option<String>,
+    /// A band between these values of x.
+    Between([f64; 2]),
 }
 
 impl From<[f64; 2]> for PlotPoint {
@@ -107,11 +92,16 @@ impl From<[f64; 2]> for PlotPoint {
 impl PlotPoint {
     /// The point of an item that other figures share.
     #[must_use]
-    pub fn of_item(self, item: usize) -> Self {
-        Self {
-            item: Some(item),
-            ..self
-        }
+    pub fn of_item(mut self, item: usize) -> Self {
+        self.item = Some(item);
+        self
+    }
+
+    /// The point with a note instead of its coordinates.
+    #[must_use]
+    pub fn noted(mut self, note: String) -> Self {
+        self.note = Some(note);
+        self
     }
 }
 
@@ -123,75 +113,77 @@ impl Series {
             key: Some(name.clone()),
             name,
             look,
-            bar_width: None,
+            form: Form::Points,
+            label: None,
             points: points.into_iter().map(Into::into).collect(),
         }
     }
 
+    /// A line across the whole plot, or a band if it has no style; listed in the legend by its name.
+    pub fn across(name: impl Into<String>, at: LineAt, hue: Hue, style: impl Into<Option<LineStyle>>) -> Self {
+        let (line, marker) = (style.into(), None);
+        let mut series = Self::new(name, Look { hue, line, marker }, [[0.0; 2]; 0]);
+        series.form = Form::Across(at);
+        series
+    }
+
+    /// The series with a value that is constant up to the next point.
+    #[must_use]
+    pub fn stepped(mut self) -> Self {
+        let (mut steps, mut height) = (Vec::<PlotPoint>::new(), None);
+        for point in self.points {
+            let corner = height.filter(|height| *height != point.y);
+            steps.extend(corner.map(|height| PlotPoint::from([point.x, height])));
+            height = Some(point.y);
+            steps.push(point);
+        }
+        self.points = steps;
+        self
+    }
+
+    /// A vertical line with a label instead of an entry in the legend.
+    #[must_use]
+    pub fn labelled(mut self, label: &str) -> Self {
+        self.label = Some(label.to_owned());
+        self.listed(None)
+    }
+
     /// The series with this name in the legend, or none.
     #[must_use]
-    pub fn listed(self, key: Option<&str>) -> Self {
-        Self {
-            key: key.map(str::to_owned),
-            ..self
-        }
-    }
-}
-
-impl ReferenceLine {
-    /// A line without a label, listed in the legend by its name.
-    pub fn new(name: impl Into<String>, at: LineAt, hue: Hue, style: LineStyle) -> Self {
-        let name = name.into();
-        Self {
-            key: Some(name.clone()),
-            name,
-            at,
-            hue,
-            style,
-            label: None,
-        }
-    }
-
-    /// The line with this name in the legend, or none.
-    #[must_use]
-    pub fn listed(self, key: Option<&str>) -> Self {
-        Self {
-            key: key.map(str::to_owned),
-            ..self
-        }
-    }
-
-    /// The line with a label instead of an entry in the legend.
-    #[must_use]
-    pub fn labelled(self, label: &str) -> Self {
-        Self {
-            key: None,
-            label: Some(label.to_owned()),
-            ..self
-        }
+    pub fn listed(mut self, key: Option<&str>) -> Self {
+        self.key = key.map(str::to_owned);
+        self
     }
 }
 
 impl Plot {
-    /// A plot of these series.
-    pub fn new(x: PlotAxis, y: PlotAxis, series: Vec<Series>) -> Self {
+    /// A plot of those of these series that have something to draw.
+    pub fn new(x: PlotAxis, y: PlotAxis, series: impl IntoIterator<Item = Series>) -> Self {
+        let is_drawn = |series: &Series| !series.points.is_empty() || matches!(series.form, Form::Across(_));
         Self {
             x,
             y,
-            spans: Vec::new(),
-            lines: Vec::new(),
-            series,
+            series: series.into_iter().filter(is_drawn).collect(),
             has_equal_scales: false,
         }
     }
 
-    /// The plot with these reference lines.
-    #[must_use]
-    pub fn with_lines(self, lines: impl IntoIterator<Item = ReferenceLine>) -> Self {
-        Self {
-            lines: lines.into_iter().collect(),
-            ..self
-        }
+    /// Returns the lines across the plot.
+    pub fn lines_across(&self) -> impl Iterator<Item = (&Series, LineAt)> {
+        self.series.iter().filter_map(|series| match series.form {
+            Form::Across(at) => Some((series, at)),
+            _ => None,
+        })
+    }
+
+    /// Returns two opposite corners of a line or band across these ranges, as places; `None` if an axis has none for it.
+    pub(crate) fn corners(&self, line: LineAt, [x, y]: &[RangeInclusive<f64>; 2]) -> Option<[[f64; 2]; 2]> {
+        let ([left, right], [low, high]) = match line {
+            LineAt::X(at) => ([self.x.place(at)?; 2], [*y.start(), *y.end()]),
+            LineAt::Y(at) => ([*x.start(), *x.end()], [self.y.place(at)?; 2]),
+            LineAt::Between([from, to]) => ([self.x.place(from)?, self.x.place(to)?], [*y.start(), *y.end()]),
+        };
+        Some([[left, low], [right, high]])
     }
 
     /// Returns the place of a point on both axes; `None` if one of the axes has no place for it.
@@ -208,11 +200,7 @@ impl Plot {
     /// Returns the stretches of the line of a series: a missing point leaves a gap.
     pub fn stretches(&self, series: &Series) -> Vec<Vec<[f64; 2]>> {
         let places = series.points.iter().map(|point| self.place(point.x, point.y));
-        let places: Vec<Option<[f64; 2]>> = places.collect();
-        let stretches = places.split(Option::is_none).filter(|stretch| stretch.len() > 1);
-        stretches
-            .map(|stretch| stretch.iter().copied().flatten().collect())
-            .collect()
+        unbroken(places).collect()
     }
 
     /// Returns the places of the ends of an error bar. Values without a place on a logarithmic axis are below its lower
@@ -225,21 +213,21 @@ impl Plot {
     pub fn ranges(&self) -> [RangeInclusive<f64>; 2] {
         let (mut xs, mut ys) = (Vec::new(), Vec::new());
         for series in &self.series {
+            let mut half = 0.0;
+            match series.form {
+                Form::Points => {}
+                Form::Bars(width) => {
+                    half = 0.5 * width;
+                    ys.push(0.0);
+                }
+                Form::Across(LineAt::X(x)) => xs.push(x),
+                Form::Across(LineAt::Y(y)) => ys.push(y),
+                Form::Across(LineAt::Between(ends)) => xs.extend(ends),
+            }
             for (point, _) in self.placed(series) {
-                let half = 0.5 * series.bar_width.unwrap_or(0.0);
                 xs.extend([point.x - half, point.x + half]);
                 ys.push(point.y);
                 ys.extend(point.bar.into_iter().flatten());
-                ys.extend(series.bar_width.map(|_| 0.0));
-            }
-        }
-        for span in &self.spans {
-            xs.extend([*span.range.start(), *span.range.end()]);
-        }
-        for line in &self.lines {
-            match line.at {
-                LineAt::X(x) => xs.push(x),
-                LineAt::Y(y) => ys.push(y),
             }
         }
         let x = self.x.range(xs.into_iter().filter_map(|value| self.x.place(value)));
@@ -266,33 +254,85 @@ impl Plot {
 
     /// Returns the entries of the legend with their looks.
     pub fn keys(&self) -> Vec<(&str, Look)> {
-        let series = self.series.iter().filter(|series| !series.points.is_empty());
-        let of_series = series.map(|series| (series.key.as_deref(), series.look));
-        let lines = self.lines.iter();
-        let of_lines = lines.map(|line| (line.key.as_deref(), Look::line(line.hue, line.style)));
-        let spans = self.spans.iter();
-        let of_spans = spans.map(|span| (Some(&*span.name), Look::area(span.hue)));
-        let keys = of_series.chain(of_lines).chain(of_spans);
-        each_once(keys.filter_map(|(key, look)| Some((key.filter(|key| !key.is_empty())?, look))))
+        let named = self.series.iter().filter_map(|series| {
+            let key = series.key.as_deref().filter(|key| !key.is_empty())?;
+            Some((key, series.look))
+        });
+        unique_by(named, |(key, _)| *key)
     }
 
-    /// Lays out the labels of points and of vertical lines in `frame`, where `at` gives the point of a place; those without
-    /// room are left out.
+    /// Describes the plot in a sentence: its axes, the course of each curve, the extent of each cloud of points,
+    /// the highest bar.
+    pub fn summary(&self) -> String {
+        let scale = match self.y.scale {
+            AxisScale::Logarithmic => " on a logarithmic scale",
+            AxisScale::Linear => "",
+        };
+        let series = self.series.iter().filter_map(|series| self.words_about(series));
+        let parts = Vec::from_iter(series).join("; ");
+        let parts = if parts.is_empty() { "nothing to show" } else { &parts };
+        format!("{}{scale} against {}: {parts}.", self.y.name, self.x.name)
+    }
+
+    /// Describes a series; `None` if no point of it is drawn.
+    fn words_about(&self, series: &Series) -> Option<String> {
+        let name = &series.name;
+        match series.form {
+            Form::Across(LineAt::X(x)) if name.contains(&self.x.value_text(x)) => return Some(name.clone()),
+            Form::Across(LineAt::X(x)) => return Some(format!("{name} at {}", self.x.value_text(x))),
+            Form::Across(LineAt::Y(y)) => return Some(format!("{name} at {}", self.y.value_text(y))),
+            Form::Across(LineAt::Between(_)) => return None,
+            Form::Points | Form::Bars(_) => {}
+        }
+        let points: Vec<&PlotPoint> = self.placed(series).map(|(point, _)| point).collect();
+        let (first, last) = (points.first()?, points.last()?);
+        let (lowest, highest) = extremes(points.iter(), |point| point.y)?;
+        // An axis without values only keeps the points apart.
+        let has_values = self.y.ticks != TickRule::Nothing;
+        let at = |point: &PlotPoint| match has_values {
+            true => format!("{} at {}", self.y.value_text(point.y), self.x.value_text(point.x)),
+            false => self.x.value_text(point.x),
+        };
+        Some(if series.form != Form::Points {
+            format!("{}, the highest {}", counted(points.len(), "bar"), at(highest))
+        } else if points.len() == 1 {
+            format!("{name}: {}", at(first))
+        } else if series.look.line.is_some_and(|style| style != LineStyle::Fine) {
+            let extremes = [("lowest", lowest), ("highest", highest)].into_iter();
+            let inner = extremes.filter(|(_, point)| point.y != first.y && point.y != last.y);
+            let inner: String = inner.map(|(what, point)| format!(", {what} {}", at(point))).collect();
+            format!("{name} from {} to {}{inner}", at(first), at(last))
+        } else {
+            let range = |axis: &PlotAxis, low: f64, high: f64| {
+                format!(", {} {} to {}", axis.name, axis.value_text(low), axis.value_text(high))
+            };
+            let (leftmost, rightmost) = extremes(points.iter(), |point| point.x)?;
+            let mut words = format!("{} of {name}", counted(points.len(), "point"));
+            if has_values {
+                words += &range(&self.y, lowest.y, highest.y);
+            }
+            words + &range(&self.x, leftmost.x, rightmost.x)
+        })
+    }
+
+    /// Lays out the labels of points and of vertical lines in `frame`, where `at` gives the point of a place: next to their
+    /// point, clear of each other and, if possible, of everything else. Those without room are left out; earlier ones are
+    /// shown where points are crowded.
     pub fn lay_out_labels(&self, frame: Bounds, at: impl Fn([f64; 2]) -> Vec2, measure: Measure<'_>) -> Vec<Shape> {
-        let mut labels: Vec<(Vec2, &str)> = Vec::new();
-        for line in &self.lines {
-            if let (LineAt::X(x), Some(label)) = (line.at, &line.label)
+        /// Room between a point and its label.
+        const GAP: f32 = 5.0;
+        let mut wanted: Vec<(Vec2, &str)> = Vec::new();
+        for series in &self.series {
+            if let (Form::Across(LineAt::X(x)), Some(label)) = (series.form, &series.label)
                 && let Some(x) = self.x.place(x)
             {
-                labels.push((Vec2::new(at([x, 0.0]).x, frame.min.y), label));
+                wanted.push((Vec2::new(at([x, 0.0]).x, frame.min.y), label));
             }
-        }
-        for series in &self.series {
-            let labelled = self.placed(series);
-            labels.extend(labelled.filter_map(|(point, place)| Some((at(place), point.label.as_deref()?))));
+            let placed = self.placed(series);
+            wanted.extend(placed.filter_map(|(point, place)| Some((at(place), point.label.as_deref()?))));
         }
         // Most plots have none.
-        if labels.is_empty() {
+        if wanted.is_empty() {
             return Vec::new();
         }
         let mut marks = Vec::new();
@@ -303,19 +343,32 @@ impl Plot {
                 None => marks.extend(points),
             }
         }
-        let sizes: Vec<(Vec2, Vec2)> = labels.iter().map(|(at, label)| (*at, measure(label))).collect();
-        let placed = place_labels(&sizes, &marks, frame).into_iter().zip(labels);
-        placed
-            .filter_map(|(bounds, (_, label))| {
-                let left = Vec2::new(bounds?.min.x, bounds?.middle().y);
-                Some(Shape::text(left, Align::Start, Ink::Label, label))
-            })
-            .collect()
+        // To the right of the point if possible, else to the left, above or below.
+        let sides = [1.0, -1.0, 0.0].map(|x| [-1.0, 0.0, 1.0].map(|y| Vec2::new(x, y)));
+        let mut labels = Labels::new(measure);
+        for (at, text) in wanted {
+            let (sides, size) = (
+                sides.iter().flatten().filter(|side| **side != Vec2::ZERO),
+                labels.size(text),
+            );
+            let middles = sides.map(|side| at + side * (GAP + 0.5 * size));
+            labels.place(text, -1e-3, middles, |place| {
+                let is_within = frame.contains(place.min) && frame.contains(place.max);
+                let covered = || marks.iter().filter(|mark| place.grown(2.0).contains(**mark)).count();
+                is_within.then(covered)
+            });
+        }
+        labels.shapes().collect()
     }
 }
 
-/// Room between a mark and its label.
-const GAP: f32 = 5.0;
+/// Returns the stretches of at least two neighbours without a gap.
+pub(super) fn unbroken<T: Clone>(items: impl Iterator<Item = Option<T>>) -> impl Iterator<Item = Vec<T>> {
+    let items: Vec<Option<T>> = items.collect();
+    let stretches = items.split(Option::is_none).filter(|stretch| stretch.len() > 1);
+    let stretches = stretches.map(|stretch| stretch.iter().flatten().cloned().collect());
+    stretches.collect::<Vec<_>>().into_iter()
+}
 
 /// Returns places along a line, which labels should avoid.
 fn along(line: &[Vec2]) -> impl Iterator<Item = Vec2> {
@@ -325,41 +378,6 @@ fn along(line: &[Vec2]) -> impl Iterator<Item = Vec2> {
         let steps = (from.distance(to) / STEP).ceil().clamp(1.0, 1000.0);
         (0..=steps as usize).map(move |step| from.lerp(to, step as f32 / steps))
     })
-}
-
-/// Returns the rectangle of each label, given by its point and its size: next to the point, clear of the other labels and, if
-/// possible, of `marks`, the places of everything else that is drawn; `None` if there is no room in `frame`.
-///
-/// Labels are placed in order, each at its best free place, so earlier ones are shown where points are crowded.
-fn place_labels(labels: &[(Vec2, Vec2)], marks: &[Vec2], frame: Bounds) -> Vec<Option<Bounds>> {
-    /// To the right of the point if possible, else to the left, above or below.
-    const SIDES: [[f32; 2]; 8] = [
-        [1.0, -1.0],
-        [1.0, 0.0],
-        [1.0, 1.0],
-        [-1.0, -1.0],
-        [-1.0, 0.0],
-        [-1.0, 1.0],
-        [0.0, -1.0],
-        [0.0, 1.0],
-    ];
-    let mut placed: Vec<Bounds> = Vec::new();
-    let mut place = |&(at, size): &(Vec2, Vec2)| {
-        let places = SIDES.map(|side| {
-            let side = Vec2::from(side);
-            Bounds::centred(at + side * (GAP + 0.5 * size), size)
-        });
-        let is_free = |bounds: &Bounds| {
-            frame.contains(bounds.min)
-                && frame.contains(bounds.max)
-                && placed.iter().all(|other| !other.grown(-1e-3).intersects(bounds))
-        };
-        let covered = |bounds: &Bounds| marks.iter().filter(|mark| bounds.grown(2.0).contains(**mark)).count();
-        let best = places.into_iter().filter(is_free).min_by_key(covered)?;
-        placed.push(best);
-        Some(best)
-    };
-    labels.iter().map(&mut place).collect()
 }
 
 /// Plots side by side.
@@ -373,24 +391,35 @@ pub struct PlotFigure {
 
 impl From<Plot> for PlotFigure {
     fn from(plot: Plot) -> Self {
-        Self {
-            plots: vec![plot],
-            notes: Vec::new(),
-        }
+        Self::new([plot], [])
     }
 }
 
 impl PlotFigure {
+    /// Plots with notes.
+    pub fn new(plots: impl IntoIterator<Item = Plot>, notes: impl IntoIterator<Item = String>) -> Self {
+        Self {
+            plots: plots.into_iter().collect(),
+            notes: notes.into_iter().collect(),
+        }
+    }
+
     /// Returns the entries of the legends of all plots, each once.
     pub fn keys(&self) -> Vec<(&str, Look)> {
-        each_once(self.plots.iter().flat_map(Plot::keys))
+        unique_by(self.plots.iter().flat_map(Plot::keys), |(key, _)| *key)
+    }
+
+    /// Describes the figure in one sentence per plot, followed by its notes.
+    pub fn summary(&self) -> String {
+        let plots = self.plots.iter().map(Plot::summary);
+        plots.chain(self.notes.iter().cloned()).collect::<Vec<_>>().join(" ")
     }
 
     /// Returns the figure with a halo around the points of one of these items, and around `others`.
     #[must_use]
     pub fn lighting(mut self, is_lit: impl Fn(usize) -> bool, others: &[[f64; 2]]) -> Self {
         for plot in &mut self.plots {
-            let points = plot.series.iter().filter(|series| series.bar_width.is_none());
+            let points = plot.series.iter().filter(|series| series.form == Form::Points);
             let lit = points.flat_map(|series| &series.points);
             let lit = lit.filter(|point| point.item.is_some_and(&is_lit)).cloned();
             let points: Vec<PlotPoint> = lit.chain(others.iter().copied().map(PlotPoint::from)).collect();
@@ -403,27 +432,12 @@ impl PlotFigure {
     }
 }
 
-/// Returns the first of the entries with each name.
-fn each_once<'a>(entries: impl Iterator<Item = (&'a str, Look)>) -> Vec<(&'a str, Look)> {
-    let mut keys: Vec<(&str, Look)> = Vec::new();
-    for key in entries {
-        if keys.iter().all(|(other, _)| *other != key.0) {
-            keys.push(key);
-        }
-    }
-    keys
-}
-
-/// Maximum number of dots drawn for one cloud; more would not be visible.
-const MAX_POINTS: usize = 2000;
-
-/// Returns evenly spaced indices, at most [`MAX_POINTS`] and the last one.
+/// Returns evenly spaced indices, at most 2000 and the last one: more dots of one cloud would not be visible.
 pub(super) fn thinned_places(count: usize) -> impl Iterator<Item = usize> {
-    let stride = count.div_ceil(MAX_POINTS).max(1);
+    let stride = count.div_ceil(2000).max(1);
     let last = count.checked_sub(1);
-    (0..count)
-        .step_by(stride)
-        .chain(last.filter(|last| !last.is_multiple_of(stride)))
+    let last = last.filter(|last| !last.is_multiple_of(stride));
+    (0..count).step_by(stride).chain(last)
 }
 
 #[cfg(test)]
@@ -456,16 +470,17 @@ mod tests {
     fn everything_that_is_drawn_is_in_view() {
         let look = Look::area(Hue::Blue);
         let series = Series {
-            bar_width: Some(2.0),
+            form: Form::Bars(2.0),
             ..Series::new("bars", look, [[1.0, 5.0]])
         };
         let mut plot = Plot::new(PlotAxis::linear(""), PlotAxis::linear(""), vec![series]);
-        plot.lines = vec![
-            ReferenceLine::new("x", LineAt::X(9.0), Hue::Grey, LineStyle::Dashed),
-            ReferenceLine::new("y", LineAt::Y(-3.0), Hue::Grey, LineStyle::Dashed),
-        ];
+        plot.series.extend([
+            Series::across("x", LineAt::X(9.0), Hue::Grey, LineStyle::Dashed),
+            Series::across("y", LineAt::Y(-3.0), Hue::Grey, LineStyle::Dashed),
+            Series::across("band", LineAt::Between([-4.0, 3.0]), Hue::Grey, None),
+        ]);
         let [x, y] = plot.ranges();
-        assert!([0.0, 2.0, 9.0].iter().all(|value| x.contains(value)), "{x:?}");
+        assert!([0.0, 2.0, 9.0, -4.0].iter().all(|value| x.contains(value)), "{x:?}");
         assert!([0.0, 5.0, -3.0].iter().all(|value| y.contains(value)), "{y:?}");
         plot.has_equal_scales = true;
         let [x, y] = plot.ranges();
@@ -478,58 +493,76 @@ mod tests {
     };
     const SIZE: Vec2 = Vec2::new(60.0, 12.0);
 
-    fn placed(points: &[[f32; 2]]) -> Vec<Option<Bounds>> {
-        let marks: Vec<Vec2> = points.iter().map(|&point| point.into()).collect();
-        let labels: Vec<(Vec2, Vec2)> = marks.iter().map(|&at| (at, SIZE)).collect();
-        place_labels(&labels, &marks, FRAME)
+    /// A plot in which each point has a label.
+    fn labelled(look: Look, points: &[[f64; 2]]) -> Plot {
+        let points = points.iter().map(|&point| PlotPoint {
+            label: Some("label".to_owned()),
+            ..point.into()
+        });
+        let series = Series::new("", look, points);
+        Plot::new(PlotAxis::linear(""), PlotAxis::linear(""), [series])
     }
+
+    fn labels(plot: &Plot) -> Vec<Bounds> {
+        let at = |[x, y]: [f64; 2]| Vec2::new(x as f32, y as f32);
+        let bounds = |shape| match shape {
+            Shape::Text(at, ..) => Bounds::centred(at, SIZE),
+            _ => panic!("not a label: {shape:?}"),
+        };
+        let shapes = plot.lay_out_labels(FRAME, at, &|_| SIZE).into_iter();
+        shapes.map(bounds).collect()
+    }
+
+    const DISC: Look = Look {
+        hue: Hue::Blue,
+        line: None,
+        marker: Some(Marker::Disc),
+    };
 
     #[test]
     fn labels_are_in_the_plot_and_clear_of_each_other_and_of_marks() {
         let points = [[10.0, 50.0], [12.0, 54.0], [190.0, 95.0], [198.0, 4.0], [100.0, 50.0]];
-        let labels: Vec<Bounds> = placed(&points).into_iter().map(Option::unwrap).collect();
+        let labels = labels(&labelled(DISC, &points));
+        assert_eq!(labels.len(), points.len());
         for (index, label) in labels.iter().enumerate() {
             assert!(FRAME.contains(label.min) && FRAME.contains(label.max), "{label:?}");
-            assert_eq!(label.size(), SIZE);
             for other in &labels[..index] {
                 assert!(!other.grown(-1e-3).intersects(label), "{label:?} {other:?}");
             }
-            for &point in &points {
-                assert!(!label.grown(1.0).contains(point.into()), "{label:?} {point:?}");
+            for [x, y] in points {
+                let point = Vec2::new(x as f32, y as f32);
+                assert!(!label.grown(1.0).contains(point), "{label:?} {point:?}");
             }
         }
     }
 
     #[test]
     fn a_label_keeps_clear_of_a_line_through_its_point() {
-        let (at, line) = (Vec2::new(100.0, 6.0), [Vec2::new(20.0, 6.0), Vec2::new(180.0, 6.0)]);
-        let marks: Vec<Vec2> = along(&line).collect();
-        assert_eq!((marks[0], *marks.last().unwrap()), (line[0], line[1]));
-        let label = place_labels(&[(at, SIZE)], &marks, FRAME)[0].unwrap();
+        let mut plot = labelled(DISC, &[[100.0, 6.0]]);
+        let line = Look::line(Hue::Blue, LineStyle::Solid);
+        plot.series.push(Series::new("", line, [[20.0, 6.0], [180.0, 6.0]]));
+        let label = labels(&plot)[0];
         assert!(label.min.y > 6.0, "below, because there is no room above: {label:?}");
     }
 
     #[test]
     fn a_label_without_room_is_left_out() {
-        let crowd = vec![[100.0, 50.0]; 30];
-        let labels = placed(&crowd);
-        assert!(labels[0].is_some() && labels[29].is_none());
+        let labels = labels(&labelled(DISC, &[[100.0, 50.0]; 30]));
+        assert!((1..29).contains(&labels.len()), "{}", labels.len());
     }
 
     #[test]
     fn a_legend_lists_series_that_look_alike_once() {
         let series = |name: &str, key| Series::new(name, Look::area(Hue::Blue), [[0.0, 1.0]]).listed(key);
-        let plot = Plot::new(
-            PlotAxis::linear(""),
-            PlotAxis::linear(""),
-            vec![
-                series("row 1", Some("rows")),
-                series("row 2", Some("rows")),
-                series("lit", None),
-            ],
-        );
-        let line = ReferenceLine::new("limit", LineAt::Y(1.0), Hue::Grey, LineStyle::Dashed);
-        let plot = plot.with_lines([line.clone(), line.labelled("here")]);
+        let line = Series::across("limit", LineAt::Y(1.0), Hue::Grey, LineStyle::Dashed);
+        let all = [
+            series("row 1", Some("rows")),
+            series("row 2", Some("rows")),
+            series("lit", None),
+            line.clone(),
+            line.labelled("here"),
+        ];
+        let plot = Plot::new(PlotAxis::linear(""), PlotAxis::linear(""), all);
         let figure = PlotFigure {
             plots: vec![plot.clone(), plot],
             notes: Vec::new(),
@@ -546,7 +579,7 @@ mod tests {
     #[test]
     fn thinning_keeps_both_ends() {
         let thin: Vec<usize> = thinned_places(12_345).collect();
-        assert!(thin.len() <= MAX_POINTS + 1);
+        assert!(thin.len() <= 2001);
         assert_eq!((thin[0], thin[thin.len() - 1]), (0, 12_344));
         assert_eq!(thinned_places(1).collect::<Vec<_>>(), [0]);
         assert_eq!(thinned_places(0).count(), 0);

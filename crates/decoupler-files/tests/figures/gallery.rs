@@ -18,11 +18,11 @@ use decoupler_core::{
 use decoupler_files::{
     export::{NetworkFile, figures::PictureFormat, report::RunReport},
     figure::{
-        Figure, SectionNodes, TradeOffLevel, TradeOffLimits, compared_losses_figure, error_histogram_figure,
-        experiment_figure, loss_figure, node_figure, position_error_map, readings_figure, regression_figure,
-        sample_figure, section_figure, singular_values_figure, starts_figure,
+        Decoded, Figure, RegressionLine, SectionNodes, TradeOffLevel, TradeOffLimits, compared_losses_figure,
+        experiment_figure, histogram_figure, loss_figure, node_figure, position_error_map, readings_figure,
+        regression_figure, sample_figure, section_figure, singular_values_figure, starts_figure,
         surface::{Quantity, Section, SectionLine, Surface, SurfaceFigure, ViewMode},
-        targets_over_time_figure, trade_off_figure, training_state_figure, z_pairs_mm,
+        targets_over_time_figure, trade_off_figure, training_state_figure, value_pairs,
     },
     import::Setup,
 };
@@ -62,9 +62,11 @@ fn gallery_of_printed_figures() {
     let runs = [Some(("A: first run", history)), Some(("B: second run", &history[..20]))];
     draw("compared", compared_losses_figure(runs));
     let decoupled = run.decouple_test();
-    let pairs = z_pairs_mm(run.test(), &decoupled);
-    draw("histogram", error_histogram_figure(&pairs, Some(22)));
-    draw("regression", regression_figure(&pairs));
+    let pairs = value_pairs(run.test(), &decoupled, None);
+    draw("histogram", histogram_figure(&pairs, Some(22), Decoded::Nodes));
+    let line = RegressionLine::of(pairs.iter().copied());
+    let regression = regression_figure((pairs.len(), &|pair| pairs[pair]), &line, Decoded::Nodes);
+    draw("regression", regression);
     let file = NetworkFile::from_run(&run, None).unwrap();
     let report = RunReport {
         name: Some("gallery"),

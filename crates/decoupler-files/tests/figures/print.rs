@@ -181,9 +181,8 @@ fn colours_of_a_heat_map_are_logarithmic_on_request() {
         colours: SequentialMap::default(),
     };
     let cells = |map: HeatMap| -> Vec<String> {
-        let svg = Figure::from(map).draw().svg().to_owned();
-        let fills = svg.split("<path color=\"").skip(1);
-        fills.take(3).map(|path| path[..7].to_owned()).collect()
+        let fill = |path: Node<'_, '_>| path.attribute("fill").unwrap_or_default().to_owned();
+        elements(&Figure::from(map).draw(), "path", fill)[..3].to_vec()
     };
     let even = cells(map([1.0, 2.0, 3.0], PlotAxis::linear("")));
     let decades = cells(map([0.001, 0.1, 10.0], PlotAxis::logarithmic("")));
@@ -276,7 +275,7 @@ fn hollow_marks_of_the_trade_off_mean_32_bits_and_nothing_else() {
         .filter(|line| line.first() == line.last());
     // Each in both plots.
     assert_eq!((hollow_discs, closed.count()), (2, 2), "discs and diamonds");
-    let areas = elements(&picture, "path", |path| path.attribute("color").is_some());
+    let areas = elements(&picture, "path", |path| path.attribute("fill") != Some("none"));
     let diamonds = areas.into_iter().filter(|is_area| *is_area).count();
     let filled_marks = (rings.len() - hollow_discs) + diamonds;
     // In the legend each decoder has one.

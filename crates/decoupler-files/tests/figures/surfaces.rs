@@ -7,7 +7,7 @@ use decoupler_files::{
     export::figures::Picture,
     figure::{
         Bounds, Figure, SequentialMap, Shape,
-        surface::{Card, Drawing, OrbitCamera, Quantity, Section, SectionLine, Surface, SurfaceFigure, ViewMode},
+        surface::{Drawing, OrbitCamera, Piece, Quantity, Section, SectionLine, Surface, SurfaceFigure, ViewMode},
     },
 };
 use glam::{DVec3, Vec2};
@@ -69,17 +69,9 @@ fn figure(surfaces: Vec<Surface>) -> SurfaceFigure {
 }
 
 fn lay_out(surface: &Surface, camera: OrbitCamera) -> Drawing {
-    surface.lay_out(
-        camera,
-        &Card {
-            bounds: Bounds {
-                min: Vec2::ZERO,
-                max: Vec2::new(360.0, 400.0),
-            },
-            measure: &|text| Vec2::new(6.0 * text.chars().count() as f32, 14.0),
-            colours: SequentialMap::Viridis.colours(),
-        },
-    )
+    let card = Bounds::of_size(Vec2::ZERO, Vec2::new(360.0, 400.0));
+    let measure = |text: &str| Vec2::new(6.0 * text.chars().count() as f32, 14.0);
+    surface.lay_out(camera, card, &measure, SequentialMap::Viridis.colours())
 }
 
 /// Returns the number of times that a picture contains a text.
@@ -95,104 +87,63 @@ fn contour_lines_of_a_slope_are_at_their_heights() {
     let x_at = |node: usize| drawing.dots.position(node).unwrap().x;
     let points_per_mm = (x_at(15) - x_at(0)) / 3.0;
     let mut seen = [0; 10];
-    for (_, lines) in drawing.mesh.strips() {
-        for line in lines {
-            for end in [line.from, line.to] {
-                let height = 4.05 + 0.3 * f64::from((end.x - x_at(0)) / points_per_mm);
-                let level = (10.0 * height).round();
-                assert!((10.0 * height - level).abs() < 0.01, "a line at {height} mm");
-                seen[level as usize - 40] += 1;
-            }
+    for piece in &drawing.mesh.pieces {
+        let Piece::Line(ends, _) = piece else { continue };
+        for end in ends {
+            let height = 4.05 + 0.3 * f64::from((end.x - x_at(0)) / points_per_mm);
+            let level = (10.0 * height).round();
+            assert!((10.0 * height - level).abs() < 0.01, "a line at {height} mm");
+            seen[level as usize - 40] += 1;
         }
     }
     // The line at 4.0 would be in the margin; heights are cut at the ends of the scale.
     assert!(seen[1..].iter().all(|ends| *ends > 20), "{seen:?}");
 }
 
-/// A slope leaves the range of the axes, 3.92 to 5.08 mm, in the margin on both sides: at x = (level − 4.05) / 0.32.
-#[test]
-fn a_steep_surface_ends_along_the_ends_of_the_axis() {
-    let slope = |mode| Surface {
-        mode,
-        ..surface("", Quantity::Height, |x, _| 4.05 + 0.32 * x)
+/// Returns the places of the corners of the cells that are drawn, each with its grid point in millimetres.
+fn drawn_corners(surface: &Surface, drawing: &Drawing) -> Vec<(DVec3, Vec2)> {
+    let (x_mm, y_mm) = (surface.map.grid().x_mm(), surface.map.grid().y_mm());
+    let cells = drawing.mesh.pieces.iter().filter_map(|piece| match piece {
+        Piece::Cell(cell) => Some(*cell),
+        Piece::Line(..) => None,
+    });
+    let place = |corner: usize| {
+        let (ix, iy) = (corner / y_mm.len(), corner % y_mm.len());
+        DVec3::new(x_mm[ix], y_mm[iy], surface.values[corner])
     };
-    let [low, high] = [3.92, 5.08].map(|level| (level - 4.05) / 0.32);
-    let drawing = lay_out(&slope(ViewMode::Top), OrbitCamera::default());
-    let x_at = |node: usize| drawing.dots.position(node).unwrap().x;
-    let points_per_mm = f64::from(x_at(15) - x_at(0)) / 3.0;
-    let mut area = 0.0;
-    let (mut left, mut right) = (f64::MAX, f64::MIN);
-    for cell in drawing.mesh.strips().flat_map(|(cells, _)| cells) {
-        let corners = cell.map(|corner| drawing.mesh.vertices[corner].at.as_dvec2());
-        for corner in corners {
-            let x_mm = (corner.x - f64::from(x_at(0))) / points_per_mm;
-            (left, right) = (left.min(x_mm), right.max(x_mm));
-        }
-        let [a, b, c, d] = corners;
-        area += 0.5 * ((b - a).perp_dot(c - a) + (c - a).perp_dot(d - a)).abs();
-    }
-    assert!(
-        (left - low).abs() < 1e-3 && (right - high).abs() < 1e-3,
-        "{left} {right}"
-    );
-    // Along y the margin is half a pitch on both sides of the five nodes.
-    let expected = (high - low) * 5.0;
-    assert!((area / points_per_mm.powi(2) / expected - 1.0).abs() < 1e-3, "{area}");
-
-    // In space, the same edges are on the top and the floor of the box.
-    let drawing = lay_out(&slope(ViewMode::ThreeD), OrbitCamera::default());
-    for (x_mm, z_mm) in [(low, 3.92), (high, 5.08)] {
-        for y_mm in [0.3, 2.0, 3.7] {
-            let edge = drawing.sight.point(DVec3::new(x_mm, y_mm, z_mm));
-            let nearest = drawing
-                .mesh
-                .vertices
-                .iter()
-                .map(|vertex| vertex.at.as_dvec2().distance(edge));
-            assert!(nearest.fold(f64::MAX, f64::min) < 3.0, "the surface reaches {edge}");
-        }
-    }
+    let corners = cells.flatten();
+    corners
+        .map(|corner| (place(corner), drawing.mesh.vertices[corner].at))
+        .collect()
 }
 
-/// The spline rises above the axis around a node: in space, this is a plateau at the end of the axis, with marks and a
-/// note.
+/// The axis goes from 3.92 to 5.08 mm: in space, the surface stays between these planes, also in the extrapolated margin,
+/// and is marked there. A map has no axis for heights and no holes.
 #[test]
-fn beyond_the_axis_a_surface_is_a_marked_plateau_and_a_map_has_no_holes() {
-    let peak = |mode| Surface {
-        mode,
-        ..surface(
-            "",
-            Quantity::Height,
-            |x, y| {
-                if (x, y) == (1.0, 2.0) { 5.4 } else { 4.4 }
-            },
-        )
-    };
-    let beyond = |mode| {
-        let surface = peak(mode);
-        let drawing = lay_out(&surface, OrbitCamera::default());
-        let grid = surface.map.grid();
-        let cells = drawing.mesh.strips().flat_map(|(cells, _)| cells);
-        // Corners beyond the grid belong to cut cells.
-        let corners = cells
-            .flat_map(|cell| *cell)
-            .filter(|corner| surface.values.get(*corner).is_some_and(|height| *height > 5.08 + 1e-12));
-        let across = grid.y_mm().len();
-        let off_the_edge = corners.map(|corner| {
-            let (x_mm, y_mm) = (grid.x_mm()[corner / across], grid.y_mm()[corner % across]);
-            let at_edge = drawing.sight.point(DVec3::new(x_mm, y_mm, 5.08));
-            drawing.mesh.vertices[corner].at.as_dvec2().distance(at_edge)
-        });
-        let off_the_edge: Vec<f64> = off_the_edge.collect();
-        let furthest = off_the_edge.iter().fold(0.0_f64, |furthest, &off| furthest.max(off));
-        (off_the_edge.len(), furthest, drawing.note)
-    };
-    let (count, off_the_edge, note) = beyond(ViewMode::ThreeD);
-    assert!(count > 20 && off_the_edge < 0.01, "{count} {off_the_edge}");
-    assert_eq!(note.as_deref(), Some("Beyond the axes: hatched, 1 node"));
-    let (count, _, note) = beyond(ViewMode::Top);
-    assert!(count > 20, "{count}");
-    assert_eq!(note, None, "a map has no axis for heights");
+fn beyond_the_axis_a_surface_is_a_marked_plateau_and_a_map_is_whole() {
+    let slope = |x: f64, _: f64| 4.05 + 0.32 * x;
+    let peak = |x: f64, y: f64| if (x, y) == (1.0, 2.0) { 5.4 } else { 4.4 };
+    let cases: [(&dyn Fn(f64, f64) -> f64, _); 2] = [
+        (&slope, "Beyond the axes: hatched"),
+        (&peak, "Beyond the axes: hatched, 1 node"),
+    ];
+    for (height, note) in cases {
+        let in_space = surface("", Quantity::Height, height);
+        let drawing = lay_out(&in_space, OrbitCamera::default());
+        let corners = drawn_corners(&in_space, &drawing);
+        let grid = in_space.map.grid();
+        assert_eq!(corners.len(), 4 * (grid.x_mm().len() - 1) * (grid.y_mm().len() - 1));
+        for (place, at) in &corners {
+            let seen = drawing.sight.point(place.with_z(place.z.clamp(3.92, 5.08))).as_vec2();
+            assert!(at.distance(seen) < 0.01, "{place}");
+        }
+        assert!(corners.iter().filter(|(place, _)| place.z > 5.08).count() > 20);
+        assert_eq!(drawing.note.as_deref(), Some(note));
+        let map = from_above(in_space);
+        let drawing = lay_out(&map, OrbitCamera::default());
+        assert_eq!(drawn_corners(&map, &drawing).len(), corners.len());
+        assert_eq!(drawing.note, None);
+    }
 }
 
 #[test]
@@ -246,9 +197,12 @@ fn scales_are_made_common_by_quantity() {
         range: 3.0..=4.5,
         ..dent("B")
     };
-    let scales = figure(vec![dent("A"), lower, error()]).with_common_scales().scales();
-    let scales: Vec<_> = scales.into_iter().map(|scale| (scale.quantity, scale.range)).collect();
-    assert_eq!(scales, [(Quantity::Height, 3.0..=5.0), (Quantity::Error, -0.5..=0.5)]);
+    let figure = figure(vec![dent("A"), lower, error()]).with_common_scales();
+    let scales = figure.scales().into_iter();
+    let scales: Vec<_> = scales
+        .map(|surface| (&surface.quantity, surface.range.clone()))
+        .collect();
+    assert_eq!(scales, [(&Quantity::Height, 3.0..=5.0), (&Quantity::Error, -0.5..=0.5)]);
 }
 
 /// Fills of the cells of a picture, the most frequent first.
@@ -259,7 +213,7 @@ fn fills(picture: &Picture) -> Vec<String> {
     let cells = cards
         .flat_map(|card| card.descendants())
         .filter(|node| node.has_tag_name("path"));
-    for fill in cells.filter_map(|cell| cell.attribute("color")) {
+    for fill in cells.filter_map(|cell| cell.attribute("fill").filter(|fill| *fill != "none")) {
         *counts.entry(fill.to_owned()).or_insert(0) += 1;
     }
     let mut fills: Vec<_> = counts.into_iter().collect();

@@ -12,9 +12,8 @@ use decoupler_core::{
 use decoupler_files::{
     export::{Table, TableColumn, format_duration, format_number, format_r2},
     figure::{
-        Figure, PlotFigure, compared_losses_figure,
+        Decoded, Figure, PlotFigure, compared_losses_figure, regression_figure,
         surface::{Surface, SurfaceFigure},
-        target_regression_figure,
     },
     import::Plan,
 };
@@ -117,11 +116,11 @@ impl CompareView {
         let target = place.target.min(charts.lines.len().checked_sub(1)?);
         let channel = test.problem.targets.get(target)?;
         let pair = |sample| (test.set.targets()[[sample, target]], answers[[sample, target]]);
-        Some(target_regression_figure(
-            (test.set.samples(), &pair),
+        let samples: (usize, &dyn Fn(usize) -> (f64, f64)) = (test.set.samples(), &pair);
+        Some(regression_figure(
+            samples,
             &charts.lines[target],
-            &channel.name,
-            channel.unit.as_deref(),
+            Decoded::Target(channel),
         ))
     }
 

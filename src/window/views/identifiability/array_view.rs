@@ -57,7 +57,7 @@ pub(super) fn identifiability_ui(
         let card = Rect::from_min_size([left, upper.top()].into(), Vec2::new(width, upper.height()));
         card_ui(ui, card, |ui| {
             let slot = surface_ui(ui, surface, label, shared.look, analysis, &mut pointed, effects);
-            colour_scale_ui(ui, slot, &surface.scale(), &figure.note(), shared.look, effects);
+            colour_scale_ui(ui, slot, surface, &figure.note(), shared.look, effects);
         });
     }
     let facts_width = (0.42 * lower.width()).clamp(space(75), space(110));

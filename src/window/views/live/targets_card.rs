@@ -148,7 +148,7 @@ fn surface_ui(
             ui.label(RichText::new(format_number(*value)).size(type_size().note));
         }
     });
-    colour_scale_ui(ui, scale, &surface.scale(), &figure.note(), look, effects);
+    colour_scale_ui(ui, scale, surface, &figure.note(), look, effects);
 }
 
 fn drift_ui(ui: &mut Ui, targets: &LiveTargets) {

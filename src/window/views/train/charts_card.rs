@@ -1,7 +1,6 @@
 use decoupler_files::figure::{
-    ErrorBins, Figure, HeatMap, Hue, LineAt, LineStyle, PlotFigure, ReferenceLine, error_histogram_figure,
-    hysteresis_figure, loss_figure, node_figure, regression_figure, sample_figure, target_histogram_figure,
-    target_regression_figure, training_state_figure,
+    Decoded, ErrorBins, Figure, HeatMap, Hue, LineAt, LineStyle, PlotFigure, RegressionLine, Series, histogram_figure,
+    hysteresis_figure, loss_figure, node_figure, regression_figure, sample_figure, training_state_figure,
 };
 use eframe::egui::{Key, Modifiers, Ui, UiBuilder};
 
@@ -262,12 +261,8 @@ fn figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
             let mut figure = loss_figure(run.outline.records(), &run.stages, result.best_epoch);
             if let (Some(epoch), Some(plot)) = (view.scrub.epoch(), figure.plots.first_mut()) {
                 let at = LineAt::X(epoch as f64);
-                plot.lines.push(ReferenceLine::new(
-                    "displayed network",
-                    at,
-                    Hue::Orange,
-                    LineStyle::Solid,
-                ));
+                let line = Series::across("displayed network", at, Hue::Orange, LineStyle::Solid);
+                plot.series.push(line);
             }
             figure
         }
@@ -276,24 +271,23 @@ fn figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
             training_state_figure(run.outline.records(), &run.stages)
         }
         BottomTab::ErrorHistogram => {
-            let (pairs, bar) = (view.drawn.pairs()?, view.lights.bar);
-            match shared.recorded_test() {
-                None => error_histogram_figure(pairs, bar),
-                Some(test) => target_histogram_figure(pairs, bar, test.problem.targets.get(view.target_of(test))?),
-            }
+            let of = match shared.recorded_test() {
+                None => Decoded::Nodes,
+                Some(test) => Decoded::Target(test.problem.targets.get(view.target_of(test))?),
+            };
+            histogram_figure(view.drawn.pairs()?, view.lights.bar, of)
         }
         BottomTab::Regression => {
             let pairs = view.drawn.pairs()?;
-            match shared.recorded_test() {
-                None => regression_figure(pairs),
+            let (line, of) = match shared.recorded_test() {
+                None => (RegressionLine::of(pairs.iter().copied()), Decoded::Nodes),
                 Some(test) => {
                     let target = view.target_of(test);
-                    let channel = test.problem.targets.get(target)?;
                     let line = view.result(shared)?.charts.as_ref()?.lines.get(target)?;
-                    let samples: (usize, &dyn Fn(usize) -> (f64, f64)) = (pairs.len(), &|pair| pairs[pair]);
-                    target_regression_figure(samples, line, &channel.name, channel.unit.as_deref())
+                    (*line, Decoded::Target(test.problem.targets.get(target)?))
                 }
-            }
+            };
+            regression_figure((pairs.len(), &|pair| pairs[pair]), &line, of)
         }
         BottomTab::Hysteresis => {
             let test = shared.recorded_test()?;

@@ -7,7 +7,7 @@ use crate::window::{
     test_view::{Frame, Positions, RecordedTest, TestView},
 };
 use decoupler_core::{dataset::Dataset, evaluation::node_rms_mm};
-use decoupler_files::figure::{TargetSurface, surface::Surface, target_pairs, z_pairs_mm};
+use decoupler_files::figure::{TargetSurface, surface::Surface, value_pairs};
 
 /// Drawings of the current test set. They are rebuilt only when it, the result, the snapshot or the target changes.
 #[derive(Debug, Default)]
@@ -176,10 +176,7 @@ impl Drawn {
     /// values of the displayed target in its unit.
     pub fn pairs(&self) -> Option<&[(f64, f64)]> {
         let (test, answers) = self.result()?;
-        Some(self.pairs.get_or_init(|| match self.target {
-            None => z_pairs_mm(test, answers),
-            Some(target) => target_pairs(test, answers, target),
-        }))
+        Some(self.pairs.get_or_init(|| value_pairs(test, answers, self.target)))
     }
 }
 
@@ -246,7 +243,7 @@ mod tests {
 
         shared.run.as_mut().unwrap().result = Some(result(&run));
         assert_eq!(drawn.follow(&shared, shared.result(), 0, 0), 0);
-        let first = z_pairs_mm(run.test(), &run.decouple_test());
+        let first = value_pairs(run.test(), &run.decouple_test(), None);
         assert_eq!(drawn.pairs(), Some(&first[..]));
         let (pairs, spread) = (drawn.pairs().unwrap().as_ptr(), drawn.spread_mm().unwrap().as_ptr());
         let actual = drawn.frames.actual.nodes_mm.clone();
@@ -266,7 +263,7 @@ mod tests {
         run.step();
         shared.run.as_mut().unwrap().result = Some(result(&run));
         drawn.follow(&shared, shared.result(), 3, 0);
-        let next = z_pairs_mm(run.test(), &run.decouple_test());
+        let next = value_pairs(run.test(), &run.decouple_test(), None);
         assert_ne!(next, first);
         assert_eq!(drawn.pairs(), Some(&next[..]));
     }

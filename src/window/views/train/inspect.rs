@@ -4,8 +4,7 @@ use decoupler_core::{evaluation::NodeAddress, text::counted};
 use decoupler_files::{
     export::format_number,
     figure::{
-        ErrorBins, Hue, LineAt, LineStyle, PlotFigure, ReferenceLine, SectionNodes, pair_address, pair_sample,
-        section_figure,
+        ErrorBins, Hue, LineAt, LineStyle, PlotFigure, SectionNodes, Series, pair_address, pair_sample, section_figure,
         surface::{Section, SectionLine},
     },
 };
@@ -100,8 +99,8 @@ pub fn with_lights(mut figure: PlotFigure, view: &TrainView, shared: &Shared) ->
                 } else {
                     "node under the pointer"
                 };
-                let line = ReferenceLine::new(name, LineAt::X(decoded - actual), Hue::Orange, LineStyle::Solid);
-                plot.lines.push(line);
+                let line = Series::across(name, LineAt::X(decoded - actual), Hue::Orange, LineStyle::Solid);
+                plot.series.push(line);
             }
             figure
         }

@@ -4,14 +4,10 @@ use std::sync::OnceLock;
 
 use glam::Vec2;
 
-use super::{
-    picture::Picture,
-    svg::{Canvas, PAGE_WIDTH, TEXT, measure},
-};
+use super::picture::{Canvas, PAGE_WIDTH, Picture, TEXT, measure};
 use crate::figure::{
-    Align, Bounds, ColourMap, Figure, HeatMap, Hue, Ink, LineAt, Plot, PlotAxis, PlotFigure, Rgb, SequentialMap, Shape,
-    Stroke, share,
-    surface::{Card, ColourScale, Quantity, Surface, SurfaceFigure},
+    Align, Bounds, ColourMap, Figure, Form, HeatMap, Hue, Ink, Plot, PlotFigure, Rgb, Series, Shape, Stroke, share,
+    surface::{Surface, SurfaceFigure},
 };
 
 impl Figure {
@@ -37,6 +33,8 @@ const BOTTOM: f32 = 46.0;
 const PLOT_HEIGHT: f32 = 260.0;
 /// Width of a figure whose plot has one scale for both axes.
 const SQUARE_WIDTH: f32 = 410.0;
+/// Width of the sample of a legend.
+const SAMPLE: f32 = 22.0;
 
 /// Draws plots side by side at the width of a page, with one legend; a single square plot is narrower.
 fn draw_plots(figure: &PlotFigure) -> Picture {
@@ -47,28 +45,19 @@ fn draw_plots(figure: &PlotFigure) -> Picture {
     let plot_height = if is_square { plot_width } else { PLOT_HEIGHT };
     let (mut shapes, mut at) = (Vec::new(), Vec2::new(LEFT, 0.5 * LINE));
     for (name, look) in figure.keys() {
-        const SAMPLE: f32 = 22.0;
         let text = measure(name).x;
         if at.x > LEFT && at.x + SAMPLE + text > width {
             at = Vec2::new(LEFT, at.y + LINE);
         }
         shapes.extend(look.sample(at, SAMPLE));
-        shapes.push(Shape::text(
-            at + Vec2::new(SAMPLE + 5.0, 0.0),
-            Align::Start,
-            TEXT_INK,
-            name,
-        ));
+        let beside = at + Vec2::new(SAMPLE + 5.0, 0.0);
+        shapes.push(Shape::text(beside, Align::Start, TEXT_INK, name));
         at.x += SAMPLE + text + 20.0;
     }
     let mut top = if shapes.is_empty() { 0.0 } else { at.y + 0.5 * LINE };
     for note in &figure.notes {
-        shapes.push(Shape::text(
-            Vec2::new(LEFT, top + 0.5 * LINE),
-            Align::Start,
-            DIM,
-            &**note,
-        ));
+        let at = Vec2::new(LEFT, top + 0.5 * LINE);
+        shapes.push(Shape::text(at, Align::Start, DIM, &**note));
         top += LINE;
     }
     top += 12.0;
@@ -76,57 +65,43 @@ fn draw_plots(figure: &PlotFigure) -> Picture {
     canvas.draw(shapes);
     for (index, plot) in figure.plots.iter().enumerate() {
         let corner = Vec2::new(slot * index as f32 + LEFT, top);
-        draw_plot(
-            plot,
-            Bounds::of_size(corner, Vec2::new(plot_width, plot_height)),
-            &mut canvas,
-        );
+        let area = Bounds::of_size(corner, Vec2::new(plot_width, plot_height));
+        draw_plot(plot, area, &mut canvas);
     }
     canvas.finish()
 }
 
 /// Draws the plot within `area`; names and numbers are outside it.
 fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
-    let ranges = plot.ranges();
-    let (corner, size) = (Vec2::new(area.min.x, area.max.y), area.size());
+    let ranges @ [x_range, y_range] = &plot.ranges();
     let at = |[x, y]: [f64; 2]| {
-        let [right, up] = [share(x, &ranges[0]), share(y, &ranges[1])].map(|share| share as f32);
-        corner + Vec2::new(right, -up) * size
+        let [right, up] = [share(x, x_range), 1.0 - share(y, y_range)].map(|share| share as f32);
+        area.min + Vec2::new(right, up) * area.size()
     };
-    let x_at = |x: f64| plot.x.place(x).map(|x| at([x, *ranges[1].start()]).x);
-    let y_at = |y: f64| plot.y.place(y).map(|y| at([*ranges[0].start(), y]).y);
-    let spans = plot.spans.iter().filter_map(|span| {
-        let band = Bounds {
-            min: Vec2::new(x_at(*span.range.start())?, area.min.y),
-            max: Vec2::new(x_at(*span.range.end())?, area.max.y),
+    let (mut bands, mut lines, mut shapes) = (Vec::new(), Vec::new(), Vec::new());
+    for (Series { look, .. }, line) in plot.lines_across() {
+        let Some(corners) = plot.corners(line, ranges) else {
+            continue;
         };
-        Some(band.area(Ink::Hue(span.hue).at(0.12)))
-    });
-    canvas.draw(spans);
-    canvas.draw(axes(plot, area, at));
-
-    let mut shapes = Vec::new();
-    for series in plot.series.iter().filter(|series| series.bar_width.is_some()) {
-        let half = 0.5 * series.bar_width.unwrap_or_default();
-        for (point, [x, y]) in plot.placed(series) {
-            let [left, right] = [-half, half].map(|half| x_at(point.x + half));
-            let top = at([x, y]);
-            let bar = Bounds {
-                min: Vec2::new(left.unwrap_or(top.x), top.y),
-                max: Vec2::new(right.unwrap_or(top.x), area.max.y),
-            };
-            if bar.size().y > 0.0 {
+        let [from, to] = corners.map(at);
+        match look.line {
+            Some(style) => lines.push(Shape::Line(vec![from, to], style.stroke(look.hue))),
+            None => bands.push(Bounds::of([from, to]).area(Ink::Hue(look.hue).at(0.12))),
+        }
+    }
+    canvas.draw(bands);
+    canvas.draw(axes(plot, area, ranges));
+    for series in &plot.series {
+        let Form::Bars(width) = series.form else { continue };
+        for (_, [x, y]) in plot.placed(series) {
+            let [left, right] = [-0.5, 0.5].map(|half| at([x + half * width, y]));
+            if left.y < area.max.y {
+                let bar = Bounds::of([left, Vec2::new(right.x, area.max.y)]);
                 shapes.push(bar.area(series.look.hue));
             }
         }
     }
-    for line in &plot.lines {
-        let ends = match line.at {
-            LineAt::X(x) => x_at(x).map(|x| [Vec2::new(x, area.min.y), Vec2::new(x, area.max.y)]),
-            LineAt::Y(y) => y_at(y).map(|y| [Vec2::new(area.min.x, y), Vec2::new(area.max.x, y)]),
-        };
-        shapes.extend(ends.map(|ends| Shape::Line(ends.into(), line.style.stroke(line.hue))));
-    }
+    shapes.extend(lines);
     for series in &plot.series {
         if let Some(style) = series.look.line {
             let stretches = plot.stretches(series).into_iter();
@@ -135,11 +110,10 @@ fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
         }
         for (point, place) in plot.placed(series) {
             let Some(ends) = point.bar else { continue };
-            let [low, high] = plot.bar_ends(ends, &ranges[1]).map(|end| at([place[0], end]));
-            let stroke = Stroke::new(series.look.hue, 1.1);
+            let [low, high] = plot.bar_ends(ends, y_range).map(|end| at([place[0], end]));
             let cap = Vec2::new(3.0, 0.0);
             let lines = [[low, high], [low - cap, low + cap], [high - cap, high + cap]];
-            shapes.extend(lines.map(|ends| Shape::Line(ends.into(), stroke)));
+            shapes.extend(lines.map(|[from, to]| Shape::line(from, to, series.look.hue, 1.1)));
         }
         let marks = plot.placed(series).filter_map(|(_, place)| series.look.mark(at(place)));
         shapes.extend(marks);
@@ -149,49 +123,44 @@ fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
 }
 
 /// Grid, ticks, numbers and names of both axes, and the frame.
-fn axes(plot: &Plot, area: Bounds, at: impl Fn([f64; 2]) -> Vec2) -> Vec<Shape> {
-    /// Width and height of a number.
-    const NUMBER: [f32; 2] = [50.0, 28.0];
-    let [x_range, y_range] = plot.ranges();
+fn axes(plot: &Plot, area: Bounds, ranges: &[std::ops::RangeInclusive<f64>; 2]) -> Vec<Shape> {
     let (mut grid, mut edges, mut texts) = (Vec::new(), Vec::new(), Vec::new());
-    let ticks = |axis: &PlotAxis, range: &std::ops::RangeInclusive<f64>, number: f32, length: f32| {
-        let ticks = axis.ticks(range, (range.end() - range.start()) * f64::from(number / length));
-        let texts = ticks.places.iter().map(|place| axis.tick_text(*place, ticks.step));
-        let texts = Vec::from_iter(texts);
-        ticks.places.into_iter().zip(texts)
-    };
-    for (place, text) in ticks(&plot.x, &x_range, NUMBER[0], area.size().x) {
-        let x = at([place, *y_range.start()]).x;
-        let low = Vec2::new(x, area.max.y);
-        grid.push(Shape::line(Vec2::new(x, area.min.y), low, Ink::Grid, 0.7));
-        edges.push(Shape::line(low, low + Vec2::new(0.0, 4.0), DIM, 1.0));
-        texts.push(Shape::text(low + Vec2::new(0.0, 15.0), Align::Middle, TEXT_INK, text));
-    }
-    // The name is next to the longest number.
+    // The name of the y axis is next to its longest number.
     let mut widest = measure("0.0").x;
-    for (place, text) in ticks(&plot.y, &y_range, NUMBER[1], area.size().y) {
-        let left = Vec2::new(area.min.x, at([*x_range.start(), place]).y);
-        widest = widest.max(measure(&text).x);
-        grid.push(Shape::line(left, Vec2::new(area.max.x, left.y), Ink::Grid, 0.7));
-        edges.push(Shape::line(left - Vec2::new(4.0, 0.0), left, DIM, 1.0));
-        texts.push(Shape::text(left - Vec2::new(7.0, 0.0), Align::End, TEXT_INK, text));
+    let (corner, size) = (Vec2::new(area.min.x, area.max.y), area.size());
+    let (right, up) = (Vec2::new(size.x, 0.0), Vec2::new(0.0, -size.y));
+    // Each with the room for a number, the directions along and across it, that of its ticks, and the place of numbers.
+    let axes = [
+        (&plot.x, 50.0_f32, right, up, Vec2::Y, 15.0, Align::Middle),
+        (&plot.y, 28.0, up, right, Vec2::NEG_X, 7.0, Align::End),
+    ];
+    for ((axis, number, along, across, away, beyond, align), range) in axes.into_iter().zip(ranges) {
+        let number = f64::from(number / along.length());
+        let ticks = axis.ticks(range, number * (range.end() - range.start()));
+        for &place in &ticks.places {
+            let from = corner + along * share(place, range) as f32;
+            let text = axis.tick_text(place, ticks.step);
+            if align == Align::End {
+                widest = widest.max(measure(&text).x);
+            }
+            grid.push(Shape::line(from, from + across, Ink::Grid, 0.7));
+            edges.push(Shape::line(from, from + 4.0 * away, DIM, 1.0));
+            texts.push(Shape::text(from + beyond * away, align, TEXT_INK, text));
+        }
     }
     let below = Vec2::new(area.middle().x, area.max.y + 33.0);
     texts.push(Shape::text(below, Align::Middle, TEXT_INK, &*plot.x.name));
     let beside = Vec2::new(area.min.x - 19.0 - widest, area.middle().y);
-    texts.push(Shape::upright(beside, TEXT_INK, &*plot.y.name));
+    texts.push(Shape::text(beside, Align::Upright, TEXT_INK, &*plot.y.name));
     edges.push(area.outline(Stroke::new(DIM, 1.0)));
     grid.into_iter().chain(edges).chain(texts).collect()
 }
 
 fn draw_map(map: &HeatMap) -> Picture {
-    let height = (34.0 * map.values.nrows() as f32 + 40.0).max(190.0);
     let longest = map.columns.iter().map(|name| measure(name).x).fold(0.0, f32::max);
-    let mut canvas = Canvas::new(Vec2::new(500.0, height + longest));
-    let area = Bounds {
-        min: Vec2::new(8.0, 14.0),
-        max: Vec2::new(492.0, height + longest - 8.0),
-    };
+    let height = (34.0 * map.values.nrows() as f32 + 40.0).max(190.0) + longest;
+    let mut canvas = Canvas::new(Vec2::new(500.0, height));
+    let area = Bounds::of_size(Vec2::new(8.0, 14.0), Vec2::new(484.0, height - 22.0));
     canvas.draw(map.lay_out(area, &measure).shapes);
     canvas.finish()
 }
@@ -201,22 +170,18 @@ const TITLE: f32 = 22.0;
 
 /// Draws surfaces side by side, as wide as a page. A colour bar is drawn to the right of the last card that it belongs to.
 fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
-    let scales: Vec<ColourScale> = figure.surfaces.iter().map(Surface::scale).collect();
+    const KEY: f32 = Surface::SCALE_WIDTH;
+    let scales: Vec<_> = figure.surfaces.iter().map(Surface::scale).collect();
     let has_key = |card: usize| scales.get(card + 1) != Some(&scales[card]);
     let keys = (0..scales.len()).filter(|&card| has_key(card)).count();
-    let width = (PAGE_WIDTH - keys as f32 * ColourScale::WIDTH) / scales.len().max(1) as f32;
+    let width = (PAGE_WIDTH - keys as f32 * KEY) / scales.len().max(1) as f32;
     let height = (0.98 * width).clamp(206.0, 400.0);
-    let mut cards = Vec::new();
-    let mut left = 0.0;
+    let (mut cards, mut corner) = (Vec::new(), Vec2::new(0.0, TITLE));
     for (card, surface) in figure.surfaces.iter().enumerate() {
-        let bounds = Bounds::of_size(Vec2::new(left, TITLE), Vec2::new(width, height));
-        let of_card = Card {
-            bounds,
-            measure: &measure,
-            colours: colours(&surface.quantity, surface.colours),
-        };
-        cards.push((bounds, surface, surface.lay_out(figure.camera, &of_card)));
-        left += width + if has_key(card) { ColourScale::WIDTH } else { 0.0 };
+        let bounds = Bounds::of_size(corner, Vec2::new(width, height));
+        let drawing = surface.lay_out(figure.camera, bounds, &measure, colours(surface));
+        cards.push((bounds, surface, drawing));
+        corner.x += width + if has_key(card) { KEY } else { 0.0 };
     }
     let below = TITLE + height + 0.5 * LINE;
     let has_notes = cards.iter().any(|(_, _, drawing)| drawing.note.is_some());
@@ -231,21 +196,18 @@ fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
         canvas.draw_clipped(bounds, shapes.chain(section.into_iter().flatten()).chain(dots));
         if has_key(card) {
             let corner = Vec2::new(bounds.max.x, bounds.min.y);
-            let area = Bounds::of_size(corner, Vec2::new(ColourScale::WIDTH, height));
-            let map = colours(&surface.quantity, surface.colours);
-            canvas.draw(scales[card].lay_out(area, map, &measure));
+            let area = Bounds::of_size(corner, Vec2::new(KEY, height));
+            canvas.draw(surface.lay_out_scale(area, colours(surface), &measure));
         }
-        let note = drawing.note.map(|note| {
-            let at = Vec2::new(bounds.min.x + 16.0, below);
-            Shape::text(at, Align::Start, Ink::Hue(Hue::Orange), note)
-        });
-        canvas.draw(note);
+        let at = Vec2::new(bounds.min.x + 16.0, below);
+        let write = |note| Shape::text(at, Align::Start, Ink::Hue(Hue::Orange), note);
+        canvas.draw(drawing.note.map(write));
     }
     canvas.draw([Shape::text(Vec2::new(16.0, last), Align::Start, DIM, figure.note())]);
     canvas.finish()
 }
 
-fn colours(quantity: &Quantity, sequential: SequentialMap) -> &'static ColourMap {
+fn colours(surface: &Surface) -> &'static ColourMap {
     static DIVERGING: OnceLock<ColourMap> = OnceLock::new();
     const STOPS: [Rgb; 5] = [
         [0x0b, 0x3d, 0x91],
@@ -254,9 +216,8 @@ fn colours(quantity: &Quantity, sequential: SequentialMap) -> &'static ColourMap
         [0xf0, 0x87, 0x5a],
         [0x9a, 0x2c, 0x06],
     ];
-    if quantity.is_diverging() {
-        DIVERGING.get_or_init(|| ColourMap::diverging(STOPS))
-    } else {
-        sequential.colours()
+    match surface.quantity.is_diverging() {
+        true => DIVERGING.get_or_init(|| ColourMap::diverging(STOPS)),
+        false => surface.colours.colours(),
     }
 }

@@ -5,7 +5,6 @@
 
 mod layout;
 mod picture;
-mod svg;
 
 pub(crate) use picture::dark_style;
 pub use picture::{Picture, PictureError, PictureFormat};

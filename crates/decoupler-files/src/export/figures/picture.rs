@@ -1,4 +1,5 @@
-//! Finished figures as SVG, as PNG, and in an HTML page that follows the reader's dark theme.
+//! Shapes written as SVG, and finished figures as SVG, as PNG, and in an HTML page that follows the reader's dark theme.
+//! Lengths are points of a layout with text of size [`TEXT`]; the page is scaled to the size in print.
 
 use std::{
     io,
@@ -6,13 +7,14 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
+use decoupler_core::text::is_unprintable;
+use glam::Vec2;
 use resvg::{tiny_skia, usvg};
 use thiserror::Error;
 
-use super::svg::escaped;
 use crate::{
     export::{WriteError, atomic_write},
-    figure::{Hue, Ink, Rgb},
+    figure::{Align, Bounds, Colour, Hue, Ink, Rgb, Shape, Stroke},
 };
 
 /// A finished figure.
@@ -32,16 +34,6 @@ pub enum PictureFormat {
     Png,
 }
 
-impl PictureFormat {
-    /// File name extension, without the dot.
-    pub fn extension(self) -> &'static str {
-        match self {
-            Self::Svg => "svg",
-            Self::Png => "png",
-        }
-    }
-}
-
 /// Errors of writing a figure.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -58,6 +50,14 @@ pub enum PictureError {
 }
 
 impl PictureFormat {
+    /// File name extension, without the dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Svg => "svg",
+            Self::Png => "png",
+        }
+    }
+
     /// Returns the format given by the extension of `path`.
     ///
     /// # Errors
@@ -74,10 +74,6 @@ impl PictureFormat {
 const DOTS_PER_INCH: f32 = 300.0;
 
 impl Picture {
-    pub(super) fn new(svg: String, share: f32) -> Self {
-        Self { svg, share }
-    }
-
     /// The figure as SVG. Its text names the program's font and common substitutes.
     pub fn svg(&self) -> &str {
         &self.svg
@@ -135,6 +131,21 @@ impl Picture {
         atomic_write(path, |writer| io::Write::write_all(writer, bytes))?;
         Ok(())
     }
+
+    /// Returns the figure for an HTML page, with the same share of the page width as in print, without external
+    /// references, and with ids that are unique to `place`. `label` is its description for screen readers.
+    pub(crate) fn inline_svg(&self, place: usize, label: &str) -> String {
+        let label = escaped(label).replace('"', "&quot;");
+        let rest = self.svg.find("viewBox").unwrap_or_default();
+        let share = 100.0 * self.share;
+        let inline = format!(
+            "<svg role=\"img\" aria-label=\"{label}\" width=\"{share:.1}%\" {}",
+            &self.svg[rest..]
+        );
+        inline
+            .replace("id=\"c", &format!("id=\"f{place}c"))
+            .replace("url(#c", &format!("url(#f{place}c"))
+    }
 }
 
 /// Only the program's own fonts.
@@ -154,77 +165,193 @@ fn fonts() -> Arc<usvg::fontdb::Database> {
     Arc::clone(FONTS.get_or_init(load))
 }
 
-/// The roles of colours, each in print and on a dark background.
-fn pairs() -> [(Ink, Rgb); 12] {
-    [
-        (Ink::Ground, [0x1b, 0x1e, 0x24]),
-        (Ink::Hue(Hue::Ink), [0xe7, 0xea, 0xf0]),
-        (Ink::Hue(Hue::Grey), [0x98, 0xa2, 0xb3]),
-        (Ink::Grid, [0x2c, 0x32, 0x3c]),
-        (Ink::Edge, [0x5b, 0x64, 0x72]),
-        (Ink::Missing, [0x24, 0x29, 0x32]),
-        (Ink::Hue(Hue::Blue), [0x5b, 0x9d, 0xff]),
-        (Ink::Hue(Hue::Red), [0xf0, 0x6a, 0x6a]),
-        (Ink::Hue(Hue::Green), [0x4c, 0xc3, 0x8a]),
-        (Ink::Hue(Hue::Orange), [0xf0, 0xa8, 0x3c]),
-        (Ink::Hue(Hue::Violet), [0xb5, 0x8a, 0xe6]),
-        (Ink::Hue(Hue::Cyan), [0x4f, 0xc3, 0xd9]),
-    ]
+/// The roles of colours: each in print, dark enough for paper, and on a dark background.
+const PALETTE: [(Ink, Rgb, Rgb); 12] = [
+    (Ink::Ground, [0xff; 3], [0x1b, 0x1e, 0x24]),
+    (Ink::Hue(Hue::Ink), [0x1b, 0x24, 0x30], [0xe7, 0xea, 0xf0]),
+    (Ink::Hue(Hue::Grey), [0x5b, 0x64, 0x72], [0x98, 0xa2, 0xb3]),
+    (Ink::Grid, [0xe3, 0xe7, 0xee], [0x2c, 0x32, 0x3c]),
+    (Ink::Edge, [0xa2, 0xa9, 0xb4], [0x5b, 0x64, 0x72]),
+    (Ink::Missing, [0xf3, 0xf5, 0xf8], [0x24, 0x29, 0x32]),
+    (Ink::Hue(Hue::Blue), [0x1f, 0x6f, 0xeb], [0x5b, 0x9d, 0xff]),
+    (Ink::Hue(Hue::Red), [0xc6, 0x2f, 0x2f], [0xf0, 0x6a, 0x6a]),
+    (Ink::Hue(Hue::Green), [0x1a, 0x7f, 0x4b], [0x4c, 0xc3, 0x8a]),
+    (Ink::Hue(Hue::Orange), [0xa8, 0x64, 0x00], [0xf0, 0xa8, 0x3c]),
+    (Ink::Hue(Hue::Violet), [0x7a, 0x3e, 0xb1], [0xb5, 0x8a, 0xe6]),
+    (Ink::Hue(Hue::Cyan), [0x0b, 0x76, 0x8c], [0x4f, 0xc3, 0xd9]),
+];
+
+/// Returns a colour in print.
+fn rgb(ink: Ink) -> Rgb {
+    match ink {
+        Ink::Rgb(colour) => colour,
+        Ink::Label => rgb(Ink::Hue(Hue::Ink)),
+        _ => {
+            let entry = PALETTE.iter().find(|(role, ..)| *role == ink);
+            entry.expect("every role is in the palette").1
+        }
+    }
 }
 
-/// Returns a colour in print, dark enough for paper.
-pub(super) fn rgb(ink: Ink) -> Rgb {
-    const INK: Rgb = [0x1b, 0x24, 0x30];
-    match ink {
-        Ink::Hue(Hue::Blue) => [0x1f, 0x6f, 0xeb],
-        Ink::Hue(Hue::Red) => [0xc6, 0x2f, 0x2f],
-        Ink::Hue(Hue::Green) => [0x1a, 0x7f, 0x4b],
-        Ink::Hue(Hue::Orange) => [0xa8, 0x64, 0x00],
-        Ink::Hue(Hue::Violet) => [0x7a, 0x3e, 0xb1],
-        Ink::Hue(Hue::Cyan) => [0x0b, 0x76, 0x8c],
-        Ink::Hue(Hue::Grey) => [0x5b, 0x64, 0x72],
-        Ink::Hue(Hue::Ink) | Ink::Label => INK,
-        Ink::Grid => [0xe3, 0xe7, 0xee],
-        Ink::Edge => [0xa2, 0xa9, 0xb4],
-        Ink::Ground => [0xff; 3],
-        Ink::Missing => [0xf3, 0xf5, 0xf8],
-        Ink::Rgb(colour) => colour,
-    }
+fn hex([red, green, blue]: Rgb) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
 /// Style rules that show the figures of a page on a dark background if the reader prefers a dark theme.
 pub(crate) fn dark_style() -> String {
-    let hex = |[red, green, blue]: Rgb| format!("#{red:02x}{green:02x}{blue:02x}");
-    let rules = pairs().map(|(ink, dark)| {
-        let (print, dark) = (hex(rgb(ink)), hex(dark));
+    let rules = PALETTE.map(|(ink, print, dark)| {
+        let (print, dark) = (hex(print), hex(dark));
         // White dots mark nodes, and white cells errors of zero, on any background.
-        let (of_circles, areas) = match ink {
-            Ink::Ground => (":not(circle)", String::new()),
-            _ => ("", format!("  svg [color=\"{print}\"] {{ color: {dark}; }}\n")),
+        let [areas, lines] = match ink {
+            Ink::Ground => ["rect", "[fill=none]"],
+            _ => [""; 2],
         };
-        format!(
-            "  svg [fill=\"{print}\"]{of_circles} {{ fill: {dark}; }}\n  svg [stroke=\"{print}\"] {{ stroke: {dark}; }}\n{areas}"
-        )
+        let fill = format!("  svg {areas}[fill=\"{print}\"] {{ fill: {dark}; }}\n");
+        format!("{fill}  svg {lines}[stroke=\"{print}\"] {{ stroke: {dark}; }}\n")
     });
-    format!(
-        "@media screen and (prefers-color-scheme: dark) {{\n{}}}\n",
-        rules.concat()
-    )
+    let rules = rules.concat();
+    format!("@media screen and (prefers-color-scheme: dark) {{\n{rules}}}\n")
 }
 
-impl Picture {
-    /// Returns the figure for an HTML page, with the same share of the page width as in print, without external
-    /// references, and with ids that are unique to `place`. `label` is its description for screen readers.
-    pub(crate) fn inline_svg(&self, place: usize, label: &str) -> String {
-        let label = escaped(label).replace('"', "&quot;");
-        let rest = self.svg.find("viewBox").unwrap_or_default();
-        let share = 100.0 * self.share;
-        let inline = format!(
-            "<svg role=\"img\" aria-label=\"{label}\" width=\"{share:.1}%\" {}",
-            &self.svg[rest..]
-        );
-        inline
-            .replace("id=\"c", &format!("id=\"f{place}c"))
-            .replace("url(#c", &format!("url(#f{place}c"))
+/// Size of all text in the layout.
+pub(super) const TEXT: f32 = 11.0;
+/// Points in print (1/72 inch) per point of the layout: text has 8 points.
+const SCALE: f32 = 8.0 / TEXT;
+/// Width of a page in the layout: 510 points in print.
+pub(super) const PAGE_WIDTH: f32 = 510.0 / SCALE;
+
+/// Estimated size of a text, used to reserve room for it.
+pub(super) fn measure(text: &str) -> Vec2 {
+    let width = |character: char| match character {
+        '.' | ',' | ' ' => 0.3,
+        '0'..='9' | '−' => 0.63,
+        _ => 0.57,
+    };
+    Vec2::new(text.chars().map(width).sum(), 1.2) * TEXT
+}
+
+/// A drawing of shapes.
+pub(super) struct Canvas {
+    size: Vec2,
+    body: String,
+    clips: usize,
+}
+
+impl Canvas {
+    pub fn new(size: Vec2) -> Self {
+        let (body, clips) = (String::new(), 0);
+        Self { size, body, clips }
     }
+
+    /// Draws shapes in their order.
+    pub fn draw(&mut self, shapes: impl IntoIterator<Item = Shape>) {
+        for shape in shapes {
+            let element = match shape {
+                Shape::Line(points, stroke) => {
+                    let (path, style) = (coordinates(&points), stroke_style(&stroke));
+                    format!(r#"<path d="M{path}" fill="none"{style}/>"#)
+                }
+                Shape::Area(corners, colour) => {
+                    // A hairline in its own colour closes the seam of an area to its neighbours; a translucent area has crisp
+                    // edges instead, because the hairlines would be visible.
+                    let edge = match colour.opacity < 1.0 {
+                        true => r#" shape-rendering="crispEdges""#.to_owned(),
+                        false => paint("stroke", colour),
+                    };
+                    let (path, fill) = (coordinates(&corners), paint("fill", colour));
+                    format!(r#"<path d="M{path}z"{fill}{edge}/>"#)
+                }
+                Shape::Disc(at, radius, colour) => circle(at, radius, &paint("fill", colour)),
+                Shape::Ring(at, radius, stroke) => {
+                    circle(at, radius, &format!(r#" fill="none"{}"#, stroke_style(&stroke)))
+                }
+                Shape::Text(at, align, ink, text) => {
+                    // From the middle of the height to the base line.
+                    let below = 0.36 * TEXT;
+                    let [x, right, y, down] = [at.x, at.x + below, at.y, at.y + below].map(number);
+                    let (place, anchor) = match align {
+                        Align::Upright => (format!(r#"transform="translate({right} {y}) rotate(-90)""#), "middle"),
+                        Align::Start => (format!(r#"x="{x}" y="{down}""#), "start"),
+                        Align::Middle => (format!(r#"x="{x}" y="{down}""#), "middle"),
+                        Align::End => (format!(r#"x="{x}" y="{down}""#), "end"),
+                    };
+                    let (fill, text) = (paint("fill", ink.into()), escaped(&text));
+                    format!(r#"<text {place} text-anchor="{anchor}"{fill}>{text}</text>"#)
+                }
+            };
+            self.put(&element);
+        }
+    }
+
+    /// Draws shapes, clipped to `area`.
+    pub fn draw_clipped(&mut self, area: Bounds, shapes: impl IntoIterator<Item = Shape>) {
+        self.clips += 1;
+        let (clip, [x, y]) = (self.clips, area.min.to_array().map(number));
+        let [width, height] = area.size().to_array().map(number);
+        self.put(&format!(
+            r##"<clipPath id="c{clip}"><rect x="{x}" y="{y}" width="{width}" height="{height}"/></clipPath><g clip-path="url(#c{clip})">"##
+        ));
+        self.draw(shapes);
+        self.put("</g>");
+    }
+
+    fn put(&mut self, element: &str) {
+        self.body += element;
+        self.body.push('\n');
+    }
+
+    pub fn finish(self) -> Picture {
+        let [width, height] = self.size.to_array().map(number);
+        let print = self.size * SCALE;
+        let [print_width, print_height] = print.to_array().map(number);
+        let body = self.body;
+        let svg = format!(
+            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{print_width}pt" height="{print_height}pt" viewBox="0 0 {width} {height}" font-family="'Inter Tabular', Inter, Helvetica, Arial, sans-serif" font-size="{TEXT}" stroke-width=".4" stroke-linejoin="round">
+<rect width="{width}" height="{height}" fill="#ffffff"/>
+{body}</svg>
+"##
+        );
+        let share = self.size.x / PAGE_WIDTH;
+        Picture { svg, share }
+    }
+}
+
+/// Formats a length to a hundredth, without trailing zeros.
+fn number(value: f32) -> String {
+    let text = format!("{value:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+fn coordinates(points: &[Vec2]) -> String {
+    let points = points.iter().map(|point| point.to_array().map(number).join(","));
+    Vec::from_iter(points).join(" ")
+}
+
+fn circle(at: Vec2, radius: f32, style: &str) -> String {
+    let [x, y, radius] = [at.x, at.y, radius].map(number);
+    format!(r#"<circle cx="{x}" cy="{y}" r="{radius}"{style}/>"#)
+}
+
+/// Attributes that paint the fill or the stroke.
+fn paint(what: &str, colour: Colour) -> String {
+    let (hex, opacity) = (hex(rgb(colour.ink)), number(colour.opacity));
+    match &*opacity {
+        "1" => format!(r#" {what}="{hex}""#),
+        _ => format!(r#" {what}="{hex}" {what}-opacity="{opacity}""#),
+    }
+}
+
+fn stroke_style(stroke: &Stroke) -> String {
+    let (paint, width) = (paint("stroke", stroke.colour), number(stroke.width));
+    let dashes = stroke.dashes.map_or_else(String::new, |dashes| {
+        format!(r#" stroke-dasharray="{}""#, dashes.map(number).join(" "))
+    });
+    format!(r#"{paint} stroke-width="{width}"{dashes}"#)
+}
+
+fn escaped(text: &str) -> String {
+    // XML does not allow control characters, not even escaped ones.
+    let text = text.replace(is_unprintable, " ");
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -6,10 +6,10 @@ use ndarray::{Array2, ArrayView2};
 use crate::{
     export::NetworkFile,
     figure::{
-        Figure, RegressionLine, TargetSurface, error_histogram_figure, hysteresis_figure, loss_figure,
+        Decoded, Figure, RegressionLine, TargetSurface, histogram_figure, hysteresis_figure, loss_figure,
         regression_figure,
         surface::{Quantity, Surface, SurfaceFigure, ViewMode},
-        target_histogram_figure, target_pairs, target_regression_figure, training_state_figure, z_pairs_mm,
+        training_state_figure, value_pairs,
     },
 };
 use decoupler_core::{
@@ -44,31 +44,32 @@ pub(super) fn pictures(
         "Gradient and the method's own quantities.".to_owned(),
         training_state_figure(&training.history, &training.stages).into(),
     );
+    let mut add_errors = |index: Option<usize>, of: Decoded<'_>, captions: [String; 2]| {
+        let pairs = value_pairs(test, answers, index);
+        let line = RegressionLine::of(pairs.iter().copied());
+        let [regression, histogram] = captions;
+        add(
+            regression,
+            regression_figure((pairs.len(), &|pair| pairs[pair]), &line, of).into(),
+        );
+        add(histogram, histogram_figure(&pairs, None, of).into());
+    };
     if of_array.is_some() {
-        let pairs_mm = z_pairs_mm(test, answers);
-        add(
-            "Distribution of the z errors of the test set.".to_owned(),
-            error_histogram_figure(&pairs_mm, None).into(),
-        );
-        add(
-            "Decoupled against actual z of the nodes of the test set.".to_owned(),
-            regression_figure(&pairs_mm).into(),
-        );
+        let captions = [
+            "Decoupled against actual z of the nodes of the test set.",
+            "Distribution of the z errors of the test set.",
+        ];
+        add_errors(None, Decoded::Nodes, captions.map(str::to_owned));
         return pictures;
     }
     let targets = || file.problem.targets.iter().take(MAX_TARGETS);
     for (index, target) in targets().enumerate() {
-        let pairs = target_pairs(test, answers, index);
-        let line = RegressionLine::of(pairs.iter().copied());
-        let (name, unit) = (&target.name, target.unit.as_deref());
-        add(
+        let name = &target.name;
+        let captions = [
             format!("Decoded against actual values of {name} in the test set."),
-            target_regression_figure((pairs.len(), &|sample| pairs[sample]), &line, name, unit).into(),
-        );
-        add(
             format!("Distribution of the errors of {name} in the test set."),
-            target_histogram_figure(&pairs, None, target).into(),
-        );
+        ];
+        add_errors(Some(index), Decoded::Target(target), captions);
     }
     for (target, found) in targets().zip(loops) {
         if let Some(found) = found {

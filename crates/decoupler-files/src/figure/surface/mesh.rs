@@ -1,171 +1,149 @@
-//! The height field as one mesh, painted from far to near: near parts hide far ones.
+//! The height field as one mesh with contour lines, painted from far to near: near parts hide far ones.
 
 use std::ops::RangeInclusive;
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2};
 
-use super::{
-    camera::{Shade, Sight},
-    cut::{cross_cell, cut_cell, plateau_marks},
-    field::{CellPart, Field},
-};
+use super::{Surface, ViewMode, camera::Sight};
 use crate::figure::{
     axis::{multiples, step_for},
-    colour_map::{ColourMap, Rgb, is_light},
-    drawing::{Ink, Shape},
+    colour_map::{ColourMap, is_light},
+    drawing::{Colour, Ink, Shape},
 };
 
 const CONTOUR_LEVELS: usize = 10;
 const CONTOUR_OPACITY: f32 = 0.34;
 /// Opacity of the hatching and the rim of a plateau.
 const HATCH_OPACITY: f32 = 0.5;
-
-/// A piece of a contour line or of hatching, about one point wide.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContourLine {
-    /// First end.
-    pub from: Vec2,
-    /// Second end.
-    pub to: Vec2,
-    /// Black on light colours, white on dark ones.
-    pub is_black: bool,
-    /// 1 is opaque.
-    pub opacity: f32,
-}
+/// Approximate number of hatching lines along the longer side of a surface.
+const HATCHES: usize = 22;
 
 /// The surface with its contour lines.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
-    /// The grid points, `x points × y points`, followed by the corners of cells cut at the ends of the value axis.
+    /// The grid points, `x points × y points`.
     pub vertices: Vec<Vertex>,
-    /// Corners of the cells and of the pieces of cut cells in the order of painting, each going round; a triangle has its
-    /// last one twice.
-    cells: Vec<[usize; 4]>,
-    /// Contour lines in the order of painting.
-    lines: Vec<ContourLine>,
-    /// End of each strip of cells and of its lines.
-    strips: Vec<[usize; 2]>,
+    /// In the order of painting.
+    pub pieces: Vec<Piece>,
     /// True if a part of the surface is beyond the box and drawn at its edge.
     pub(super) has_plateau: bool,
 }
 
+/// A point of the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vertex {
+    /// Position on the screen.
+    pub at: Vec2,
+    /// Its colour under the light: opaque within the nodes' rectangle, fading towards the rim of the extrapolated margin.
+    pub colour: Colour,
+}
+
+/// A part of a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Piece {
+    /// A cell by its vertices, going round it.
+    Cell([usize; 4]),
+    /// A piece of a contour line or of hatching, about one point wide.
+    Line([Vec2; 2], Colour),
+}
+
 impl Mesh {
     /// The surface in the colours of `map`.
-    pub(super) fn new(field: &Field<'_>, sight: &Sight, map: &ColourMap) -> Self {
-        let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
+    pub(super) fn new(surface: &Surface, sight: &Sight, map: &ColourMap) -> Self {
+        let (x_mm, y_mm, eye_mm) = (surface.map.grid().x_mm(), surface.map.grid().y_mm(), sight.eye_mm());
         let mut mesh = Self {
-            vertices: vertices(field, sight, map),
-            cells: Vec::with_capacity(x_mm.len() * y_mm.len()),
+            vertices: vertices(surface, sight, map),
             ..Self::default()
         };
-        if mesh.vertices.is_empty() {
-            return mesh;
-        }
-        let eye_mm = sight.eye_mm();
-        let rows = far_to_near(y_mm, eye_mm.y);
-        let levels = contour_levels(&field.range);
-        let mut lineless = Vec::new();
+        let (rows, levels) = (far_to_near(y_mm, eye_mm.y), contour_levels(&surface.usable_range()));
+        // Lines are painted one strip late; the next strip would cover half of their width otherwise.
+        let mut late = Vec::new();
         for ix in far_to_near(x_mm, eye_mm.x) {
-            let mut strip = Vec::with_capacity(rows.len());
+            let mut lines = Vec::new();
             for &iy in &rows {
-                match field.part(ix, iy) {
-                    CellPart::Nothing => continue,
-                    CellPart::Whole | CellPart::Plateau => mesh.cells.push(field.corners(ix, iy)),
-                    CellPart::Cut => mesh.cut(ix, iy, field, sight),
+                let Some(cell_mm) = surface.cell_mm(ix, iy) else {
+                    continue;
+                };
+                let cell = corners(ix, iy).map(|[ix, iy]| surface.map.grid().index(ix, iy));
+                mesh.pieces.push(Piece::Cell(cell));
+                let opacity = cell.map(|corner| mesh.vertices[corner].colour.opacity);
+                let opacity = opacity.into_iter().fold(1.0, f32::min);
+                let mut draw = |ends: [DVec3; 2], strength: f32| {
+                    let is_black = is_light(map.at(surface.share(ends[0].z)));
+                    let ink = if is_black { Ink::BLACK } else { Ink::WHITE };
+                    let ends = ends.map(|end| sight.drawn(surface.drawn(end)));
+                    lines.push(Piece::Line(ends, ink.at(strength * opacity)));
+                };
+                let drawn_mm = cell_mm.map(|corner| surface.drawn(corner));
+                for &level in &levels {
+                    crossings(drawn_mm, level, |ends| draw(ends, CONTOUR_OPACITY));
                 }
-                strip.push((ix, iy));
+                if surface.mode == ViewMode::ThreeD {
+                    // Along the diagonals of every few cells; diagonals of neighbours meet.
+                    let stride = (x_mm.len().max(y_mm.len()) / HATCHES).max(1);
+                    let diagonal = [cell_mm[1], cell_mm[3]];
+                    let is_hatched = (ix + iy).is_multiple_of(stride);
+                    for (end, side) in surface.shown().into_iter().zip([-1.0, 1.0]) {
+                        let is_beyond = |corner: &DVec3| side * (corner.z - end) > 0.0;
+                        mesh.has_plateau |= cell_mm.iter().any(is_beyond);
+                        crossings(cell_mm, end, |ends| draw(ends, HATCH_OPACITY));
+                        if is_hatched && diagonal.iter().all(is_beyond) {
+                            draw(diagonal, HATCH_OPACITY);
+                        }
+                    }
+                }
             }
-            // Lines are painted one strip late; the next strip would cover half of their width otherwise.
-            mesh.end_strip(&lineless, field, sight, (&levels, map));
-            lineless = strip;
+            mesh.pieces.append(&mut late);
+            late = lines;
         }
-        mesh.end_strip(&lineless, field, sight, (&levels, map));
+        mesh.pieces.append(&mut late);
         mesh
     }
 
-    /// Appends the part of a cell within the box.
-    fn cut(&mut self, ix: usize, iy: usize, field: &Field<'_>, sight: &Sight) {
-        let of_cell = field.corners(ix, iy).map(|corner| self.vertices[corner]);
-        let (low, high) = (*field.shown().start(), *field.shown().end());
-        let keeps_plateau = field.keeps_plateau(ix, iy);
-        for polygon in cut_cell(field.corners_mm(ix, iy), low, high, keeps_plateau) {
-            let first = self.vertices.len();
-            self.vertices.extend(polygon.iter().map(|corner| Vertex {
-                at: sight.drawn(corner.place),
-                ..mixed(&of_cell, corner.shares)
-            }));
-            let last = polygon.len() - 1;
-            for second in (1..last).step_by(2) {
-                let corners = [0, second, second + 1, (second + 2).min(last)];
-                self.cells.push(corners.map(|corner| first + corner));
-            }
-        }
-    }
-
-    /// Appends the lines in `cells` and ends the strip: contour lines at `levels`, and marks of parts beyond the box.
-    fn end_strip(
-        &mut self,
-        cells: &[(usize, usize)],
-        field: &Field<'_>,
-        sight: &Sight,
-        (levels, map): (&[f64], &ColourMap),
-    ) {
-        let line = |ends: [DVec3; 2], opacity| {
-            let [from, to] = ends.map(|place| sight.drawn(place));
-            ContourLine {
-                from,
-                to,
-                is_black: is_light(map.at(field.share(ends[0].z))),
-                opacity,
-            }
-        };
-        for &(ix, iy) in cells {
-            let contours = self.lines.len();
-            plateau_marks(field, ix, iy, |ends| self.lines.push(line(ends, HATCH_OPACITY)));
-            self.has_plateau |= self.lines.len() > contours;
-            let corners_mm = field.corners_mm(ix, iy);
-            let values = corners_mm.map(|corner| corner.z);
-            let ends = |(low, high): (f64, f64), value: &f64| (low.min(*value), high.max(*value));
-            let (low, high) = values.iter().fold((f64::MAX, f64::MIN), ends);
-            let [a, _, c, _] = field.corners(ix, iy).map(|corner| self.vertices[corner].opacity);
-            for &level in levels.iter().filter(|level| (low..high).contains(level)) {
-                cross_cell(values, level, |ends| {
-                    let ends = ends.map(|(a, b, part)| corners_mm[a].lerp(corners_mm[b], f64::from(part)));
-                    self.lines.push(line(ends, CONTOUR_OPACITY * a.min(c)));
-                });
-            }
-        }
-        self.strips.push([self.cells.len(), self.lines.len()]);
-    }
-
-    /// Cells and contour lines from far to near: each slice of cells is followed by the lines drawn after it.
-    pub fn strips(&self) -> impl Iterator<Item = (&[[usize; 4]], &[ContourLine])> {
-        let starts = std::iter::once(&[0, 0]).chain(&self.strips);
-        starts
-            .zip(&self.strips)
-            .map(|(start, end)| (&self.cells[start[0]..end[0]], &self.lines[start[1]..end[1]]))
-    }
-
-    /// Returns the cells, each in the mean colour of its corners, and the contour lines, from far to near.
+    /// Returns the cells, each in the colour of its first corner, and the lines, in the order of painting.
     pub fn shapes(&self) -> impl Iterator<Item = Shape> {
-        let cell = |cell: &[usize; 4]| {
-            let corners = cell.map(|corner| self.vertices[corner]);
-            let part = |part: usize| corners.iter().map(|corner| u16::from(corner.colour[part])).sum::<u16>() / 4;
-            let colour = Ink::Rgb([0, 1, 2].map(|at| part(at) as u8));
-            let opacity = corners.iter().map(|corner| corner.opacity).sum::<f32>() / 4.0;
-            Shape::Area(corners.map(|corner| corner.at).into(), colour.at(opacity))
-        };
-        let line = |line: &ContourLine| {
-            let ink = if line.is_black { Ink::BLACK } else { Ink::WHITE };
-            Shape::line(line.from, line.to, ink.at(line.opacity), 1.0)
-        };
-        let strips = self.strips();
-        strips.flat_map(move |(cells, lines)| cells.iter().map(cell).chain(lines.iter().map(line)))
+        self.pieces.iter().map(|piece| match *piece {
+            Piece::Cell(cell) => {
+                let corners = cell.map(|corner| self.vertices[corner]);
+                Shape::Area(corners.map(|corner| corner.at).into(), corners[0].colour)
+            }
+            Piece::Line([from, to], colour) => Shape::line(from, to, colour, 1.0),
+        })
     }
+}
 
-    /// Number of cells and of contour lines.
-    pub fn counts(&self) -> [usize; 2] {
-        [self.cells.len(), self.lines.len()]
+/// The grid points at the corners of a cell, going round it.
+pub(super) fn corners(ix: usize, iy: usize) -> [[usize; 2]; 4] {
+    [[ix, iy], [ix + 1, iy], [ix + 1, iy + 1], [ix, iy + 1]]
+}
+
+/// Calls `draw` with the ends of each piece of the contour line at `level` in a cell whose corners go round it (marching
+/// squares).
+fn crossings(corners: [DVec3; 4], level: f64, mut draw: impl FnMut([DVec3; 2])) {
+    let is_low = corners.map(|corner| corner.z < level);
+    if is_low.iter().all(|is| *is == is_low[0]) {
+        return;
+    }
+    let mut ends = [DVec3::ZERO; 4];
+    let mut found = 0;
+    for (side, &a) in corners.iter().enumerate() {
+        let next = (side + 1) % 4;
+        if is_low[side] != is_low[next] {
+            ends[found] = a.lerp(corners[next], (level - a.z) / (corners[next].z - a.z));
+            found += 1;
+        }
+    }
+    let [w, x, y, z] = ends;
+    // At a saddle the value in the middle decides which corners are connected.
+    let middle_is_low = || corners.iter().map(|corner| corner.z).sum::<f64>() < 4.0 * level;
+    if found == 2 {
+        draw([w, x]);
+    } else if middle_is_low() == is_low[0] {
+        draw([w, x]);
+        draw([y, z]);
+    } else {
+        draw([z, w]);
+        draw([x, y]);
     }
 }
 
@@ -184,71 +162,41 @@ fn far_to_near(points_mm: &[f64], eye_mm: f64) -> Vec<usize> {
     (0..before).chain((before..cells).rev()).collect()
 }
 
-/// Opacity at the start of the extrapolated margin; it fades to 0 at the rim.
-const MARGIN_OPACITY: f32 = 0.6;
-
-/// A point of the surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Vertex {
-    /// Position on the screen.
-    pub at: Vec2,
-    /// Its colour under the light.
-    pub colour: Rgb,
-    /// 1 within the nodes' rectangle; fades towards the rim of the extrapolated margin.
-    pub opacity: f32,
-}
-
 /// One vertex for every grid point, in their order.
-pub(super) fn vertices(field: &Field<'_>, sight: &Sight, map: &ColourMap) -> Vec<Vertex> {
-    let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
-    let across = y_mm.len();
-    let places = field.values.iter().enumerate().map(|(index, &value)| {
-        let (ix, iy) = (index / across, index % across);
-        (ix, iy, DVec3::new(x_mm[ix], y_mm[iy], value))
-    });
-    let vertex = |ix: usize, iy: usize, at: Vec2, value: f64, light: f32| {
-        let beyond = field.beyond(ix, iy);
-        Vertex {
-            at,
-            colour: map.at(field.share(value)).map(|part| (f32::from(part) * light) as u8),
-            opacity: if beyond > 0.0 {
-                MARGIN_OPACITY * (1.0 - beyond).max(0.0).powf(1.3)
-            } else {
-                1.0
-            },
-        }
+fn vertices(surface: &Surface, sight: &Sight, map: &ColourMap) -> Vec<Vertex> {
+    /// Brightness in the shade, and what the light adds.
+    const LIGHT: [f32; 2] = [0.66, 0.38];
+    /// Opacity at the start of the extrapolated margin; it fades to 0 at the rim.
+    const MARGIN_OPACITY: f32 = 0.6;
+    let (nx, ny) = (surface.map.grid().x_mm().len(), surface.map.grid().y_mm().len());
+    let drawn = |ix: usize, iy: usize| surface.drawn(surface.place_mm([ix, iy]));
+    // The light follows the viewer: from above, over the left shoulder.
+    let towards_eye = sight.eye.with_z(0.0).normalize_or(DVec3::X);
+    let left = DVec3::new(towards_eye.y, -towards_eye.x, 0.0);
+    let light = (towards_eye * 0.35 + left * 0.55 + DVec3::Z * 0.9).normalize();
+    // Lambert's law.
+    let lit = |ix: usize, iy: usize| {
+        let slope = |from: DVec3, to: DVec3| (to - from) * sight.plot_box.per_mm;
+        let along_x = slope(drawn(ix.saturating_sub(1), iy), drawn((ix + 1).min(nx - 1), iy));
+        let along_y = slope(drawn(ix, iy.saturating_sub(1)), drawn(ix, (iy + 1).min(ny - 1)));
+        // NaN becomes 0 in `max`, at points that are not drawn.
+        let normal = along_x.cross(along_y).normalize_or(DVec3::Z);
+        LIGHT[0] + LIGHT[1] * normal.dot(light).max(0.0) as f32
     };
-    if sight.is_above {
-        return places
-            .map(|(ix, iy, place)| vertex(ix, iy, sight.drawn(place), place.z, 1.0))
-            .collect();
-    }
-    let plot_box = sight.plot_box;
-    let in_box = |place: DVec3| place.with_z(place.z.clamp(plot_box.min_mm.z, plot_box.max_mm.z));
-    let units: Vec<Vec3> = places
-        .clone()
-        .map(|(_, _, place)| plot_box.unit(in_box(place)))
-        .collect();
-    let shade = Shade::new(&units, across, sight.eye.as_vec3());
-    places
-        .map(|(ix, iy, place)| vertex(ix, iy, sight.drawn(in_box(place)), place.z, shade.at(ix, iy)))
-        .collect()
-}
-
-/// Interpolates a vertex between others by its share of each.
-pub(super) fn mixed(vertices: &[Vertex; 4], shares: [f64; 4]) -> Vertex {
-    let mix = |of: &dyn Fn(&Vertex) -> f32| -> f32 {
-        vertices
-            .iter()
-            .zip(shares)
-            .map(|(vertex, share)| of(vertex) * share as f32)
-            .sum()
+    let vertex = |index: usize| {
+        let (ix, iy) = (index / ny, index % ny);
+        let light = if sight.is_above { 1.0 } else { lit(ix, iy) };
+        let beyond = surface.map.beyond(ix, iy) as f32;
+        let colour = map.at(surface.share(surface.place_mm([ix, iy]).z));
+        let opacity = match beyond > 0.0 {
+            true => MARGIN_OPACITY * (1.0 - beyond).max(0.0).powf(1.3),
+            false => 1.0,
+        };
+        let colour = Ink::Rgb(colour.map(|part| (f32::from(part) * light) as u8)).at(opacity);
+        let at = sight.drawn(drawn(ix, iy));
+        Vertex { at, colour }
     };
-    Vertex {
-        at: Vec2::ZERO,
-        colour: [0, 1, 2].map(|part| mix(&|vertex| f32::from(vertex.colour[part])).round() as u8),
-        opacity: mix(&|vertex| vertex.opacity),
-    }
+    (0..nx * ny).map(vertex).collect()
 }
 
 #[cfg(test)]
@@ -259,7 +207,7 @@ mod tests {
 
     use super::*;
     use crate::figure::drawing::Bounds;
-    use crate::figure::surface::{OrbitCamera, Quantity, Surface, ViewMode, camera::PlotBox};
+    use crate::figure::surface::{Drawing, OrbitCamera, Quantity, camera::PlotBox};
 
     /// Returns the distance from the eye to a triangle at a place on the screen; `None` outside it.
     fn distance_at(place: Vec2, corners: [(Vec2, f32); 3]) -> Option<f32> {
@@ -295,30 +243,31 @@ mod tests {
             mode: ViewMode::ThreeD,
             colours: Default::default(),
         };
-        let (field, colours) = (Field::new(&surface), surface.colours.colours());
-        let (min_mm, max_mm) = field.box_mm();
-        let plot_box = PlotBox::new(min_mm, max_mm, 1.0);
+        let colours = surface.colours.colours();
+        let [min_mm, max_mm] = surface.box_mm();
+        let plot_box = PlotBox::new([min_mm, max_mm], 1.0);
         let screen = Bounds::of([Vec2::ZERO, Vec2::splat(400.0)]);
         let mut hidden = 0;
         for turn in 0..6 {
             let camera = OrbitCamera::default().dragged(140.0 * turn as f32, 12.0 * turn as f32 - 40.0);
             let sight = Sight::fit(plot_box, Some(camera), screen);
-            let mesh = Mesh::new(&field, &sight, colours);
+            let mesh = Mesh::new(&surface, &sight, colours);
             let distance = |index: usize| {
-                let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
-                let z = field.values[index].clamp(min_mm.z, max_mm.z);
+                let (x_mm, y_mm) = (surface.map.grid().x_mm(), surface.map.grid().y_mm());
+                let z = surface.values[index].clamp(min_mm.z, max_mm.z);
                 let place = DVec3::new(x_mm[index / y_mm.len()], y_mm[index % y_mm.len()], z);
-                plot_box.unit(place).distance(sight.eye.as_vec3())
+                plot_box.unit(place).distance(sight.eye) as f32
             };
-            let corners: Vec<(Vec2, f32)> = (0..field.values.len())
+            let corners: Vec<(Vec2, f32)> = (0..surface.values.len())
                 .map(|index| (mesh.vertices[index].at, distance(index)))
                 .collect();
             for probe in 0..100 {
                 let place = Vec2::new(20.3 + 39.7 * (probe / 10) as f32, 20.7 + 39.1 * (probe % 10) as f32);
-                let cells = mesh.strips().flat_map(|(cells, _)| cells);
-                // Cells cut at the ends of the axis have additional corners.
-                let whole = cells.filter(|cell| cell.iter().all(|corner| *corner < field.values.len()));
-                let painted = whole.flat_map(|cell| {
+                let cells = mesh.pieces.iter().filter_map(|piece| match piece {
+                    Piece::Cell(cell) => Some(cell),
+                    Piece::Line(..) => None,
+                });
+                let painted = cells.flat_map(|cell| {
                     let [a, b, c, d] = cell.map(|corner| corners[corner]);
                     [[a, b, c], [a, c, d]]
                         .into_iter()
@@ -365,5 +314,121 @@ mod tests {
         ] {
             assert_eq!(far_to_near(&points, eye), order, "{sentence}");
         }
+    }
+
+    /// A flat sheet at height 5 over 6 × 6 nodes, whose middle overshoots to `top`.
+    fn overshot(top: f64, mode: ViewMode) -> Surface {
+        let places: Vec<f64> = (0..6).map(f64::from).collect();
+        let map = Arc::new(SurfaceMap::new(&places, &places).expect("a lattice"));
+        let is_middle = |node: usize| (2..4).contains(&(node / 6)) && (2..4).contains(&(node % 6));
+        let heights: Vec<f64> = (0..36).map(|node| if is_middle(node) { top } else { 5.0 }).collect();
+        let values = map.evaluate(&heights);
+        let node = |node: usize| DVec3::new(places[node / 6], places[node % 6], heights[node]);
+        Surface {
+            title: String::new(),
+            values: values.into(),
+            nodes: (0..36).map(node).collect(),
+            map,
+            quantity: Quantity::Height,
+            range: 4.0..=5.0,
+            mode,
+            colours: Default::default(),
+        }
+    }
+
+    fn laid_out(surface: &Surface) -> Drawing {
+        let card = Bounds::of_size(Vec2::ZERO, Vec2::splat(400.0));
+        let measure = |text: &str| Vec2::new(6.0 * text.chars().count() as f32, 14.0);
+        surface.lay_out(OrbitCamera::default(), card, &measure, surface.colours.colours())
+    }
+
+    /// Returns true if any painted piece of the surface covers a place of the screen.
+    fn covers(drawing: &Drawing, place: Vec2) -> bool {
+        let mesh = &drawing.mesh;
+        let covers = |corners: [Vec2; 3]| {
+            let [a, b, c] = corners;
+            let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| (to - from).perp_dot(place - from));
+            sides.iter().all(|side| *side >= 0.0) || sides.iter().all(|side| *side <= 0.0)
+        };
+        mesh.pieces.iter().any(|piece| match piece {
+            Piece::Cell(cell) => {
+                let [a, b, c, d] = cell.map(|corner| mesh.vertices[corner].at);
+                covers([a, b, c]) || covers([a, c, d])
+            }
+            Piece::Line(..) => false,
+        })
+    }
+
+    #[test]
+    fn an_overshoot_leaves_no_hole_and_is_marked() {
+        for (top, mode) in [(5.6, ViewMode::ThreeD), (3.4, ViewMode::ThreeD), (5.6, ViewMode::Top)] {
+            let surface = overshot(top, mode);
+            let drawing = laid_out(&surface);
+            let end = if top > 5.0 { 5.08 } else { 3.92 };
+            for step in 0..121 {
+                let place = DVec3::new(2.0 + 0.1 * f64::from(step / 11), 2.0 + 0.1 * f64::from(step % 11), end);
+                let at = drawing.sight.point(place).as_vec2();
+                assert!(covers(&drawing, at), "{top} {mode:?}: a hole at {place}");
+            }
+            let note = drawing.note.unwrap_or_default();
+            assert_eq!(note.contains("hatched"), mode == ViewMode::ThreeD, "{note}");
+        }
+    }
+
+    #[test]
+    fn only_the_plateau_is_hatched() {
+        let surface = overshot(5.6, ViewMode::ThreeD);
+        let drawing = laid_out(&surface);
+        let mut marks = 0;
+        for piece in &drawing.mesh.pieces {
+            let Piece::Line(ends, colour) = piece else { continue };
+            if colour.opacity < HATCH_OPACITY {
+                continue;
+            }
+            marks += 1;
+            for end in ends {
+                let place = drawing.sight.ray(end.as_dvec2()).at_level(5.08).unwrap();
+                let near = |at: f64| (1.0..=4.0).contains(&at);
+                assert!(near(place.x) && near(place.y), "{place} is not near the overshoot");
+            }
+        }
+        assert!(marks > 20, "{marks}");
+        let within = overshot(5.05, ViewMode::ThreeD);
+        assert!(laid_out(&within).note.is_none(), "within the box there is no overshoot");
+    }
+
+    fn pieces(values: [f64; 4]) -> Vec<[DVec3; 2]> {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let mut pieces = Vec::new();
+        let corner = |at: usize| DVec3::new(corners[at][0], corners[at][1], values[at]);
+        crossings([0, 1, 2, 3].map(corner), 0.5, |piece| pieces.push(piece));
+        pieces
+    }
+
+    #[test]
+    fn a_slope_is_crossed_once() {
+        let along_y = [DVec3::new(0.5, 0.0, 0.5), DVec3::new(0.5, 1.0, 0.5)];
+        assert_eq!(pieces([0.0, 1.0, 1.0, 0.0]), [along_y]);
+        assert!(pieces([0.0, 0.1, 0.2, 0.3]).is_empty());
+    }
+
+    #[test]
+    fn a_saddle_is_crossed_twice_around_its_lower_or_upper_corners() {
+        let near = |piece: &[DVec3; 2], corner: [f64; 2]| {
+            let middle = (0.5 * (piece[0] + piece[1])).truncate();
+            middle.distance(corner.into()) < 0.5
+        };
+        // Middle low: the high corners 1 and 3 are cut off.
+        let low = pieces([0.0, 0.8, 0.0, 0.8]);
+        assert!(
+            low.len() == 2 && near(&low[0], [1.0, 0.0]) && near(&low[1], [0.0, 1.0]),
+            "{low:?}"
+        );
+        // Middle high: the low corners 0 and 2 are.
+        let high = pieces([0.1, 1.0, 0.1, 1.0]);
+        assert!(
+            high.len() == 2 && near(&high[0], [0.0, 0.0]) && near(&high[1], [1.0, 1.0]),
+            "{high:?}"
+        );
     }
 }

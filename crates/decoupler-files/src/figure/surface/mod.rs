@@ -1,36 +1,41 @@
 //! Surfaces in space or from above.
 //!
-//! A [`SurfaceFigure`] describes a picture of surfaces. Each [`Surface`] of it lays itself out in a [`Card`] as a
+//! A [`SurfaceFigure`] describes a picture of surfaces. Each [`Surface`] of it lays itself out in a card as a
 //! [`Drawing`]: shapes and a mesh in the order of painting. A renderer only has to paint them.
 //!
-//! `camera` maps millimetres to points on the screen and back; `box_axes` lays out the axes with their ticks, and `drawing`
-//! places the labels. `field` is the surface on its grid and `mesh` the same with contour lines, from far to near; `cut`
-//! cuts it at the ends of the value axis and along a wire. `nodes` are the dots on it, and `pick` finds the place on the
-//! surface under a point of the screen.
+//! `camera` maps millimetres to points on the screen and back; `axes` lays out the axes with their ticks and labels.
+//! `mesh` is the surface with contour lines, from far to near; `section` cuts it along a wire. `nodes` are the dots on it,
+//! and find the place on the surface under a point of the screen.
 
-mod box_axes;
+mod axes;
 mod camera;
-mod cut;
-mod drawing;
-mod field;
 mod mesh;
 mod nodes;
-mod pick;
+mod section;
 
 pub use camera::{OrbitCamera, Ray, Sight};
-pub use cut::{Section, SectionLine};
-pub use drawing::{Card, Drawing};
-pub use field::{ColourScale, Quantity};
-pub use mesh::{ContourLine, Mesh, Vertex};
+pub use mesh::{Mesh, Piece, Vertex};
 pub use nodes::Dots;
+pub use section::{Section, SectionLine, SectionNodes, section_figure};
 
 use std::{ops::RangeInclusive, sync::Arc};
 
-use decoupler_core::surface::SurfaceMap;
-use glam::DVec3;
+use decoupler_core::{
+    surface::SurfaceMap,
+    text::{counted, format_number},
+};
+use glam::{DVec3, Vec2};
 use serde::{Deserialize, Serialize};
 
-use crate::figure::colour_map::SequentialMap;
+use super::{
+    axis::PlotAxis,
+    colour_map::{ColourMap, SequentialMap},
+    drawing::{Bounds, Measure, Shape, lay_out_scale},
+    extremes, titled, unique_by, with_unit,
+};
+use axes::Axes;
+use camera::PlotBox;
+use mesh::corners;
 
 /// View of a surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -86,24 +91,172 @@ impl Surface {
         }
     }
 
-    /// Colours of the values.
-    pub fn scale(&self) -> ColourScale {
-        ColourScale {
-            quantity: self.quantity.clone(),
-            range: self.range.clone(),
-            colours: self.colours,
-        }
+    /// Width of a colour scale with its numbers, in points.
+    pub const SCALE_WIDTH: f32 = 72.0;
+
+    /// Lays the colour scale out in `area` in the colours of `map`; empty if the area or the range is too small.
+    pub fn lay_out_scale(&self, area: Bounds, map: &ColourMap, measure: Measure<'_>) -> Vec<Shape> {
+        let margin = Vec2::new(0.0, 14.0);
+        let area = Bounds::of([area.min + margin, area.max - margin]);
+        let axis = PlotAxis::linear(self.quantity.axis_name());
+        lay_out_scale(area, &axis, &self.range, map, measure)
+    }
+
+    /// Returns what determines the colour of a value.
+    pub fn scale(&self) -> (&Quantity, &RangeInclusive<f64>, SequentialMap) {
+        (&self.quantity, &self.range, self.colours)
     }
 
     /// Returns `true` if both look the same. Values are compared by their address in memory, which is fast.
     pub fn looks_like(&self, other: &Self) -> bool {
-        let bits = |surface: &Self| [*surface.range.start(), *surface.range.end()].map(f64::to_bits);
         Arc::ptr_eq(&self.map, &other.map)
             && Arc::ptr_eq(&self.values, &other.values)
             && Arc::ptr_eq(&self.nodes, &other.nodes)
-            && self.quantity == other.quantity
-            && (self.mode, self.colours, bits(self)) == (other.mode, other.colours, bits(other))
+            && (self.mode, self.usable_range()) == (other.mode, other.usable_range())
+            && (self.colours, &self.quantity) == (other.colours, &other.quantity)
     }
+
+    /// Returns the range of its nodes: "z 4.00 to 5.00 mm".
+    pub fn range_text(&self) -> String {
+        match self.extremes() {
+            Some((low, high)) => self.quantity.range_text(low.z, high.z),
+            None => "no values".to_owned(),
+        }
+    }
+
+    /// Returns the lowest and the highest node.
+    fn extremes(&self) -> Option<(&DVec3, &DVec3)> {
+        let finite = self.nodes.iter().filter(|node| node.is_finite());
+        extremes(finite, |node| node.z)
+    }
+
+    /// Describes the surface: the range of its nodes, and the place furthest from rest.
+    pub fn summary(&self) -> String {
+        let (range, nodes) = (self.range_text(), counted(self.nodes.len(), "node"));
+        let Some((lowest, highest)) = self.extremes() else {
+            return range;
+        };
+        if lowest.z == highest.z {
+            return format!("{range}, the same at {nodes}");
+        }
+        let (what, furthest) = match self.quantity {
+            Quantity::Height => ("lowest", lowest),
+            Quantity::Sensitivity | Quantity::Target(_) => ("largest", highest),
+            Quantity::Error | Quantity::Pattern | Quantity::TargetError(_) => {
+                let furthest = if -lowest.z > highest.z { lowest } else { highest };
+                ("furthest from zero", furthest)
+            }
+        };
+        let [x, y] = [furthest.x, furthest.y].map(|place_mm| format_number(place_mm).replace('-', "−"));
+        format!("{range} over {nodes}, {what} at x {x}, y {y} mm")
+    }
+
+    /// Lays the surface out in `card`, as `camera` sees it, with its values in these colours.
+    pub fn lay_out(&self, camera: OrbitCamera, card: Bounds, measure: Measure<'_>, colours: &ColourMap) -> Drawing {
+        let (plot_box, camera) = match self.mode {
+            ViewMode::ThreeD => {
+                let room = (card.size() - LABELS).max(Vec2::ONE);
+                (PlotBox::new(self.box_mm(), room.y / room.x), Some(camera))
+            }
+            ViewMode::Top => (PlotBox::flat(self.box_mm()), None),
+        };
+        let names = ["x (mm)", "y (mm)", &self.quantity.axis_name()];
+        let (inner, range) = (card.grown(-EDGE), self.usable_range());
+        let axes = Axes::new(measure, inner, plot_box, camera, &range, names);
+        let sight = axes.sight;
+        let (mesh, dots) = match self.values.len() == self.map.grid().len() {
+            true => (Mesh::new(self, &sight, colours), Dots::new(self, &sight)),
+            false => Default::default(),
+        };
+        let mut frame = axes.lines;
+        frame.extend(axes.labels.shapes());
+        let note = match (mesh.has_plateau, dots.beyond()) {
+            (false, 0) => None,
+            (true, 0) => Some("Beyond the axes: hatched".to_owned()),
+            (true, nodes) => Some(format!("Beyond the axes: hatched, {}", counted(nodes, "node"))),
+            (false, 1) => Some("1 node beyond the axes is drawn at their edge".to_owned()),
+            (false, nodes) => Some(format!("{nodes} nodes beyond the axes are drawn at their edge")),
+        };
+        Drawing {
+            frame,
+            mesh,
+            dots,
+            sight,
+            note,
+        }
+    }
+
+    /// Returns the values at the ends of the colours and of the value axis: a range of non-zero width for any input.
+    fn usable_range(&self) -> RangeInclusive<f64> {
+        match (*self.range.start(), *self.range.end()) {
+            (low, high) if !(low.is_finite() && high.is_finite()) => 0.0..=1.0,
+            (low, high) if high - low > 1e-9 * low.abs().max(1e-3) => low..=high,
+            (low, _) => low - 0.5..=low + 0.5,
+        }
+    }
+
+    /// Returns the lowest and the highest value in the box, which has room for overshoots.
+    fn shown(&self) -> [f64; 2] {
+        let range = self.usable_range();
+        let headroom = 0.08 * (range.end() - range.start());
+        [range.start() - headroom, range.end() + headroom]
+    }
+
+    /// Returns two corners of the box: the extent of the grid, and the range of values.
+    pub(super) fn box_mm(&self) -> [DVec3; 2] {
+        let (x_mm, y_mm) = (self.map.grid().x_mm(), self.map.grid().y_mm());
+        let (last_x, last_y) = (x_mm[x_mm.len() - 1], y_mm[y_mm.len() - 1]);
+        let [low, high] = self.shown();
+        [DVec3::new(x_mm[0], y_mm[0], low), DVec3::new(last_x, last_y, high)]
+    }
+
+    /// Position of a value on the scale of colours.
+    pub(super) fn share(&self, value: f64) -> f32 {
+        let range = self.usable_range();
+        ((value - range.start()) / (range.end() - range.start())) as f32
+    }
+
+    /// Returns the position at which a place of the surface is drawn: in space, beyond the box, at its edge.
+    pub(super) fn drawn(&self, place_mm: DVec3) -> DVec3 {
+        let [low, high] = self.shown();
+        match self.mode {
+            ViewMode::ThreeD => place_mm.with_z(place_mm.z.clamp(low, high)),
+            ViewMode::Top => place_mm,
+        }
+    }
+
+    /// Returns the place of a grid point; its value is NaN in a gap.
+    pub(super) fn place_mm(&self, [ix, iy]: [usize; 2]) -> DVec3 {
+        let grid = self.map.grid();
+        let value = self.values.get(grid.index(ix, iy)).copied();
+        DVec3::new(grid.x_mm()[ix], grid.y_mm()[iy], value.unwrap_or(f64::NAN))
+    }
+
+    /// Returns the places of the corners of a cell, going round it; `None` in a gap.
+    pub(super) fn cell_mm(&self, ix: usize, iy: usize) -> Option<[DVec3; 4]> {
+        let corners = corners(ix, iy).map(|corner| self.place_mm(corner));
+        corners.iter().all(|corner| corner.z.is_finite()).then_some(corners)
+    }
+}
+
+/// Usual size of the labels of a box, in points.
+const LABELS: Vec2 = Vec2::new(72.0, 56.0);
+/// Free edge of a card, in points.
+const EDGE: f32 = 8.0;
+
+/// A laid-out surface, in the order of painting.
+#[derive(Clone, Debug)]
+pub struct Drawing {
+    /// The frame with its ticks, numbers and names.
+    pub frame: Vec<Shape>,
+    /// The surface.
+    pub mesh: Mesh,
+    /// The nodes.
+    pub dots: Dots,
+    /// From points on the screen back to millimetres.
+    pub sight: Sight,
+    /// Note on parts beyond the axes and how they are drawn.
+    pub note: Option<String>,
 }
 
 /// Surfaces side by side, seen by one camera.
@@ -125,36 +278,80 @@ impl SurfaceFigure {
     /// Gives surfaces of the same quantity a common scale, which makes colours and heights comparable.
     #[must_use]
     pub fn with_common_scales(mut self) -> Self {
-        let scales = self.scales();
+        let surfaces = self.surfaces.clone();
         for surface in &mut self.surfaces {
-            let alike = scales.iter().filter(|scale| scale.quantity == surface.quantity);
-            let union =
-                |a: RangeInclusive<f64>, b: RangeInclusive<f64>| a.start().min(*b.start())..=a.end().max(*b.end());
-            let range = alike.map(|scale| scale.range.clone()).reduce(union);
-            surface.range = range.unwrap_or(0.0..=1.0);
+            let alike = surfaces.iter().filter(|other| other.quantity == surface.quantity);
+            for Surface { range, .. } in alike {
+                let low = surface.range.start().min(*range.start());
+                surface.range = low..=surface.range.end().max(*range.end());
+            }
         }
         self
     }
 
-    /// Returns the different colour scales, from left to right.
-    pub fn scales(&self) -> Vec<ColourScale> {
-        let mut scales: Vec<ColourScale> = Vec::new();
-        for scale in self.surfaces.iter().map(Surface::scale) {
-            if !scales.contains(&scale) {
-                scales.push(scale);
-            }
-        }
-        scales
+    /// Returns the first surface with each colour scale, from left to right.
+    pub fn scales(&self) -> Vec<&Surface> {
+        unique_by(self.surfaces.iter(), |surface| surface.scale())
     }
 
     /// Returns the note common to all surfaces: "Between the nodes: bilinear."
     pub fn note(&self) -> String {
-        let mut kinds: Vec<&str> = Vec::new();
-        for kind in self.surfaces.iter().map(|surface| surface.map.interpolation()) {
-            if !kinds.contains(&kind) {
-                kinds.push(kind);
-            }
+        let kinds = self.surfaces.iter().map(|surface| surface.map.interpolation());
+        format!("Between the nodes: {}.", unique_by(kinds, |kind| *kind).join("; "))
+    }
+}
+
+/// Quantity that a surface shows, which determines its colours.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Heights.
+    Height,
+    /// Errors, diverging about zero.
+    Error,
+    /// A deformation pattern of arbitrary scale, diverging about zero.
+    Pattern,
+    /// Change of the readings with each node.
+    Sensitivity,
+    /// Values of measured targets in their unit, if that is known.
+    Target(Option<Arc<str>>),
+    /// Errors of measured targets in their unit, diverging about zero.
+    TargetError(Option<Arc<str>>),
+}
+
+impl Quantity {
+    /// Returns the name and the unit.
+    fn name_and_unit(&self) -> (&'static str, Option<&str>) {
+        match self {
+            Self::Height => ("z", Some("mm")),
+            Self::Error => ("error", Some("mm")),
+            Self::Pattern => ("pattern", None),
+            Self::Sensitivity => ("sensitivity", Some("per mm")),
+            Self::Target(unit) => ("value", unit.as_deref()),
+            Self::TargetError(unit) => ("error", unit.as_deref()),
         }
-        format!("Between the nodes: {}.", kinds.join("; "))
+    }
+
+    /// Name of the value axis, with its unit.
+    pub fn axis_name(&self) -> String {
+        match (self, self.name_and_unit()) {
+            (Self::Sensitivity, _) => "1/mm".to_owned(),
+            (_, (name, unit)) => titled(name, unit),
+        }
+    }
+
+    /// Returns the range from `low` to `high` as text, with the unit: "z 4.00 to 5.00 mm".
+    fn range_text(&self, low: f64, high: f64) -> String {
+        let (name, unit) = self.name_and_unit();
+        let text = |value: f64| match self {
+            Self::Height | Self::Error => format!("{value:.2}"),
+            _ => format_number(value),
+        };
+        let [low, high] = [low, high].map(|end| text(end).replace('-', "−"));
+        with_unit(format!("{name} {low} to {high}"), unit)
+    }
+
+    /// Returns `true` if the colours diverge from zero.
+    pub fn is_diverging(&self) -> bool {
+        matches!(self, Self::Error | Self::Pattern | Self::TargetError(_))
     }
 }

@@ -1,0 +1,314 @@
+//! Sections of surfaces along a wire, and their figure.
+
+use std::ops::RangeInclusive;
+
+use decoupler_core::{
+    surface::{Grid, SurfaceMap},
+    text::{capitalised, format_number},
+};
+use glam::{DVec3, Vec2};
+
+use super::{Surface, camera::Sight};
+use crate::figure::{
+    Hue, LineStyle, Look, Marker,
+    axis::PlotAxis,
+    drawing::{Ink, Shape, Stroke},
+    plot::{LineAt, Plot, PlotFigure, PlotPoint, Series, unbroken},
+};
+
+/// Wire along which surfaces are cut, by its number from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SectionLine {
+    /// Along y, through the nodes of the row-wire.
+    RowWire(usize),
+    /// Along x, above the column-wire.
+    ColumnWire(usize),
+}
+
+/// Vertical plane along a wire.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Section {
+    /// The wire.
+    pub line: SectionLine,
+    /// x of a row-wire, y of a column-wire.
+    pub at_mm: f64,
+}
+
+impl SectionLine {
+    /// Returns its name: "row-wire 3".
+    pub fn name(self) -> String {
+        match self {
+            Self::RowWire(row) => format!("row-wire {}", row + 1),
+            Self::ColumnWire(column) => format!("column-wire {}", column + 1),
+        }
+    }
+}
+
+impl Section {
+    /// Returns the curve in which the plane cuts the surface of these `values` on a grid, linear between its points as the
+    /// surface is drawn; empty if it misses the grid.
+    pub fn curve_mm(&self, grid: &Grid, values: &[f64]) -> Vec<DVec3> {
+        let is_row = matches!(self.line, SectionLine::RowWire(_));
+        let (across, along) = across_and_along(is_row, grid.x_mm(), grid.y_mm());
+        let Some(before) = cell(across, self.at_mm).filter(|_| values.len() == grid.len()) else {
+            return Vec::new();
+        };
+        let share = (self.at_mm - across[before]) / (across[before + 1] - across[before]);
+        let points = along.iter().enumerate().map(|(at, &at_mm)| {
+            let value = |across| {
+                let (ix, iy) = across_and_along(is_row, across, at);
+                values[grid.index(ix, iy)]
+            };
+            // At a grid point, where a wire through the nodes is up to rounding, a gap next to it does not matter.
+            let height = match share {
+                ..1e-9 => value(before),
+                0.999_999_999.. => value(before + 1),
+                _ => (1.0 - share) * value(before) + share * value(before + 1),
+            };
+            let (x, y) = across_and_along(is_row, self.at_mm, at_mm);
+            DVec3::new(x, y, height)
+        });
+        points.collect()
+    }
+
+    /// Returns the curve along the surface as it is drawn, in several pieces if it has gaps.
+    pub fn shapes(&self, surface: &Surface, sight: &Sight) -> Vec<Shape> {
+        let curve = self.curve_mm(surface.map.grid(), &surface.values).into_iter();
+        let drawn = curve.map(|place| place.z.is_finite().then(|| sight.drawn(surface.drawn(place))));
+        let shapes = unbroken(drawn).flat_map(|points: Vec<Vec2>| {
+            let under = Stroke::new(Ink::Ground.at(0.7), 3.5);
+            let over = Stroke::new(Hue::Orange, 1.8);
+            [Shape::Line(points.clone(), under), Shape::Line(points, over)]
+        });
+        shapes.collect()
+    }
+}
+
+/// Returns what is across and what is along the curve, given x and y; or the other way round.
+fn across_and_along<T>(is_row: bool, x: T, y: T) -> (T, T) {
+    if is_row { (x, y) } else { (y, x) }
+}
+
+/// Returns the cell of an ascending axis that contains a place; `None` outside it.
+pub(super) fn cell(points_mm: &[f64], at_mm: f64) -> Option<usize> {
+    let after = points_mm.partition_point(|point| *point <= at_mm);
+    (after > 0 && at_mm <= points_mm[points_mm.len() - 1]).then(|| (after - 1).min(points_mm.len() - 2))
+}
+
+/// A surface to be cut, with its nodes.
+#[derive(Clone, Copy, Debug)]
+pub struct SectionNodes<'a> {
+    /// Values on the grid of the map, in millimetres.
+    pub values_mm: &'a [f64],
+    /// The nodes row by row; a cut along a row-wire shows those on it.
+    pub nodes_mm: &'a [DVec3],
+}
+
+/// Actual and decoupled z along a wire, with the nodes on it. `rows` are the row-wires read, from 0, and `heights_mm` are
+/// always in view. Sections beyond the nodes are marked as extrapolated.
+pub fn section_figure(
+    section: &Section,
+    map: &SurfaceMap,
+    rows: &[usize],
+    actual: SectionNodes<'_>,
+    decoupled: Option<SectionNodes<'_>>,
+    heights_mm: RangeInclusive<f64>,
+) -> PlotFigure {
+    let (axis, place): (_, fn(&DVec3) -> f64) = match section.line {
+        SectionLine::RowWire(_) => ("y", |place| place.y),
+        SectionLine::ColumnWire(_) => ("x", |place| place.x),
+    };
+    let shown = || {
+        let decoupled = decoupled.map(|surface| ("decoupled", Hue::Blue, Marker::Disc, surface));
+        std::iter::once(("actual", Hue::Grey, Marker::Square, actual)).chain(decoupled)
+    };
+    let curves = shown().map(|(name, hue, _, surface)| {
+        let curve = section.curve_mm(map.grid(), surface.values_mm);
+        let curve = curve.iter().map(|at| [place(at), at.z]);
+        Series::new(name, Look::line(hue, LineStyle::Solid), curve)
+    });
+    let name = section.line.name();
+    let title = capitalised(&name);
+    let nodes = shown().map(|(name, hue, marker, surface)| {
+        let points = on_wire(section.line, rows, surface.nodes_mm).map(|(node, of_row)| {
+            let at = surface.nodes_mm[node];
+            let note = format!("{title}, node {}\n{name} z: {} mm", of_row + 1, format_number(at.z));
+            PlotPoint::from([place(&at), at.z]).of_item(node).noted(note)
+        });
+        Series::new(format!("{name} nodes"), Look::marker(hue, marker), points).listed(None)
+    });
+    let x = PlotAxis::linear(format!("{axis} along {name} (mm)"));
+    let y = PlotAxis::linear("z (mm)").including([*heights_mm.start(), *heights_mm.end()]);
+    let mut plot = Plot::new(x, y, curves.chain(nodes));
+    if plot.keys().is_empty() {
+        let note = format!("{title} lies beyond the nodes: there is no surface above it.");
+        return PlotFigure::new([plot], [note]);
+    }
+    plot.series.extend(beyond(section.line, map));
+    plot.into()
+}
+
+/// The nodes on a row-wire: their numbers among all and on the wire. None for a column-wire, which passes below the surface
+/// between them.
+fn on_wire(line: SectionLine, rows: &[usize], nodes_mm: &[DVec3]) -> impl Iterator<Item = (usize, usize)> + use<> {
+    let row = rows.iter().position(|&row| line == SectionLine::RowWire(row));
+    let per_row = nodes_mm.len() / rows.len().max(1);
+    let on_wire = row.map(|row| (0..per_row).map(move |of_row| (row * per_row + of_row, of_row)));
+    on_wire.into_iter().flatten()
+}
+
+/// The stretches on which the surface is extrapolated.
+fn beyond(line: SectionLine, map: &SurfaceMap) -> impl Iterator<Item = Series> {
+    let grid = map.grid();
+    let (points_mm, inside) = match line {
+        SectionLine::RowWire(_) => (grid.y_mm(), grid.inside_y()),
+        SectionLine::ColumnWire(_) => (grid.x_mm(), grid.inside_x()),
+    };
+    let last = points_mm.len() - 1;
+    let ends = [(0, *inside.start()), (*inside.end(), last)];
+    let bands = ends.into_iter().filter(|(from, to)| from < to);
+    bands.map(|(from, to)| {
+        let at = LineAt::Between([points_mm[from], points_mm[to]]);
+        Series::across("beyond the nodes", at, Hue::Grey, None)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use decoupler_core::surface::SurfaceMap;
+
+    use super::*;
+
+    /// A plane over 3 × 4 nodes, which every interpolation reproduces.
+    fn plane() -> (SurfaceMap, Vec<f64>) {
+        let (x, y) = ([8.0, 9.0, 10.0], [3.0, 5.0, 7.0, 9.0]);
+        let map = SurfaceMap::new(&x, &y).unwrap();
+        let nodes: Vec<f64> = x.iter().flat_map(|x| y.iter().map(move |y| height(*x, *y))).collect();
+        let values = map.evaluate(&nodes);
+        (map, values)
+    }
+
+    fn height(x: f64, y: f64) -> f64 {
+        4.0 + 0.1 * x - 0.03 * y
+    }
+
+    #[test]
+    fn a_plane_is_cut_in_straight_lines() {
+        let (map, values) = plane();
+        for line in [SectionLine::RowWire(0), SectionLine::ColumnWire(4)] {
+            // On nodes, between them, and in the margin beyond them.
+            for at_mm in [9.0, 8.37, 9.999_999, 7.6] {
+                let curve = Section { line, at_mm }.curve_mm(map.grid(), &values);
+                assert!(curve.len() > 20, "{line:?} at {at_mm}");
+                for place in curve {
+                    let fixed = if matches!(line, SectionLine::RowWire(_)) {
+                        place.x
+                    } else {
+                        place.y
+                    };
+                    assert!((fixed - at_mm).abs() < 1e-12);
+                    assert!((place.z - height(place.x, place.y)).abs() < 1e-9, "{place} of {line:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_cut_outside_the_surface_and_a_gap_next_to_a_wire_does_not_matter() {
+        let (map, mut values) = plane();
+        let grid = map.grid();
+        let outside = Section {
+            line: SectionLine::RowWire(0),
+            at_mm: 2.0,
+        };
+        assert!(outside.curve_mm(grid, &values).is_empty());
+        let row = grid.x_mm().iter().position(|x| (x - 9.0).abs() < 1e-9).unwrap();
+        for iy in 0..grid.y_mm().len() {
+            values[grid.index(row + 1, iy)] = f64::NAN;
+        }
+        let on = Section {
+            line: SectionLine::RowWire(1),
+            at_mm: 9.0 + 1e-13,
+        };
+        assert!(on.curve_mm(grid, &values).iter().all(|place| place.z.is_finite()));
+    }
+}
+
+#[cfg(test)]
+mod figure_tests {
+    use super::*;
+
+    const X: [f64; 3] = [8.0, 9.0, 10.0];
+    const Y: [f64; 4] = [3.0, 5.0, 7.0, 9.0];
+
+    fn nodes(height: impl Fn(f64, f64) -> f64) -> Vec<DVec3> {
+        let at = X.iter().flat_map(|&x| Y.iter().map(move |&y| (x, y)));
+        at.map(|(x, y)| DVec3::new(x, y, height(x, y))).collect()
+    }
+
+    fn figure(line: SectionLine, at_mm: f64) -> PlotFigure {
+        let map = SurfaceMap::new(&X, &Y).unwrap();
+        let [actual, decoupled] = [nodes(|x, y| 4.0 + 0.05 * x - 0.02 * y), nodes(|_, y| 4.5 - 0.01 * y)];
+        let values =
+            [&actual, &decoupled].map(|nodes| map.evaluate(&nodes.iter().map(|node| node.z).collect::<Vec<_>>()));
+        let cut = |place: usize, nodes| SectionNodes {
+            values_mm: &values[place],
+            nodes_mm: nodes,
+        };
+        let section = Section { line, at_mm };
+        // Row-wires 3, 5 and 8 are read.
+        section_figure(
+            &section,
+            &map,
+            &[2, 4, 7],
+            cut(0, &actual),
+            Some(cut(1, &decoupled)),
+            4.0..=5.0,
+        )
+    }
+
+    #[test]
+    fn along_a_row_wire_the_curves_pass_through_its_nodes() {
+        let figure = figure(SectionLine::RowWire(4), 9.0);
+        let [plot] = &figure.plots[..] else { panic!() };
+        let names: Vec<&str> = plot.series.iter().map(|series| &*series.name).collect();
+        assert_eq!(
+            names,
+            [
+                "actual",
+                "decoupled",
+                "actual nodes",
+                "decoupled nodes",
+                "beyond the nodes",
+                "beyond the nodes"
+            ]
+        );
+        for (curve, nodes) in [(0, 2), (1, 3)] {
+            for (point, y) in plot.series[nodes].points.iter().zip(Y) {
+                assert_eq!(point.x, y);
+                let on_curve = plot.series[curve].points.iter().find(|at| (at.x - y).abs() < 1e-9);
+                assert!((on_curve.unwrap().y - point.y).abs() < 1e-9);
+            }
+        }
+        let node = &plot.series[3].points[2];
+        assert_eq!(node.item, Some(6), "the third node of the second row read");
+        assert_eq!(node.note.as_deref(), Some("Row-wire 5, node 3\ndecoupled z: 4.43 mm"));
+        let beyond: Vec<_> = plot.lines_across().map(|(_, at)| at).collect();
+        assert_eq!(beyond, [[2.0, 3.0], [9.0, 10.0]].map(LineAt::Between));
+    }
+
+    #[test]
+    fn a_column_wire_has_curves_only_and_outside_the_nodes_a_reason() {
+        let along = figure(SectionLine::ColumnWire(3), 4.0);
+        let points = &along.plots[0].series[0].points;
+        assert!(points.iter().all(|at| (at.y - (4.0 + 0.05 * at.x - 0.08)).abs() < 1e-9));
+        assert_eq!(along.keys().len(), 3, "the curves and the stretches beyond the nodes");
+        assert_eq!(along.plots[0].x.name, "x along column-wire 4 (mm)");
+        let outside = figure(SectionLine::ColumnWire(11), 12.0);
+        assert!(outside.plots[0].series.is_empty() && outside.keys().is_empty());
+        assert_eq!(
+            outside.notes,
+            ["Column-wire 12 lies beyond the nodes: there is no surface above it."]
+        );
+    }
+}
