@@ -37,8 +37,11 @@ pub enum Command {
     /// The last frame was drawn: send the next one.
     Drawn,
     /// Change the session, and send the event that this returns.
-    Change(Box<dyn FnOnce(&mut Session) -> Option<LiveEvent> + Send>),
+    Change(Change),
 }
+
+/// Change of the session.
+pub type Change = Box<dyn FnOnce(&mut Session) -> Option<LiveEvent> + Send>;
 
 /// Event from the thread.
 #[derive(Debug)]
