@@ -350,13 +350,8 @@ impl ImportArguments {
             };
             let given = std::path::absolute(given).unwrap_or_else(|_| given.clone());
             let is_named = |path: &PathBuf| path.file_name() == given.file_name();
-            let mut named = saved.plan.files().filter(|path| is_named(path));
-            let before = if is_named(place) {
-                place
-            } else {
-                named.next().unwrap_or(place)
-            };
-            found = found.relocated(before, &given);
+            let named = saved.plan.files().find(is_named).filter(|_| !is_named(place));
+            found = found.relocated(named.as_ref().unwrap_or(place), &given);
             let missing = Vec::from_iter(found.missing().into_iter().map(Path::to_owned));
             for path in missing {
                 let near = path.file_name().map(|name| given.with_file_name(name));

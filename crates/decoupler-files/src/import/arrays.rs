@@ -8,7 +8,7 @@ use super::{
     Cells, Column, Fault, Format, Table, TableError, Variable,
     csv_table::{Reading, Role},
     format::Array,
-    table::{Excess, Labels, Lines, stem},
+    table::{Excess, Labels, Lines},
 };
 
 /// Maximum number of rows of an array that are one sample, such as two readings per press.
@@ -94,7 +94,7 @@ pub(super) fn table(
         .for_each(|(column, role)| give_role(column, &role));
     variables.retain(|variable| !variable.name.is_empty());
     Ok(Table {
-        stem: stem(path),
+        path: path.to_owned(),
         columns,
         variables,
         rows,

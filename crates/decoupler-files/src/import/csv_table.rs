@@ -8,12 +8,13 @@ use decoupler_core::text::{clean_name, counted, original_name};
 
 use super::{
     Cells, Column, Dialect, DialectChoice, Encoding, Fault, Format, Missing, Table, TableError,
+    columns::position,
     detection::{BEGINNING, detect},
     dialect::utf8_of_utf16,
     format::{Cell, parse},
     progress::table_error,
     rows::{Rows, commonest},
-    table::{Excess, Labels, Lines, column_called, excerpt, name_and_unit, stem},
+    table::{Excess, Labels, Lines, excerpt, name_and_unit},
     time_stamp::TimeStamp,
 };
 use crate::machine::ReadingBudget;
@@ -33,8 +34,8 @@ pub(super) struct Reading<'a> {
     pub(super) choice: DialectChoice,
     /// Markers of missing values in this file: the column, or `None` for all, and the text.
     pub(super) missing: Vec<(Option<String>, &'a Missing)>,
-    /// Columns that hold labels.
-    pub(super) labels: Vec<String>,
+    /// Column of labels.
+    pub(super) label: Option<String>,
     /// Columns or ranges that are used, which choose among the arrays of a file.
     pub(super) used: Vec<String>,
 }
@@ -48,8 +49,8 @@ pub(super) struct Role<'a> {
 impl<'a> Reading<'a> {
     /// Returns the role of each column.
     pub(super) fn roles(&self, columns: &[Column]) -> Vec<Role<'a>> {
-        let find = |name: &String| column_called(columns, name);
-        let labels = Vec::from_iter(self.labels.iter().filter_map(find));
+        let find = |name: &String| position(columns, name);
+        let label = self.label.as_ref().and_then(find);
         let markers = self.missing.iter();
         let markers =
             Vec::from_iter(markers.map(|(name, missing)| (name.is_none(), name.as_ref().and_then(find), *missing)));
@@ -59,7 +60,7 @@ impl<'a> Reading<'a> {
                 .filter(|(is_of_all, of, _)| *is_of_all || *of == Some(column))
                 .map(|(.., missing)| *missing)
                 .collect(),
-            has_labels: labels.contains(&column),
+            has_labels: label == Some(column),
         };
         (0..columns.len()).map(role).collect()
     }
@@ -262,7 +263,7 @@ impl<'a> Body<'a> {
         }
         Ok(Table {
             variables: Vec::new(),
-            stem: stem(path),
+            path: path.to_owned(),
             columns: self.builders.into_iter().map(Builder::finish).collect(),
             rows: self.rows,
             format: Format::Text(self.dialect),

@@ -4,9 +4,9 @@ use decoupler_core::text::in_one_line;
 
 use super::{
     Cells, Column, Derived, ImportError, Table,
+    columns::position,
     expression::{Expression, Operand, Operator},
     selection::seconds,
-    table::column_called,
 };
 
 /// Reasons why there is no mean at the start.
@@ -45,7 +45,7 @@ impl Derived {
         own: impl Fn(&str) -> Option<String>,
         time: Option<TimeColumn<'_>>,
     ) -> Result<Option<(Located, Column)>, ImportError> {
-        let find = |name: &str| column_called(columns, name);
+        let find = |name: &str| position(columns, name);
         let Some(column) = own(&self.expression.column).and_then(|name| find(&name)) else {
             return Ok(None);
         };
@@ -202,7 +202,7 @@ impl Located {
 }
 
 /// Derived columns of a stream. Means at the start are known only after the start, whose lines are kept until then.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct DerivedStream {
     /// The columns in the order in which they are computed: a later one may be computed from an earlier one.
     columns: Vec<(Derived, Located)>,
@@ -241,8 +241,8 @@ impl DerivedStream {
             }
         }
         Ok(Self {
+            start: (!located.is_empty()).then(Vec::new),
             columns: located,
-            start: Some(Vec::new()),
         })
     }
 

@@ -40,14 +40,9 @@ pub enum ImportError {
         /// Similar names, or all names, as a phrase.
         near: String,
     },
-    /// A name is ambiguous.
-    #[error("the name '{name}' is ambiguous: it matches {candidates}; write one of them")]
-    Ambiguous {
-        /// Name given.
-        name: String,
-        /// Full names of the columns.
-        candidates: String,
-    },
+    /// Several columns have this name.
+    #[error("the name '{0}' is ambiguous: several columns have it; rename them in their files")]
+    Ambiguous(String),
     /// A range of columns is reversed, or spans two files.
     #[error(
         "'{0}' is not a range of columns: write FIRST..LAST, both in one file and in its order, for example c2..c16"
@@ -180,7 +175,7 @@ impl ImportError {
     pub(super) fn of_file(self, path: &Path) -> Self {
         match self {
             Self::Unknown { .. }
-            | Self::Ambiguous { .. }
+            | Self::Ambiguous(_)
             | Self::Range(_)
             | Self::NoRows { .. }
             | Self::RowWire { .. }

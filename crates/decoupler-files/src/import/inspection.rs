@@ -7,11 +7,10 @@ use serde::Serialize;
 
 use super::{
     Cells, Column, DialectChoice, Format, ImportError, Meaning, Recipe, Table, Variable, Watch,
-    inputs::{ColumnId, Names},
+    columns::{Files, find},
     join::median_interval,
     read_table,
     sentinel::{Sentinel, is_rounding, rounding_warning},
-    table::column_called,
 };
 
 /// Number of bars of a histogram.
@@ -124,7 +123,7 @@ impl Inspection {
         let mut columns: Vec<ColumnSummary> = table.columns.iter().map(ColumnSummary::of).collect();
         name_duplicates(table, &mut columns);
         let chosen = match time {
-            Some(name) => Some((Names::of(&[&table.columns], &[]).find(name)?.column, false)),
+            Some(name) => Some((find(&table.columns, name)?, false)),
             None => guess_time(table, &columns).map(|column| (column, true)),
         };
         let time = chosen.and_then(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));
@@ -308,62 +307,35 @@ impl Recipe {
             group: None,
             ..self.clone()
         };
+        let set = self.sets().swap_remove(0);
         let stems = self.stems();
-        let files = std::iter::once((&self.data, None));
-        let files = files.chain(
-            self.join
-                .iter()
-                .zip(&stems)
-                .map(|(joined, stem)| (&joined.file, Some(stem))),
-        );
-        let (mut tables, mut inspected) = (Vec::new(), Vec::new());
-        for (number, (path, stem)) in files.enumerate() {
-            let (_, mut table) = plain.read_using(variables, folder, (number, path, stem), watch)?;
+        let mut tables = plain.read_set(&set, variables, folder, watch)?;
+        let mut inspected = Vec::new();
+        for (table, path) in tables.iter_mut().zip(set.files()) {
             inspected.push(InspectedFile {
                 path: path.clone(),
-                stem: stem.cloned(),
+                stem: inspected.len().checked_sub(1).map(|joined| stems[joined].clone()),
                 format: table.format.clone(),
-                inspection: Inspection::of(&table, None)?,
+                inspection: Inspection::of(table, None)?,
                 meanings: vec![Meaning::Unused; table.columns.len()],
             });
             // Only their names are needed from here on.
-            for column in &mut table.columns {
-                column.cells = Default::default();
-            }
-            tables.push(table);
+            table
+                .columns
+                .iter_mut()
+                .for_each(|column| column.cells = Default::default());
         }
-        let names = Names::of(
-            &Vec::from_iter(tables.iter().map(|table| table.columns.as_slice())),
-            &stems,
-        );
-        for (id, meaning) in self.meant(&names)? {
-            inspected[id.file].meanings[id.column] = meaning;
-        }
-        for (number, joined) in self.join.iter().enumerate() {
+        let files = Files::of(tables, stems);
+        let mut meant = files.meant(self)?;
+        for (joined, file) in self.join.iter().zip(1..) {
             let time = joined.time.as_ref().or(self.time.as_ref());
-            let columns = &tables[number + 1].columns;
-            if let Some(column) = time.and_then(|time| column_called(columns, time)) {
-                inspected[number + 1].meanings[column] = Meaning::Time;
-            }
+            let found = time.and_then(|time| files.find_joined(file, time));
+            meant.splice(..0, found.map(|id| (id, Meaning::Time)));
+        }
+        for (id, meaning) in meant.into_iter().rev() {
+            let (file, column) = files.place(id);
+            inspected[file].meanings[column] = meaning;
         }
         Ok(inspected)
-    }
-
-    /// Returns the columns with their meanings in the recipe, except the times of joined files.
-    fn meant(&self, names: &Names) -> Result<Vec<(ColumnId, Meaning)>, ImportError> {
-        let mut meant = Vec::new();
-        for (one, meaning) in [
-            (&self.time, Meaning::Time),
-            (&self.group, Meaning::Group),
-            (&self.row_wire, Meaning::RowWire),
-        ] {
-            if let Some(name) = one {
-                meant.push((names.find(name)?, meaning));
-            }
-        }
-        for (several, meaning) in [(&self.inputs, Meaning::Input), (&self.targets, Meaning::Target)] {
-            meant.extend(names.find_all(several)?.into_iter().map(|id| (id, meaning)));
-        }
-        Ok(meant)
     }
 }

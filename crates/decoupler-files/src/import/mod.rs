@@ -10,6 +10,7 @@
 
 mod arrays;
 mod choosing;
+mod columns;
 mod csv_table;
 mod derived;
 mod detection;

@@ -118,7 +118,7 @@ fn table(path: &Path, watch: Watch<'_>) -> Result<Table, ImportError> {
             header: Some(true),
             ..DialectChoice::default()
         },
-        labels: vec![COLUMNS[0].to_owned()],
+        label: Some(COLUMNS[0].to_owned()),
         ..Reading::default()
     };
     read(path, &reading, watch)

@@ -96,6 +96,15 @@ impl Recipe {
         std::iter::once(&self.data).chain(self.append.iter().map(|set| &set.data))
     }
 
+    /// Returns the sets of files whose rows become samples.
+    pub(super) fn sets(&self) -> Vec<FileSet> {
+        let first = FileSet {
+            data: self.data.clone(),
+            join: self.join.iter().map(|joined| joined.file.clone()).collect(),
+        };
+        std::iter::once(first).chain(self.append.iter().cloned()).collect()
+    }
+
     /// Returns `true` if samples belong to groups: the values of the group column, or else the files.
     pub fn has_groups(&self) -> bool {
         self.group.is_some() || !self.append.is_empty()
@@ -220,13 +229,11 @@ pub struct FileChecksum {
 impl Recorded {
     /// Describes the samples read by `plan`, whose paths must not depend on the working folder.
     pub(super) fn of(plan: Plan, sets: &PlannedSets, watch: Watch<'_>) -> Result<Self, ImportError> {
-        let checksum = |path: &PathBuf| {
+        let checksum = |path: PathBuf| {
             // A pipe can be read only once, and is empty now.
-            let crc32 = path.is_file().then(|| file_crc32(path, watch)).transpose()?;
-            Ok(FileChecksum {
-                path: path.clone(),
-                crc32: crc32.unwrap_or_default(),
-            })
+            let crc32 = path.is_file().then(|| file_crc32(&path, watch)).transpose()?;
+            let crc32 = crc32.unwrap_or_default();
+            Ok(FileChecksum { path, crc32 })
         };
         let files = plan.files().map(checksum).collect::<Result<_, ImportError>>()?;
         Ok(Self {

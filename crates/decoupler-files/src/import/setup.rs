@@ -113,7 +113,7 @@ impl Setup {
 
     fn check_files(&self) -> Result<(), ImportError> {
         let found = self.plan.as_ref().filter(|_| self.is_stored).and_then(Plan::irregular);
-        found.map_or(Ok(()), |path| Err(ImportError::Irregular(path.clone())))
+        found.map_or(Ok(()), |path| Err(ImportError::Irregular(path)))
     }
 
     /// Returns the settings of the run.

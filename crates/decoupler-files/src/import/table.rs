@@ -1,4 +1,9 @@
-use std::{collections::HashMap, ops::Range, path::Path};
+use std::{
+    borrow::Cow,
+    collections::HashMap,
+    ops::Range,
+    path::{Path, PathBuf},
+};
 
 use decoupler_core::text::clean_name;
 
@@ -9,8 +14,8 @@ use super::{Dialect, Format, time_stamp::TimeStamp};
 /// Table read from a file: columns of equal length.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// Name of the file without its folder and extension.
-    pub stem: String,
+    /// The file.
+    pub path: PathBuf,
     /// Columns.
     pub columns: Vec<Column>,
     /// Named arrays of numbers in the file, such as the variables of a workspace; none in other formats.
@@ -191,13 +196,27 @@ impl Cells {
     }
 
     /// Returns the cell as text; empty if it is missing. A number reads back bit for bit.
-    pub(super) fn text(&self, row: usize) -> String {
+    pub(super) fn text(&self, row: usize) -> Cow<'_, str> {
         match self {
-            Self::Numbers(numbers) if numbers[row].is_nan() => String::new(),
-            Self::Numbers(numbers) => numbers[row].to_string(),
+            Self::Numbers(numbers) if numbers[row].is_nan() => Cow::default(),
+            Self::Numbers(numbers) => numbers[row].to_string().into(),
             Self::Labels { numbers, texts } => {
-                numbers[row].map_or(String::new(), |label| texts[label as usize].0.clone())
+                numbers[row].map_or(Cow::default(), |label| texts[label as usize].0.as_str().into())
             }
+        }
+    }
+
+    /// Returns the cells of these rows; missing where there is none.
+    pub(super) fn of_rows(&self, rows: &[Option<u32>]) -> Self {
+        match self {
+            Self::Numbers(numbers) => {
+                let number = |row: &Option<u32>| row.map_or(f64::NAN, |row| numbers[row as usize]);
+                Self::Numbers(rows.iter().map(number).collect())
+            }
+            Self::Labels { numbers, texts } => Self::Labels {
+                numbers: rows.iter().map(|row| numbers[(*row)? as usize]).collect(),
+                texts: texts.clone(),
+            },
         }
     }
 
@@ -206,25 +225,6 @@ impl Cells {
         match self {
             Self::Numbers(numbers) => numbers[row].is_nan(),
             Self::Labels { numbers, .. } => numbers[row].is_none(),
-        }
-    }
-
-    /// Returns a value that is equal for cells of the same group.
-    pub(super) fn group(&self, row: usize) -> u64 {
-        match self {
-            Self::Numbers(numbers) => numbers[row].to_bits(),
-            Self::Labels { numbers, .. } => numbers[row].map_or(u64::MAX, u64::from),
-        }
-    }
-
-    /// Returns the name of a group: the label or the number.
-    pub(super) fn name_of_group(&self, row: usize) -> String {
-        match self {
-            Self::Numbers(numbers) => numbers[row].to_string(),
-            Self::Labels { numbers, texts } => {
-                let label = numbers[row].map(|label| texts[label as usize].0.clone());
-                label.unwrap_or_default()
-            }
         }
     }
 
@@ -270,13 +270,6 @@ impl Labels {
             texts: self.texts,
         }
     }
-}
-
-/// Returns the index of the column with this name, with or without the unit of its header.
-pub(super) fn column_called(columns: &[Column], given: &str) -> Option<usize> {
-    let given = clean_name(given.trim());
-    let named = |name: &str| columns.iter().position(|column| column.name == name);
-    named(&given).or_else(|| named(name_and_unit(&given).0))
 }
 
 /// Splits a header such as "x (mm)" or "x [mm]" into name and unit.

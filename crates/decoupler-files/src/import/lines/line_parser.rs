@@ -47,7 +47,7 @@ pub struct LineParser {
     /// Number of lines so far whose row-wire follows from their order, valid or not.
     lines_in_turn: usize,
     /// The derived columns, once the columns of the lines are known.
-    derived: Option<DerivedStream>,
+    derived: DerivedStream,
     /// Group of each line of the start, which is waited for.
     groups_of_start: Vec<u64>,
     memory: Option<MemoryStream>,
@@ -226,7 +226,7 @@ impl LineParser {
             is_snapshot: false,
             has_readings: false,
             lines_in_turn: 0,
-            derived: None,
+            derived: DerivedStream::default(),
             groups_of_start: Vec::new(),
             memory: None,
             start: None,
@@ -266,7 +266,7 @@ impl LineParser {
             self.count_bad();
             // Garbage before the first readings does not determine the layout.
             if !self.has_names && !self.has_readings {
-                (self.columns, self.derived) = (None, None);
+                (self.columns, self.derived) = (None, DerivedStream::default());
             }
         }
         Ok(match found? {
@@ -349,7 +349,7 @@ impl LineParser {
             Needed::Number
         };
         let read = columns.inputs.iter().filter(|column| **column < width);
-        let derived = self.derived.iter().flat_map(|derived| derived.needed(width));
+        let derived = self.derived.needed(width);
         // A memory places the line in its series.
         let time = columns.time.filter(|_| self.memory.is_some());
         let row_wire = columns
@@ -383,25 +383,22 @@ impl LineParser {
         self.cells.truncate(width);
         let group = columns.group.filter(|&column| column < width);
         let group = group.map_or(0, |column| key(self.fields.get(text, column)));
-        if let Some(derived) = &mut self.derived {
-            let taken = derived.take(&mut self.cells).map_err(|error| LineError::Header {
-                line,
-                source: InputError::Derived(error.to_string()),
-            });
-            match taken? {
-                derived::Progress::Start { is_first } => {
-                    self.groups_of_start.push(group);
-                    return Ok(Found::Start { is_first });
-                }
-                derived::Progress::Complete(start) => self.remember(&start),
+        let taken = self.derived.take(&mut self.cells).map_err(|error| LineError::Header {
+            line,
+            source: InputError::Derived(error.to_string()),
+        });
+        match taken? {
+            derived::Progress::Start { is_first } => {
+                self.groups_of_start.push(group);
+                return Ok(Found::Start { is_first });
             }
+            derived::Progress::Complete(start) => self.remember(&start),
         }
-        let (Some(columns), derived) = (&self.columns, &self.derived) else {
+        let Some(columns) = &self.columns else {
             return Ok(Found::NoReadings);
         };
         if let Some(column) = columns.inputs.iter().find(|&&column| !self.cells[column].is_finite()) {
-            let name = derived.as_ref().map_or("", |derived| derived.name(column - width));
-            let name = name.to_owned();
+            let name = self.derived.name(column - width).to_owned();
             return Err(LineError::NoValue { line, name });
         }
         columns.gather(&self.cells, &mut self.readings);
@@ -484,25 +481,24 @@ impl LineParser {
 
     /// Finds the inputs in the cells of a header, or in lines of `width` cells without one.
     fn find_columns(&mut self, header: &[String], width: usize) -> Result<(), InputError> {
-        let mut is_snapshot = false;
         let has_rows = self.rows.is_some();
-        let mut found_derived = None;
-        let columns = match header {
-            _ if !self.derive.is_empty() => {
-                // Derived columns have names.
-                let (columns, derived) =
-                    InputColumns::with_derived(header, width, &self.inputs, &self.others, &self.derive)?;
-                found_derived = Some(derived);
-                columns
-            }
-            [] if self.is_array => {
-                let all = self.rows.as_ref().map_or(0, |rows| rows.read.len()) * self.inputs.len();
-                is_snapshot = width == all && width > self.inputs.len();
-                let count = if is_snapshot { all } else { self.inputs.len() };
-                InputColumns::in_order(count, !is_snapshot && width == count + 1)
-            }
-            [] => InputColumns::unnamed(width, &self.inputs, &self.others, has_rows)?,
-            header => InputColumns::of_header(header, &self.inputs, &self.others)?,
+        let channels = self.inputs.len();
+        let all = self.rows.as_ref().map_or(0, |rows| rows.read.len()) * channels;
+        let is_unnamed_array = self.is_array && header.is_empty();
+        let is_snapshot = is_unnamed_array && width == all && width > channels;
+        let (columns, derived) = if is_unnamed_array {
+            let count = if is_snapshot { all } else { channels };
+            let columns = InputColumns::in_order(count, !is_snapshot && width == count + 1);
+            (columns, DerivedStream::default())
+        } else {
+            InputColumns::of(
+                header,
+                width,
+                &self.inputs,
+                &self.others,
+                &self.derive,
+                has_rows && !self.is_array,
+            )?
         };
         if self.is_array
             && let Some(name) = InputColumns::named_twice(header, &self.inputs)
@@ -522,7 +518,7 @@ impl LineParser {
                 ..KeptCell::default()
             });
             self.kept = cells.collect();
-            (self.columns, self.derived) = (Some(columns), found_derived);
+            (self.columns, self.derived) = (Some(columns), derived);
         }
         (self.has_names, self.is_snapshot) = (!header.is_empty(), is_snapshot);
         Ok(())
@@ -543,7 +539,7 @@ fn key(group: &[u8]) -> u64 {
 
 impl InputColumns {
     fn series(&self, group: u64, cells: &[f64]) -> Series {
-        let row_wire = self.row_wire.and_then(|column| row_wire("", cells[column]).ok());
+        let row_wire = self.row_wire.and_then(|column| row_wire(cells[column]));
         Series {
             group,
             row_wire: row_wire.unwrap_or(0),
