@@ -5,10 +5,10 @@ use std::{collections::BTreeMap, path::Path};
 use decoupler_core::text::{clean_name, original_name};
 
 use super::{
-    Cells, Column, Fault, Format, Table, TableError, Variable,
+    Cells, Column, Format, Table, TableError, Variable,
     csv_table::{Reading, Role},
     format::Array,
-    table::{Excess, Labels, Lines},
+    table::Labels,
 };
 
 /// Maximum number of rows of an array that are one sample, such as two readings per press.
@@ -94,15 +94,11 @@ pub(super) fn table(
         .for_each(|(column, role)| give_role(column, &role));
     variables.retain(|variable| !variable.name.is_empty());
     Ok(Table {
-        path: path.to_owned(),
         columns,
         variables,
         rows,
-        format,
         notes,
-        torn_line: None,
-        too_long: Excess::default(),
-        lines: Lines::default(),
+        ..Table::new(path, format)
     })
 }
 
@@ -152,11 +148,7 @@ fn give_role(column: &mut Column, role: &Role<'_>) {
             column.missing += 1;
             *number = f64::NAN;
         } else if number.is_infinite() {
-            column.faults.count += 1;
-            column.faults.first.get_or_insert(Fault {
-                line: row as u64 + 1,
-                text: number.to_string(),
-            });
+            column.faults.add(row as u64 + 1, || number.to_string());
             *number = f64::NAN;
         }
     }

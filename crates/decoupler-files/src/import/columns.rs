@@ -8,15 +8,15 @@ use decoupler_core::{
 };
 
 use super::{
-    Column, ImportError, Meaning, Recipe, Table, expression::Expression, join::Partners, table::name_and_unit,
-    time_stamp::TimeStamp,
+    Column, Condition, Cure, ImportError, Meaning, Recipe, Table, expression::Expression, join::Partners,
+    table::name_and_unit, time_stamp::TimeStamp,
 };
 
 /// Number of names above which a message lists only names similar to the one given.
 const FEW: usize = 24;
 
 /// Returns the columns with this name, with or without the unit given in the header.
-fn called(columns: &[Column], given: &str) -> Vec<usize> {
+pub(super) fn called(columns: &[Column], given: &str) -> Vec<usize> {
     let name = clean_name(given.trim());
     let with = |name: &str| Vec::from_iter((0..columns.len()).filter(|&id| columns[id].name == name));
     let found = with(&name);
@@ -37,16 +37,18 @@ pub(super) fn find(columns: &[Column], given: &str) -> Result<usize, ImportError
     let name = clean_name(given.trim());
     match called(columns, given)[..] {
         [id] => Ok(id),
-        [] => Err(ImportError::Unknown {
-            near: near(columns, &name),
-            name,
-        }),
-        _ => Err(ImportError::Ambiguous(name)),
+        [] => Err(ImportError::Columns(format!(
+            "there is no column '{name}'; {}",
+            near(columns, &name)
+        ))),
+        _ => Err(ImportError::Columns(format!(
+            "the name '{name}' is ambiguous: several columns have it; rename them in their files"
+        ))),
     }
 }
 
 /// Lists the columns, or those with names similar to `name`.
-fn near(columns: &[Column], name: &str) -> String {
+pub(super) fn near(columns: &[Column], name: &str) -> String {
     let mut names = Vec::from_iter(columns.iter().map(|column| column.name.as_str()));
     if names.len() <= FEW {
         return format!("there are {}", names.join(", "));
@@ -142,7 +144,10 @@ impl Files {
                         (found, None) => found?,
                     };
                     if !is_near(&last_id) || first_id > last_id {
-                        return Err(ImportError::Range(name.clone()));
+                        return Err(ImportError::Columns(format!(
+                            "'{name}' is not a range of columns: write FIRST..LAST, both in one file and in its order, for \
+                             example c2..c16"
+                        )));
                     }
                     all.extend(first_id..=last_id);
                 }
@@ -175,10 +180,8 @@ impl Files {
         let compared = meanings.comparisons.iter().map(|(id, _)| *id);
         for id in compared.chain(meanings.time).chain(meanings.row_wire) {
             if let Some(label) = self.columns[id].cells.wordy_label() {
-                return Err(ImportError::Condition {
-                    text: self.columns[id].name.clone(),
-                    reason: format!("the label '{label}' is not a number"),
-                });
+                let reason = format!("the label '{label}' is not a number");
+                return Err(Condition::refused(&self.columns[id].name, &reason));
             }
         }
         Ok(())
@@ -196,13 +199,10 @@ impl Files {
             reason += &format!(", and {others} of the column cannot be read either");
         }
         let (file, column) = self.place(id);
-        Err(ImportError::NotANumber {
-            path: self.tables[file].path.clone(),
-            line: first.line,
-            column: column + 1,
-            name: name.clone(),
-            text: first.text.clone(),
-            reason,
+        let (path, line, column, text) = (self.tables[file].path.display(), first.line, column + 1, &first.text);
+        Err(ImportError::Curable {
+            cause: format!("'{path}': line {line}, column {column} ('{name}'): '{text}' {reason}"),
+            cure: Cure::CallMissing(text.clone()),
         })
     }
 
@@ -289,7 +289,8 @@ impl Meanings {
         }
         for (columns, meaning) in [(&meanings.inputs, Meaning::Input), (&meanings.targets, Meaning::Target)] {
             if columns.is_empty() {
-                return Err(ImportError::NoColumns(meaning.with_article()));
+                let what = meaning.with_article();
+                return Err(ImportError::Columns(format!("no column is {what}; name at least one")));
             }
         }
         let mut seen = HashMap::new();
@@ -299,11 +300,10 @@ impl Meanings {
                     entry.insert(meaning);
                 }
                 Entry::Occupied(first) => {
-                    return Err(ImportError::TwoMeanings {
-                        name: files.columns[id].name.clone(),
-                        one: first.get().with_article(),
-                        other: meaning.with_article(),
-                    });
+                    let (one, other) = (first.get().with_article(), meaning.with_article());
+                    let name = &files.columns[id].name;
+                    let reason = format!("column '{name}' is both {one} and {other}; give it one meaning");
+                    return Err(ImportError::Columns(reason));
                 }
             }
         }

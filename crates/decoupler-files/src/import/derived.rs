@@ -1,7 +1,5 @@
 //! Derived columns of tables and of streams of lines: those of a stream equal those of a file with the same lines.
 
-use decoupler_core::text::in_one_line;
-
 use super::{
     Cells, Column, Derived, ImportError, Table,
     columns::position,
@@ -132,13 +130,6 @@ impl Derived {
             ..new
         });
         Ok(())
-    }
-
-    fn refused(&self, reason: &str) -> ImportError {
-        ImportError::Derived {
-            text: in_one_line(&self.to_string()),
-            reason: in_one_line(reason),
-        }
     }
 }
 

@@ -1,6 +1,6 @@
 use std::{
     fs::File,
-    io::{self, BufReader, Read, Seek},
+    io::{self, BufReader},
     path::{Path, PathBuf},
 };
 
@@ -25,7 +25,7 @@ use super::{
     progress::Watched,
     selection::Rows,
     sentinel::{Sentinel, is_rounding, rounding_warning},
-    sheet::Spreadsheet,
+    sheet,
     suggestion::is_group_name,
     table::stem,
 };
@@ -195,11 +195,8 @@ impl Recipe {
     ) -> Result<Vec<Table>, ImportError> {
         if set.join.len() != self.join.len() {
             let needed = counted(self.join.len(), "joined file");
-            return Err(ImportError::Join {
-                path: set.data.clone(),
-                reason: format!("it needs {needed} and has {}", set.join.len()),
-                cure: Cure::GiveJoinedFiles,
-            });
+            let reason = format!("it needs {needed} and has {}", set.join.len());
+            return Err(not_joined(&set.data, &reason, Cure::GiveJoinedFiles));
         }
         let stems = self.stems();
         let joined = self.join.iter().zip(&stems).map(Some);
@@ -264,15 +261,11 @@ impl Recipe {
         warnings: &mut Vec<String>,
     ) -> Result<Option<Partners>, ImportError> {
         let (main, table, joined) = (&files.tables[0], &files.tables[file], &self.join[file - 1]);
-        let refuse = |reason: String, cure: Cure| ImportError::Join {
-            path: table.path.clone(),
-            reason: in_one_line(&reason),
-            cure,
-        };
+        let refuse = |reason: &str, cure| not_joined(&table.path, reason, cure);
         let Some(time) = meanings.time else {
             if table.rows != main.rows {
                 let reason = format!("it has {} and the other file {}", counted(table.rows, "row"), main.rows);
-                return Err(refuse(reason, Cure::NameTimes));
+                return Err(refuse(&reason, Cure::NameTimes));
             }
             return Ok(None);
         };
@@ -280,25 +273,24 @@ impl Recipe {
         let Some(column) = files.find_joined(file, wanted) else {
             let names = Vec::from_iter(files.names_in(file).take(30));
             let reason = format!("it has no time column '{wanted}', only {}", names.join(", "));
-            return Err(refuse(reason, Cure::NameJoinedTime));
+            return Err(refuse(&reason, Cure::NameJoinedTime));
         };
         [time, column].into_iter().try_for_each(|id| files.check_cells(id))?;
         let [of_main, of_joined] = [time, column].map(|id| &files.columns[id]);
         let (Cells::Numbers(times), Cells::Numbers(joined_times)) = (&of_main.cells, &of_joined.cells) else {
-            let reason = "its times are a group as well".to_owned();
-            return Err(refuse(reason, Cure::GiveOneMeaning));
+            return Err(refuse("its times are a group as well", Cure::GiveOneMeaning));
         };
         let later = match (of_main.start, of_joined.start) {
             (None, None) => 0.0,
             (Some(start), Some(joined)) if start.has_zone == joined.has_zone => joined.seconds_since(start),
             _ => {
-                let reason = "only one of the two files has time stamps, or only one has a time zone".to_owned();
+                let reason = "only one of the two files has time stamps, or only one has a time zone";
                 return Err(refuse(reason, Cure::NameJoinedTime));
             }
         };
         let joined_times = Vec::from_iter(joined_times.iter().map(|time| later + time));
         let Some(limit) = joined.limit.or_else(|| Some(median_interval(&joined_times)? / 2.0)) else {
-            return Err(refuse("its times are all the same".to_owned(), Cure::GiveLimit));
+            return Err(refuse("its times are all the same", Cure::GiveLimit));
         };
         let partners = nearest(times, &joined_times, limit);
         let several = partners.uses(table.rows).iter().filter(|uses| **uses > 1).count();
@@ -310,6 +302,11 @@ impl Recipe {
         }
         Ok(Some(partners))
     }
+}
+
+fn not_joined(file: &Path, reason: &str, cure: Cure) -> ImportError {
+    let cause = format!("'{}' cannot be joined: {}", file.display(), in_one_line(reason));
+    ImportError::Curable { cause, cure }
 }
 
 /// Returns the memory with its usual interval, and the features of the samples with it.
@@ -337,38 +334,31 @@ pub(super) fn read(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Resu
 }
 
 fn read_file(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Result<Table, TableError> {
-    let mut file = File::open(path)?;
+    let file = File::open(path)?;
     let metadata = file.metadata()?;
     if metadata.is_dir() {
         return Err(io::Error::from(io::ErrorKind::IsADirectory).into());
     }
     let size = metadata.is_file().then_some(metadata.len());
-    let mut start = Vec::new();
     let budget = &mut ReadingBudget::now();
-    if size.is_none() {
-        // A pipe can be read only once.
-        return csv_table::read(path, Watched::new(file, None, watch), reading, budget);
-    }
-    (&file).take(Format::BEGINNING).read_to_end(&mut start)?;
-    file.rewind()?;
-    let (found, left_out, format) = match Contents::of(path, &start)? {
+    // A pipe can be read only once.
+    let contents = if size.is_some() {
+        Contents::of(path, &file)?
+    } else {
+        Contents::Text
+    };
+    let ((found, left_out), format) = match contents {
         Contents::Text => return csv_table::read(path, Watched::new(file, size, watch), reading, budget),
-        Contents::Zip => {
-            let kind = Spreadsheet::of_zip(&file)?;
-            file.rewind()?;
-            if let Some(kind) = kind {
-                return kind.read(path, file, reading, budget, watch);
-            }
-            let (found, left_out) = numpy::read_archive(BufReader::new(file), budget, watch)?;
-            (found, left_out, Format::Npz)
-        }
+        Contents::Xlsx => return sheet::read(path, file, false, reading, budget, watch),
+        Contents::Ods => return sheet::read(path, file, true, reading, budget, watch),
+        Contents::Npz => (numpy::read_archive(BufReader::new(file), budget, watch)?, Format::Npz),
         Contents::Npy => {
             let array = numpy::read("", BufReader::new(Watched::new(file, size, watch)), budget)?;
-            (vec![array], Vec::new(), Format::Npy)
+            ((vec![array], Vec::new()), Format::Npy)
         }
         Contents::Matlab => {
-            let (found, left_out) = matlab::read(BufReader::new(Watched::new(file, size, watch)), budget)?;
-            (found, left_out, Format::Matlab)
+            let source = BufReader::new(Watched::new(file, size, watch));
+            (matlab::read(source, budget)?, Format::Matlab)
         }
     };
     arrays::table(path, found, format, left_out, reading)

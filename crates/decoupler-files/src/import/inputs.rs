@@ -6,11 +6,10 @@ use decoupler_core::{
     text::counted,
 };
 use ndarray::Array2;
-use thiserror::Error;
 
 use super::{
     Column, Derived, FileSet, ImportError, Recipe, TableError, Watch,
-    columns::{self, Files, Meanings, position},
+    columns::{Files, Meanings, called, near, position},
     csv_table::named,
     derived::{DerivedStream, TimeColumn},
     selection::{Rows, order_note, seconds},
@@ -78,44 +77,6 @@ pub(super) struct OtherColumns {
     pub(super) kept: Vec<String>,
 }
 
-/// Reason why the columns of a table are not the inputs of a network.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum InputError {
-    /// No column has the name of an input.
-    #[error("there is no column '{name}', which is an input of the network; {near}")]
-    Missing {
-        /// Name of the input.
-        name: String,
-        /// Similar names, or all names, as a phrase.
-        near: String,
-    },
-    /// The unit of a column differs from that of the input.
-    #[error("column '{name}' is in {found}, and the network was trained on {expected}; convert it")]
-    Unit {
-        /// Name of the input.
-        name: String,
-        /// Unit in the header.
-        found: String,
-        /// Unit of the input.
-        expected: String,
-    },
-    /// Two columns have the name of an input.
-    #[error("there are two columns '{0}'; keep one")]
-    Twice(String),
-    /// A derived column cannot be computed.
-    #[error("{0}")]
-    Derived(String),
-    /// There is no header, and the number of columns is wrong.
-    #[error("{} where {expected} are needed, separated by commas; give the inputs of the network in their order, or a header", counted(*.found, "cell"))]
-    Count {
-        /// Number of columns.
-        found: usize,
-        /// Number needed.
-        expected: usize,
-    },
-}
-
 impl InputColumns {
     /// Finds the inputs of a network in the cells of a header or, without one, in `width` columns, and those of `derive`, whose
     /// cells follow those of a line. Columns without names are called c1, c2, … as in a recording without a header; if the
@@ -131,14 +92,13 @@ impl InputColumns {
         others: &OtherColumns,
         derive: &[Derived],
         has_row_wire: bool,
-    ) -> Result<(Self, DerivedStream), InputError> {
+    ) -> Result<(Self, DerivedStream), String> {
         let mut columns = named(header, width);
         let time = others.time.as_deref().map(|name| TimeColumn {
             name,
             given_unit: others.time_unit.as_deref(),
         });
-        let derived =
-            DerivedStream::new(derive, &mut columns, time).map_err(|error| InputError::Derived(error.to_string()))?;
+        let derived = DerivedStream::new(derive, &mut columns, time).map_err(|error| error.to_string())?;
         let has_names = !header.is_empty() || !derive.is_empty();
         let found = Self::find(&columns, has_names, inputs, others, has_row_wire)?;
         Ok((Self { width, ..found }, derived))
@@ -201,7 +161,7 @@ impl InputColumns {
         inputs: &[Channel],
         others: &OtherColumns,
         has_row_wire: bool,
-    ) -> Result<Self, InputError> {
+    ) -> Result<Self, String> {
         let found = Self::of_names(columns, inputs, others);
         let is_complete = |found: &Self| found.row_wire.is_some() >= has_row_wire;
         if has_names || found.as_ref().is_ok_and(is_complete) {
@@ -210,28 +170,28 @@ impl InputColumns {
         let expected = usize::from(has_row_wire) + inputs.len();
         match columns.len() {
             width if width == expected => Ok(Self::in_order(inputs.len(), has_row_wire)),
-            found => Err(InputError::Count { found, expected }),
+            width => Err(format!(
+                "{} where {expected} are needed, separated by commas; give the inputs of the network in their order, or a \
+                 header",
+                counted(width, "cell")
+            )),
         }
     }
 
-    fn of_names(columns: &[Column], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
+    fn of_names(columns: &[Column], inputs: &[Channel], others: &OtherColumns) -> Result<Self, String> {
         let mut found = Vec::with_capacity(inputs.len());
         for Channel { name, unit, .. } in inputs {
-            let column = columns::find(columns, name).map_err(|error| match error {
-                ImportError::Unknown { name, near } => InputError::Missing { name, near },
-                error => InputError::Missing {
-                    name: name.clone(),
-                    near: error.to_string(),
-                },
-            })?;
+            let [column] = called(columns, name)[..] else {
+                let near = near(columns, name);
+                return Err(format!(
+                    "there is no column '{name}', which is an input of the network; {near}"
+                ));
+            };
             if let (Some(found), Some(expected)) = (&columns[column].unit, unit)
                 && found != expected
             {
-                return Err(InputError::Unit {
-                    name: name.clone(),
-                    found: found.clone(),
-                    expected: expected.clone(),
-                });
+                let trained = format!("the network was trained on {expected}");
+                return Err(format!("column '{name}' is in {found}, and {trained}; convert it"));
             }
             found.push(column);
         }
@@ -273,13 +233,11 @@ impl Recipe {
         let others = &self.other_columns(problem);
         let files = Files::of(vec![self.read(path, None, &[], watch)?], Vec::new());
         let (table, columns) = (&files.tables[0], &files.columns);
-        if let Some(line) = table.too_long.first_line {
-            return Err(TableError::Uneven { line }.in_file(path));
-        }
+        table.check_widths().map_err(|error| error.in_file(path))?;
         // Derived columns have names.
         let has_names = table.has_header() || !self.derive.is_empty();
         let found = InputColumns::find(columns, has_names, &problem.inputs, others, has_row_wire);
-        let found = found.map_err(|error| TableError::Inputs(error).in_file(path))?;
+        let found = found.map_err(|error| TableError::Contents(error).in_file(path))?;
         // A memory cannot place a row without a time.
         let time = found
             .time
@@ -308,11 +266,9 @@ impl Recipe {
         let is_missing = |id: usize, row: usize| columns[id].cells.is_missing(row);
         for &id in meanings.inputs.iter().chain(&meanings.row_wire) {
             if let Some(row) = (0..table.rows).find(|&row| is_missing(id, row)) {
-                return Err(ImportError::MissingInput {
-                    path: path.to_owned(),
-                    line: table.line(row),
-                    name: columns[id].name.clone(),
-                });
+                let reason = "a network needs all of its inputs, so leave the line out";
+                let reason = format!("{} is missing; {reason}", columns[id].name);
+                return Err(TableError::in_row(table.line(row), reason).in_file(path));
             }
         }
         let is_placed = |row: &usize| time.is_none_or(|id| !is_missing(id, *row));

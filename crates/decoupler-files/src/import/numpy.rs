@@ -63,7 +63,7 @@ pub(super) fn read(name: &str, mut source: impl Read, budget: &mut ReadingBudget
     }
     let header = Header::parse(&String::from_utf8_lossy(&bytes(length)?)).map_err(wrong)?;
     let shape = header.shape.as_slice();
-    let size = header.element.size();
+    let size = header.element.size;
     let expected = shape.iter().copied().try_fold(size, usize::checked_mul);
     let written = written(shape);
     let expected = expected.ok_or_else(|| wrong(format!("{written} numbers do not fit into memory")))?;
@@ -73,16 +73,13 @@ pub(super) fn read(name: &str, mut source: impl Read, budget: &mut ReadingBudget
     let count = (expected / size) as u64;
     // The numbers in the order of the file are freed once they are copied to their columns.
     budget.claim(count.saturating_mul(2 * NUMBER))?;
-    let mut numbers = Vec::new();
-    let mut block = Vec::new();
+    let (mut numbers, mut block) = (Vec::new(), Vec::new());
     while numbers.len() * size < expected {
         block.clear();
         let wanted = (expected - numbers.len() * size).min(BLOCK);
-        (&mut source)
-            .take(wanted as u64)
-            .read_to_end(&mut block)
-            .map_err(table_error)?;
-        numbers.extend(header.element.read(&block, header.endian));
+        let read = (&mut source).take(wanted as u64).read_to_end(&mut block);
+        read.map_err(table_error)?;
+        numbers.append(&mut header.element.read(&block, header.endian));
         if block.len() < wanted {
             let found = numbers.len();
             return Err(wrong(format!(
@@ -121,24 +118,10 @@ impl Header {
             Some('<' | '|' | '=') => (Endian::Little, &descr[1..]),
             _ => (Endian::Little, descr),
         };
-        let element = match code {
-            "f4" => Element::F32,
-            "f8" => Element::F64,
-            "i1" => Element::I8,
-            "i2" => Element::I16,
-            "i4" => Element::I32,
-            "i8" => Element::I64,
-            "u1" | "b1" | "?" => Element::U8,
-            "u2" => Element::U16,
-            "u4" => Element::U32,
-            "u8" => Element::U64,
-            _ => {
-                let descr: String = descr.chars().take(20).collect();
-                return Err(format!(
-                    "its type '{descr}' is not supported; convert it with .astype(float)"
-                ));
-            }
-        };
+        let element = Element::of_code(code).ok_or_else(|| {
+            let descr: String = descr.chars().take(20).collect();
+            format!("its type '{descr}' is not supported; convert it with .astype(float)")
+        })?;
         let order = value("fortran_order").ok_or_else(|| missing("fortran_order"))?;
         let is_by_column = order.starts_with("True");
         if !is_by_column && !order.starts_with("False") {
@@ -187,11 +170,11 @@ pub(super) fn read_archive(
         match array {
             Ok(_) if rest > 0 => {
                 let reason = format!("it has {rest} bytes more than its header states; copy it again");
-                return Err(TableError::damaged(name, reason));
+                return Err(TableError::damaged(&name, reason));
             }
             Ok(array) => arrays.push(array),
             // A text or a scalar next to the arrays does not make the file invalid.
-            Err(TableError::Array { what, reason }) => left_out.push(format!("{what}: {reason}")),
+            Err(TableError::Array(reason)) => left_out.push(reason),
             Err(TableError::Io(error)) => return Err(damage(&name, error)),
             Err(error) => return Err(error),
         }

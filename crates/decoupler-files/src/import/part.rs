@@ -77,11 +77,11 @@ impl Recording {
 
 /// Refuses a file whose columns are not those of the first.
 fn check_same(first: &Recording, other: &Recording) -> Result<(), ImportError> {
-    let refuse = |found: String, expected: String| ImportError::OtherColumns {
-        path: other.files[0].path.clone(),
-        found,
-        first: first.files[0].path.clone(),
-        expected,
+    let refuse = |found: String, expected: String| {
+        let [path, first] = [other, first].map(|recording| recording.files[0].path.display());
+        ImportError::Files(format!(
+            "'{path}': {found}, and '{first}': {expected}; files of one experiment need the same columns"
+        ))
     };
     let channels = first.inputs.iter().chain(&first.targets);
     for (one, another) in channels.zip(other.inputs.iter().chain(&other.targets)) {

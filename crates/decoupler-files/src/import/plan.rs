@@ -118,7 +118,10 @@ impl Plan {
         let trained = HashSet::<PathBuf>::from_iter(self.import.data_files().filter_map(real));
         let is_trained = |path: &&PathBuf| real(path).is_some_and(|path| trained.contains(&path));
         match tests.iter().map(|set| &set.data).find(is_trained) {
-            Some(path) => Err(ImportError::TrainedOn(path.clone())),
+            Some(path) => Err(ImportError::Files(format!(
+                "'{}' is trained on, so it cannot be a test file; give another one",
+                path.display()
+            ))),
             None => Ok(()),
         }
     }
@@ -143,7 +146,8 @@ impl Plan {
     /// If the files cannot be imported, or there are no groups for a split by group.
     pub fn recording(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
         if self.division.by == SplitBy::Group && !self.import.has_groups() {
-            return Err(ImportError::NoColumns("the group, by which the samples are split"));
+            let reason = "no column is the group, by which the samples are split; name at least one";
+            return Err(ImportError::Columns(reason.to_owned()));
         }
         self.import.import(folder, watch)
     }

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets, Watch,
+    expression::texts,
     progress::{Watched, table_error},
     table::name_and_unit,
 };
@@ -56,13 +57,13 @@ pub struct Recipe {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub memory: Option<Memory>,
     /// Conditions that every used row must meet.
-    #[serde(default, rename = "where", skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, rename = "where", skip_serializing_if = "Vec::is_empty", with = "texts")]
     pub conditions: Vec<Condition>,
     /// Columns computed from others of the same file.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "texts")]
     pub derive: Vec<Derived>,
     /// Markers of missing values, in addition to empty cells.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "texts")]
     pub missing: Vec<Missing>,
     /// Units of columns that the header does not give.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]

@@ -102,10 +102,8 @@ impl Rows<'_> {
             let reasons = dropped
                 .iter()
                 .map(|Dropped { rows, reason, .. }| format!("{rows}: {reason}"));
-            return Err(ImportError::NoRows {
-                rows: main.rows + main.too_long.rows,
-                reasons: Vec::from_iter(reasons).join("; "),
-            });
+            let (rows, reasons) = (main.rows + main.too_long.rows, Vec::from_iter(reasons).join("; "));
+            return Err(ImportError::Samples(format!("no row of {rows} is left: {reasons}")));
         }
         Ok((kept, dropped))
     }
@@ -139,10 +137,11 @@ impl Rows<'_> {
             let channel = self.files.channel(self.meanings, id);
             let factor = seconds(channel.unit.as_deref());
             if factor.is_none() && self.recipe.memory.as_ref().is_some_and(Memory::needs_clock) {
-                return Err(ImportError::TimeUnit {
-                    name: channel.name,
-                    unit: channel.unit.unwrap_or_default(),
-                });
+                let (name, unit) = (channel.name, channel.unit.unwrap_or_default());
+                return Err(ImportError::Samples(format!(
+                    "the times in '{name}' are in {unit}, and a memory needs times in s, ms, us, ns, min or h: give the unit \
+                     of the column"
+                )));
             }
             times_s = factor.map(|factor| read.iter().map(|&row| factor * self.number(id, row)).collect());
         }
@@ -219,9 +218,11 @@ impl Rows<'_> {
 
     fn row_wire(&self, id: usize, row: usize) -> Result<usize, ImportError> {
         let value = self.number(id, row);
-        row_wire(value).ok_or_else(|| ImportError::RowWire {
-            name: self.name(id).to_owned(),
-            value,
+        row_wire(value).ok_or_else(|| {
+            let name = self.name(id);
+            ImportError::Samples(format!(
+                "'{name}': {value} is not the number of a row-wire; give whole numbers from 1 to {LAST_ROW_WIRE}"
+            ))
         })
     }
 

@@ -42,7 +42,7 @@ pub(super) fn claim(
     for index in 0..archive.len() {
         let entry = archive
             .by_index(index)
-            .map_err(|error| TableError::damaged("the archive", format!("{error}; copy it again")))?;
+            .map_err(|error| TableError::damaged("the archive", format_args!("{error}; copy it again")))?;
         let size = entry.size();
         let name = String::from_utf8_lossy(entry.name_raw()).into_owned();
         let is_strict = is_strict && name == "content.xml";

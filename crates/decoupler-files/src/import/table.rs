@@ -9,7 +9,7 @@ use decoupler_core::text::clean_name;
 
 use serde::Serialize;
 
-use super::{Dialect, Format, time_stamp::TimeStamp};
+use super::{Dialect, Format, TableError, time_stamp::TimeStamp};
 
 /// Table read from a file: columns of equal length.
 #[derive(Clone, Debug)]
@@ -87,9 +87,31 @@ impl Lines {
 }
 
 impl Table {
+    /// Returns a table without rows.
+    pub(super) fn new(path: &Path, format: Format) -> Self {
+        Self {
+            path: path.to_owned(),
+            columns: Vec::new(),
+            variables: Vec::new(),
+            rows: 0,
+            format,
+            notes: Vec::new(),
+            torn_line: None,
+            too_long: Excess::default(),
+            lines: Lines::default(),
+        }
+    }
+
     /// Returns the line of a row of a text file, else the number of the row; from 1.
     pub fn line(&self, row: usize) -> u64 {
         self.lines.of(row)
+    }
+
+    /// Refuses a table with rows that were left out because they are too long.
+    pub(super) fn check_widths(&self) -> Result<(), TableError> {
+        let reason = "the row has more cells than there are columns; correct it";
+        let line = self.too_long.first_line;
+        line.map_or(Ok(()), |line| Err(TableError::in_row(line, reason)))
     }
 
     /// Returns `true` if the columns have names in the file.
@@ -156,6 +178,16 @@ pub struct Faults {
     pub count: usize,
     /// The first of them.
     pub first: Option<Fault>,
+}
+
+impl Faults {
+    pub(super) fn add(&mut self, line: u64, text: impl FnOnce() -> String) {
+        self.count += 1;
+        self.first.get_or_insert_with(|| Fault {
+            line,
+            text: excerpt(&text()),
+        });
+    }
 }
 
 /// Cell that is neither a number nor missing.

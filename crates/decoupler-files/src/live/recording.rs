@@ -130,7 +130,7 @@ impl Recording {
                     ..
                 }) => (row_index, readings, time_s),
                 Ok(_) => continue,
-                Err(LineError::OtherRow { .. }) => (None, &[][..], None),
+                Err(LineError::OtherRow(..)) => (None, &[][..], None),
                 Err(error) => return Err(ReadError::from(error).into()),
             };
             if row_index != Some(expected) {

@@ -1,15 +1,19 @@
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::{
+    fmt,
+    hash::{DefaultHasher, Hash, Hasher},
+};
 
 use decoupler_core::{
     dataset::{DatasetError, MemoryStream, Place, Series},
     problem::{Channel, Problem},
     scene::{RowModel, Rows, SceneError},
     sensor::ArrayScale,
+    text::counted,
 };
 
 use super::{
     super::{
-        Derived, InputError, Recipe, Separator,
+        Derived, Recipe, Separator,
         derived::{self, DerivedStream},
         fields::Fields,
         inputs::{InputColumns, OtherColumns},
@@ -17,7 +21,7 @@ use super::{
         table::excerpt,
         time_stamp::TimeStamp,
     },
-    LineError, Needed,
+    LineError,
 };
 
 /// Parser of successive lines of CSV with the readings of a network, without allocation in steady state.
@@ -57,6 +61,44 @@ pub struct LineParser {
     cells: Vec<f64>,
     readings: Vec<f64>,
     kept: Vec<KeptCell>,
+}
+
+const NO_ROW: &str = "it has no row number, and it is not known with which row a device begins; send the row number before \
+                      the resistances, or whole snapshots in one line";
+
+/// What a cell should be.
+#[derive(Clone, Copy)]
+enum Needed {
+    /// A reading of an array.
+    Resistance,
+    /// An input of a network.
+    Number,
+    /// A time for a memory.
+    Time,
+    /// The number of a row-wire, from 1 to this.
+    RowWire(usize),
+}
+
+impl Needed {
+    /// Returns `true` for the number of a cell that can be used; NaN if the cell is not a number.
+    fn is_met(self, number: f64) -> bool {
+        match self {
+            Self::Resistance => number > 0.0 && number.is_finite(),
+            Self::Number | Self::Time => number.is_finite(),
+            Self::RowWire(last) => number.fract() == 0.0 && (1.0..=last as f64).contains(&number),
+        }
+    }
+}
+
+impl fmt::Display for Needed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Resistance => f.write_str("a resistance; give a finite number of ohm above 0"),
+            Self::Number => f.write_str("a finite number"),
+            Self::Time => f.write_str("a time, which the history of readings needs"),
+            Self::RowWire(last) => write!(f, "a row-wire; give a number from 1 to {last}"),
+        }
+    }
 }
 
 /// Row-wires that are read.
@@ -290,7 +332,8 @@ impl LineParser {
             return Ok(Found::NoReadings);
         }
         if text.contains(&b'\r') {
-            return Err(LineError::LineBreak(line));
+            let reason = "there is a line break within the line; end lines, and only lines, with LF or CR LF";
+            return Err(LineError::Malformed(line, reason.to_owned()));
         }
         self.fields.split(text);
         self.cells.clear();
@@ -314,7 +357,7 @@ impl LineParser {
             };
             if is_header {
                 let found = self.find_columns(&cells, cells.len());
-                found.map_err(|source| LineError::Header { line, source })?;
+                found.map_err(|reason| LineError::Final(line, reason))?;
                 return Ok(Found::NoReadings);
             }
             if self.columns.is_none() {
@@ -322,7 +365,7 @@ impl LineParser {
                 let last = self.fields.iter(text).next_back();
                 let has_comma = self.cells.len() > 1 && last.is_some_and(<[u8]>::is_empty);
                 let found = self.find_columns(&[], self.cells.len() - usize::from(has_comma));
-                found.map_err(|source| LineError::Unnamed { line, source })?;
+                found.map_err(|reason| LineError::Malformed(line, reason))?;
                 self.read_stamp(text);
             }
             if let Some(columns) = &self.columns {
@@ -340,8 +383,9 @@ impl LineParser {
         let found = self.fields.len();
         let has_trailing_comma = found == width + 1 && found > 1 && self.fields.get(text, width).is_empty();
         if found != width && !has_trailing_comma {
-            let expected = width;
-            return Err(LineError::Width { line, found, expected });
+            let found = counted(found, "cell");
+            let reason = format!("{found} where {width} are needed, separated by commas");
+            return Err(LineError::Malformed(line, reason));
         }
         let reading = if self.is_array {
             Needed::Resistance
@@ -363,12 +407,8 @@ impl LineParser {
             .chain(time.map(|(column, _)| (column, Needed::Time)));
         for (column, needed) in all {
             if !needed.is_met(self.cells[column]) {
-                return Err(LineError::Cell {
-                    line,
-                    column: column + 1,
-                    text: excerpt(&String::from_utf8_lossy(self.fields.get(text, column))),
-                    needed,
-                });
+                let cell = excerpt(&String::from_utf8_lossy(self.fields.get(text, column)));
+                return Err(LineError::Cell(line, column + 1, format!("'{cell}' is not {needed}")));
             }
         }
         Ok(())
@@ -383,11 +423,8 @@ impl LineParser {
         self.cells.truncate(width);
         let group = columns.group.filter(|&column| column < width);
         let group = group.map_or(0, |column| key(self.fields.get(text, column)));
-        let taken = self.derived.take(&mut self.cells).map_err(|error| LineError::Header {
-            line,
-            source: InputError::Derived(error.to_string()),
-        });
-        match taken? {
+        let taken = self.derived.take(&mut self.cells);
+        match taken.map_err(|error| LineError::Final(line, error.to_string()))? {
             derived::Progress::Start { is_first } => {
                 self.groups_of_start.push(group);
                 return Ok(Found::Start { is_first });
@@ -398,8 +435,9 @@ impl LineParser {
             return Ok(Found::NoReadings);
         };
         if let Some(column) = columns.inputs.iter().find(|&&column| !self.cells[column].is_finite()) {
-            let name = self.derived.name(column - width).to_owned();
-            return Err(LineError::NoValue { line, name });
+            let name = self.derived.name(column - width);
+            let reason = format!("the derived column '{name}' has no value");
+            return Err(LineError::Malformed(line, reason));
         }
         columns.gather(&self.cells, &mut self.readings);
         for (&(column, _), kept) in columns.kept.iter().zip(&mut self.kept) {
@@ -465,22 +503,24 @@ impl LineParser {
                     self.lines_in_turn += 1;
                     Ok(Some(turn))
                 }
-                Unnumbered::Refused => Err(LineError::NoRow(line)),
+                Unnumbered::Refused => Err(LineError::Final(line, NO_ROW.to_owned())),
             };
         };
         let row = self.cells[column] as usize;
         let index = rows.read.iter().position(|read| read + 1 == row);
-        let read = || rows.read.clone();
-        let index = index.ok_or_else(|| LineError::OtherRow {
-            line,
-            row,
-            read: read(),
+        let index = index.ok_or_else(|| {
+            let read = Vec::from_iter(rows.read.iter().map(|row| (row + 1).to_string())).join(", ");
+            let noun = if rows.read.len() == 1 { "row" } else { "rows" };
+            LineError::OtherRow(
+                line,
+                format!("there is no network for row {row}, only for {noun} {read}"),
+            )
         })?;
         Ok(Some(index))
     }
 
     /// Finds the inputs in the cells of a header, or in lines of `width` cells without one.
-    fn find_columns(&mut self, header: &[String], width: usize) -> Result<(), InputError> {
+    fn find_columns(&mut self, header: &[String], width: usize) -> Result<(), String> {
         let has_rows = self.rows.is_some();
         let channels = self.inputs.len();
         let all = self.rows.as_ref().map_or(0, |rows| rows.read.len()) * channels;
@@ -503,13 +543,14 @@ impl LineParser {
         if self.is_array
             && let Some(name) = InputColumns::named_twice(header, &self.inputs)
         {
-            return Err(InputError::Twice(name));
+            return Err(format!("there are two columns '{name}'; keep one"));
         }
         if has_rows && !self.is_array && columns.row_wire.is_none() {
-            return Err(InputError::Missing {
-                name: self.others.row_wire.clone().unwrap_or_else(|| "row".to_owned()),
-                near: "each row-wire has its own network, which is selected by this column".to_owned(),
-            });
+            let name = self.others.row_wire.as_deref().unwrap_or("row");
+            return Err(format!(
+                "there is no column '{name}', which is an input of the network; each row-wire has its own network, which is \
+                 selected by this column"
+            ));
         }
         // The header of a device that starts again does not begin another start.
         if self.columns.as_ref() != Some(&columns) {
@@ -586,7 +627,7 @@ mod tests {
     /// Line, column and text of a cell that cannot be used.
     fn bad_cell(error: &LineError) -> (u64, usize, &str) {
         match error {
-            LineError::Cell { line, column, text, .. } => (*line, *column, text),
+            LineError::Cell(line, column, reason) => (*line, *column, reason.split('\'').nth(1).unwrap()),
             _ => panic!("{error}"),
         }
     }
@@ -603,17 +644,8 @@ mod tests {
         let mut unnamed = plain(&["u1", "u2"]);
         assert_eq!(readings(&mut unnamed, 1, "1,2"), Some((0, vec![1.0, 2.0])));
         let other = unnamed.parse(2, b"1,2,3").unwrap_err();
-        assert!(
-            matches!(
-                other,
-                LineError::Width {
-                    found: 3,
-                    expected: 2,
-                    ..
-                }
-            ),
-            "{other}"
-        );
+        let expected = "line 2: 3 cells where 2 are needed, separated by commas";
+        assert_eq!(other.to_string(), expected);
         let mut renamed = plain(&["u1", "u2"]);
         let missing = renamed.parse(1, b"time,u1,v2").unwrap_err();
         assert!(missing.is_final() && missing.to_string().contains("u2"), "{missing}");
