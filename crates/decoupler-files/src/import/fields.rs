@@ -5,11 +5,11 @@ use csv_core::{ReadRecordResult, Reader, ReaderBuilder};
 use super::Separator;
 
 /// Cells of a row of text; the buffers are reused, so that rows of similar length need no allocation.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Fields {
     separator: Separator,
     /// Maximum number of cells; one more is found, so that a longer row is noticed.
-    limit: usize,
+    limit: Option<usize>,
     parser: Reader,
     /// Text of the cells of a row with quotes.
     unquoted: Vec<u8>,
@@ -19,15 +19,12 @@ pub(super) struct Fields {
 }
 
 impl Fields {
-    pub(super) fn new(separator: Separator, limit: usize) -> Self {
+    pub(super) fn new(separator: Separator, limit: Option<usize>) -> Self {
         Self {
             separator,
             limit,
             parser: ReaderBuilder::new().delimiter(separator.byte()).build(),
-            unquoted: Vec::new(),
-            has_quotes: false,
-            ends: Vec::new(),
-            ranges: Vec::new(),
+            ..Self::default()
         }
     }
 
@@ -49,7 +46,8 @@ impl Fields {
             range
         });
         let cells = cells.filter(|range| !is_spaced || !range.is_empty());
-        self.ranges.extend(cells.take(self.limit.saturating_add(1)));
+        self.ranges
+            .extend(cells.take(self.limit.map_or(usize::MAX, |limit| limit + 1)));
     }
 
     fn split_quoted(&mut self, text: &[u8]) {
@@ -66,7 +64,9 @@ impl Fields {
             match result {
                 // The parser treats empty input as the end of the record.
                 ReadRecordResult::InputEmpty => {}
-                ReadRecordResult::OutputEndsFull if count <= self.limit => self.ends.resize(2 * count + 8, 0),
+                ReadRecordResult::OutputEndsFull if self.limit.is_none_or(|limit| count <= limit) => {
+                    self.ends.resize(2 * count + 8, 0)
+                }
                 _ => break,
             }
         }
@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn cells_are_split_as_by_the_csv_crate() {
         let long = format!("\"{}\",{}", "x".repeat(5000), "1,".repeat(500));
-        let mut fields = Fields::new(Separator::Comma, usize::MAX);
+        let mut fields = Fields::new(Separator::Comma, None);
         for line in [
             "1.5, 2 ,3",
             "a",
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn a_row_is_split_up_to_one_cell_beyond_the_limit() {
         for row in [",".repeat(1000), "\"\",".repeat(1000)] {
-            let mut fields = Fields::new(Separator::Comma, 20);
+            let mut fields = Fields::new(Separator::Comma, Some(20));
             fields.split(row.as_bytes());
             assert!(fields.len() > 20 && fields.len() < 100, "{}", fields.len());
         }

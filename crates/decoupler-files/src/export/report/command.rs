@@ -8,6 +8,7 @@ use decoupler_core::{
     evaluation::{RUN_OPTIONS, RunSettings},
     scene::{Loading, Movement, RowModel, Scene},
     sensor::SensorModel,
+    text::Named as _,
 };
 
 /// Settings for which the terminal has no option.
@@ -229,11 +230,15 @@ impl Command {
             header,
             skip_lines,
         } = dialect;
-        separator.iter().for_each(|separator| self.add("separator", separator));
-        decimal.iter().for_each(|decimal| self.add("decimal", decimal));
+        separator
+            .iter()
+            .for_each(|separator| self.add("separator", separator.name()));
+        decimal.iter().for_each(|decimal| self.add("decimal", decimal.name()));
         let header = header.map(|header| if header { "yes" } else { "no" });
         header.iter().for_each(|header| self.add("header", header));
-        encoding.iter().for_each(|encoding| self.add("encoding", encoding));
+        encoding
+            .iter()
+            .for_each(|encoding| self.add("encoding", encoding.name()));
         skip_lines.iter().for_each(|lines| self.add("skip-lines", lines));
     }
 }

@@ -1,7 +1,4 @@
-use std::{
-    fmt,
-    hash::{DefaultHasher, Hash, Hasher},
-};
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 use decoupler_core::{
     dataset::{DatasetError, MemoryStream, Place, Series},
@@ -13,7 +10,7 @@ use decoupler_core::{
 
 use super::{
     super::{
-        Derived, Recipe, Separator,
+        Derived, Recipe,
         derived::{self, DerivedStream},
         fields::Fields,
         inputs::{InputColumns, OtherColumns},
@@ -29,7 +26,7 @@ use super::{
 /// A header names the columns, in any order and among others; without one, the first line of readings determines the layout:
 /// the inputs in their order, possibly after the number of the row-wire or, for an array, a whole snapshot row by row. A header
 /// may be repeated, for example when a device restarts, and a comma may end a line.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct LineParser {
     inputs: Vec<Channel>,
     others: OtherColumns,
@@ -65,41 +62,6 @@ pub struct LineParser {
 
 const NO_ROW: &str = "it has no row number, and it is not known with which row a device begins; send the row number before \
                       the resistances, or whole snapshots in one line";
-
-/// What a cell should be.
-#[derive(Clone, Copy)]
-enum Needed {
-    /// A reading of an array.
-    Resistance,
-    /// An input of a network.
-    Number,
-    /// A time for a memory.
-    Time,
-    /// The number of a row-wire, from 1 to this.
-    RowWire(usize),
-}
-
-impl Needed {
-    /// Returns `true` for the number of a cell that can be used; NaN if the cell is not a number.
-    fn is_met(self, number: f64) -> bool {
-        match self {
-            Self::Resistance => number > 0.0 && number.is_finite(),
-            Self::Number | Self::Time => number.is_finite(),
-            Self::RowWire(last) => number.fract() == 0.0 && (1.0..=last as f64).contains(&number),
-        }
-    }
-}
-
-impl fmt::Display for Needed {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Resistance => f.write_str("a resistance; give a finite number of ohm above 0"),
-            Self::Number => f.write_str("a finite number"),
-            Self::Time => f.write_str("a time, which the history of readings needs"),
-            Self::RowWire(last) => write!(f, "a row-wire; give a number from 1 to {last}"),
-        }
-    }
-}
 
 /// Row-wires that are read.
 #[derive(Debug)]
@@ -163,13 +125,8 @@ pub enum ParsedLine<'a> {
 /// What was found in a line, without its readings.
 enum Found {
     NoReadings,
-    Start {
-        is_first: bool,
-    },
-    Readings {
-        row_index: Option<usize>,
-        place: Option<Place>,
-    },
+    Start { is_first: bool },
+    Readings(Option<usize>, Option<Place>),
 }
 
 impl LineParser {
@@ -201,15 +158,19 @@ impl LineParser {
     }
 
     fn of_resistances(channels: usize, rows: RowWires) -> Self {
-        let inputs = (1..=channels).map(|channel| Channel::new(format!("r_{channel}"), None));
+        let inputs = Vec::from_iter((1..=channels).map(|channel| Channel::new(format!("r_{channel}"), None)));
         let others = OtherColumns {
             row_wire: Some("row".to_owned()),
             time: Some("time_s".to_owned()),
             ..OtherColumns::default()
         };
         Self {
+            read: inputs.clone(),
+            inputs,
+            others,
+            rows: Some(rows),
             is_array: true,
-            ..Self::new(inputs.collect(), others, Some(rows))
+            ..Self::default()
         }
     }
 
@@ -250,32 +211,11 @@ impl LineParser {
             memory: memory
                 .map(|memory| MemoryStream::new(memory, inputs.len()))
                 .transpose()?,
-            ..Self::new(inputs.clone(), recipe.other_columns(problem), rows)
-        })
-    }
-
-    fn new(inputs: Vec<Channel>, others: OtherColumns, rows: Option<RowWires>) -> Self {
-        Self {
-            read: inputs.clone(),
-            inputs,
-            others,
-            derive: Vec::new(),
+            inputs: inputs.clone(),
+            others: recipe.other_columns(problem),
             rows,
-            is_array: false,
-            fields: Fields::new(Separator::Comma, usize::MAX),
-            columns: None,
-            has_names: false,
-            is_snapshot: false,
-            has_readings: false,
-            lines_in_turn: 0,
-            derived: DerivedStream::default(),
-            groups_of_start: Vec::new(),
-            memory: None,
-            start: None,
-            cells: Vec::new(),
-            readings: Vec::new(),
-            kept: Vec::new(),
-        }
+            ..Self::default()
+        })
     }
 
     /// Number of readings of a row-wire.
@@ -314,8 +254,8 @@ impl LineParser {
         Ok(match found? {
             Found::NoReadings => ParsedLine::NoReadings,
             Found::Start { is_first } => ParsedLine::Start { is_first },
-            Found::Readings { .. } if self.is_snapshot => ParsedLine::Snapshot(&self.readings),
-            Found::Readings { row_index, place } => ParsedLine::Row {
+            Found::Readings(..) if self.is_snapshot => ParsedLine::Snapshot(&self.readings),
+            Found::Readings(row_index, place) => ParsedLine::Row {
                 row_index,
                 readings: &self.readings,
                 time_s: self.columns.as_ref().and_then(|columns| columns.time_s(&self.cells)),
@@ -387,31 +327,37 @@ impl LineParser {
             let reason = format!("{found} where {width} are needed, separated by commas");
             return Err(LineError::Malformed(line, reason));
         }
-        let reading = if self.is_array {
-            Needed::Resistance
-        } else {
-            Needed::Number
+        let refused = |column: usize, needed: &str| {
+            let cell = excerpt(&String::from_utf8_lossy(self.fields.get(text, column)));
+            LineError::Cell(line, column + 1, format!("'{cell}' is not {needed}"))
         };
-        let read = columns.inputs.iter().filter(|column| **column < width);
-        let derived = self.derived.needed(width);
-        // A memory places the line in its series.
-        let time = columns.time.filter(|_| self.memory.is_some());
-        let row_wire = columns
-            .row_wire
-            .filter(|_| self.memory.is_some() || self.rows.is_some());
-        let last = self.rows.as_ref().map_or(LAST_ROW_WIRE, |rows| rows.last);
-        let all = read
-            .map(|column| (*column, reading))
-            .chain(row_wire.map(|column| (column, Needed::RowWire(last))))
-            .chain(derived.map(|column| (column, Needed::Number)))
-            .chain(time.map(|(column, _)| (column, Needed::Time)));
-        for (column, needed) in all {
-            if !needed.is_met(self.cells[column]) {
-                let cell = excerpt(&String::from_utf8_lossy(self.fields.get(text, column)));
-                return Err(LineError::Cell(line, column + 1, format!("'{cell}' is not {needed}")));
-            }
+        let is_number = |column: &usize| self.cells[*column].is_finite();
+        let is_resistance = |column: &usize| is_number(column) && self.cells[*column] > 0.0;
+        let mut read = columns.inputs.iter().copied().filter(|column| *column < width);
+        if self.is_array
+            && let Some(column) = read.clone().find(|column| !is_resistance(column))
+        {
+            return Err(refused(column, "a resistance; give a finite number of ohm above 0"));
         }
-        Ok(())
+        if let Some(column) = read.find(|column| !is_number(column)) {
+            return Err(refused(column, "a finite number"));
+        }
+        // A memory places the line in its series.
+        let last = self.rows.as_ref().map_or(LAST_ROW_WIRE, |rows| rows.last);
+        let needs_row_wire = self.memory.is_some() || self.rows.is_some();
+        let is_row_wire = |column: &usize| row_wire(self.cells[*column]).is_some_and(|row| row < last);
+        if let Some(column) = columns.row_wire.filter(|column| needs_row_wire && !is_row_wire(column)) {
+            return Err(refused(column, &format!("a row-wire; give a number from 1 to {last}")));
+        }
+        if let Some(column) = self.derived.needed(width).find(|column| !is_number(column)) {
+            return Err(refused(column, "a finite number"));
+        }
+        let time = columns
+            .time
+            .filter(|(column, _)| self.memory.is_some() && !is_number(column));
+        time.map_or(Ok(()), |(column, _)| {
+            Err(refused(column, "a time, which the history of readings needs"))
+        })
     }
 
     /// Gathers the readings of a line whose cells can be used.
@@ -457,7 +403,7 @@ impl LineParser {
             self.readings.clear();
             self.readings.extend_from_slice(features);
         }
-        Ok(Found::Readings { row_index, place })
+        Ok(Found::Readings(row_index, place))
     }
 
     /// Replaces a time stamp by the time since the first.
