@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use decoupler_core::text::{clean_name, original_name};
 
 use super::{
-    Cells, Column, Format, Table, TableError, Variable,
+    Column, Format, Table, TableError, Variable,
     csv_table::{Reading, Role},
     format::Array,
     table::Labels,
@@ -81,7 +81,7 @@ pub(super) fn table(
             columns.push(Column {
                 original: original.clone(),
                 name,
-                cells: Cells::Numbers(numbers),
+                numbers,
                 ..Column::default()
             });
         }
@@ -138,12 +138,10 @@ fn side_by_side(columns: Vec<Vec<f64>>, each: usize) -> Vec<Vec<f64>> {
     (0..each).flat_map(part).collect()
 }
 
-/// Marks the cells that are missing or infinite, and turns the cells of a group into labels.
+/// Marks the cells that are missing or infinite, and labels the cells of a group.
 fn give_role(column: &mut Column, role: &Role<'_>) {
-    let Cells::Numbers(numbers) = &mut column.cells else {
-        return;
-    };
-    for (row, number) in numbers.iter_mut().enumerate() {
+    let mut labels = role.has_labels.then(Labels::default);
+    for (row, number) in column.numbers.iter_mut().enumerate() {
         if number.is_nan() || role.missing.iter().any(|rule| rule.is_number(*number)) {
             column.missing += 1;
             *number = f64::NAN;
@@ -151,12 +149,9 @@ fn give_role(column: &mut Column, role: &Role<'_>) {
             column.faults.add(row as u64 + 1, || number.to_string());
             *number = f64::NAN;
         }
-    }
-    if role.has_labels {
-        let mut labels = Labels::default();
-        for &number in &*numbers {
-            labels.push((!number.is_nan()).then_some((&number.to_string(), Some(number))));
+        if let Some(labels) = &mut labels {
+            labels.push((!number.is_nan()).then(|| number.to_string()).as_deref());
         }
-        column.cells = labels.into_cells();
     }
+    column.labels = labels;
 }

@@ -179,7 +179,7 @@ impl Files {
         meanings.used().try_for_each(|id| self.check_cells(id))?;
         let compared = meanings.comparisons.iter().map(|(id, _)| *id);
         for id in compared.chain(meanings.time).chain(meanings.row_wire) {
-            if let Some(label) = self.columns[id].cells.wordy_label() {
+            if let Some(label) = self.columns[id].wordy_label() {
                 let reason = format!("the label '{label}' is not a number");
                 return Err(Condition::refused(&self.columns[id].name, &reason));
             }
@@ -211,11 +211,10 @@ impl Files {
         let used: HashSet<usize> = meanings.used().collect();
         for id in 0..self.columns.len() {
             let (file, _) = self.place(id);
-            let cells = &mut self.columns[id].cells;
             if !used.contains(&id) {
-                *cells = Default::default();
+                self.columns[id].clear();
             } else if let Some(Some(partners)) = file.checked_sub(1).map(|joined| &joins[joined]) {
-                *cells = cells.of_rows(&partners.rows);
+                self.columns[id].take_rows(&partners.rows);
             }
         }
     }

@@ -7,7 +7,7 @@ use std::{
 use decoupler_core::text::{clean_name, counted, original_name};
 
 use super::{
-    Cells, Column, Dialect, DialectChoice, Encoding, Format, Missing, Table, TableError,
+    Column, Dialect, DialectChoice, Encoding, Format, Missing, Table, TableError,
     columns::position,
     detection::{BEGINNING, detect, encoding_of},
     dialect::utf8_of_utf16,
@@ -100,11 +100,12 @@ pub(super) fn read(
     let columns = named(&headers, width - usize::from(empty_end && width > 1));
     let roles = reading.roles(&columns);
     let builders = columns.into_iter().zip(roles).map(|(column, role)| Builder {
-        missing: role.missing,
-        labels: role.has_labels.then(Labels::default),
-        numbers: Vec::new(),
+        column: Column {
+            labels: role.has_labels.then(Labels::default),
+            ..column
+        },
         has_numbers: false,
-        column,
+        missing: role.missing,
     });
     let mut body = Body {
         dialect,
@@ -145,10 +146,8 @@ struct Body<'a> {
 
 struct Builder<'a> {
     column: Column,
-    numbers: Vec<f64>,
     /// `true` once a cell was a number.
     has_numbers: bool,
-    labels: Option<Labels>,
     missing: Vec<&'a Missing>,
 }
 
@@ -223,14 +222,15 @@ impl Builder<'_> {
         let found = parse(cell, dialect.decimal);
         let is_missing = found == Cell::Missing || self.missing.iter().any(|missing| missing.is(cell, found));
         self.column.missing += usize::from(is_missing);
-        if let Some(labels) = &mut self.labels {
-            let text = text_of(cell, dialect.encoding);
-            let is_new = labels.push((!is_missing).then_some((&text, found.number())));
-            return is_new.then_some(text.len());
-        }
-        let number = match found.number() {
+        let mut added = None;
+        let number = match (found.number(), &mut self.column.labels) {
+            (number, Some(labels)) => {
+                let text = text_of(cell, dialect.encoding);
+                added = labels.push((!is_missing).then_some(&text)).then_some(text.len());
+                number.filter(|_| !is_missing).unwrap_or(f64::NAN)
+            }
             _ if is_missing => f64::NAN,
-            Some(number) if self.column.start.is_none() => {
+            (Some(number), None) if self.column.start.is_none() => {
                 self.has_numbers = true;
                 number
             }
@@ -239,8 +239,8 @@ impl Builder<'_> {
                 f64::NAN
             }),
         };
-        self.numbers.push(number);
-        None
+        self.column.numbers.push(number);
+        added
     }
 
     /// Returns the seconds since the first time stamp of a column; `None` unless all of its cells are time stamps, all with or
@@ -259,13 +259,7 @@ impl Builder<'_> {
             // Whatever the header says, such as a time zone.
             self.column.unit = Some("s".to_owned());
         }
-        Column {
-            cells: match self.labels {
-                Some(labels) => labels.into_cells(),
-                None => Cells::Numbers(self.numbers),
-            },
-            ..self.column
-        }
+        self.column
     }
 }
 

@@ -1,7 +1,7 @@
 //! Derived columns of tables and of streams of lines: those of a stream equal those of a file with the same lines.
 
 use super::{
-    Cells, Column, Derived, ImportError, Table,
+    Column, Derived, ImportError, Table,
     columns::position,
     expression::{Expression, Operand, Operator},
     selection::seconds,
@@ -108,17 +108,11 @@ impl Derived {
         let Some((mut located, new)) = self.located(&table.columns, own, time)? else {
             return Ok(());
         };
-        for place in located.columns() {
-            let column = &table.columns[place];
-            match &column.cells {
-                Cells::Numbers(_) if column.faults.count > 0 => {
-                    return Err(self.refused(&format!("'{}' has text", column.name)));
-                }
-                Cells::Numbers(_) => {}
-                Cells::Labels { .. } => return Err(self.refused(&format!("'{}' is the group", column.name))),
-            }
+        let mut read = located.columns().map(|place| &table.columns[place]);
+        if let Some(column) = read.find(|column| column.faults.count > 0 || column.wordy_label().is_some()) {
+            return Err(self.refused(&format!("'{}' has text", column.name)));
         }
-        let cell = |row: usize, column: usize| table.columns[column].cells.number(row);
+        let cell = |row: usize, column: usize| table.columns[column].numbers[row];
         if !located.take_start(table.rows, cell) {
             return Err(self.refused(NOTHING_AT_START));
         }
@@ -126,7 +120,7 @@ impl Derived {
         let derived = Vec::from_iter((0..table.rows).map(of_row));
         table.columns.push(Column {
             missing: derived.iter().filter(|value| value.is_nan()).count(),
-            cells: Cells::Numbers(derived),
+            numbers: derived,
             ..new
         });
         Ok(())

@@ -154,9 +154,6 @@ pub enum Cure {
     /// Name the time column of the joined file.
     #[error("name it")]
     NameJoinedTime,
-    /// Give a column one meaning.
-    #[error("give the column one meaning")]
-    GiveOneMeaning,
     /// Give the maximum time difference between joined rows.
     #[error("give the limit")]
     GiveLimit,

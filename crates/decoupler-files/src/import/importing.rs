@@ -13,8 +13,8 @@ use ndarray::ArcArray2;
 use serde::Serialize;
 
 use super::{
-    Cells, Column, Cure, Derived, DialectChoice, FileSet, Format, ImportError, Joined, Recipe, Table, TableError,
-    Watch, arrays,
+    Column, Cure, Derived, DialectChoice, FileSet, Format, ImportError, Joined, Recipe, Table, TableError, Watch,
+    arrays,
     columns::{Files, Meanings},
     csv_table::{self, Reading},
     derived::TimeColumn,
@@ -277,9 +277,6 @@ impl Recipe {
         };
         [time, column].into_iter().try_for_each(|id| files.check_cells(id))?;
         let [of_main, of_joined] = [time, column].map(|id| &files.columns[id]);
-        let (Cells::Numbers(times), Cells::Numbers(joined_times)) = (&of_main.cells, &of_joined.cells) else {
-            return Err(refuse("its times are a group as well", Cure::GiveOneMeaning));
-        };
         let later = match (of_main.start, of_joined.start) {
             (None, None) => 0.0,
             (Some(start), Some(joined)) if start.has_zone == joined.has_zone => joined.seconds_since(start),
@@ -288,11 +285,11 @@ impl Recipe {
                 return Err(refuse(reason, Cure::NameJoinedTime));
             }
         };
-        let joined_times = Vec::from_iter(joined_times.iter().map(|time| later + time));
+        let joined_times = Vec::from_iter(of_joined.numbers.iter().map(|time| later + time));
         let Some(limit) = joined.limit.or_else(|| Some(median_interval(&joined_times)? / 2.0)) else {
             return Err(refuse("its times are all the same", Cure::GiveLimit));
         };
-        let partners = nearest(times, &joined_times, limit);
+        let partners = nearest(&of_main.numbers, &joined_times, limit);
         let several = partners.uses(table.rows).iter().filter(|uses| **uses > 1).count();
         if 10 * several > table.rows {
             let (rows, file) = (table.rows, table.path.display());

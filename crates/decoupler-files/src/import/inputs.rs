@@ -263,7 +263,7 @@ impl Recipe {
             meanings: &meanings,
             joins: &[],
         };
-        let is_missing = |id: usize, row: usize| columns[id].cells.is_missing(row);
+        let is_missing = |id: usize, row: usize| columns[id].is_missing(row);
         for &id in meanings.inputs.iter().chain(&meanings.row_wire) {
             if let Some(row) = (0..table.rows).find(|&row| is_missing(id, row)) {
                 let reason = "a network needs all of its inputs, so leave the line out";
@@ -306,7 +306,7 @@ impl Recipe {
             title,
             cells: placed
                 .iter()
-                .map(|&row| columns[column].cells.text(row).into_owned())
+                .map(|&row| columns[column].text(row).into_owned())
                 .collect(),
         });
         Ok(InputTable {

@@ -6,7 +6,7 @@ use std::{
 use serde::Serialize;
 
 use super::{
-    Cells, Column, DialectChoice, Format, ImportError, Meaning, Recipe, Table, Variable, Watch,
+    Column, DialectChoice, Format, ImportError, Meaning, Recipe, Table, Variable, Watch,
     columns::{Files, find},
     join::median_interval,
     read_table,
@@ -126,7 +126,7 @@ impl Inspection {
             Some(name) => Some((find(&table.columns, name)?, false)),
             None => guess_time(table, &columns).map(|column| (column, true)),
         };
-        let time = chosen.and_then(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));
+        let time = chosen.map(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));
         let mut warnings = table.notes.clone();
         let sentinels = columns
             .iter()
@@ -146,10 +146,7 @@ impl Inspection {
 
 impl ColumnSummary {
     fn of(column: &Column) -> Self {
-        let numbers: &[f64] = match &column.cells {
-            Cells::Numbers(numbers) => numbers,
-            Cells::Labels { .. } => &[],
-        };
+        let numbers = &column.numbers;
         let present = || numbers.iter().copied().filter(|number| !number.is_nan());
         let (mut min, mut max, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0);
         for number in present() {
@@ -169,11 +166,7 @@ impl ColumnSummary {
             kind,
             missing: column.missing,
             texts: column.faults.count,
-            first_text: column
-                .faults
-                .first
-                .as_ref()
-                .map(|fault| (fault.line, fault.text.clone())),
+            first_text: column.faults.first.clone().map(|fault| (fault.line, fault.text)),
             min: (count > 0).then_some(min),
             max: (count > 0).then_some(max),
             is_constant: count > 0 && min == max,
@@ -200,67 +193,51 @@ fn histogram(numbers: impl Iterator<Item = f64>, min: f64, max: f64) -> Vec<usiz
 
 /// Marks the columns that have the same cells as an earlier one.
 fn name_duplicates(table: &Table, columns: &mut [ColumnSummary]) {
+    let bits = |column: usize| table.columns[column].numbers.iter().map(|number| number.to_bits());
     let mut known: HashMap<u64, Vec<usize>> = HashMap::new();
-    for index in 0..columns.len() {
-        let Cells::Numbers(numbers) = &table.columns[index].cells else {
-            continue;
-        };
-        if columns[index].min.is_none() {
-            continue;
-        }
-        // FNV-1a over the bits.
-        let hash = numbers.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, number| {
-            (hash ^ number.to_bits()).wrapping_mul(0x0100_0000_01b3)
+    for index in (0..columns.len())
+        .filter(|&index| columns[index].min.is_some())
+        .collect::<Vec<_>>()
+    {
+        // FNV-1a.
+        let hash = bits(index).fold(0xcbf2_9ce4_8422_2325_u64, |hash, bits| {
+            (hash ^ bits).wrapping_mul(0x0100_0000_01b3)
         });
-        let same = |other: &usize| match &table.columns[*other].cells {
-            Cells::Numbers(others) => others
-                .iter()
-                .zip(numbers)
-                .all(|(one, other)| one.to_bits() == other.to_bits()),
-            Cells::Labels { .. } => false,
-        };
         let earlier = known.entry(hash).or_default();
-        match earlier.iter().find(|other| same(other)) {
+        match earlier.iter().find(|other| bits(**other).eq(bits(index))) {
             Some(&other) => columns[index].duplicate_of = Some(columns[other].name.clone()),
             None => earlier.push(index),
         }
     }
 }
 
-/// Returns the first column if it always increases.
+/// Returns the column that is named like a time, or else the first column if it always increases.
 fn guess_time(table: &Table, columns: &[ColumnSummary]) -> Option<usize> {
-    let by_name = columns.iter().position(|column| {
-        let name = column.name.to_lowercase();
-        ["time", "timestamp", "t"].contains(&name.as_str()) && column.min.is_some()
-    });
-    let grows = || match &table.columns.first()?.cells {
-        Cells::Numbers(numbers) => (numbers.len() > 2 && numbers.windows(2).all(|pair| pair[0] < pair[1])).then_some(0),
-        Cells::Labels { .. } => None,
+    let is_time = |column: &ColumnSummary| {
+        ["time", "timestamp", "t"].contains(&column.name.to_lowercase().as_str()) && column.min.is_some()
     };
-    by_name.or_else(grows)
+    let first = &table.columns.first()?.numbers;
+    let grows = first.len() > 2 && first.windows(2).all(|pair| pair[0] < pair[1]);
+    columns.iter().position(is_time).or(grows.then_some(0))
 }
 
 impl TimeSummary {
-    fn of(table: &Table, column: usize, is_guessed: bool) -> Option<Self> {
-        let Cells::Numbers(times) = &table.columns[column].cells else {
-            return None;
-        };
+    fn of(table: &Table, column: usize, is_guessed: bool) -> Self {
+        let times = &table.columns[column].numbers;
         let intervals = || times.windows(2).map(|pair| pair[1] - pair[0]).enumerate();
         let median = median_interval(times);
-        let longest = intervals()
-            .filter(|(_, interval)| *interval > 0.0)
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        Some(Self {
+        let growing = intervals().filter(|(_, interval)| *interval > 0.0);
+        let longest = growing.max_by(|one, other| one.1.total_cmp(&other.1));
+        let gaps = |median| intervals().filter(|(_, interval)| *interval > GAP * median).count();
+        Self {
             column: table.columns[column].name.clone(),
             is_guessed,
             median_interval: median,
-            gaps: median.map_or(0, |median| {
-                intervals().filter(|(_, interval)| *interval > GAP * median).count()
-            }),
+            gaps: median.map_or(0, gaps),
             longest: longest.map(|(_, interval)| interval),
             longest_after_line: longest.map(|(row, _)| table.line(row)),
             backwards: intervals().filter(|(_, interval)| *interval < 0.0).count(),
-        })
+        }
     }
 }
 
@@ -320,10 +297,7 @@ impl Recipe {
                 meanings: vec![Meaning::Unused; table.columns.len()],
             });
             // Only their names are needed from here on.
-            table
-                .columns
-                .iter_mut()
-                .for_each(|column| column.cells = Default::default());
+            table.columns.iter_mut().for_each(Column::clear);
         }
         let files = Files::of(tables, stems);
         let mut meant = files.meant(self)?;

@@ -1,6 +1,6 @@
 use ndarray::Array2;
 
-use super::{Cells, Column};
+use super::Column;
 
 /// Rows of a joined recording that match the rows of the first.
 pub(super) struct Partners {
@@ -89,7 +89,7 @@ const BLOCK: usize = 1 << 14;
 pub(super) fn gather(columns: &mut [Column], ids: &[usize], rows: &[usize], kept: &[usize]) -> Array2<f64> {
     for (id, column) in columns.iter_mut().enumerate() {
         if !ids.contains(&id) && !kept.contains(&id) {
-            column.cells = Cells::default();
+            column.clear();
         }
     }
     let is_ascending = rows.is_sorted();
@@ -99,12 +99,12 @@ pub(super) fn gather(columns: &mut [Column], ids: &[usize], rows: &[usize], kept
     while end > 0 {
         let start = end.saturating_sub(BLOCK);
         for (place, &id) in ids.iter().enumerate() {
-            let cells = &mut columns[id].cells;
+            let moved = &mut columns[id].numbers;
             let block = numbers[start * ids.len()..end * ids.len()].chunks_exact_mut(ids.len());
             for (sample, &row) in block.zip(&rows[start..end]) {
-                sample[place] = cells.number(row);
+                sample[place] = moved[row];
             }
-            if let (Cells::Numbers(moved), true) = (cells, is_ascending) {
+            if is_ascending {
                 moved.truncate(rows[start]);
                 moved.shrink_to_fit();
             }

@@ -58,4 +58,4 @@ pub(crate) use rows::Rows;
 pub use sentinel::Sentinel;
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
 pub use suggestion::{Meaning, suggested_plan, suggested_plan_in_order};
-pub use table::{Cells, Column, Excess, Fault, Faults, Table, Variable};
+pub use table::{Column, Excess, Fault, Faults, Table, Variable};

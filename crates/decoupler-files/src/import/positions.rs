@@ -71,7 +71,7 @@ fn positions(table: &Table, targets: &[Channel]) -> Result<Vec<TargetPosition>, 
     let (mut line_of_target, mut line_of_place) = (HashMap::new(), BTreeMap::new());
     for row in 0..table.rows {
         let line = table.line(row);
-        let (label, x_mm, y_mm) = (names.cells.text(row), x.cells.number(row), y.cells.number(row));
+        let (label, x_mm, y_mm) = (names.text(row), x.numbers[row], y.numbers[row]);
         let name = label.trim();
         let Some(&target) = places.get(name) else {
             let listed = targets.iter().take(MAX_LISTED).map(|target| target.name.as_str());
@@ -115,7 +115,7 @@ fn check(table: &Table, column: &Column) -> Result<(), TableError> {
     }
     let fault = column.faults.first.as_ref();
     let fault = fault.map(|fault| (fault.line, format!("'{}', which is not a finite number", fault.text)));
-    let missing = (0..table.rows).find(|&row| column.cells.is_missing(row));
+    let missing = (0..table.rows).find(|&row| column.is_missing(row));
     let missing = missing.map(|row| (table.line(row), "missing".to_owned()));
     match fault.or(missing) {
         None => Ok(()),

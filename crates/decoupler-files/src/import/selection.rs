@@ -47,11 +47,11 @@ impl Rows<'_> {
 
     /// Returns the cell of a row; NaN if it is missing or the row has no match.
     pub(super) fn number(&self, id: usize, row: usize) -> f64 {
-        self.files.columns[id].cells.number(row)
+        self.files.columns[id].numbers[row]
     }
 
     fn is_missing(&self, id: usize, row: usize) -> bool {
-        self.files.columns[id].cells.is_missing(row)
+        self.files.columns[id].is_missing(row)
     }
 
     /// Returns the rows that are samples, and the dropped rows by reason, in order of first occurrence.
@@ -196,7 +196,7 @@ impl Rows<'_> {
         };
         let (mut known, mut names) = (HashMap::<Cow<'_, str>, usize>::new(), Vec::new());
         let numbers = kept.iter().map(|&row| {
-            let name = self.files.columns[id].cells.text(row);
+            let name = self.files.columns[id].text(row);
             *known.entry(name).or_insert_with_key(|name| {
                 names.push(name.clone().into_owned());
                 names.len() - 1
