@@ -55,21 +55,9 @@ const REFUSED: [(&[u8], &str, &str); 21] = [
         "a file of Excel up to 2003",
         "save it as .xlsx or CSV",
     ),
-    (
-        b"\x89HDF\r\n\x1a\n",
-        "an HDF5 file",
-        "save it as .npz with numpy.savez, with the option -v7 from MATLAB, or as CSV",
-    ),
-    (
-        b"PAR1",
-        "a Parquet file",
-        "save it as CSV, for example with DataFrame.to_csv",
-    ),
-    (
-        b"ARROW1",
-        "an Arrow file",
-        "save it as CSV, for example with DataFrame.to_csv",
-    ),
+    (b"\x89HDF\r\n\x1a\n", "an HDF5 file", HDF),
+    (b"PAR1", "a Parquet file", FRAME),
+    (b"ARROW1", "an Arrow file", FRAME),
     (b"SQLite format 3", "an SQLite database", "export the table as CSV"),
     (b"#ROSBAG", "a ROS bag", "export the topics as CSV"),
     (b"\x89MCAP", "an MCAP log", "export the topics as CSV"),
@@ -88,6 +76,8 @@ const REFUSED: [(&[u8], &str, &str); 21] = [
     (b"%PDF", "a PDF document", TABLE),
     (b"RIFF", "a WAV or AVI file", "export its channels as CSV or .npy"),
 ];
+const HDF: &str = "save it as .npz with numpy.savez, with the option -v7 from MATLAB, or as CSV";
+const FRAME: &str = "save it as CSV, for example with DataFrame.to_csv";
 const PICKLE: &str = "load it in Python and save the arrays with numpy.savez";
 const UNPACK: &str = "unpack it";
 const TABLE: &str = "give a table of numbers";

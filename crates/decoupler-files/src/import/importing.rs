@@ -143,7 +143,7 @@ impl Recipe {
             main.rows + main.too_long.rows,
         );
         let targets_of_rows = gather(&mut files.columns, &meanings.targets, &kept, &meanings.inputs);
-        let history = past.with_readings(gather(&mut files.columns, &meanings.inputs, &read, &[]));
+        let history = past(gather(&mut files.columns, &meanings.inputs, &read, &[]));
         let (memory, readings) = remembered(&history, memory)?;
         let problem = Problem {
             inputs,

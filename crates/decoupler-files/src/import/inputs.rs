@@ -291,7 +291,7 @@ impl Recipe {
             Some(placed.iter().map(|&row| unit_s * rows.number(id, row)).collect())
         });
         if let Some(memory) = &problem.memory {
-            let history = rows.past(&placed, &placed)?.with_readings(readings);
+            let history = rows.past(&placed, &placed)?(readings);
             if let order @ (RowOrder::Restarts { first_row, .. } | RowOrder::Shuffled { first_row, .. }) =
                 history.order()
             {

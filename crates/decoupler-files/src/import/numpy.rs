@@ -1,9 +1,10 @@
 //! The `.npy` format, versions 1 to 3: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
-//! The header is one line with three known keys. A parser of all Python literals would not be safe: nested brackets in a
-//! corrupt header would overflow its stack.
+//! The header is one line with three known keys, a Python literal that is read as JSON.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
+use serde::Deserialize;
+use serde_json::Value;
 use zip::{ZipArchive, result::ZipError};
 
 use super::{
@@ -45,16 +46,16 @@ pub(super) fn read(name: &str, mut source: impl Read, budget: &mut ReadingBudget
     let [b'\x93', b'N', b'U', b'M', b'P', b'Y', major, _] = bytes(8)?[..] else {
         return Err(wrong("it is not a NumPy file; save it with numpy.save".to_owned()));
     };
-    let length = match major {
-        1 => bytes(2)?,
-        2 | 3 => bytes(4)?,
+    let of_length = match major {
+        1 => 2,
+        2 | 3 => 4,
         _ => {
             return Err(wrong(format!(
                 "version {major} of the format is unknown; save it with numpy.save"
             )));
         }
     };
-    let length = length
+    let length = bytes(of_length)?
         .iter()
         .rev()
         .fold(0, |length, byte| (length << 8) + usize::from(*byte));
@@ -92,51 +93,52 @@ pub(super) fn read(name: &str, mut source: impl Read, budget: &mut ReadingBudget
     Ok(array)
 }
 
+/// Header as written, with the names of its keys.
+#[derive(Deserialize)]
+struct Written {
+    descr: Value,
+    fortran_order: bool,
+    shape: Vec<usize>,
+}
+
 impl Header {
     /// Parses a header such as `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 2), }`.
     ///
     /// # Errors
     /// Cause and cure.
     fn parse(text: &str) -> Result<Self, String> {
-        let value = |key: &str| {
-            let quoted = [format!("'{key}'"), format!("\"{key}\"")];
-            let after = quoted.iter().find_map(|key| text.split_once(key.as_str()))?.1;
-            Some(after.trim_start().strip_prefix(':')?.trim_start())
-        };
-        let missing = |key: &str| format!("its header has no {key}; save it with numpy.save");
-        let descr = value("descr").ok_or_else(|| missing("descr"))?;
-        if descr.starts_with('[') {
-            return Err("it has named fields; save its columns as one array of numbers".to_owned());
+        let mut json = text.replace('\'', "\"").replace('(', "[").replace(')', "]");
+        // Python 2 wrote long integers with an L.
+        for (python, other) in [
+            ("False", "false"),
+            ("True", "true"),
+            ("L,", ","),
+            ("L]", "]"),
+            (" ", ""),
+        ] {
+            json = json.replace(python, other);
         }
-        let quote = descr.chars().next().filter(|quote| "'\"".contains(*quote));
-        let descr = quote
-            .and_then(|quote| descr[1..].split_once(quote))
-            .ok_or_else(|| missing("descr"))?
-            .0;
-        let (endian, code) = match descr.chars().next() {
-            Some('>') => (Endian::Big, &descr[1..]),
-            Some('<' | '|' | '=') => (Endian::Little, &descr[1..]),
-            _ => (Endian::Little, descr),
+        let json = json.replace(",]", "]").replace(",}", "}");
+        let written = serde_json::from_str::<Written>(&json);
+        let written =
+            written.map_err(|error| format!("its header is not understood: {error}; save it with numpy.save"))?;
+        let Value::String(descr) = written.descr else {
+            return Err("it has named fields; save its columns as one array of numbers".to_owned());
         };
-        let element = Element::of_code(code).ok_or_else(|| {
+        let endian = if descr.starts_with('>') {
+            Endian::Big
+        } else {
+            Endian::Little
+        };
+        let element = Element::of_code(descr.trim_start_matches(['>', '<', '|', '='])).ok_or_else(|| {
             let descr: String = descr.chars().take(20).collect();
             format!("its type '{descr}' is not supported; convert it with .astype(float)")
         })?;
-        let order = value("fortran_order").ok_or_else(|| missing("fortran_order"))?;
-        let is_by_column = order.starts_with("True");
-        if !is_by_column && !order.starts_with("False") {
-            return Err(missing("fortran_order"));
-        }
-        let shape = value("shape").and_then(|shape| shape.strip_prefix('(')?.split_once(')'));
-        let (shape, _) = shape.ok_or_else(|| missing("shape"))?;
-        let sizes = shape.split(',').map(str::trim).filter(|size| !size.is_empty());
-        // Python 2 wrote long integers with an L.
-        let sizes = sizes.map(|size| size.trim_end_matches('L').parse().map_err(|_| missing("shape")));
         Ok(Self {
             element,
             endian,
-            is_by_column,
-            shape: sizes.collect::<Result<_, _>>()?,
+            is_by_column: written.fortran_order,
+            shape: written.shape,
         })
     }
 }
@@ -272,8 +274,8 @@ mod tests {
                 "states 99999999999 × 2 numbers, but it has 2",
             ),
             ("'<f8'", "(0, 2)", "it is empty (0 × 2)"),
-            ("'<f8'", "(x, 2)", "no shape"),
-            ("'<f8", "(2,)", "is not supported"),
+            ("'<f8'", "(x, 2)", "is not understood"),
+            ("'<f8", "(2,)", "is not understood"),
         ] {
             let error = of(descr, shape);
             assert!(error.contains(cause), "{descr} {shape}: {error}");

@@ -128,8 +128,13 @@ impl Rows<'_> {
         (0..self.main().rows).filter(is_complete).collect()
     }
 
-    /// Describes the rows `read` in order of time, of which those in `kept` are samples.
-    pub(super) fn past(&self, read: &[usize], kept: &[usize]) -> Result<Past, ImportError> {
+    /// Describes the rows `read` in order of time, of which those in `kept` are samples: returns the history of their readings,
+    /// once these are moved.
+    pub(super) fn past(
+        &self,
+        read: &[usize],
+        kept: &[usize],
+    ) -> Result<impl FnOnce(Array2<f64>) -> History + use<>, ImportError> {
         let mut places = vec![0; self.main().rows];
         read.iter().enumerate().for_each(|(place, &row)| places[row] = place);
         let mut times_s = None;
@@ -145,12 +150,9 @@ impl Rows<'_> {
             }
             times_s = factor.map(|factor| read.iter().map(|&row| factor * self.number(id, row)).collect());
         }
-        Ok(Past {
-            groups: self.group_keys(read),
-            row_wires: self.row_wires(read)?,
-            times_s,
-            samples: kept.iter().map(|&row| places[row]).collect(),
-        })
+        let (groups, row_wires) = (self.group_keys(read), self.row_wires(read)?);
+        let samples = kept.iter().map(|&row| places[row]).collect();
+        Ok(move |readings| History::new(readings, groups.as_deref(), row_wires.as_deref(), times_s, samples))
     }
 
     /// Puts the samples `kept` and the rows `read` in order of time, unless the clock restarts; returns a note if they were
@@ -244,21 +246,6 @@ impl Rows<'_> {
             }
         };
         self.files.tables.iter().enumerate().map(report).collect()
-    }
-}
-
-/// Rows of a history, before their readings are moved.
-pub(super) struct Past {
-    groups: Option<Vec<u64>>,
-    row_wires: Option<Vec<usize>>,
-    times_s: Option<Vec<f64>>,
-    samples: Vec<usize>,
-}
-
-impl Past {
-    pub(super) fn with_readings(self, readings: Array2<f64>) -> History {
-        let (groups, row_wires) = (self.groups.as_deref(), self.row_wires.as_deref());
-        History::new(readings, groups, row_wires, self.times_s, self.samples)
     }
 }
 
