@@ -4,12 +4,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use decoupler_core::text::{clean_name, original_name};
 
-use super::{
-    Column, Format, Table, TableError, Variable,
-    csv_table::{Reading, Role},
-    format::Array,
-    table::Labels,
-};
+use super::{Column, Format, Missing, Table, TableError, Variable, csv_table::Reading, format::Array, table::Labels};
 
 /// Maximum number of rows of an array that are one sample, such as two readings per press.
 const MAX_ROWS_PER_SAMPLE: usize = 16;
@@ -88,10 +83,9 @@ pub(super) fn table(
         variables.push(variable(columns.len()));
     }
     let roles = reading.roles(&columns);
-    columns
-        .iter_mut()
-        .zip(roles)
-        .for_each(|(column, role)| give_role(column, &role));
+    for (column, (missing, has_labels)) in columns.iter_mut().zip(roles) {
+        give_role(column, &missing, has_labels);
+    }
     variables.retain(|variable| !variable.name.is_empty());
     Ok(Table {
         columns,
@@ -139,10 +133,10 @@ fn side_by_side(columns: Vec<Vec<f64>>, each: usize) -> Vec<Vec<f64>> {
 }
 
 /// Marks the cells that are missing or infinite, and labels the cells of a group.
-fn give_role(column: &mut Column, role: &Role<'_>) {
-    let mut labels = role.has_labels.then(Labels::default);
+fn give_role(column: &mut Column, missing: &[&Missing], has_labels: bool) {
+    let mut labels = has_labels.then(Labels::default);
     for (row, number) in column.numbers.iter_mut().enumerate() {
-        if number.is_nan() || role.missing.iter().any(|rule| rule.is_number(*number)) {
+        if number.is_nan() || missing.iter().any(|rule| rule.is_number(*number)) {
             column.missing += 1;
             *number = f64::NAN;
         } else if number.is_infinite() {

@@ -257,7 +257,7 @@ pub(super) struct Meanings {
     pub(super) time: Option<usize>,
     pub(super) group: Option<usize>,
     pub(super) row_wire: Option<usize>,
-    pub(super) comparisons: Vec<(usize, Expression<String>)>,
+    pub(super) comparisons: Vec<(usize, Expression)>,
     pub(super) units: HashMap<usize, String>,
 }
 

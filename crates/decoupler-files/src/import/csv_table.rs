@@ -38,29 +38,22 @@ pub(super) struct Reading<'a> {
     pub(super) used: Vec<String>,
 }
 
-/// Markers and kind of the cells of a column.
-pub(super) struct Role<'a> {
-    pub(super) missing: Vec<&'a Missing>,
-    pub(super) has_labels: bool,
-}
-
 impl<'a> Reading<'a> {
-    /// Returns the role of each column.
-    pub(super) fn roles(&self, columns: &[Column]) -> Vec<Role<'a>> {
+    /// Returns the markers of missing values of each column, and `true` if it holds labels.
+    pub(super) fn roles(&self, columns: &[Column]) -> Vec<(Vec<&'a Missing>, bool)> {
         let find = |name: &String| position(columns, name);
         let label = self.label.as_ref().and_then(find);
-        let markers = self.missing.iter();
-        let markers =
-            Vec::from_iter(markers.map(|(name, missing)| (name.is_none(), name.as_ref().and_then(find), *missing)));
-        let role = |column| Role {
-            missing: markers
-                .iter()
-                .filter(|(is_of_all, of, _)| *is_of_all || *of == Some(column))
-                .map(|(.., missing)| *missing)
-                .collect(),
-            has_labels: label == Some(column),
+        let markers = self
+            .missing
+            .iter()
+            .map(|(name, missing)| (name.as_ref().map(find), *missing));
+        let markers = Vec::from_iter(markers);
+        let of = |column| {
+            let is_marker = |of: &Option<Option<usize>>| of.is_none_or(|of| of == Some(column));
+            let markers = markers.iter().filter(|(of, _)| is_marker(of));
+            (markers.map(|(_, missing)| *missing).collect(), label == Some(column))
         };
-        (0..columns.len()).map(role).collect()
+        (0..columns.len()).map(of).collect()
     }
 }
 
@@ -99,14 +92,17 @@ pub(super) fn read(
     let empty_end = dialect.trailing_separator && headers.last().is_none_or(String::is_empty);
     let columns = named(&headers, width - usize::from(empty_end && width > 1));
     let roles = reading.roles(&columns);
-    let builders = columns.into_iter().zip(roles).map(|(column, role)| Builder {
-        column: Column {
-            labels: role.has_labels.then(Labels::default),
-            ..column
-        },
-        has_numbers: false,
-        missing: role.missing,
-    });
+    let builders = columns
+        .into_iter()
+        .zip(roles)
+        .map(|(column, (missing, has_labels))| Builder {
+            column: Column {
+                labels: has_labels.then(Labels::default),
+                ..column
+            },
+            has_numbers: false,
+            missing,
+        });
     let mut body = Body {
         dialect,
         budget,

@@ -7,12 +7,12 @@ use serde::{Deserialize, Deserializer, Serializer, de};
 
 use super::{ImportError, format::Cell};
 
-/// A column with an operator and what it is compared or combined with; columns are names or, in a table, indices.
+/// A column with an operator and what it is compared or combined with.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Expression<C> {
-    pub(super) column: C,
+pub(super) struct Expression {
+    pub(super) column: String,
     pub(super) operator: Operator,
-    pub(super) operand: Operand<C>,
+    pub(super) operand: Operand,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,9 +29,9 @@ pub(super) enum Operator {
 
 /// What a column is compared or combined with.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Operand<C> {
+pub(super) enum Operand {
     /// Another column, row by row.
-    Column(C),
+    Column(String),
     Number(f64),
     /// Its own mean over the first rows.
     Rows(usize),
@@ -51,28 +51,28 @@ const COMPARISONS: [(&str, Operator); 7] = [
 ];
 const COMBINATIONS: [(&str, Operator); 2] = [("-", Operator::Minus), ("/", Operator::Over)];
 
-impl<C> Expression<C> {
+impl Operator {
     /// Value for a number of the column and the number of the operand: 1 or 0 for a comparison.
-    pub(super) fn value(&self, column: f64, operand: f64) -> f64 {
-        match self.operator {
-            Operator::Minus => column - operand,
-            Operator::Over => column / operand,
-            Operator::AtMost => f64::from(column <= operand),
-            Operator::AtLeast => f64::from(column >= operand),
-            Operator::Other => f64::from(column != operand),
-            Operator::Equal => f64::from(column == operand),
-            Operator::Less => f64::from(column < operand),
-            Operator::Greater => f64::from(column > operand),
+    pub(super) fn value(self, column: f64, operand: f64) -> f64 {
+        match self {
+            Self::Minus => column - operand,
+            Self::Over => column / operand,
+            Self::AtMost => f64::from(column <= operand),
+            Self::AtLeast => f64::from(column >= operand),
+            Self::Other => f64::from(column != operand),
+            Self::Equal => f64::from(column == operand),
+            Self::Less => f64::from(column < operand),
+            Self::Greater => f64::from(column > operand),
         }
-    }
-
-    /// Returns `true` for a number of the column that meets a comparison with a number.
-    pub(super) fn is_met(&self, column: f64) -> bool {
-        matches!(self.operand, Operand::Number(number) if self.value(column, number) > 0.0)
     }
 }
 
-impl Expression<String> {
+impl Expression {
+    /// Returns `true` for a number of the column that meets a comparison with a number.
+    pub(super) fn is_met(&self, column: f64) -> bool {
+        matches!(self.operand, Operand::Number(number) if self.operator.value(column, number) > 0.0)
+    }
+
     /// Parses a comparison with a number.
     fn comparison(text: &str) -> Result<Self, String> {
         let place = text.find(['<', '>', '=', '!']);
@@ -133,7 +133,7 @@ fn finite(text: &str) -> Option<f64> {
     text.parse().ok().filter(|number: &f64| number.is_finite())
 }
 
-impl fmt::Display for Expression<String> {
+impl fmt::Display for Expression {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut signs = COMPARISONS.iter().chain(&COMBINATIONS);
         let sign = signs.find(|(_, operator)| *operator == self.operator);
@@ -155,7 +155,7 @@ impl fmt::Display for Expression<String> {
 pub struct Derived {
     /// Name of the new column.
     pub name: String,
-    pub(super) expression: Expression<String>,
+    pub(super) expression: Expression,
 }
 
 /// Returns the error in the derived column `text`.
@@ -216,7 +216,7 @@ impl fmt::Display for Derived {
 /// Written as `c4<145.1 and c5!=0`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
-    pub(super) comparisons: Vec<Expression<String>>,
+    pub(super) comparisons: Vec<Expression>,
 }
 
 impl Condition {

@@ -5,7 +5,7 @@ use csv_core::{ReadRecordResult, Reader, ReaderBuilder};
 use super::Separator;
 
 /// Cells of a row of text; the buffers are reused, so that rows of similar length need no allocation.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Fields {
     separator: Separator,
     /// Maximum number of cells; one more is found, so that a longer row is noticed.
@@ -18,13 +18,22 @@ pub(super) struct Fields {
     ranges: Vec<Range<usize>>,
 }
 
+impl Default for Fields {
+    fn default() -> Self {
+        Self::new(Separator::Comma, None)
+    }
+}
+
 impl Fields {
     pub(super) fn new(separator: Separator, limit: Option<usize>) -> Self {
         Self {
             separator,
             limit,
             parser: ReaderBuilder::new().delimiter(separator.byte()).build(),
-            ..Self::default()
+            unquoted: Vec::new(),
+            has_quotes: false,
+            ends: Vec::new(),
+            ranges: Vec::new(),
         }
     }
 
