@@ -219,16 +219,23 @@ impl Files {
         }
     }
 
+    /// Gives the columns their units in the recipe, except time stamps.
+    pub(super) fn give_units(&mut self, recipe: &Recipe) -> Result<(), ImportError> {
+        for (name, unit) in &recipe.units {
+            let id = find(&self.columns, name)?;
+            if self.columns[id].start.is_none() {
+                self.columns[id].unit = Some(unit.clone());
+            }
+        }
+        Ok(())
+    }
+
     /// Name and unit of a column.
-    pub(super) fn channel(&self, meanings: &Meanings, id: usize) -> Channel {
+    pub(super) fn channel(&self, id: usize) -> Channel {
         let column = &self.columns[id];
         Channel {
-            name: column.name.clone(),
-            unit: match column.start {
-                Some(_) => column.unit.clone(),
-                None => meanings.units.get(&id).or(column.unit.as_ref()).cloned(),
-            },
             original: column.original.clone(),
+            ..Channel::new(&column.name, column.unit.as_deref())
         }
     }
 }
@@ -258,7 +265,6 @@ pub(super) struct Meanings {
     pub(super) group: Option<usize>,
     pub(super) row_wire: Option<usize>,
     pub(super) comparisons: Vec<(usize, Expression)>,
-    pub(super) units: HashMap<usize, String>,
 }
 
 impl Meanings {
@@ -273,7 +279,6 @@ impl Meanings {
         };
         let comparisons = recipe.conditions.iter().flat_map(|condition| &condition.comparisons);
         let comparisons = comparisons.map(|comparison| Ok((find(&comparison.column)?, comparison.clone())));
-        let units = recipe.units.iter().map(|(name, unit)| Ok((find(name)?, unit.clone())));
         let meanings = Self {
             inputs: of(Meaning::Input).collect(),
             targets: of(Meaning::Target).collect(),
@@ -281,7 +286,6 @@ impl Meanings {
             group: of(Meaning::Group).next(),
             row_wire: of(Meaning::RowWire).next(),
             comparisons: comparisons.collect::<Result<_, ImportError>>()?,
-            units: units.collect::<Result<_, ImportError>>()?,
         };
         for missing in recipe.missing.iter().filter_map(|missing| missing.column.as_deref()) {
             find(missing)?;

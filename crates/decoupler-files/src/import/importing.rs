@@ -86,6 +86,7 @@ impl Recipe {
     ) -> Result<Recording, ImportError> {
         let mut files = Files::of(self.read_set(set, &[], folder, watch)?, self.stems());
         let meanings = Meanings::of(self, &files)?;
+        files.give_units(self)?;
         let noted = |table: &Table| {
             let file = table.path.display();
             Vec::from_iter(table.notes.iter().map(|note| format!("'{file}': {note}")))
@@ -121,11 +122,7 @@ impl Recipe {
         let (groups, group_names) = rows.groups(&kept);
         let row_wires = rows.row_wires(&kept)?;
         let past = rows.past(&read, &kept)?;
-        let channels = |ids: &[usize]| {
-            ids.iter()
-                .map(|id| files.channel(&meanings, *id))
-                .collect::<Vec<Channel>>()
-        };
+        let channels = |ids: &[usize]| Vec::from_iter(ids.iter().map(|id| files.channel(*id)));
         let (inputs, targets) = (channels(&meanings.inputs), channels(&meanings.targets));
         let positions = match &self.positions {
             Some(file) => read_positions(&folder.join(file), &targets, watch)?,

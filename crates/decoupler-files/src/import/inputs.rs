@@ -46,7 +46,7 @@ pub struct KeptColumn {
 }
 
 /// Columns of a table that contain the inputs of a network.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct InputColumns {
     /// Column index of each input, in the order of the network.
     pub(super) inputs: Vec<usize>,
@@ -110,10 +110,8 @@ impl InputColumns {
         Self {
             inputs: (before..before + count).collect(),
             row_wire: begins_with_row_wire.then_some(0),
-            time: None,
-            group: None,
-            kept: Vec::new(),
             width: before + count,
+            ..Self::default()
         }
     }
 
@@ -231,30 +229,26 @@ impl Recipe {
         watch: Watch<'_>,
     ) -> Result<InputTable, ImportError> {
         let others = &self.other_columns(problem);
-        let files = Files::of(vec![self.read(path, None, &[], watch)?], Vec::new());
-        let (table, columns) = (&files.tables[0], &files.columns);
-        table.check_widths().map_err(|error| error.in_file(path))?;
+        let mut files = Files::of(vec![self.read(path, None, &[], watch)?], Vec::new());
+        files.tables[0].check_widths().map_err(|error| error.in_file(path))?;
         // Derived columns have names.
-        let has_names = table.has_header() || !self.derive.is_empty();
-        let found = InputColumns::find(columns, has_names, &problem.inputs, others, has_row_wire);
+        let has_names = files.tables[0].has_header() || !self.derive.is_empty();
+        let found = InputColumns::find(&files.columns, has_names, &problem.inputs, others, has_row_wire);
         let found = found.map_err(|error| TableError::Contents(error).in_file(path))?;
         // A memory cannot place a row without a time.
-        let time = found
-            .time
-            .filter(|_| problem.memory.is_some())
-            .map(|(column, _)| column);
-        let given_unit = time.zip(others.time_unit.clone());
+        let time = found.time.filter(|_| problem.memory.is_some()).map(|(id, _)| id);
+        if let Some(id) = time {
+            let unit = files.columns[id].unit.take();
+            files.columns[id].unit = unit.or(others.time_unit.clone());
+        }
         let meanings = Meanings {
             inputs: found.inputs,
             time,
             group: found.group,
             row_wire: found.row_wire,
-            units: given_unit
-                .into_iter()
-                .filter(|(id, _)| columns[*id].unit.is_none())
-                .collect(),
             ..Meanings::default()
         };
+        let (table, columns) = (&files.tables[0], &files.columns);
         files.check_numbers(&meanings)?;
         let rows = Rows {
             recipe: self,

@@ -139,7 +139,7 @@ impl Rows<'_> {
         read.iter().enumerate().for_each(|(place, &row)| places[row] = place);
         let mut times_s = None;
         if let Some(id) = self.meanings.time {
-            let channel = self.files.channel(self.meanings, id);
+            let channel = self.files.channel(id);
             let factor = seconds(channel.unit.as_deref());
             if factor.is_none() && self.recipe.memory.as_ref().is_some_and(Memory::needs_clock) {
                 let (name, unit) = (channel.name, channel.unit.unwrap_or_default());
