@@ -3,6 +3,7 @@ use std::{fs, ops::ControlFlow, path::Path};
 use decoupler_core::dataset::Seed;
 use decoupler_files::{
     export::{RecipeFile, RecipeSource},
+    import::SetupSets,
     machine::limit_memory,
 };
 
@@ -68,8 +69,8 @@ fn check(path: &Path, bytes: &[u8]) -> bool {
         return false;
     }
     match plan.sets(Path::new(""), Seed(1), &mut |_| ControlFlow::Continue(())) {
-        Ok(sets) => {
-            let recording = &sets.recording;
+        Ok(SetupSets { sets, recordings }) => {
+            let recording = &recordings.unwrap().training;
             for set in [&recording.set, &sets.test, &sets.split.training] {
                 let is_finite = |number: &f64| number.is_finite();
                 assert!(set.readings().iter().all(is_finite), "{}", text());

@@ -194,18 +194,6 @@ pub(super) struct DerivedStream {
     start: Option<Vec<Vec<f64>>>,
 }
 
-/// What a line is.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Progress {
-    /// Part of the start: its derived columns are not known yet.
-    Start {
-        /// `true` for the first line.
-        is_first: bool,
-    },
-    /// Complete. The lines of the start, with their derived columns, come with the first such line.
-    Complete(Vec<Vec<f64>>),
-}
-
 impl DerivedStream {
     /// Finds the columns from which `derive` are computed, and adds the new ones to `columns`.
     ///
@@ -241,16 +229,17 @@ impl DerivedStream {
         self.columns.get(place).map_or("", |(derived, _)| &derived.name)
     }
 
-    /// Adds the derived columns to the cells of the next line.
+    /// Adds the derived columns to the cells of the next line, and returns the lines of the start, with their derived columns,
+    /// after the last of them; `None` for a line of the start, whose derived columns are not known yet.
     ///
     /// # Errors
     /// If no cell at the start is a number, or the start is too long.
-    pub(super) fn take(&mut self, cells: &mut Vec<f64>) -> Result<Progress, ImportError> {
+    pub(super) fn take(&mut self, cells: &mut Vec<f64>) -> Result<Option<Vec<Vec<f64>>>, ImportError> {
         let Some(mut lines) = self.start.take() else {
             for (_, column) in &self.columns {
                 cells.push(column.value(|place| cells[place]));
             }
-            return Ok(Progress::Complete(Vec::new()));
+            return Ok(Some(Vec::new()));
         };
         lines.push(cells.clone());
         // Times of derived columns do not exist: a span is over by the cells of the stream.
@@ -260,9 +249,8 @@ impl DerivedStream {
             if lines.len().saturating_mul(cells.len()) > MAX_CELLS {
                 return Err(derived.refused(TOO_LONG));
             }
-            let is_first = lines.len() == 1;
             self.start = Some(lines);
-            return Ok(Progress::Start { is_first });
+            return Ok(None);
         }
         for (derived, column) in &mut self.columns {
             if !column.take_start(lines.len(), |row, place| lines[row][place]) {
@@ -274,6 +262,6 @@ impl DerivedStream {
             }
         }
         *cells = lines.pop().unwrap_or_default();
-        Ok(Progress::Complete(lines))
+        Ok(Some(lines))
     }
 }

@@ -171,34 +171,20 @@ pub(super) enum Endian {
 }
 
 impl Element {
-    pub(super) const I8: Self = Self { kind: 'i', size: 1 };
-    pub(super) const U8: Self = Self { kind: 'u', size: 1 };
-    pub(super) const I16: Self = Self { kind: 'i', size: 2 };
-    pub(super) const U16: Self = Self { kind: 'u', size: 2 };
     pub(super) const I32: Self = Self { kind: 'i', size: 4 };
     pub(super) const U32: Self = Self { kind: 'u', size: 4 };
-    pub(super) const I64: Self = Self { kind: 'i', size: 8 };
-    pub(super) const U64: Self = Self { kind: 'u', size: 8 };
-    pub(super) const F32: Self = Self { kind: 'f', size: 4 };
-    pub(super) const F64: Self = Self { kind: 'f', size: 8 };
 
     /// Returns the type with this code of NumPy, such as `f8`.
     pub(super) fn of_code(code: &str) -> Option<Self> {
-        let all = [
-            Self::I8,
-            Self::U8,
-            Self::I16,
-            Self::U16,
-            Self::I32,
-            Self::U32,
-            Self::I64,
-            Self::U64,
-            Self::F32,
-            Self::F64,
-        ];
         let code = if ["b1", "?"].contains(&code) { "u1" } else { code };
-        all.into_iter()
-            .find(|element| format!("{}{}", element.kind, element.size) == code)
+        let kind = code.chars().next()?;
+        let size = code[kind.len_utf8()..].parse().ok()?;
+        let is_known = match kind {
+            'f' => [4, 8].contains(&size),
+            'i' | 'u' => [1, 2, 4, 8].contains(&size),
+            _ => false,
+        };
+        is_known.then_some(Self { kind, size })
     }
 
     /// Reads the numbers in `bytes`; a part of a number at the end is ignored.

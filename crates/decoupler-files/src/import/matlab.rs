@@ -236,22 +236,23 @@ impl<'a> Elements<'a> {
         }
         let shape = Vec::from_iter(shape.iter().map(|size| *size as usize));
         let (kind, bytes) = self.next()?;
-        let element = match kind {
-            1 => Element::I8,
-            2 => Element::U8,
-            3 => Element::I16,
-            4 => Element::U16,
-            5 => Element::I32,
-            6 => Element::U32,
-            7 => Element::F32,
-            9 => Element::F64,
-            12 => Element::I64,
-            13 => Element::U64,
-            _ => {
-                let reason = "its numbers have an unknown type; save it with the option -v7";
-                return Err(TableError::array(name, reason));
-            }
+        let code = match kind {
+            1 => "i1",
+            2 => "u1",
+            3 => "i2",
+            4 => "u2",
+            5 => "i4",
+            6 => "u4",
+            7 => "f4",
+            9 => "f8",
+            12 => "i8",
+            13 => "u8",
+            _ => "",
         };
+        let element = Element::of_code(code).ok_or_else(|| {
+            let reason = "its numbers have an unknown type; save it with the option -v7";
+            TableError::array(name, reason)
+        })?;
         let found = bytes.len() / element.size;
         let expected = shape.iter().copied().try_fold(1, usize::checked_mul);
         if expected != Some(found) {

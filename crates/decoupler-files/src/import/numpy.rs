@@ -236,7 +236,7 @@ mod tests {
     #[test]
     fn headers_are_read_in_any_order() {
         let header = Header::parse("{'descr': '<f8', 'fortran_order': False, 'shape': (3, 2), }  \n").unwrap();
-        let (element, endian) = (Element::F64, Endian::Little);
+        let (element, endian) = (Element::of_code("f8").unwrap(), Endian::Little);
         let expected = Header {
             element,
             endian,

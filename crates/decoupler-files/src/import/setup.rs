@@ -1,6 +1,7 @@
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use decoupler_core::{
+    dataset::Seed,
     evaluation::{
         Intervals, Run, RunError, RunSets, RunSettings,
         experiments::{ExperimentRecording, TrialSamples},
@@ -13,7 +14,7 @@ use decoupler_core::{
 use ndarray::{Axis, Slice};
 use thiserror::Error;
 
-use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording, Watch};
+use super::{ImportError, Plan, Progress, Recorded, Recording, Watch};
 use crate::machine::memory_budget;
 
 /// Everything needed to repeat a run: its settings and, for a recording, the plan that reads it.
@@ -170,8 +171,7 @@ impl Setup {
         };
         self.check_files()?;
         let watch = &mut watch(job, on_progress);
-        let planned = plan.sets(folder, self.settings.seed, watch)?;
-        Ok(SetupSets::of_plan(plan, folder, planned, watch)?)
+        Ok(plan.sets(folder, self.settings.seed, watch)?)
     }
 
     /// Returns the recording for an experiment; `None` for a simulated array.
@@ -223,23 +223,22 @@ impl SetupSets {
     pub(super) fn of_plan(
         plan: &Plan,
         folder: &Path,
-        planned: PlannedSets,
+        (training, test): (Recording, Option<Recording>),
+        seed: Seed,
         watch: Watch<'_>,
     ) -> Result<Self, ImportError> {
-        let recorded = Recorded::of(plan.within(folder).absolute(), &planned, watch)?;
+        let (split, test_set) = plan.divide(&training, test.as_ref(), seed)?;
+        let recorded = Recorded::of(plan.within(folder).absolute(), [&training.set, &test_set], watch)?;
         let sets = RunSets {
             memory: memory_budget(),
-            ..RunSets::new(planned.split, planned.test).described(planned.recording.problem())
+            ..RunSets::new(split, test_set).described(training.problem())
         };
-        let recordings = Recordings {
+        let recordings = Some(Recordings {
             recorded,
-            training: planned.recording,
-            test: planned.test_recording,
-        };
-        Ok(Self {
-            sets,
-            recordings: Some(recordings),
-        })
+            training,
+            test,
+        });
+        Ok(Self { sets, recordings })
     }
 
     /// Prepares a run of `setup` on these datasets, with its baselines.

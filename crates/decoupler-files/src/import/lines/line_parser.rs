@@ -11,7 +11,7 @@ use decoupler_core::{
 use super::{
     super::{
         Derived, Recipe,
-        derived::{self, DerivedStream},
+        derived::DerivedStream,
         fields::Fields,
         inputs::{InputColumns, OtherColumns},
         selection::{LAST_ROW_WIRE, row_wire},
@@ -370,13 +370,12 @@ impl LineParser {
         let group = columns.group.filter(|&column| column < width);
         let group = group.map_or(0, |column| key(self.fields.get(text, column)));
         let taken = self.derived.take(&mut self.cells);
-        match taken.map_err(|error| LineError::Final(line, error.to_string()))? {
-            derived::Progress::Start { is_first } => {
-                self.groups_of_start.push(group);
-                return Ok(Found::Start { is_first });
-            }
-            derived::Progress::Complete(start) => self.remember(&start),
-        }
+        let Some(start) = taken.map_err(|error| LineError::Final(line, error.to_string()))? else {
+            self.groups_of_start.push(group);
+            let is_first = self.groups_of_start.len() == 1;
+            return Ok(Found::Start { is_first });
+        };
+        self.remember(&start);
         let Some(columns) = &self.columns else {
             return Ok(Found::NoReadings);
         };
