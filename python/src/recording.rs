@@ -8,7 +8,7 @@ use std::{
 use decoupler_core::{dataset::Seed, problem::Channel};
 use decoupler_files::{
     export::RecipeFile,
-    import::{ImportError, Recording, Recordings, SetupSets},
+    import::{ImportError, Recording},
 };
 use numpy::ToPyArray;
 use pyo3::{prelude::*, types::PyDict};
@@ -38,9 +38,8 @@ pub fn import_recording<'py>(py: Python<'py>, recipe: PathBuf, seed: u64) -> PyR
         // A signal is an exception of its own, not an error of the import.
         Ok::<_, ImportError>(interrupted.map_or(Ok(sets), Err))
     })??;
-    let SetupSets { sets, recordings } = sets.map_err(value_error)?;
-    let Recordings { training, .. } = recordings.expect("the sets are those of a recording");
-    let all = of_recording(py, &training)?;
+    let sets = sets.map_err(value_error)?;
+    let all = of_recording(py, &sets.recording)?;
     all.set_item("training", arrays(py, &sets.split.training)?)?;
     let validation = sets.split.validation.as_ref();
     all.set_item("validation", validation.map(|set| arrays(py, set)).transpose()?)?;

@@ -3,7 +3,6 @@ use std::{fs, ops::ControlFlow, path::Path};
 use decoupler_core::dataset::Seed;
 use decoupler_files::{
     export::{RecipeFile, RecipeSource},
-    import::SetupSets,
     machine::limit_memory,
 };
 
@@ -69,8 +68,8 @@ fn check(path: &Path, bytes: &[u8]) -> bool {
         return false;
     }
     match plan.sets(Path::new(""), Seed(1), &mut |_| ControlFlow::Continue(())) {
-        Ok(SetupSets { sets, recordings }) => {
-            let recording = &recordings.unwrap().training;
+        Ok(sets) => {
+            let recording = &sets.recording;
             for set in [&recording.set, &sets.test, &sets.split.training] {
                 let is_finite = |number: &f64| number.is_finite();
                 assert!(set.readings().iter().all(is_finite), "{}", text());

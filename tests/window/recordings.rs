@@ -158,7 +158,7 @@ pub(crate) fn trained(plan: &Plan) -> Run {
     let sets = plan.sets(Path::new(""), Seed::default(), watch).unwrap();
     let mut run = Run::with_baselines(
         settings(),
-        RunSets::new(sets.sets.split, sets.sets.test),
+        RunSets::new(sets.split, sets.test),
         None,
         &Job::UNINTERRUPTED,
     )

@@ -114,8 +114,8 @@ impl Setup {
         let memory = recording.memory();
         let test_recording = test_recording.map(|test| test.with_memory(memory)).transpose();
         let test_recording = test_recording.map_err(ImportError::from)?;
-        let read = (recording, test_recording);
-        let mut sets = SetupSets::of_plan(&plan, folder, read, settings.seed, &mut watch(job, &mut |_| {}))?;
+        let planned = plan.planned(recording, test_recording, settings.seed)?;
+        let mut sets = SetupSets::of_plan(&plan, folder, planned, &mut watch(job, &mut |_| {}))?;
         if let (Some(recordings), Some(choice)) = (&mut sets.recordings, &choice) {
             recordings.recorded.search = Some(choice.record.clone());
             recordings.recorded.combined = Some(choice.combined.clone());

@@ -6,7 +6,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{
-    FileSet, ImportError, Recipe, Recording, SetupSets, Watch,
+    FileSet, ImportError, Recipe, Recording, Watch,
     recipe::{is_irregular, restored, stored},
 };
 use decoupler_core::dataset::{Dataset, Division, Seed, Split, SplitBy};
@@ -56,14 +56,43 @@ impl TestFiles {
     }
 }
 
+/// Datasets of a run on measured samples.
+#[derive(Clone, Debug)]
+pub struct PlannedSets {
+    /// All samples except those of the test files.
+    pub recording: Recording,
+    /// Samples of the test files, if there are any.
+    pub test_recording: Option<Recording>,
+    /// Training and validation samples.
+    pub split: Split,
+    /// Test samples.
+    pub test: Dataset,
+}
+
 impl Plan {
     /// Imports the files, whose paths are relative to `folder`, and splits the samples; `seed` is the seed of the run.
     ///
     /// # Errors
     /// If the files cannot be imported or the samples cannot be split.
-    pub fn sets(&self, folder: &Path, seed: Seed, watch: Watch<'_>) -> Result<SetupSets, ImportError> {
-        let recordings = self.recordings(folder, watch)?;
-        SetupSets::of_plan(self, folder, recordings, seed, watch)
+    pub fn sets(&self, folder: &Path, seed: Seed, watch: Watch<'_>) -> Result<PlannedSets, ImportError> {
+        let (recording, test_recording) = self.recordings(folder, watch)?;
+        self.planned(recording, test_recording, seed)
+    }
+
+    /// Splits imported samples; `seed` is the seed of the run.
+    pub(super) fn planned(
+        &self,
+        recording: Recording,
+        test_recording: Option<Recording>,
+        seed: Seed,
+    ) -> Result<PlannedSets, ImportError> {
+        let (split, test) = self.divide(&recording, test_recording.as_ref(), seed)?;
+        Ok(PlannedSets {
+            recording,
+            test_recording,
+            split,
+            test,
+        })
     }
 
     /// Imports the files, whose paths are relative to `folder`: returns all samples except those of the test files, and the

@@ -15,7 +15,7 @@ use decoupler_core::{
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Condition, Derived, DialectChoice, ImportError, Missing, Plan, Watch,
+    Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets, Watch,
     expression::texts,
     progress::{Watched, table_error},
     table::name_and_unit,
@@ -229,7 +229,7 @@ pub struct FileChecksum {
 
 impl Recorded {
     /// Describes the samples read by `plan`, whose paths must not depend on the working folder.
-    pub(super) fn of(plan: Plan, sets: [&Dataset; 2], watch: Watch<'_>) -> Result<Self, ImportError> {
+    pub(super) fn of(plan: Plan, sets: &PlannedSets, watch: Watch<'_>) -> Result<Self, ImportError> {
         let checksum = |path: PathBuf| {
             // A pipe can be read only once, and is empty now.
             let crc32 = path.is_file().then(|| file_crc32(&path, watch)).transpose()?;
@@ -239,7 +239,7 @@ impl Recorded {
         let files = plan.files().map(checksum).collect::<Result<_, ImportError>>()?;
         Ok(Self {
             files,
-            samples_crc32: samples_crc32(sets),
+            samples_crc32: samples_crc32([&sets.recording.set, &sets.test]),
             search: None,
             combined: None,
             chosen_intervals: None,

@@ -1,7 +1,6 @@
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use decoupler_core::{
-    dataset::Seed,
     evaluation::{
         Intervals, Run, RunError, RunSets, RunSettings,
         experiments::{ExperimentRecording, TrialSamples},
@@ -14,7 +13,7 @@ use decoupler_core::{
 use ndarray::{Axis, Slice};
 use thiserror::Error;
 
-use super::{ImportError, Plan, Progress, Recorded, Recording, Watch};
+use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording, Watch};
 use crate::machine::memory_budget;
 
 /// Everything needed to repeat a run: its settings and, for a recording, the plan that reads it.
@@ -171,7 +170,8 @@ impl Setup {
         };
         self.check_files()?;
         let watch = &mut watch(job, on_progress);
-        Ok(plan.sets(folder, self.settings.seed, watch)?)
+        let planned = plan.sets(folder, self.settings.seed, watch)?;
+        Ok(SetupSets::of_plan(plan, folder, planned, watch)?)
     }
 
     /// Returns the recording for an experiment; `None` for a simulated array.
@@ -223,22 +223,23 @@ impl SetupSets {
     pub(super) fn of_plan(
         plan: &Plan,
         folder: &Path,
-        (training, test): (Recording, Option<Recording>),
-        seed: Seed,
+        planned: PlannedSets,
         watch: Watch<'_>,
     ) -> Result<Self, ImportError> {
-        let (split, test_set) = plan.divide(&training, test.as_ref(), seed)?;
-        let recorded = Recorded::of(plan.within(folder).absolute(), [&training.set, &test_set], watch)?;
+        let recorded = Recorded::of(plan.within(folder).absolute(), &planned, watch)?;
         let sets = RunSets {
             memory: memory_budget(),
-            ..RunSets::new(split, test_set).described(training.problem())
+            ..RunSets::new(planned.split, planned.test).described(planned.recording.problem())
         };
-        let recordings = Some(Recordings {
+        let recordings = Recordings {
             recorded,
-            training,
-            test,
-        });
-        Ok(Self { sets, recordings })
+            training: planned.recording,
+            test: planned.test_recording,
+        };
+        Ok(Self {
+            sets,
+            recordings: Some(recordings),
+        })
     }
 
     /// Prepares a run of `setup` on these datasets, with its baselines.

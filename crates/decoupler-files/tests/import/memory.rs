@@ -116,7 +116,7 @@ fn the_state_continues_into_the_test_samples_and_test_files_have_the_intervals_o
     let sets = plan
         .sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(()))
         .unwrap();
-    let first = sets.sets.test.sample_readings(0);
+    let first = sets.test.sample_readings(0);
     assert_eq!(first[1], first[0] - 2.0);
     // Twice as slow: a lag of 0.04 s would be one sample of this file.
     let slow = (0..10)
@@ -131,7 +131,7 @@ fn the_state_continues_into_the_test_samples_and_test_files_have_the_intervals_o
     let sets = plan
         .sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(()))
         .unwrap();
-    assert_eq!(sets.sets.test.sample_readings(5), [5.0, 3.0]);
+    assert_eq!(sets.test.sample_readings(5), [5.0, 3.0]);
 }
 
 #[test]

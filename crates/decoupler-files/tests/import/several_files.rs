@@ -76,7 +76,7 @@ fn rows_of_all_files_follow_one_another_and_each_file_is_a_group() {
     let sets = plan
         .sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(()))
         .unwrap();
-    assert_eq!((sets.sets.test.samples(), sets.sets.split.training.samples()), (5, 10));
+    assert_eq!((sets.test.samples(), sets.split.training.samples()), (5, 10));
 }
 
 #[test]

@@ -29,8 +29,7 @@ fn training_rows_are_refused_as_test_rows() {
             ..Plan::default()
         };
         let sets = plan.sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(()));
-        sets.map(|sets| sets.sets.test.samples())
-            .map_err(|error| error.to_string())
+        sets.map(|sets| sets.test.samples()).map_err(|error| error.to_string())
     };
     assert_eq!(tested("test.csv"), Ok(40));
     for same in ["train.csv", "sub/../train.csv"] {
