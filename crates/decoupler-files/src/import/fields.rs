@@ -74,7 +74,7 @@ impl Fields {
                 // The parser treats empty input as the end of the record.
                 ReadRecordResult::InputEmpty => {}
                 ReadRecordResult::OutputEndsFull if self.limit.is_none_or(|limit| count <= limit) => {
-                    self.ends.resize(2 * count + 8, 0)
+                    self.ends.resize(2 * count + 8, 0);
                 }
                 _ => break,
             }

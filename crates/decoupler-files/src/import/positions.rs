@@ -81,13 +81,11 @@ fn positions(table: &Table, targets: &[Channel]) -> Result<Vec<TargetPosition>, 
         };
         // −0 and 0 are the same position.
         let place = [x_mm, y_mm].map(|mm| (mm + 0.0).to_bits());
-        let twice = if let Some(first) = line_of_target.insert(target, line) {
-            Some((first, format!("both are the position of '{name}'; leave one out")))
-        } else if let Some(first) = line_of_place.insert(place, line) {
-            Some((first, "two targets have the same position; correct one".to_owned()))
-        } else {
-            None
-        };
+        let same_target = line_of_target.insert(target, line);
+        let same_target = same_target.map(|first| (first, format!("both are the position of '{name}'; leave one out")));
+        let same_place = line_of_place.insert(place, line);
+        let same_place = same_place.map(|first| (first, "two targets have the same position; correct one".to_owned()));
+        let twice = same_target.or(same_place);
         if let Some((first, reason)) = twice {
             return Err(TableError::Contents(format!("lines {first} and {line}: {reason}")));
         }
