@@ -163,14 +163,7 @@ impl Failure {
             Self::Arguments(_) | Self::Bundle(BundleError::Choice(_)) => 2,
             Self::Specification(SpecificationError::Read { .. }) => 1,
             Self::Specification(_) => 2,
-            Self::Import(
-                ImportError::Unknown { .. }
-                | ImportError::Ambiguous { .. }
-                | ImportError::Range(_)
-                | ImportError::TwoMeanings { .. }
-                | ImportError::NoColumns(_)
-                | ImportError::Condition { .. },
-            ) => 2,
+            Self::Import(ImportError::Columns(_)) => 2,
             // A division or a memory that does not fit the samples is an argument; their shape is not.
             Self::Import(ImportError::Dataset(
                 DatasetError::Empty { .. } | DatasetError::Length { .. } | DatasetError::RowWire { .. },

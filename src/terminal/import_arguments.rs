@@ -59,16 +59,16 @@ impl FromStr for MemoryArgument {
 #[command(next_help_heading = "Text files")]
 pub(super) struct DialectArguments {
     /// Separator of the cells [default: detected]
-    #[arg(long, value_name = "comma|semicolon|tab|bar|space")]
+    #[arg(long, value_name = "comma|semicolon|tab|bar|space", value_parser = Separator::named)]
     separator: Option<Separator>,
     /// Decimal separator [default: detected]
-    #[arg(long, value_name = "point|comma")]
+    #[arg(long, value_name = "point|comma", value_parser = Decimal::named)]
     decimal: Option<Decimal>,
     /// Whether the first row has the names of the columns [default: detected]
     #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
     header: Option<bool>,
     /// Encoding [default: detected]
-    #[arg(long, value_name = "utf-8|latin-1|utf-16le|utf-16be")]
+    #[arg(long, value_name = "utf-8|latin-1|utf-16le|utf-16be", value_parser = |text: &str| Encoding::parse(&text.to_lowercase()))]
     encoding: Option<Encoding>,
     /// Number of lines to skip before the table [default: 0]
     #[arg(long, value_name = "N")]
@@ -350,13 +350,8 @@ impl ImportArguments {
             };
             let given = std::path::absolute(given).unwrap_or_else(|_| given.clone());
             let is_named = |path: &PathBuf| path.file_name() == given.file_name();
-            let mut named = saved.plan.files().filter(|path| is_named(path));
-            let before = if is_named(place) {
-                place
-            } else {
-                named.next().unwrap_or(place)
-            };
-            found = found.relocated(before, &given);
+            let named = saved.plan.files().find(is_named).filter(|_| !is_named(place));
+            found = found.relocated(named.as_ref().unwrap_or(place), &given);
             let missing = Vec::from_iter(found.missing().into_iter().map(Path::to_owned));
             for path in missing {
                 let near = path.file_name().map(|name| given.with_file_name(name));

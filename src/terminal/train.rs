@@ -256,7 +256,7 @@ impl Train {
         if let Some(recorded) = &mut file.recorded {
             *recorded = self.import.relocated(recorded)?;
             if let Some(file) = recorded.plan.irregular().filter(|_| self.import.data.is_empty()) {
-                return Err(ImportError::Irregular(file.clone()).into());
+                return Err(ImportError::Irregular(file).into());
             }
             if let Some(missing) = recorded.missing().first() {
                 return Err(Failure::MissingRecording {

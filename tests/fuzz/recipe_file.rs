@@ -61,7 +61,7 @@ fn check(path: &Path, bytes: &[u8]) -> bool {
     assert_eq!(again.absolute(), plan.absolute(), "{}", text());
     // Devices and other files of this machine are no recordings of a corpus.
     let folder = path.parent().unwrap();
-    let is_ours = |file: &std::path::PathBuf| {
+    let is_ours = |file: std::path::PathBuf| {
         file.parent() == Some(folder) && RECORDINGS.iter().any(|(name, _)| file.ends_with(name))
     };
     if !plan.files().all(is_ours) {

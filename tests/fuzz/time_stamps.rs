@@ -2,7 +2,7 @@
 
 use std::{fs, ops::ControlFlow, path::Path};
 
-use decoupler_files::import::{Cells, DialectChoice, Separator, read_table};
+use decoupler_files::import::{DialectChoice, Separator, read_table};
 use rand::{Rng, RngExt};
 
 use crate::{
@@ -24,10 +24,8 @@ fn seconds(stamp: &str, path: &Path) -> Option<f64> {
         ..DialectChoice::default()
     };
     let table = read_table(path, choice, &mut |_| ControlFlow::Continue(())).ok()?;
-    match &table.columns.first()?.cells {
-        Cells::Numbers(numbers) if table.rows == 2 && numbers[0] == 0.0 => {
-            Some(numbers[1]).filter(|seconds| !seconds.is_nan())
-        }
+    match table.columns.first()?.numbers[..] {
+        [0.0, seconds] => Some(seconds).filter(|seconds| !seconds.is_nan()),
         _ => None,
     }
 }

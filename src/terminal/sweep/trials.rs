@@ -110,11 +110,11 @@ impl Trials {
     /// Checksums of the files of `plan`, each read once.
     fn crc32(&self, plan: &Plan) -> Result<Vec<String>, ImportError> {
         let mut checksums = self.checksums.lock().unwrap_or_else(PoisonError::into_inner);
-        let of_file = |path: &PathBuf| match checksums.get(path) {
+        let of_file = |path: PathBuf| match checksums.get(&path) {
             Some(crc32) => Ok(crc32.clone()),
             None => {
-                let crc32 = file_crc32(path, &mut |_| ControlFlow::Continue(()))?;
-                checksums.insert(path.clone(), crc32.clone());
+                let crc32 = file_crc32(&path, &mut |_| ControlFlow::Continue(()))?;
+                checksums.insert(path, crc32.clone());
                 Ok(crc32)
             }
         };

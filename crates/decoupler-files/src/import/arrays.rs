@@ -4,12 +4,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use decoupler_core::text::{clean_name, original_name};
 
-use super::{
-    Cells, Column, Fault, Format, Table, TableError, Variable,
-    csv_table::{Reading, Role},
-    format::Array,
-    table::{Excess, Labels, Lines, stem},
-};
+use super::{Column, Format, Missing, Table, TableError, Variable, csv_table::Reading, format::Array, table::Labels};
 
 /// Maximum number of rows of an array that are one sample, such as two readings per press.
 const MAX_ROWS_PER_SAMPLE: usize = 16;
@@ -81,28 +76,23 @@ pub(super) fn table(
             columns.push(Column {
                 original: original.clone(),
                 name,
-                cells: Cells::Numbers(numbers),
+                numbers,
                 ..Column::default()
             });
         }
         variables.push(variable(columns.len()));
     }
     let roles = reading.roles(&columns);
-    columns
-        .iter_mut()
-        .zip(roles)
-        .for_each(|(column, role)| give_role(column, &role));
+    for (column, (missing, has_labels)) in columns.iter_mut().zip(roles) {
+        give_role(column, &missing, has_labels);
+    }
     variables.retain(|variable| !variable.name.is_empty());
     Ok(Table {
-        stem: stem(path),
         columns,
         variables,
         rows,
-        format,
         notes,
-        torn_line: None,
-        too_long: Excess::default(),
-        lines: Lines::default(),
+        ..Table::new(path, format)
     })
 }
 
@@ -142,29 +132,20 @@ fn side_by_side(columns: Vec<Vec<f64>>, each: usize) -> Vec<Vec<f64>> {
     (0..each).flat_map(part).collect()
 }
 
-/// Marks the cells that are missing or infinite, and turns the cells of a group into labels.
-fn give_role(column: &mut Column, role: &Role<'_>) {
-    let Cells::Numbers(numbers) = &mut column.cells else {
-        return;
-    };
-    for (row, number) in numbers.iter_mut().enumerate() {
-        if number.is_nan() || role.missing.iter().any(|rule| rule.is_number(*number)) {
+/// Marks the cells that are missing or infinite, and labels the cells of a group.
+fn give_role(column: &mut Column, missing: &[&Missing], has_labels: bool) {
+    let mut labels = has_labels.then(Labels::default);
+    for (row, number) in column.numbers.iter_mut().enumerate() {
+        if number.is_nan() || missing.iter().any(|rule| rule.is_number(*number)) {
             column.missing += 1;
             *number = f64::NAN;
         } else if number.is_infinite() {
-            column.faults.count += 1;
-            column.faults.first.get_or_insert(Fault {
-                line: row as u64 + 1,
-                text: number.to_string(),
-            });
+            column.faults.add(row as u64 + 1, || number.to_string());
             *number = f64::NAN;
         }
-    }
-    if role.has_labels {
-        let mut labels = Labels::default();
-        for &number in &*numbers {
-            labels.push((!number.is_nan()).then_some((&number.to_string(), Some(number))));
+        if let Some(labels) = &mut labels {
+            labels.push((!number.is_nan()).then(|| number.to_string()).as_deref());
         }
-        column.cells = labels.into_cells();
     }
+    column.labels = labels;
 }

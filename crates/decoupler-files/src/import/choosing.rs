@@ -11,10 +11,7 @@ use decoupler_core::{
     scene::RowModel,
 };
 
-use super::{
-    ImportError, Plan, Progress, Recording, Setup, SetupError, SetupSets,
-    setup::{unless_cancelled, watch},
-};
+use super::{ImportError, Plan, Progress, Recording, Setup, SetupError, SetupSets, setup::watch};
 use crate::machine::memory_budget;
 
 /// Setup whose settings were chosen from its training samples.
@@ -64,14 +61,15 @@ impl Setup {
         on_progress: &mut dyn FnMut(ChoosingProgress),
     ) -> Result<ChosenSetup, SetupError> {
         let mut plan = self.plan().expect("settings are chosen for a recording").clone();
-        let mut on_reading = |progress| on_progress(ChoosingProgress::Reading(progress));
-        let read = plan.recordings(folder, &mut watch(job, &mut on_reading));
-        let (mut recording, mut test_recording) = unless_cancelled(job, read)?;
+        let mut read = |plan: &Plan| {
+            let mut on_reading = |progress| on_progress(ChoosingProgress::Reading(progress));
+            plan.recordings(folder, &mut watch(job, &mut on_reading))
+        };
+        let (mut recording, mut test_recording) = read(&plan)?;
         let left_out = leave_out_dead(&mut plan, &recording, self.settings().seed)?;
         if !left_out.is_empty() {
             // Rows in which only these channels have no value are samples now.
-            let read = plan.recordings(folder, &mut watch(job, &mut on_reading));
-            (recording, test_recording) = unless_cancelled(job, read)?;
+            (recording, test_recording) = read(&plan)?;
         }
         let raw = recording.with_memory(None).map_err(ImportError::from)?;
         let seed = self.settings().seed;
@@ -117,8 +115,7 @@ impl Setup {
         let test_recording = test_recording.map(|test| test.with_memory(memory)).transpose();
         let test_recording = test_recording.map_err(ImportError::from)?;
         let planned = plan.planned(recording, test_recording, settings.seed)?;
-        let read = SetupSets::of_plan(&plan, folder, planned, &mut watch(job, &mut |_| {}));
-        let mut sets = unless_cancelled(job, read)?;
+        let mut sets = SetupSets::of_plan(&plan, folder, planned, &mut watch(job, &mut |_| {}))?;
         if let (Some(recordings), Some(choice)) = (&mut sets.recordings, &choice) {
             recordings.recorded.search = Some(choice.record.clone());
             recordings.recorded.combined = Some(choice.combined.clone());
@@ -165,17 +162,11 @@ fn leave_out_dead(plan: &mut Plan, recording: &Recording, seed: Seed) -> Result<
         return Ok(Vec::new());
     }
     let dead = dead_channels(&raw.set.select(&training));
-    let (mut left_out, mut kept) = (Vec::new(), Vec::new());
-    for (channel, input) in raw.inputs.iter().enumerate() {
-        let names = if dead.contains(&channel) {
-            &mut left_out
-        } else {
-            &mut kept
-        };
-        names.push(input.name.clone());
-    }
+    let channels = raw.inputs.iter().map(|input| input.name.clone()).enumerate();
+    let (left_out, kept): (Vec<_>, Vec<_>) = channels.partition(|(channel, _)| dead.contains(channel));
+    let names = |channels: Vec<(usize, String)>| Vec::from_iter(channels.into_iter().map(|(_, name)| name));
     if !left_out.is_empty() {
-        plan.import.inputs = kept;
+        plan.import.inputs = names(kept);
     }
-    Ok(left_out)
+    Ok(names(left_out))
 }

@@ -7,13 +7,14 @@ use std::{
 use decoupler_core::text::{clean_name, counted, original_name};
 
 use super::{
-    Cells, Column, Dialect, DialectChoice, Encoding, Fault, Format, Missing, Table, TableError,
-    detection::{BEGINNING, detect},
+    Column, Dialect, DialectChoice, Encoding, Format, Missing, Table, TableError,
+    columns::position,
+    detection::{BEGINNING, detect, encoding_of},
     dialect::utf8_of_utf16,
     format::{Cell, parse},
     progress::table_error,
-    rows::{Rows, commonest},
-    table::{Excess, Labels, Lines, column_called, excerpt, name_and_unit, stem},
+    rows::Rows,
+    table::{Excess, Labels, name_and_unit},
     time_stamp::TimeStamp,
 };
 use crate::machine::ReadingBudget;
@@ -24,8 +25,6 @@ const LARGEST_ROWS: usize = 50_000_000;
 const NUMBER: u64 = 2 * size_of::<f64>() as u64;
 /// Memory of a short text in bytes, without its letters.
 const TEXT: u64 = 64;
-/// Number of rows that determine the number of columns, by their most common length, if there is no header.
-const FIRST_ROWS: usize = 500;
 
 /// Columns that are not read as numbers, and markers of missing values.
 #[derive(Clone, Debug, Default)]
@@ -33,35 +32,28 @@ pub(super) struct Reading<'a> {
     pub(super) choice: DialectChoice,
     /// Markers of missing values in this file: the column, or `None` for all, and the text.
     pub(super) missing: Vec<(Option<String>, &'a Missing)>,
-    /// Columns that hold labels.
-    pub(super) labels: Vec<String>,
+    /// Column of labels.
+    pub(super) label: Option<String>,
     /// Columns or ranges that are used, which choose among the arrays of a file.
     pub(super) used: Vec<String>,
 }
 
-/// Markers and kind of the cells of a column.
-pub(super) struct Role<'a> {
-    pub(super) missing: Vec<&'a Missing>,
-    pub(super) has_labels: bool,
-}
-
 impl<'a> Reading<'a> {
-    /// Returns the role of each column.
-    pub(super) fn roles(&self, columns: &[Column]) -> Vec<Role<'a>> {
-        let find = |name: &String| column_called(columns, name);
-        let labels = Vec::from_iter(self.labels.iter().filter_map(find));
-        let markers = self.missing.iter();
-        let markers =
-            Vec::from_iter(markers.map(|(name, missing)| (name.is_none(), name.as_ref().and_then(find), *missing)));
-        let role = |column| Role {
-            missing: markers
-                .iter()
-                .filter(|(is_of_all, of, _)| *is_of_all || *of == Some(column))
-                .map(|(.., missing)| *missing)
-                .collect(),
-            has_labels: labels.contains(&column),
+    /// Returns the markers of missing values of each column, and `true` if it holds labels.
+    pub(super) fn roles(&self, columns: &[Column]) -> Vec<(Vec<&'a Missing>, bool)> {
+        let find = |name: &String| position(columns, name);
+        let label = self.label.as_ref().and_then(find);
+        let markers = self
+            .missing
+            .iter()
+            .map(|(name, missing)| (name.as_ref().map(find), *missing));
+        let markers = Vec::from_iter(markers);
+        let of = |column| {
+            let is_marker = |of: &Option<Option<usize>>| of.is_none_or(|of| of == Some(column));
+            let markers = markers.iter().filter(|(of, _)| is_marker(of));
+            (markers.map(|(_, missing)| *missing).collect(), label == Some(column))
         };
-        (0..columns.len()).map(role).collect()
+        (0..columns.len()).map(of).collect()
     }
 }
 
@@ -72,159 +64,116 @@ pub(super) fn read(
     reading: &Reading<'_>,
     budget: &mut ReadingBudget,
 ) -> Result<Table, TableError> {
-    let mut beginning = Vec::new();
-    (&mut source)
-        .take(BEGINNING as u64)
-        .read_to_end(&mut beginning)
-        .map_err(table_error)?;
-    let dialect = detect(&beginning, beginning.len() < BEGINNING, &reading.choice)?;
-    let whole = Cursor::new(beginning).chain(source);
-    match dialect.encoding {
-        Encoding::Utf8 | Encoding::Latin1 => read_rows(path, whole, dialect, reading, budget),
-        Encoding::Utf16Le | Encoding::Utf16Be => {
-            let text = utf8_of_utf16(whole, dialect.encoding == Encoding::Utf16Le);
-            read_rows(path, text, dialect, reading, budget)
-        }
-    }
-}
-
-fn read_rows(
-    path: &Path,
-    text: impl Read,
-    dialect: Dialect,
-    reading: &Reading<'_>,
-    budget: &mut ReadingBudget,
-) -> Result<Table, TableError> {
+    let bytes = beginning_of(&mut source)?;
+    let encoding = reading.choice.encoding.unwrap_or_else(|| encoding_of(&bytes));
+    let whole = Cursor::new(bytes).chain(source);
+    let mut text: Box<dyn Read + '_> = match encoding {
+        Encoding::Utf8 | Encoding::Latin1 => Box::new(whole),
+        Encoding::Utf16Le | Encoding::Utf16Be => Box::new(utf8_of_utf16(whole, encoding == Encoding::Utf16Le)),
+    };
+    let beginning = beginning_of(&mut text)?;
+    let is_whole = beginning.len() < BEGINNING;
+    let table = beginning.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&beginning);
+    let (dialect, width) = detect(table, is_whole, encoding, &reading.choice)?;
+    let text = table.chain(text);
     let mut rows = Rows::new(text, dialect.separator, dialect.carriage_returns);
     rows.skip(dialect.skipped_lines + usize::from(dialect.sep_line))?;
     let mut headers = Vec::new();
     if dialect.header && rows.advance()? {
-        headers = rows.cells().map(|cell| text_of(cell, dialect.encoding)).collect();
+        headers = rows.cells().map(|cell| text_of(cell, encoding)).collect();
     }
+    let mut has_row = rows.advance()?;
+    let width = match headers.len() {
+        // No row ends within the beginning.
+        0 if width == 0 => rows.len(),
+        0 => width,
+        of_headers => of_headers,
+    };
+    let empty_end = dialect.trailing_separator && headers.last().is_none_or(String::is_empty);
+    let columns = named(&headers, width - usize::from(empty_end && width > 1));
+    let roles = reading.roles(&columns);
+    let builders = columns
+        .into_iter()
+        .zip(roles)
+        .map(|(column, (missing, has_labels))| Builder {
+            column: Column {
+                labels: has_labels.then(Labels::default),
+                ..column
+            },
+            has_numbers: false,
+            missing,
+        });
     let mut body = Body {
         dialect,
-        reading,
         budget,
-        first: Vec::new(),
-        builders: Vec::new(),
-        rows: 0,
-        lines: Lines::default(),
-        too_long: Excess::default(),
+        builders: builders.collect(),
+        table: Table::new(path, Format::Text(dialect)),
         too_short: Excess::default(),
-        torn_line: None,
     };
-    while rows.advance()? {
-        if body.is_torn(&rows, &headers) {
-            body.torn_line = Some(rows.line());
+    let width = if headers.is_empty() { width } else { body.builders.len() };
+    while has_row {
+        if body.is_torn(&rows, width) {
+            body.table.torn_line = Some(rows.line());
         } else {
-            body.push(&rows, &headers)?;
+            body.add(&rows)?;
         }
+        has_row = rows.advance()?;
     }
-    body.finish(path, headers)
+    body.finish()
+}
+
+/// Reads the beginning, by which the layout is detected.
+fn beginning_of(source: &mut impl Read) -> Result<Vec<u8>, TableError> {
+    let mut beginning = Vec::new();
+    let read = source.take(BEGINNING as u64).read_to_end(&mut beginning);
+    read.map_err(table_error)?;
+    Ok(beginning)
 }
 
 /// The rows after the header.
 struct Body<'a> {
     dialect: Dialect,
-    reading: &'a Reading<'a>,
     budget: &'a mut ReadingBudget,
-    /// Rows buffered until the number of columns is known, with their line numbers.
-    first: Vec<(u64, Vec<Vec<u8>>)>,
     builders: Vec<Builder<'a>>,
-    rows: usize,
-    lines: Lines,
-    too_long: Excess,
+    /// The table without its columns.
+    table: Table,
     too_short: Excess,
-    torn_line: Option<u64>,
 }
 
 struct Builder<'a> {
     column: Column,
-    numbers: Vec<f64>,
     /// `true` once a cell was a number.
     has_numbers: bool,
-    labels: Option<Labels>,
     missing: Vec<&'a Missing>,
 }
 
-impl<'a> Body<'a> {
+impl Body<'_> {
     /// Returns `true` if the row is the last of a file that is cut off, as when the disk was full: it ends without a line
-    /// break, before the last column or within its number.
-    fn is_torn<R: Read>(&self, rows: &Rows<R>, headers: &[String]) -> bool {
-        if rows.is_ended() || self.rows + self.first.len() == 0 {
+    /// break, before the last of `width` columns or within its number.
+    fn is_torn<R: Read>(&self, rows: &Rows<R>, width: usize) -> bool {
+        if rows.is_ended() || self.table.rows == 0 {
             return false;
         }
-        let width = match (self.builders.len(), headers.len()) {
-            (0, 0) => commonest(self.first.iter().map(|(_, cells)| cells.len())).0,
-            (0, _) => return false,
-            (width, _) => width,
-        };
         let is_text = |cell: &[u8]| parse(cell, self.dialect.decimal) == Cell::Text;
         let has_numbers = |builder: &Builder<'_>| builder.has_numbers && builder.column.faults.count == 0;
-        let is_within_number = || {
-            let of_numbers = self.builders.last().is_some_and(has_numbers);
-            of_numbers && rows.len() == width && rows.cells().last().is_some_and(is_text)
-        };
-        rows.len() < width || is_within_number()
+        let ends_in_text = || rows.len() == self.builders.len() && rows.cells().last().is_some_and(is_text);
+        rows.len() < width || (self.builders.last().is_some_and(has_numbers) && ends_in_text())
     }
 
-    fn push<R: Read>(&mut self, rows: &Rows<R>, headers: &[String]) -> Result<(), TableError> {
-        if self.builders.is_empty() {
-            if headers.is_empty() && self.first.len() < FIRST_ROWS {
-                let texts = rows.cells().map(|cell| cell.len() as u64).sum::<u64>();
-                self.budget.claim(texts + TEXT * rows.len() as u64)?;
-                self.first
-                    .push((rows.line(), rows.cells().map(<[u8]>::to_vec).collect()));
-                return Ok(());
-            }
-            self.begin(headers)?;
-        }
-        self.add(rows.line(), rows.len(), rows.cells())
-    }
-
-    /// Creates the columns and adds the buffered rows.
-    fn begin(&mut self, headers: &[String]) -> Result<(), TableError> {
-        let waiting = std::mem::take(&mut self.first);
-        let width = match headers.len() {
-            0 => commonest(waiting.iter().map(|(_, cells)| cells.len())).0,
-            width => width,
-        };
-        let empty_end = self.dialect.trailing_separator && headers.last().is_none_or(String::is_empty);
-        let width = width - usize::from(empty_end && width > 1);
-        let columns = named(headers, width);
-        let roles = self.reading.roles(&columns);
-        let columns = columns.into_iter().zip(roles);
-        let builders = columns.map(|(column, role)| Builder {
-            missing: role.missing,
-            labels: role.has_labels.then(Labels::default),
-            numbers: Vec::new(),
-            has_numbers: false,
-            column,
-        });
-        self.builders = builders.collect();
-        for (line, cells) in waiting {
-            self.add(line, cells.len(), cells.iter().map(Vec::as_slice))?;
-        }
-        Ok(())
-    }
-
-    fn add<'c>(
-        &mut self,
-        line: u64,
-        count: usize,
-        mut cells: impl Iterator<Item = &'c [u8]> + Clone,
-    ) -> Result<(), TableError> {
-        let width = self.builders.len();
+    fn add<R: Read>(&mut self, rows: &Rows<R>) -> Result<(), TableError> {
+        let (line, width, count) = (rows.line(), self.builders.len(), rows.len());
+        let mut cells = rows.cells();
         // A separator at the end of a row does not start another cell.
         if count > width && (count > width + 1 || cells.clone().last().is_some_and(|cell| !cell.is_empty())) {
-            self.too_long.add(line);
+            self.table.too_long.add(line);
             return Ok(());
         }
         if count < width {
             self.too_short.add(line);
         }
-        if self.rows == LARGEST_ROWS {
-            return Err(TableError::Long(LARGEST_ROWS));
+        if self.table.rows == LARGEST_ROWS {
+            let reason = format!("it has more than {LARGEST_ROWS} rows; use every second row, or a part of the file");
+            return Err(TableError::Contents(reason));
         }
         self.budget.claim(NUMBER * width as u64)?;
         for builder in &mut self.builders {
@@ -233,44 +182,33 @@ impl<'a> Body<'a> {
                 self.budget.claim(2 * (length as u64 + TEXT))?;
             }
         }
-        self.lines.push(self.rows, line);
-        self.rows += 1;
+        self.table.lines.push(self.table.rows, line);
+        self.table.rows += 1;
         Ok(())
     }
 
-    fn finish(mut self, path: &Path, headers: Vec<String>) -> Result<Table, TableError> {
-        if self.builders.is_empty() {
-            self.begin(&headers)?;
-        }
-        if self.rows == 0 {
+    fn finish(self) -> Result<Table, TableError> {
+        let mut table = self.table;
+        if table.rows == 0 {
             return Err(TableError::Empty);
         }
-        let mut notes = Vec::new();
-        if let Some(line) = self.torn_line {
-            notes.push(format!("line {line}, the last, is cut off and left out"));
-        }
+        let torn = table
+            .torn_line
+            .map(|line| format!("line {line}, the last, is cut off and left out"));
+        table.notes.extend(torn);
         for (excess, what) in [
             (self.too_short, "fewer cells than there are columns, which are missing"),
-            (self.too_long, "more cells than there are columns, left out"),
+            (table.too_long, "more cells than there are columns, left out"),
         ] {
             if let Some(line) = excess.first_line {
-                notes.push(format!(
-                    "{} with {what}, the first on line {line}",
-                    counted(excess.rows, "row")
-                ));
+                let rows = counted(excess.rows, "row");
+                table
+                    .notes
+                    .push(format!("{rows} with {what}, the first on line {line}"));
             }
         }
-        Ok(Table {
-            variables: Vec::new(),
-            stem: stem(path),
-            columns: self.builders.into_iter().map(Builder::finish).collect(),
-            rows: self.rows,
-            format: Format::Text(self.dialect),
-            notes,
-            torn_line: self.torn_line,
-            too_long: self.too_long,
-            lines: self.lines,
-        })
+        table.columns = self.builders.into_iter().map(Builder::finish).collect();
+        Ok(table)
     }
 }
 
@@ -280,37 +218,25 @@ impl Builder<'_> {
         let found = parse(cell, dialect.decimal);
         let is_missing = found == Cell::Missing || self.missing.iter().any(|missing| missing.is(cell, found));
         self.column.missing += usize::from(is_missing);
-        if let Some(labels) = &mut self.labels {
-            let text = text_of(cell, dialect.encoding);
-            let number = match found {
-                Cell::Number(number) => Some(number),
-                _ => None,
-            };
-            let is_new = labels.push((!is_missing).then_some((&text, number)));
-            return is_new.then_some(text.len());
-        }
-        let number = match found {
-            Cell::Number(number) if !is_missing && self.column.start.is_none() => {
+        let mut added = None;
+        let number = match (found.number(), &mut self.column.labels) {
+            (number, Some(labels)) => {
+                let text = text_of(cell, dialect.encoding);
+                added = labels.push((!is_missing).then_some(&text)).then_some(text.len());
+                number.filter(|_| !is_missing).unwrap_or(f64::NAN)
+            }
+            _ if is_missing => f64::NAN,
+            (Some(number), None) if self.column.start.is_none() => {
                 self.has_numbers = true;
                 number
             }
-            Cell::Missing => f64::NAN,
-            _ if is_missing => f64::NAN,
-            _ => match self.seconds(cell) {
-                Some(seconds) => seconds,
-                None => {
-                    let faults = &mut self.column.faults;
-                    faults.count += 1;
-                    faults.first.get_or_insert_with(|| Fault {
-                        line,
-                        text: excerpt(&text_of(cell, dialect.encoding)),
-                    });
-                    f64::NAN
-                }
-            },
+            _ => self.seconds(cell).unwrap_or_else(|| {
+                self.column.faults.add(line, || text_of(cell, dialect.encoding));
+                f64::NAN
+            }),
         };
-        self.numbers.push(number);
-        None
+        self.column.numbers.push(number);
+        added
     }
 
     /// Returns the seconds since the first time stamp of a column; `None` unless all of its cells are time stamps, all with or
@@ -329,13 +255,7 @@ impl Builder<'_> {
             // Whatever the header says, such as a time zone.
             self.column.unit = Some("s".to_owned());
         }
-        Column {
-            cells: match self.labels {
-                Some(labels) => labels.into_cells(),
-                None => Cells::Numbers(self.numbers),
-            },
-            ..self.column
-        }
+        self.column
     }
 }
 

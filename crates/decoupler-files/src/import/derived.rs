@@ -1,12 +1,10 @@
 //! Derived columns of tables and of streams of lines: those of a stream equal those of a file with the same lines.
 
-use decoupler_core::text::in_one_line;
-
 use super::{
-    Cells, Column, Derived, ImportError, Table,
-    expression::{Expression, Operand, Operator},
+    Column, Derived, ImportError, Table,
+    columns::position,
+    expression::{Operand, Operator},
     selection::seconds,
-    table::column_called,
 };
 
 /// Reasons why there is no mean at the start.
@@ -28,9 +26,20 @@ pub(super) struct TimeColumn<'a> {
 /// Derived column with the places of its columns in a table or in the lines of a stream.
 #[derive(Clone, Debug, PartialEq)]
 struct Located {
-    expression: Expression<usize>,
-    /// Place of the time column and the seconds in its unit, for a mean over seconds.
-    time: Option<(usize, f64)>,
+    column: usize,
+    operator: Operator,
+    operand: Source,
+}
+
+/// What a column is combined with.
+#[derive(Clone, Debug, PartialEq)]
+enum Source {
+    Column(usize),
+    Number(f64),
+    /// Its own mean over the first rows.
+    Rows(usize),
+    /// Its own mean over the first seconds, by the time column and the seconds in its unit.
+    Seconds(f64, (usize, f64)),
 }
 
 impl Derived {
@@ -45,44 +54,38 @@ impl Derived {
         own: impl Fn(&str) -> Option<String>,
         time: Option<TimeColumn<'_>>,
     ) -> Result<Option<(Located, Column)>, ImportError> {
-        let find = |name: &str| column_called(columns, name);
-        let Some(column) = own(&self.expression.column).and_then(|name| find(&name)) else {
+        let find = |name: &str| position(columns, &own(name)?);
+        let name = own(&self.name).filter(|name| position(columns, name).is_none());
+        let (Some(column), Some(name)) = (find(&self.expression.column), name) else {
             return Ok(None);
         };
-        let Some(name) = own(&self.name).filter(|name| find(name).is_none()) else {
-            return Ok(None);
-        };
-        let (mut other, mut unit_s) = (column, None);
+        let mut other = column;
         let operand = match &self.expression.operand {
             Operand::Column(name) => {
-                let found = own(name).and_then(|name| find(&name));
-                other = found.ok_or_else(|| self.refused(&format!("there is no column '{name}' in the same file")))?;
-                Operand::Column(other)
+                let missing = || self.refused(&format!("there is no column '{name}' in the same file"));
+                other = find(name).ok_or_else(missing)?;
+                Source::Column(other)
             }
-            Operand::Rows(rows) => Operand::Rows(*rows),
-            Operand::Number(number) => Operand::Number(*number),
+            Operand::Rows(rows) => Source::Rows(*rows),
+            Operand::Number(number) => Source::Number(*number),
             Operand::Seconds(limit_s) => {
-                let found = time.and_then(|time| Some((find(time.name)?, time.given_unit)));
-                let (time, given_unit) =
-                    found.ok_or_else(|| self.refused("seconds need the time column; give a number of rows"))?;
-                let of_stamps = columns[time].start.map(|_| "s");
-                let unit = of_stamps.or(given_unit).or(columns[time].unit.as_deref());
-                let factor = seconds(unit)
-                    .ok_or_else(|| self.refused(&format!("'{}' has no unit of time", columns[time].name)))?;
-                unit_s = Some((time, factor));
-                Operand::Seconds(*limit_s)
+                let found = time.and_then(|time| Some((position(columns, time.name)?, time.given_unit)));
+                let Some((time, given_unit)) = found else {
+                    return Err(self.refused("seconds need the time column; give a number of rows"));
+                };
+                let Column { name, unit, start, .. } = &columns[time];
+                let Some(unit_s) = seconds(start.map(|_| "s").or(given_unit).or(unit.as_deref())) else {
+                    return Err(self.refused(&format!("'{name}' has no unit of time")));
+                };
+                Source::Seconds(*limit_s, (time, unit_s))
             }
         };
+        let operator = self.expression.operator;
         let units = [column, other].map(|place| columns[place].unit.as_deref());
-        let unit = match (self.expression.operator, units) {
+        let unit = match (operator, units) {
             (Operator::Over, [one, other]) if one == other => None,
             (Operator::Over, [one, other]) => one.zip(other).map(|(one, other)| format!("{one}/{other}")),
             (_, [one, other]) => one.filter(|_| one == other).map(str::to_owned),
-        };
-        let expression = Expression {
-            column,
-            operator: self.expression.operator,
-            operand,
         };
         let new = Column {
             name,
@@ -90,8 +93,9 @@ impl Derived {
             ..Column::default()
         };
         let located = Located {
-            expression,
-            time: unit_s,
+            column,
+            operator,
+            operand,
         };
         Ok(Some((located, new)))
     }
@@ -110,17 +114,11 @@ impl Derived {
         let Some((mut located, new)) = self.located(&table.columns, own, time)? else {
             return Ok(());
         };
-        for place in located.columns() {
-            let column = &table.columns[place];
-            match &column.cells {
-                Cells::Numbers(_) if column.faults.count > 0 => {
-                    return Err(self.refused(&format!("'{}' has text", column.name)));
-                }
-                Cells::Numbers(_) => {}
-                Cells::Labels { .. } => return Err(self.refused(&format!("'{}' is the group", column.name))),
-            }
+        let mut read = located.columns().map(|place| &table.columns[place]);
+        if let Some(column) = read.find(|column| column.faults.count > 0 || column.wordy_label().is_some()) {
+            return Err(self.refused(&format!("'{}' has text", column.name)));
         }
-        let cell = |row: usize, column: usize| table.columns[column].cells.number(row);
+        let cell = |row: usize, column: usize| table.columns[column].numbers[row];
         if !located.take_start(table.rows, cell) {
             return Err(self.refused(NOTHING_AT_START));
         }
@@ -128,98 +126,72 @@ impl Derived {
         let derived = Vec::from_iter((0..table.rows).map(of_row));
         table.columns.push(Column {
             missing: derived.iter().filter(|value| value.is_nan()).count(),
-            cells: Cells::Numbers(derived),
+            numbers: derived,
             ..new
         });
         Ok(())
-    }
-
-    fn refused(&self, reason: &str) -> ImportError {
-        ImportError::Derived {
-            text: in_one_line(&self.to_string()),
-            reason: in_one_line(reason),
-        }
     }
 }
 
 impl Located {
     /// Places of the columns from which it is computed.
     fn columns(&self) -> impl Iterator<Item = usize> + use<> {
-        let other = match self.expression.operand {
-            Operand::Column(other) => Some(other),
-            Operand::Seconds(_) => self.time.map(|(time, _)| time),
-            Operand::Rows(_) | Operand::Number(_) => None,
+        let other = match self.operand {
+            Source::Column(other) | Source::Seconds(_, (other, _)) => Some(other),
+            Source::Rows(_) | Source::Number(_) => None,
         };
-        std::iter::once(self.expression.column).chain(other)
+        std::iter::once(self.column).chain(other)
     }
 
     /// Returns `true` if `rows` rows are the whole start, or all of it and more; `cell` returns a cell by row and column.
     fn has_start(&self, rows: usize, cell: impl Fn(usize, usize) -> f64) -> bool {
-        match (&self.expression.operand, self.time) {
-            (Operand::Rows(needed), _) => rows >= *needed,
-            (Operand::Seconds(limit_s), Some((time, unit_s))) => {
-                let elapsed = |row| unit_s * (cell(row, time) - cell(0, time));
-                rows > 0 && elapsed(rows - 1) > *limit_s
+        match self.operand {
+            Source::Rows(needed) => rows >= needed,
+            Source::Seconds(limit_s, (time, unit_s)) => {
+                rows > 0 && unit_s * (cell(rows - 1, time) - cell(0, time)) > limit_s
             }
-            _ => true,
+            Source::Column(_) | Source::Number(_) => true,
         }
     }
 
     /// Replaces a mean at the start of `rows` rows by its value; returns `false` if no cell there is a number. `cell` returns a
     /// cell by row and column.
     fn take_start(&mut self, rows: usize, cell: impl Fn(usize, usize) -> f64) -> bool {
-        let Self { expression, time } = &*self;
-        let first = time.map_or(f64::NAN, |(time, _)| {
-            (0..rows).map(|row| cell(row, time)).fold(f64::INFINITY, f64::min)
-        });
-        let is_at_start = |row: &usize| match (&expression.operand, *time) {
-            (Operand::Rows(limit), _) => row < limit,
-            (Operand::Seconds(limit_s), Some((time, unit_s))) => unit_s * (cell(*row, time) - first) <= *limit_s,
-            _ => false,
-        };
-        if matches!(expression.operand, Operand::Column(_) | Operand::Number(_)) {
-            return true;
+        let mut start = Vec::from_iter(0..rows);
+        match self.operand {
+            Source::Column(_) | Source::Number(_) => return true,
+            Source::Rows(limit) => start.truncate(limit),
+            Source::Seconds(limit_s, (time, unit_s)) => {
+                let first = start.iter().map(|&row| cell(row, time)).fold(f64::INFINITY, f64::min);
+                start.retain(|&row| unit_s * (cell(row, time) - first) <= limit_s);
+            }
         }
-        let start = (0..rows).filter(is_at_start);
-        let present = start
-            .map(|row| cell(row, expression.column))
-            .filter(|value| !value.is_nan());
+        let present = start.into_iter().map(|row| cell(row, self.column));
+        let present = present.filter(|value| !value.is_nan());
         let (sum, count) = present.fold((0.0, 0_u32), |(sum, count), value| (sum + value, count + 1));
-        self.expression.operand = Operand::Number(sum / f64::from(count));
+        self.operand = Source::Number(sum / f64::from(count));
         count > 0
     }
 
     /// Value in a row; NaN if there is none, such as for a quotient by zero. `cell` returns a cell of the row by column.
     fn value(&self, cell: impl Fn(usize) -> f64) -> f64 {
-        let operand = match self.expression.operand {
-            Operand::Column(other) => cell(other),
-            Operand::Number(number) => number,
-            Operand::Rows(_) | Operand::Seconds(_) => f64::NAN,
+        let operand = match self.operand {
+            Source::Column(other) => cell(other),
+            Source::Number(number) => number,
+            Source::Rows(_) | Source::Seconds(..) => f64::NAN,
         };
-        let value = self.expression.value(cell(self.expression.column), operand);
+        let value = self.operator.value(cell(self.column), operand);
         if value.is_finite() { value } else { f64::NAN }
     }
 }
 
 /// Derived columns of a stream. Means at the start are known only after the start, whose lines are kept until then.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct DerivedStream {
     /// The columns in the order in which they are computed: a later one may be computed from an earlier one.
     columns: Vec<(Derived, Located)>,
     /// Cells of the lines of the start; `None` after it.
     start: Option<Vec<Vec<f64>>>,
-}
-
-/// What a line is.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Progress {
-    /// Part of the start: its derived columns are not known yet.
-    Start {
-        /// `true` for the first line.
-        is_first: bool,
-    },
-    /// Complete. The lines of the start, with their derived columns, come with the first such line.
-    Complete(Vec<Vec<f64>>),
 }
 
 impl DerivedStream {
@@ -241,8 +213,8 @@ impl DerivedStream {
             }
         }
         Ok(Self {
+            start: (!located.is_empty()).then(Vec::new),
             columns: located,
-            start: Some(Vec::new()),
         })
     }
 
@@ -257,16 +229,17 @@ impl DerivedStream {
         self.columns.get(place).map_or("", |(derived, _)| &derived.name)
     }
 
-    /// Adds the derived columns to the cells of the next line.
+    /// Adds the derived columns to the cells of the next line, and returns the lines of the start, with their derived columns,
+    /// after the last of them; `None` for a line of the start, whose derived columns are not known yet.
     ///
     /// # Errors
     /// If no cell at the start is a number, or the start is too long.
-    pub(super) fn take(&mut self, cells: &mut Vec<f64>) -> Result<Progress, ImportError> {
+    pub(super) fn take(&mut self, cells: &mut Vec<f64>) -> Result<Option<Vec<Vec<f64>>>, ImportError> {
         let Some(mut lines) = self.start.take() else {
             for (_, column) in &self.columns {
                 cells.push(column.value(|place| cells[place]));
             }
-            return Ok(Progress::Complete(Vec::new()));
+            return Ok(Some(Vec::new()));
         };
         lines.push(cells.clone());
         // Times of derived columns do not exist: a span is over by the cells of the stream.
@@ -276,9 +249,8 @@ impl DerivedStream {
             if lines.len().saturating_mul(cells.len()) > MAX_CELLS {
                 return Err(derived.refused(TOO_LONG));
             }
-            let is_first = lines.len() == 1;
             self.start = Some(lines);
-            return Ok(Progress::Start { is_first });
+            return Ok(None);
         }
         for (derived, column) in &mut self.columns {
             if !column.take_start(lines.len(), |row, place| lines[row][place]) {
@@ -290,6 +262,6 @@ impl DerivedStream {
             }
         }
         *cells = lines.pop().unwrap_or_default();
-        Ok(Progress::Complete(lines))
+        Ok(Some(lines))
     }
 }

@@ -2,7 +2,6 @@ use decoupler_core::text::Named;
 
 use super::{
     Decimal, Dialect, DialectChoice, Encoding, Separator, TableError,
-    dialect::utf8_of_utf16,
     format::{Cell, parse},
     rows::{Rows, commonest},
     time_stamp::TimeStamp,
@@ -13,34 +12,32 @@ pub(super) const BEGINNING: usize = 1 << 18;
 /// Number of rows from which the layout is detected.
 const MAX_ROWS: usize = 500;
 
-/// Detects the layout of a file from its `beginning`; `is_whole` if nothing follows.
+/// Detects the layout of a file from its `beginning` in UTF-8 or Latin-1; `is_whole` if nothing follows. Returns it with the
+/// most common number of cells of a row, or 0 if no row ends within the beginning.
 ///
 /// Of all pairs of separator and decimal separator, the one is chosen with which most cells, in rows of the most common
 /// length, are numbers; ties go to the pair with most cells. The first row contains names if at least half of its cells are
 /// not numbers and at least one of them is above a column of numbers.
-pub(super) fn detect(beginning: &[u8], is_whole: bool, choice: &DialectChoice) -> Result<Dialect, TableError> {
-    let encoding = choice.encoding.unwrap_or_else(|| encoding(beginning));
-    let decoded;
-    let text = match encoding {
-        Encoding::Utf8 | Encoding::Latin1 => beginning,
-        Encoding::Utf16Le | Encoding::Utf16Be => {
-            decoded = decode(beginning, encoding == Encoding::Utf16Le)?;
-            &decoded
-        }
-    };
-    let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
+pub(super) fn detect(
+    text: &[u8],
+    is_whole: bool,
+    encoding: Encoding,
+    choice: &DialectChoice,
+) -> Result<(Dialect, usize), TableError> {
     let carriage_returns = text.contains(&b'\r') && !text.contains(&b'\n');
     let line_break = if carriage_returns { b'\r' } else { b'\n' };
     let declared = sep_line(text, line_break);
     let skipped_lines = choice.skip_lines.unwrap_or(0);
     let skipped = skipped_lines + usize::from(declared.is_some());
-    let table = rest_after(text, line_break, skipped);
+    let mut lines = text.split_inclusive(|&byte| byte == line_break);
+    let start: usize = lines.by_ref().take(skipped).map(<[u8]>::len).sum();
+    let table = &text[start..];
     // The last row may be truncated.
-    let end = table.iter().rposition(|&byte| byte == line_break);
+    let end = table.iter().rposition(|&byte| byte == line_break).map(|end| end + 1);
     let table = if is_whole {
         table
     } else {
-        end.map_or(table, |end| &table[..=end])
+        &table[..end.unwrap_or(table.len())]
     };
     let separators = match choice.separator.or(declared) {
         Some(separator) => vec![separator],
@@ -66,23 +63,21 @@ pub(super) fn detect(beginning: &[u8], is_whole: bool, choice: &DialectChoice) -
             }
         }
     }
-    let Some((score, separator, decimal, rows)) = best else {
+    let Some((score, separator, decimal, rows)) = best.filter(|(.., rows)| !rows.is_empty()) else {
         return Err(defect.unwrap_or(TableError::Empty));
     };
-    if rows.is_empty() {
-        return Err(TableError::Empty);
-    }
-    let header = choice.header.unwrap_or_else(|| has_names(&rows));
-    Ok(Dialect {
+    let dialect = Dialect {
         encoding,
         separator,
         decimal,
-        header,
+        header: choice.header.unwrap_or_else(|| has_names(&rows)),
         trailing_separator: separator != Separator::Space && score.width > 1 && ends_empty(&rows, score.width),
         sep_line: declared.is_some(),
         skipped_lines,
         carriage_returns,
-    })
+    };
+    let is_known = is_whole || end.is_some();
+    Ok((dialect, if is_known { score.width } else { 0 }))
 }
 
 /// Score of a pair of separators.
@@ -129,7 +124,7 @@ fn sample(text: &[u8], separator: Separator, decimal: Decimal, crs: bool) -> Res
             Ok(true) => sample.push(rows.cells().map(|cell| parse_or_stamp(cell, decimal)).collect()),
             Ok(false) => break,
             // The closing quote may lie beyond the beginning.
-            Err(TableError::Quote { .. }) if !sample.is_empty() => break,
+            Err(TableError::Quote(_)) if !sample.is_empty() => break,
             Err(error) => return Err(error),
         }
     }
@@ -168,32 +163,24 @@ fn ends_empty(rows: &[Vec<Cell>], width: usize) -> bool {
         .all(|row| row[width - 1] == Cell::Missing)
 }
 
-fn encoding(beginning: &[u8]) -> Encoding {
-    let even = |offset: usize| {
-        let bytes = beginning.iter().skip(offset).step_by(2).take(200);
-        let (zeros, count) = bytes.fold((0, 0), |(zeros, count), byte| {
-            (zeros + usize::from(*byte == 0), count + 1)
-        });
-        count > 2 && 10 * zeros > 7 * count
+/// Guesses the encoding of a file from its beginning.
+pub(super) fn encoding_of(beginning: &[u8]) -> Encoding {
+    let has_zeros = |offset: usize| {
+        let bytes = Vec::from_iter(beginning.iter().skip(offset).step_by(2).take(200));
+        let zeros = bytes.iter().filter(|byte| ***byte == 0).count();
+        bytes.len() > 2 && 10 * zeros > 7 * bytes.len()
     };
     match beginning {
         [0xff, 0xfe, ..] => Encoding::Utf16Le,
         [0xfe, 0xff, ..] => Encoding::Utf16Be,
-        _ if even(1) && !even(0) => Encoding::Utf16Le,
-        _ if even(0) && !even(1) => Encoding::Utf16Be,
+        _ if has_zeros(1) && !has_zeros(0) => Encoding::Utf16Le,
+        _ if has_zeros(0) && !has_zeros(1) => Encoding::Utf16Be,
         _ => match std::str::from_utf8(beginning) {
-            Ok(_) => Encoding::Utf8,
             // The last character of the beginning may be truncated.
-            Err(error) if error.error_len().is_none() => Encoding::Utf8,
-            Err(_) => Encoding::Latin1,
+            Err(error) if error.error_len().is_some() => Encoding::Latin1,
+            _ => Encoding::Utf8,
         },
     }
-}
-
-fn decode(bytes: &[u8], is_little_endian: bool) -> Result<Vec<u8>, TableError> {
-    let mut text = Vec::new();
-    std::io::Read::read_to_end(&mut utf8_of_utf16(bytes, is_little_endian), &mut text)?;
-    Ok(text)
 }
 
 /// Returns the separator given by a first line `sep=`.
@@ -211,23 +198,16 @@ fn sep_line(text: &[u8], line_break: u8) -> Option<Separator> {
     Separator::of_character(character)
 }
 
-fn rest_after(text: &[u8], line_break: u8, lines: usize) -> &[u8] {
-    let mut rest = text;
-    for _ in 0..lines {
-        let Some(end) = rest.iter().position(|&byte| byte == line_break) else {
-            return &[];
-        };
-        rest = &rest[end + 1..];
-    }
-    rest
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn dialect(text: &[u8], choice: &DialectChoice) -> Result<Dialect, TableError> {
+        detect(text, true, encoding_of(text), choice).map(|(dialect, _)| dialect)
+    }
+
     fn found(text: &[u8]) -> String {
-        detect(text, true, &DialectChoice::default()).unwrap().to_string()
+        dialect(text, &DialectChoice::default()).unwrap().to_string()
     }
 
     #[test]
@@ -275,11 +255,7 @@ mod tests {
             .encode_utf16()
             .flat_map(u16::to_le_bytes)
             .collect();
-        assert_eq!(found(&utf16), "separator semicolon, decimal comma, a header, utf-16le");
-        assert_eq!(
-            found(&utf16[2..]),
-            "separator semicolon, decimal comma, a header, utf-16le"
-        );
+        assert_eq!([&utf16, &utf16[2..]].map(encoding_of), [Encoding::Utf16Le; 2]);
     }
 
     #[test]
@@ -290,7 +266,7 @@ mod tests {
             skip_lines: Some(1),
             ..DialectChoice::default()
         };
-        let dialect = detect(b"a;b;c\n1,2\n3,4\n", true, &choice).unwrap();
+        let dialect = dialect(b"a;b;c\n1,2\n3,4\n", &choice).unwrap();
         assert_eq!(
             (dialect.separator, dialect.header, dialect.skipped_lines),
             (Separator::Comma, true, 1)
@@ -299,11 +275,11 @@ mod tests {
 
     #[test]
     fn empty_and_binary_files_are_refused() {
-        for text in ["", "\n\n", "\u{feff}", "sep=;\n"] {
-            let error = detect(text.as_bytes(), true, &DialectChoice::default()).unwrap_err();
+        for text in ["", "\n\n", "sep=;\n"] {
+            let error = dialect(text.as_bytes(), &DialectChoice::default()).unwrap_err();
             assert!(matches!(error, TableError::Empty), "{text:?}: {error}");
         }
-        let error = detect(b"1,2\n\0\x01\x02\x03,\n", true, &DialectChoice::default()).unwrap_err();
+        let error = dialect(b"1,2\n\0\x01\x02\x03,\n", &DialectChoice::default()).unwrap_err();
         assert_eq!(
             error.to_string().split(';').next(),
             Some("it is not text: line 2 contains a zero byte")

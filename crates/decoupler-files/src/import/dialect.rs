@@ -1,4 +1,4 @@
-use std::{fmt, io::Read, str::FromStr};
+use std::{fmt, io::Read};
 
 use decoupler_core::text::{Named, UnknownName, counted};
 use encoding_rs::{UTF_16BE, UTF_16LE};
@@ -111,6 +111,15 @@ impl Named for Separator {
 }
 
 impl Separator {
+    /// Returns the separator of this name, or with this character.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn named(text: &str) -> Result<Self, UnknownName> {
+        let of_character = Self::of_character(text.replace("\\t", "\t").as_bytes());
+        of_character.map_or_else(|| Self::parse(&text.to_lowercase()), Ok)
+    }
+
     /// The character.
     pub(super) fn byte(self) -> u8 {
         match self {
@@ -124,28 +133,8 @@ impl Separator {
 
     /// Returns the separator with this character.
     pub(super) fn of_character(character: &[u8]) -> Option<Self> {
-        Self::ALL
-            .iter()
-            .copied()
-            .find(|separator| character == [separator.byte()])
-    }
-}
-
-impl fmt::Display for Separator {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Separator {
-    type Err = UnknownName;
-
-    /// Returns the separator of this name, or with this character.
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        match Self::of_character(text.replace("\\t", "\t").as_bytes()) {
-            Some(separator) => Ok(separator),
-            None => Self::parse(&text.to_lowercase()),
-        }
+        let mut all = Self::ALL.iter().copied();
+        all.find(|separator| character == [separator.byte()])
     }
 }
 
@@ -161,22 +150,17 @@ impl Named for Decimal {
     }
 }
 
-impl fmt::Display for Decimal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Decimal {
-    type Err = UnknownName;
-
+impl Decimal {
     /// Returns the separator of this name, or with this character.
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        match text {
-            "." => Ok(Self::Point),
-            "," => Ok(Self::Comma),
-            _ => Self::parse(text),
-        }
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn named(text: &str) -> Result<Self, UnknownName> {
+        Self::parse(match text {
+            "." => "point",
+            "," => "comma",
+            name => name,
+        })
     }
 }
 
@@ -194,27 +178,15 @@ impl Named for Encoding {
     }
 }
 
-impl fmt::Display for Encoding {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Encoding {
-    type Err = UnknownName;
-
-    fn from_str(text: &str) -> Result<Self, UnknownName> {
-        Self::parse(&text.to_lowercase())
-    }
-}
-
 impl fmt::Display for Dialect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let header = if self.header { "a header" } else { "no header" };
         write!(
             f,
             "separator {}, decimal {}, {header}, {}",
-            self.separator, self.decimal, self.encoding
+            self.separator.name(),
+            self.decimal.name(),
+            self.encoding.name()
         )?;
         if self.sep_line {
             write!(f, ", a sep= line")?;

@@ -3,16 +3,16 @@
 use std::{convert::Infallible, fmt, str::FromStr};
 
 use decoupler_core::text::{in_one_line, is_unprintable};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serializer, de};
 
 use super::{ImportError, format::Cell};
 
-/// A column with an operator and what it is compared or combined with; columns are names or, in a table, indices.
+/// A column with an operator and what it is compared or combined with.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Expression<C> {
-    pub(super) column: C,
+pub(super) struct Expression {
+    pub(super) column: String,
     pub(super) operator: Operator,
-    pub(super) operand: Operand<C>,
+    pub(super) operand: Operand,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,9 +29,9 @@ pub(super) enum Operator {
 
 /// What a column is compared or combined with.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Operand<C> {
+pub(super) enum Operand {
     /// Another column, row by row.
-    Column(C),
+    Column(String),
     Number(f64),
     /// Its own mean over the first rows.
     Rows(usize),
@@ -51,28 +51,28 @@ const COMPARISONS: [(&str, Operator); 7] = [
 ];
 const COMBINATIONS: [(&str, Operator); 2] = [("-", Operator::Minus), ("/", Operator::Over)];
 
-impl<C> Expression<C> {
+impl Operator {
     /// Value for a number of the column and the number of the operand: 1 or 0 for a comparison.
-    pub(super) fn value(&self, column: f64, operand: f64) -> f64 {
-        match self.operator {
-            Operator::Minus => column - operand,
-            Operator::Over => column / operand,
-            Operator::AtMost => f64::from(column <= operand),
-            Operator::AtLeast => f64::from(column >= operand),
-            Operator::Other => f64::from(column != operand),
-            Operator::Equal => f64::from(column == operand),
-            Operator::Less => f64::from(column < operand),
-            Operator::Greater => f64::from(column > operand),
+    pub(super) fn value(self, column: f64, operand: f64) -> f64 {
+        match self {
+            Self::Minus => column - operand,
+            Self::Over => column / operand,
+            Self::AtMost => f64::from(column <= operand),
+            Self::AtLeast => f64::from(column >= operand),
+            Self::Other => f64::from(column != operand),
+            Self::Equal => f64::from(column == operand),
+            Self::Less => f64::from(column < operand),
+            Self::Greater => f64::from(column > operand),
         }
-    }
-
-    /// Returns `true` for a number of the column that meets a comparison with a number.
-    pub(super) fn is_met(&self, column: f64) -> bool {
-        matches!(self.operand, Operand::Number(number) if self.value(column, number) > 0.0)
     }
 }
 
-impl Expression<String> {
+impl Expression {
+    /// Returns `true` for a number of the column that meets a comparison with a number.
+    pub(super) fn is_met(&self, column: f64) -> bool {
+        matches!(self.operand, Operand::Number(number) if self.operator.value(column, number) > 0.0)
+    }
+
     /// Parses a comparison with a number.
     fn comparison(text: &str) -> Result<Self, String> {
         let place = text.find(['<', '>', '=', '!']);
@@ -133,7 +133,7 @@ fn finite(text: &str) -> Option<f64> {
     text.parse().ok().filter(|number: &f64| number.is_finite())
 }
 
-impl fmt::Display for Expression<String> {
+impl fmt::Display for Expression {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut signs = COMPARISONS.iter().chain(&COMBINATIONS);
         let sign = signs.find(|(_, operator)| *operator == self.operator);
@@ -151,15 +151,26 @@ impl fmt::Display for Expression<String> {
 ///
 /// Written as `d=c1-c2`, `q=c1/c2`, `r=c1/start(2s)` for the mean of the first two seconds, or `r=c1-start(100)` for that of
 /// the first 100 rows. Spaces around the operator are needed if a name contains `-` or `/`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Derived {
     /// Name of the new column.
     pub name: String,
-    pub(super) expression: Expression<String>,
+    pub(super) expression: Expression,
+}
+
+/// Returns the error in the derived column `text`.
+fn refused(text: &str, reason: &str) -> ImportError {
+    let (text, reason) = (in_one_line(text), in_one_line(reason));
+    ImportError::Samples(format!(
+        "the derived column '{text}': {reason}; write for example \"d=c1-c2\" or \"r=c1/start(2s)\""
+    ))
 }
 
 impl Derived {
+    pub(super) fn refused(&self, reason: &str) -> ImportError {
+        refused(&self.to_string(), reason)
+    }
+
     /// Returns the columns from which it is computed.
     pub(super) fn columns(&self) -> impl Iterator<Item = &String> {
         let other = match &self.expression.operand {
@@ -179,10 +190,7 @@ impl FromStr for Derived {
     type Err = ImportError;
 
     fn from_str(text: &str) -> Result<Self, ImportError> {
-        let refuse = |reason: String| ImportError::Derived {
-            text: in_one_line(text),
-            reason,
-        };
+        let refuse = |reason: String| refused(text, &reason);
         // Names of columns contain no other white space, and signs are found between spaces.
         let spaced = text.replace(|c: char| c.is_whitespace() || is_unprintable(c), " ");
         let (name, expression) = spaced
@@ -197,20 +205,6 @@ impl FromStr for Derived {
     }
 }
 
-impl TryFrom<String> for Derived {
-    type Error = ImportError;
-
-    fn try_from(text: String) -> Result<Self, ImportError> {
-        text.parse()
-    }
-}
-
-impl From<Derived> for String {
-    fn from(derived: Derived) -> Self {
-        derived.to_string()
-    }
-}
-
 impl fmt::Display for Derived {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}={}", self.name, self.expression)
@@ -220,13 +214,19 @@ impl fmt::Display for Derived {
 /// Condition on the rows that are used: comparisons of columns with numbers, joined by `and`.
 ///
 /// Written as `c4<145.1 and c5!=0`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
-    pub(super) comparisons: Vec<Expression<String>>,
+    pub(super) comparisons: Vec<Expression>,
 }
 
 impl Condition {
+    pub(super) fn refused(text: &str, reason: &str) -> ImportError {
+        let (text, reason) = (in_one_line(text), in_one_line(reason));
+        ImportError::Columns(format!(
+            "the condition '{text}' is not understood: {reason}; write for example \"c4<145.1 and c5!=0\""
+        ))
+    }
+
     /// Returns this condition with renamed columns: `name` returns the new name of a column, or `None` to keep it.
     #[must_use]
     pub fn renamed(mut self, name: impl Fn(&str) -> Option<String>) -> Self {
@@ -247,25 +247,8 @@ impl FromStr for Condition {
         let parts = words.split(|word| word.eq_ignore_ascii_case("and") || *word == "&&");
         let comparisons = parts.map(|words| Expression::comparison(&words.join(" ")));
         let comparisons = comparisons.collect::<Result<_, _>>();
-        let comparisons = comparisons.map_err(|reason: String| ImportError::Condition {
-            text: in_one_line(text),
-            reason: in_one_line(&reason),
-        })?;
+        let comparisons = comparisons.map_err(|reason: String| Self::refused(text, &reason))?;
         Ok(Self { comparisons })
-    }
-}
-
-impl TryFrom<String> for Condition {
-    type Error = ImportError;
-
-    fn try_from(text: String) -> Result<Self, ImportError> {
-        text.parse()
-    }
-}
-
-impl From<Condition> for String {
-    fn from(condition: Condition) -> Self {
-        condition.to_string()
     }
 }
 
@@ -279,8 +262,7 @@ impl fmt::Display for Condition {
 /// Marker of missing values: a text or number, in one column or in all.
 ///
 /// Written as `-1` or, for one column, as `states.c5=-1`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "String", into = "String")]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Missing {
     /// Column; `None` for all.
     pub column: Option<String>,
@@ -305,29 +287,17 @@ impl Missing {
     }
 }
 
-impl From<String> for Missing {
-    fn from(text: String) -> Self {
-        let named = text.split_once('=').filter(|(column, _)| !column.trim().is_empty());
-        let value = named.map_or(text.as_str(), |(_, value)| value).trim();
-        Self {
-            column: named.map(|(column, _)| column.trim().to_owned()),
-            number: finite(value),
-            text: value.to_owned(),
-        }
-    }
-}
-
 impl FromStr for Missing {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(text.to_owned().into())
-    }
-}
-
-impl From<Missing> for String {
-    fn from(missing: Missing) -> Self {
-        missing.to_string()
+        let named = text.split_once('=').filter(|(column, _)| !column.trim().is_empty());
+        let value = named.map_or(text, |(_, value)| value).trim();
+        Ok(Self {
+            column: named.map(|(column, _)| column.trim().to_owned()),
+            number: finite(value),
+            text: value.to_owned(),
+        })
     }
 }
 
@@ -337,6 +307,27 @@ impl fmt::Display for Missing {
             Some(column) => write!(f, "{column}={}", self.text),
             None => f.write_str(&self.text),
         }
+    }
+}
+
+/// Lists of these notations in a file.
+pub(super) mod texts {
+    use super::*;
+
+    pub(crate) fn serialize<T: fmt::Display, S: Serializer>(list: &[T], serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(list.iter().map(ToString::to_string))
+    }
+
+    pub(crate) fn deserialize<'de, T, D>(deserializer: D) -> Result<Vec<T>, D::Error>
+    where
+        T: FromStr<Err: fmt::Display>,
+        D: Deserializer<'de>,
+    {
+        let texts = Vec::<String>::deserialize(deserializer)?;
+        texts
+            .iter()
+            .map(|text| text.parse().map_err(de::Error::custom))
+            .collect()
     }
 }
 

@@ -9,7 +9,7 @@ use super::Separator;
 pub(super) struct Fields {
     separator: Separator,
     /// Maximum number of cells; one more is found, so that a longer row is noticed.
-    limit: usize,
+    limit: Option<usize>,
     parser: Reader,
     /// Text of the cells of a row with quotes.
     unquoted: Vec<u8>,
@@ -18,8 +18,14 @@ pub(super) struct Fields {
     ranges: Vec<Range<usize>>,
 }
 
+impl Default for Fields {
+    fn default() -> Self {
+        Self::new(Separator::Comma, None)
+    }
+}
+
 impl Fields {
-    pub(super) fn new(separator: Separator, limit: usize) -> Self {
+    pub(super) fn new(separator: Separator, limit: Option<usize>) -> Self {
         Self {
             separator,
             limit,
@@ -49,7 +55,8 @@ impl Fields {
             range
         });
         let cells = cells.filter(|range| !is_spaced || !range.is_empty());
-        self.ranges.extend(cells.take(self.limit.saturating_add(1)));
+        self.ranges
+            .extend(cells.take(self.limit.map_or(usize::MAX, |limit| limit + 1)));
     }
 
     fn split_quoted(&mut self, text: &[u8]) {
@@ -66,7 +73,9 @@ impl Fields {
             match result {
                 // The parser treats empty input as the end of the record.
                 ReadRecordResult::InputEmpty => {}
-                ReadRecordResult::OutputEndsFull if count <= self.limit => self.ends.resize(2 * count + 8, 0),
+                ReadRecordResult::OutputEndsFull if self.limit.is_none_or(|limit| count <= limit) => {
+                    self.ends.resize(2 * count + 8, 0);
+                }
                 _ => break,
             }
         }
@@ -105,7 +114,7 @@ mod tests {
     #[test]
     fn cells_are_split_as_by_the_csv_crate() {
         let long = format!("\"{}\",{}", "x".repeat(5000), "1,".repeat(500));
-        let mut fields = Fields::new(Separator::Comma, usize::MAX);
+        let mut fields = Fields::new(Separator::Comma, None);
         for line in [
             "1.5, 2 ,3",
             "a",
@@ -129,7 +138,7 @@ mod tests {
     #[test]
     fn a_row_is_split_up_to_one_cell_beyond_the_limit() {
         for row in [",".repeat(1000), "\"\",".repeat(1000)] {
-            let mut fields = Fields::new(Separator::Comma, 20);
+            let mut fields = Fields::new(Separator::Comma, Some(20));
             fields.split(row.as_bytes());
             assert!(fields.len() > 20 && fields.len() < 100, "{}", fields.len());
         }

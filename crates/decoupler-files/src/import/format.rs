@@ -2,11 +2,15 @@
 //! arrays.
 
 use std::{
-    fmt, io,
+    fmt,
+    fs::File,
+    io::{self, BufReader, Read as _, Seek as _},
     path::{Path, PathBuf},
 };
 
-use super::{Decimal, Dialect, TableError};
+use zip::ZipArchive;
+
+use super::{Decimal, Dialect, TableError, rows::MAX_CELLS};
 
 /// File format.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,10 +38,14 @@ pub(super) enum Contents {
     Text,
     /// A NumPy array.
     Npy,
+    /// An archive of NumPy arrays.
+    Npz,
     /// Arrays of MATLAB.
     Matlab,
-    /// A zip archive: arrays, or sheets.
-    Zip,
+    /// Sheets of Excel since 2007.
+    Xlsx,
+    /// Sheets of OpenDocument.
+    Ods,
 }
 
 /// Beginnings of files that are not read, with what they are and what to do.
@@ -47,21 +55,9 @@ const REFUSED: [(&[u8], &str, &str); 21] = [
         "a file of Excel up to 2003",
         "save it as .xlsx or CSV",
     ),
-    (
-        b"\x89HDF\r\n\x1a\n",
-        "an HDF5 file",
-        "save it as .npz with numpy.savez, with the option -v7 from MATLAB, or as CSV",
-    ),
-    (
-        b"PAR1",
-        "a Parquet file",
-        "save it as CSV, for example with DataFrame.to_csv",
-    ),
-    (
-        b"ARROW1",
-        "an Arrow file",
-        "save it as CSV, for example with DataFrame.to_csv",
-    ),
+    (b"\x89HDF\r\n\x1a\n", "an HDF5 file", HDF),
+    (b"PAR1", "a Parquet file", FRAME),
+    (b"ARROW1", "an Arrow file", FRAME),
     (b"SQLite format 3", "an SQLite database", "export the table as CSV"),
     (b"#ROSBAG", "a ROS bag", "export the topics as CSV"),
     (b"\x89MCAP", "an MCAP log", "export the topics as CSV"),
@@ -80,6 +76,8 @@ const REFUSED: [(&[u8], &str, &str); 21] = [
     (b"%PDF", "a PDF document", TABLE),
     (b"RIFF", "a WAV or AVI file", "export its channels as CSV or .npy"),
 ];
+const HDF: &str = "save it as .npz with numpy.savez, with the option -v7 from MATLAB, or as CSV";
+const FRAME: &str = "save it as CSV, for example with DataFrame.to_csv";
 const PICKLE: &str = "load it in Python and save the arrays with numpy.savez";
 const UNPACK: &str = "unpack it";
 const TABLE: &str = "give a table of numbers";
@@ -106,27 +104,41 @@ impl Format {
         found.sort();
         Ok(found)
     }
-
-    /// Number of bytes from which a format is recognised.
-    pub(super) const BEGINNING: u64 = 16;
 }
 
 impl Contents {
-    /// Recognises the contents of the file at `path` by its `beginning`.
+    /// Recognises the contents of the file at `path` by its beginning, and those of an archive by the names in it.
     ///
     /// # Errors
-    /// If it is a known kind of file that is not read.
-    pub(super) fn of(path: &Path, beginning: &[u8]) -> Result<Self, TableError> {
-        let is_named = path.extension().is_some_and(|found| found.eq_ignore_ascii_case("mat"));
+    /// If it cannot be read, or is a known kind of file that is not read.
+    pub(super) fn of(path: &Path, mut file: &File) -> Result<Self, TableError> {
+        let mut beginning = Vec::new();
+        file.take(16).read_to_end(&mut beginning)?;
+        file.rewind()?;
+        let refused = |what: &str, cure: &str| TableError::Contents(format!("it is {what}, which is not read; {cure}"));
         if let Some((_, what, cure)) = REFUSED.iter().find(|(start, ..)| beginning.starts_with(start)) {
-            return Err(TableError::OtherKind { what, cure });
+            return Err(refused(what, cure));
         }
-        Ok(match beginning {
-            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Self::Npy,
-            [b'P', b'K', 3 | 5, ..] => Self::Zip,
-            _ if is_named || beginning.starts_with(b"MATLAB") => Self::Matlab,
-            _ => Self::Text,
-        })
+        let is_named = path.extension().is_some_and(|found| found.eq_ignore_ascii_case("mat"));
+        match beginning[..] {
+            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => return Ok(Self::Npy),
+            [b'P', b'K', 3 | 5, ..] => {}
+            _ if is_named || beginning.starts_with(b"MATLAB") => return Ok(Self::Matlab),
+            _ => return Ok(Self::Text),
+        }
+        let archive = ZipArchive::new(BufReader::new(file));
+        file.rewind()?;
+        let Ok(archive) = archive else { return Ok(Self::Npz) };
+        let has = |is_it: &dyn Fn(&str) -> bool| archive.file_names().any(|name| name.is_ok_and(|name| is_it(&name)));
+        if has(&|name| name.starts_with("xl/")) {
+            Ok(Self::Xlsx)
+        } else if has(&|name| name == "mimetype") && has(&|name| name == "content.xml") {
+            Ok(Self::Ods)
+        } else if archive.is_empty() || has(&|name| name.ends_with(".npy")) {
+            Ok(Self::Npz)
+        } else {
+            Err(refused("a zip archive without .npy arrays", "unpack it"))
+        }
     }
 }
 
@@ -144,17 +156,11 @@ impl fmt::Display for Format {
 
 /// Type of the numbers in a NumPy or MATLAB file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Element {
-    F32,
-    F64,
-    I8,
-    I16,
-    I32,
-    I64,
-    U8,
-    U16,
-    U32,
-    U64,
+pub(super) struct Element {
+    /// As in NumPy: `f` for floating point, `i` and `u` for integers with and without a sign.
+    kind: char,
+    /// Number of bytes.
+    pub(super) size: usize,
 }
 
 /// Byte order.
@@ -165,47 +171,39 @@ pub(super) enum Endian {
 }
 
 impl Element {
-    /// Number of bytes.
-    pub(super) fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::F32 | Self::I32 | Self::U32 => 4,
-            Self::F64 | Self::I64 | Self::U64 => 8,
-        }
+    pub(super) const I32: Self = Self { kind: 'i', size: 4 };
+    pub(super) const U32: Self = Self { kind: 'u', size: 4 };
+
+    /// Returns the type with this code of NumPy, such as `f8`.
+    pub(super) fn of_code(code: &str) -> Option<Self> {
+        let code = if ["b1", "?"].contains(&code) { "u1" } else { code };
+        let kind = code.chars().next()?;
+        let size = code[kind.len_utf8()..].parse().ok()?;
+        let is_known = match kind {
+            'f' => [4, 8].contains(&size),
+            'i' | 'u' => [1, 2, 4, 8].contains(&size),
+            _ => false,
+        };
+        is_known.then_some(Self { kind, size })
     }
 
-    /// Reads the numbers in `bytes`, whose length must be a multiple of [`Self::size`].
+    /// Reads the numbers in `bytes`; a part of a number at the end is ignored.
     pub(super) fn read(self, bytes: &[u8], endian: Endian) -> Vec<f64> {
-        macro_rules! numbers {
-            ($type:ty) => {
-                bytes
-                    .chunks_exact(size_of::<$type>())
-                    .map(|chunk| {
-                        let bytes = chunk.try_into().expect("chunks have the size of the type");
-                        let number = match endian {
-                            Endian::Little => <$type>::from_le_bytes(bytes),
-                            Endian::Big => <$type>::from_be_bytes(bytes),
-                        };
-                        #[allow(clippy::cast_lossless, reason = "not lossless for all of the types")]
-                        let number = number as f64;
-                        number
-                    })
-                    .collect()
-            };
-        }
-        match self {
-            Self::F32 => numbers!(f32),
-            Self::F64 => numbers!(f64),
-            Self::I8 => numbers!(i8),
-            Self::I16 => numbers!(i16),
-            Self::I32 => numbers!(i32),
-            Self::I64 => numbers!(i64),
-            Self::U8 => numbers!(u8),
-            Self::U16 => numbers!(u16),
-            Self::U32 => numbers!(u32),
-            Self::U64 => numbers!(u64),
-        }
+        let number = |chunk: &[u8]| {
+            let mut bytes = [0; 8];
+            bytes[..self.size].copy_from_slice(chunk);
+            if endian == Endian::Big {
+                bytes[..self.size].reverse();
+            }
+            let bits = u64::from_le_bytes(bytes);
+            match (self.kind, self.size) {
+                ('f', 4) => f64::from(f32::from_bits(bits as u32)),
+                ('f', _) => f64::from_bits(bits),
+                ('i', size) => ((bits << (64 - 8 * size)) as i64 >> (64 - 8 * size)) as f64,
+                _ => bits as f64,
+            }
+        };
+        bytes.chunks_exact(self.size).map(number).collect()
     }
 }
 
@@ -232,13 +230,9 @@ impl Array {
     ) -> Result<Self, TableError> {
         let rows = shape.first().copied().unwrap_or(1);
         let width = shape.iter().skip(1).product();
-        if width > super::rows::MAX_CELLS {
-            let reason = format!(
-                "{} is more than {} columns; transpose it",
-                written(shape),
-                super::rows::MAX_CELLS
-            );
-            return Err(TableError::array(name, reason));
+        if width > MAX_CELLS {
+            let reason = format!("{} is more than {MAX_CELLS} columns; transpose it", written(shape));
+            return Err(TableError::array(&name, reason));
         }
         let columns = if width == 1 {
             vec![numbers]
@@ -276,6 +270,15 @@ pub(super) enum Cell {
     Missing,
     /// Anything else, including infinities.
     Text,
+}
+
+impl Cell {
+    pub(super) fn number(self) -> Option<f64> {
+        match self {
+            Self::Number(number) => Some(number),
+            Self::Missing | Self::Text => None,
+        }
+    }
 }
 
 /// Maximum length of a number that is copied to the stack.

@@ -1,7 +1,6 @@
 use std::{
-    borrow::Cow,
     fs::File,
-    io::{self, BufReader, Read, Seek},
+    io::{self, BufReader},
     path::{Path, PathBuf},
 };
 
@@ -10,25 +9,25 @@ use decoupler_core::{
     problem::{Channel, Problem, TargetPosition},
     text::{counted, in_one_line},
 };
+use ndarray::ArcArray2;
 use serde::Serialize;
 
 use super::{
-    Cells, Cure, Derived, DialectChoice, FileSet, Format, ImportError, Joined, Missing, Recipe, Table, TableError,
-    Watch, arrays,
+    Column, Cure, Derived, DialectChoice, FileSet, Format, ImportError, Joined, Recipe, Table, TableError, Watch,
+    arrays,
+    columns::{Files, Meanings},
     csv_table::{self, Reading},
     derived::TimeColumn,
     format::Contents,
-    inputs::{ColumnId, Names},
-    join::{Partners, Source, gather, median_interval, nearest},
+    join::{Partners, gather, median_interval, nearest},
     matlab, numpy,
-    part::Part,
     positions::read_positions,
     progress::Watched,
-    selection::{Rows, not_a_number},
+    selection::Rows,
     sentinel::{Sentinel, is_rounding, rounding_warning},
-    sheet::Spreadsheet,
-    suggestion::{Meanings, is_group_name},
-    table::{column_called, stem},
+    sheet,
+    suggestion::is_group_name,
+    table::stem,
 };
 use crate::machine::ReadingBudget;
 
@@ -38,7 +37,36 @@ impl Recipe {
     /// # Errors
     /// If a file cannot be read, a column is missing, a used cell is not a number, no row is left, or `watch` breaks.
     pub fn import(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
-        let mut recording = self.import_all(folder, watch)?;
+        self.import_sets(&self.sets(), self.memory.as_ref(), folder, watch)
+    }
+
+    /// Imports the samples of these files, one set after another, with the features of `memory`.
+    pub(super) fn import_sets(
+        &self,
+        sets: &[FileSet],
+        memory: Option<&Memory>,
+        folder: &Path,
+        watch: Watch<'_>,
+    ) -> Result<Recording, ImportError> {
+        let mut memory = memory.cloned();
+        let mut parts = Vec::new();
+        for set in sets {
+            let imported = self.import_set(set, sets.len() == 1, memory.as_ref(), folder, watch);
+            let part = imported.map_err(|error| {
+                if sets.len() == 1 {
+                    error
+                } else {
+                    error.of_file(&set.data)
+                }
+            })?;
+            // Lags in seconds have as many samples in all files.
+            memory = part.memory().cloned();
+            parts.push(part);
+        }
+        let mut recording = match sets.len() {
+            1 => parts.remove(0),
+            _ => Recording::joined(parts)?,
+        };
         let values = recording.set.targets();
         let targets = recording.targets.iter().zip(values.columns());
         let rounded = targets.filter(|(_, values)| is_rounding(&values.to_vec()));
@@ -47,103 +75,73 @@ impl Recipe {
         Ok(recording)
     }
 
-    /// Imports the samples of all files.
-    fn import_all(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
-        let first = self.import_set(folder, watch);
-        if self.append.is_empty() {
-            return first.map(|part| part.recording);
-        }
-        let mut parts = vec![first.map_err(|error| error.of_file(&self.data))?];
-        // Lags in seconds have as many samples in all files.
-        let memory = parts[0].recording.memory().cloned();
-        // Without the further files, of which each recipe of one of them would have a copy.
-        let of_one = Self {
-            append: Vec::new(),
-            ..self.clone()
+    /// Imports the samples of one set of files.
+    fn import_set(
+        &self,
+        set: &FileSet,
+        is_alone: bool,
+        memory: Option<&Memory>,
+        folder: &Path,
+        watch: Watch<'_>,
+    ) -> Result<Recording, ImportError> {
+        let mut files = Files::of(self.read_set(set, &[], folder, watch)?, self.stems());
+        let meanings = Meanings::of(self, &files)?;
+        files.give_units(self)?;
+        let noted = |table: &Table| {
+            let file = table.path.display();
+            Vec::from_iter(table.notes.iter().map(|note| format!("'{file}': {note}")))
         };
-        for FileSet { data, join } in &self.append {
-            let mut recipe = of_one.of_files(data, join)?;
-            recipe.memory.clone_from(&memory);
-            let part = recipe.import_set(folder, watch);
-            parts.push(part.map_err(|error| error.of_file(data))?);
-        }
-        Part::joined(parts, self.group.is_some())
-    }
-
-    /// Imports the samples of the first file, without those of appended files.
-    fn import_set(&self, folder: &Path, watch: Watch<'_>) -> Result<Part, ImportError> {
-        let stems = self.stems();
-        let mut files = vec![self.read(folder, 0, &self.data, None, watch)?];
-        for (number, (joined, stem)) in self.join.iter().zip(&stems).enumerate() {
-            files.push(self.read(folder, number + 1, &joined.file, Some(stem), watch)?);
-        }
-        let columns = Vec::from_iter(files.iter().map(|(_, table)| table.columns.as_slice()));
-        let names = Names::of(&columns, &stems);
-        let meanings = Meanings::of(self, &names)?;
-        let mut warnings = notes(&files);
-        let used = |id: &ColumnId| meanings.inputs.contains(id) || meanings.targets.contains(id);
-        let groups = names
-            .all()
-            .find(|(name, id)| id.file == 0 && is_group_name(name) && !used(id));
-        if let Some((name, _)) = groups.filter(|_| meanings.group.is_none() && self.append.is_empty()) {
+        let mut warnings = Vec::from_iter(files.tables.iter().flat_map(noted));
+        let is_used = |id: &usize| meanings.inputs.contains(id) || meanings.targets.contains(id);
+        let own = files.columns[..files.width(0)].iter().enumerate();
+        let group = { own }.find(|(id, column)| is_group_name(&column.name) && !is_used(id));
+        if let Some((_, Column { name, .. })) = group.filter(|_| meanings.group.is_none() && is_alone) {
             warnings.push(format!(
                 "the column {name} looks like a group of samples that belong together: choose it as the group (--group \
                  {name}), so that training and test samples never share one"
             ));
         }
-        let mut joins = Vec::new();
-        for (number, joined) in self.join.iter().enumerate() {
-            joins.push(self.partners(number + 1, joined, &files, &names, &meanings, &mut warnings)?);
-        }
+        let joins = (1..files.tables.len()).map(|file| self.partners(file, &files, &meanings, &mut warnings));
+        let joins = joins.collect::<Result<Vec<_>, _>>()?;
+        files.check_numbers(&meanings)?;
+        files.join(&meanings, &joins);
         let rows = Rows {
             recipe: self,
+            set,
             files: &files,
-            names: &names,
             meanings: &meanings,
             joins: &joins,
         };
-        rows.check_numbers()?;
         let (mut kept, dropped) = rows.select()?;
         // The past includes rows that are no samples.
         let mut read = rows.with_readings();
         if let Some(id) = meanings.time {
             warnings.extend(rows.put_in_order(id, &mut kept, &mut read)?);
         }
-        let times: Option<Vec<f64>> = meanings
-            .time
-            .map(|id| kept.iter().map(|&row| rows.number(id, row)).collect());
-        let lines = kept.iter().map(|&row| files[0].1.line(row)).collect();
+        let of_samples = |id: usize| Vec::from_iter(kept.iter().map(|&row| rows.number(id, row)));
         let (groups, group_names) = rows.groups(&kept);
         let row_wires = rows.row_wires(&kept)?;
         let past = rows.past(&read, &kept)?;
-        let channels = |ids: &[ColumnId]| ids.iter().map(|id| rows.channel(*id)).collect::<Vec<Channel>>();
+        let channels = |ids: &[usize]| Vec::from_iter(ids.iter().map(|id| files.channel(*id)));
         let (inputs, targets) = (channels(&meanings.inputs), channels(&meanings.targets));
         let positions = match &self.positions {
             Some(file) => read_positions(&folder.join(file), &targets, watch)?,
             None => Vec::new(),
         };
         for &id in meanings.inputs.iter().chain(&meanings.targets) {
-            let used = Vec::from_iter(kept.iter().map(|&row| rows.number(id, row)));
-            warnings.extend(Sentinel::find(&used).map(|found| found.warning(names.name(id))));
+            let found = Sentinel::find(&of_samples(id));
+            warnings.extend(found.map(|found| found.warning(&files.columns[id].name)));
         }
-        let reports = rows.reports();
-        let total = files[0].1.rows + files[0].1.too_long.rows;
-        let partners: Vec<Option<Vec<Option<u32>>>> = joins
-            .into_iter()
-            .map(|partners| partners.map(|partners| partners.rows))
-            .collect();
-        let mut tables: Vec<Table> = files.into_iter().map(|(_, table)| table).collect();
-        let mut source = Source {
-            tables: &mut tables,
-            partners: &partners,
-            rows: &kept,
-        };
-        let targets_of_rows = gather(&mut source, &meanings.targets, &meanings.inputs);
-        source.rows = &read;
-        let history = past.with_readings(gather(&mut source, &meanings.inputs, &[]));
-        let memory = self.memory.as_ref().filter(|memory| !memory.is_empty());
-        let memory = memory.map(|memory| history.checked(memory)).transpose()?;
-        let readings = history.features(memory.as_ref().unwrap_or(&Memory::default()))?;
+        let main = &files.tables[0];
+        let lines = kept.iter().map(|&row| main.line(row)).collect();
+        let (times, reports, total) = (
+            meanings.time.map(of_samples),
+            rows.reports(),
+            main.rows + main.too_long.rows,
+        );
+        let targets_of_rows = gather(&mut files.columns, &meanings.targets, &kept, &meanings.inputs);
+        let history = past(gather(&mut files.columns, &meanings.inputs, &read, &[]));
+        let (memory, readings) = remembered(&history, memory)?;
         let problem = Problem {
             inputs,
             targets,
@@ -151,7 +149,7 @@ impl Recipe {
             positions,
             sensor: None,
         };
-        let recording = Recording {
+        Ok(Recording {
             set: Dataset::new(readings, targets_of_rows, row_wires.as_deref(), groups)?,
             inputs: problem.features(),
             targets: problem.targets.clone(),
@@ -159,6 +157,7 @@ impl Recipe {
             problem,
             history,
             parts: vec![(0, reports[0].path.clone())],
+            group_names,
             lines,
             times,
             has_groups: self.group.is_some(),
@@ -166,174 +165,150 @@ impl Recipe {
             dropped,
             files: reports,
             warnings,
-        };
-        Ok(Part { recording, group_names })
+        })
     }
 
     /// Returns the name prefixed to the columns of each joined file.
     pub fn stems(&self) -> Vec<String> {
-        let mut stems: Vec<String> = Vec::new();
-        for joined in &self.join {
-            let wanted = joined.stem.clone().unwrap_or_else(|| stem(&joined.file));
-            let same = stems.iter().filter(|other| **other == wanted).count();
-            stems.push(if same == 0 {
-                wanted
-            } else {
-                format!("{wanted}#{}", same + 1)
-            });
-        }
-        stems
+        let mut wanted: Vec<String> = Vec::new();
+        let numbered = |joined: &Joined| {
+            let stem = joined.stem.clone().unwrap_or_else(|| stem(&joined.file));
+            wanted.push(stem.clone());
+            match wanted.iter().filter(|other| **other == stem).count() {
+                1 => stem,
+                count => format!("{stem}#{count}"),
+            }
+        };
+        self.join.iter().map(numbered).collect()
     }
 
-    /// Reads one file; `prefix` is the stem of a joined one.
-    pub(super) fn read(
+    /// Reads the files of a set; columns or variables with the names `more` are used, too.
+    pub(super) fn read_set(
         &self,
-        folder: &Path,
-        number: usize,
-        file: &Path,
-        prefix: Option<&String>,
-        watch: Watch<'_>,
-    ) -> Result<(PathBuf, Table), ImportError> {
-        self.read_using(&[], folder, (number, file, prefix), watch)
-    }
-
-    /// As [`Self::read`] for the file with this number, path and prefix; columns or variables with the names `more` are used,
-    /// too.
-    pub(super) fn read_using(
-        &self,
+        set: &FileSet,
         more: &[String],
         folder: &Path,
-        (number, file, prefix): (usize, &Path, Option<&String>),
         watch: Watch<'_>,
-    ) -> Result<(PathBuf, Table), ImportError> {
-        let own_name = |full: &str| match prefix {
+    ) -> Result<Vec<Table>, ImportError> {
+        if set.join.len() != self.join.len() {
+            let needed = counted(self.join.len(), "joined file");
+            let reason = format!("it needs {needed} and has {}", set.join.len());
+            return Err(not_joined(&set.data, &reason, Cure::GiveJoinedFiles));
+        }
+        let stems = self.stems();
+        let joined = self.join.iter().zip(&stems).map(Some);
+        let files = set.files().zip(std::iter::once(None).chain(joined));
+        files
+            .map(|(file, joined)| self.read(&folder.join(file), joined, more, watch))
+            .collect()
+    }
+
+    /// Reads one file, with its derived columns; `joined` gives the stem of a joined one.
+    pub(super) fn read(
+        &self,
+        path: &Path,
+        joined: Option<(&Joined, &String)>,
+        more: &[String],
+        watch: Watch<'_>,
+    ) -> Result<Table, ImportError> {
+        let own_name = |full: &str| match joined {
             None => Some(full.trim().to_owned()),
-            Some(stem) => full.trim().strip_prefix(stem)?.strip_prefix('.').map(str::to_owned),
+            Some((_, stem)) => full.trim().strip_prefix(stem)?.strip_prefix('.').map(str::to_owned),
         };
-        let missing: Vec<(Option<String>, &Missing)> = self
-            .missing
-            .iter()
-            .filter_map(|missing| match &missing.column {
-                None => Some((None, missing)),
-                Some(column) => Some((Some(own_name(column)?), missing)),
-            })
-            .collect();
-        let path = folder.join(file);
+        let missing = self.missing.iter().filter_map(|missing| match &missing.column {
+            None => Some((None, missing)),
+            Some(column) => Some((Some(own_name(column)?), missing)),
+        });
         let columns = self.inputs.iter().chain(&self.targets);
         let columns = columns.chain(self.derive.iter().flat_map(Derived::columns));
-        let used = columns
-            .chain(&self.time)
-            .chain(&self.group)
-            .chain(&self.row_wire)
-            .chain(more);
+        let single = self.time.iter().chain(&self.group).chain(&self.row_wire);
         let reading = Reading {
             choice: self.dialect,
-            missing,
-            labels: self.group.iter().filter_map(|group| own_name(group)).collect(),
-            used: used.filter_map(|name| own_name(name)).collect(),
+            missing: missing.collect(),
+            label: self.group.as_deref().and_then(own_name),
+            used: columns
+                .chain(single)
+                .chain(more)
+                .filter_map(|name| own_name(name))
+                .collect(),
         };
-        let mut table = read(&path, &reading, watch)?;
-        let time = match number.checked_sub(1).and_then(|joined| self.join.get(joined)) {
-            Some(joined) => joined.time.clone().or_else(|| self.time.clone()),
-            None => self.time.clone(),
-        };
-        let time = time.as_deref().map(|name| TimeColumn {
+        let mut table = read(path, &reading, watch)?;
+        let time = joined
+            .and_then(|(joined, _)| joined.time.as_deref())
+            .or(self.time.as_deref());
+        let time = time.map(|name| TimeColumn {
             name,
-            given_unit: match prefix {
+            given_unit: match joined {
                 None => self.unit_of(name),
-                Some(stem) => self.unit_of(&format!("{stem}.{name}")),
+                Some((_, stem)) => self.unit_of(&format!("{stem}.{name}")),
             },
         });
         for derived in &self.derive {
             derived.add_to(&mut table, own_name, time)?;
         }
-        if number == 0 {
-            table.stem = stem(file);
-        }
-        Ok((path, table))
+        Ok(table)
     }
 
-    /// Returns the matching rows of the joined file `number`; `None` if it is joined row by row.
+    /// Returns the matching rows of the joined file number `file`; `None` if it is joined row by row.
     fn partners(
         &self,
-        number: usize,
-        joined: &Joined,
-        files: &[(PathBuf, Table)],
-        names: &Names,
+        file: usize,
+        files: &Files,
         meanings: &Meanings,
         warnings: &mut Vec<String>,
     ) -> Result<Option<Partners>, ImportError> {
-        let (path, table) = &files[number];
-        let refuse = |reason: String, cure: Cure| ImportError::Join {
-            path: path.clone(),
-            reason: in_one_line(&reason),
-            cure,
-        };
-        let main = &files[0].1;
+        let (main, table, joined) = (&files.tables[0], &files.tables[file], &self.join[file - 1]);
+        let refuse = |reason: &str, cure| not_joined(&table.path, reason, cure);
         let Some(time) = meanings.time else {
             if table.rows != main.rows {
                 let reason = format!("it has {} and the other file {}", counted(table.rows, "row"), main.rows);
-                return Err(refuse(reason, Cure::NameTimes));
+                return Err(refuse(&reason, Cure::NameTimes));
             }
             return Ok(None);
         };
         let wanted = joined.time.as_deref().or(self.time.as_deref()).unwrap_or_default();
-        let Some(column) = column_called(&table.columns, wanted) else {
-            let all: Vec<&str> = table
-                .columns
-                .iter()
-                .map(|column| column.name.as_str())
-                .take(30)
-                .collect();
-            let reason = format!("it has no time column '{wanted}', only {}", all.join(", "));
-            return Err(refuse(reason, Cure::NameJoinedTime));
+        let Some(column) = files.find_joined(file, wanted) else {
+            let names = Vec::from_iter(files.names_in(file).take(30));
+            let reason = format!("it has no time column '{wanted}', only {}", names.join(", "));
+            return Err(refuse(&reason, Cure::NameJoinedTime));
         };
-        let id = ColumnId { file: number, column };
-        for id in [time, id] {
-            not_a_number(files, names, id)?;
-        }
-        let (Cells::Numbers(times), Cells::Numbers(joined_times)) =
-            (&main.columns[time.column].cells, &table.columns[column].cells)
-        else {
-            let reason = "its times are a group as well".to_owned();
-            return Err(refuse(reason, Cure::GiveOneMeaning));
-        };
-        let joined_times = match (main.columns[time.column].start, table.columns[column].start) {
-            (None, None) => Cow::Borrowed(joined_times),
-            (Some(start), Some(joined_start)) if start.has_zone == joined_start.has_zone => {
-                let later = joined_start.seconds_since(start);
-                Cow::Owned(joined_times.iter().map(|time| later + time).collect())
-            }
+        [time, column].into_iter().try_for_each(|id| files.check_cells(id))?;
+        let [of_main, of_joined] = [time, column].map(|id| &files.columns[id]);
+        let later = match (of_main.start, of_joined.start) {
+            (None, None) => 0.0,
+            (Some(start), Some(joined)) if start.has_zone == joined.has_zone => joined.seconds_since(start),
             _ => {
-                let reason = "only one of the two files has time stamps, or only one has a time zone".to_owned();
+                let reason = "only one of the two files has time stamps, or only one has a time zone";
                 return Err(refuse(reason, Cure::NameJoinedTime));
             }
         };
+        let joined_times = Vec::from_iter(of_joined.numbers.iter().map(|time| later + time));
         let Some(limit) = joined.limit.or_else(|| Some(median_interval(&joined_times)? / 2.0)) else {
-            return Err(refuse("its times are all the same".to_owned(), Cure::GiveLimit));
+            return Err(refuse("its times are all the same", Cure::GiveLimit));
         };
-        let partners = nearest(times, &joined_times, limit);
-        let mut uses = vec![0_usize; table.rows];
-        partners.rows.iter().flatten().for_each(|&row| uses[row as usize] += 1);
-        let several = uses.iter().filter(|&&count| count > 1).count();
+        let partners = nearest(&of_main.numbers, &joined_times, limit);
+        let several = partners.uses(table.rows).iter().filter(|uses| **uses > 1).count();
         if 10 * several > table.rows {
-            let file = path.display();
+            let (rows, file) = (table.rows, table.path.display());
             warnings.push(format!(
-                "{several} of {} rows of '{file}' are joined to several rows each; it is slower, so its values are stale by up to {limit}",
-                table.rows
+                "{several} of {rows} rows of '{file}' are joined to several rows each; it is slower, so its values are stale by up to {limit}"
             ));
         }
         Ok(Some(partners))
     }
 }
 
-/// Returns the notes on each file.
-fn notes(files: &[(PathBuf, Table)]) -> Vec<String> {
-    let of_file = |(path, table): &(PathBuf, Table)| {
-        let file = path.display().to_string();
-        Vec::from_iter(table.notes.iter().map(|note| format!("'{file}': {note}")))
-    };
-    files.iter().flat_map(of_file).collect()
+fn not_joined(file: &Path, reason: &str, cure: Cure) -> ImportError {
+    let cause = format!("'{}' cannot be joined: {}", file.display(), in_one_line(reason));
+    ImportError::Curable { cause, cure }
+}
+
+/// Returns the memory with its usual interval, and the features of the samples with it.
+fn remembered(history: &History, memory: Option<&Memory>) -> Result<(Option<Memory>, ArcArray2<f64>), DatasetError> {
+    let memory = memory.filter(|memory| !memory.is_empty());
+    let memory = memory.map(|memory| history.checked(memory)).transpose()?;
+    let features = history.features(memory.as_ref().unwrap_or(&Memory::default()))?;
+    Ok((memory, features))
 }
 
 /// Reads the table in the file at `path`; a file that does not start like a known array format is read as text.
@@ -353,38 +328,31 @@ pub(super) fn read(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Resu
 }
 
 fn read_file(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Result<Table, TableError> {
-    let mut file = File::open(path)?;
+    let file = File::open(path)?;
     let metadata = file.metadata()?;
     if metadata.is_dir() {
         return Err(io::Error::from(io::ErrorKind::IsADirectory).into());
     }
     let size = metadata.is_file().then_some(metadata.len());
-    let mut start = Vec::new();
     let budget = &mut ReadingBudget::now();
-    if size.is_none() {
-        // A pipe can be read only once.
-        return csv_table::read(path, Watched::new(file, None, watch), reading, budget);
-    }
-    (&file).take(Format::BEGINNING).read_to_end(&mut start)?;
-    file.rewind()?;
-    let (found, left_out, format) = match Contents::of(path, &start)? {
+    // A pipe can be read only once.
+    let contents = if size.is_some() {
+        Contents::of(path, &file)?
+    } else {
+        Contents::Text
+    };
+    let ((found, left_out), format) = match contents {
         Contents::Text => return csv_table::read(path, Watched::new(file, size, watch), reading, budget),
-        Contents::Zip => {
-            let kind = Spreadsheet::of_zip(&file)?;
-            file.rewind()?;
-            if let Some(kind) = kind {
-                return kind.read(path, file, reading, budget, watch);
-            }
-            let (found, left_out) = numpy::read_archive(BufReader::new(file), budget, watch)?;
-            (found, left_out, Format::Npz)
-        }
+        Contents::Xlsx => return sheet::read(path, file, false, reading, budget, watch),
+        Contents::Ods => return sheet::read(path, file, true, reading, budget, watch),
+        Contents::Npz => (numpy::read_archive(BufReader::new(file), budget, watch)?, Format::Npz),
         Contents::Npy => {
             let array = numpy::read("", BufReader::new(Watched::new(file, size, watch)), budget)?;
-            (vec![array], Vec::new(), Format::Npy)
+            ((vec![array], Vec::new()), Format::Npy)
         }
         Contents::Matlab => {
-            let (found, left_out) = matlab::read(BufReader::new(Watched::new(file, size, watch)), budget)?;
-            (found, left_out, Format::Matlab)
+            let source = BufReader::new(Watched::new(file, size, watch));
+            (matlab::read(source, budget)?, Format::Matlab)
         }
     };
     arrays::table(path, found, format, left_out, reading)
@@ -409,6 +377,8 @@ pub struct Recording {
     pub(super) history: History,
     /// Index of the first sample of each data file, and the file.
     pub(super) parts: Vec<(usize, PathBuf)>,
+    /// Name of each group of a group column.
+    pub(super) group_names: Vec<String>,
     /// Line of each sample in its file, from 1.
     pub lines: Vec<u64>,
     /// Time of each sample, if there is a time column.
@@ -499,11 +469,7 @@ impl Recording {
     /// # Errors
     /// If the memory is invalid for the readings, such as one in seconds without times.
     pub fn with_memory(&self, memory: Option<&Memory>) -> Result<Self, DatasetError> {
-        let memory = memory
-            .filter(|memory| !memory.is_empty())
-            .map(|memory| self.history.checked(memory))
-            .transpose()?;
-        let features = self.history.features(memory.as_ref().unwrap_or(&Memory::default()))?;
+        let (memory, features) = remembered(&self.history, memory)?;
         let problem = Problem {
             memory,
             ..self.problem.clone()

@@ -6,12 +6,11 @@ use std::{
 use serde::Serialize;
 
 use super::{
-    Cells, Column, DialectChoice, Format, ImportError, Meaning, Recipe, Table, Variable, Watch,
-    inputs::{ColumnId, Names},
+    Column, DialectChoice, Format, ImportError, Meaning, Recipe, Table, Variable, Watch,
+    columns::{Files, find},
     join::median_interval,
     read_table,
     sentinel::{Sentinel, is_rounding, rounding_warning},
-    table::column_called,
 };
 
 /// Number of bars of a histogram.
@@ -124,10 +123,10 @@ impl Inspection {
         let mut columns: Vec<ColumnSummary> = table.columns.iter().map(ColumnSummary::of).collect();
         name_duplicates(table, &mut columns);
         let chosen = match time {
-            Some(name) => Some((Names::of(&[&table.columns], &[]).find(name)?.column, false)),
+            Some(name) => Some((find(&table.columns, name)?, false)),
             None => guess_time(table, &columns).map(|column| (column, true)),
         };
-        let time = chosen.and_then(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));
+        let time = chosen.map(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));
         let mut warnings = table.notes.clone();
         let sentinels = columns
             .iter()
@@ -147,10 +146,7 @@ impl Inspection {
 
 impl ColumnSummary {
     fn of(column: &Column) -> Self {
-        let numbers: &[f64] = match &column.cells {
-            Cells::Numbers(numbers) => numbers,
-            Cells::Labels { .. } => &[],
-        };
+        let numbers = &column.numbers;
         let present = || numbers.iter().copied().filter(|number| !number.is_nan());
         let (mut min, mut max, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0);
         for number in present() {
@@ -170,11 +166,7 @@ impl ColumnSummary {
             kind,
             missing: column.missing,
             texts: column.faults.count,
-            first_text: column
-                .faults
-                .first
-                .as_ref()
-                .map(|fault| (fault.line, fault.text.clone())),
+            first_text: column.faults.first.clone().map(|fault| (fault.line, fault.text)),
             min: (count > 0).then_some(min),
             max: (count > 0).then_some(max),
             is_constant: count > 0 && min == max,
@@ -201,67 +193,51 @@ fn histogram(numbers: impl Iterator<Item = f64>, min: f64, max: f64) -> Vec<usiz
 
 /// Marks the columns that have the same cells as an earlier one.
 fn name_duplicates(table: &Table, columns: &mut [ColumnSummary]) {
+    let bits = |column: usize| table.columns[column].numbers.iter().map(|number| number.to_bits());
     let mut known: HashMap<u64, Vec<usize>> = HashMap::new();
-    for index in 0..columns.len() {
-        let Cells::Numbers(numbers) = &table.columns[index].cells else {
-            continue;
-        };
-        if columns[index].min.is_none() {
-            continue;
-        }
-        // FNV-1a over the bits.
-        let hash = numbers.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, number| {
-            (hash ^ number.to_bits()).wrapping_mul(0x0100_0000_01b3)
+    for index in (0..columns.len())
+        .filter(|&index| columns[index].min.is_some())
+        .collect::<Vec<_>>()
+    {
+        // FNV-1a.
+        let hash = bits(index).fold(0xcbf2_9ce4_8422_2325_u64, |hash, bits| {
+            (hash ^ bits).wrapping_mul(0x0100_0000_01b3)
         });
-        let same = |other: &usize| match &table.columns[*other].cells {
-            Cells::Numbers(others) => others
-                .iter()
-                .zip(numbers)
-                .all(|(one, other)| one.to_bits() == other.to_bits()),
-            Cells::Labels { .. } => false,
-        };
         let earlier = known.entry(hash).or_default();
-        match earlier.iter().find(|other| same(other)) {
+        match earlier.iter().find(|other| bits(**other).eq(bits(index))) {
             Some(&other) => columns[index].duplicate_of = Some(columns[other].name.clone()),
             None => earlier.push(index),
         }
     }
 }
 
-/// Returns the first column if it always increases.
+/// Returns the column that is named like a time, or else the first column if it always increases.
 fn guess_time(table: &Table, columns: &[ColumnSummary]) -> Option<usize> {
-    let by_name = columns.iter().position(|column| {
-        let name = column.name.to_lowercase();
-        ["time", "timestamp", "t"].contains(&name.as_str()) && column.min.is_some()
-    });
-    let grows = || match &table.columns.first()?.cells {
-        Cells::Numbers(numbers) => (numbers.len() > 2 && numbers.windows(2).all(|pair| pair[0] < pair[1])).then_some(0),
-        Cells::Labels { .. } => None,
+    let is_time = |column: &ColumnSummary| {
+        ["time", "timestamp", "t"].contains(&column.name.to_lowercase().as_str()) && column.min.is_some()
     };
-    by_name.or_else(grows)
+    let first = &table.columns.first()?.numbers;
+    let grows = first.len() > 2 && first.windows(2).all(|pair| pair[0] < pair[1]);
+    columns.iter().position(is_time).or(grows.then_some(0))
 }
 
 impl TimeSummary {
-    fn of(table: &Table, column: usize, is_guessed: bool) -> Option<Self> {
-        let Cells::Numbers(times) = &table.columns[column].cells else {
-            return None;
-        };
+    fn of(table: &Table, column: usize, is_guessed: bool) -> Self {
+        let times = &table.columns[column].numbers;
         let intervals = || times.windows(2).map(|pair| pair[1] - pair[0]).enumerate();
         let median = median_interval(times);
-        let longest = intervals()
-            .filter(|(_, interval)| *interval > 0.0)
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        Some(Self {
+        let growing = intervals().filter(|(_, interval)| *interval > 0.0);
+        let longest = growing.max_by(|one, other| one.1.total_cmp(&other.1));
+        let gaps = |median| intervals().filter(|(_, interval)| *interval > GAP * median).count();
+        Self {
             column: table.columns[column].name.clone(),
             is_guessed,
             median_interval: median,
-            gaps: median.map_or(0, |median| {
-                intervals().filter(|(_, interval)| *interval > GAP * median).count()
-            }),
+            gaps: median.map_or(0, gaps),
             longest: longest.map(|(_, interval)| interval),
             longest_after_line: longest.map(|(row, _)| table.line(row)),
             backwards: intervals().filter(|(_, interval)| *interval < 0.0).count(),
-        })
+        }
     }
 }
 
@@ -308,62 +284,32 @@ impl Recipe {
             group: None,
             ..self.clone()
         };
+        let set = self.sets().swap_remove(0);
         let stems = self.stems();
-        let files = std::iter::once((&self.data, None));
-        let files = files.chain(
-            self.join
-                .iter()
-                .zip(&stems)
-                .map(|(joined, stem)| (&joined.file, Some(stem))),
-        );
-        let (mut tables, mut inspected) = (Vec::new(), Vec::new());
-        for (number, (path, stem)) in files.enumerate() {
-            let (_, mut table) = plain.read_using(variables, folder, (number, path, stem), watch)?;
+        let mut tables = plain.read_set(&set, variables, folder, watch)?;
+        let mut inspected = Vec::new();
+        for (table, path) in tables.iter_mut().zip(set.files()) {
             inspected.push(InspectedFile {
                 path: path.clone(),
-                stem: stem.cloned(),
+                stem: inspected.len().checked_sub(1).map(|joined| stems[joined].clone()),
                 format: table.format.clone(),
-                inspection: Inspection::of(&table, None)?,
+                inspection: Inspection::of(table, None)?,
                 meanings: vec![Meaning::Unused; table.columns.len()],
             });
             // Only their names are needed from here on.
-            for column in &mut table.columns {
-                column.cells = Default::default();
-            }
-            tables.push(table);
+            table.columns.iter_mut().for_each(Column::clear);
         }
-        let names = Names::of(
-            &Vec::from_iter(tables.iter().map(|table| table.columns.as_slice())),
-            &stems,
-        );
-        for (id, meaning) in self.meant(&names)? {
-            inspected[id.file].meanings[id.column] = meaning;
-        }
-        for (number, joined) in self.join.iter().enumerate() {
+        let files = Files::of(tables, stems);
+        let mut meant = files.meant(self)?;
+        for (joined, file) in self.join.iter().zip(1..) {
             let time = joined.time.as_ref().or(self.time.as_ref());
-            let columns = &tables[number + 1].columns;
-            if let Some(column) = time.and_then(|time| column_called(columns, time)) {
-                inspected[number + 1].meanings[column] = Meaning::Time;
-            }
+            let found = time.and_then(|time| files.find_joined(file, time));
+            meant.splice(..0, found.map(|id| (id, Meaning::Time)));
+        }
+        for (id, meaning) in meant.into_iter().rev() {
+            let (file, column) = files.place(id);
+            inspected[file].meanings[column] = meaning;
         }
         Ok(inspected)
-    }
-
-    /// Returns the columns with their meanings in the recipe, except the times of joined files.
-    fn meant(&self, names: &Names) -> Result<Vec<(ColumnId, Meaning)>, ImportError> {
-        let mut meant = Vec::new();
-        for (one, meaning) in [
-            (&self.time, Meaning::Time),
-            (&self.group, Meaning::Group),
-            (&self.row_wire, Meaning::RowWire),
-        ] {
-            if let Some(name) = one {
-                meant.push((names.find(name)?, meaning));
-            }
-        }
-        for (several, meaning) in [(&self.inputs, Meaning::Input), (&self.targets, Meaning::Target)] {
-            meant.extend(names.find_all(several)?.into_iter().map(|id| (id, meaning)));
-        }
-        Ok(meant)
     }
 }

@@ -1,6 +1,6 @@
 use ndarray::Array2;
 
-use super::{Table, inputs::ColumnId, table::Cells};
+use super::Column;
 
 /// Rows of a joined recording that match the rows of the first.
 pub(super) struct Partners {
@@ -10,6 +10,15 @@ pub(super) struct Partners {
     pub(super) limit: f64,
     /// Median of the time of a row minus the time of its match.
     pub(super) median_offset: Option<f64>,
+}
+
+impl Partners {
+    /// Number of rows that match each of the `count` rows of the joined file.
+    pub(super) fn uses(&self, count: usize) -> Vec<usize> {
+        let mut uses = vec![0; count];
+        self.rows.iter().flatten().for_each(|&row| uses[row as usize] += 1);
+        uses
+    }
 }
 
 /// Finds the nearest of `joined` within `limit` for each of `times`; of two equally near ones, the earlier. Times may be in
@@ -72,50 +81,31 @@ fn median(values: &mut [f64]) -> Option<f64> {
 /// Number of rows moved at once.
 const BLOCK: usize = 1 << 14;
 
-/// Rows of a recording; their columns are freed as they are moved.
-pub(super) struct Source<'a> {
-    pub(super) tables: &'a mut [Table],
-    /// Matching rows of each joined file; `None` if it is joined row by row.
-    pub(super) partners: &'a [Option<Vec<Option<u32>>>],
-    /// Rows of the first file that are samples.
-    pub(super) rows: &'a [usize],
-}
-
-/// Moves columns into an array of samples × columns; those in `kept` are needed later.
+/// Moves the columns `ids` into an array of `rows` × `ids`, and frees the others except those in `kept`, which are needed
+/// later.
 ///
 /// Works from the last row to the first and shortens the columns on the way, to avoid a second copy of the numbers in
 /// memory.
-pub(super) fn gather(source: &mut Source<'_>, columns: &[ColumnId], kept: &[ColumnId]) -> Array2<f64> {
-    for (file, table) in source.tables.iter_mut().enumerate() {
-        for (index, column) in table.columns.iter_mut().enumerate() {
-            let id = ColumnId { file, column: index };
-            if !columns.contains(&id) && !kept.contains(&id) {
-                column.cells = Cells::default();
-            }
+pub(super) fn gather(columns: &mut [Column], ids: &[usize], rows: &[usize], kept: &[usize]) -> Array2<f64> {
+    for (id, column) in columns.iter_mut().enumerate() {
+        if !ids.contains(&id) && !kept.contains(&id) {
+            column.clear();
         }
     }
-    let is_ascending = source.rows.is_sorted();
-    let mut all = Array2::zeros((source.rows.len(), columns.len()));
+    let is_ascending = rows.is_sorted();
+    let mut all = Array2::zeros((rows.len(), ids.len()));
     let numbers = all.as_slice_mut().expect("a new array is contiguous");
-    let mut end = source.rows.len();
+    let mut end = rows.len();
     while end > 0 {
         let start = end.saturating_sub(BLOCK);
-        let rows = &source.rows[start..end];
-        for (place, id) in columns.iter().enumerate() {
-            let partners = id
-                .file
-                .checked_sub(1)
-                .and_then(|joined| source.partners[joined].as_deref());
-            let cells = &mut source.tables[id.file].columns[id.column].cells;
-            let block = numbers[start * columns.len()..end * columns.len()].chunks_exact_mut(columns.len());
-            for (sample, &row) in block.zip(rows) {
-                sample[place] = match partners {
-                    None => cells.number(row),
-                    Some(partners) => partners[row].map_or(f64::NAN, |row| cells.number(row as usize)),
-                };
+        for (place, &id) in ids.iter().enumerate() {
+            let moved = &mut columns[id].numbers;
+            let block = numbers[start * ids.len()..end * ids.len()].chunks_exact_mut(ids.len());
+            for (sample, &row) in block.zip(&rows[start..end]) {
+                sample[place] = moved[row];
             }
-            if let (None, Cells::Numbers(moved), true) = (partners, cells, is_ascending) {
-                moved.truncate(rows[0]);
+            if is_ascending {
+                moved.truncate(rows[start]);
                 moved.shrink_to_fit();
             }
         }

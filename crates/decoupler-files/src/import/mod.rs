@@ -10,6 +10,7 @@
 
 mod arrays;
 mod choosing;
+mod columns;
 mod csv_table;
 mod derived;
 mod detection;
@@ -46,15 +47,15 @@ pub use error::{Cure, ImportError, TableError};
 pub use expression::{Condition, Derived, Missing};
 pub use format::Format;
 pub use importing::{Dropped, FileReport, JoinReport, Recording, read_table};
-pub use inputs::{InputError, InputTable, KeptColumn};
+pub use inputs::{InputTable, KeptColumn};
 pub use inspection::{ColumnKind, ColumnSummary, InspectedFile, Inspection, TimeSummary};
-pub use lines::{KeptCell, LONGEST_LINE, LineError, LineParser, Needed, ParsedLine, ReadError, Readings, ReadingsFile};
+pub use lines::{KeptCell, LONGEST_LINE, LineError, LineParser, ParsedLine, ReadError, Readings, ReadingsFile};
 pub use plan::{Plan, PlannedSets, TestFiles};
-pub use positions::{PositionsError, holds_positions};
+pub use positions::holds_positions;
 pub use progress::{Progress, Watch};
 pub use recipe::{FileChecksum, FileSet, Joined, Recipe, Recorded, file_crc32};
 pub use sentinel::Sentinel;
 pub(crate) use setup::watch;
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
 pub use suggestion::{Meaning, suggested_plan, suggested_plan_in_order};
-pub use table::{Cells, Column, Excess, Fault, Faults, Table, Variable};
+pub use table::{Column, Excess, Fault, Faults, Table, Variable};

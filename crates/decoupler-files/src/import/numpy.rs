@@ -1,9 +1,10 @@
 //! The `.npy` format, versions 1 to 3: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
-//! The header is one line with three known keys. A parser of all Python literals would not be safe: nested brackets in a
-//! corrupt header would overflow its stack.
+//! The header is one line with three known keys, a Python literal that is read as JSON.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
+use serde::Deserialize;
+use serde_json::Value;
 use zip::{ZipArchive, result::ZipError};
 
 use super::{
@@ -45,16 +46,16 @@ pub(super) fn read(name: &str, mut source: impl Read, budget: &mut ReadingBudget
     let [b'\x93', b'N', b'U', b'M', b'P', b'Y', major, _] = bytes(8)?[..] else {
         return Err(wrong("it is not a NumPy file; save it with numpy.save".to_owned()));
     };
-    let length = match major {
-        1 => bytes(2)?,
-        2 | 3 => bytes(4)?,
+    let of_length = match major {
+        1 => 2,
+        2 | 3 => 4,
         _ => {
             return Err(wrong(format!(
                 "version {major} of the format is unknown; save it with numpy.save"
             )));
         }
     };
-    let length = length
+    let length = bytes(of_length)?
         .iter()
         .rev()
         .fold(0, |length, byte| (length << 8) + usize::from(*byte));
@@ -63,7 +64,7 @@ pub(super) fn read(name: &str, mut source: impl Read, budget: &mut ReadingBudget
     }
     let header = Header::parse(&String::from_utf8_lossy(&bytes(length)?)).map_err(wrong)?;
     let shape = header.shape.as_slice();
-    let size = header.element.size();
+    let size = header.element.size;
     let expected = shape.iter().copied().try_fold(size, usize::checked_mul);
     let written = written(shape);
     let expected = expected.ok_or_else(|| wrong(format!("{written} numbers do not fit into memory")))?;
@@ -73,16 +74,13 @@ pub(super) fn read(name: &str, mut source: impl Read, budget: &mut ReadingBudget
     let count = (expected / size) as u64;
     // The numbers in the order of the file are freed once they are copied to their columns.
     budget.claim(count.saturating_mul(2 * NUMBER))?;
-    let mut numbers = Vec::new();
-    let mut block = Vec::new();
+    let (mut numbers, mut block) = (Vec::new(), Vec::new());
     while numbers.len() * size < expected {
         block.clear();
         let wanted = (expected - numbers.len() * size).min(BLOCK);
-        (&mut source)
-            .take(wanted as u64)
-            .read_to_end(&mut block)
-            .map_err(table_error)?;
-        numbers.extend(header.element.read(&block, header.endian));
+        let read = (&mut source).take(wanted as u64).read_to_end(&mut block);
+        read.map_err(table_error)?;
+        numbers.append(&mut header.element.read(&block, header.endian));
         if block.len() < wanted {
             let found = numbers.len();
             return Err(wrong(format!(
@@ -95,65 +93,52 @@ pub(super) fn read(name: &str, mut source: impl Read, budget: &mut ReadingBudget
     Ok(array)
 }
 
+/// Header as written, with the names of its keys.
+#[derive(Deserialize)]
+struct Written {
+    descr: Value,
+    fortran_order: bool,
+    shape: Vec<usize>,
+}
+
 impl Header {
     /// Parses a header such as `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 2), }`.
     ///
     /// # Errors
     /// Cause and cure.
     fn parse(text: &str) -> Result<Self, String> {
-        let value = |key: &str| {
-            let quoted = [format!("'{key}'"), format!("\"{key}\"")];
-            let after = quoted.iter().find_map(|key| text.split_once(key.as_str()))?.1;
-            Some(after.trim_start().strip_prefix(':')?.trim_start())
-        };
-        let missing = |key: &str| format!("its header has no {key}; save it with numpy.save");
-        let descr = value("descr").ok_or_else(|| missing("descr"))?;
-        if descr.starts_with('[') {
-            return Err("it has named fields; save its columns as one array of numbers".to_owned());
-        }
-        let quote = descr.chars().next().filter(|quote| "'\"".contains(*quote));
-        let descr = quote
-            .and_then(|quote| descr[1..].split_once(quote))
-            .ok_or_else(|| missing("descr"))?
-            .0;
-        let (endian, code) = match descr.chars().next() {
-            Some('>') => (Endian::Big, &descr[1..]),
-            Some('<' | '|' | '=') => (Endian::Little, &descr[1..]),
-            _ => (Endian::Little, descr),
-        };
-        let element = match code {
-            "f4" => Element::F32,
-            "f8" => Element::F64,
-            "i1" => Element::I8,
-            "i2" => Element::I16,
-            "i4" => Element::I32,
-            "i8" => Element::I64,
-            "u1" | "b1" | "?" => Element::U8,
-            "u2" => Element::U16,
-            "u4" => Element::U32,
-            "u8" => Element::U64,
-            _ => {
-                let descr: String = descr.chars().take(20).collect();
-                return Err(format!(
-                    "its type '{descr}' is not supported; convert it with .astype(float)"
-                ));
-            }
-        };
-        let order = value("fortran_order").ok_or_else(|| missing("fortran_order"))?;
-        let is_by_column = order.starts_with("True");
-        if !is_by_column && !order.starts_with("False") {
-            return Err(missing("fortran_order"));
-        }
-        let shape = value("shape").and_then(|shape| shape.strip_prefix('(')?.split_once(')'));
-        let (shape, _) = shape.ok_or_else(|| missing("shape"))?;
-        let sizes = shape.split(',').map(str::trim).filter(|size| !size.is_empty());
+        let mut json = text.replace('\'', "\"").replace('(', "[").replace(')', "]");
         // Python 2 wrote long integers with an L.
-        let sizes = sizes.map(|size| size.trim_end_matches('L').parse().map_err(|_| missing("shape")));
+        for (python, other) in [
+            ("False", "false"),
+            ("True", "true"),
+            ("L,", ","),
+            ("L]", "]"),
+            (" ", ""),
+        ] {
+            json = json.replace(python, other);
+        }
+        let json = json.replace(",]", "]").replace(",}", "}");
+        let written = serde_json::from_str::<Written>(&json);
+        let written =
+            written.map_err(|error| format!("its header is not understood: {error}; save it with numpy.save"))?;
+        let Value::String(descr) = written.descr else {
+            return Err("it has named fields; save its columns as one array of numbers".to_owned());
+        };
+        let endian = if descr.starts_with('>') {
+            Endian::Big
+        } else {
+            Endian::Little
+        };
+        let element = Element::of_code(descr.trim_start_matches(['>', '<', '|', '='])).ok_or_else(|| {
+            let descr: String = descr.chars().take(20).collect();
+            format!("its type '{descr}' is not supported; convert it with .astype(float)")
+        })?;
         Ok(Self {
             element,
             endian,
-            is_by_column,
-            shape: sizes.collect::<Result<_, _>>()?,
+            is_by_column: written.fortran_order,
+            shape: written.shape,
         })
     }
 }
@@ -187,11 +172,11 @@ pub(super) fn read_archive(
         match array {
             Ok(_) if rest > 0 => {
                 let reason = format!("it has {rest} bytes more than its header states; copy it again");
-                return Err(TableError::damaged(name, reason));
+                return Err(TableError::damaged(&name, reason));
             }
             Ok(array) => arrays.push(array),
             // A text or a scalar next to the arrays does not make the file invalid.
-            Err(TableError::Array { what, reason }) => left_out.push(format!("{what}: {reason}")),
+            Err(TableError::Array(reason)) => left_out.push(reason),
             Err(TableError::Io(error)) => return Err(damage(&name, error)),
             Err(error) => return Err(error),
         }
@@ -251,7 +236,7 @@ mod tests {
     #[test]
     fn headers_are_read_in_any_order() {
         let header = Header::parse("{'descr': '<f8', 'fortran_order': False, 'shape': (3, 2), }  \n").unwrap();
-        let (element, endian) = (Element::F64, Endian::Little);
+        let (element, endian) = (Element::of_code("f8").unwrap(), Endian::Little);
         let expected = Header {
             element,
             endian,
@@ -289,8 +274,8 @@ mod tests {
                 "states 99999999999 × 2 numbers, but it has 2",
             ),
             ("'<f8'", "(0, 2)", "it is empty (0 × 2)"),
-            ("'<f8'", "(x, 2)", "no shape"),
-            ("'<f8", "(2,)", "is not supported"),
+            ("'<f8'", "(x, 2)", "is not understood"),
+            ("'<f8", "(2,)", "is not understood"),
         ] {
             let error = of(descr, shape);
             assert!(error.contains(cause), "{descr} {shape}: {error}");

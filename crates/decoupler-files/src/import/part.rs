@@ -7,56 +7,45 @@ use ndarray::{Array2, ArrayView2, Axis, concatenate};
 
 use super::{FileReport, ImportError, Recording};
 
-/// Samples of one of the files of an experiment, with what is joined to it.
-pub(super) struct Part {
-    pub(super) recording: Recording,
-    /// Name of each group, if there is a group column.
-    pub(super) group_names: Vec<String>,
-}
-
-impl Part {
+impl Recording {
     /// Appends the samples of one part after another. Groups of the same name are one group, in whatever files; without a group
     /// column, each part is a group.
     ///
     /// # Errors
     /// If the parts have different columns.
-    pub(super) fn joined(parts: Vec<Self>, has_group_column: bool) -> Result<Recording, ImportError> {
+    pub(super) fn joined(parts: Vec<Self>) -> Result<Self, ImportError> {
         for part in &parts[1..] {
-            check_same(&parts[0].recording, &part.recording)?;
+            check_same(&parts[0], part)?;
         }
         let mut known: HashMap<&str, usize> = HashMap::new();
         let (mut groups, mut row_wires) = (Vec::new(), Vec::new());
-        for (number, Self { recording, group_names }) in parts.iter().enumerate() {
-            let set = &recording.set;
-            if has_group_column {
-                let numbers = Vec::from_iter(group_names.iter().map(|name| {
-                    let next = known.len();
-                    *known.entry(name).or_insert(next)
-                }));
-                groups.extend(set.groups().iter().map(|&group| numbers[group]));
-            } else {
-                groups.extend(std::iter::repeat_n(number, set.samples()));
-            }
+        for (number, Self { set, group_names, .. }) in parts.iter().enumerate() {
+            let numbers = Vec::from_iter(group_names.iter().map(|name| {
+                let next = known.len();
+                *known.entry(name).or_insert(next)
+            }));
+            groups.extend(
+                set.groups()
+                    .iter()
+                    .map(|&group| numbers.get(group).copied().unwrap_or(number)),
+            );
             row_wires.extend((0..set.samples()).filter_map(|sample| set.row_wire(sample)));
         }
         let rows = |of: for<'a> fn(&'a Dataset) -> ArrayView2<'a, f64>| -> Array2<f64> {
-            let views = Vec::from_iter(parts.iter().map(|part| of(&part.recording.set)));
+            let views = Vec::from_iter(parts.iter().map(|part| of(&part.set)));
             concatenate(Axis(0), &views).expect("the parts have the same columns")
         };
         let (readings, targets) = (rows(Dataset::readings), rows(Dataset::targets));
         let row_wires = (row_wires.len() == readings.nrows()).then_some(row_wires);
         let set = Dataset::new(readings, targets, row_wires.as_deref(), groups)?;
-        let mut parts = parts.into_iter().map(|part| part.recording);
-        let mut whole = parts.next().expect("there is a part").naming_its_file();
-        for part in parts.map(Recording::naming_its_file) {
+        let mut parts = parts.into_iter().map(Self::naming_its_file);
+        let mut whole = parts.next().expect("there is a part");
+        for part in parts {
             let before = whole.lines.len();
             let starts = part.parts.into_iter().map(|(first, path)| (before + first, path));
             whole.parts.extend(starts);
             whole.lines.extend(part.lines);
-            whole.times = whole.times.zip(part.times).map(|(mut times, more)| {
-                times.extend(more);
-                times
-            });
+            whole.times = whole.times.zip(part.times).map(|(times, more)| [times, more].concat());
             whole.history.append(&part.history);
             whole.rows += part.rows;
             whole.dropped.extend(part.dropped);
@@ -66,9 +55,7 @@ impl Part {
         (whole.set, whole.has_groups) = (set, true);
         Ok(whole)
     }
-}
 
-impl Recording {
     /// Returns the file of a sample, whose line is in [`Self::lines`].
     pub fn file_of(&self, sample: usize) -> &Path {
         let after = self.parts.partition_point(|(first, _)| *first <= sample);
@@ -90,11 +77,11 @@ impl Recording {
 
 /// Refuses a file whose columns are not those of the first.
 fn check_same(first: &Recording, other: &Recording) -> Result<(), ImportError> {
-    let refuse = |found: String, expected: String| ImportError::OtherColumns {
-        path: other.files[0].path.clone(),
-        found,
-        first: first.files[0].path.clone(),
-        expected,
+    let refuse = |found: String, expected: String| {
+        let [path, first] = [other, first].map(|recording| recording.files[0].path.display());
+        ImportError::Files(format!(
+            "'{path}': {found}, and '{first}': {expected}; files of one experiment need the same columns"
+        ))
     };
     let channels = first.inputs.iter().chain(&first.targets);
     for (one, another) in channels.zip(other.inputs.iter().chain(&other.targets)) {

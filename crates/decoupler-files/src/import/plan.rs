@@ -6,13 +6,10 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Cure, FileSet, ImportError, Joined, Recipe, Recording, Watch,
+    FileSet, ImportError, Recipe, Recording, Watch,
     recipe::{is_irregular, restored, stored},
 };
-use decoupler_core::{
-    dataset::{Dataset, Division, Seed, Split, SplitBy},
-    text::counted,
-};
+use decoupler_core::dataset::{Dataset, Division, Seed, Split, SplitBy};
 
 /// Files, the meanings of their columns, and the split of their samples: everything needed to repeat a run on measured
 /// samples.
@@ -52,10 +49,10 @@ impl TestFiles {
         Some(Self { data, join, append })
     }
 
-    /// Returns all test files.
-    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        let first = std::iter::once(&self.data).chain(&self.join);
-        first.chain(self.append.iter().flat_map(FileSet::files))
+    /// Returns the sets of test files.
+    pub(super) fn sets(&self) -> Vec<FileSet> {
+        let Self { data, join, append } = self.clone();
+        std::iter::once(FileSet { data, join }).chain(append).collect()
     }
 }
 
@@ -105,28 +102,26 @@ impl Plan {
     /// If the files cannot be imported.
     pub fn recordings(&self, folder: &Path, watch: Watch<'_>) -> Result<(Recording, Option<Recording>), ImportError> {
         let recording = self.recording(folder, watch)?;
-        let test_recording = match &self.test {
-            None => None,
-            Some(files) => {
-                self.check_test_files(folder, files)?;
-                let mut recipe = self.import.of_test(files)?;
-                // Lags in seconds have as many samples as in training.
-                recipe.memory = recording.memory().cloned();
-                Some(recipe.import(folder, watch)?)
-            }
+        let Some(tests) = self.test.as_ref().map(TestFiles::sets) else {
+            return Ok((recording, None));
         };
-        Ok((recording, test_recording))
+        self.check_test_files(folder, &tests)?;
+        // Lags in seconds have as many samples as in training.
+        let test = self.import.import_sets(&tests, recording.memory(), folder, watch)?;
+        Ok((recording, Some(test)))
     }
 
     /// Refuses test rows that are also used for training. The same file may be joined to both, because its rows are matched by
     /// time.
-    fn check_test_files(&self, folder: &Path, tests: &TestFiles) -> Result<(), ImportError> {
+    fn check_test_files(&self, folder: &Path, tests: &[FileSet]) -> Result<(), ImportError> {
         let real = |path: &PathBuf| folder.join(path).canonicalize().ok();
         let trained = HashSet::<PathBuf>::from_iter(self.import.data_files().filter_map(real));
-        let tested = std::iter::once(&tests.data).chain(tests.append.iter().map(|set| &set.data));
         let is_trained = |path: &&PathBuf| real(path).is_some_and(|path| trained.contains(&path));
-        match { tested }.find(is_trained) {
-            Some(path) => Err(ImportError::TrainedOn(path.clone())),
+        match tests.iter().map(|set| &set.data).find(is_trained) {
+            Some(path) => Err(ImportError::Files(format!(
+                "'{}' is trained on, so it cannot be a test file; give another one",
+                path.display()
+            ))),
             None => Ok(()),
         }
     }
@@ -151,7 +146,8 @@ impl Plan {
     /// If the files cannot be imported, or there are no groups for a split by group.
     pub fn recording(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
         if self.division.by == SplitBy::Group && !self.import.has_groups() {
-            return Err(ImportError::NoColumns("the group, by which the samples are split"));
+            let reason = "no column is the group, by which the samples are split; name at least one";
+            return Err(ImportError::Columns(reason.to_owned()));
         }
         self.import.import(folder, watch)
     }
@@ -187,19 +183,32 @@ impl Plan {
     }
 
     /// Returns all files of the plan.
-    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
-        let import = &self.import;
-        let joined = import.join.iter().map(|joined| &joined.file);
-        let tests = self.test.iter().flat_map(TestFiles::files);
-        std::iter::once(&import.data)
-            .chain(joined)
-            .chain(import.append.iter().flat_map(FileSet::files))
-            .chain(&import.positions)
-            .chain(tests)
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> + use<> {
+        let paths = self
+            .clone()
+            .paths_mut()
+            .into_iter()
+            .map(std::mem::take)
+            .collect::<Vec<_>>();
+        paths.into_iter()
+    }
+
+    fn paths_mut(&mut self) -> Vec<&mut PathBuf> {
+        let import = &mut self.import;
+        let mut paths = vec![&mut import.data];
+        paths.extend(import.join.iter_mut().map(|joined| &mut joined.file));
+        paths.extend(import.append.iter_mut().flat_map(FileSet::files_mut));
+        paths.extend(&mut import.positions);
+        if let Some(TestFiles { data, join, append }) = &mut self.test {
+            paths.push(data);
+            paths.extend(join);
+            paths.extend(append.iter_mut().flat_map(FileSet::files_mut));
+        }
+        paths
     }
 
     /// Returns the first file that is a pipe or device, which only a user may name: one in a stored plan could block for ever.
-    pub fn irregular(&self) -> Option<&PathBuf> {
+    pub fn irregular(&self) -> Option<PathBuf> {
         self.files().find(|path| is_irregular(path))
     }
 
@@ -223,57 +232,7 @@ impl Plan {
 
     pub(super) fn with_paths(&self, of: impl Fn(&PathBuf) -> PathBuf) -> Self {
         let mut plan = self.clone();
-        plan.import.data = of(&plan.import.data);
-        plan.import
-            .join
-            .iter_mut()
-            .for_each(|joined| joined.file = of(&joined.file));
-        plan.import.positions.iter_mut().for_each(|file| *file = of(file));
-        let mut sets = Vec::from_iter(&mut plan.import.append);
-        if let Some(test) = &mut plan.test {
-            test.data = of(&test.data);
-            test.join.iter_mut().for_each(|file| *file = of(file));
-            sets.extend(&mut test.append);
-        }
-        let files = sets.into_iter().flat_map(FileSet::files_mut);
-        files.for_each(|file| *file = of(file));
+        plan.paths_mut().into_iter().for_each(|path| *path = of(path));
         plan
-    }
-}
-
-impl Recipe {
-    /// Returns the recipe of the test files; the names of the columns stay.
-    fn of_test(&self, files: &TestFiles) -> Result<Self, ImportError> {
-        Ok(Self {
-            append: files.append.clone(),
-            ..self.of_files(&files.data, &files.join)?
-        })
-    }
-
-    /// Returns this recipe with other files and none appended; the names of the columns stay.
-    pub(super) fn of_files(&self, data: &Path, joined: &[PathBuf]) -> Result<Self, ImportError> {
-        if joined.len() != self.join.len() {
-            return Err(ImportError::Join {
-                path: data.to_owned(),
-                reason: format!(
-                    "it needs {} and has {}",
-                    counted(self.join.len(), "joined file"),
-                    joined.len()
-                ),
-                cure: Cure::GiveJoinedFiles,
-            });
-        }
-        let all = self.join.iter().zip(joined).zip(self.stems());
-        let join = all.map(|((joined, file), stem)| Joined {
-            file: file.clone(),
-            stem: Some(stem),
-            ..joined.clone()
-        });
-        Ok(Self {
-            data: data.to_owned(),
-            join: join.collect(),
-            append: Vec::new(),
-            ..self.clone()
-        })
     }
 }

@@ -46,10 +46,10 @@ impl<'a, 'w, R: Read> Watched<'a, 'w, R> {
 impl<R: Read> Read for Watched<'_, '_, R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if self.progress.bytes >= self.next {
-            self.next = self.progress.bytes + INTERVAL;
             if (self.watch)(self.progress).is_break() {
                 return Err(io::Error::other(Cancelled));
             }
+            self.next = self.progress.bytes + INTERVAL;
         }
         let read = self.source.read(buffer)?;
         self.progress.bytes += read as u64;

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets, Watch,
+    expression::texts,
     progress::{Watched, table_error},
     table::name_and_unit,
 };
@@ -56,13 +57,13 @@ pub struct Recipe {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub memory: Option<Memory>,
     /// Conditions that every used row must meet.
-    #[serde(default, rename = "where", skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, rename = "where", skip_serializing_if = "Vec::is_empty", with = "texts")]
     pub conditions: Vec<Condition>,
     /// Columns computed from others of the same file.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "texts")]
     pub derive: Vec<Derived>,
     /// Markers of missing values, in addition to empty cells.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "texts")]
     pub missing: Vec<Missing>,
     /// Units of columns that the header does not give.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
@@ -94,6 +95,15 @@ impl Recipe {
     /// Returns the files whose rows become samples, without those joined to them.
     pub fn data_files(&self) -> impl Iterator<Item = &PathBuf> {
         std::iter::once(&self.data).chain(self.append.iter().map(|set| &set.data))
+    }
+
+    /// Returns the sets of files whose rows become samples.
+    pub(super) fn sets(&self) -> Vec<FileSet> {
+        let first = FileSet {
+            data: self.data.clone(),
+            join: self.join.iter().map(|joined| joined.file.clone()).collect(),
+        };
+        std::iter::once(first).chain(self.append.iter().cloned()).collect()
     }
 
     /// Returns `true` if samples belong to groups: the values of the group column, or else the files.
@@ -220,13 +230,11 @@ pub struct FileChecksum {
 impl Recorded {
     /// Describes the samples read by `plan`, whose paths must not depend on the working folder.
     pub(super) fn of(plan: Plan, sets: &PlannedSets, watch: Watch<'_>) -> Result<Self, ImportError> {
-        let checksum = |path: &PathBuf| {
+        let checksum = |path: PathBuf| {
             // A pipe can be read only once, and is empty now.
-            let crc32 = path.is_file().then(|| file_crc32(path, watch)).transpose()?;
-            Ok(FileChecksum {
-                path: path.clone(),
-                crc32: crc32.unwrap_or_default(),
-            })
+            let crc32 = path.is_file().then(|| file_crc32(&path, watch)).transpose()?;
+            let crc32 = crc32.unwrap_or_default();
+            Ok(FileChecksum { path, crc32 })
         };
         let files = plan.files().map(checksum).collect::<Result<_, ImportError>>()?;
         Ok(Self {

@@ -1,6 +1,6 @@
 use std::io::{BufRead, BufReader, Read};
 
-use super::{Separator, TableError, fields::Fields, progress::table_error};
+use super::{Format, Separator, TableError, fields::Fields, progress::table_error};
 
 /// Maximum length of a row in bytes: 16 MiB, enough for more than ten thousand columns.
 pub(super) const LONGEST_ROW: usize = 1 << 24;
@@ -29,7 +29,7 @@ impl<R: Read> Rows<R> {
     pub(crate) fn new(source: R, separator: Separator, has_carriage_returns: bool) -> Self {
         Self {
             source: BufReader::with_capacity(BUFFER, source),
-            fields: Fields::new(separator, MAX_CELLS),
+            fields: Fields::new(separator, Some(MAX_CELLS)),
             longest: LONGEST_ROW,
             line_break: if has_carriage_returns { b'\r' } else { b'\n' },
             text: Vec::new(),
@@ -63,8 +63,8 @@ impl<R: Read> Rows<R> {
         }
         self.fields.split(&self.text);
         if self.fields.len() > MAX_CELLS {
-            let limit = MAX_CELLS;
-            return Err(TableError::Wide { line: self.line, limit });
+            let reason = format_args!("more than {MAX_CELLS} cells in a row; check the separator");
+            return Err(TableError::in_row(self.line, reason));
         }
         Ok(true)
     }
@@ -78,12 +78,6 @@ impl<R: Read> Rows<R> {
             if !self.append_line()? {
                 return Ok(false);
             }
-            if self.lines == 1 {
-                let mark: &[u8] = b"\xef\xbb\xbf";
-                if self.text.starts_with(mark) {
-                    self.text.drain(..mark.len());
-                }
-            }
             // Spaces only: an empty cell between tabs is a cell.
             if self.text.iter().all(|byte| b" \r\n".contains(byte)) {
                 blank += self.text.len();
@@ -96,7 +90,7 @@ impl<R: Read> Rows<R> {
             while !quotes.is_multiple_of(2) {
                 let before = self.text.len();
                 if !self.append_line()? {
-                    return Err(TableError::Quote { line: self.line });
+                    return Err(TableError::Quote(self.line));
                 }
                 quotes += count_quotes(&self.text[before..]);
             }
@@ -109,10 +103,9 @@ impl<R: Read> Rows<R> {
     }
 
     fn endless(&self) -> TableError {
-        TableError::Endless {
-            line: self.line,
-            limit: self.longest,
-        }
+        let limit = self.longest >> 20;
+        let reason = format_args!("no row ends within {limit} MiB; check its quotes and line breaks");
+        TableError::in_row(self.line, reason)
     }
 
     /// Appends the next line to the text; returns `false` at the end.
@@ -128,7 +121,9 @@ impl<R: Read> Rows<R> {
         self.lines += u64::from(read > 0);
         let start = self.text.len() - read;
         if self.text[start..].contains(&0) {
-            return Err(TableError::Binary { line: self.lines });
+            let (line, names) = (self.lines, Format::NAMES);
+            let reason = format!("it is not text: line {line} contains a zero byte; give {names}");
+            return Err(TableError::Contents(reason));
         }
         Ok(read > 0)
     }

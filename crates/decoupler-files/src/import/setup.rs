@@ -57,7 +57,7 @@ pub struct Recordings {
 pub enum SetupError {
     /// The recording cannot be read.
     #[error(transparent)]
-    Import(#[from] ImportError),
+    Import(ImportError),
     /// The samples cannot be drawn or trained on.
     #[error(transparent)]
     Run(#[from] RunError),
@@ -67,6 +67,15 @@ pub enum SetupError {
     /// The recording has changed.
     #[error("'{0}' has other samples than when the run was saved; use the original files, or train again")]
     OtherSamples(String),
+}
+
+impl From<ImportError> for SetupError {
+    fn from(error: ImportError) -> Self {
+        match error {
+            ImportError::Cancelled => Self::Cancelled(Cancelled),
+            error => Self::Import(error),
+        }
+    }
 }
 
 impl From<RunSettings> for Setup {
@@ -112,8 +121,8 @@ impl Setup {
     }
 
     fn check_files(&self) -> Result<(), ImportError> {
-        let found = self.plan.as_ref().filter(|_| self.is_stored).and_then(Plan::irregular);
-        found.map_or(Ok(()), |path| Err(ImportError::Irregular(path.clone())))
+        let irregular = self.plan.as_ref().filter(|_| self.is_stored).and_then(Plan::irregular);
+        irregular.map_or(Ok(()), |path| Err(ImportError::Irregular(path)))
     }
 
     /// Returns the settings of the run.
@@ -161,15 +170,10 @@ impl Setup {
         };
         self.check_files()?;
         let watch = &mut watch(job, on_progress);
-        let planned = plan.sets(folder, self.settings.seed, watch);
-        unless_cancelled(
-            job,
-            planned.and_then(|planned| SetupSets::of_plan(plan, folder, planned, watch)),
-        )
+        let planned = plan.sets(folder, self.settings.seed, watch)?;
+        Ok(SetupSets::of_plan(plan, folder, planned, watch)?)
     }
-}
 
-impl Setup {
     /// Returns the recording for an experiment; `None` for a simulated array.
     pub fn experiment_recording(&self) -> Option<ExperimentRecording> {
         let plan = self.plan.as_ref()?;
@@ -196,7 +200,7 @@ impl Setup {
             return Ok(TrialSamples::Drawn(memory_budget()));
         };
         self.check_files()?;
-        let (recording, test) = unless_cancelled(job, plan.recordings(folder, &mut watch(job, on_progress)))?;
+        let (recording, test) = plan.recordings(folder, &mut watch(job, on_progress))?;
         Ok(TrialSamples::Recorded {
             problem: Arc::new(recording.problem()),
             set: Arc::new(recording.set),
@@ -206,23 +210,11 @@ impl Setup {
     }
 }
 
-/// Returns what was read, or that the job was cancelled, which is why it could not be.
-pub(super) fn unless_cancelled<T>(job: &Job<'_>, read: Result<T, ImportError>) -> Result<T, SetupError> {
-    if read.is_err() {
-        job.check()?;
-    }
-    Ok(read?)
-}
-
 /// Returns a callback that reports progress and ends the import once the job is cancelled.
 pub(crate) fn watch(job: &Job<'_>, on_progress: &mut dyn FnMut(Progress)) -> impl FnMut(Progress) -> ControlFlow<()> {
     move |progress| {
         on_progress(progress);
-        if job.is_cancelled() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+        job.check().map_or(ControlFlow::Break(()), ControlFlow::Continue)
     }
 }
 
@@ -235,23 +227,18 @@ impl SetupSets {
         watch: Watch<'_>,
     ) -> Result<Self, ImportError> {
         let recorded = Recorded::of(plan.within(folder).absolute(), &planned, watch)?;
-        let PlannedSets {
-            recording,
-            test_recording,
-            split,
-            test,
-        } = planned;
         let sets = RunSets {
             memory: memory_budget(),
-            ..RunSets::new(split, test).described(recording.problem())
+            ..RunSets::new(planned.split, planned.test).described(planned.recording.problem())
+        };
+        let recordings = Recordings {
+            recorded,
+            training: planned.recording,
+            test: planned.test_recording,
         };
         Ok(Self {
             sets,
-            recordings: Some(Recordings {
-                recorded,
-                training: recording,
-                test: test_recording,
-            }),
+            recordings: Some(recordings),
         })
     }
 

@@ -10,7 +10,6 @@ use std::{
 
 use calamine::{Cell, Data, DataRef, Ods, Range, Reader, Xlsx, XlsxError, open_workbook_from_rs};
 use decoupler_core::text::clean_name;
-use zip::ZipArchive;
 
 use super::{
     Decimal, DialectChoice, Encoding, Format, Progress, Separator, Table, TableError, Watch,
@@ -21,97 +20,64 @@ use super::{
 };
 use crate::{export::csv_cell, machine::ReadingBudget};
 
-/// Kind of spreadsheet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Spreadsheet {
-    /// Excel since 2007.
-    Xlsx,
-    /// OpenDocument.
-    Ods,
-}
-
-impl Spreadsheet {
-    /// Returns the kind of a zip archive, or `None` if it has arrays or cannot be read.
-    ///
-    /// # Errors
-    /// If it has neither sheets nor arrays.
-    pub(super) fn of_zip(file: &File) -> Result<Option<Self>, TableError> {
-        let Ok(archive) = ZipArchive::new(BufReader::new(file)) else {
-            return Ok(None);
-        };
-        let has = |is_it: &dyn Fn(&str) -> bool| archive.file_names().any(|name| name.is_ok_and(|name| is_it(&name)));
-        if has(&|name| name.starts_with("xl/")) {
-            return Ok(Some(Self::Xlsx));
+/// Reads the sheet with most numbers of an Excel file, or of an OpenDocument file with `is_ods`.
+///
+/// # Errors
+/// If the file is damaged or no sheet has cells.
+pub(super) fn read(
+    path: &Path,
+    file: File,
+    is_ods: bool,
+    reading: &Reading<'_>,
+    budget: &mut ReadingBudget,
+    watch: Watch<'_>,
+) -> Result<Table, TableError> {
+    check_names(&mut BufReader::new(&file))?;
+    sheet_claims::claim(BufReader::new(&file), is_ods, budget, watch)?;
+    (&file).rewind()?;
+    let source = BufReader::new(file);
+    // The reader of spreadsheets may panic on a file whose parts contradict each other.
+    let read = catch_unwind(AssertUnwindSafe(|| {
+        if is_ods {
+            let range_of = |workbook: &mut Ods<_>, name: &str| workbook.worksheet_range(name).map_err(damaged);
+            Sheets::read(source, watch, range_of)
+        } else {
+            Sheets::read(source, watch, |workbook, name| cells(workbook, name, budget))
         }
-        if has(&|name| name == "mimetype") && has(&|name| name == "content.xml") {
-            return Ok(Some(Self::Ods));
-        }
-        if archive.is_empty() || has(&|name| name.ends_with(".npy")) {
-            return Ok(None);
-        }
-        Err(TableError::OtherKind {
-            what: "a zip archive without .npy arrays",
-            cure: "unpack it",
-        })
-    }
-
-    /// Reads the sheet with most numbers.
-    ///
-    /// # Errors
-    /// If the file is damaged or no sheet has cells.
-    pub(super) fn read(
-        self,
-        path: &Path,
-        file: File,
-        reading: &Reading<'_>,
-        budget: &mut ReadingBudget,
-        watch: Watch<'_>,
-    ) -> Result<Table, TableError> {
-        check_names(&mut BufReader::new(&file))?;
-        sheet_claims::claim(BufReader::new(&file), self == Self::Ods, budget, watch)?;
-        (&file).rewind()?;
-        let source = BufReader::new(file);
-        // The reader of spreadsheets may panic on a file whose parts contradict each other.
-        let read = catch_unwind(AssertUnwindSafe(|| match self {
-            Self::Xlsx => Sheets::read(source, watch, |workbook, name| cells(workbook, name, budget)),
-            Self::Ods => Sheets::read(source, watch, |workbook: &mut Ods<_>, name| {
-                workbook.worksheet_range(name).map_err(damaged)
-            }),
-        }));
-        let sheets = read.unwrap_or_else(|_| {
-            let reason = "its parts contradict each other; save it again, or as CSV";
-            Err(TableError::damaged("the spreadsheet", reason))
-        })?;
-        let Some((name, range)) = sheets.chosen.filter(|(_, range)| !range.is_empty()) else {
-            return Err(TableError::Empty);
-        };
-        let text = text_of(&range);
-        drop(range);
-        let size = text.len() as u64;
-        let reading = Reading {
-            choice: DialectChoice {
-                encoding: Some(Encoding::Utf8),
-                separator: Some(Separator::Comma),
-                decimal: Some(Decimal::Point),
-                ..reading.choice
-            },
-            ..reading.clone()
-        };
-        let mut table = csv_table::read(
-            path,
-            Watched::new(Cursor::new(text), Some(size), watch),
-            &reading,
-            budget,
-        )?;
-        table.notes.extend(sheets.others.iter().map(|(other, (rows, width))| {
-            format!("left out: sheet '{other}' is {rows} × {width}; save it as its own file to use it")
-        }));
-        table.format = Format::Sheet {
-            name,
-            header: table.has_header(),
-        };
-        Ok(table)
-    }
+    }));
+    let sheets = read.unwrap_or_else(|_| {
+        let reason = "its parts contradict each other; save it again, or as CSV";
+        Err(TableError::damaged("the spreadsheet", reason))
+    })?;
+    let Some((name, range)) = sheets.chosen.filter(|(_, range)| !range.is_empty()) else {
+        return Err(TableError::Empty);
+    };
+    let text = text_of(&range);
+    drop(range);
+    let size = text.len() as u64;
+    let reading = Reading {
+        choice: DialectChoice {
+            encoding: Some(Encoding::Utf8),
+            separator: Some(Separator::Comma),
+            decimal: Some(Decimal::Point),
+            ..reading.choice
+        },
+        ..reading.clone()
+    };
+    let mut table = csv_table::read(
+        path,
+        Watched::new(Cursor::new(text), Some(size), watch),
+        &reading,
+        budget,
+    )?;
+    table.notes.extend(sheets.others.iter().map(|(other, (rows, width))| {
+        format!("left out: sheet '{other}' is {rows} × {width}; save it as its own file to use it")
+    }));
+    table.format = Format::Sheet {
+        name,
+        header: table.has_header(),
+    };
+    Ok(table)
 }
 
 /// Sheets of a file, of which one is used.
@@ -165,7 +131,7 @@ impl Sheets {
 }
 
 fn damaged(error: impl std::fmt::Display) -> TableError {
-    TableError::array("spreadsheet", format!("{error}; save it again, or as CSV"))
+    TableError::array("spreadsheet", format_args!("{error}; save it again, or as CSV"))
 }
 
 /// Reads a sheet of an Excel file cell by cell: the reader of spreadsheets would allocate the whole rectangle between the first

@@ -42,27 +42,18 @@ pub(super) fn claim(
     for index in 0..archive.len() {
         let entry = archive
             .by_index(index)
-            .map_err(|error| TableError::damaged("the archive", format!("{error}; copy it again")))?;
+            .map_err(|error| TableError::damaged("the archive", format_args!("{error}; copy it again")))?;
         let size = entry.size();
         let name = String::from_utf8_lossy(entry.name_raw()).into_owned();
         let is_strict = is_strict && name == "content.xml";
         budget.claim(size.saturating_mul(OF_BYTE))?;
-        let mut is_cancelled = false;
-        let mut watched = |progress| {
-            let flow = watch(progress);
-            is_cancelled |= flow.is_break();
-            flow
-        };
-        let mut xml = BufReader::new(Watched::new(entry, Some(size), &mut watched));
+        let mut xml = BufReader::new(Watched::new(entry, Some(size), watch));
         let claimed = claim_part(&mut xml, is_strict, budget);
         // Without its end, a part may be larger than memory or endless.
         let ended = match claimed {
             Err(TableError::OverBudget(_)) => Ok(0),
             _ => io::copy(&mut xml, &mut io::sink()),
         };
-        if is_cancelled {
-            return Err(TableError::Cancelled);
-        }
         ended.map_err(|error| damage(&name, error))?;
         claimed?;
     }

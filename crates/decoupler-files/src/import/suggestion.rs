@@ -1,12 +1,9 @@
-use std::{collections::HashMap, fmt, path::Path};
+use std::{fmt, path::Path};
 
-use decoupler_core::dataset::{Division, SplitBy};
+use decoupler_core::dataset::SplitBy;
 
 use super::{
-    ColumnKind, ColumnSummary, FileSet, Format, ImportError, InspectedFile, Joined, Plan, Recipe, TestFiles,
-    expression::Expression,
-    inputs::{ColumnId, Names},
-    table::stem,
+    ColumnKind, ColumnSummary, FileSet, Format, InspectedFile, Inspection, Joined, Plan, Recipe, TestFiles, table::stem,
 };
 
 /// Words in names of columns and files that suggest a target, by their weights.
@@ -78,14 +75,15 @@ fn series<'a>(files: &[&'a InspectedFile]) -> Vec<Vec<&'a InspectedFile>> {
 /// Returns `true` if two files have the same columns and are of the same kind: their names differ in numbers only, or they
 /// have a header and different numbers of rows, so that they cannot be joined row by row.
 fn are_alike(one: &InspectedFile, other: &InspectedFile) -> bool {
-    let columns =
-        |file: &InspectedFile| Vec::from_iter(file.inspection.columns.iter().map(|column| column.name.clone()));
+    fn names(file: &InspectedFile) -> impl Iterator<Item = &String> {
+        file.inspection.columns.iter().map(|column| &column.name)
+    }
     let letters = |file: &InspectedFile| {
         let name = stem(&file.path).to_lowercase();
         name.chars().filter(|letter| letter.is_alphabetic()).collect::<String>()
     };
     let has_header = matches!(&one.format, Format::Text(dialect) if dialect.header);
-    columns(one) == columns(other)
+    names(one).eq(names(other))
         && score_of_file(&one.path) == score_of_file(&other.path)
         && (letters(one) == letters(other) || (has_header && one.inspection.rows != other.inspection.rows))
 }
@@ -102,40 +100,31 @@ fn plan_of(order: &[&InspectedFile]) -> Plan {
     };
     let by_time = joined.iter().all(|file| share_time(first, file));
     let time_of = |file: &InspectedFile| time(file).filter(|_| by_time).map(|time| time.name.clone());
-    let recipe = Recipe {
-        data: first.path.clone(),
-        join: joined
-            .iter()
-            .map(|file| Joined {
-                file: file.path.clone(),
-                stem: own_stem(file),
-                time: time_of(file),
-                ..Joined::default()
-            })
-            .collect(),
-        ..Recipe::default()
+    let mut plan = Plan::default();
+    let recipe = &mut plan.import;
+    recipe.data.clone_from(&first.path);
+    let with_time = |file: &&InspectedFile| Joined {
+        file: file.path.clone(),
+        stem: own_stem(file),
+        time: time_of(file),
+        limit: None,
     };
-    let stems = recipe.stems();
-    let mut plan = Plan {
-        import: Recipe {
-            time: time_of(first),
-            ..recipe
-        },
-        ..Plan::default()
-    };
-    let first_meanings = guesses(first, joined.is_empty());
-    add(&mut plan.import, first, &first_meanings, None);
-    for (file, stem) in joined.iter().zip(&stems) {
-        // Columns of joined files are targets, whatever their names.
-        let meanings = guesses(file, false).into_iter().zip(&file.inspection.columns);
-        let meanings = meanings.map(|(meaning, column)| match meaning {
-            Meaning::Input if column.is_rounding => Meaning::Unused,
-            Meaning::Input => Meaning::Target,
-            other => other,
-        });
-        add(&mut plan.import, file, &Vec::from_iter(meanings), Some(stem));
+    recipe.join = joined.iter().map(with_time).collect();
+    recipe.time = time_of(first);
+    add(recipe, first, guesses(first, joined.is_empty()), None);
+    for (file, stem) in joined.iter().zip(recipe.stems()) {
+        let mut meanings = guesses(file, false);
+        for (meaning, column) in meanings.iter_mut().zip(&file.inspection.columns) {
+            // Columns of joined files are targets, whatever their names.
+            match meaning {
+                Meaning::Input if column.is_rounding => *meaning = Meaning::Unused,
+                Meaning::Input => *meaning = Meaning::Target,
+                _ => {}
+            }
+        }
+        add(recipe, file, meanings, Some(&stem));
     }
-    let Recipe { inputs, targets, .. } = &mut plan.import;
+    let Recipe { inputs, targets, .. } = recipe;
     // If the names do not distinguish them, the last column is the target, as in most tables of samples.
     if inputs.is_empty() {
         std::mem::swap(inputs, targets);
@@ -143,11 +132,8 @@ fn plan_of(order: &[&InspectedFile]) -> Plan {
     if targets.is_empty() && inputs.len() > 1 {
         targets.extend(inputs.pop());
     }
-    if plan.import.group.is_some() {
-        plan.division = Division {
-            by: SplitBy::Group,
-            ..plan.division
-        };
+    if recipe.group.is_some() {
+        plan.division.by = SplitBy::Group;
     }
     plan
 }
@@ -161,30 +147,22 @@ fn own_stem(file: &InspectedFile) -> Option<String> {
 
 /// Returns the training files, and the test files if each training file has one, such as `trainPose` and `testPose`.
 fn apart(files: &[InspectedFile]) -> (Vec<&InspectedFile>, Option<TestFiles>) {
-    let all = || files.iter().collect::<Vec<_>>();
     let is_test = |file: &&InspectedFile| stem(&file.path).to_lowercase().contains("test");
-    let (test, training): (Vec<_>, Vec<_>) = files.iter().partition(is_test);
-    if test.is_empty() || test.len() != training.len() {
-        return (all(), None);
-    }
+    let (tests, training): (Vec<_>, Vec<_>) = files.iter().partition(is_test);
     let mut sorted = training.clone();
     sorted.sort_by_key(|file| (score_of_file(&file.path), usize::MAX - numeric(file).count()));
     let partner = |file: &&InspectedFile| {
-        let key = without_part(&file.path);
-        test.iter()
-            .find(|test| without_part(&test.path) == key)
-            .map(|test| test.path.clone())
+        let is_partner = |test: &&&InspectedFile| without_part(&test.path) == without_part(&file.path);
+        Some(tests.iter().find(is_partner)?.path.clone())
     };
-    let Some(mut partners) = sorted.iter().map(partner).collect::<Option<Vec<_>>>() else {
-        return (all(), None);
-    };
-    let data = partners.remove(0);
-    let test = TestFiles {
-        data,
-        join: partners,
-        append: Vec::new(),
-    };
-    (training, Some(test))
+    match sorted.iter().map(partner).collect::<Option<Vec<_>>>() {
+        Some(mut partners) if !tests.is_empty() && tests.len() == training.len() => {
+            let (data, join) = (partners.remove(0), partners);
+            let append = Vec::new();
+            (training, Some(TestFiles { data, join, append }))
+        }
+        _ => (files.iter().collect(), None),
+    }
 }
 
 /// Returns the name of a file without "training", "train" or "test".
@@ -206,12 +184,9 @@ fn is_numeric(column: &ColumnSummary) -> bool {
 
 /// Returns the time column, if its name or unit suggests a time or it has no name: an input may increase steadily, too.
 fn time(file: &InspectedFile) -> Option<&ColumnSummary> {
-    let time = file.inspection.time.as_ref()?;
-    let column = file
-        .inspection
-        .columns
-        .iter()
-        .find(|column| column.name == time.column)?;
+    let Inspection { time, columns, .. } = &file.inspection;
+    let name = &time.as_ref()?.column;
+    let column = columns.iter().find(|column| column.name == *name)?;
     let name = column.name.to_lowercase();
     let is_named = ["time", "stamp", "clock", "date", "index", "frame", "sample", "second"];
     let has_unit = |unit: &String| ["s", "ms", "µs", "us", "min", "h"].contains(&unit.trim());
@@ -223,14 +198,9 @@ fn time(file: &InspectedFile) -> Option<&ColumnSummary> {
 
 /// Returns `true` if both files have times and the times overlap.
 fn share_time(one: &InspectedFile, other: &InspectedFile) -> bool {
-    let range = |file: &InspectedFile| {
-        let column = time(file)?;
-        Some((column.min?, column.max?))
-    };
-    match (range(one), range(other)) {
-        (Some(one), Some(other)) => one.0 <= other.1 && other.0 <= one.1,
-        _ => false,
-    }
+    let range = |file| time(file).and_then(|column| Some([column.min?, column.max?]));
+    let overlap = |([from, to], [start, end]): ([f64; 2], [f64; 2])| from <= end && start <= to;
+    range(one).zip(range(other)).is_some_and(overlap)
 }
 
 /// Returns the score of a file name: positive for targets, negative for readings.
@@ -274,14 +244,10 @@ fn guesses(file: &InspectedFile, is_alone: bool) -> Vec<Meaning> {
             return Meaning::RowWire;
         }
         // A single file contains both inputs and targets.
-        if is_alone && looks_like_target(&name, column.unit.as_deref()) {
-            if column.is_rounding {
-                Meaning::Unused
-            } else {
-                Meaning::Target
-            }
-        } else {
-            Meaning::Input
+        match is_alone && looks_like_target(&name, column.unit.as_deref()) {
+            true if column.is_rounding => Meaning::Unused,
+            true => Meaning::Target,
+            false => Meaning::Input,
         }
     };
     inspection.columns.iter().map(guess).collect()
@@ -308,7 +274,7 @@ fn looks_like_target(name: &str, unit: Option<&str>) -> bool {
 }
 
 /// Adds the columns of a file to a recipe by their full names.
-fn add(recipe: &mut Recipe, file: &InspectedFile, meanings: &[Meaning], stem: Option<&String>) {
+fn add(recipe: &mut Recipe, file: &InspectedFile, meanings: Vec<Meaning>, stem: Option<&String>) {
     for (column, meaning) in file.inspection.columns.iter().zip(meanings) {
         let name = match stem {
             None => column.name.clone(),
@@ -323,74 +289,6 @@ fn add(recipe: &mut Recipe, file: &InspectedFile, meanings: &[Meaning], stem: Op
             Meaning::Time if stem.is_none() && recipe.join.is_empty() => recipe.time = Some(name),
             _ => {}
         }
-    }
-}
-
-/// Columns by their meaning.
-#[derive(Default)]
-pub(super) struct Meanings {
-    pub(super) inputs: Vec<ColumnId>,
-    pub(super) targets: Vec<ColumnId>,
-    pub(super) time: Option<ColumnId>,
-    pub(super) group: Option<ColumnId>,
-    pub(super) row_wire: Option<ColumnId>,
-    pub(super) comparisons: Vec<(ColumnId, Expression<String>)>,
-    pub(super) units: HashMap<ColumnId, String>,
-}
-
-impl Meanings {
-    pub(super) fn of(recipe: &Recipe, names: &Names) -> Result<Self, ImportError> {
-        let one = |name: &Option<String>| name.as_ref().map(|name| names.find(name)).transpose();
-        let comparisons = recipe.conditions.iter().flat_map(|condition| &condition.comparisons);
-        for missing in recipe.missing.iter().filter_map(|missing| missing.column.as_deref()) {
-            names.find(missing)?;
-        }
-        let units = recipe
-            .units
-            .iter()
-            .map(|(name, unit)| Ok((names.find(name)?, unit.clone())));
-        let meanings = Self {
-            inputs: names.find_all(&recipe.inputs)?,
-            targets: names.find_all(&recipe.targets)?,
-            time: one(&recipe.time)?,
-            group: one(&recipe.group)?,
-            row_wire: one(&recipe.row_wire)?,
-            comparisons: comparisons
-                .map(|comparison| Ok((names.find(&comparison.column)?, comparison.clone())))
-                .collect::<Result<_, ImportError>>()?,
-            units: units.collect::<Result<_, ImportError>>()?,
-        };
-        for (columns, what) in [(&meanings.inputs, "an input"), (&meanings.targets, "a target")] {
-            if columns.is_empty() {
-                return Err(ImportError::NoColumns(what));
-            }
-        }
-        let mut seen: HashMap<ColumnId, &'static str> = HashMap::new();
-        let all = [
-            ("an input", meanings.inputs.clone()),
-            ("a target", meanings.targets.clone()),
-            ("the group", Vec::from_iter(meanings.group)),
-            ("the row-wire", Vec::from_iter(meanings.row_wire)),
-        ];
-        for (other, columns) in all {
-            for id in columns {
-                if let Some(one) = seen.insert(id, other) {
-                    let name = names.name(id).to_owned();
-                    return Err(ImportError::TwoMeanings { name, one, other });
-                }
-            }
-        }
-        Ok(meanings)
-    }
-
-    /// Columns whose cells must be numbers.
-    pub(super) fn used(&self) -> impl Iterator<Item = ColumnId> {
-        let compared = self.comparisons.iter().map(|(id, _)| *id);
-        let single = self.time.into_iter().chain(self.row_wire).chain(self.group);
-        compared
-            .chain(single)
-            .chain(self.inputs.iter().copied())
-            .chain(self.targets.iter().copied())
     }
 }
 
@@ -422,6 +320,20 @@ impl Meaning {
         Self::RowWire,
         Self::Unused,
     ];
+}
+
+impl Meaning {
+    /// Returns the meaning in a sentence.
+    pub(super) fn with_article(self) -> &'static str {
+        match self {
+            Self::Input => "an input",
+            Self::Target => "a target",
+            Self::Time => "the time",
+            Self::Group => "the group",
+            Self::RowWire => "the row-wire",
+            Self::Unused => "unused",
+        }
+    }
 }
 
 impl fmt::Display for Meaning {

@@ -1,16 +1,21 @@
-use std::{collections::HashMap, ops::Range, path::Path};
+use std::{
+    borrow::Cow,
+    collections::HashMap,
+    ops::Range,
+    path::{Path, PathBuf},
+};
 
 use decoupler_core::text::clean_name;
 
 use serde::Serialize;
 
-use super::{Dialect, Format, time_stamp::TimeStamp};
+use super::{Dialect, Format, TableError, time_stamp::TimeStamp};
 
 /// Table read from a file: columns of equal length.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// Name of the file without its folder and extension.
-    pub stem: String,
+    /// The file.
+    pub path: PathBuf,
     /// Columns.
     pub columns: Vec<Column>,
     /// Named arrays of numbers in the file, such as the variables of a workspace; none in other formats.
@@ -82,9 +87,31 @@ impl Lines {
 }
 
 impl Table {
+    /// Returns a table without rows.
+    pub(super) fn new(path: &Path, format: Format) -> Self {
+        Self {
+            path: path.to_owned(),
+            columns: Vec::new(),
+            variables: Vec::new(),
+            rows: 0,
+            format,
+            notes: Vec::new(),
+            torn_line: None,
+            too_long: Excess::default(),
+            lines: Lines::default(),
+        }
+    }
+
     /// Returns the line of a row of a text file, else the number of the row; from 1.
     pub fn line(&self, row: usize) -> u64 {
         self.lines.of(row)
+    }
+
+    /// Refuses a table with rows that were left out because they are too long.
+    pub(super) fn check_widths(&self) -> Result<(), TableError> {
+        let reason = "the row has more cells than there are columns; correct it";
+        let line = self.too_long.first_line;
+        line.map_or(Ok(()), |line| Err(TableError::in_row(line, reason)))
     }
 
     /// Returns `true` if the columns have names in the file.
@@ -120,28 +147,16 @@ pub struct Column {
     pub unit: Option<String>,
     /// Header in the file, with unprintable characters escaped, if the name lacks some of its characters.
     pub original: Option<String>,
-    /// Cells, one per row.
-    pub cells: Cells,
+    /// Cells, one per row; NaN if a cell is missing or not a number.
+    pub numbers: Vec<f64>,
+    /// Labels of a column of groups.
+    pub(super) labels: Option<Labels>,
     /// Number of cells that are missing.
     pub missing: usize,
     /// Cells that are neither numbers nor missing.
     pub faults: Faults,
     /// First time stamp of a column of time stamps, whose numbers are the seconds since then.
     pub(super) start: Option<TimeStamp>,
-}
-
-/// Cells of a column.
-#[derive(Clone, Debug)]
-pub enum Cells {
-    /// Numbers; NaN if a cell is missing or not a number.
-    Numbers(Vec<f64>),
-    /// Labels of groups.
-    Labels {
-        /// Index into `texts` for each cell; `None` if it is missing.
-        numbers: Vec<Option<u32>>,
-        /// Labels in order of first occurrence, each with its value as a number, or NaN.
-        texts: Vec<(String, f64)>,
-    },
 }
 
 /// Cells that are neither numbers nor missing.
@@ -153,6 +168,16 @@ pub struct Faults {
     pub first: Option<Fault>,
 }
 
+impl Faults {
+    pub(super) fn add(&mut self, line: u64, text: impl FnOnce() -> String) {
+        self.count += 1;
+        self.first.get_or_insert_with(|| Fault {
+            line,
+            text: excerpt(&text()),
+        });
+    }
+}
+
 /// Cell that is neither a number nor missing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
@@ -162,121 +187,73 @@ pub struct Fault {
     pub text: String,
 }
 
-impl Default for Cells {
-    fn default() -> Self {
-        Self::Numbers(Vec::new())
-    }
-}
-
-impl Cells {
-    /// Number of cells.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Numbers(numbers) => numbers.len(),
-            Self::Labels { numbers, .. } => numbers.len(),
-        }
-    }
-
-    /// Returns `true` if there are no cells.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Returns the cell as a number; NaN if it is missing, or a label that is not a number.
-    pub(super) fn number(&self, row: usize) -> f64 {
-        match self {
-            Self::Numbers(numbers) => numbers[row],
-            Self::Labels { numbers, texts } => numbers[row].map_or(f64::NAN, |label| texts[label as usize].1),
+impl Column {
+    /// Returns `true` if the cell is missing, or not a number in a column without labels.
+    pub(super) fn is_missing(&self, row: usize) -> bool {
+        match &self.labels {
+            None => self.numbers[row].is_nan(),
+            Some(labels) => labels.of_rows[row].is_none(),
         }
     }
 
     /// Returns the cell as text; empty if it is missing. A number reads back bit for bit.
-    pub(super) fn text(&self, row: usize) -> String {
-        match self {
-            Self::Numbers(numbers) if numbers[row].is_nan() => String::new(),
-            Self::Numbers(numbers) => numbers[row].to_string(),
-            Self::Labels { numbers, texts } => {
-                numbers[row].map_or(String::new(), |label| texts[label as usize].0.clone())
+    pub(super) fn text(&self, row: usize) -> Cow<'_, str> {
+        match &self.labels {
+            _ if self.is_missing(row) => Cow::default(),
+            None => self.numbers[row].to_string().into(),
+            Some(labels) => {
+                labels.of_rows[row].map_or(Cow::default(), |label| Cow::from(&labels.texts[label as usize]))
             }
         }
     }
 
-    /// Returns `true` if the cell is missing.
-    pub(super) fn is_missing(&self, row: usize) -> bool {
-        match self {
-            Self::Numbers(numbers) => numbers[row].is_nan(),
-            Self::Labels { numbers, .. } => numbers[row].is_none(),
+    /// Replaces the cells by those of these rows; missing where there is none.
+    pub(super) fn take_rows(&mut self, rows: &[Option<u32>]) {
+        let number = |row: &Option<u32>| row.map_or(f64::NAN, |row| self.numbers[row as usize]);
+        self.numbers = rows.iter().map(number).collect();
+        if let Some(Labels { of_rows, .. }) = &mut self.labels {
+            *of_rows = rows.iter().map(|row| of_rows[(*row)? as usize]).collect();
         }
     }
 
-    /// Returns a value that is equal for cells of the same group.
-    pub(super) fn group(&self, row: usize) -> u64 {
-        match self {
-            Self::Numbers(numbers) => numbers[row].to_bits(),
-            Self::Labels { numbers, .. } => numbers[row].map_or(u64::MAX, u64::from),
-        }
-    }
-
-    /// Returns the name of a group: the label or the number.
-    pub(super) fn name_of_group(&self, row: usize) -> String {
-        match self {
-            Self::Numbers(numbers) => numbers[row].to_string(),
-            Self::Labels { numbers, texts } => {
-                let label = numbers[row].map(|label| texts[label as usize].0.clone());
-                label.unwrap_or_default()
-            }
-        }
+    /// Frees the cells.
+    pub(super) fn clear(&mut self) {
+        (self.numbers, self.labels) = (Vec::new(), None);
     }
 
     /// Returns the first label that is not a number.
     pub(super) fn wordy_label(&self) -> Option<&str> {
-        match self {
-            Self::Numbers(_) => None,
-            Self::Labels { texts, .. } => texts
-                .iter()
-                .find(|(_, number)| number.is_nan())
-                .map(|(text, _)| text.as_str()),
-        }
+        let is_wordy = |row: &usize| self.numbers[*row].is_nan() && !self.is_missing(*row);
+        let labels = self.labels.as_ref()?;
+        let row = (0..self.numbers.len()).find(is_wordy)?;
+        Some(&labels.texts[labels.of_rows[row]? as usize])
     }
 }
 
-/// Labels in order of first occurrence.
-#[derive(Debug, Default)]
+/// Labels of the groups in a column.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Labels {
-    pub(super) numbers: Vec<Option<u32>>,
-    texts: Vec<(String, f64)>,
+    /// Index into `texts` for each cell; `None` if it is missing.
+    of_rows: Vec<Option<u32>>,
+    /// Labels in order of first occurrence.
+    texts: Vec<String>,
     known: HashMap<String, u32>,
 }
 
 impl Labels {
-    /// Adds a cell: its text and its value, if it is a number. Returns `true` if the label is new.
-    pub(super) fn push(&mut self, label: Option<(&str, Option<f64>)>) -> bool {
-        let known = self.texts.len();
-        let number = label.map(|(text, value)| {
+    /// Adds a cell. Returns `true` if its label is new.
+    pub(super) fn push(&mut self, label: Option<&str>) -> bool {
+        let before = self.texts.len();
+        let number = label.map(|text| {
             self.known.get(text).copied().unwrap_or_else(|| {
-                let number = self.texts.len() as u32;
-                self.texts.push((clean_name(text), value.unwrap_or(f64::NAN)));
-                self.known.insert(text.to_owned(), number);
-                number
+                self.texts.push(clean_name(text));
+                self.known.insert(text.to_owned(), before as u32);
+                before as u32
             })
         });
-        self.numbers.push(number);
-        self.texts.len() > known
+        self.of_rows.push(number);
+        self.texts.len() > before
     }
-
-    pub(super) fn into_cells(self) -> Cells {
-        Cells::Labels {
-            numbers: self.numbers,
-            texts: self.texts,
-        }
-    }
-}
-
-/// Returns the index of the column with this name, with or without the unit of its header.
-pub(super) fn column_called(columns: &[Column], given: &str) -> Option<usize> {
-    let given = clean_name(given.trim());
-    let named = |name: &str| columns.iter().position(|column| column.name == name);
-    named(&given).or_else(|| named(name_and_unit(&given).0))
 }
 
 /// Splits a header such as "x (mm)" or "x [mm]" into name and unit.

@@ -7,7 +7,7 @@ use std::{
     path::Path,
 };
 
-use decoupler_files::import::{Cells, DialectChoice, Table, read_table};
+use decoupler_files::import::{DialectChoice, Table, read_table};
 use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 /// Formats with a checksum.
@@ -56,11 +56,8 @@ fn read(bytes: &[u8], path: &Path) -> Result<Content, String> {
     fs::write(path, bytes).unwrap();
     let read = read_table(path, DialectChoice::default(), &mut |_| ControlFlow::Continue(()));
     let Table { columns, notes, .. } = read.map_err(|error| error.to_string())?;
-    let bits = |cells: &Cells| match cells {
-        Cells::Numbers(numbers) => numbers.iter().map(|number| number.to_bits()).collect(),
-        Cells::Labels { .. } => Vec::new(),
-    };
-    let numbers = columns.iter().map(|column| bits(&column.cells)).collect();
+    let bits = |numbers: &[f64]| numbers.iter().map(|number| number.to_bits()).collect();
+    let numbers = columns.iter().map(|column| bits(&column.numbers)).collect();
     let names = columns.into_iter().map(|column| column.name).collect();
     Ok((names, numbers, notes))
 }

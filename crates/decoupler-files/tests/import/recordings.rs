@@ -4,8 +4,8 @@ use std::{fs, ops::ControlFlow, path::Path};
 
 use decoupler_core::dataset::{Memory, Span};
 use decoupler_files::import::{
-    Cells, ColumnKind, Decimal, DialectChoice, Encoding, Inspection, Joined, Progress, Recipe, Recording, Separator,
-    Table, read_table,
+    ColumnKind, Decimal, DialectChoice, Encoding, Inspection, Joined, Progress, Recipe, Recording, Separator, Table,
+    read_table,
 };
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use tempfile::TempDir;
@@ -19,11 +19,7 @@ fn read(path: &Path) -> Result<Table, String> {
 }
 
 fn numbers(table: &Table) -> Vec<Vec<f64>> {
-    let column = |cells: &Cells| match cells {
-        Cells::Numbers(numbers) => numbers.clone(),
-        Cells::Labels { .. } => Vec::new(),
-    };
-    table.columns.iter().map(|found| column(&found.cells)).collect()
+    table.columns.iter().map(|column| column.numbers.clone()).collect()
 }
 
 fn names(table: &Table) -> Vec<&str> {

@@ -185,7 +185,7 @@ fn a_recipe_is_inspected_with_its_own_meanings_and_missing_cells() {
         targets: vec!["b.f".to_owned()],
         time: Some("t".to_owned()),
         group: Some("g".to_owned()),
-        missing: vec![Missing::from("v=-1".to_owned())],
+        missing: vec!["v=-1".parse::<Missing>().unwrap()],
         ..Recipe::default()
     };
     let files = recipe

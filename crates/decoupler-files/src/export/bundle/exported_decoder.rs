@@ -1,4 +1,4 @@
-use std::sync::Arc;
+use std::{path::PathBuf, sync::Arc};
 
 use decoupler_core::{
     dataset::{Dataset, GAP, PerRow, Seed, Simulation, Stream},
@@ -502,6 +502,6 @@ fn errors(decoder: &mut dyn Decoder, problem: &Problem, test: &Dataset) -> Resul
 
 fn file_names(plan: Option<&Plan>) -> Vec<String> {
     let paths = plan.into_iter().flat_map(Plan::files);
-    let names = paths.filter_map(|path| path.file_name());
-    names.map(|name| name.to_string_lossy().into_owned()).collect()
+    let name = |path: PathBuf| Some(path.file_name()?.to_string_lossy().into_owned());
+    paths.filter_map(name).collect()
 }

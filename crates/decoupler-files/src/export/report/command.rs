@@ -11,6 +11,7 @@ use decoupler_core::{
     dataset::{Division, Memory, Simulation, Span, SplitBy},
     evaluation::{RUN_OPTIONS, RunOption, RunSettings},
     scene::RowModel,
+    text::Named as _,
 };
 
 /// Settings for which the terminal has no option.
@@ -243,10 +244,10 @@ fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
         ("missing", texts(missing)),
         ("unit", units.collect()),
         ("positions", texts(&positions.as_ref().map(|file| file.display()))),
-        ("separator", texts(separator)),
-        ("decimal", texts(decimal)),
+        ("separator", texts(&separator.map(|separator| separator.name()))),
+        ("decimal", texts(&decimal.map(|decimal| decimal.name()))),
         ("header", texts(&header.map(|header| if header { "yes" } else { "no" }))),
-        ("encoding", texts(encoding)),
+        ("encoding", texts(&encoding.map(|encoding| encoding.name()))),
         ("skip-lines", texts(skip_lines)),
     ];
     let of_columns = options_of_columns.into_iter();

@@ -5,19 +5,20 @@ use decoupler_core::{
     problem::{Channel, Problem},
     scene::{RowModel, Rows, SceneError},
     sensor::ArrayScale,
+    text::counted,
 };
 
 use super::{
     super::{
-        Derived, InputError, Recipe, Separator,
-        derived::{self, DerivedStream},
+        Derived, Recipe,
+        derived::DerivedStream,
         fields::Fields,
         inputs::{InputColumns, OtherColumns},
         selection::{LAST_ROW_WIRE, row_wire},
         table::excerpt,
         time_stamp::TimeStamp,
     },
-    LineError, Needed,
+    LineError,
 };
 
 /// Parser of successive lines of CSV with the readings of a network, without allocation in steady state.
@@ -25,7 +26,7 @@ use super::{
 /// A header names the columns, in any order and among others; without one, the first line of readings determines the layout:
 /// the inputs in their order, possibly after the number of the row-wire or, for an array, a whole snapshot row by row. A header
 /// may be repeated, for example when a device restarts, and a comma may end a line.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct LineParser {
     inputs: Vec<Channel>,
     others: OtherColumns,
@@ -47,7 +48,7 @@ pub struct LineParser {
     /// Number of lines so far whose row-wire follows from their order, valid or not.
     lines_in_turn: usize,
     /// The derived columns, once the columns of the lines are known.
-    derived: Option<DerivedStream>,
+    derived: DerivedStream,
     /// Group of each line of the start, which is waited for.
     groups_of_start: Vec<u64>,
     memory: Option<MemoryStream>,
@@ -58,6 +59,9 @@ pub struct LineParser {
     readings: Vec<f64>,
     kept: Vec<KeptCell>,
 }
+
+const NO_ROW: &str = "it has no row number, and it is not known with which row a device begins; send the row number before \
+                      the resistances, or whole snapshots in one line";
 
 /// Row-wires that are read.
 #[derive(Debug)]
@@ -121,13 +125,8 @@ pub enum ParsedLine<'a> {
 /// What was found in a line, without its readings.
 enum Found {
     NoReadings,
-    Start {
-        is_first: bool,
-    },
-    Readings {
-        row_index: Option<usize>,
-        place: Option<Place>,
-    },
+    Start { is_first: bool },
+    Readings(Option<usize>, Option<Place>),
 }
 
 impl LineParser {
@@ -153,15 +152,19 @@ impl LineParser {
     }
 
     fn of_resistances(channels: usize, rows: RowWires) -> Self {
-        let inputs = (1..=channels).map(|channel| Channel::new(format!("r_{channel}"), None));
+        let inputs = Vec::from_iter((1..=channels).map(|channel| Channel::new(format!("r_{channel}"), None)));
         let others = OtherColumns {
             row_wire: Some("row".to_owned()),
             time: Some("time_s".to_owned()),
             ..OtherColumns::default()
         };
         Self {
+            read: inputs.clone(),
+            inputs,
+            others,
+            rows: Some(rows),
             is_array: true,
-            ..Self::new(inputs.collect(), others, Some(rows))
+            ..Self::default()
         }
     }
 
@@ -202,32 +205,11 @@ impl LineParser {
             memory: memory
                 .map(|memory| MemoryStream::new(memory, inputs.len()))
                 .transpose()?,
-            ..Self::new(inputs.clone(), recipe.other_columns(problem), rows)
-        })
-    }
-
-    fn new(inputs: Vec<Channel>, others: OtherColumns, rows: Option<RowWires>) -> Self {
-        Self {
-            read: inputs.clone(),
-            inputs,
-            others,
-            derive: Vec::new(),
+            inputs: inputs.clone(),
+            others: recipe.other_columns(problem),
             rows,
-            is_array: false,
-            fields: Fields::new(Separator::Comma, usize::MAX),
-            columns: None,
-            has_names: false,
-            is_snapshot: false,
-            has_readings: false,
-            lines_in_turn: 0,
-            derived: None,
-            groups_of_start: Vec::new(),
-            memory: None,
-            start: None,
-            cells: Vec::new(),
-            readings: Vec::new(),
-            kept: Vec::new(),
-        }
+            ..Self::default()
+        })
     }
 
     /// Number of readings of a row-wire.
@@ -260,14 +242,14 @@ impl LineParser {
             self.count_bad();
             // Garbage before the first readings does not determine the layout.
             if !self.has_names && !self.has_readings {
-                (self.columns, self.derived) = (None, None);
+                (self.columns, self.derived) = (None, DerivedStream::default());
             }
         }
         Ok(match found? {
             Found::NoReadings => ParsedLine::NoReadings,
             Found::Start { is_first } => ParsedLine::Start { is_first },
-            Found::Readings { .. } if self.is_snapshot => ParsedLine::Snapshot(&self.readings),
-            Found::Readings { row_index, place } => ParsedLine::Row {
+            Found::Readings(..) if self.is_snapshot => ParsedLine::Snapshot(&self.readings),
+            Found::Readings(row_index, place) => ParsedLine::Row {
                 row_index,
                 readings: &self.readings,
                 time_s: self.columns.as_ref().and_then(|columns| columns.time_s(&self.cells)),
@@ -284,7 +266,8 @@ impl LineParser {
             return Ok(Found::NoReadings);
         }
         if text.contains(&b'\r') {
-            return Err(LineError::LineBreak(line));
+            let reason = "there is a line break within the line; end lines, and only lines, with LF or CR LF";
+            return Err(LineError::Malformed(line, reason.to_owned()));
         }
         self.fields.split(text);
         self.cells.clear();
@@ -308,7 +291,7 @@ impl LineParser {
             };
             if is_header {
                 let found = self.find_columns(&cells, cells.len());
-                found.map_err(|source| LineError::Header { line, source })?;
+                found.map_err(|reason| LineError::Final(line, reason))?;
                 return Ok(Found::NoReadings);
             }
             if self.columns.is_none() {
@@ -316,7 +299,7 @@ impl LineParser {
                 let last = self.fields.iter(text).next_back();
                 let has_comma = self.cells.len() > 1 && last.is_some_and(<[u8]>::is_empty);
                 let found = self.find_columns(&[], self.cells.len() - usize::from(has_comma));
-                found.map_err(|source| LineError::Unnamed { line, source })?;
+                found.map_err(|reason| LineError::Malformed(line, reason))?;
                 self.read_stamp(text);
             }
             if let Some(columns) = &self.columns {
@@ -334,38 +317,41 @@ impl LineParser {
         let found = self.fields.len();
         let has_trailing_comma = found == width + 1 && found > 1 && self.fields.get(text, width).is_empty();
         if found != width && !has_trailing_comma {
-            let expected = width;
-            return Err(LineError::Width { line, found, expected });
+            let found = counted(found, "cell");
+            let reason = format!("{found} where {width} are needed, separated by commas");
+            return Err(LineError::Malformed(line, reason));
         }
-        let reading = if self.is_array {
-            Needed::Resistance
-        } else {
-            Needed::Number
+        let refused = |column: usize, needed: &str| {
+            let cell = excerpt(&String::from_utf8_lossy(self.fields.get(text, column)));
+            LineError::Cell(line, column + 1, format!("'{cell}' is not {needed}"))
         };
-        let read = columns.inputs.iter().filter(|column| **column < width);
-        let derived = self.derived.iter().flat_map(|derived| derived.needed(width));
-        // A memory places the line in its series.
-        let time = columns.time.filter(|_| self.memory.is_some());
-        let row_wire = columns
-            .row_wire
-            .filter(|_| self.memory.is_some() || self.rows.is_some());
-        let last = self.rows.as_ref().map_or(LAST_ROW_WIRE, |rows| rows.last);
-        let all = read
-            .map(|column| (*column, reading))
-            .chain(row_wire.map(|column| (column, Needed::RowWire(last))))
-            .chain(derived.map(|column| (column, Needed::Number)))
-            .chain(time.map(|(column, _)| (column, Needed::Time)));
-        for (column, needed) in all {
-            if !needed.is_met(self.cells[column]) {
-                return Err(LineError::Cell {
-                    line,
-                    column: column + 1,
-                    text: excerpt(&String::from_utf8_lossy(self.fields.get(text, column))),
-                    needed,
-                });
-            }
+        let is_number = |column: &usize| self.cells[*column].is_finite();
+        let is_resistance = |column: &usize| is_number(column) && self.cells[*column] > 0.0;
+        let mut read = columns.inputs.iter().copied().filter(|column| *column < width);
+        if self.is_array
+            && let Some(column) = read.clone().find(|column| !is_resistance(column))
+        {
+            return Err(refused(column, "a resistance; give a finite number of ohm above 0"));
         }
-        Ok(())
+        if let Some(column) = read.find(|column| !is_number(column)) {
+            return Err(refused(column, "a finite number"));
+        }
+        // A memory places the line in its series.
+        let last = self.rows.as_ref().map_or(LAST_ROW_WIRE, |rows| rows.last);
+        let needs_row_wire = self.memory.is_some() || self.rows.is_some();
+        let is_row_wire = |column: &usize| row_wire(self.cells[*column]).is_some_and(|row| row < last);
+        if let Some(column) = columns.row_wire.filter(|column| needs_row_wire && !is_row_wire(column)) {
+            return Err(refused(column, &format!("a row-wire; give a number from 1 to {last}")));
+        }
+        if let Some(column) = self.derived.needed(width).find(|column| !is_number(column)) {
+            return Err(refused(column, "a finite number"));
+        }
+        let time = columns
+            .time
+            .filter(|(column, _)| self.memory.is_some() && !is_number(column));
+        time.map_or(Ok(()), |(column, _)| {
+            Err(refused(column, "a time, which the history of readings needs"))
+        })
     }
 
     /// Gathers the readings of a line whose cells can be used.
@@ -377,26 +363,20 @@ impl LineParser {
         self.cells.truncate(width);
         let group = columns.group.filter(|&column| column < width);
         let group = group.map_or(0, |column| key(self.fields.get(text, column)));
-        if let Some(derived) = &mut self.derived {
-            let taken = derived.take(&mut self.cells).map_err(|error| LineError::Header {
-                line,
-                source: InputError::Derived(error.to_string()),
-            });
-            match taken? {
-                derived::Progress::Start { is_first } => {
-                    self.groups_of_start.push(group);
-                    return Ok(Found::Start { is_first });
-                }
-                derived::Progress::Complete(start) => self.remember(&start),
-            }
-        }
-        let (Some(columns), derived) = (&self.columns, &self.derived) else {
+        let taken = self.derived.take(&mut self.cells);
+        let Some(start) = taken.map_err(|error| LineError::Final(line, error.to_string()))? else {
+            self.groups_of_start.push(group);
+            let is_first = self.groups_of_start.len() == 1;
+            return Ok(Found::Start { is_first });
+        };
+        self.remember(&start);
+        let Some(columns) = &self.columns else {
             return Ok(Found::NoReadings);
         };
         if let Some(column) = columns.inputs.iter().find(|&&column| !self.cells[column].is_finite()) {
-            let name = derived.as_ref().map_or("", |derived| derived.name(column - width));
-            let name = name.to_owned();
-            return Err(LineError::NoValue { line, name });
+            let name = self.derived.name(column - width);
+            let reason = format!("the derived column '{name}' has no value");
+            return Err(LineError::Malformed(line, reason));
         }
         columns.gather(&self.cells, &mut self.readings);
         for (&(column, _), kept) in columns.kept.iter().zip(&mut self.kept) {
@@ -416,7 +396,7 @@ impl LineParser {
             self.readings.clear();
             self.readings.extend_from_slice(features);
         }
-        Ok(Found::Readings { row_index, place })
+        Ok(Found::Readings(row_index, place))
     }
 
     /// Replaces a time stamp by the time since the first.
@@ -462,52 +442,54 @@ impl LineParser {
                     self.lines_in_turn += 1;
                     Ok(Some(turn))
                 }
-                Unnumbered::Refused => Err(LineError::NoRow(line)),
+                Unnumbered::Refused => Err(LineError::Final(line, NO_ROW.to_owned())),
             };
         };
         let row = self.cells[column] as usize;
         let index = rows.read.iter().position(|read| read + 1 == row);
-        let read = || rows.read.clone();
-        let index = index.ok_or_else(|| LineError::OtherRow {
-            line,
-            row,
-            read: read(),
+        let index = index.ok_or_else(|| {
+            let read = Vec::from_iter(rows.read.iter().map(|row| (row + 1).to_string())).join(", ");
+            let noun = if rows.read.len() == 1 { "row" } else { "rows" };
+            LineError::OtherRow(
+                line,
+                format!("there is no network for row {row}, only for {noun} {read}"),
+            )
         })?;
         Ok(Some(index))
     }
 
     /// Finds the inputs in the cells of a header, or in lines of `width` cells without one.
-    fn find_columns(&mut self, header: &[String], width: usize) -> Result<(), InputError> {
-        let mut is_snapshot = false;
+    fn find_columns(&mut self, header: &[String], width: usize) -> Result<(), String> {
         let has_rows = self.rows.is_some();
-        let mut found_derived = None;
-        let columns = match header {
-            _ if !self.derive.is_empty() => {
-                // Derived columns have names.
-                let (columns, derived) =
-                    InputColumns::with_derived(header, width, &self.inputs, &self.others, &self.derive)?;
-                found_derived = Some(derived);
-                columns
-            }
-            [] if self.is_array => {
-                let all = self.rows.as_ref().map_or(0, |rows| rows.read.len()) * self.inputs.len();
-                is_snapshot = width == all && width > self.inputs.len();
-                let count = if is_snapshot { all } else { self.inputs.len() };
-                InputColumns::in_order(count, !is_snapshot && width == count + 1)
-            }
-            [] => InputColumns::unnamed(width, &self.inputs, &self.others, has_rows)?,
-            header => InputColumns::of_header(header, &self.inputs, &self.others)?,
+        let channels = self.inputs.len();
+        let all = self.rows.as_ref().map_or(0, |rows| rows.read.len()) * channels;
+        let is_unnamed_array = self.is_array && header.is_empty();
+        let is_snapshot = is_unnamed_array && width == all && width > channels;
+        let (columns, derived) = if is_unnamed_array {
+            let count = if is_snapshot { all } else { channels };
+            let columns = InputColumns::in_order(count, !is_snapshot && width == count + 1);
+            (columns, DerivedStream::default())
+        } else {
+            InputColumns::of(
+                header,
+                width,
+                &self.inputs,
+                &self.others,
+                &self.derive,
+                has_rows && !self.is_array,
+            )?
         };
         if self.is_array
             && let Some(name) = InputColumns::named_twice(header, &self.inputs)
         {
-            return Err(InputError::Twice(name));
+            return Err(format!("there are two columns '{name}'; keep one"));
         }
         if has_rows && !self.is_array && columns.row_wire.is_none() {
-            return Err(InputError::Missing {
-                name: self.others.row_wire.clone().unwrap_or_else(|| "row".to_owned()),
-                near: "each row-wire has its own network, which is selected by this column".to_owned(),
-            });
+            let name = self.others.row_wire.as_deref().unwrap_or("row");
+            return Err(format!(
+                "there is no column '{name}', which is an input of the network; each row-wire has its own network, which is \
+                 selected by this column"
+            ));
         }
         // The header of a device that starts again does not begin another start.
         if self.columns.as_ref() != Some(&columns) {
@@ -516,7 +498,7 @@ impl LineParser {
                 ..KeptCell::default()
             });
             self.kept = cells.collect();
-            (self.columns, self.derived) = (Some(columns), found_derived);
+            (self.columns, self.derived) = (Some(columns), derived);
         }
         (self.has_names, self.is_snapshot) = (!header.is_empty(), is_snapshot);
         Ok(())
@@ -537,7 +519,7 @@ fn key(group: &[u8]) -> u64 {
 
 impl InputColumns {
     fn series(&self, group: u64, cells: &[f64]) -> Series {
-        let row_wire = self.row_wire.and_then(|column| row_wire("", cells[column]).ok());
+        let row_wire = self.row_wire.and_then(|column| row_wire(cells[column]));
         Series {
             group,
             row_wire: row_wire.unwrap_or(0),
@@ -584,7 +566,7 @@ mod tests {
     /// Line, column and text of a cell that cannot be used.
     fn bad_cell(error: &LineError) -> (u64, usize, &str) {
         match error {
-            LineError::Cell { line, column, text, .. } => (*line, *column, text),
+            LineError::Cell(line, column, reason) => (*line, *column, reason.split('\'').nth(1).unwrap()),
             _ => panic!("{error}"),
         }
     }
@@ -601,17 +583,8 @@ mod tests {
         let mut unnamed = plain(&["u1", "u2"]);
         assert_eq!(readings(&mut unnamed, 1, "1,2"), Some((0, vec![1.0, 2.0])));
         let other = unnamed.parse(2, b"1,2,3").unwrap_err();
-        assert!(
-            matches!(
-                other,
-                LineError::Width {
-                    found: 3,
-                    expected: 2,
-                    ..
-                }
-            ),
-            "{other}"
-        );
+        let expected = "line 2: 3 cells where 2 are needed, separated by commas";
+        assert_eq!(other.to_string(), expected);
         let mut renamed = plain(&["u1", "u2"]);
         let missing = renamed.parse(1, b"time,u1,v2").unwrap_err();
         assert!(missing.is_final() && missing.to_string().contains("u2"), "{missing}");

@@ -551,7 +551,7 @@ fn time(file: &InspectedFile) -> Option<String> {
 /// Cells that mean missing, as typed.
 pub(super) fn missing(text: &str) -> Vec<Missing> {
     let texts = text.split(',').map(str::trim).filter(|text| !text.is_empty());
-    texts.map(|text| Missing::from(text.to_owned())).collect()
+    texts.filter_map(|text| text.parse().ok()).collect()
 }
 
 /// Returns the columns computed from others in a text with commas between them.

@@ -408,7 +408,7 @@ impl RecordingEditor {
     /// Returns the files of the import, which must not be overwritten.
     pub fn files_in_use(&self) -> Vec<FileInUse> {
         let plan = self.planned();
-        let files = plan.iter().flat_map(|plan| plan.files().cloned());
+        let files = plan.iter().flat_map(|plan| plan.files());
         let paths = self.draft.iter().flat_map(Draft::paths);
         files.chain(paths).map(FileInUse::Recording).collect()
     }

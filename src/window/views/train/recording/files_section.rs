@@ -310,8 +310,8 @@ impl From<Recorded> for Reopened {
 impl From<Plan> for Reopened {
     /// Returns the import of a plan without known checksums.
     fn from(plan: Plan) -> Self {
-        let unknown = |path: &PathBuf| FileChecksum {
-            path: path.clone(),
+        let unknown = |path| FileChecksum {
+            path,
             crc32: String::new(),
         };
         Self::from(Recorded {
