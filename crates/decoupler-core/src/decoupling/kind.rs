@@ -1,11 +1,10 @@
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
 
 use crate::text::Named;
 
 /// Method of decoding the readings of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::Display, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum DecoderKind {
     /// Mean of the training set, independent of the readings.
     Mean,
@@ -14,6 +13,7 @@ pub enum DecoderKind {
     /// Network trained on the samples.
     Network,
     /// Radial-basis network: Gaussians around centres.
+    #[strum(serialize = "rbf")]
     RadialBasis,
     /// Fuzzy rules with affine consequents: a Takagi-Sugeno system.
     Fuzzy,
@@ -34,15 +34,6 @@ pub enum Precision {
     Single,
 }
 
-/// Properties of a decoder.
-struct Entry {
-    /// Name in the terminal and in files.
-    name: &'static str,
-    /// Name in tables, charts and forms.
-    title: &'static str,
-    meaning: &'static str,
-}
-
 impl DecoderKind {
     /// All decoders, in the order offered to the user.
     pub const ALL: [Self; 7] = [
@@ -58,43 +49,31 @@ impl DecoderKind {
     /// Largest number of steps of [`DecoderKind::Polish`].
     pub const POLISH_STEPS: usize = 3;
 
-    const fn entry(self) -> Entry {
+    /// Title in tables, and a sentence that describes the method.
+    const fn texts(self) -> (&'static str, &'static str) {
         match self {
-            Self::Mean => Entry {
-                name: "mean",
-                title: "Training mean",
-                meaning: "Always answers the mean of the training set",
-            },
-            Self::Ridge => Entry {
-                name: "ridge",
-                title: "Ridge",
-                meaning: "The best affine map of the chosen inputs: ridge regression, with the penalty of each target chosen by cross-validation",
-            },
-            Self::Network => Entry {
-                name: "network",
-                title: "Network",
-                meaning: "The trained network, in 64 or in 32 bits",
-            },
-            Self::RadialBasis => Entry {
-                name: "rbf",
-                title: "Radial basis",
-                meaning: "A radial-basis network by kernel ridge regression: Gaussians around all training samples, or around 1000 of more than 4000, their width and penalties chosen by cross-validation",
-            },
-            Self::Fuzzy => Entry {
-                name: "fuzzy",
-                title: "Fuzzy rules",
-                meaning: "A Takagi-Sugeno system: fuzzy rules with affine consequents, their number chosen by cross-validation",
-            },
-            Self::Newton => Entry {
-                name: "newton",
-                title: "Newton",
-                meaning: "Newton's method on Eq. (2) from mid-stroke, with restarts if that fails; with noise and prior if the scene has noise or the readings do not determine the answer",
-            },
-            Self::Polish => Entry {
-                name: "polish",
-                title: "Network + Newton",
-                meaning: "The network's answer, improved by at most three Newton steps",
-            },
+            Self::Mean => ("Training mean", "Always answers the mean of the training set"),
+            Self::Ridge => (
+                "Ridge",
+                "The best affine map of the chosen inputs: ridge regression, with the penalty of each target chosen by cross-validation",
+            ),
+            Self::Network => ("Network", "The trained network, in 64 or in 32 bits"),
+            Self::RadialBasis => (
+                "Radial basis",
+                "A radial-basis network by kernel ridge regression: Gaussians around all training samples, or around 1000 of more than 4000, their width and penalties chosen by cross-validation",
+            ),
+            Self::Fuzzy => (
+                "Fuzzy rules",
+                "A Takagi-Sugeno system: fuzzy rules with affine consequents, their number chosen by cross-validation",
+            ),
+            Self::Newton => (
+                "Newton",
+                "Newton's method on Eq. (2) from mid-stroke, with restarts if that fails; with noise and prior if the scene has noise or the readings do not determine the answer",
+            ),
+            Self::Polish => (
+                "Network + Newton",
+                "The network's answer, improved by at most three Newton steps",
+            ),
         }
     }
 
@@ -102,13 +81,13 @@ impl DecoderKind {
     pub fn name(self, precision: Precision) -> &'static str {
         match (self, precision) {
             (Self::Network, Precision::Single) => "Network f32",
-            _ => self.entry().title,
+            _ => self.texts().0,
         }
     }
 
     /// Returns a sentence that describes the method of decoding.
     pub fn meaning(self) -> &'static str {
-        self.entry().meaning
+        self.texts().1
     }
 
     /// Returns `true` if the decoder uses the trained network.
@@ -133,17 +112,6 @@ impl DecoderKind {
 impl Named for DecoderKind {
     const WHAT: &'static str = "a decoder";
     const ALL: &'static [Self] = &Self::ALL;
-
-    fn name(self) -> &'static str {
-        self.entry().name
-    }
-}
-
-impl fmt::Display for DecoderKind {
-    /// Writes the name used in the terminal and in files.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(Named::name(*self))
-    }
 }
 
 #[cfg(test)]

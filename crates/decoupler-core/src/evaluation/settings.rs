@@ -1,5 +1,3 @@
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
 
 use super::{PublishedErrors, RunError};
@@ -69,7 +67,10 @@ impl Source {
 }
 
 /// How several starts become the network that a run answers with.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
+)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum Combination {
     /// The network of the start with the lowest validation error, or training error if nothing is held out.
@@ -90,23 +91,13 @@ impl Combination {
 impl Named for Combination {
     const WHAT: &'static str = "a combination of starts";
     const ALL: &'static [Self] = &[Self::Best, Self::Mean];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Best => "best",
-            Self::Mean => "mean",
-        }
-    }
-}
-
-impl fmt::Display for Combination {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
 }
 
 /// Weights with which a training begins.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
+)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum Initialization {
     /// Random weights ([Nguyen and Widrow](crate::network::nguyen_widrow)).
@@ -126,19 +117,6 @@ impl Initialization {
 impl Named for Initialization {
     const WHAT: &'static str = "an initialisation";
     const ALL: &'static [Self] = &[Self::Random, Self::Ridge];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Random => "random",
-            Self::Ridge => "ridge",
-        }
-    }
-}
-
-impl fmt::Display for Initialization {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
 }
 
 /// Maximum number of starts in a run: enough for the distribution of its results, and limited for memory.
@@ -283,7 +261,8 @@ impl RunSettings {
 }
 
 /// Preset settings of a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::Display, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Preset {
     /// As in the paper: one network for all rows, resistances scaled to [−1, 1].
     #[default]
@@ -333,19 +312,6 @@ impl Preset {
 impl Named for Preset {
     const WHAT: &'static str = "a preset";
     const ALL: &'static [Self] = &Self::ALL;
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::Best => "best",
-        }
-    }
-}
-
-impl fmt::Display for Preset {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
 }
 
 #[cfg(test)]
