@@ -1,26 +1,49 @@
 use serde::{Deserialize, Serialize};
+use strum::EnumMessage;
 
 use crate::text::Named;
 
 /// Method of decoding the readings of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::Display, strum::IntoStaticStr)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::Display, strum::EnumMessage, strum::IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 pub enum DecoderKind {
     /// Mean of the training set, independent of the readings.
+    #[strum(message = "Training mean")]
+    #[strum(detailed_message = "Always answers the mean of the training set")]
     Mean,
     /// Affine map fitted by ridge regression.
+    #[strum(message = "Ridge")]
+    #[strum(
+        detailed_message = "The best affine map of the chosen inputs: ridge regression, with the penalty of each target chosen by cross-validation"
+    )]
     Ridge,
     /// Network trained on the samples.
+    #[strum(message = "Network")]
+    #[strum(detailed_message = "The trained network, in 64 or in 32 bits")]
     Network,
     /// Radial-basis network: Gaussians around centres.
     #[strum(serialize = "rbf")]
+    #[strum(message = "Radial basis")]
+    #[strum(
+        detailed_message = "A radial-basis network by kernel ridge regression: Gaussians around all training samples, or around 1000 of more than 4000, their width and penalties chosen by cross-validation"
+    )]
     RadialBasis,
     /// Fuzzy rules with affine consequents: a Takagi-Sugeno system.
+    #[strum(message = "Fuzzy rules")]
+    #[strum(
+        detailed_message = "A Takagi-Sugeno system: fuzzy rules with affine consequents, their number chosen by cross-validation"
+    )]
     Fuzzy,
     /// Gauss-Newton method on Eq. (2), with noise and prior if the scene has noise or the equations do not determine
     /// the answer.
+    #[strum(message = "Newton")]
+    #[strum(
+        detailed_message = "Newton's method on Eq. (2) from mid-stroke, with restarts if that fails; with noise and prior if the scene has noise or the readings do not determine the answer"
+    )]
     Newton,
     /// Network followed by at most [`DecoderKind::POLISH_STEPS`] Gauss-Newton steps.
+    #[strum(message = "Network + Newton")]
+    #[strum(detailed_message = "The network's answer, improved by at most three Newton steps")]
     Polish,
 }
 
@@ -49,45 +72,17 @@ impl DecoderKind {
     /// Largest number of steps of [`DecoderKind::Polish`].
     pub const POLISH_STEPS: usize = 3;
 
-    /// Title in tables, and a sentence that describes the method.
-    const fn texts(self) -> (&'static str, &'static str) {
-        match self {
-            Self::Mean => ("Training mean", "Always answers the mean of the training set"),
-            Self::Ridge => (
-                "Ridge",
-                "The best affine map of the chosen inputs: ridge regression, with the penalty of each target chosen by cross-validation",
-            ),
-            Self::Network => ("Network", "The trained network, in 64 or in 32 bits"),
-            Self::RadialBasis => (
-                "Radial basis",
-                "A radial-basis network by kernel ridge regression: Gaussians around all training samples, or around 1000 of more than 4000, their width and penalties chosen by cross-validation",
-            ),
-            Self::Fuzzy => (
-                "Fuzzy rules",
-                "A Takagi-Sugeno system: fuzzy rules with affine consequents, their number chosen by cross-validation",
-            ),
-            Self::Newton => (
-                "Newton",
-                "Newton's method on Eq. (2) from mid-stroke, with restarts if that fails; with noise and prior if the scene has noise or the readings do not determine the answer",
-            ),
-            Self::Polish => (
-                "Network + Newton",
-                "The network's answer, improved by at most three Newton steps",
-            ),
-        }
-    }
-
     /// Returns the name in tables, charts and forms; a network in single precision is named as such.
     pub fn name(self, precision: Precision) -> &'static str {
         match (self, precision) {
             (Self::Network, Precision::Single) => "Network f32",
-            _ => self.texts().0,
+            _ => self.get_message().unwrap_or_default(),
         }
     }
 
     /// Returns a sentence that describes the method of decoding.
     pub fn meaning(self) -> &'static str {
-        self.texts().1
+        self.get_detailed_message().unwrap_or_default()
     }
 
     /// Returns `true` if the decoder uses the trained network.

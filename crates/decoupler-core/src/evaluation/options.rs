@@ -4,7 +4,7 @@ use super::{MAX_STARTS, RunSettings, Source};
 use crate::{
     dataset::{LARGEST_SAMPLES, Simulation},
     network::LARGEST_HIDDEN,
-    scene::{Noise, RowModel, Rows},
+    scene::Noise,
     sensor::{ArrayScale, SensorError, SensorModel},
     settings::{Field, Kind, Method, STOPPING, Setting},
 };
@@ -114,17 +114,9 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
     option(
         Part::Scene,
         ("adc bits", "N", "no rounding"),
-        Kind::Text,
+        Kind::Integer(1, Noise::MAX_BITS as u64),
         "Resolution of the analogue-to-digital converter, in bits.",
-        |run| {
-            let bits = &mut noise(run)?.converter_bits;
-            let text = bits.map_or(String::new(), |bits| bits.to_string());
-            Some(Field::text(text, bits, |text| {
-                let bits = text.parse().ok().filter(|bits| (1..=Noise::MAX_BITS).contains(bits));
-                bits.map(Some)
-                    .ok_or(format!("give a whole number from 1 to {}", Noise::MAX_BITS))
-            }))
-        },
+        |run| Some(Field::Optional(&mut noise(run)?.converter_bits)),
     ),
     option(
         Part::Scene,
@@ -217,29 +209,19 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
         STOPPING[0].help,
         |run| (STOPPING[0].field)(&mut run.training.stopping),
     ),
-    option(
-        Part::Training,
-        ("goal", "MSE", "0"),
-        STOPPING[1].kind,
-        STOPPING[1].help,
-        |run| (STOPPING[1].field)(&mut run.training.stopping),
-    ),
-    option(
-        Part::Training,
-        ("min gradient", "LENGTH", "1e-7"),
-        STOPPING[2].kind,
-        STOPPING[2].help,
-        |run| (STOPPING[2].field)(&mut run.training.stopping),
-    ),
-    option(
-        Part::Training,
+    stopping(1, ("goal", "MSE", "0"), |run| {
+        (STOPPING[1].field)(&mut run.training.stopping)
+    }),
+    stopping(2, ("min gradient", "LENGTH", "1e-7"), |run| {
+        (STOPPING[2].field)(&mut run.training.stopping)
+    }),
+    stopping(
+        3,
         (
             "max fail",
             "N",
             "6; 100 for a recording with a method that follows gradients",
         ),
-        STOPPING[3].kind,
-        STOPPING[3].help,
         |run| (STOPPING[3].field)(&mut run.training.stopping),
     ),
     option(
@@ -266,27 +248,23 @@ const fn option(
     }
 }
 
+/// A rule that ends a training.
+const fn stopping(
+    rule: usize,
+    texts: (&'static str, &'static str, &'static str),
+    field: fn(&mut RunSettings) -> Option<Field<'_>>,
+) -> RunOption {
+    option(Part::Training, texts, STOPPING[rule].kind, STOPPING[rule].help, field)
+}
+
 fn noise(run: &mut RunSettings) -> Option<&mut Noise> {
     Some(&mut run.simulation_mut()?.scene.noise)
 }
 
 /// Rows that are read; of a recording, one network for all or one for each.
 fn rows(run: &mut RunSettings) -> Option<Field<'_>> {
-    match &mut run.source {
-        Source::Simulated(Simulation { scene, .. }) => {
-            Some(Field::text(scene.rows.to_string(), &mut scene.rows, str::parse))
-        }
-        Source::Measured { rows } => {
-            let text = match rows {
-                RowModel::Shared => Rows::All,
-                RowModel::Each => Rows::Known,
-            };
-            Some(Field::text(text.to_string(), rows, |text| match text.parse() {
-                Ok(Rows::All) => Ok(RowModel::Shared),
-                Ok(Rows::Known) => Ok(RowModel::Each),
-                Ok(Rows::One(_)) => Err("choose one row of a recording with --where, for example \"row=3\"".to_owned()),
-                Err(error) => Err(error.to_string()),
-            }))
-        }
-    }
+    Some(match &mut run.source {
+        Source::Simulated(Simulation { scene, .. }) => Field::text(scene.rows.to_string(), &mut scene.rows, str::parse),
+        Source::Measured { rows } => Field::named(rows),
+    })
 }

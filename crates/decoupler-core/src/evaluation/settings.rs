@@ -22,15 +22,20 @@ pub struct RunSettings {
     /// Number of starts: trainings from different random initialisations.
     pub starts: usize,
     /// How several starts become one network.
-    #[serde(default, skip_serializing_if = "Combination::is_best")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub combine: Combination,
     /// Weights with which a training begins.
-    #[serde(default, skip_serializing_if = "Initialization::is_random")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub initialization: Initialization,
     /// Training method, its settings, and the stopping rules.
     pub training: TrainingSettings,
     /// Seed from which all randomness follows.
     pub seed: Seed,
+}
+
+/// Returns `true` for the default, which files leave out.
+pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// Source of the samples of a run.
@@ -82,12 +87,6 @@ pub enum Combination {
     Mean,
 }
 
-impl Combination {
-    fn is_best(&self) -> bool {
-        *self == Self::Best
-    }
-}
-
 impl Named for Combination {
     const WHAT: &'static str = "a combination of starts";
     const ALL: &'static [Self] = &[Self::Best, Self::Mean];
@@ -106,12 +105,6 @@ pub enum Initialization {
     /// Ridge regression: one hidden node for each of its principal directions, in the linear range of tanh; random weights
     /// elsewhere.
     Ridge,
-}
-
-impl Initialization {
-    pub(super) fn is_random(&self) -> bool {
-        *self == Self::Random
-    }
 }
 
 impl Named for Initialization {

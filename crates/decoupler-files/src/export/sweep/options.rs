@@ -115,14 +115,10 @@ pub fn train_options(settings: &RunSettings, decoders: &[DecoderKind]) -> TrialO
         let setting = &option.setting;
         let value = setting.get(settings)?;
         // Left out at their defaults, so that trials keep the names they had before these options existed.
-        let is_left_out = ["combine", "begin", "adc bits"].contains(&setting.name) && setting.get(&defaults)? == value;
+        let is_left_out = ["combine", "begin"].contains(&setting.name) && setting.get(&defaults)? == value;
         let value = match &value {
             settings::Value::Number(value) => number(*value),
             settings::Value::Integer(value) => Value::from(*value),
-            // As a number, which it is.
-            settings::Value::Text(bits) if setting.name == "adc bits" => {
-                bits.parse::<u64>().map_or(Value::Null, Value::from)
-            }
             settings::Value::Text(text) => Value::from(text.as_str()),
         };
         (!is_left_out).then(|| (setting.word("-"), value))
