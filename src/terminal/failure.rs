@@ -1,12 +1,11 @@
 use std::{
     error::Error as StdError,
-    fmt,
     io::{self, ErrorKind},
     path::PathBuf,
 };
 
 use decoupler_core::{
-    calibration::CalibrationError, dataset::DatasetError, evaluation::RunError, sensor::SensorError, text::counted,
+    calibration::CalibrationError, dataset::DatasetError, evaluation::RunError, sensor::SensorError,
     training::SettingError,
 };
 use decoupler_files::{
@@ -52,31 +51,21 @@ pub(super) enum Failure {
     MissingRecording { checkpoint: PathBuf, recording: PathBuf },
     #[error("'{}' is the network of a recording: {reason}", .path.display())]
     NoArray { path: PathBuf, reason: &'static str },
-    #[error("{0}")]
-    Interrupted(Interruption),
-    #[error("interrupted after {done} of {trials} trials")]
-    InterruptedTrials { done: usize, trials: usize },
+    /// By Ctrl-C, SIGTERM or SIGHUP.
+    #[error("interrupted{0}")]
+    Interrupted(String),
     #[error("{place}: {cause}; only earlier results are printed")]
     TradeOff { place: String, cause: Box<Failure> },
-    #[error("interrupted after {}", counted(*.done, "point"))]
-    InterruptedTrade { done: usize },
-    #[error("interrupted")]
-    InterruptedFollow,
-    #[error(transparent)]
-    Specification(#[from] SpecificationError),
-    #[error("interrupted after {done} of {trials} trials; the same command trains the rest")]
-    InterruptedSweep { done: usize, trials: usize },
     #[error("{failed} of {trials} trials failed, for the reasons above; the others are kept")]
     FailedTrials { failed: usize, trials: usize },
     #[error(transparent)]
     SweepFolder(#[from] SweepFolderError),
-    #[error("'{}' lacks trials: {missing} missing, {conflicting} conflicting, {unreadable} files unreadable; run the sweep again for missing ones, and delete the wrong file of those that conflict{}", .out.display(), if *.is_kept { "; the table there has more trials, or cannot be read, and is left as it is" } else { "" })]
+    #[error("'{}' lacks trials: {missing} missing, {conflicting} conflicting, {unreadable} files unreadable; run the sweep again for missing ones, and delete the wrong file of those that conflict", .out.display())]
     IncompleteSweep {
         missing: usize,
         conflicting: usize,
         unreadable: usize,
         out: PathBuf,
-        is_kept: bool,
     },
     #[error(transparent)]
     Session(#[from] SessionError),
@@ -90,6 +79,8 @@ pub(super) enum Failure {
     Files(Vec<PictureError>),
     #[error("cannot write to standard output: {}", system_cause(.0))]
     Output(io::Error),
+    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
+    Read { path: PathBuf, source: io::Error },
     #[error("cannot open '{}': {}", .path.display(), system_cause(.source))]
     Open { path: PathBuf, source: io::Error },
     #[error("'{}': {source}", .path.display())]
@@ -102,25 +93,6 @@ pub(super) enum Failure {
     PartOfSnapshot { path: PathBuf, lines: usize, rows: usize },
     #[error("'{}': line {line}: the resistances are so far outside the training range that the network's output is not a finite number; check them", .path.display())]
     NoAnswer { path: PathBuf, line: u64 },
-}
-
-/// A training stopped by Ctrl-C, SIGTERM or SIGHUP.
-#[derive(Debug)]
-pub(super) struct Interruption {
-    /// Last completed epoch.
-    pub(super) epoch: usize,
-    /// Command that resumes the training.
-    pub(super) resume: Option<String>,
-}
-
-impl fmt::Display for Interruption {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "interrupted after epoch {}; ", self.epoch)?;
-        match &self.resume {
-            Some(command) => write!(f, "to resume: {command}"),
-            None => write!(f, "use --checkpoint FILE to be able to resume"),
-        }
-    }
 }
 
 fn joined(errors: &[PictureError]) -> String {
@@ -161,8 +133,6 @@ impl Failure {
     pub(super) fn status(&self) -> u8 {
         match self {
             Self::Arguments(_) | Self::Bundle(BundleError::Choice(_)) => 2,
-            Self::Specification(SpecificationError::Read { .. }) => 1,
-            Self::Specification(_) => 2,
             Self::Import(
                 ImportError::Unknown { .. }
                 | ImportError::Ambiguous { .. }
@@ -178,11 +148,7 @@ impl Failure {
             Self::Import(ImportError::Dataset(_)) => 2,
             Self::Run(error) if is_argument_error(error) => 2,
             Self::Dataset(DatasetError::Count(_) | DatasetError::Scene(_)) => 2,
-            Self::Interrupted(_)
-            | Self::InterruptedTrials { .. }
-            | Self::InterruptedTrade { .. }
-            | Self::InterruptedSweep { .. }
-            | Self::InterruptedFollow => interruption::status(),
+            Self::Interrupted(_) => interruption::status(),
             _ => 1,
         }
     }
@@ -209,28 +175,4 @@ fn is_argument_error(error: &RunError) -> bool {
             | RunError::Memory { .. }
             | RunError::Division(_)
     ) && !matches!(error, RunError::Division(DatasetError::Sensor { .. }))
-}
-
-/// Maximum number of trials of a sweep. Every program that works on a sweep reads all of them.
-pub(super) const MAX_TRIALS: usize = 100_000;
-
-/// Errors of a specification.
-#[derive(Debug, Error)]
-pub(super) enum SpecificationError {
-    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
-    Read { path: PathBuf, source: io::Error },
-    #[error(
-        "'{}' is not a specification: {message}; write {{\"train\": {{OPTION: VALUE, ...}}, \"axes\": {{OPTION: [VALUE, ...], \
-         ...}}}} with the options of decoupler train",
-        .path.display()
-    )]
-    Layout { path: PathBuf, message: String },
-    #[error("'{}': {place}: {message}", .path.display())]
-    Option {
-        path: PathBuf,
-        place: String,
-        message: String,
-    },
-    #[error("'{}': its axes have more than {MAX_TRIALS} combinations; give fewer values, or several specifications", .0.display())]
-    TooMany(PathBuf),
 }

@@ -2,7 +2,6 @@
 
 use std::{
     fmt::Display,
-    io::Write,
     path::Path,
     sync::{
         Arc,
@@ -24,7 +23,7 @@ use super::{
     interruption::Graceful,
     intervals::{note_drift, note_unmonitored},
     number,
-    output::messages,
+    output::{note, warn},
 };
 
 // Decoding of live frames.
@@ -32,22 +31,22 @@ use super::{
 pub(super) struct Follow {
     /// Decode frames as they arrive, writing each answer to standard output at once
     ///
-    /// --input is then - for standard input, a file or pipe, a serial port as DEVICE:BAUD, or tcp:HOST:PORT. A line has
+    /// --data is then - for standard input, a file or pipe, a serial port as DEVICE:BAUD, or tcp:HOST:PORT. A line has
     /// the resistances of one row-wire as without --follow, optionally after its row number, or of a whole snapshot, row
     /// by row. From a file or pipe every line is decoded; from a port or socket, older lines are dropped once a line has
     /// waited for 0.1 s. Bad lines are counted and reported.
-    #[arg(long, conflicts_with = "output")]
+    #[arg(long, conflicts_with = "out")]
     pub(super) follow: bool,
     /// With --follow: output format [default: csv]
     #[arg(long, value_name = "csv|jsonl", hide_possible_values = true)]
     format: Option<Form>,
     /// With --follow: report rate and latency on standard error every N seconds; always at the end, and on SIGUSR1
     #[arg(long, value_name = "SECONDS", value_parser = number)]
-    report: Option<f64>,
+    status: Option<f64>,
     /// With --follow: relative noise of the readings (standard deviation) assumed in fault detection [default: that of
     /// the network's scene]
     #[arg(long, value_name = "REL", value_parser = number)]
-    noise: Option<f64>,
+    fault_noise: Option<f64>,
 }
 
 /// Timeout of waiting for a line, after which requests for a report and to stop are checked.
@@ -58,8 +57,8 @@ impl Follow {
     pub(super) fn check_unused(&self) -> Result<(), Failure> {
         let given = [
             (self.format.is_some(), "--format"),
-            (self.report.is_some(), "--report"),
-            (self.noise.is_some(), "--noise"),
+            (self.status.is_some(), "--status"),
+            (self.fault_noise.is_some(), "--fault-noise"),
         ];
         match given.into_iter().find(|(is_given, _)| *is_given) {
             Some((_, argument)) => Err(wrong(argument, "it needs --follow")),
@@ -92,13 +91,13 @@ impl Follow {
         let graceful = Graceful::begin();
         let mut answers = Answers::new(&file, self.format.unwrap_or_default());
         let mut report = Report::new(source);
-        let every = self.report.map(Duration::from_secs_f64);
+        let every = self.status.map(Duration::from_secs_f64);
         let end = loop {
             if asked.swap(false, Ordering::SeqCst) || every.is_some_and(|every| report.is_due(every)) {
                 report.print(&session);
             }
             if graceful.is_end_requested() {
-                break Err(Failure::InterruptedFollow);
+                break Err(Failure::Interrupted(String::new()));
             }
             let event = session.next(Instant::now(), WAIT);
             for note in session.notes() {
@@ -126,27 +125,25 @@ impl Follow {
         let Some(simulation) = &file.problem.sensor else {
             let reason =
                 "fault detection needs a sensor model, which the network of a recording does not have; leave it out";
-            return match self.noise {
-                Some(_) => Err(wrong("--noise", reason)),
+            return match self.fault_noise {
+                Some(_) => Err(wrong("--fault-noise", reason)),
                 None => Ok(Noise::default()),
             };
         };
         let mut scene = simulation.scene;
-        if let Some(relative) = self.noise {
+        if let Some(relative) = self.fault_noise {
             scene.noise = Noise::relative(relative);
-            scene.check().map_err(|error| wrong("--noise", error))?;
+            scene.check().map_err(|error| wrong("--fault-noise", error))?;
         }
         Ok(scene.noise.in_test())
     }
 
     /// Source named by `input`, after a check of the other arguments.
     fn source(&self, input: &Path) -> Result<Source, Failure> {
-        let input = input
-            .to_str()
-            .ok_or_else(|| wrong("--input", "its name is not UTF-8"))?;
-        let source: Source = input.parse().map_err(|error| wrong("--input", error))?;
-        if self.report.is_some_and(|seconds| !(seconds > 0.0 && seconds <= 1e9)) {
-            return Err(wrong("--report", "give a number of seconds above 0"));
+        let input = input.to_str().ok_or_else(|| wrong("--data", "its name is not UTF-8"))?;
+        let source: Source = input.parse().map_err(|error| wrong("--data", error))?;
+        if self.status.is_some_and(|seconds| !(seconds > 0.0 && seconds <= 1e9)) {
+            return Err(wrong("--status", "give a number of seconds above 0"));
         }
         Ok(source)
     }
@@ -156,11 +153,6 @@ fn wrong(argument: &str, reason: impl Display) -> Failure {
     Failure::Arguments(format!("{argument}: {reason}"))
 }
 
-fn warn(message: &dyn Display) {
-    // There is no one to report to if this fails.
-    let _ = writeln!(messages(), "warning: {message}");
-}
-
 /// Reports why faults of the wires are not looked for, if they are not.
 fn warn_unwatched(session: &Session) {
     let Some(Watched::Off(reason)) = session.array().map(|array| &array.watched) else {
@@ -168,35 +160,35 @@ fn warn_unwatched(session: &Session) {
     };
     let reason = match reason {
         Unwatched::NoNoise => {
-            "fault detection needs the noise of the readings, and the network was trained without noise; give --noise REL"
+            "fault detection needs the noise of the readings, and the network was trained without noise; give --fault-noise REL"
         }
         Unwatched::TooLarge => "the array is too large",
     };
-    warn(&format_args!("wires are not checked for faults: {reason}"));
+    warn(format_args!("wires are not checked for faults: {reason}"));
 }
 
 fn print_note(file: &NetworkFile, note: &Note) {
     match note {
-        Note::Start(line) => warn(&format_args!(
+        Note::Start(line) => warn(format_args!(
             "line {line}: the lines at the start give the means of derived columns and are not decoded"
         )),
-        Note::StepBack(line) => warn(&format_args!(
+        Note::StepBack(line) => warn(format_args!(
             "line {line}: the time steps back: the history of readings restarts here and at every further step back; \
              send the lines in order of time"
         )),
-        Note::NoRow(line) => warn(&format_args!(
+        Note::NoRow(line) => warn(format_args!(
             "line {line}: wires are not checked for faults, because the line has no row number; add a column named row, \
              or send whole snapshots in one line"
         )),
-        Note::Fault(line, fault @ FaultEvent::Named { .. }) => warn(&format_args!(
+        Note::Fault(line, fault @ FaultEvent::Named { .. }) => warn(format_args!(
             "line {line}: {fault}; left out from here on; frames are decoded from the other readings by the Gauss-Newton \
              method"
         )),
-        Note::Fault(line, FaultEvent::Unexplained) => warn(&format_args!(
+        Note::Fault(line, FaultEvent::Unexplained) => warn(format_args!(
             "line {line}: the readings contradict Eq. (2), and no single-wire fault explains them: the answers may be \
              wrong; check the wiring, the geometry and the order of the rows"
         )),
-        Note::Fault(line, FaultEvent::Recovered) => warn(&format_args!(
+        Note::Fault(line, FaultEvent::Recovered) => warn(format_args!(
             "line {line}: {}; all wires are used",
             FaultEvent::Recovered
         )),
@@ -243,8 +235,8 @@ impl Report {
         }
         self.last_reported = Instant::now();
         match std::mem::take(&mut self.unreported) {
-            0 => warn(&reason),
-            unreported => warn(&format_args!(
+            0 => warn(reason),
+            unreported => warn(format_args!(
                 "{reason} ({unreported} other bad lines since the last message)"
             )),
         }
@@ -252,7 +244,7 @@ impl Report {
             && bad == MAX_REPORTED
             && session.latencies().count() == 0
         {
-            warn(&format_args!(
+            warn(format_args!(
                 "none of the first {MAX_REPORTED} lines is a frame: does the device send at {baud} baud?"
             ));
         }
@@ -269,7 +261,7 @@ impl Report {
         let unended = if has_lines { 0 } else { session.unended() };
         if unended > 0 {
             self.has_warned_of_ends = true;
-            warn(&format_args!(
+            warn(format_args!(
                 "{unended} bytes have arrived, but no line has ended: does the sender end lines with LF or CR LF?"
             ));
         }
@@ -288,14 +280,12 @@ impl Report {
     fn print(&self, session: &Session) {
         let (counts, latencies) = (session.counts(), session.latencies());
         let (decoded, seconds) = (latencies.count(), self.begin.elapsed().as_secs_f64());
-        // There is no one to report to if this fails.
-        let _ = writeln!(
-            messages(),
+        note(format_args!(
             "{} decoded in {seconds:.1} s ({:.0} per second), {} bad, {} dropped; {latencies}",
             counted(decoded, "line"),
             decoded as f64 / seconds.max(1e-9),
             counts.bad,
             counts.dropped
-        );
+        ));
     }
 }

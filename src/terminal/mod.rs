@@ -35,13 +35,14 @@ pub use decoupler_files::export::exit_leaving_nothing;
 use std::{error::Error, ffi::OsString, io::Write, ops::RangeInclusive, process::ExitCode};
 
 use calibrate::Calibrate;
-use clap::{Parser, Subcommand, error::ErrorKind};
+use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind};
+use clap_complete::Shell;
 use decode::{Decode, FineTune};
 use decoupler_files::machine::limit_memory;
 use export::Export;
 use failure::Failure;
 use inspect::Inspect;
-use output::messages;
+use output::{OutputArguments, messages};
 use reproduce::Reproduce;
 use samples::Simulate;
 use sweep::Sweep;
@@ -59,6 +60,8 @@ pub type Window = fn() -> Result<(), Box<dyn Error>>;
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
+    #[command(flatten)]
+    output: OutputArguments,
     /// Memory that trainings may use, and reading a file, in GB [default: that of the machine, and half of the free memory]
     #[arg(long, value_name = "GB", global = true, value_parser = gigabytes)]
     memory_limit: Option<f64>,
@@ -76,6 +79,11 @@ enum Command {
     Reproduce(Reproduce),
     Trade(Box<Trade>),
     Sweep(Box<Sweep>),
+    /// Print a script that completes commands and options in a shell
+    Completions {
+        /// Shell for which to write it
+        shell: Shell,
+    },
 }
 
 /// Runs the command in `arguments` (program name first), and returns the exit status. Without a command it opens
@@ -98,13 +106,7 @@ pub fn run_for_status<A: Into<OsString> + Clone>(arguments: impl IntoIterator<It
         Err(failure) if !failure.is_broken_pipe() => {
             // There is no one to report to if this fails.
             let _ = match &failure {
-                Failure::Interrupted(_)
-                | Failure::InterruptedTrials { .. }
-                | Failure::InterruptedTrade { .. }
-                | Failure::InterruptedSweep { .. }
-                | Failure::InterruptedFollow => {
-                    writeln!(messages(), "{failure}")
-                }
+                Failure::Interrupted(_) => writeln!(messages(), "{failure}"),
                 _ => writeln!(messages(), "error: {}", without_long_words(&failure.to_string())),
             };
             failure.status()
@@ -121,6 +123,7 @@ impl Arguments {
         if let Some(gigabytes) = self.memory_limit {
             limit_memory(gigabytes);
         }
+        self.output.apply();
         match self.command {
             Some(Command::Train(train)) => train.run(),
             Some(Command::Inspect(inspect)) => inspect.run(),
@@ -132,6 +135,10 @@ impl Arguments {
             Some(Command::Reproduce(reproduce)) => reproduce.run(),
             Some(Command::Trade(trade)) => trade.run(),
             Some(Command::Sweep(sweep)) => sweep.run(),
+            Some(Command::Completions { shell }) => {
+                clap_complete::generate(shell, &mut Arguments::command(), "decoupler", &mut std::io::stdout());
+                Ok(())
+            }
             None => {
                 window().map_err(Failure::Window)?;
                 // A file that takes too long to write is not left incomplete.

@@ -8,6 +8,7 @@ use decoupler_core::{
     job::Job,
     network::LARGEST_HIDDEN,
     scene::Noise,
+    text::counted,
     training::Method,
 };
 use decoupler_files::{
@@ -56,9 +57,6 @@ pub(super) struct Trade {
     /// Also print the most accurate decoder that takes at most this many microseconds per frame
     #[arg(long, value_name = "US", value_parser = number)]
     under_us: Option<f64>,
-    /// Print one JSON object instead of text and progress
-    #[arg(long)]
-    json: bool,
 }
 
 /// A network to be measured with the decoders that need one, or all decoders.
@@ -87,7 +85,7 @@ impl Trade {
             source: TradeSource::Array(self.scene.settings_at(Preset::default(), 0.0)?.drawn()?.sensor.scale),
             levels: Vec::new(),
         };
-        let bar = progress_bar(self.json, cases.len(), "{bar:30} {pos} of {len}, {msg}, {elapsed}");
+        let bar = progress_bar(cases.len(), "{bar:30} {pos} of {len}, {msg}, {elapsed}");
         let graceful = Graceful::begin();
         let mut recordings: Option<Recordings> = None;
         let (levels, end) = measure_levels(&cases, |case, level| {
@@ -95,12 +93,11 @@ impl Trade {
             let sets = match (&recordings, case.setup.plan()) {
                 (Some(recordings), Some(plan)) => divided(recordings, plan, case.setup.settings().seed)?,
                 _ => {
-                    let SetupSets { sets, recordings: read } = following(&case.setup, self.json, |on_progress| {
+                    let SetupSets { sets, recordings: read } = following(&case.setup, |on_progress| {
                         case.setup.sets(working_folder(), &Job::UNINTERRUPTED, on_progress)
                     })?;
                     if let Some(read) = &read {
-                        self.import.save_recipe(&case.setup)?;
-                        trade_off.source = TradeSource::Recording(Box::new(RecordedSource::new(&sets, read)));
+                        trade_off.source = TradeSource::Recording(Box::new(RecordedSource::new(&sets, read)?));
                     }
                     recordings = read;
                     sets
@@ -138,34 +135,27 @@ impl Trade {
         });
         bar.finish_and_clear();
         drop(graceful);
-        let done = levels.iter().map(|level| level.level.points.len()).sum();
+        let done: usize = levels.iter().map(|level| level.level.points.len()).sum();
         trade_off.levels = levels;
         if end.is_ok() || done > 0 {
-            trade_off.print(self.limits(), self.json)?;
+            trade_off.print(Limits {
+                percent: self.under_percent,
+                microseconds: self.under_us,
+            })?;
         }
         if end? {
             return Ok(());
         }
-        Err(Failure::InterruptedTrade { done })
-    }
-
-    fn limits(&self) -> Limits {
-        Limits {
-            percent: self.under_percent,
-            microseconds: self.under_us,
-        }
+        Err(Failure::Interrupted(format!(" after {}", counted(done, "point"))))
     }
 
     /// Cases to measure: both presets at every level of noise, or a recording with every method.
     fn cases(&self) -> Result<Vec<Case>, Failure> {
-        if self.import.folds.is_some() {
-            let message = "--folds: the decoders are measured on the test samples; leave it out";
-            return Err(Failure::Arguments(message.to_owned()));
+        if self.import.is_given() {
+            return self.cases_of_recording(&self.import.plan(&self.scene.columns())?);
         }
-        match self.import.given(&self.scene.columns())? {
-            Some(plan) => self.cases_of_recording(&plan),
-            None => self.cases_of_array(),
-        }
+        self.import.check_unused()?;
+        self.cases_of_array()
     }
 
     fn cases_of_array(&self) -> Result<Vec<Case>, Failure> {
@@ -348,7 +338,7 @@ mod tests {
                 if (case.noise, case.preset) == (Some(fails_at.0), Some(fails_at.1)) {
                     return Err(Failure::Arguments("too wide".to_owned()));
                 }
-                let sets = sets(&case.setup, true)?.sets;
+                let sets = sets(&case.setup)?.sets;
                 let keep =
                     |_, point: Result<TradeOffPoint, RunError>, _: Option<&_>| level.level.points.push(point.unwrap());
                 let job = Job::UNINTERRUPTED;

@@ -1,17 +1,17 @@
 use std::io::{self, Write};
 
-use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::{
-    errors_report::ErrorsReport,
+    errors_report::errors_object,
     failure::Failure,
-    inspect::{RecordingReport, import_warnings, write_warnings},
-    output::{print, print_object},
+    inspect::{RecordingReport, import_warnings},
+    output::{joined, print, warn},
 };
 use decoupler_core::{
     dataset::SplitBy,
     decoupling::Precision,
-    evaluation::{ErrorTable, RunSets, TradeOffPoint, decoded_unit, fastest_under, most_accurate_under},
+    evaluation::{ErrorTable, Errors, RunSets, TradeOffPoint, decoded_unit, fastest_under, most_accurate_under},
     problem::Problem,
     sensor::ArrayScale,
 };
@@ -70,75 +70,7 @@ pub(super) struct PointTraining {
 const FRONTS: &str = "* no other decoder is both faster and more accurate; + no other is both trained faster and more accurate\n\
                       Training time is the sum over all rows and starts.";
 
-/// The object printed by `trade --json`.
-#[derive(Serialize)]
-#[serde(untagged)]
-enum Report<'a> {
-    Array {
-        array: ArrayScale,
-        levels: Vec<LevelReport<'a>>,
-    },
-    Recording {
-        #[serde(flatten)]
-        recording: &'a RecordingReport,
-        decoded: &'a str,
-        #[serde(flatten)]
-        level: LevelReport<'a>,
-        warnings: Vec<String>,
-    },
-}
-
-#[derive(Serialize)]
-struct LevelReport<'a> {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    noise: Option<f64>,
-    points: Vec<PointReport<'a>>,
-    fastest_under: Option<Choice>,
-    most_accurate_under: Option<Choice>,
-    /// Decoders of an array that cannot be used, with the reason.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    refused: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct PointReport<'a> {
-    decoder: String,
-    precision: &'static str,
-    hidden: Option<usize>,
-    #[serde(flatten)]
-    errors: ErrorsReport<'a>,
-    #[serde(flatten)]
-    source: PointSource,
-    frame_us: f64,
-    training_s: f64,
-    /// Remarks on the figures, with cause and remedy.
-    remarks: Vec<String>,
-    on_decoding_front: bool,
-    on_training_front: bool,
-    command: Option<&'a str>,
-}
-
-/// Figures that depend on the kind of source.
-#[derive(Serialize)]
-#[serde(untagged)]
-enum PointSource {
-    Array {
-        preset: Option<String>,
-        /// Root mean square of m/R − 1; none if the decoded deformation has no valid resistance.
-        residual: Option<f64>,
-        model_based_z_percent: Option<f64>,
-        model_based_z_mm: Option<f64>,
-        to_model_based: Option<f64>,
-    },
-    Recording {
-        method: Option<&'static str>,
-        samples: usize,
-        validation_samples: usize,
-    },
-}
-
 /// The best point within a limit.
-#[derive(Serialize)]
 struct Choice {
     limit: f64,
     /// Index of the point; none if no point is within the limit.
@@ -147,7 +79,7 @@ struct Choice {
 }
 
 impl RecordedSource {
-    pub(super) fn new(sets: &RunSets, recordings: &Recordings) -> Self {
+    pub(super) fn new(sets: &RunSets, recordings: &Recordings) -> Result<Self, Failure> {
         let plan = &recordings.recorded.plan;
         let mut warnings = import_warnings(recordings);
         if plan.division.by == SplitBy::Random && recordings.test.is_none() {
@@ -155,12 +87,12 @@ impl RecordedSource {
                            train measures by how much, and --split group or time avoids it";
             warnings.push(message.to_owned());
         }
-        Self {
-            report: RecordingReport::new(sets, recordings),
+        Ok(Self {
+            report: RecordingReport::new(sets, recordings).map_err(Failure::Output)?,
             decoded: decoded_unit(&sets.test),
             problem: Problem::clone(&sets.problem),
             warnings,
-        }
+        })
     }
 }
 
@@ -200,56 +132,72 @@ impl MeasuredLevel {
         ]
     }
 
-    fn report<'a>(&'a self, source: &'a TradeSource, limits: Limits) -> LevelReport<'a> {
-        let channels = match source {
-            TradeSource::Array(_) => &[][..],
-            TradeSource::Recording(recording) => &recording.problem.targets,
-        };
-        let point = |((point, training), (on_decoding_front, on_training_front)): (
-            (&TradeOffPoint, &'a PointTraining),
-            (bool, bool),
-        )| PointReport {
-            decoder: point.report.kind.to_string(),
-            precision: match point.report.precision {
+    fn object(&self, source: &TradeSource, limits: Limits) -> Value {
+        let point = |(place, (on_decoding_front, on_training_front))| {
+            let (point, training): (&TradeOffPoint, &PointTraining) =
+                (&self.level.points[place], &self.trainings[place]);
+            let (channels, of_source) = match source {
+                TradeSource::Array(_) => {
+                    let of_model = |figure: fn(&Errors) -> Option<f64>| point.model_based.as_ref().and_then(figure);
+                    let figures = json!({
+                        "preset": point.preset.map(|preset| preset.to_string()),
+                        "residual": point.report.residual,
+                        "model_based_z_percent": of_model(|errors| errors.z_percent),
+                        "model_based_z_mm": of_model(|errors| Some(errors.z_mm)),
+                        "to_model_based": point.to_model_based(),
+                    });
+                    (&[][..], figures)
+                }
+                TradeSource::Recording(recording) => {
+                    let figures = json!({
+                        "method": point.method().map(|method| method.short_name()),
+                        "samples": training.samples[0],
+                        "validation_samples": training.samples[1],
+                    });
+                    (&recording.problem.targets[..], figures)
+                }
+            };
+            let precision = match point.report.precision {
                 Precision::Double => "f64",
                 Precision::Single => "f32",
-            },
-            hidden: point.hidden(),
-            errors: ErrorsReport::new(channels, &point.report.errors),
-            source: match source {
-                TradeSource::Array(_) => PointSource::Array {
-                    preset: point.preset.map(|preset| preset.to_string()),
-                    residual: point.report.residual.filter(|residual| residual.is_finite()),
-                    model_based_z_percent: point.model_based.and_then(|errors| errors.z_percent),
-                    model_based_z_mm: point.model_based.map(|errors| errors.z_mm),
-                    to_model_based: point.to_model_based(),
-                },
-                TradeSource::Recording(_) => PointSource::Recording {
-                    method: point.method().map(|method| method.short_name()),
-                    samples: training.samples[0],
-                    validation_samples: training.samples[1],
-                },
-            },
-            frame_us: point.report.frame_us,
-            training_s: point.training_seconds,
-            remarks: point.report.remarks.iter().map(ToString::to_string).collect(),
-            on_decoding_front,
-            on_training_front,
-            command: training.command.as_deref(),
+            };
+            let figures = json!({
+                "decoder": point.report.kind.to_string(),
+                "precision": precision,
+                "hidden": point.hidden(),
+                "frame_us": point.report.frame_us,
+                "training_s": point.training_seconds,
+                "remarks": point.report.remarks,
+                "on_decoding_front": on_decoding_front,
+                "on_training_front": on_training_front,
+                "command": training.command,
+            });
+            joined([figures, errors_object(channels, &point.report.errors), of_source])
         };
-        let points = self.level.points.iter().zip(&self.trainings).zip(self.fronts());
-        let [fastest_under, most_accurate_under] = self.choices(limits);
-        LevelReport {
-            noise: self.level.noise,
-            points: points.map(point).collect(),
-            fastest_under,
-            most_accurate_under,
-            refused: if self.level.noise.is_some() {
-                self.refused.clone()
-            } else {
-                Vec::new()
-            },
+        let [fastest_under, most_accurate_under] = self.choices(limits).map(|choice| {
+            choice.map(|choice| json!({"limit": choice.limit, "point": choice.point, "command": choice.command}))
+        });
+        let mut object = json!({
+            "points": Vec::from_iter(self.fronts().into_iter().enumerate().map(point)),
+            "fastest_under": fastest_under,
+            "most_accurate_under": most_accurate_under,
+        });
+        if let Some(noise) = self.level.noise {
+            object["noise"] = noise.into();
+            if !self.refused.is_empty() {
+                object["refused"] = self.refused.clone().into();
+            }
         }
+        object
+    }
+
+    /// Remarks on the figures, with cause and remedy, and decoders that cannot be used.
+    fn warnings(&self) -> impl Iterator<Item = String> {
+        let remarks = self.level.points.iter().flat_map(|point| {
+            let remarks = point.report.remarks.iter();
+            remarks.map(move |remark| format!("{}: {remark}", point_name(point)))
+        });
+        remarks.chain(self.refused.iter().cloned())
     }
 
     /// Table of the points, fastest first, with marks for those on the Pareto fronts.
@@ -282,12 +230,6 @@ impl MeasuredLevel {
             }
         }
         write!(out, "\n{}", self.table().aligned())?;
-        for point in &self.level.points {
-            for remark in &point.report.remarks {
-                writeln!(out, "Warning: {}: {remark}", point_name(point))?;
-            }
-        }
-        write_warnings(&self.refused, out)?;
         let [fastest, most_accurate] = self.choices(limits);
         let choices = [
             fastest.map(|choice| (format!("Fastest under {} %", choice.limit), choice)),
@@ -315,28 +257,20 @@ impl MeasuredLevel {
 }
 
 impl TradeOff {
-    pub(super) fn print(&self, limits: Limits, is_json: bool) -> Result<(), Failure> {
-        if is_json {
-            print_object(&self.report(limits))
-        } else {
-            print(|out| self.write(limits, out))
+    pub(super) fn print(&self, limits: Limits) -> Result<(), Failure> {
+        if let TradeSource::Recording(recording) = &self.source {
+            recording.warnings.iter().for_each(warn);
         }
-    }
-
-    fn report(&self, limits: Limits) -> Report<'_> {
-        let mut levels = Vec::from_iter(self.levels.iter().map(|level| level.report(&self.source, limits)));
-        match &self.source {
-            TradeSource::Array(array) => Report::Array { array: *array, levels },
+        self.levels.iter().flat_map(MeasuredLevel::warnings).for_each(warn);
+        let levels = self.levels.iter().map(|level| level.object(&self.source, limits));
+        let object = || match &self.source {
+            TradeSource::Array(array) => json!({"array": array, "levels": Vec::from_iter(levels)}),
             TradeSource::Recording(recording) => {
-                let refused = self.levels.iter().flat_map(|level| level.refused.iter().cloned());
-                Report::Recording {
-                    recording: &recording.report,
-                    decoded: &recording.decoded,
-                    level: levels.pop().expect("a recording has one level"),
-                    warnings: recording.warnings.iter().cloned().chain(refused).collect(),
-                }
+                let decoded = json!({"decoded": recording.decoded});
+                joined([recording.report.object.clone(), decoded].into_iter().chain(levels))
             }
-        }
+        };
+        print(object, |out| self.write(limits, out))
     }
 
     fn write(&self, limits: Limits, out: &mut dyn Write) -> io::Result<()> {
@@ -346,7 +280,7 @@ impl TradeOff {
                 "{array}: time per frame (one thread) and training time against the error of z"
             )?,
             TradeSource::Recording(recording) => {
-                recording.report.write(out)?;
+                out.write_all(&recording.report.text)?;
                 writeln!(
                     out,
                     "\nTime to decode {} (one thread) and training time against the error (MAE in % of range, mean of the \
@@ -361,7 +295,6 @@ impl TradeOff {
             for level in &self.levels {
                 write!(out, "\n{}", level.target_table(&recording.problem).aligned())?;
             }
-            write_warnings(&recording.warnings, out)?;
         }
         Ok(())
     }

@@ -1,6 +1,5 @@
 use std::{
     fs::{self, File, TryLockError},
-    io::Write,
     num::NonZero,
     path::{Path, PathBuf},
     str::FromStr,
@@ -8,12 +7,15 @@ use std::{
     time::Instant,
 };
 
-use clap::Args;
-use decoupler_core::{evaluation::experiments::worker_threads, text::counted};
-use decoupler_files::export::{
-    MergedSweep, SweepTableFormat, Trial, TrialId, WriteError, atomic_write, check_writable, format_duration,
+use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, FromArgMatches};
+use decoupler_core::{
+    evaluation::{RUN_OPTIONS, RunOption, experiments::worker_threads},
+    text::counted,
 };
-use serde::Serialize;
+use decoupler_files::export::{
+    MergedSweep, SweepTableFormat, Trial, TrialId, WriteError, atomic_write, format_duration,
+};
+use serde_json::json;
 
 use super::{
     filling::{Filled, fill},
@@ -25,7 +27,7 @@ use crate::terminal::{
     failure::Failure,
     import_arguments::ImportArguments,
     interruption::Graceful,
-    output::{print, print_object, progress_bar},
+    output::{check_output, input, print, progress_bar, value},
     seed,
 };
 
@@ -49,12 +51,12 @@ use crate::terminal::{
 #[derive(Args)]
 pub(in crate::terminal) struct Sweep {
     /// Specification of the trials, as JSON
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["merge", "axes"])]
+    #[arg(long, value_name = "FILE", value_parser = input, required_unless_present_any = ["merge", "axes"])]
     spec: Option<PathBuf>,
     #[command(flatten)]
     given: SweepArguments,
     /// Folder for the results, created if missing; with --merge the table, as CSV or JSON depending on the file extension
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
     /// Train only part I of N parts, which together contain every trial once
     #[arg(long, value_name = "I/N", conflicts_with = "merge")]
@@ -66,22 +68,9 @@ pub(in crate::terminal) struct Sweep {
     /// have not begun
     #[arg(long, value_name = "DIR", num_args = 1..)]
     merge: Vec<PathBuf>,
-    /// Print one JSON object instead of text and progress
-    #[arg(long)]
-    json: bool,
 }
 
 const MAX_THREADS: usize = 1024;
-
-#[derive(Serialize)]
-struct FilledReport {
-    trials: usize,
-    present: usize,
-    trained: usize,
-    elsewhere: usize,
-    failed: usize,
-    seconds: f64,
-}
 
 impl Sweep {
     pub(in crate::terminal) fn run(self) -> Result<(), Failure> {
@@ -102,7 +91,7 @@ impl Sweep {
         })?;
         let positions = self.shard.unwrap_or_default().positions(trials.count());
         let of_shard = positions.len();
-        let bar = progress_bar(self.json, of_shard, "{bar:30} {pos} of {len} trials, {elapsed} elapsed");
+        let bar = progress_bar(of_shard, "{bar:30} {pos} of {len} trials, {elapsed} elapsed");
         let stop = Stop::begin();
         let threads = self.threads.and_then(NonZero::new).unwrap_or_else(worker_threads);
         let threads = NonZero::new(of_shard).map_or(threads, |trials| threads.min(trials));
@@ -115,34 +104,33 @@ impl Sweep {
             elsewhere,
             failed,
         } = filled;
-        if self.json {
-            print_object(&FilledReport {
-                trials: of_shard,
-                present,
-                trained,
-                elsewhere,
-                failed,
-                seconds: begun.elapsed().as_secs_f64(),
-            })?;
-        } else {
-            let time = format_duration(begun.elapsed());
+        let seconds = begun.elapsed();
+        let object = || {
+            json!({
+                "trials": of_shard,
+                "present": present,
+                "trained": trained,
+                "elsewhere": elsewhere,
+                "failed": failed,
+                "seconds": seconds.as_secs_f64(),
+            })
+        };
+        print(object, |output| {
+            let (trials, time) = (counted(of_shard, "trial"), format_duration(seconds));
             let elsewhere = match elsewhere {
                 0 => String::new(),
                 count => format!("{count} left to other programs that train them, "),
             };
-            print(|output| {
-                writeln!(
-                    output,
-                    "{}: {present} already done, {trained} trained, {elsewhere}{failed} failed, in {time}",
-                    counted(of_shard, "trial")
-                )
-            })?;
-        }
+            writeln!(
+                output,
+                "{trials}: {present} already done, {trained} trained, {elsewhere}{failed} failed, in {time}"
+            )
+        })?;
         match stop.graceful.is_end_requested() {
-            true if filled.total() < of_shard => Err(Failure::InterruptedSweep {
-                done: present + trained,
-                trials: of_shard,
-            }),
+            true if filled.total() < of_shard => Err(Failure::Interrupted(format!(
+                " after {} of {of_shard} trials; the same command trains the rest",
+                present + trained
+            ))),
             _ if failed > 0 => Err(Failure::FailedTrials {
                 failed,
                 trials: of_shard,
@@ -161,26 +149,16 @@ impl Sweep {
             );
             Failure::Arguments(message)
         })?;
-        check_writable(out)?;
+        check_output("--out", out)?;
         let mut merged = MergedSweep::read(&self.merge)?;
         if let Some(trials) = specified {
             let missing = (0..trials.count()).filter(|&position| !merged.has(trials.id(position)));
             merged.missing = missing.map(|position| trials.describe(position)).collect();
         }
-        // A table that cannot be read may have more trials.
-        let has_fewer = || {
-            format
-                .trials_in(out)
-                .is_some_and(|trials| trials <= merged.trials.len())
-        };
-        let is_kept = !merged.is_whole() && !has_fewer();
-        if !is_kept {
-            atomic_write(out, |writer| format.write(&merged, writer))?;
-        }
-        if self.json {
-            print_object(&merged)?;
-        } else {
-            print(|output| {
+        atomic_write(out, |writer| format.write(&merged, writer))?;
+        print(
+            || value(&merged),
+            |output| {
                 for (what, trials) in [("missing", &merged.missing), ("conflicting", &merged.conflicting)] {
                     for trial in trials {
                         writeln!(output, "{what}: {trial}")?;
@@ -191,8 +169,8 @@ impl Sweep {
                 }
                 let trials = counted(merged.trials.len(), "trial");
                 writeln!(output, "{trials}; digest of options and results: {}", merged.digest)
-            })?;
-        }
+            },
+        )?;
         if merged.is_whole() {
             return Ok(());
         }
@@ -201,7 +179,6 @@ impl Sweep {
             conflicting: merged.conflicting.len(),
             unreadable: merged.damaged.len(),
             out: out.clone(),
-            is_kept,
         })
     }
 }
@@ -301,7 +278,7 @@ impl Claim {
 #[command(next_help_heading = "Without a specification")]
 pub(super) struct SweepArguments {
     #[command(flatten)]
-    axes: AxisArguments,
+    axes: Axes,
     /// Columns of --data that the network reads, separated by commas
     #[arg(
         long,
@@ -321,58 +298,73 @@ pub(super) struct SweepArguments {
     import: ImportArguments,
 }
 
-// Values of the varied options.
-#[derive(Args)]
-#[group(id = "axes", multiple = true, conflicts_with_all = ["spec", "merge"])]
-struct AxisArguments {
-    /// Numbers of hidden nodes
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    hidden: Vec<String>,
-    /// Training methods
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    method: Vec<String>,
-    /// Scalings of the inputs: minmax, whiten
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    scaling: Vec<String>,
-    /// Maximum numbers of epochs
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    epochs: Vec<String>,
-    /// Numbers of trainings from different random weights
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    starts: Vec<String>,
-    /// Array scales, without --data
-    #[arg(long, value_name = "LIST", value_delimiter = ',', conflicts_with_all = ["data", "recipe"])]
-    array: Vec<String>,
-    /// Numbers of training samples, without --data
-    #[arg(long, value_name = "LIST", value_delimiter = ',', conflicts_with_all = ["data", "recipe"])]
-    samples: Vec<String>,
+/// Options of the settings, each with values separated by commas.
+struct Axes(Vec<(String, Vec<String>)>);
+
+impl Axes {
+    /// Settings that can be varied, by their options.
+    fn offered() -> impl Iterator<Item = (String, &'static RunOption)> {
+        let varied = RUN_OPTIONS.iter();
+        let varied = varied.filter(|row| !row.is_rare() && !["inputs", "seed"].contains(&row.setting.name));
+        varied.map(|row| (row.setting.word("-"), row))
+    }
+}
+
+impl Args for Axes {
+    fn augment_args(command: Command) -> Command {
+        let group = ArgGroup::new("axes")
+            .multiple(true)
+            .conflicts_with_all(["spec", "merge"]);
+        let group = group.args(Self::offered().map(|(word, _)| word));
+        let argument = |(word, row): (String, &RunOption)| {
+            let argument = Arg::new(word.clone())
+                .long(word)
+                .value_name("LIST")
+                .value_delimiter(',');
+            argument
+                .action(ArgAction::Append)
+                .help(row.setting.help.trim_end_matches('.'))
+        };
+        command.args(Self::offered().map(argument)).group(group)
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for Axes {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let given = Self::offered().filter_map(|(word, _)| {
+            let values = matches.get_many::<String>(&word)?.cloned().collect();
+            Some((word, values))
+        });
+        Ok(Self(given.collect()))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
 }
 
 impl SweepArguments {
     /// Trials described by the arguments.
     pub(super) fn trials(&self) -> Result<Trials, Failure> {
-        let recording = self.import.given(&self.inputs)?;
-        let holds_out = self.import.holds_out();
-        let axes = &self.axes;
-        let axes = [
-            ("array", &axes.array),
-            ("samples", &axes.samples),
-            ("scaling", &axes.scaling),
-            ("hidden", &axes.hidden),
-            ("method", &axes.method),
-            ("epochs", &axes.epochs),
-            ("starts", &axes.starts),
-        ];
-        let mut axes = Vec::from_iter(axes.into_iter().filter(|(_, values)| !values.is_empty()));
+        let recording = match self.import.is_given() {
+            true => Some(self.import.plan(&self.inputs)?),
+            false => None,
+        };
+        if recording.is_none() {
+            self.import.check_unused()?;
+        }
         let first = self.seed.unwrap_or(0);
         let seeds = (0..self.seeds.unwrap_or(1) as u64).map(|number| first.wrapping_add(number).to_string());
-        let seeds = Vec::from_iter(seeds);
-        axes.push(("seed", &seeds));
-        let shared = recording.iter().filter(|_| holds_out);
-        let shared = shared.map(|plan| format!("--validation-fraction={}", plan.division.validation_fraction));
+        let mut axes = self.axes.0.clone();
+        axes.push(("seed".to_owned(), seeds.collect()));
         let mut train = TrainOptions::new();
-        let specification = Specification::of_arguments(recording.clone(), shared.collect(), axes, &mut train)?;
-        Ok(Trials::of(specification, &mut train)?)
+        let specification = Specification::of_arguments(recording, self.import.holds_out(), &axes, &mut train)?;
+        Trials::of(specification, &mut train)
     }
 }
 

@@ -1,5 +1,4 @@
 use std::{
-    io::Write,
     num::NonZero,
     panic::resume_unwind,
     path::Path,
@@ -15,7 +14,7 @@ use super::{
     specification::TrainOptions,
     trials::{Trials, train},
 };
-use crate::terminal::{failure::Failure, output::messages};
+use crate::terminal::{failure::Failure, output::warn};
 use decoupler_core::evaluation::RunError;
 use decoupler_files::export::WriteError;
 
@@ -81,13 +80,7 @@ pub(super) fn fill(
                 Attempt::Failed(failure) => {
                     filled.failed += 1;
                     let trial = trials.describe(position);
-                    // There is no one to report to if this fails.
-                    bar.suspend(|| {
-                        drop(writeln!(
-                            messages(),
-                            "warning: {trial}: {failure}; the other trials continue"
-                        ));
-                    });
+                    bar.suspend(|| warn(format_args!("{trial}: {failure}; the other trials continue")));
                 }
             }
             bar.inc(1);
@@ -135,8 +128,10 @@ fn attempt(
         Claimed::Done => return Ok(Attempt::Present),
         Claimed::Theirs => return Ok(Attempt::Elsewhere),
     };
-    let trained = trials.get(position, options).map_err(Failure::from);
-    match trained.and_then(|trial| train(&trial, &claim, parallel, || stop.is_requested())) {
+    match trials
+        .get(position, options)
+        .and_then(|trial| train(&trial, &claim, parallel, || stop.is_requested()))
+    {
         Ok(Some(trial)) => {
             trial.save_in(folder)?;
             claim.finish();

@@ -14,12 +14,19 @@ use crate::{
 pub struct RunOption {
     /// Part of the settings to which it belongs.
     pub part: Part,
-    /// Form of the value, for help.
+    /// Form of the value, for help; empty for a setting that is [rarely](Self::is_rare) changed.
     pub form: &'static str,
     /// Default in words; empty where it follows from a preset.
     pub default: &'static str,
     /// The row: explanation, allowed values, access.
     pub setting: Setting<RunSettings>,
+}
+
+impl RunOption {
+    /// Returns `true` for a setting that is rarely changed, which has no option of its own: `--set` changes it.
+    pub fn is_rare(&self) -> bool {
+        self.form.is_empty()
+    }
 }
 
 /// Part of the settings of a run.
@@ -106,28 +113,28 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
     ),
     option(
         Part::Scene,
-        ("noise ohm", "OHM", "0"),
+        ("noise ohm", "", "0"),
         NOISE,
         "Noise of each reading (standard deviation) in ohm.",
         |run| Some(Field::Number(&mut noise(run)?.additive_ohm)),
     ),
     option(
         Part::Scene,
-        ("adc bits", "N", "no rounding"),
+        ("adc bits", "", "no rounding"),
         Kind::Integer(1, Noise::MAX_BITS as u64),
         "Resolution of the analogue-to-digital converter, in bits.",
         |run| Some(Field::Optional(&mut noise(run)?.converter_bits)),
     ),
     option(
         Part::Scene,
-        ("drift", "REL", "0"),
+        ("drift", "", "0"),
         NOISE,
         "Gain error shared by all readings of a snapshot, e.g. from temperature (standard deviation, relative).",
         |run| Some(Field::Number(&mut noise(run)?.drift)),
     ),
     option(
         Part::Scene,
-        ("noise in", "both|training|test", "both"),
+        ("noise in", "", "both"),
         Kind::Choice,
         "Samples to which noise is added.",
         |run| Some(Field::named(&mut noise(run)?.sets)),
@@ -141,14 +148,14 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
     ),
     option(
         Part::Array,
-        ("test samples", "N", "100"),
+        ("test samples", "", "100"),
         SAMPLES,
         "Test samples, on which the printed errors are measured.",
         |run| Some(Field::Count(&mut run.simulation_mut()?.test_samples)),
     ),
     option(
         Part::Array,
-        ("validation samples", "N", "200"),
+        ("validation samples", "", "200"),
         Kind::Integer(0, LARGEST_SAMPLES as u64),
         "Validation samples, which select the best weights and end the training; 0 for none.",
         |run| Some(Field::Count(&mut run.simulation_mut()?.validation_samples)),
@@ -165,7 +172,7 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
     ),
     option(
         Part::Network,
-        ("combine", "best|mean", "best"),
+        ("combine", "", "best"),
         Kind::Choice,
         "How several starts become one network: best keeps the one with the lowest validation error, mean averages their \
          answers.",
@@ -173,7 +180,7 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
     ),
     option(
         Part::Network,
-        ("begin", "random|ridge", "random"),
+        ("begin", "", "random"),
         Kind::Choice,
         "Weights with which a training begins: random, or ridge regression with random weights added.",
         |run| Some(Field::named(&mut run.initialization)),
@@ -209,17 +216,17 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
         STOPPING[0].help,
         |run| (STOPPING[0].field)(&mut run.training.stopping),
     ),
-    stopping(1, ("goal", "MSE", "0"), |run| {
+    stopping(1, ("goal", "", "0"), |run| {
         (STOPPING[1].field)(&mut run.training.stopping)
     }),
-    stopping(2, ("min gradient", "LENGTH", "1e-7"), |run| {
+    stopping(2, ("min gradient", "", "1e-7"), |run| {
         (STOPPING[2].field)(&mut run.training.stopping)
     }),
     stopping(
         3,
         (
             "max fail",
-            "N",
+            "",
             "6; 100 for a recording with a method that follows gradients",
         ),
         |run| (STOPPING[3].field)(&mut run.training.stopping),

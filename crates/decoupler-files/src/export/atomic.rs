@@ -77,6 +77,10 @@ struct Place {
 impl Place {
     /// Returns the place of a file; `None` for a pipe or device.
     fn of(path: &Path) -> Result<Option<Self>, WriteError> {
+        // Also a file to which a shell redirects it is not replaced.
+        if path == Path::new("/dev/stdout") {
+            return Ok(None);
+        }
         let is_folder = path.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator);
         if is_folder || path.is_dir() {
             return Err(WriteError::Folder(path.to_owned()));
@@ -146,7 +150,7 @@ impl AtomicFile {
         let place = Place::of(path)?;
         let created = || {
             let Some(place) = place else {
-                return Ok((File::options().write(true).open(path)?, None));
+                return Ok((File::options().append(true).open(path)?, None));
             };
             let unfinished = UnfinishedFile::begin(&place.folder)?;
             if let Some(permissions) = place.permissions {

@@ -70,7 +70,10 @@ pub fn changed_options(settings: &RunSettings, usual: &RunSettings) -> impl Iter
     RUN_OPTIONS.iter().filter_map(|option| {
         let setting = &option.setting;
         let (value, usual) = (setting.get(settings)?, setting.get(usual));
-        (Some(&value) != usual.as_ref()).then(|| (setting.word("-"), value.to_string()))
+        (Some(&value) != usual.as_ref()).then(|| match (setting.word("-"), option.is_rare()) {
+            (word, true) => ("set".to_owned(), format!("{word}={value}")),
+            (word, false) => (word, value.to_string()),
+        })
     })
 }
 

@@ -3,7 +3,7 @@ use std::{path::Path, time::Duration};
 use decoupler_core::{
     dataset::{Dataset, Simulation},
     evaluation::{
-        DecoderReport, ErrorTable, Errors, Outlook, StartRecord, TestErrors, error_remarks,
+        Combination, DecoderReport, ErrorTable, Errors, Outlook, StartRecord, TestErrors, best_start, error_remarks,
         recorded::{Determination, HysteresisLoop},
     },
     sensor::Geometry,
@@ -11,9 +11,11 @@ use decoupler_core::{
     training::StopReason,
 };
 
+use ndarray::Array2;
+
 use super::{
     command::train_command,
-    html::{Block, Tone, document},
+    html::{Block, Tone, document, text},
     pictures::pictures,
     settings::{recording_facts, settings_facts},
 };
@@ -62,20 +64,51 @@ impl RunReport<'_> {
         document(&self.title(), &self.blocks(folder))
     }
 
-    fn blocks(&self, folder: &Path) -> Vec<Block> {
-        let Self { file, decoders, .. } = *self;
-        let setup = self.setup(folder);
-        let is_array = setup.plan().is_none();
-        let answers = file.decoder().answers_to(self.test);
+    /// Returns the report as text for a terminal: without its warnings, figures and command.
+    ///
+    /// # Panics
+    /// If the test set does not belong to the run.
+    pub fn text(&self) -> String {
+        let setup = self.setup(Path::new(""));
+        let (_, loops) = self.answers(&setup);
+        let mut blocks = vec![Block::dim(self.summary())];
+        blocks.extend(self.results(&setup, &loops));
+        blocks.extend(self.training(&setup, Path::new("")));
+        text(&blocks)
+    }
+
+    /// Answers to the test set, and the loops of loading and unloading in them.
+    fn answers(&self, setup: &Setup) -> (Array2<f64>, Vec<Option<HysteresisLoop>>) {
+        let answers = self.file.decoder().answers_to(self.test);
         let loops = setup.plan().map_or_else(Vec::new, |plan| {
             HysteresisLoop::of_test(self.test, answers.view(), plan.test_order())
         });
+        (answers, loops)
+    }
+
+    fn blocks(&self, folder: &Path) -> Vec<Block> {
+        let setup = self.setup(folder);
+        let (answers, loops) = self.answers(&setup);
         let mut blocks = vec![Block::dim(self.summary())];
         let remarks = self.remarks(&setup, &answers).into_iter();
         blocks.extend(remarks.map(|remark| Block::Text(Tone::Warning, remark)));
+        blocks.extend(self.results(&setup, &loops));
+        blocks.push(Block::Heading("Figures"));
+        let pictures = pictures(self.file, self.test, &answers, &loops).into_iter();
+        blocks.extend(pictures.map(|(caption, figure)| Block::Figure(caption, Box::new(figure))));
+        blocks.extend(self.training(&setup, folder));
+        blocks.push(Block::Heading("Repeating this run"));
+        blocks.extend(self.repeat(&setup));
+        blocks
+    }
+
+    /// Tables of errors.
+    fn results(&self, setup: &Setup, loops: &[Option<HysteresisLoop>]) -> Vec<Block> {
+        let Self { file, decoders, .. } = *self;
+        let is_array = setup.plan().is_none();
         let mut tables = file.error_table();
-        ErrorTable::add_loops(&mut tables, &loops);
-        blocks.extend([
+        ErrorTable::add_loops(&mut tables, loops);
+        let mut blocks = Vec::from([
             Block::Heading("Errors on the test set"),
             Block::Table(error_table(&tables), "network"),
             Block::dim(if is_array {
@@ -101,11 +134,19 @@ impl RunReport<'_> {
                 }),
             ]);
         }
-        blocks.push(Block::Heading("Figures"));
-        let pictures = pictures(file, self.test, &answers, &loops).into_iter();
-        blocks.extend(pictures.map(|(caption, figure)| Block::Figure(caption, Box::new(figure))));
+        blocks
+    }
+
+    /// Starts, choice of settings, and settings.
+    fn training(&self, setup: &Setup, folder: &Path) -> Vec<Block> {
+        let (file, mut blocks) = (self.file, Vec::new());
         if file.training.starts.len() > 1 {
             blocks.extend([Block::Heading("Starts"), Block::Table(self.starts_table(), "")]);
+            let best = best_start(&file.training.starts).map_or(0, |best| best + 1);
+            blocks.push(Block::dim(match file.settings.combine {
+                Combination::Best => format!("Number {best}, with the lowest error, is kept."),
+                Combination::Mean => format!("The network is their mean; number {best} has the lowest error."),
+            }));
         }
         if let Some(search) = file.recorded.as_ref().and_then(|recorded| recorded.search.as_ref()) {
             blocks.extend([
@@ -127,8 +168,6 @@ impl RunReport<'_> {
             }
             (None, None) => {}
         }
-        blocks.push(Block::Heading("Repeating this run"));
-        blocks.extend(self.repeat(&setup));
         blocks
     }
 
@@ -180,7 +219,7 @@ impl RunReport<'_> {
     }
 
     /// Returns all warnings and remarks on the run, with cause and remedy.
-    fn remarks(&self, setup: &Setup, answers: &ndarray::Array2<f64>) -> Vec<String> {
+    fn remarks(&self, setup: &Setup, answers: &Array2<f64>) -> Vec<String> {
         let mut remarks = Vec::from_iter(self.defect.map(str::to_owned));
         match (setup.settings().simulation(), setup.plan()) {
             (Some(simulation), _) => remarks.extend(self.array_remarks(simulation)),
@@ -224,7 +263,7 @@ impl RunReport<'_> {
         remarks
     }
 
-    fn recording_remarks(&self, plan: &Plan, answers: &ndarray::Array2<f64>) -> Vec<String> {
+    fn recording_remarks(&self, plan: &Plan, answers: &Array2<f64>) -> Vec<String> {
         let measured = Determination::measure(self.test, answers.view(), plan.division.by);
         let mut remarks = describe_determinacy(&self.file.problem.targets, &measured, self.file.combined().is_some());
         let NetworkFile { problem, scores, .. } = self.file;

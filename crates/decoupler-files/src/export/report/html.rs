@@ -37,6 +37,18 @@ impl Block {
     }
 }
 
+/// Returns the blocks as text for a terminal; figures are left out.
+pub(super) fn text(blocks: &[Block]) -> String {
+    let written = |block: &Block| match block {
+        Block::Heading(heading) => format!("\n{heading}\n"),
+        Block::Text(_, text) | Block::Command(text) => format!("{text}\n"),
+        Block::Table(table, _) => table.aligned(),
+        Block::Facts(facts) => facts.iter().map(|(name, value)| format!("{name}: {value}\n")).collect(),
+        Block::Figure(..) => String::new(),
+    };
+    blocks.iter().map(written).collect()
+}
+
 /// Returns the report as one self-contained document. Elements are closed as in XML, which lets XML parsers read it too.
 pub(super) fn document(title: &str, blocks: &[Block]) -> String {
     let mut body = format!("<h1>{}</h1>\n", escaped(title));
