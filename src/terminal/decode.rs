@@ -19,19 +19,17 @@ use decoupler_core::{
     training::StoppingRules,
 };
 use decoupler_files::{
-    export::{
-        AtomicFile, NetworkFile, WriteError, csv_cell, format_number, is_same, write_csv_row, write_decoded,
-        write_decoded_header,
-    },
+    export::{AtomicFile, NetworkFile, WriteError, format_number, is_same, write_csv_row, write_decoded_header},
     machine::memory_budget,
 };
 use glam::DVec3;
-use ndarray::{Array2, ArrayView1};
+use ndarray::Array2;
 use serde_json::json;
 
 use super::{
     failure::Failure,
     follow::Follow,
+    follow_answers::{Answer, Answers, Form},
     import_arguments::ImportArguments,
     intervals::DriftWarnings,
     output::{check_output, input, output, print, progress_bar, read, warn},
@@ -93,57 +91,41 @@ impl Decode {
 
 /// Decodes the file `input` into the file `output`.
 fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Failure> {
-    let mut written = AtomicFile::create(output)?;
     let refused = |source| WriteError::io(output, source);
-    let mut has_heading = false;
+    let mut answers = Answers::new(file, Form::Csv, AtomicFile::create(output)?);
     let mut drift = DriftWarnings::new(file);
-    let mut values = Vec::new();
-    let mut outside = OutsideTraining::new(&file.problem);
     let mut decoder = file.decoder();
-    read(file, input, &mut |readings| {
-        if !std::mem::replace(&mut has_heading, true) {
-            let kept = readings.kept.iter().map(|column| column.title.clone());
-            write_heading(file, &kept.collect::<Vec<_>>(), 1, &mut written).map_err(refused)?;
-        }
-        let answers = decoder.answers(&readings.row_indices, readings.values.view());
-        let kept = &readings.kept;
-        let lines = readings.lines.iter().zip(&readings.row_indices);
-        let rows = readings.values.outer_iter().zip(answers.outer_iter());
-        for (row, ((&line, &row_index), (readings, answer))) in lines.zip(rows).enumerate() {
-            if answer.iter().any(|value| !value.is_finite()) {
+    read(file, input, &mut |block| {
+        let decoded = decoder.answers(&block.row_indices, block.values.view());
+        for (row, (&line, &first_row)) in block.lines.iter().zip(&block.row_indices).enumerate() {
+            let [readings, values] = [block.values.row(row), decoded.row(row)];
+            if values.iter().any(|value| !value.is_finite()) {
                 let path = input.to_owned();
                 return Err(Failure::NoAnswer { path, line });
             }
-            let [readings, targets] =
-                [&readings, &answer].map(|row| row.to_slice().expect("a row of a standard array is contiguous"));
-            let of_line = outside.count(file.network.at(row_index), line, readings, targets);
+            let [readings, values] =
+                [&readings, &values].map(|row| row.to_slice().expect("a row of a standard array is contiguous"));
             drift.take(line, readings);
-            for column in kept {
-                write_cell(&column.cells[row], &mut written).map_err(refused)?;
-            }
-            with_half_widths(file, targets, &mut values);
-            write_decoded(
-                ArrayView1::from(&values),
-                of_line.readings,
-                of_line.targets,
-                &mut written,
-            )
-            .map_err(refused)?;
+            let answer = Answer {
+                line,
+                first_row,
+                readings,
+                values,
+                left_out: None,
+            };
+            let kept = block.kept.iter().map(|column| (&*column.title, &*column.cells[row]));
+            answers.write(&answer, kept).map_err(refused)?;
         }
         Ok(())
     })?;
-    written.commit()?;
+    answers.output.commit()?;
+    let outside = answers.outside;
     outside.warn();
     drift.end();
     print(
         || json!({"lines": outside.lines, "lines_outside": outside.outside}),
         |_| Ok(()),
     )
-}
-
-/// Writes a cell kept from the input, followed by a comma.
-pub(super) fn write_cell(cell: &str, out: &mut dyn Write) -> io::Result<()> {
-    write!(out, "{},", csv_cell(&inert(cell)))
 }
 
 /// Fills `values` with the answers, each followed by the half-width of its interval if the target has one.
@@ -167,7 +149,7 @@ pub(super) struct FrameArguments {
     inputs: Vec<String>,
     /// Columns with the depth of each node of the row-wire in mm, as an alternative to --targets with the coordinates of
     /// its nodes (x, y, z of each) in the frame of the nominal sensor
-    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', conflicts_with = "targets")]
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', group = "roles")]
     depths: Vec<String>,
 }
 
@@ -248,7 +230,12 @@ fn coordinates_of_depths(set: Dataset, row_wires: &[usize], sensor: &SensorModel
 
 /// Writes the header: the columns `kept` from the input, the targets of `rows` row-wires, each followed by the half-width
 /// of its interval if it has one, and the counts of values outside the training range.
-pub(super) fn write_heading(file: &NetworkFile, kept: &[String], rows: usize, out: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write_heading<'a>(
+    file: &NetworkFile,
+    kept: impl Iterator<Item = &'a str>,
+    rows: usize,
+    out: &mut dyn Write,
+) -> io::Result<()> {
     let problem = &file.problem;
     if problem.has_nodes() {
         return write_decoded_header(rows * problem.targets.len() / 3, out);
@@ -263,8 +250,8 @@ pub(super) fn write_heading(file: &NetworkFile, kept: &[String], rows: usize, ou
             .then(|| Channel::new(half_width_name(target), target.unit.as_deref()));
         [Some(target.clone()), half_width].into_iter().flatten()
     });
-    let kept = kept.iter().map(|title| inert(title));
     let names = kept
+        .map(inert)
         .chain(titles.map(|target| inert(&target.title())))
         .chain(["readings_outside".to_owned(), "targets_outside".to_owned()]);
     write_csv_row(names, out)

@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use decoupler_core::text::Named;
+use decoupler_core::{problem::Channel, text::Named};
 use decoupler_files::export::{
     NetworkFile,
     bundle::{BundleDecoder, BundleError, BundleFormat, BundlePrecision, BundleReport, ExportedDecoder, export_bundle},
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::{
     failure::Failure,
-    output::{input, print},
+    output::{input, print, value},
     samples::sets,
 };
 
@@ -74,45 +74,18 @@ impl Export {
 /// The object printed by `export --json`. Deviations are relative to `output_range_mm`, or for a recording to the range of
 /// each target.
 fn object(report: &BundleReport) -> Value {
-    let files = report
-        .files
-        .iter()
-        .map(|(name, bytes)| json!({"name": name, "bytes": bytes}));
-    let checks = report.checks.iter();
-    let checks = checks.map(|check| json!({"evaluator": check.evaluator, "deviation": check.deviation}));
-    let mut object = json!({
-        "path": report.path.to_string_lossy(),
-        "format": report.format.to_string(),
-        "precision": report.precision.to_string(),
-        "files": Vec::from_iter(files),
-        "verified_vectors": report.verified,
-        "golden_vectors": report.golden,
-        "checks": Vec::from_iter(checks),
-        "limit": report.limit,
-        "remarks": report.remarks,
-    });
-    // Figures that the bundle has: the bound of all coordinates of an array, or of each target of a recording.
-    let bounds = report.bounds.iter().map(|(output, bound)| {
-        let (name, unit) = (&output.name, &output.unit);
-        json!({"name": name, "unit": unit, "bound": bound})
-    });
-    let is_array = report.output_range_mm.is_some();
-    let bound = report
-        .bounds
-        .first()
-        .filter(|_| is_array)
-        .map(|(_, bound)| (*bound).into());
-    let bounds = (!is_array && !report.bounds.is_empty()).then(|| bounds.collect());
-    for (name, figure) in [
-        ("deviation", report.deviation().map(Value::from)),
-        ("change_by_rounding_readings", report.rounding.map(Value::from)),
-        ("output_range_mm", report.output_range_mm.map(Value::from)),
-        ("error_bound_mm", bound),
-        ("error_bounds", bounds),
-    ] {
-        if let Some(figure) = figure {
-            object[name] = figure;
-        }
+    let file = |(name, bytes): &(String, u64)| json!({"name": name, "bytes": bytes});
+    let mut object = value(report);
+    object["files"] = report.files.iter().map(file).collect();
+    if let Some(deviation) = report.deviation() {
+        object["deviation"] = deviation.into();
+    }
+    // Of all coordinates of an array, or of each target of a recording.
+    let bound = |(output, bound): &(Channel, f64)| json!({"name": output.name, "unit": output.unit, "bound": bound});
+    match &report.bounds[..] {
+        [] => {}
+        [(_, bound), ..] if report.output_range_mm.is_some() => object["error_bound_mm"] = (*bound).into(),
+        bounds => object["error_bounds"] = bounds.iter().map(bound).collect(),
     }
     object
 }

@@ -2,6 +2,7 @@
 
 use std::{
     fmt::Display,
+    io::{BufWriter, Write, stdout},
     path::Path,
     sync::{
         Arc,
@@ -19,7 +20,7 @@ use decoupler_files::{
 
 use super::{
     failure::Failure,
-    follow_answers::{Answers, Form},
+    follow_answers::{Answer, Answers, Form},
     interruption::Graceful,
     intervals::{note_drift, note_unmonitored},
     number,
@@ -89,7 +90,8 @@ impl Follow {
         };
         warn_unwatched(&session);
         let graceful = Graceful::begin();
-        let mut answers = Answers::new(&file, self.format.unwrap_or_default());
+        let output = BufWriter::with_capacity(1 << 16, stdout().lock());
+        let mut answers = Answers::new(&file, self.format.unwrap_or_default(), output);
         let mut report = Report::new(source);
         let every = self.status.map(Duration::from_secs_f64);
         let end = loop {
@@ -105,7 +107,15 @@ impl Follow {
             }
             match event {
                 SessionEvent::Answer => {
-                    if let Err(error) = answers.write(&session) {
+                    let answer = Answer {
+                        line: session.line(),
+                        first_row: session.first_row(),
+                        readings: session.readings(),
+                        values: session.values(),
+                        left_out: session.left_out(),
+                    };
+                    let kept = session.kept().iter().map(|kept| (&*kept.title, &*kept.text));
+                    if let Err(error) = answers.write(&answer, kept).and_then(|()| answers.output.flush()) {
                         break Err(Failure::Output(error));
                     }
                     session.count();
@@ -116,7 +126,7 @@ impl Follow {
             }
         };
         report.print(&session);
-        answers.warn();
+        answers.outside.warn();
         end
     }
 

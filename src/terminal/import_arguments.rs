@@ -10,6 +10,7 @@ use super::{
     file_patterns::{expanded, file_sets},
     interruption::check_same,
     output::input,
+    within,
 };
 use decoupler_core::{
     dataset::{DatasetError, Division, Memory, Span, SplitBy},
@@ -62,22 +63,28 @@ pub(super) struct ImportArguments {
     /// Join this file: by time (nearest row), or row by row without --time; its columns are prefixed with its stem, as in
     /// states.c2; may be repeated. With several files in --data, first those joined to the first, then those joined to the
     /// second, and so on
-    #[arg(long, value_name = "FILE", requires = "data", num_args = 1.., value_parser = input, hide_short_help = true)]
+    #[arg(long, value_name = "FILE", requires = "roles", num_args = 1.., value_parser = input, hide_short_help = true)]
     join: Vec<PathBuf>,
     /// Columns to be predicted from the inputs
-    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', requires = "data")]
+    #[arg(
+        long,
+        value_name = "COLUMNS",
+        value_delimiter = ',',
+        requires = "data",
+        group = "roles"
+    )]
     targets: Vec<String>,
     /// Time column
     #[arg(long, value_name = "COLUMN", requires = "data")]
     pub(super) time: Option<String>,
     /// Column that groups samples with equal values, such as one press or session
-    #[arg(long, value_name = "COLUMN", requires = "data")]
+    #[arg(long, value_name = "COLUMN", requires = "roles")]
     group: Option<String>,
     /// Column with the row number from 1
-    #[arg(long, value_name = "COLUMN", requires = "data", hide_short_help = true)]
+    #[arg(long, value_name = "COLUMN", requires = "roles", hide_short_help = true)]
     row_wire: Option<String>,
     /// Use only rows that meet this condition, for example "c4<145.1 and c5!=0"; may be repeated
-    #[arg(long = "where", value_name = "CONDITION", requires = "data", hide_short_help = true)]
+    #[arg(long = "where", value_name = "CONDITION", requires = "roles", hide_short_help = true)]
     conditions: Vec<Condition>,
     /// Inputs from the past: exponential averages of the readings with these time constants, such as 0.1s,1s,10s, which need
     /// --time, or 20,100 samples. For a choice of settings, none tries no history, and auto tries some even without --time;
@@ -86,7 +93,7 @@ pub(super) struct ImportArguments {
         long,
         value_name = "SPANS|none|auto",
         value_delimiter = ',',
-        requires = "data",
+        requires = "roles",
         hide_short_help = true
     )]
     history: Vec<HistoryArgument>,
@@ -110,29 +117,29 @@ pub(super) struct ImportArguments {
 pub(super) struct RecipeArguments {
     /// Inputs from the past: the readings this number of samples, or seconds, before each sample, such as 5,10,20 or 0.5s;
     /// within a group and across no gap in time (over fifty usual intervals)
-    #[arg(long, value_name = "SPANS", value_delimiter = ',', requires = "data")]
+    #[arg(long, value_name = "SPANS", value_delimiter = ',', requires = "roles")]
     lags: Vec<Span>,
     /// The past as its difference from the present reading; without --lags and --history, from the sample before
-    #[arg(long, requires = "data")]
+    #[arg(long, requires = "roles")]
     differences: bool,
     /// Time column of a joined file, without its stem; once, or once for each --join [default: as --time]
     #[arg(long, value_name = "COLUMN", requires = "join")]
     join_time: Vec<String>,
     /// Maximum time between matched rows [default: half the median interval of the joined file]
-    #[arg(long, value_name = "TIME", requires = "join", value_parser = positive)]
+    #[arg(long, value_name = "TIME", requires = "join", value_parser = within(f64::MIN_POSITIVE.., "a number above 0, in the unit of the times"))]
     join_limit: Option<f64>,
     /// Add a column computed from others of the same file: a difference such as d=c1-c2, a ratio such as q=c1/c2, or either
     /// with its own mean over the first seconds or rows, such as r=c1/start(2s) or r=c1-start(100); may be repeated
-    #[arg(long, value_name = "NAME=EXPRESSION", requires = "data")]
+    #[arg(long, value_name = "NAME=EXPRESSION", requires = "roles")]
     derive: Vec<Derived>,
     /// Number or text that marks a missing value, in all columns or in one, such as -1 or states.c5=-1; may be repeated
-    #[arg(long, value_name = "[COLUMN=]VALUE", requires = "data")]
+    #[arg(long, value_name = "[COLUMN=]VALUE", requires = "roles")]
     missing: Vec<Missing>,
     /// Unit of a column, such as states.c2=mm; may be repeated [default: from a header such as "x (mm)"]
-    #[arg(long, value_name = "COLUMN=UNIT", value_parser = assignment, requires = "data")]
+    #[arg(long, value_name = "COLUMN=UNIT", value_parser = assignment, requires = "roles")]
     unit: Vec<(String, String)>,
     /// Positions of the targets on the skin, for surfaces in the window: a table with the columns target,x,y (mm)
-    #[arg(long, value_name = "FILE", requires = "data", value_parser = input)]
+    #[arg(long, value_name = "FILE", requires = "roles", value_parser = input)]
     positions: Option<PathBuf>,
     /// Share of the samples held out for testing [default: 0.2]
     #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "test_data")]
@@ -170,16 +177,7 @@ fn yes_or_no(text: &str) -> Result<bool, String> {
 }
 
 fn share(text: &str) -> Result<f64, String> {
-    let share = text.parse().ok().filter(|share| (0.0..1.0).contains(share));
-    share.ok_or_else(|| "give a number from 0 to below 1, for example 0.2".to_owned())
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let number = text
-        .parse()
-        .ok()
-        .filter(|number: &f64| number.is_finite() && *number > 0.0);
-    number.ok_or_else(|| "give a number above 0, in the unit of the times".to_owned())
+    within(0.0..1.0, "a number from 0 to below 1, for example 0.2")(text)
 }
 
 fn assignment(text: &str) -> Result<(String, String), String> {
@@ -258,24 +256,7 @@ impl ImportArguments {
     /// # Errors
     /// If there is no file, or an argument needs targets.
     pub(super) fn only_files(&self) -> Result<Vec<PathBuf>, Failure> {
-        let rest = &self.rest;
-        let given = [
-            (!self.join.is_empty(), "--join"),
-            (self.group.is_some(), "--group"),
-            (self.row_wire.is_some(), "--row-wire"),
-            (
-                !self.history.is_empty() || self.memory().is_some(),
-                "--history, --lags and --differences",
-            ),
-            (!self.conditions.is_empty(), "--where"),
-            (!rest.derive.is_empty(), "--derive"),
-            (!rest.missing.is_empty(), "--missing"),
-            (!rest.unit.is_empty(), "--unit"),
-            (rest.positions.is_some(), "--positions"),
-        ];
-        let message = |argument: &str| format!("{argument} needs --inputs and --targets");
-        refuse(&given, message)?;
-        self.refuse_division(message)?;
+        self.refuse_division(|argument| format!("{argument} needs --inputs and --targets"))?;
         if self.data.is_empty() {
             let message = "--data: name the file to inspect";
             return Err(Failure::Arguments(message.to_owned()));

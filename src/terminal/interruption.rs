@@ -15,6 +15,7 @@ use super::{
     failure::Failure,
     output::{messages, warn},
     settings_arguments::RARELY,
+    within,
 };
 use crate::signals::on_termination;
 
@@ -97,7 +98,7 @@ pub(super) struct CheckpointArguments {
     #[arg(long, requires = "checkpoint", hide_short_help = true, help_heading = "Output")]
     pub(super) resume: bool,
     /// Seconds between two checkpoints
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, requires = "checkpoint", hide_short_help = true, help_heading = RARELY)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = within(0.0..=86_400.0, "a number of seconds from 0 to 86400"), requires = "checkpoint", hide_short_help = true, help_heading = RARELY)]
     checkpoint_interval: f64,
 }
 
@@ -115,13 +116,6 @@ pub(super) fn check_same<T: fmt::Display>(
         ))),
         None => Ok(()),
     }
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    /// A day.
-    const LONGEST: f64 = 86_400.0;
-    let seconds = text.parse().ok().filter(|seconds| (0.0..=LONGEST).contains(seconds));
-    seconds.ok_or_else(|| format!("give a number of seconds from 0 to {LONGEST}"))
 }
 
 impl CheckpointArguments {

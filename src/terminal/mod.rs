@@ -32,7 +32,13 @@ mod train_report;
 
 pub use decoupler_files::export::exit_leaving_nothing;
 
-use std::{error::Error, ffi::OsString, io::Write, ops::RangeInclusive, process::ExitCode};
+use std::{
+    error::Error,
+    ffi::OsString,
+    io::Write,
+    ops::{RangeBounds, RangeInclusive},
+    process::ExitCode,
+};
 
 use calibrate::Calibrate;
 use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind};
@@ -63,7 +69,7 @@ struct Arguments {
     #[command(flatten)]
     output: OutputArguments,
     /// Memory that trainings may use, and reading a file, in GB [default: that of the machine, and half of the free memory]
-    #[arg(long, value_name = "GB", global = true, value_parser = gigabytes)]
+    #[arg(long, value_name = "GB", global = true, value_parser = within(f64::MIN_POSITIVE.., "a number of GB above 0, for example 16"))]
     memory_limit: Option<f64>,
 }
 
@@ -156,19 +162,23 @@ pub(super) fn count(allowed: RangeInclusive<usize>) -> impl Fn(&str) -> Result<u
     }
 }
 
-/// Parses a finite number that is not negative.
-pub(super) fn number(text: &str) -> Result<f64, String> {
-    let number = text
-        .parse()
-        .ok()
-        .filter(|number: &f64| number.is_finite() && *number >= 0.0);
-    number.ok_or_else(|| "give a number from 0, for example 1e-7".to_owned())
+/// Returns a parser of numbers in `allowed`; `what` completes "give …".
+pub(super) fn within(
+    allowed: impl RangeBounds<f64> + Clone,
+    what: &'static str,
+) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| {
+        let number = text
+            .parse()
+            .ok()
+            .filter(|number: &f64| number.is_finite() && allowed.contains(number));
+        number.ok_or_else(|| format!("give {what}"))
+    }
 }
 
-/// Parses a size in GB.
-fn gigabytes(text: &str) -> Result<f64, String> {
-    let size = text.parse().ok().filter(|size: &f64| size.is_finite() && *size > 0.0);
-    size.ok_or_else(|| "give a number of GB above 0, for example 16".to_owned())
+/// Parses a finite number that is not negative.
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    within(0.0.., "a number from 0, for example 1e-7")(text)
 }
 
 /// Parses a seed.

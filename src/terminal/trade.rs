@@ -2,17 +2,16 @@
 
 use clap::Args;
 use decoupler_core::{
-    dataset::{Dataset, Seed, Simulation},
+    dataset::{Dataset, Seed},
     decoupling::DecoderKind,
-    evaluation::{Preset, RunError, RunSets, RunSettings, TradeOffPoint, Workload, measure_trade_off},
+    evaluation::{Preset, RunError, RunSets, TradeOffPoint, Workload, measure_trade_off},
     job::Job,
     network::LARGEST_HIDDEN,
-    scene::Noise,
     text::counted,
     training::Method,
 };
 use decoupler_files::{
-    export::report::{changed_options, train_command},
+    export::report::train_command,
     import::{Plan, Recordings, Setup, SetupSets},
 };
 
@@ -272,48 +271,21 @@ fn measure_levels(
 
 /// Command that trains with the settings of `point`, on the samples of `plan` if there is one; `None` for decoders of a
 /// recording that have no network.
-pub(super) fn command(point: &TradeOffPoint, plan: Option<&Plan>, import: &ImportArguments) -> Option<String> {
-    match (plan, point.settings.simulation()) {
-        (Some(plan), _) => on_recording(point, plan, import),
-        (None, Some(simulation)) => Some(on_array(point, simulation)),
-        (None, None) => None,
-    }
-}
-
-fn on_array(point: &TradeOffPoint, simulation: &Simulation) -> String {
-    let preset = point.preset.unwrap_or_default();
-    // The defaults of `train` with this noise: its number of samples and epochs, but not the noise itself.
-    let settings_of_preset = preset.settings_in(simulation.scene.noise);
-    let simulation_of_preset = Simulation {
-        scene: preset.simulation_in(Noise::default()).scene,
-        ..preset.simulation_in(simulation.scene.noise)
-    };
-    let array = simulation.sensor.scale.to_string().replace('×', "x");
-    let mut command = format!("decoupler train --preset {preset} --array {array}");
-    let base = RunSettings {
-        source: simulation_of_preset.into(),
-        ..settings_of_preset
-    };
-    for (word, value) in changed_options(&point.settings, &base) {
-        // The array is named in any case, and hidden nodes below.
-        if !["array", "hidden"].contains(&&*word) {
-            command += &format!(" --{word} {value}");
-        }
-    }
-    if let Some(hidden) = point.hidden() {
-        command += &format!(" --hidden {hidden}");
-    }
-    command + &format!(" --decoder {}", point.report.kind)
-}
-
-fn on_recording(point: &TradeOffPoint, plan: &Plan, import: &ImportArguments) -> Option<String> {
-    point.hidden()?;
-    let setup = Setup::recording(point.settings, plan.clone());
-    train_command(&setup, import.recipe()).ok()
+fn command(point: &TradeOffPoint, plan: Option<&Plan>, import: &ImportArguments) -> Option<String> {
+    let mut settings = point.settings;
+    settings.hidden = point.hidden().or_else(|| plan.is_none().then_some(settings.hidden))?;
+    let setup = Setup::of(settings, plan.cloned())?;
+    let command = train_command(&setup, import.recipe()).ok()?;
+    Some(match plan {
+        Some(_) => command,
+        None => format!("{command} --decoder {}", point.report.kind),
+    })
 }
 
 #[cfg(test)]
 mod tests {
+    use decoupler_core::evaluation::RunSettings;
+
     use super::*;
     use crate::terminal::samples::sets;
 

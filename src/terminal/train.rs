@@ -13,6 +13,7 @@ use super::{
     samples::{announce, announce_recording, following, sets, working_folder},
     settings_arguments::{RARELY, TrainingArguments},
     train_report::Trained,
+    within,
 };
 use decoupler_core::{
     decoupling::DecoderKind,
@@ -65,7 +66,7 @@ pub(super) struct Train {
     pub(super) folds: Option<usize>,
     /// Time on one core that a choice of settings (--hidden auto) and the training may take, estimated from their work, so
     /// that the choice is the same on every machine [default: 60]
-    #[arg(long, value_name = "SECONDS", value_parser = budget, hide_short_help = true, help_heading = RARELY)]
+    #[arg(long, value_name = "SECONDS", value_parser = within(1.0..=86_400.0, "seconds from 1 to 86400, for example 60"), hide_short_help = true, help_heading = RARELY)]
     budget: Option<f64>,
     /// When to calibrate the 90 % prediction intervals of a recording's targets. After a choice of settings (--hidden
     /// auto), this takes no time; otherwise the training samples are cross-validated, which takes four times as long as the
@@ -350,11 +351,6 @@ impl Train {
         }
         command
     }
-}
-
-fn budget(text: &str) -> Result<f64, String> {
-    let seconds = text.parse().ok().filter(|seconds| (1.0..=86_400.0).contains(seconds));
-    seconds.ok_or_else(|| "give seconds from 1 to 86400, for example 60".to_owned())
 }
 
 /// Returns the first failure, and prints the others.

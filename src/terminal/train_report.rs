@@ -138,7 +138,6 @@ impl Trained<'_> {
             "unknowns": rows * source.scene.unknowns_per_row(scale),
             "equations": rows * scale.columns(),
             "condition": condition(source),
-            "remarks": self.remarks(),
             "model_based": model_based.map(|errors| json!({"z_percent": errors.z_percent, "z_mm": errors.z_mm})),
         }))
     }
@@ -171,45 +170,15 @@ impl Trained<'_> {
     /// Warnings of the source and of the training, and remarks on the figures.
     pub(super) fn warnings(&self) -> Vec<String> {
         let NetworkFile { problem, scores, .. } = self.report.file;
-        let targets = &problem.targets;
-        let outlook = problem.sensor.as_ref().and_then(|sensor| Outlook::of(sensor).ok());
-        let mut warnings = Vec::new();
-        warnings.extend(
-            outlook
-                .iter()
-                .flat_map(|outlook| &outlook.warnings)
-                .map(ToString::to_string),
-        );
-        warnings.extend(self.sets.recordings.iter().flat_map(import_warnings));
+        let mut warnings = Vec::from_iter(self.sets.recordings.iter().flat_map(import_warnings));
         warnings.extend(self.extrapolation().and_then(|(_, warning)| warning));
         warnings.extend(describe_samples(self.sets));
-        warnings.extend(
-            search(self.report.file)
-                .into_iter()
-                .flat_map(|record| record.remarks(targets)),
-        );
+        let search = search(self.report.file).into_iter();
+        warnings.extend(search.flat_map(|record| record.remarks(&problem.targets)));
         warnings.extend(self.optimism.iter().cloned());
-        warnings.extend(self.run.defect());
-        let has_ridge = scores.network_alone.is_some();
-        warnings.extend(describe_determinacy(targets, &self.determined(), has_ridge));
-        warnings.extend(describe_worse_than_ridge(problem, scores));
-        warnings.extend(describe_coverage(targets, &scores.coverage));
-        if problem.has_nodes() {
-            warnings.extend(self.remarks());
-        }
-        for report in self.report.decoders {
-            let name = report.kind.name(report.precision);
-            warnings.extend(report.remarks.iter().map(|remark| format!("{name}: {remark}")));
-        }
+        warnings.extend(self.report.remarks());
+        warnings.extend(describe_coverage(&problem.targets, &scores.coverage));
         warnings
-    }
-
-    /// Remarks on the rows of the error table.
-    fn remarks(&self) -> Vec<String> {
-        let (file, baselines) = (self.report.file, &self.report.file.scores.baselines);
-        let remarks = error_remarks(&file.settings, &file.scores, file.training.stop_reason);
-        let remarks = remarks.iter().map(|(row, remark)| format!("{row}: {remark}"));
-        remarks.chain(baselines.model_based_note().map(str::to_owned)).collect()
     }
 
     fn write(&self, out: &mut dyn Write) -> io::Result<()> {

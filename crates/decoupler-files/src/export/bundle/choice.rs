@@ -9,7 +9,8 @@ use decoupler_core::{
 use thiserror::Error;
 
 /// Format in which a decoder is exported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::Display, strum::IntoStaticStr)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::Display, strum::IntoStaticStr, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum BundleFormat {
     /// ONNX graph.
@@ -23,15 +24,18 @@ pub enum BundleFormat {
 }
 
 /// Numbers with which a bundle computes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::Display, strum::IntoStaticStr)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::Display, strum::IntoStaticStr, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum BundlePrecision {
     /// 64-bit floating point.
     #[default]
     #[strum(serialize = "f64")]
+    #[serde(rename = "f64")]
     Double,
     /// 32-bit floating point.
     #[strum(serialize = "f32")]
+    #[serde(rename = "f32")]
     Single,
     /// Integers with 16-bit weights and activations.
     Fixed16,

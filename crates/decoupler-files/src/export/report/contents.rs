@@ -90,8 +90,8 @@ impl RunReport<'_> {
         let setup = self.setup(folder);
         let (answers, loops) = self.answers(&setup);
         let mut blocks = vec![Block::dim(self.summary())];
-        let remarks = self.remarks(&setup, &answers).into_iter();
-        blocks.extend(remarks.map(|remark| Block::Text(Tone::Warning, remark)));
+        let remarks = self.remarks_on(&setup, &answers).into_iter();
+        blocks.extend(remarks.map(|remark| Block::Text(Tone::Warning, sentence(&remark))));
         blocks.extend(self.results(&setup, &loops));
         blocks.push(Block::Heading("Figures"));
         let pictures = pictures(self.file, self.test, &answers, &loops).into_iter();
@@ -219,7 +219,16 @@ impl RunReport<'_> {
     }
 
     /// Returns all warnings and remarks on the run, with cause and remedy.
-    fn remarks(&self, setup: &Setup, answers: &Array2<f64>) -> Vec<String> {
+    ///
+    /// # Panics
+    /// If the test set does not belong to the run.
+    pub fn remarks(&self) -> Vec<String> {
+        let setup = self.setup(Path::new(""));
+        let answers = self.file.decoder().answers_to(self.test);
+        self.remarks_on(&setup, &answers)
+    }
+
+    fn remarks_on(&self, setup: &Setup, answers: &Array2<f64>) -> Vec<String> {
         let mut remarks = Vec::from_iter(self.defect.map(str::to_owned));
         match (setup.settings().simulation(), setup.plan()) {
             (Some(simulation), _) => remarks.extend(self.array_remarks(simulation)),
@@ -230,7 +239,7 @@ impl RunReport<'_> {
             let name = decoder.kind.name(decoder.precision);
             remarks.extend(decoder.remarks.iter().map(|remark| format!("{name}: {remark}")));
         }
-        remarks.into_iter().map(|remark| sentence(&remark)).collect()
+        remarks
     }
 
     fn array_remarks(&self, simulation: &Simulation) -> Vec<String> {
