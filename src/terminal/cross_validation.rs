@@ -3,13 +3,13 @@
 use serde_json::json;
 
 use super::{
-    errors_report::targets,
     failure::Failure,
     inspect::{files, write_files},
     interruption::Graceful,
     output::{print, warn},
     samples::{with_bar, working_folder},
     train::Train,
+    train_report::targets,
 };
 use decoupler_core::{
     dataset::{Folds, SplitBy, Stream},

@@ -28,8 +28,7 @@ use serde_json::json;
 
 use super::{
     failure::Failure,
-    follow::Follow,
-    follow_answers::{Answer, Answers, Form},
+    follow::{Answer, Answers, Follow, Form},
     import_arguments::ImportArguments,
     intervals::DriftWarnings,
     output::{check_output, input, output, print, progress_bar, read, warn},
@@ -100,8 +99,13 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
         for (row, (&line, &first_row)) in block.lines.iter().zip(&block.row_indices).enumerate() {
             let [readings, values] = [block.values.row(row), decoded.row(row)];
             if values.iter().any(|value| !value.is_finite()) {
-                let path = input.to_owned();
-                return Err(Failure::NoAnswer { path, line });
+                return Err(Failure::at(
+                    input,
+                    format_args!(
+                        "line {line}: the resistances are so far outside the training range that the network's output is not a \
+                         finite number; check them"
+                    ),
+                ));
             }
             let [readings, values] =
                 [&readings, &values].map(|row| row.to_slice().expect("a row of a standard array is contiguous"));
@@ -205,11 +209,13 @@ impl FrameArguments {
         };
         let checked = check_presses(sensor, scene, &frames);
         checked.map_err(|source| match source.sample() {
-            Some(sample) => Failure::Press {
-                path: recording.file_of(sample).to_owned(),
-                line: lines[sample],
-                source,
-            },
+            Some(sample) => {
+                let line = lines[sample];
+                Failure::at(
+                    recording.file_of(sample),
+                    format_args!("line {line}: {source} (--where)"),
+                )
+            }
             None => source.into(),
         })?;
         Ok(frames)
@@ -387,9 +393,10 @@ impl FineTune {
         }
         check_output("--out", &self.out)?;
         let mut file = NetworkFile::load(&self.network)?;
-        let no_array = || Failure::NoArray {
-            path: self.network.clone(),
-            reason: "frames of known presses need a model of the sensor; give a network of train --sensor",
+        let no_array = || {
+            let message = "it is the network of a recording: frames of known presses need a model of the sensor; give a \
+                           network of train --sensor";
+            Failure::at(&self.network, message)
         };
         let simulation = file.problem.sensor.ok_or_else(no_array)?;
         let settings = file.settings;

@@ -1,7 +1,9 @@
 use std::{
     error::Error as StdError,
+    fmt::Display,
+    fs,
     io::{self, ErrorKind},
-    path::PathBuf,
+    path::{Path, PathBuf},
 };
 
 use decoupler_core::{
@@ -10,7 +12,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError},
-    import::{Cure, ImportError, ReadError, SetupError},
+    import::{Cure, ImportError, SetupError},
     live::SessionError,
     machine::system_cause,
 };
@@ -33,24 +35,15 @@ pub(super) enum Failure {
     Document(#[from] DocumentError),
     #[error(transparent)]
     Bundle(#[from] BundleError),
-    #[error("'{}': {source}", .path.display())]
-    Resume { path: PathBuf, source: RunError },
+    /// In this file.
+    #[error("'{}': {}", .0.display(), .1)]
+    At(PathBuf, String),
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    #[error("'{}': line {line}: {source} (--where)", .path.display())]
-    Press {
-        path: PathBuf,
-        line: u64,
-        source: CalibrationError,
-    },
     #[error("{}", .0.with_cure(in_arguments))]
     Import(#[from] ImportError),
     #[error(transparent)]
     Setup(SetupError),
-    #[error("'{}': its recording '{}' is missing; give its new path with --data FILE", .checkpoint.display(), .recording.display())]
-    MissingRecording { checkpoint: PathBuf, recording: PathBuf },
-    #[error("'{}' is the network of a recording: {reason}", .path.display())]
-    NoArray { path: PathBuf, reason: &'static str },
     /// By Ctrl-C, SIGTERM or SIGHUP.
     #[error("interrupted{0}")]
     Interrupted(String),
@@ -83,16 +76,6 @@ pub(super) enum Failure {
     Read { path: PathBuf, source: io::Error },
     #[error("cannot open '{}': {}", .path.display(), system_cause(.source))]
     Open { path: PathBuf, source: io::Error },
-    #[error("'{}': {source}", .path.display())]
-    Resistances { path: PathBuf, source: ReadError },
-    #[error("'{}': line {line}: there is no network for row {row}; train with samples of it", .path.display())]
-    UnknownRow { path: PathBuf, line: u64, row: usize },
-    #[error("'{}': it has no column '{column}' with the row number of each line, which is needed because each row has its own network; add it", .path.display())]
-    NoRowWires { path: PathBuf, column: String },
-    #[error("'{}': {lines} lines are not a multiple of {rows} rows: each snapshot needs one line per row-wire; add the missing lines, or a column named row with the row number of each line", .path.display())]
-    PartOfSnapshot { path: PathBuf, lines: usize, rows: usize },
-    #[error("'{}': line {line}: the resistances are so far outside the training range that the network's output is not a finite number; check them", .path.display())]
-    NoAnswer { path: PathBuf, line: u64 },
 }
 
 fn joined(errors: &[PictureError]) -> String {
@@ -129,6 +112,17 @@ fn in_arguments(cure: &Cure) -> String {
 }
 
 impl Failure {
+    pub(super) fn at(path: &Path, message: impl Display) -> Self {
+        Self::At(path.to_owned(), message.to_string())
+    }
+
+    pub(super) fn make_folder(path: &Path) -> Result<(), Self> {
+        fs::create_dir_all(path).map_err(|source| Self::MakeFolder {
+            path: path.to_owned(),
+            source,
+        })
+    }
+
     /// Exit status of the program.
     pub(super) fn status(&self) -> u8 {
         match self {

@@ -9,13 +9,10 @@
 mod calibrate;
 mod cross_validation;
 mod decode;
-mod errors_report;
 mod export;
 mod failure;
 mod file_patterns;
-mod findings;
 mod follow;
-mod follow_answers;
 mod import_arguments;
 mod inspect;
 mod interruption;
@@ -26,7 +23,6 @@ mod samples;
 mod settings_arguments;
 mod sweep;
 mod trade;
-mod trade_report;
 mod train;
 mod train_report;
 

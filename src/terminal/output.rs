@@ -219,19 +219,21 @@ fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Rea
         (Some(of_lines), Some(read)) => {
             let index = |(row_wire, &line): (usize, &u64)| {
                 let index = read.binary_search(&row_wire);
-                index.map_err(|_| Failure::UnknownRow {
-                    path: input.to_owned(),
-                    line,
-                    row: row_wire + 1,
-                })
+                let row = row_wire + 1;
+                let message = format_args!("line {line}: there is no network for row {row}; train with samples of it");
+                index.map_err(|_| Failure::at(input, message))
             };
             of_lines.into_iter().zip(&lines).map(index).collect::<Result<_, _>>()?
         }
         _ => {
-            return Err(Failure::NoRowWires {
-                path: input.to_owned(),
-                column: recipe.row_wire.clone().unwrap_or_default(),
-            });
+            let column = recipe.row_wire.as_deref().unwrap_or_default();
+            return Err(Failure::at(
+                input,
+                format_args!(
+                    "it has no column '{column}' with the row number of each line, which is needed because each row has its \
+                     own network; add it"
+                ),
+            ));
         }
     };
     Ok(Readings {
@@ -263,10 +265,7 @@ fn read_resistances(
         path: input.to_owned(),
         source,
     })?;
-    let unreadable = |source| Failure::Resistances {
-        path: input.to_owned(),
-        source,
-    };
+    let unreadable = |error| Failure::at(input, error);
     let read = scene.rows.read(sensor.scale.rows()).map_err(DatasetError::from)?;
     let mut readings = ReadingsFile::new(opened, file.line_parser(false, true)?);
     while let Some(block) = readings.read(BLOCK).map_err(unreadable)? {
@@ -285,11 +284,14 @@ fn read_resistances(
     warn_if_torn(input, readings.torn_line());
     let lines = readings.lines_in_turn();
     if readings.torn_line().is_none() && !lines.is_multiple_of(read.len()) {
-        return Err(Failure::PartOfSnapshot {
-            path: input.to_owned(),
-            lines,
-            rows: read.len(),
-        });
+        let rows = read.len();
+        return Err(Failure::at(
+            input,
+            format_args!(
+                "{lines} lines are not a multiple of {rows} rows: each snapshot needs one line per row-wire; add the missing \
+                 lines, or a column named row with the row number of each line"
+            ),
+        ));
     }
     Ok(())
 }

@@ -1,6 +1,5 @@
 use std::{
     collections::BTreeSet,
-    fs,
     io::{self, Write},
     path::{Path, PathBuf},
     time::{Duration, Instant},
@@ -220,10 +219,7 @@ fn files(folder: &Path, table: PaperTable) -> [PathBuf; 5] {
 
 /// Creates the folder and checks that every file can be written, before training starts.
 fn prepare_folder(folder: &Path, tables: &[PaperTable]) -> Result<(), Failure> {
-    fs::create_dir_all(folder).map_err(|source| Failure::MakeFolder {
-        path: folder.to_owned(),
-        source,
-    })?;
+    Failure::make_folder(folder)?;
     let paths = tables.iter().flat_map(|&table| files(folder, table));
     paths.into_iter().try_for_each(|path| check_output("--out", &path))
 }

@@ -258,19 +258,15 @@ impl Train {
                 return Err(ImportError::Irregular(file.clone()).into());
             }
             if let Some(missing) = recorded.missing().first() {
-                return Err(Failure::MissingRecording {
-                    checkpoint: path.to_owned(),
-                    recording: missing.to_path_buf(),
-                });
+                let missing = missing.display();
+                let message = format_args!("its recording '{missing}' is missing; give its new path with --data FILE");
+                return Err(Failure::at(path, message));
             }
         }
         announce(&file.settings)?;
         let resumed = following(&saved, |on_progress| file.resume(&Job::UNINTERRUPTED, on_progress));
         let (mut run, mut sets) = resumed.map_err(|error| match error {
-            SetupError::Run(source) => Failure::Resume {
-                path: path.to_owned(),
-                source,
-            },
+            SetupError::Run(source) => Failure::at(path, source),
             error => error.into(),
         })?;
         if training != saved.settings().training {

@@ -3,7 +3,6 @@ use std::io::{self, Write};
 use serde_json::{Value, json};
 
 use super::{
-    errors_report::{errors_object, targets},
     failure::Failure,
     inspect::{RecordingReport, import_warnings},
     output::{joined, print, value},
@@ -11,9 +10,9 @@ use super::{
 use decoupler_core::{
     dataset::Simulation,
     evaluation::{
-        DecoderReport, Outlook, Run, RunError, TestErrors,
+        Coverage, DecoderReport, Outlook, Run, RunError, TargetErrors, TestErrors,
         auto::AutoRecord,
-        best_start, error_remarks,
+        best_start,
         recorded::{Determination, HysteresisLoop, Undetermined, extrapolation},
     },
     problem::Channel,
@@ -21,8 +20,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        NetworkFile, TrainingRecord, describe_coverage, describe_determinacy, describe_half_widths, describe_samples,
-        describe_worse_than_ridge, report::RunReport,
+        NetworkFile, TrainingRecord, describe_coverage, describe_half_widths, describe_samples, report::RunReport,
     },
     import::{Recording, Recordings, SetupSets},
 };
@@ -250,4 +248,36 @@ fn decoder_object(channels: &[Channel], report: &DecoderReport) -> Value {
         "solved": (solved.rows > 0).then(rows),
     });
     joined([errors_object(channels, &report.errors), figures])
+}
+
+/// Errors of a decoder: of the nodes of an array, or of each target with the mean absolute error in percent of the range.
+pub(super) fn errors_object(channels: &[Channel], errors: &TestErrors) -> Value {
+    match errors {
+        TestErrors::Nodes(errors) => json!({"z_percent": errors.z_percent, "z_mm": errors.z_mm}),
+        TestErrors::Targets(_) => {
+            json!({"percent_of_range": errors.percent(), "targets": targets(channels, errors, &[], &[])})
+        }
+    }
+}
+
+/// Returns the errors of the targets `channels`; `determined` are the coefficients of determination with their 95 %
+/// confidence intervals, and `coverage` that of the 90 % prediction intervals, if they were measured.
+pub(super) fn targets(
+    channels: &[Channel],
+    errors: &TestErrors,
+    determined: &[Result<Determination, Undetermined>],
+    coverage: &[Option<Coverage>],
+) -> Value {
+    let target = |(index, (channel, errors)): (usize, (&Channel, &TargetErrors))| {
+        let mut target = joined([json!({"name": channel.name, "unit": channel.unit}), value(errors)]);
+        if let Some(Ok(Determination { r2, .. })) = determined.get(index) {
+            target["r2_interval"] = json!([r2.low, r2.high]);
+        }
+        if let Some(Some(coverage)) = coverage.get(index) {
+            target["interval"] = value(coverage);
+        }
+        target
+    };
+    let channels = channels.iter().zip(errors.targets());
+    channels.enumerate().map(target).collect()
 }

@@ -1,15 +1,20 @@
 use std::{
     fs::{self, File, TryLockError},
     num::NonZero,
+    panic::resume_unwind,
     path::{Path, PathBuf},
     str::FromStr,
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
     time::Instant,
 };
 
 use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, FromArgMatches};
 use decoupler_core::{
-    evaluation::{RUN_OPTIONS, RunOption, experiments::worker_threads},
+    evaluation::{RUN_OPTIONS, RunError, RunOption, experiments::worker_threads},
     text::counted,
 };
 use decoupler_files::export::{
@@ -17,17 +22,19 @@ use decoupler_files::export::{
 };
 use serde_json::json;
 
+use indicatif::ProgressBar;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
 use super::{
-    filling::{Filled, fill},
     specification::{Specification, TrainOptions},
-    trials::Trials,
+    trials::{Trials, train},
 };
 use crate::terminal::{
     count,
     failure::Failure,
     import_arguments::ImportArguments,
     interruption::Graceful,
-    output::{check_output, input, print, progress_bar, value},
+    output::{check_output, input, print, progress_bar, value, warn},
     seed,
 };
 
@@ -85,10 +92,7 @@ impl Sweep {
     fn fill(&self, trials: &Trials) -> Result<(), Failure> {
         let begun = Instant::now();
         let folder = &self.out;
-        fs::create_dir_all(folder).map_err(|source| Failure::MakeFolder {
-            path: folder.clone(),
-            source,
-        })?;
+        Failure::make_folder(folder)?;
         let positions = self.shard.unwrap_or_default().positions(trials.count());
         let of_shard = positions.len();
         let bar = progress_bar(of_shard, "{bar:30} {pos} of {len} trials, {elapsed} elapsed");
@@ -98,12 +102,9 @@ impl Sweep {
         let filled = fill(folder, trials, positions, threads, &bar, &stop);
         bar.finish_and_clear();
         let filled = filled?;
-        let Filled {
-            present,
-            trained,
-            elsewhere,
-            failed,
-        } = filled;
+        let count = |of: Attempt| filled.iter().filter(|attempt| **attempt == of).count();
+        let [present, trained, elsewhere, failed] =
+            [Attempt::Present, Attempt::Trained, Attempt::Elsewhere, Attempt::Failed].map(count);
         let seconds = begun.elapsed();
         let object = || {
             json!({
@@ -127,7 +128,7 @@ impl Sweep {
             )
         })?;
         match stop.graceful.is_end_requested() {
-            true if filled.total() < of_shard => Err(Failure::Interrupted(format!(
+            true if filled.len() < of_shard => Err(Failure::Interrupted(format!(
                 " after {} of {of_shard} trials; the same command trains the rest",
                 present + trained
             ))),
@@ -180,6 +181,101 @@ impl Sweep {
             unreadable: merged.damaged.len(),
             out: out.clone(),
         })
+    }
+}
+
+/// Trains those of the trials at `positions` that neither have a result in `folder` nor are being trained by another program,
+/// each on one of `threads` threads. Returns early once `stop` is requested.
+///
+/// # Errors
+/// If results cannot be written. A trial that cannot be trained is reported on standard error, and the others continue.
+fn fill(
+    folder: &Path,
+    trials: &Trials,
+    positions: impl Iterator<Item = usize> + Send,
+    threads: NonZero<usize>,
+    bar: &ProgressBar,
+    stop: &Stop,
+) -> Result<Vec<Attempt>, Failure> {
+    let threads = threads.get();
+    let pool = |_| {
+        ThreadPoolBuilder::new()
+            .num_threads(1)
+            .thread_name(|_| "trial".to_owned())
+            .build()
+    };
+    let pools: Result<Vec<ThreadPool>, _> = (0..threads).map(pool).collect();
+    let pools = pools.map_err(|error| Failure::Run(RunError::Threads(error.to_string())))?;
+    let positions = Mutex::new(positions);
+    let next = || positions.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let work = || {
+        let mut options = TrainOptions::new();
+        let mut filled = Vec::new();
+        while let Some(position) = next().filter(|_| !stop.is_requested()) {
+            match attempt(folder, trials, position, threads, stop, &mut options)? {
+                Ok(Some(attempt)) => filled.push(attempt),
+                Ok(None) => break,
+                Err(failure) => {
+                    let trial = trials.describe(position);
+                    bar.suspend(|| warn(format_args!("{trial}: {failure}; the other trials continue")));
+                    filled.push(Attempt::Failed);
+                }
+            }
+            bar.inc(1);
+        }
+        Ok(filled)
+    };
+    thread::scope(|scope| {
+        let workers = pools.iter().map(|pool| {
+            scope.spawn(|| {
+                let worked: Result<Vec<Attempt>, WriteError> = pool.install(work);
+                worked.inspect_err(|_| stop.fail())
+            })
+        });
+        // All are started before the first is joined.
+        let workers = Vec::from_iter(workers).into_iter();
+        // The panic of the scope itself would not contain the reason.
+        let worked = workers.map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        Ok(worked.collect::<Result<Vec<_>, _>>()?.concat())
+    })
+}
+
+/// What became of a trial.
+#[derive(Clone, Copy, PartialEq)]
+enum Attempt {
+    /// Finished before.
+    Present,
+    Trained,
+    /// In training by another program, and left to it.
+    Elsewhere,
+    Failed,
+}
+
+/// Trains the trial at `position` unless it is finished or being trained; `None` if it was stopped, and saved in a checkpoint.
+fn attempt(
+    folder: &Path,
+    trials: &Trials,
+    position: usize,
+    parallel: usize,
+    stop: &Stop,
+    options: &mut TrainOptions,
+) -> Result<Result<Option<Attempt>, Failure>, WriteError> {
+    let claim = match Claim::take(folder, trials.id(position))? {
+        Claimed::Ours(claim) => claim,
+        Claimed::Done => return Ok(Ok(Some(Attempt::Present))),
+        Claimed::Theirs => return Ok(Ok(Some(Attempt::Elsewhere))),
+    };
+    match trials
+        .get(position, options)
+        .and_then(|trial| train(&trial, &claim, parallel, || stop.is_requested()))
+    {
+        Ok(Some(trial)) => {
+            trial.save_in(folder)?;
+            claim.finish();
+            Ok(Ok(Some(Attempt::Trained)))
+        }
+        Ok(None) => Ok(Ok(None)),
+        Err(failure) => Ok(Err(failure)),
     }
 }
 
