@@ -144,8 +144,8 @@ pub(super) struct RecipeArguments {
     /// Share of the samples held out for testing [default: 0.2]
     #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "test_data")]
     test_fraction: Option<f64>,
-    /// Share of the other samples that selects the best weights and ends the training; 0 for none [default: 0 with
-    /// --method br, the default; else 0.2]
+    /// Share of the other samples that selects the best weights and ends the training; 0 for none, which suits the
+    /// default method, and 0.2 the others than br [default: 0]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     validation_fraction: Option<f64>,
     /// File joined to --test-data, corresponding to --join; may be repeated

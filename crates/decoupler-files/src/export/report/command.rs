@@ -21,13 +21,13 @@ impl fmt::Display for CommandGap {
 }
 
 /// Returns the terminal command that trains with `setup`. Options that have their default value are omitted. A plan
-/// that was read from `recipe` is given by that file.
+/// that was read from `recipe` is given by that file; one that needs a recipe is first written to a recipe by another command.
 ///
 /// # Errors
 /// Settings for which the terminal has no option.
 pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, CommandGap> {
     let settings = setup.settings();
-    let mut command = Command("decoupler train".to_owned());
+    let mut command = Command::default();
     let mut usual = match (settings.simulation(), setup.plan()) {
         (Some(simulation), _) => {
             check_simulation(simulation)?;
@@ -62,7 +62,7 @@ pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, Com
         }
     }
     changed_options(settings, &usual).for_each(|(word, value)| command.add(&word, value));
-    Ok(command.0)
+    Ok(command.text())
 }
 
 /// Options, with their values, in which `settings` differ from `usual`, except those of the method.
@@ -131,26 +131,48 @@ fn check<const N: usize>(gaps: [(bool, &'static str); N]) -> Result<(), CommandG
     if gaps.is_empty() { Ok(()) } else { Err(CommandGap(gaps)) }
 }
 
-struct Command(String);
+/// Options of `train`, and those of a recipe written before.
+#[derive(Default)]
+struct Command {
+    import: String,
+    recipe: String,
+    training: String,
+}
 
 impl Command {
+    /// Adds an option of the training.
     fn add(&mut self, name: &str, value: impl fmt::Display) {
-        self.0 += &format!(" --{name} {}", quoted(Path::new(&value.to_string())));
+        add(&mut self.training, name, value);
+    }
+
+    fn text(&self) -> String {
+        let Self {
+            import,
+            recipe,
+            training,
+        } = self;
+        if recipe.is_empty() {
+            return format!("decoupler train{import}{training}");
+        }
+        format!(
+            "decoupler inspect{import}{recipe} --recipe-out recipe.json && decoupler train --recipe recipe.json{training}"
+        )
     }
 
     /// Adds the files of a recording, the meanings of their columns and the division of the samples, of which
     /// `validation_fraction` is held out by default.
     fn recording(&mut self, plan: &Plan, recipe: Option<&Path>, validation_fraction: f64) {
         match recipe {
-            Some(recipe) => self.add("recipe", recipe.display()),
+            Some(recipe) => add(&mut self.import, "recipe", recipe.display()),
             None => self.import(&plan.import),
         }
         if let Some(test) = &plan.test {
             let sets = std::iter::once((&test.data, &test.join));
             let sets = sets.chain(test.append.iter().map(|set| (&set.data, &set.join)));
             for (data, join) in sets {
-                self.add("test-data", data.display());
-                join.iter().for_each(|file| self.add("test-join", file.display()));
+                add(&mut self.import, "test-data", data.display());
+                join.iter()
+                    .for_each(|file| add(&mut self.recipe, "test-join", file.display()));
             }
         }
         let (division, default) = (plan.division, Division::default());
@@ -158,15 +180,19 @@ impl Command {
             true => SplitBy::Group,
             false => default.by,
         };
-        // The recipe may have another division.
+        // The recipe may have another rule.
         if recipe.is_some() || division.by != by_default || division.by != default.by {
-            self.add("split", division.by);
+            add(&mut self.import, "split", division.by);
         }
-        if plan.test.is_none() && (recipe.is_some() || division.test_fraction != default.test_fraction) {
-            self.add("test-fraction", division.test_fraction);
+        if recipe.is_some() {
+            return;
         }
-        if recipe.is_some() || division.validation_fraction != validation_fraction {
-            self.add("validation-fraction", division.validation_fraction);
+        if plan.test.is_none() && division.test_fraction != default.test_fraction {
+            add(&mut self.recipe, "test-fraction", division.test_fraction);
+        }
+        // A recipe fixes the share, which otherwise follows from the method.
+        if division.validation_fraction != validation_fraction || !self.recipe.is_empty() {
+            add(&mut self.recipe, "validation-fraction", division.validation_fraction);
         }
     }
 
@@ -188,43 +214,46 @@ impl Command {
             units,
             positions,
         } = recipe;
-        self.add("data", data.display());
-        join.iter().for_each(|joined| self.add("join", joined.file.display()));
+        let (import, rest) = (&mut self.import, &mut self.recipe);
+        add(import, "data", data.display());
+        join.iter()
+            .for_each(|joined| add(import, "join", joined.file.display()));
         for FileSet { data, join } in append {
-            self.add("data", data.display());
-            join.iter().for_each(|file| self.add("join", file.display()));
+            add(import, "data", data.display());
+            join.iter().for_each(|file| add(import, "join", file.display()));
         }
         let times = Vec::from_iter(join.iter().filter_map(|joined| joined.time.as_deref()));
         // One for all, or one for each.
         let is_one = times.windows(2).all(|pair| pair[0] == pair[1]);
         let most = if is_one { 1 } else { times.len() };
-        times.iter().take(most).for_each(|time| self.add("join-time", time));
+        times.iter().take(most).for_each(|time| add(rest, "join-time", time));
         if let Some(limit) = join.first().and_then(|joined| joined.limit) {
-            self.add("join-limit", limit);
+            add(rest, "join-limit", limit);
         }
-        self.add("inputs", inputs.join(","));
-        self.add("targets", targets.join(","));
+        add(import, "inputs", inputs.join(","));
+        add(import, "targets", targets.join(","));
         for (name, column) in [("time", time), ("group", group), ("row-wire", row_wire)] {
-            column.iter().for_each(|column| self.add(name, column));
+            column.iter().for_each(|column| add(import, name, column));
         }
         if let Some(memory) = memory {
-            for (name, spans) in [("lags", &memory.lags), ("memory", &memory.averages)] {
-                let spans = Vec::from_iter(spans.iter().map(Span::to_string));
-                if !spans.is_empty() {
-                    self.add(name, spans.join(","));
-                }
+            let spans = |spans: &[Span]| Vec::from_iter(spans.iter().map(Span::to_string)).join(",");
+            if !memory.averages.is_empty() {
+                add(import, "history", spans(&memory.averages));
+            }
+            if !memory.lags.is_empty() {
+                add(rest, "lags", spans(&memory.lags));
             }
             if memory.differences {
-                self.0 += " --differences";
+                *rest += " --differences";
             }
         }
-        conditions.iter().for_each(|condition| self.add("where", condition));
-        derive.iter().for_each(|derived| self.add("derive", derived));
-        missing.iter().for_each(|missing| self.add("missing", missing));
+        conditions.iter().for_each(|condition| add(import, "where", condition));
+        derive.iter().for_each(|derived| add(rest, "derive", derived));
+        missing.iter().for_each(|missing| add(rest, "missing", missing));
         units
             .iter()
-            .for_each(|(column, unit)| self.add("unit", format!("{column}={unit}")));
-        positions.iter().for_each(|file| self.add("positions", file.display()));
+            .for_each(|(column, unit)| add(rest, "unit", format!("{column}={unit}")));
+        positions.iter().for_each(|file| add(rest, "positions", file.display()));
         let DialectChoice {
             encoding,
             separator,
@@ -232,13 +261,17 @@ impl Command {
             header,
             skip_lines,
         } = dialect;
-        separator.iter().for_each(|separator| self.add("separator", separator));
-        decimal.iter().for_each(|decimal| self.add("decimal", decimal));
+        separator.iter().for_each(|separator| add(rest, "separator", separator));
+        decimal.iter().for_each(|decimal| add(rest, "decimal", decimal));
         let header = header.map(|header| if header { "yes" } else { "no" });
-        header.iter().for_each(|header| self.add("header", header));
-        encoding.iter().for_each(|encoding| self.add("encoding", encoding));
-        skip_lines.iter().for_each(|lines| self.add("skip-lines", lines));
+        header.iter().for_each(|header| add(rest, "header", header));
+        encoding.iter().for_each(|encoding| add(rest, "encoding", encoding));
+        skip_lines.iter().for_each(|lines| add(rest, "skip-lines", lines));
     }
+}
+
+fn add(options: &mut String, name: &str, value: impl fmt::Display) {
+    *options += &format!(" --{name} {}", quoted(Path::new(&value.to_string())));
 }
 
 #[cfg(test)]
