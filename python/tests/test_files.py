@@ -247,11 +247,11 @@ def test_a_memory_continues_as_in_the_program(tmp_path):
     table = pd.DataFrame({"time": times, "press": groups, "row": wires + 1, "u": u, "force": np.roll(u, 6)})
     table.to_csv(tmp_path / "train.csv", index=False)
     columns = ["--time", "time", "--group", "press", "--row-wire", "row", "--inputs", "u", "--targets", "force"]
-    training = ["--lags", "2", "--memory", "0.5s", "--hidden", "3", "--epochs", "20", "--out", "network.json"]
+    training = ["--lags", "2", "--history", "0.5s", "--hidden", "3", "--epochs", "20", "--out", "network.json"]
     done = program("train", "--data", "train.csv", *columns, *training, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     done = program(
-        "decode", "--network", "network.json", "--input", "train.csv", "--output", "decoded.csv", cwd=tmp_path
+        "decode", "--network", "network.json", "--data", "train.csv", "--out", "decoded.csv", cwd=tmp_path
     )
     assert done.returncode == 0, done.stderr
     expected = pd.read_csv(tmp_path / "decoded.csv")["force"]

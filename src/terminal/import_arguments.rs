@@ -78,7 +78,7 @@ pub(super) struct ImportArguments {
     #[arg(long, value_name = "COLUMN", requires = "data")]
     pub(super) time: Option<String>,
     /// Column that groups samples with equal values, such as one press or session
-    #[arg(long, value_name = "COLUMN", requires = "roles")]
+    #[arg(long, value_name = "COLUMN", requires = "roles", hide_short_help = true)]
     group: Option<String>,
     /// Column with the row number from 1
     #[arg(long, value_name = "COLUMN", requires = "roles", hide_short_help = true)]
@@ -98,7 +98,7 @@ pub(super) struct ImportArguments {
     )]
     history: Vec<HistoryArgument>,
     /// Use the simulated array or the recording of this recipe, written by decoupler inspect --recipe-out
-    #[arg(long, value_name = "FILE", value_parser = input)]
+    #[arg(long, value_name = "FILE", value_parser = input, hide_short_help = true)]
     recipe: Option<PathBuf>,
     /// Test samples: the last in time, whole groups, or random ones [default: group with --group, else time]
     #[arg(long, value_name = "time|group|random", value_parser = SplitBy::parse, hide_short_help = true)]

@@ -47,6 +47,7 @@ use inspect::Inspect;
 use output::{OutputArguments, messages};
 use reproduce::Reproduce;
 use samples::Simulate;
+use settings_arguments::RARELY;
 use sweep::Sweep;
 use trade::Trade;
 use train::Train;
@@ -65,7 +66,7 @@ struct Arguments {
     #[command(flatten)]
     output: OutputArguments,
     /// Memory that trainings may use, and reading a file, in GB [default: that of the machine, and half of the free memory]
-    #[arg(long, value_name = "GB", global = true, value_parser = within(f64::MIN_POSITIVE.., "a number of GB above 0, for example 16"))]
+    #[arg(long, value_name = "GB", global = true, hide_short_help = true, help_heading = RARELY, value_parser = within(f64::MIN_POSITIVE.., "a number of GB above 0, for example 16"))]
     memory_limit: Option<f64>,
 }
 

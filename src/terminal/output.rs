@@ -31,13 +31,13 @@ use super::{failure::Failure, samples::with_bar};
 #[derive(clap::Args, Default)]
 pub(super) struct OutputArguments {
     /// Print one JSON object instead of text and progress
-    #[arg(long, global = true)]
+    #[arg(long, global = true, hide_short_help = true)]
     json: bool,
     /// Show no progress and no notes, only results, warnings and errors
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, hide_short_help = true)]
     quiet: bool,
     /// Replace files that exist
-    #[arg(long, global = true)]
+    #[arg(long, global = true, hide_short_help = true)]
     force: bool,
 }
 

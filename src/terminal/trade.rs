@@ -32,7 +32,7 @@ use super::{
     output::{joined, print, progress_bar, warn},
     samples::{announce_workload, following, working_folder},
     settings_arguments::{OfTrade, SettingsArguments},
-    train_report::errors_object,
+    train_report::decoder_object,
 };
 
 /// Measure speed against accuracy of every decoder
@@ -292,34 +292,33 @@ fn command(point: &TradeOffPoint, plan: Option<&Plan>, import: &ImportArguments)
 
 /// Limits for choosing the best decoder.
 #[derive(Clone, Copy)]
-pub(super) struct Limits {
+struct Limits {
     pub(super) percent: Option<f64>,
     pub(super) microseconds: Option<f64>,
 }
 
 /// Decoders measured at every level of noise, or on a recording.
-pub(super) struct TradeOff {
+struct TradeOff {
     pub(super) source: TradeSource,
     pub(super) levels: Vec<MeasuredLevel>,
 }
 
 /// Source of the samples.
-pub(super) enum TradeSource {
+enum TradeSource {
     Array(ArrayScale),
     Recording(Box<RecordedSource>),
 }
 
 /// A recording on which decoders are measured.
-pub(super) struct RecordedSource {
+struct RecordedSource {
     report: RecordingReport,
     /// Unit that is decoded: "a sample", "a frame of 4 row-wires".
     decoded: String,
     problem: Problem,
-    warnings: Vec<String>,
 }
 
 /// Points of a level with their training data.
-pub(super) struct MeasuredLevel {
+struct MeasuredLevel {
     pub(super) level: TradeOffLevel,
     /// Training of each point.
     pub(super) trainings: Vec<PointTraining>,
@@ -328,7 +327,7 @@ pub(super) struct MeasuredLevel {
 }
 
 /// Training of a point.
-pub(super) struct PointTraining {
+struct PointTraining {
     /// Numbers of training and validation samples.
     pub(super) samples: [usize; 2],
     /// Command that trains it, if there is one.
@@ -339,28 +338,23 @@ pub(super) struct PointTraining {
 const FRONTS: &str = "* no other decoder is both faster and more accurate; + no other is both trained faster and more accurate\n\
                       Training time is the sum over all rows and starts.";
 
-/// The best point within a limit.
-struct Choice {
-    limit: f64,
-    /// Index of the point; none if no point is within the limit.
-    point: Option<usize>,
-    command: Option<String>,
-}
+/// A limit, and the index of the best point within it; none if no point is.
+type Choice = (f64, Option<usize>);
 
 impl RecordedSource {
     pub(super) fn new(sets: &RunSets, recordings: &Recordings) -> Result<Self, Failure> {
         let plan = &recordings.recorded.plan;
-        let mut warnings = import_warnings(recordings);
+        import_warnings(recordings).iter().for_each(warn);
         if plan.division.by == SplitBy::Random && recordings.test.is_none() {
-            let message = "random test samples are optimistic when neighbouring rows of a recording are similar; decoupler \
-                           train measures by how much, and --split group or time avoids it";
-            warnings.push(message.to_owned());
+            warn(
+                "random test samples are optimistic when neighbouring rows of a recording are similar; decoupler train \
+                 measures by how much, and --split group or time avoids it",
+            );
         }
         Ok(Self {
             report: RecordingReport::new(sets, recordings).map_err(Failure::Output)?,
             decoded: decoded_unit(&sets.test),
             problem: Problem::clone(&sets.problem),
-            warnings,
         })
     }
 }
@@ -387,18 +381,16 @@ impl MeasuredLevel {
     fn choices(&self, limits: Limits) -> [Option<Choice>; 2] {
         let points = &self.level.points;
         let choice = |limit: Option<f64>, choose: fn(&[TradeOffPoint], f64) -> Option<usize>| {
-            let limit = limit?;
-            let point = choose(points, limit);
-            Some(Choice {
-                limit,
-                point,
-                command: point.and_then(|place| self.trainings[place].command.clone()),
-            })
+            limit.map(|limit| (limit, choose(points, limit)))
         };
         [
             choice(limits.percent, fastest_under),
             choice(limits.microseconds, most_accurate_under),
         ]
+    }
+
+    fn command(&self, point: Option<usize>) -> Option<&str> {
+        self.trainings[point?].command.as_deref()
     }
 
     fn object(&self, source: &TradeSource, limits: Limits) -> Value {
@@ -410,7 +402,6 @@ impl MeasuredLevel {
                     let of_model = |figure: fn(&Errors) -> Option<f64>| point.model_based.as_ref().and_then(figure);
                     let figures = json!({
                         "preset": point.preset.map(|preset| preset.to_string()),
-                        "residual": point.report.residual,
                         "model_based_z_percent": of_model(|errors| errors.z_percent),
                         "model_based_z_mm": of_model(|errors| Some(errors.z_mm)),
                         "to_model_based": point.to_model_based(),
@@ -434,17 +425,15 @@ impl MeasuredLevel {
                 "decoder": point.report.kind.to_string(),
                 "precision": precision,
                 "hidden": point.hidden(),
-                "frame_us": point.report.frame_us,
                 "training_s": point.training_seconds,
-                "remarks": point.report.remarks,
                 "on_decoding_front": on_decoding_front,
                 "on_training_front": on_training_front,
                 "command": training.command,
             });
-            joined([figures, errors_object(channels, &point.report.errors), of_source])
+            joined([decoder_object(channels, &point.report), figures, of_source])
         };
         let [fastest_under, most_accurate_under] = self.choices(limits).map(|choice| {
-            choice.map(|choice| json!({"limit": choice.limit, "point": choice.point, "command": choice.command}))
+            choice.map(|(limit, point)| json!({"limit": limit, "point": point, "command": self.command(point)}))
         });
         let mut object = json!({
             "points": Vec::from_iter(self.fronts().into_iter().enumerate().map(point)),
@@ -501,13 +490,13 @@ impl MeasuredLevel {
         write!(out, "\n{}", self.table().aligned())?;
         let [fastest, most_accurate] = self.choices(limits);
         let choices = [
-            fastest.map(|choice| (format!("Fastest under {} %", choice.limit), choice)),
-            most_accurate.map(|choice| (format!("Most accurate under {} us", choice.limit), choice)),
+            fastest.map(|(percent, point)| (format!("Fastest under {percent} %"), point)),
+            most_accurate.map(|(us, point)| (format!("Most accurate under {us} us"), point)),
         ];
-        for (what, choice) in choices.into_iter().flatten() {
-            let decoder = choice.point.map(|place| point_name(&self.level.points[place]));
-            let answer = choice.command.or(decoder).unwrap_or_else(|| "none".to_owned());
-            writeln!(out, "{what}: {answer}")?;
+        for (what, point) in choices.into_iter().flatten() {
+            let decoder = point.map(|place| point_name(&self.level.points[place]));
+            let answer = self.command(point).map(str::to_owned).or(decoder);
+            writeln!(out, "{what}: {}", answer.as_deref().unwrap_or("none"))?;
         }
         Ok(())
     }
@@ -527,9 +516,6 @@ impl MeasuredLevel {
 
 impl TradeOff {
     pub(super) fn print(&self, limits: Limits) -> Result<(), Failure> {
-        if let TradeSource::Recording(recording) = &self.source {
-            recording.warnings.iter().for_each(warn);
-        }
         self.levels.iter().flat_map(MeasuredLevel::warnings).for_each(warn);
         let levels = self.levels.iter().map(|level| level.object(&self.source, limits));
         let object = || match &self.source {

@@ -47,11 +47,7 @@ use decoupler_files::{
 #[command(allow_negative_numbers = true)]
 pub(super) struct Train {
     #[command(flatten)]
-    pub(super) training: TrainingArguments,
-    #[command(flatten)]
     pub(super) import: ImportArguments,
-    #[command(flatten)]
-    pub(super) checkpoint: CheckpointArguments,
     /// Sensor model written by calibrate, instead of --array
     #[arg(long, value_name = "FILE", value_parser = input, conflicts_with_all = ["array", "resume", "data", "recipe"], hide_short_help = true, help_heading = "Simulated array")]
     sensor: Option<PathBuf>,
@@ -61,6 +57,10 @@ pub(super) struct Train {
     /// File for a report with errors, figures, settings and the command that repeats the run, as one HTML page
     #[arg(long, value_name = "FILE", value_parser = output, help_heading = "Output")]
     pub(super) report: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) training: TrainingArguments,
+    #[command(flatten)]
+    pub(super) checkpoint: CheckpointArguments,
     /// Test on every sample by cross-validation with this many folds, divided by --split
     #[arg(long, value_name = "K", conflicts_with = "test_data", hide_short_help = true, help_heading = RARELY)]
     pub(super) folds: Option<usize>,
@@ -336,11 +336,13 @@ impl Train {
     /// Command that resumes the training.
     fn resume_command(&self, checkpoint: &Path) -> String {
         let mut command = format!("decoupler train --checkpoint {} --resume", quoted(checkpoint));
-        if let Some(path) = &self.out {
-            command += &format!(" --out {}", quoted(path));
+        for (name, path) in [("out", &self.out), ("report", &self.report)] {
+            if let Some(path) = path {
+                command += &format!(" --{name} {}", quoted(path));
+            }
         }
-        if let Some(path) = &self.report {
-            command += &format!(" --report {}", quoted(path));
+        if self.out.is_some() || self.report.is_some() {
+            command += " --force";
         }
         if is_json() {
             command += " --json";

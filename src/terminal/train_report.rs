@@ -237,7 +237,7 @@ fn condition(source: &Simulation) -> Option<f64> {
 
 /// Errors and times of a decoder; `residual` is the root mean square of m/R − 1, none if the decoded deformation has no valid
 /// resistance, and `solved` is none for decoders that do not solve the equations of the sensor.
-fn decoder_object(channels: &[Channel], report: &DecoderReport) -> Value {
+pub(super) fn decoder_object(channels: &[Channel], report: &DecoderReport) -> Value {
     let solved = &report.solved;
     let rows = || json!({"rows": solved.rows, "unsolved": solved.unsolved, "undetermined": solved.undetermined});
     let figures = json!({
@@ -251,7 +251,7 @@ fn decoder_object(channels: &[Channel], report: &DecoderReport) -> Value {
 }
 
 /// Errors of a decoder: of the nodes of an array, or of each target with the mean absolute error in percent of the range.
-pub(super) fn errors_object(channels: &[Channel], errors: &TestErrors) -> Value {
+fn errors_object(channels: &[Channel], errors: &TestErrors) -> Value {
     match errors {
         TestErrors::Nodes(errors) => json!({"z_percent": errors.z_percent, "z_mm": errors.z_mm}),
         TestErrors::Targets(_) => {

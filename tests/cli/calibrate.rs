@@ -78,7 +78,7 @@ fn a_real_sensor_is_calibrated_and_a_network_trained_and_fine_tuned() {
     }
     let residual = |name: &str| report[name].as_f64().unwrap();
     assert!(residual("residual") < 1.2e-3 && residual("nominal_residual") > 1e-2);
-    let train = "--rows known --inputs conductance --loading smooth:4 --noise 1e-3 --samples 400 --validation-samples 80 \
+    let train = "--rows known --inputs conductance --loading smooth:4 --noise 1e-3 --samples 400 --set validation-samples=80 \
                  --hidden 6 --epochs 15 --decoder mean --json";
     json(
         &format!("train --sensor sensor.json {train} --out calibrated.json"),
@@ -151,7 +151,7 @@ fn arguments_that_divide_frames_are_refused() {
     record(folder.path());
     let path = folder.path();
     let trained =
-        format!("train --array {ARRAY} --samples 40 --test-samples 8 --epochs 1 --decoder mean --out net.json");
+        format!("train --array {ARRAY} --samples 40 --set test-samples=8 --epochs 1 --decoder mean --out net.json");
     assert!(decoupler(&trained, path).status.success());
     for argument in [
         "--folds 5",
@@ -185,7 +185,7 @@ fn impossible_readings_and_depths_are_refused_with_their_line() {
     let path = folder.path();
     let trained = decoupler(
         &format!(
-            "train --array {ARRAY} --samples 40 --validation-samples 0 --test-samples 8 --epochs 1 --out net.json"
+            "train --array {ARRAY} --samples 40 --set validation-samples=0 --set test-samples=8 --epochs 1 --out net.json"
         ),
         path,
     );

@@ -79,8 +79,8 @@ fn invalid_arguments_end_with_status_2() {
         ("train --hidden twelve", "from 1 to 512"),
         ("train --samples 0", "from 1 to 1000000"),
         ("train --samples -5", "from 1 to 1000000"),
-        ("train --test-samples 0", "from 1"),
-        ("train --validation-samples 1000001", "from 0 to 1000000"),
+        ("train --set test-samples=0", "from 1"),
+        ("train --set validation-samples=1000001", "from 0 to 1000000"),
         ("train --epochs 0", "from 1"),
         ("train --seed -1", "from 0"),
         ("train --seed 18446744073709551616", "from 0"),
@@ -96,7 +96,7 @@ fn invalid_arguments_end_with_status_2() {
         ("train --sed 1", "--seed"),
         ("simulate --samples 0", "from 1"),
         ("simulate --array 0x1_1x1", "row-wires (M1)"),
-        ("decode --network n.json", "--input <FILE>"),
+        ("decode --network n.json", "--data <FILE>"),
         ("trian", "'train'"),
     ];
     for (arguments, expected) in cases {
@@ -196,7 +196,7 @@ fn simulate_and_decode_agree_with_the_library() {
         folder,
     );
     success(
-        "decode --network network.json --input samples.csv --output decoded.csv",
+        "decode --network network.json --data samples.csv --out decoded.csv",
         folder,
     );
     assert_eq!(names(folder), ["decoded.csv", "network.json", "samples.csv"]);
@@ -253,7 +253,7 @@ fn files_that_cannot_be_decoded_leave_nothing() {
     for (sentence, text, expected) in cases {
         fs::write(folder.join("input.csv"), text).unwrap();
         let text = failure(
-            "decode --network network.json --input input.csv --output out.csv",
+            "decode --network network.json --data input.csv --out out.csv",
             folder,
             1,
         );
@@ -263,9 +263,9 @@ fn files_that_cannot_be_decoded_leave_nothing() {
         );
         assert_eq!(names(folder), ["input.csv", "network.json"], "{sentence}");
     }
-    let missing = "decode --network network.json --input none.csv --output out.csv";
+    let missing = "decode --network network.json --data none.csv --out out.csv";
     assert!(failure(missing, folder, 1).contains("cannot open 'none.csv'"));
-    let damaged = "decode --network input.csv --input input.csv --output out.csv";
+    let damaged = "decode --network input.csv --data input.csv --out out.csv";
     assert!(failure(damaged, folder, 1).contains("not a network file"));
 }
 

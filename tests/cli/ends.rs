@@ -27,7 +27,7 @@ fn trained() -> TempDir {
     let small = "--array 2x2_2x6 --rows known";
     succeed(
         &format!(
-            "train {small} --samples 100 --validation-samples 0 --test-samples 10 --hidden 2 --epochs 2 --decoder mean --out n.json"
+            "train {small} --samples 100 --set validation-samples=0 --set test-samples=10 --hidden 2 --epochs 2 --decoder mean --out n.json"
         ),
         folder.path(),
     );
@@ -47,7 +47,7 @@ fn lines(folder: &Path, name: &str) -> Vec<String> {
 fn readings_of_an_array_that_are_cut_off_are_decoded_up_to_there() {
     let folder = trained();
     let folder = folder.path();
-    let decode = "decode --network n.json --input readings.csv --output out.csv";
+    let decode = "decode --network n.json --data readings.csv --out out.csv";
     succeed(decode, folder);
     let whole = lines(folder, "out.csv");
     let readings = fs::read(folder.join("readings.csv")).unwrap();
@@ -74,7 +74,7 @@ fn a_recording_that_is_cut_off_is_trained_on_and_decoded_up_to_there() {
             "train --data data.csv --inputs t,u --targets d --hidden 2 --epochs 2 --decoder mean --intervals never --out n.json",
             folder,
         );
-        let message = succeed("decode --network n.json --input data.csv --output out.csv", folder);
+        let message = succeed("decode --network n.json --data data.csv --out out.csv", folder);
         let is_torn = cut == 5;
         assert_eq!(
             message.contains("line 61, the last, is cut off"),
@@ -88,7 +88,7 @@ fn a_recording_that_is_cut_off_is_trained_on_and_decoded_up_to_there() {
 #[test]
 fn a_network_is_read_once_also_from_a_pipe() {
     let folder = trained();
-    let script = "\"$0\" decode --network <(cat n.json) --input readings.csv --output out.csv";
+    let script = "\"$0\" decode --network <(cat n.json) --data readings.csv --out out.csv";
     let mut command = Command::new("bash");
     command.args(["-c", script, env!("CARGO_BIN_EXE_decoupler")]);
     let output = command.current_dir(folder.path()).output().unwrap();

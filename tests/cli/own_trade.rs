@@ -112,7 +112,7 @@ fn the_command_of_a_point_trains_its_network() {
     let folder = recording();
     let given = "--where c4<0.95 --split random --test-fraction 0.3";
     let arguments = format!(
-        "trade {DATA} {given} --hidden 3 --method lm --epochs 30 --seed 7 --decoder network --save-recipe r.json"
+        "trade {DATA} {given} --hidden 3 --method lm --epochs 30 --seed 7 --decoder network --recipe-out r.json"
     );
     let of_arguments = json(&arguments, folder.path());
     let of_recipe = "trade --recipe r.json --hidden 3 --method lm --epochs 30 --seed 7 --decoder network";
@@ -161,7 +161,7 @@ fn options_of_a_simulated_sensor_are_refused_and_vice_versa() {
     let cases = [
         (own("--array 2x3_2x9"), "no array"),
         (own("--samples 10"), "--where"),
-        (own("--test-samples 10"), "--test-fraction"),
+        (own("--set test-samples=10"), "--test-fraction"),
         (own("--preset best"), "no scene"),
         (own("--noise 0,1e-3"), "its own noise"),
         (

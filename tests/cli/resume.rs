@@ -16,15 +16,17 @@ use tempfile::TempDir;
 use crate::folders::names;
 
 /// Two starts; the number of epochs is appended.
-const LONG: &str =
-    "--array 10x6_3x18 --samples 300 --hidden 8 --starts 2 --seed 2 --max-fail 1000000 --min-gradient 0 --epochs";
+const LONG: &str = "--array 10x6_3x18 --samples 300 --hidden 8 --starts 2 --seed 2 --set max-fail=1000000 --set min-gradient=0 --epochs";
 const SHORT: &str = "--array 10x6_3x18 --samples 100 --hidden 4 --seed 5 --epochs 10";
 /// The same settings; the number of epochs is appended.
 const UNTIL: &str = "--array 10x6_3x18 --samples 100 --hidden 4 --seed 5 --epochs";
 
 fn command(arguments: &str, folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
-    command.args(arguments.split_whitespace()).current_dir(folder);
+    command
+        .args(arguments.split_whitespace())
+        .arg("--force")
+        .current_dir(folder);
     command
 }
 
@@ -33,7 +35,10 @@ fn command(arguments: &str, folder: &Path) -> Command {
 fn interruptible(arguments: &str, folder: &Path) -> Command {
     let mut command = Command::new("env");
     command.args(["--default-signal", env!("CARGO_BIN_EXE_decoupler")]);
-    command.args(arguments.split_whitespace()).current_dir(folder);
+    command
+        .args(arguments.split_whitespace())
+        .arg("--force")
+        .current_dir(folder);
     command
 }
 
@@ -134,7 +139,10 @@ fn a_hangup_that_is_ignored_stays_ignored() {
     let mut command = Command::new("env");
     command.args(["--ignore-signal=HUP", env!("CARGO_BIN_EXE_decoupler")]);
     let arguments = format!("train {LONG} 1000000 --checkpoint run.checkpoint --checkpoint-interval 0");
-    command.args(arguments.split_whitespace()).current_dir(folder);
+    command
+        .args(arguments.split_whitespace())
+        .arg("--force")
+        .current_dir(folder);
     let child = begun(command, folder);
     signal("HUP", &child);
     let epochs = || {
@@ -185,7 +193,7 @@ fn interrupted_training_is_resumed(name: &str, code: i32) {
 fn an_interrupted_training_without_a_checkpoint_suggests_one() {
     let folder = tempfile::tempdir().unwrap();
     let interrupted_after = |seconds| {
-        let arguments = "train --epochs 1000000 --max-fail 1000000 --min-gradient 0 --out n.json";
+        let arguments = "train --epochs 1000000 --set max-fail=1000000 --set min-gradient=0 --out n.json";
         let mut command = interruptible(arguments, folder.path());
         let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         thread::sleep(Duration::from_secs(seconds));
@@ -223,7 +231,7 @@ fn an_interrupted_decoding_leaves_no_files() {
             .unwrap()
             .success()
     );
-    let mut command = interruptible("decode --network network.json --input input --output out.csv", folder);
+    let mut command = interruptible("decode --network network.json --data input --out out.csv", folder);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut input = fs::File::options().write(true).open(folder.join("input")).unwrap();
     std::io::Write::write_all(&mut input, format!("{}\n", ["600"; 18].join(",")).as_bytes()).unwrap();
@@ -297,8 +305,8 @@ fn arguments_that_contradict_the_checkpoint_are_refused() {
         ("--array 10x8_4x24", "--array 10×8_4×24: the checkpoint has 10×6_3×18"),
         ("--seed 6", "--seed 6: the checkpoint has 5"),
         ("--samples 200", "--samples 200: the checkpoint has 100"),
-        ("--test-samples 10", "the checkpoint has 100"),
-        ("--validation-samples 10", "the checkpoint has 200"),
+        ("--set test-samples=10", "the checkpoint has 100"),
+        ("--set validation-samples=10", "the checkpoint has 200"),
         ("--starts 2", "--starts 2: the checkpoint has 1"),
         ("--set momentum=0.5", "lm has no such setting"),
         ("--out ./run.checkpoint", "name the same file"),
@@ -391,10 +399,15 @@ fn every_stopping_rule_can_be_given() {
         let report: Value = serde_json::from_str(&json).unwrap();
         report["stop_reason"].as_str().unwrap().to_owned()
     };
-    assert_eq!(stopped("--goal 0.5"), "goal_reached");
-    assert_eq!(stopped("--min-gradient 1000"), "gradient_small");
-    assert_eq!(stopped("--max-fail 1"), "validation_rose");
-    for rule in ["--goal -1", "--goal NaN", "--max-fail 0", "--min-gradient inf"] {
+    assert_eq!(stopped("--set goal=0.5"), "goal_reached");
+    assert_eq!(stopped("--set min-gradient=1000"), "gradient_small");
+    assert_eq!(stopped("--set max-fail=1"), "validation_rose");
+    for rule in [
+        "--set goal=-1",
+        "--set goal=NaN",
+        "--set max-fail=0",
+        "--set min-gradient=inf",
+    ] {
         assert!(
             failure(&format!("train {rule}"), folder.path(), 2).contains("give a"),
             "{rule}"

@@ -81,11 +81,16 @@ impl Specification {
                 in_one_line(&error.to_string())
             ))
         })?;
+        let holds_out = (layout.recording.as_ref()).is_some_and(|plan| plan.division.validation_fraction > 0.0);
+        Self::of(path, layout, holds_out, train)
+    }
+
+    fn of(path: &Path, layout: Layout, holds_out: bool, train: &mut TrainOptions) -> Result<Self, Failure> {
         let mut specification = Self {
             path: path.to_owned(),
             shared: Vec::new(),
             axes: Vec::new(),
-            holds_out: (layout.recording.as_ref()).is_some_and(|plan| plan.division.validation_fraction > 0.0),
+            holds_out,
             recording: layout.recording.map(|plan| plan.within(folder(path)).absolute()),
         };
         if let Some(file) = specification.recording.as_ref().and_then(Plan::irregular) {
@@ -112,24 +117,19 @@ impl Specification {
     pub(super) fn of_arguments(
         recording: Option<Plan>,
         holds_out: bool,
-        axes: &[(String, Vec<String>)],
+        axes: Vec<(String, Vec<String>)>,
         train: &mut TrainOptions,
     ) -> Result<Self, Failure> {
-        let mut specification = Self {
-            path: PathBuf::from("the arguments"),
-            shared: Vec::new(),
-            axes: Vec::new(),
-            recording: recording.map(|plan| plan.absolute()),
-            holds_out,
+        let value = |text: String| text.parse().map_or_else(|_| Value::from(&*text), Value::Number);
+        let axes = axes
+            .into_iter()
+            .map(|(option, values)| (option, values.into_iter().map(value).collect()));
+        let layout = Layout {
+            train: UniqueKeys::default(),
+            axes: UniqueKeys(axes.collect()),
+            recording,
         };
-        for (option, values) in axes {
-            let value = |text: &String| text.parse().map_or_else(|_| Value::from(&**text), Value::Number);
-            let values = values.iter().map(value);
-            let axis = specification.axis(option, &values.collect(), train)?;
-            specification.axes.push(axis);
-        }
-        specification.count()?;
-        Ok(specification)
+        Self::of(Path::new("the arguments"), layout, holds_out, train)
     }
 
     fn axis(&self, option: &str, values: &Value, train: &mut TrainOptions) -> Result<Axis, Failure> {

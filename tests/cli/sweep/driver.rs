@@ -14,7 +14,10 @@ use tempfile::TempDir;
 
 pub(crate) fn command(arguments: &str, folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
-    command.args(arguments.split_whitespace()).current_dir(folder);
+    command
+        .args(arguments.split_whitespace())
+        .arg("--force")
+        .current_dir(folder);
     command
 }
 
