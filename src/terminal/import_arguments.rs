@@ -63,7 +63,7 @@ pub(super) struct ImportArguments {
     /// Join this file: by time (nearest row), or row by row without --time; its columns are prefixed with its stem, as in
     /// states.c2; may be repeated. With several files in --data, first those joined to the first, then those joined to the
     /// second, and so on
-    #[arg(long, value_name = "FILE", requires = "roles", num_args = 1.., value_parser = input, hide_short_help = true)]
+    #[arg(long, value_name = "FILE", requires = "data", num_args = 1.., value_parser = input, hide_short_help = true)]
     join: Vec<PathBuf>,
     /// Columns to be predicted from the inputs
     #[arg(
@@ -256,7 +256,9 @@ impl ImportArguments {
     /// # Errors
     /// If there is no file, or an argument needs targets.
     pub(super) fn only_files(&self) -> Result<Vec<PathBuf>, Failure> {
-        self.refuse_division(|argument| format!("{argument} needs --inputs and --targets"))?;
+        let message = |argument: &str| format!("{argument} needs --inputs and --targets");
+        refuse(&[(!self.join.is_empty(), "--join")], message)?;
+        self.refuse_division(message)?;
         if self.data.is_empty() {
             let message = "--data: name the file to inspect";
             return Err(Failure::Arguments(message.to_owned()));

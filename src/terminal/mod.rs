@@ -33,6 +33,7 @@ use std::{
     ffi::OsString,
     io::Write,
     ops::{RangeBounds, RangeInclusive},
+    path::PathBuf,
     process::ExitCode,
 };
 
@@ -52,12 +53,12 @@ use sweep::Sweep;
 use trade::Trade;
 use train::Train;
 
-/// Opens the window and returns when it is closed.
-pub type Window = fn() -> Result<(), Box<dyn Error>>;
+/// Opens the window with these files, and returns when it is closed.
+pub type Window = fn(Vec<PathBuf>) -> Result<(), Box<dyn Error>>;
 
 /// Decouples flexible tactile sensor arrays with back-propagation networks.
 ///
-/// Without a command it opens the window.
+/// Without a command it opens the window; decoupler FILE… opens it with these files.
 #[derive(Parser)]
 #[command(name = "decoupler", version, max_term_width = 100)]
 struct Arguments {
@@ -97,7 +98,17 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
 
 /// As [`run`], for a program that passes the status on as a number.
 pub fn run_for_status<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, window: Window) -> u8 {
-    let done = match Arguments::try_parse_from(arguments) {
+    let arguments = Vec::from_iter(arguments.into_iter().map(Into::into));
+    let files = arguments.iter().skip(1).map(PathBuf::from);
+    let begins_with_command = arguments.get(1).is_none_or(|word| {
+        let commands = Arguments::command();
+        commands.get_subcommands().any(|command| *command.get_name() == **word)
+    });
+    let done = match Arguments::try_parse_from(&arguments) {
+        // Only files, and no command.
+        Err(_) if !begins_with_command && files.clone().all(|file| file.exists()) => {
+            window(files.collect()).map_err(Failure::Window)
+        }
         Ok(arguments) => arguments.run(window),
         // Help and version are not errors; a closed output needs neither.
         Err(message) if matches!(message.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
@@ -143,7 +154,7 @@ impl Arguments {
                 Ok(())
             }
             None => {
-                window().map_err(Failure::Window)?;
+                window(Vec::new()).map_err(Failure::Window)?;
                 // A file that takes too long to write is not left incomplete.
                 exit_leaving_nothing(0)
             }

@@ -37,7 +37,7 @@ pub(super) struct OutputArguments {
     #[arg(short, long, global = true, hide_short_help = true)]
     quiet: bool,
     /// Replace files that exist
-    #[arg(long, global = true, hide_short_help = true)]
+    #[arg(long, global = true, overrides_with = "force", hide_short_help = true)]
     force: bool,
 }
 

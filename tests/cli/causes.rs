@@ -132,10 +132,10 @@ fn an_untrained_network_is_reported_with_cause_and_remedy() {
     ];
     for (arguments, cause, cure) in cases {
         let arguments = format!("{SMALL} {arguments}");
-        let text = String::from_utf8(decoupler(&arguments, folder.path()).stdout).unwrap();
+        let text = String::from_utf8(decoupler(&arguments, folder.path()).stderr).unwrap();
         let line = text
             .lines()
-            .find(|line| line.starts_with("Warning: ") && line.contains(cause));
+            .find(|line| line.starts_with("warning: ") && line.contains(cause));
         assert!(line.is_some_and(|line| line.contains(cure)), "{arguments}: {text}");
         let json = decoupler(&format!("{arguments} --json"), folder.path()).stdout;
         let json: Value = serde_json::from_slice(&json).unwrap();

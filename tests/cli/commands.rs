@@ -29,7 +29,8 @@ fn failure(arguments: &str, folder: &Path, status: i32) -> String {
 fn success(arguments: &str, folder: &Path) -> String {
     let output = decoupler(arguments, folder);
     let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && errors.is_empty(), "{arguments}: {errors}");
+    let are_warnings = errors.lines().all(|line| line.starts_with("warning: "));
+    assert!(output.status.success() && are_warnings, "{arguments}: {errors}");
     String::from_utf8(output.stdout).unwrap()
 }
 
@@ -77,10 +78,10 @@ fn invalid_arguments_end_with_status_2() {
     let cases = [
         ("train --hidden 0", "from 1 to 512"),
         ("train --hidden twelve", "from 1 to 512"),
-        ("train --samples 0", "from 1 to 1000000"),
-        ("train --samples -5", "from 1 to 1000000"),
+        ("train --samples 0", "from 1 to 1e6"),
+        ("train --samples -5", "from 1 to 1e6"),
         ("train --set test-samples=0", "from 1"),
-        ("train --set validation-samples=1000001", "from 0 to 1000000"),
+        ("train --set validation-samples=1000001", "from 0 to 1e6"),
         ("train --epochs 0", "from 1"),
         ("train --seed -1", "from 0"),
         ("train --seed 18446744073709551616", "from 0"),

@@ -96,66 +96,6 @@ fn a_network_is_read_once_also_from_a_pipe() {
     assert_eq!(lines(folder.path(), "out.csv").len(), 9);
 }
 
-#[test]
-fn an_incomplete_table_does_not_replace_a_larger_one() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    fs::write(
-        folder.join("sweep.json"),
-        r#"{"train": {"array": "10x6_3x18", "samples": 100, "epochs": 2, "decoder": ["ridge"]}, "axes": {"hidden": [2, 3], "seed": [0, 1]}}"#,
-    )
-    .unwrap();
-    succeed("sweep --spec sweep.json --out runs", folder);
-    for table in ["table.csv", "table.json"] {
-        succeed(&format!("sweep --merge runs --out {table}"), folder);
-    }
-    let trial = names(&folder.join("runs")).into_iter().next();
-    fs::remove_file(folder.join("runs").join(trial.unwrap())).unwrap();
-    for table in ["table.csv", "table.json"] {
-        let before = fs::read(folder.join(table)).unwrap();
-        let output = decoupler(&format!("sweep --merge runs --spec sweep.json --out {table}"), folder);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{message}");
-        assert!(
-            message.contains("the table there has more trials, or cannot be read, and is left as it is"),
-            "{message}"
-        );
-        assert_eq!(fs::read(folder.join(table)).unwrap(), before, "{table}");
-    }
-    let output = decoupler("sweep --merge runs --spec sweep.json --out new.csv", folder);
-    assert!(output.status.code() == Some(1) && lines(folder, "new.csv").len() == 4);
-}
-
-#[test]
-fn an_incomplete_table_does_not_replace_one_that_cannot_be_read() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    let specification = r#"{"train": {"array": "10x6_3x18", "samples": 100, "epochs": 2, "decoder": ["ridge"]}, "axes": {"seed": [0, 1]}}"#;
-    fs::write(folder.join("sweep.json"), specification).unwrap();
-    succeed("sweep --spec sweep.json --out runs", folder);
-    for table in ["table.csv", "table.json"] {
-        succeed(&format!("sweep --merge runs --out {table}"), folder);
-    }
-    let runs = folder.join("runs");
-    let mut trials = names(&runs).into_iter();
-    fs::remove_file(runs.join(trials.next().unwrap())).unwrap();
-    // A number of cells that changes, and a text that is cut off.
-    for (table, damage) in [("table.csv", "1,2\n"), ("table.json", "")] {
-        let path = folder.join(table);
-        let whole = fs::read_to_string(&path).unwrap();
-        let damaged = match damage {
-            "" => whole[..whole.len() - 10].to_owned(),
-            line => whole.lines().next().unwrap().to_owned() + "\n" + line,
-        };
-        fs::write(&path, &damaged).unwrap();
-        let output = decoupler(&format!("sweep --merge runs --spec sweep.json --out {table}"), folder);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{message}");
-        assert!(message.contains("cannot be read, and is left as it is"), "{message}");
-        assert_eq!(fs::read_to_string(&path).unwrap(), damaged, "{table}");
-    }
-}
-
 fn export(folder: &Path, variable: (&str, &Path)) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
     command.args("export --network n.json --format c99 --out bundle".split(' '));

@@ -103,7 +103,7 @@ fn a_file_or_pipe_is_decoded_as_by_decode() {
         report.contains("40 lines decoded") && report.contains("0 bad, 0 dropped; latency p50"),
         "{report}"
     );
-    assert!(report.contains("trained without noise; give --noise"), "{report}");
+    assert!(report.contains("trained without noise; give --fault-noise"), "{report}");
     // Without names, in order; row numbers are not needed.
     let lines = device_lines(&folder);
     let plain = lines.iter().map(|line| line.split_once(',').unwrap().1.to_owned());

@@ -9,7 +9,7 @@ use tempfile::TempDir;
 
 use crate::{printed::success, terminal::decoupler};
 
-const DATA: &str = "--data skin.csv --inputs c1..c3 --targets c4,c5 --unit c4=mm --unit c5=N";
+const DATA: &str = "--data skin.csv --inputs c1..c3 --targets c4,c5";
 
 /// Three readings of a position and a force, neither of which is an affine function of the readings.
 fn recording() -> TempDir {
@@ -168,7 +168,6 @@ fn options_of_a_simulated_sensor_are_refused_and_vice_versa() {
             own("--decoder ridge,newton"),
             "--decoder newton: it solves the equations of a simulated array",
         ),
-        (own("--folds 3"), "on the test samples"),
         (own("--rows known"), "--row-wire"),
         ("trade --method lm".to_owned(), "the presets name the methods"),
         ("trade --split time".to_owned(), "--split needs --data"),

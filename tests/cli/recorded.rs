@@ -412,11 +412,7 @@ fn options_that_need_targets_are_refused_without_them() {
         ("inspect", "--data: name the file"),
         (
             "inspect --data r.csv --inputs a --targets x --test-data r.csv",
-            "leave the test files out",
-        ),
-        (
-            "inspect --data r.csv --inputs a --targets x --folds 9",
-            "analysed in five folds",
+            "--test-data: a recording is analysed by cross-validation",
         ),
         (
             "inspect --data r.csv --inputs a --targets x --test-fraction 0.3",

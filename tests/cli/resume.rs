@@ -49,7 +49,8 @@ fn run(arguments: &str, folder: &Path) -> Output {
 fn success(arguments: &str, folder: &Path) -> String {
     let output = run(arguments, folder);
     let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && errors.is_empty(), "{arguments}: {errors}");
+    let are_warnings = errors.lines().all(|line| line.starts_with("warning: "));
+    assert!(output.status.success() && are_warnings, "{arguments}: {errors}");
     String::from_utf8(output.stdout).unwrap()
 }
 
@@ -360,14 +361,7 @@ fn threads_and_the_terminal_give_identical_networks() {
 fn the_spread_of_the_starts_is_shown_and_the_best_is_kept() {
     let folder = tempfile::tempdir().unwrap();
     let text = success(&format!("train {SHORT} --starts 4"), folder.path());
-    for words in [
-        "4 starts, of which number",
-        "median",
-        "test Z %",
-        "validation mse",
-        "quartiles",
-        "* the one kept",
-    ] {
+    for words in ["Start", "validation mse", "with the lowest error, is kept"] {
         assert!(text.contains(words), "{words}: {text}");
     }
     let json = success(&format!("train {SHORT} --starts 4 --json"), folder.path());

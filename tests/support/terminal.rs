@@ -59,7 +59,7 @@ pub(crate) fn decoupler(arguments: &str, folder: &Path) -> Output {
     }
     // The share that is otherwise held out for these methods.
     let method = rest.iter().position(|word| *word == "--method");
-    if method.is_some_and(|place| rest[place + 1] != "br") && !inspect.contains(&"--validation-fraction") {
+    if method.is_some_and(|place| !rest[place + 1].contains("br")) && !inspect.contains(&"--validation-fraction") {
         inspect.extend(["--validation-fraction", "0.2"]);
     }
     let recipe = match inspect.iter().position(|word| *word == "--recipe-out") {

@@ -58,7 +58,7 @@ use crate::terminal::{
 #[derive(Args)]
 pub(in crate::terminal) struct Sweep {
     /// Specification of the trials, as JSON
-    #[arg(long, value_name = "FILE", value_parser = input, required_unless_present_any = ["merge", "axes"])]
+    #[arg(long, value_name = "FILE", value_parser = input, required_unless_present_any = ["merge", "varied"])]
     spec: Option<PathBuf>,
     #[command(flatten)]
     given: SweepArguments,
@@ -385,10 +385,10 @@ pub(super) struct SweepArguments {
     )]
     inputs: Vec<String>,
     /// Number of consecutive seeds [default: 1]
-    #[arg(long, value_name = "N", value_parser = count(1..=1000), requires = "axes", conflicts_with = "spec")]
+    #[arg(long, value_name = "N", value_parser = count(1..=1000), requires = "varied", conflicts_with = "spec")]
     seeds: Option<usize>,
     /// First seed [default: 0]
-    #[arg(long, value_name = "SEED", value_parser = seed, requires = "axes", conflicts_with = "spec")]
+    #[arg(long, value_name = "SEED", value_parser = seed, requires = "varied", conflicts_with = "spec")]
     seed: Option<u64>,
     #[command(flatten)]
     import: ImportArguments,
@@ -408,7 +408,7 @@ impl Axes {
 
 impl Args for Axes {
     fn augment_args(command: Command) -> Command {
-        let group = ArgGroup::new("axes")
+        let group = ArgGroup::new("varied")
             .multiple(true)
             .conflicts_with_all(["spec", "merge"]);
         let group = group.args(Self::offered().map(|(word, _)| word));

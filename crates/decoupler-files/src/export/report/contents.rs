@@ -121,6 +121,13 @@ impl RunReport<'_> {
                  a network has to beat."
             }),
         ]);
+        let model_based = file.scores.baselines.model_based.as_ref().and_then(TestErrors::nodes);
+        if model_based.is_some_and(Errors::is_rounding) {
+            blocks.push(Block::dim(
+                "The model-based error is nothing but rounding: the readings determine the deformation, and no ratio to it \
+                 is given.",
+            ));
+        }
         if !decoders.is_empty() {
             let model_based = file.scores.baselines.model_based.as_ref();
             blocks.extend([
@@ -263,12 +270,6 @@ impl RunReport<'_> {
             ));
         }
         remarks.extend(baselines.model_based_note().map(str::to_owned));
-        let model_based = baselines.model_based.as_ref().and_then(TestErrors::nodes);
-        if model_based.is_some_and(Errors::is_rounding) {
-            let text = "the model-based error is nothing but rounding: the readings determine the deformation, and no \
-                        ratio to it is given";
-            remarks.push(text.to_owned());
-        }
         remarks
     }
 
