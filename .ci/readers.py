@@ -333,10 +333,14 @@ def train_on_series(name):
     columns = np.column_stack([times, group, rows, readings, force])
     np.savetxt(path, columns, delimiter=",", header="t,press,row,a,b,force", comments="", fmt="%.17g")
     arguments = ["--data", path, "--time", "t", "--group", "press", "--inputs", "a,b", "--targets", "force"]
-    arguments += ["--history", "0.1s,1s,50", "--lags", "3,0.2s", "--differences", "--hidden", 4, "--starts", 1, "--epochs", 20]
+    arguments += ["--history", "0.1s,1s,50", "--lags", "3,0.2s", "--differences"]
+    training = ["--hidden", 4, "--starts", 1, "--epochs", 20]
     if name == "pastrows":
-        arguments += ["--row-wire", "row", "--rows", "known"]
-    run(PROGRAM, "train", *arguments, "--out", HOME / name / "network.json", "--json")
+        arguments += ["--row-wire", "row"]
+        training += ["--rows", "known"]
+    recipe = HOME / name / "recipe.json"
+    run(PROGRAM, "inspect", *arguments, "--recipe-out", recipe)
+    run(PROGRAM, "train", "--recipe", recipe, *training, "--out", HOME / name / "network.json", "--json")
     decoded = decoded_columns(name, path, ["force"])
     return Samples(readings, rows if name == "pastrows" else None, group, times, decoded)
 
