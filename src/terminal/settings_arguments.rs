@@ -108,7 +108,7 @@ fn argument(option: &'static RunOption) -> Arg {
         .help_heading(heading)
         .hide_short_help(!USUAL.contains(&setting.name));
     match setting.name {
-        "inputs" => argument.value_delimiter(','),
+        "inputs" => argument.value_delimiter(',').action(ArgAction::Append),
         _ => argument.value_parser(move |text: &str| parsed(option, text)),
     }
 }

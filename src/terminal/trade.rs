@@ -88,8 +88,9 @@ impl Case {
 impl Trade {
     pub(super) fn run(self) -> Result<(), Failure> {
         let cases = self.cases()?;
+        let simulation = cases.first().and_then(|case| case.setup.settings().simulation());
         let mut trade_off = TradeOff {
-            source: TradeSource::Array(self.scene.settings_at(Preset::default(), 0.0)?.drawn()?.sensor.scale),
+            source: TradeSource::Array(simulation.map_or_else(ArrayScale::default, |source| source.sensor.scale)),
             levels: Vec::new(),
         };
         let bar = progress_bar(cases.len(), "{bar:30} {pos} of {len}, {msg}, {elapsed}");

@@ -62,7 +62,7 @@ pub(super) struct Train {
     #[command(flatten)]
     pub(super) checkpoint: CheckpointArguments,
     /// Test on every sample by cross-validation with this many folds, divided by --split
-    #[arg(long, value_name = "K", conflicts_with = "test_data", hide_short_help = true, help_heading = RARELY)]
+    #[arg(long, value_name = "K", conflicts_with_all = ["test_data", "resume"], hide_short_help = true, help_heading = RARELY)]
     pub(super) folds: Option<usize>,
     /// Time on one core that a choice of settings (--hidden auto) and the training may take, estimated from their work, so
     /// that the choice is the same on every machine [default: 60]

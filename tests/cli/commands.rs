@@ -79,7 +79,7 @@ fn invalid_arguments_end_with_status_2() {
         ("train --hidden 0", "from 1 to 512"),
         ("train --hidden twelve", "from 1 to 512"),
         ("train --samples 0", "from 1 to 1e6"),
-        ("train --samples -5", "from 1 to 1e6"),
+        ("train --samples -5", "not a whole number"),
         ("train --set test-samples=0", "from 1"),
         ("train --set validation-samples=1000001", "from 0 to 1e6"),
         ("train --epochs 0", "from 1"),

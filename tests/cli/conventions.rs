@@ -68,7 +68,7 @@ const OBJECTS: [&str; 16] = [
     "inspect @recording",
     "inspect @recording --recipe-out recipe.json",
     "decode --network n.json --data readings.csv --out decoded.csv",
-    "decode --network recording.json --data data.csv --out decoded.csv",
+    "decode --network recording.json --data data.csv --out own.csv",
     "simulate --array 2x2_2x6 --samples 4 --out drawn.csv",
     "export --network n.json --format numpy --out bundle",
     "calibrate --array 2x2_2x6 @frames",

@@ -264,14 +264,14 @@ fn more_epochs_and_another_method_continue_from_the_current_weights() {
         .unwrap()
         .0;
     let text = success(&format!("{RESUME} --epochs 20 --out more.json"), folder);
-    assert!(text.contains("Ended after 20 epochs"), "{text}");
+    assert!(text.contains("Trained for 20 epochs"), "{text}");
     success(&format!("train {UNTIL} 20 --method gdm --out whole.json"), folder);
     assert_eq!(network(&folder.join("more.json")), network(&folder.join("whole.json")));
     // Momentum first, Levenberg-Marquardt to finish.
     let line = format!("{RESUME} --method lm --set mu=0.1 --epochs 25 --out network.json");
     let text = success(&line, folder);
     assert!(
-        text.contains("Momentum, Eq. (11)") && text.contains("From epoch 21 Levenberg-Marquardt"),
+        text.contains("Momentum, Eq. (11)") && text.contains("from epoch 21: Levenberg-Marquardt"),
         "{text}"
     );
     let file = network(&folder.join("network.json"));
@@ -303,7 +303,7 @@ fn arguments_that_contradict_the_checkpoint_are_refused() {
     let bytes = fs::read(folder.join("run.checkpoint")).unwrap();
     let cases = [
         ("--hidden 5", "--hidden 5: the checkpoint has 4"),
-        ("--array 10x8_4x24", "--array 10×8_4×24: the checkpoint has 10×6_3×18"),
+        ("--array 10x8_4x24", "--array 10x8_4x24: the checkpoint has 10x6_3x18"),
         ("--seed 6", "--seed 6: the checkpoint has 5"),
         ("--samples 200", "--samples 200: the checkpoint has 100"),
         ("--set test-samples=10", "the checkpoint has 100"),
@@ -403,7 +403,7 @@ fn every_stopping_rule_can_be_given() {
         "--set min-gradient=inf",
     ] {
         assert!(
-            failure(&format!("train {rule}"), folder.path(), 2).contains("give a"),
+            failure(&format!("train {rule}"), folder.path(), 2).contains("it must be"),
             "{rule}"
         );
     }

@@ -29,7 +29,8 @@ pub(crate) fn success(arguments: &str, folder: &Path) -> String {
     let output = run(arguments, folder);
     let errors = String::from_utf8_lossy(&output.stderr);
     // The recordings here are short.
-    let is_note = |line: &str| line.starts_with("Drift of the readings is not monitored");
+    let is_note =
+        |line: &str| line.starts_with("Drift of the readings is not monitored") || line.starts_with("warning: ");
     assert!(
         output.status.success() && errors.lines().all(is_note),
         "{arguments}: {errors}"
