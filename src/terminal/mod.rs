@@ -253,7 +253,7 @@ mod tests {
             ("train --array 10x6", "10x10_5x30"),
             ("train --method sgd", "lm, br, scg"),
             ("train extra", "unexpected argument 'extra'"),
-            ("decode --network n", "--input <FILE> --output <FILE>"),
+            ("decode --network n", "--data <FILE> --out <FILE>"),
             ("trian", "unrecognized subcommand 'trian'"),
             ("train --seed", "a value is required"),
         ];
