@@ -42,6 +42,7 @@ use super::{
 /// arguments of train --data, it measures on held-out samples how well the readings determine each target, by ridge and kernel
 /// ridge regression and with confidence intervals, how optimistic a random split would be, and what may be a leak.
 #[derive(Args)]
+#[command(allow_negative_numbers = true)]
 pub(super) struct Inspect {
     #[command(flatten)]
     import: ImportArguments,

@@ -271,7 +271,10 @@ impl Command {
 }
 
 fn add(options: &mut String, name: &str, value: impl fmt::Display) {
-    *options += &format!(" --{name} {}", quoted(Path::new(&value.to_string())));
+    let value = value.to_string();
+    // Otherwise it would be taken for an option.
+    let between = if value.starts_with('-') { "=" } else { " " };
+    *options += &format!(" --{name}{between}{}", quoted(Path::new(&value)));
 }
 
 #[cfg(test)]
