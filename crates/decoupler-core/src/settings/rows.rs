@@ -147,7 +147,7 @@ impl<S: Clone> Setting<S> {
             }
             (Some(Field::Integer(field)), Value::Integer(value)) => *field = *value,
             (Some(Field::Optional(field)), Value::Integer(value)) => {
-                *field = Some((*value).try_into().unwrap_or(u8::MAX))
+                *field = Some((*value).try_into().unwrap_or(u8::MAX));
             }
             (Some(Field::Text(_, read)), Value::Text(text)) => {
                 read(text).map_err(|message| self.refusal(message))?;
