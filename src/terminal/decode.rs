@@ -75,7 +75,7 @@ impl Decode {
             let file = NetworkFile::load(&self.network)?;
             return self.follow.run(self.data.as_ref().unwrap_or(&standard_input), file);
         };
-        let data = input(&data.to_string_lossy()).map_or_else(|_| data.clone(), |path| path);
+        let data = input(&data.to_string_lossy()).unwrap_or_else(|_| data.clone());
         for (name, path) in [("data", &data), ("network", &self.network)] {
             if is_same(path, out) {
                 let message = format!("--{name} and --out name the same file: give the output another name");
