@@ -307,7 +307,7 @@ def train_on_own_data():
 def decoded_columns(name, path, targets, *options):
     """The answers of the program to a file."""
     out = HOME / name / "decoded.csv"
-    run(PROGRAM, "decode", "--network", HOME / name / "network.json", "--input", path, "--output", out, *options)
+    run(PROGRAM, "decode", "--network", HOME / name / "network.json", "--data", path, "--out", out, *options)
     with open(out) as file:
         lines = list(csv.DictReader(file))
     find = lambda target: next(key for key in lines[0] if key.split(" (")[0] == target)
@@ -333,10 +333,14 @@ def train_on_series(name):
     columns = np.column_stack([times, group, rows, readings, force])
     np.savetxt(path, columns, delimiter=",", header="t,press,row,a,b,force", comments="", fmt="%.17g")
     arguments = ["--data", path, "--time", "t", "--group", "press", "--inputs", "a,b", "--targets", "force"]
-    arguments += ["--memory", "0.1s,1s,50", "--lags", "3,0.2s", "--differences", "--hidden", 4, "--starts", 1, "--epochs", 20]
+    arguments += ["--history", "0.1s,1s,50", "--lags", "3,0.2s", "--differences"]
+    training = ["--hidden", 4, "--starts", 1, "--epochs", 20]
     if name == "pastrows":
-        arguments += ["--row-wire", "row", "--rows", "known"]
-    run(PROGRAM, "train", *arguments, "--out", HOME / name / "network.json", "--json")
+        arguments += ["--row-wire", "row"]
+        training += ["--rows", "known"]
+    recipe = HOME / name / "recipe.json"
+    run(PROGRAM, "inspect", *arguments, "--recipe-out", recipe)
+    run(PROGRAM, "train", "--recipe", recipe, *training, "--out", HOME / name / "network.json", "--json")
     decoded = decoded_columns(name, path, ["force"])
     return Samples(readings, rows if name == "pastrows" else None, group, times, decoded)
 

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    decoupler::terminal::run(std::env::args_os(), || Ok(decoupler::window::open()?))
+    decoupler::terminal::run(std::env::args_os(), |files| Ok(decoupler::window::open(files)?))
 }

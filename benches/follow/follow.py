@@ -36,7 +36,7 @@ class Decoder:
         self.master, slave = os.openpty()
         tty.setraw(self.master)
         tty.setraw(slave)
-        command = [PROGRAM, "decode", "--network", network, "--follow", "--input", f"{os.ttyname(slave)}:115200"]
+        command = [PROGRAM, "decode", "--network", network, "--follow", "--data", f"{os.ttyname(slave)}:115200"]
         # A shell makes its background processes ignore interrupts.
         listens = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=listens)

@@ -60,7 +60,7 @@ def import_recording(recipe: Path, *, seed: int = 0) -> Recording:
     Parameters
     ----------
     recipe : path-like
-        Recipe written by ``decoupler train --save-recipe``, by the window, or by hand. Its paths
+        Recipe written by ``decoupler inspect --recipe-out``, by the window, or by hand. Its paths
         are relative to its folder.
     seed : int, default=0
         Seed of a division by groups or at random.

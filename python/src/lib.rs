@@ -25,7 +25,7 @@ use pyo3::prelude::*;
 /// Runs the program with these arguments, the first being its name, and returns its exit status.
 #[pyfunction]
 fn run_program(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
-    py.detach(|| decoupler::terminal::run_for_status(arguments, || Ok(decoupler::window::open()?)))
+    py.detach(|| decoupler::terminal::run_for_status(arguments, |files| Ok(decoupler::window::open(files)?)))
 }
 
 /// See the documentation of the crate.

@@ -68,15 +68,15 @@ def trained(folder, *settings):
                 "3",
                 "--method",
                 "lm",
-                "--combine",
-                "mean",
+                "--set",
+                "combine=mean",
                 "--starts",
                 "2",
             ],
         ),
         (
             {"begin": "ridge", "epochs": 20, "method_settings": {"mu_decrease": 0.5}},
-            ["--begin", "ridge", "--epochs", "20", "--method", "lm", "--set", "mu-decrease=0.5"],
+            ["--set", "begin=ridge", "--epochs", "20", "--method", "lm", "--set", "mu-decrease=0.5"],
         ),
     ],
     ids=lambda value: "" if isinstance(value, list) else str(value),
@@ -98,10 +98,10 @@ def test_the_simulated_run_of_the_program_has_the_same_bits(folder, small):
     sizes = [
         "--samples",
         "200",
-        "--validation-samples",
-        "40",
-        "--test-samples",
-        "40",
+        "--set",
+        "validation-samples=40",
+        "--set",
+        "test-samples=40",
         "--seed",
         "3",
     ]
@@ -237,7 +237,7 @@ def test_a_recording_is_imported_with_the_division_of_the_program(folder, record
 
 def test_a_network_with_a_memory_decodes_consecutive_samples(folder, recorded):
     _, test = recorded
-    file = trained(folder, "--lags", "1,2", "--method", "lm", "--epochs", "10", "--hidden", "3")
+    file = trained(folder, "--history", "1,2", "--method", "lm", "--epochs", "10", "--hidden", "3")
     answers = file.predict(test[NAMES].to_numpy())
     assert answers.shape == (60, 2)
     # The first sample has no past, so it is not decoded as in the middle of the stream.
@@ -257,11 +257,13 @@ def test_a_memory_continues_as_in_the_program(tmp_path):
     table = pd.DataFrame({"time": times, "press": groups, "row": wires + 1, "u": u, "force": np.roll(u, 6)})
     table.to_csv(tmp_path / "train.csv", index=False)
     columns = ["--time", "time", "--group", "press", "--row-wire", "row", "--inputs", "u", "--targets", "force"]
-    training = ["--lags", "2", "--memory", "0.5s", "--hidden", "3", "--epochs", "20", "--out", "network.json"]
-    done = program("train", "--data", "train.csv", *columns, *training, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    past = ["--lags", "2", "--history", "0.5s", "--recipe-out", "recipe.json"]
+    training = ["--recipe", "recipe.json", "--hidden", "3", "--epochs", "20", "--out", "network.json"]
+    for arguments in [["inspect", "--data", "train.csv", *columns, *past], ["train", *training]]:
+        done = program(*arguments, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
     done = program(
-        "decode", "--network", "network.json", "--input", "train.csv", "--output", "decoded.csv", cwd=tmp_path
+        "decode", "--network", "network.json", "--data", "train.csv", "--out", "decoded.csv", cwd=tmp_path
     )
     assert done.returncode == 0, done.stderr
     expected = pd.read_csv(tmp_path / "decoded.csv")["force"]

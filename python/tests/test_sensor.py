@@ -118,7 +118,7 @@ def test_test_samples_are_those_of_the_program(scene):
 def test_errors_are_those_of_the_program(tmp_path, small):
     """The program's network, decoded and measured here, has the errors in its output."""
     file = tmp_path / "network.json"
-    sizes = ["--samples", "200", "--validation-samples", "40", "--test-samples", "40"]
+    sizes = ["--samples", "200", "--set", "validation-samples=40", "--set", "test-samples=40"]
     settings = ["--seed", "3", "--hidden", "4", "--epochs", "15", "--decoder", "mean"]
     done = program("train", "--array", "4x4_2x12", *sizes, *settings, "--out", file, "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -1,19 +1,19 @@
-use std::{io::Write, path::PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use serde::Serialize;
+use serde_json::json;
 
 use super::{
     decode::FrameArguments,
     failure::Failure,
-    output::{print, print_object},
+    output::{check_output, input, output, print, warn},
 };
 use decoupler_core::{
-    calibration::{Calibration, SensorParameter},
+    calibration::{CalibratedParameter, Calibration},
     sensor::{ArrayScale, SensorModel},
     text::counted,
 };
-use decoupler_files::export::{SensorFile, check_writable, format_number};
+use decoupler_files::export::{SensorFile, format_number};
 
 /// Fit geometry and resistivity of a sensor to frames of known presses
 ///
@@ -28,69 +28,52 @@ pub(super) struct Calibrate {
     #[arg(long, value_name = "SCALE", default_value = "10x10_5x30", conflicts_with = "sensor")]
     array: ArrayScale,
     /// Nominal sensor model from a file written by --out, instead of --array
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = input)]
     sensor: Option<PathBuf>,
     #[command(flatten)]
     frames: FrameArguments,
     /// File for the calibrated sensor model
-    #[arg(long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = output)]
     out: Option<PathBuf>,
-    /// Print one JSON object instead of text
-    #[arg(long)]
-    json: bool,
-}
-
-/// The object printed by `calibrate --json`.
-#[derive(Serialize)]
-struct Report {
-    frames: usize,
-    readings: usize,
-    parameters: Vec<Parameter>,
-    /// Root mean square of the relative errors of the resistances.
-    nominal_residual: f64,
-    residual: f64,
-    warnings: Vec<String>,
-    sensor: SensorModel,
-}
-
-#[derive(Serialize)]
-struct Parameter {
-    name: SensorParameterName,
-    unit: &'static str,
-    nominal: f64,
-    value: f64,
-    /// Half-width of the interval; absent if the frames do not determine the parameter.
-    half_width: Option<f64>,
-}
-
-/// A parameter, serialised by its name.
-struct SensorParameterName(SensorParameter);
-
-impl Serialize for SensorParameterName {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(&self.0)
-    }
 }
 
 impl Calibrate {
     pub(super) fn run(self) -> Result<(), Failure> {
         if let Some(path) = &self.out {
-            check_writable(path)?;
+            check_output("--out", path)?;
         }
         let nominal = match &self.sensor {
             Some(path) => SensorFile::load(path)?,
             None => SensorModel::new(self.array),
         };
-        let frames = self.frames.read(&nominal, None, self.json)?;
+        let frames = self.frames.read(&nominal, None)?;
         let calibration = Calibration::fit(&nominal, &frames)?;
         if let Some(path) = &self.out {
             SensorFile::save(&calibration.model, path)?;
         }
+        calibration.warnings.iter().for_each(warn);
         let snapshots = frames.snapshots().len();
-        if self.json {
-            return print_object(&Report::of(&calibration, snapshots));
-        }
-        print(|out| {
+        let parameter = |fitted: &CalibratedParameter| {
+            let parameter = fitted.parameter;
+            json!({
+                "name": parameter.to_string(),
+                "unit": parameter.unit(),
+                "nominal": fitted.nominal,
+                "value": fitted.value,
+                "half_width": fitted.half_width,
+            })
+        };
+        let object = || {
+            json!({
+                "frames": snapshots,
+                "readings": calibration.readings,
+                "parameters": Vec::from_iter(calibration.parameters.iter().map(parameter)),
+                "nominal_residual": calibration.nominal_residual,
+                "residual": calibration.residual,
+                "sensor": calibration.model,
+            })
+        };
+        print(object, |out| {
             writeln!(
                 out,
                 "{} of {} in {}",
@@ -107,9 +90,6 @@ impl Calibrate {
                 format_number(calibration.nominal_residual),
                 format_number(calibration.residual)
             )?;
-            for warning in &calibration.warnings {
-                writeln!(out, "Warning: {warning}")?;
-            }
             match &self.out {
                 Some(path) => writeln!(
                     out,
@@ -119,26 +99,5 @@ impl Calibrate {
                 None => Ok(()),
             }
         })
-    }
-}
-
-impl Report {
-    fn of(calibration: &Calibration, frames: usize) -> Self {
-        let parameter = |fitted: &decoupler_core::calibration::CalibratedParameter| Parameter {
-            name: SensorParameterName(fitted.parameter),
-            unit: fitted.parameter.unit(),
-            nominal: fitted.nominal,
-            value: fitted.value,
-            half_width: fitted.half_width,
-        };
-        Self {
-            frames,
-            readings: calibration.readings,
-            parameters: calibration.parameters.iter().map(parameter).collect(),
-            nominal_residual: calibration.nominal_residual,
-            residual: calibration.residual,
-            warnings: calibration.warnings.clone(),
-            sensor: calibration.model,
-        }
     }
 }

@@ -19,22 +19,21 @@ use decoupler_core::{
     training::StoppingRules,
 };
 use decoupler_files::{
-    export::{
-        AtomicFile, NetworkFile, WriteError, check_writable, csv_cell, format_number, is_same, write_csv_row,
-        write_decoded, write_decoded_header,
-    },
+    export::{AtomicFile, NetworkFile, WriteError, format_number, is_same, write_csv_row, write_decoded_header},
+    import::KeptCell,
+    live::Answer,
     machine::memory_budget,
 };
 use glam::DVec3;
-use ndarray::{Array2, ArrayView1};
-use serde::Serialize;
+use ndarray::Array2;
+use serde_json::json;
 
 use super::{
     failure::Failure,
-    follow::Follow,
+    follow::{Answers, Follow, Form},
     import_arguments::ImportArguments,
     intervals::DriftWarnings,
-    output::{messages, print, print_object, progress_bar, read},
+    output::{check_output, input, output, print, progress_bar, read, warn},
     samples::{with_bar, working_folder},
 };
 
@@ -58,95 +57,81 @@ use super::{
 #[derive(Args)]
 pub(super) struct Decode {
     /// Network saved by train --out or by the window
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = input)]
     network: PathBuf,
-    /// CSV file of resistances in ohm; with --follow also -, the default, DEVICE:BAUD or tcp:HOST:PORT
+    /// File of readings, for an array a CSV file of resistances in ohm; - is standard input. With --follow also
+    /// DEVICE:BAUD or tcp:HOST:PORT, and - is the default
     #[arg(long, value_name = "FILE", required_unless_present = "follow")]
-    input: Option<PathBuf>,
-    /// CSV file to write, with coordinates in mm
-    #[arg(long, value_name = "FILE", required_unless_present = "follow")]
-    output: Option<PathBuf>,
+    data: Option<PathBuf>,
+    /// CSV file to write, for an array with coordinates in mm; - is standard output
+    #[arg(short, long, value_name = "FILE", required_unless_present = "follow", value_parser = output)]
+    out: Option<PathBuf>,
     #[command(flatten)]
     follow: Follow,
 }
 
 impl Decode {
     pub(super) fn run(self) -> Result<(), Failure> {
-        if let Some((input, output)) = self.input.as_ref().zip(self.output.as_ref()) {
-            self.check_output(input, output)?;
-        }
-        let file = NetworkFile::load(&self.network)?;
-        match (&self.input, &self.output) {
-            (Some(input), Some(output)) if !self.follow.follow => decode_file(&file, input, output),
-            (input, _) => {
-                let standard_input = Path::new("-");
-                self.follow.run(input.as_deref().unwrap_or(standard_input), file)
-            }
-        }
-    }
-
-    /// Checks that the output does not overwrite an input.
-    fn check_output(&self, input: &Path, output: &Path) -> Result<(), Failure> {
-        for (name, path) in [("input", input), ("network", &self.network)] {
-            if is_same(path, output) {
-                let message = format!("--{name} and --output name the same file: give the output another name");
+        let standard_input = PathBuf::from("-");
+        let (Some(data), Some(out), false) = (&self.data, &self.out, self.follow.follow) else {
+            let file = NetworkFile::load(&self.network)?;
+            return self.follow.run(self.data.as_ref().unwrap_or(&standard_input), file);
+        };
+        let data = input(&data.to_string_lossy()).unwrap_or_else(|_| data.clone());
+        for (name, path) in [("data", &data), ("network", &self.network)] {
+            if is_same(path, out) {
+                let message = format!("--{name} and --out name the same file: give the output another name");
                 return Err(Failure::Arguments(message));
             }
         }
-        Ok(())
+        check_output("--out", out)?;
+        decode_file(&NetworkFile::load(&self.network)?, &data, out)
     }
 }
 
 /// Decodes the file `input` into the file `output`.
 fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Failure> {
-    let mut written = AtomicFile::create(output)?;
     let refused = |source| WriteError::io(output, source);
-    let mut has_heading = false;
+    let mut answers = Answers::new(file, Form::Csv, AtomicFile::create(output)?);
+    let mut answer = Answer::default();
     let mut drift = DriftWarnings::new(file);
-    let mut values = Vec::new();
-    let mut outside = OutsideTraining::new(&file.problem);
     let mut decoder = file.decoder();
-    read(file, input, &mut |readings| {
-        if !std::mem::replace(&mut has_heading, true) {
-            let kept = readings.kept.iter().map(|column| column.title.clone());
-            write_heading(file, &kept.collect::<Vec<_>>(), 1, &mut written).map_err(refused)?;
-        }
-        let answers = decoder.answers(&readings.row_indices, readings.values.view());
-        let kept = &readings.kept;
-        let lines = readings.lines.iter().zip(&readings.row_indices);
-        let rows = readings.values.outer_iter().zip(answers.outer_iter());
-        for (row, ((&line, &row_index), (readings, answer))) in lines.zip(rows).enumerate() {
-            if answer.iter().any(|value| !value.is_finite()) {
-                let path = input.to_owned();
-                return Err(Failure::NoAnswer { path, line });
+    read(file, input, &mut |block| {
+        let decoded = decoder.answers(&block.row_indices, block.values.view());
+        for (row, (&line, &first_row)) in block.lines.iter().zip(&block.row_indices).enumerate() {
+            let [readings, values] = [block.values.row(row), decoded.row(row)];
+            if values.iter().any(|value| !value.is_finite()) {
+                return Err(Failure::at(
+                    input,
+                    format_args!(
+                        "line {line}: the resistances are so far outside the training range that the network's output is not a \
+                         finite number; check them"
+                    ),
+                ));
             }
-            let [readings, targets] =
-                [&readings, &answer].map(|row| row.to_slice().expect("a row of a standard array is contiguous"));
-            let of_line = outside.count(file.network.at(row_index), line, readings, targets);
+            let [readings, values] =
+                [&readings, &values].map(|row| row.to_slice().expect("a row of a standard array is contiguous"));
             drift.take(line, readings);
-            for column in kept {
-                write_cell(&column.cells[row], &mut written).map_err(refused)?;
+            (answer.line, answer.first_row) = (line, Some(first_row));
+            readings.clone_into(&mut answer.readings);
+            values.clone_into(&mut answer.values);
+            answer.kept.resize_with(block.kept.len(), KeptCell::default);
+            for (cell, column) in answer.kept.iter_mut().zip(&block.kept) {
+                cell.title.clone_from(&column.title);
+                cell.text.clone_from(&column.cells[row]);
             }
-            with_half_widths(file, targets, &mut values);
-            write_decoded(
-                ArrayView1::from(&values),
-                of_line.readings,
-                of_line.targets,
-                &mut written,
-            )
-            .map_err(refused)?;
+            answers.write(&answer).map_err(refused)?;
         }
         Ok(())
     })?;
-    written.commit()?;
+    answers.output.commit()?;
+    let outside = answers.outside;
     outside.warn();
     drift.end();
-    Ok(())
-}
-
-/// Writes a cell kept from the input, followed by a comma.
-pub(super) fn write_cell(cell: &str, out: &mut dyn Write) -> io::Result<()> {
-    write!(out, "{},", csv_cell(&inert(cell)))
+    print(
+        || json!({"lines": outside.lines, "lines_outside": outside.outside}),
+        |_| Ok(()),
+    )
 }
 
 /// Fills `values` with the answers, each followed by the half-width of its interval if the target has one.
@@ -170,14 +155,14 @@ pub(super) struct FrameArguments {
     inputs: Vec<String>,
     /// Columns with the depth of each node of the row-wire in mm, as an alternative to --targets with the coordinates of
     /// its nodes (x, y, z of each) in the frame of the nominal sensor
-    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', conflicts_with = "targets")]
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', group = "roles")]
     depths: Vec<String>,
 }
 
 impl FrameArguments {
     /// Reads the frames of presses within the limits of `scene`, if there is one: a sample is a row-wire, and its targets are the coordinates of its
     /// nodes in the frame of `sensor`.
-    pub(super) fn read(&self, sensor: &SensorModel, scene: Option<&Scene>, is_json: bool) -> Result<Dataset, Failure> {
+    pub(super) fn read(&self, sensor: &SensorModel, scene: Option<&Scene>) -> Result<Dataset, Failure> {
         let has_depths = !self.depths.is_empty();
         self.import.refuse_division(|argument| {
             format!(
@@ -193,8 +178,7 @@ impl FrameArguments {
             let message = "--row-wire: name the column with the number of the row-wire of each line, from 1";
             return Err(Failure::Arguments(message.to_owned()));
         };
-        let recording = with_bar(is_json, |watch| plan.recording(working_folder(), watch))?;
-        self.import.save_recipe(&plan)?;
+        let recording = with_bar(|watch| plan.recording(working_folder(), watch))?;
         let (set, lines, scale) = (recording.set.clone(), &recording.lines, sensor.scale);
         let (argument, targets) = if has_depths {
             ("--depths", scale.nodes_per_row())
@@ -227,11 +211,13 @@ impl FrameArguments {
         };
         let checked = check_presses(sensor, scene, &frames);
         checked.map_err(|source| match source.sample() {
-            Some(sample) => Failure::Press {
-                path: recording.file_of(sample).to_owned(),
-                line: lines[sample],
-                source,
-            },
+            Some(sample) => {
+                let line = lines[sample];
+                Failure::at(
+                    recording.file_of(sample),
+                    format_args!("line {line}: {source} (--where)"),
+                )
+            }
             None => source.into(),
         })?;
         Ok(frames)
@@ -252,7 +238,12 @@ fn coordinates_of_depths(set: Dataset, row_wires: &[usize], sensor: &SensorModel
 
 /// Writes the header: the columns `kept` from the input, the targets of `rows` row-wires, each followed by the half-width
 /// of its interval if it has one, and the counts of values outside the training range.
-pub(super) fn write_heading(file: &NetworkFile, kept: &[String], rows: usize, out: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write_heading<'a>(
+    file: &NetworkFile,
+    kept: impl Iterator<Item = &'a str>,
+    rows: usize,
+    out: &mut dyn Write,
+) -> io::Result<()> {
     let problem = &file.problem;
     if problem.has_nodes() {
         return write_decoded_header(rows * problem.targets.len() / 3, out);
@@ -267,8 +258,8 @@ pub(super) fn write_heading(file: &NetworkFile, kept: &[String], rows: usize, ou
             .then(|| Channel::new(half_width_name(target), target.unit.as_deref()));
         [Some(target.clone()), half_width].into_iter().flatten()
     });
-    let kept = kept.iter().map(|title| inert(title));
     let names = kept
+        .map(inert)
         .chain(titles.map(|target| inert(&target.title())))
         .chain(["readings_outside".to_owned(), "targets_outside".to_owned()]);
     write_csv_row(names, out)
@@ -361,17 +352,11 @@ impl<'a> OutsideTraining<'a> {
         if *outside == 0 {
             return;
         }
-        let mut stderr = messages();
-        for line in listed {
-            // There is no one to report to if this fails.
-            let _ = writeln!(stderr, "warning: {line}");
-        }
-        let _ = writeln!(
-            stderr,
-            "warning: {outside} of {lines} lines are outside the range seen in training, where the network \
-             extrapolates; the last two columns count such readings and targets: check these readings, or train with samples \
-             that cover them"
-        );
+        listed.iter().for_each(warn);
+        warn(format_args!(
+            "{outside} of {lines} lines are outside the range seen in training, where the network extrapolates; the last two \
+             columns count such readings and targets: check these readings, or train with samples that cover them"
+        ));
     }
 }
 
@@ -390,7 +375,7 @@ fn described(channel: &Channel, value: f64, (low, high): (f64, f64)) -> String {
 #[derive(Args)]
 pub(super) struct FineTune {
     /// Network saved by train --sensor
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = input)]
     network: PathBuf,
     #[command(flatten)]
     frames: FrameArguments,
@@ -398,45 +383,27 @@ pub(super) struct FineTune {
     #[arg(long, value_name = "N", value_parser = super::count(1..=StoppingRules::MAX_EPOCHS))]
     epochs: Option<usize>,
     /// File for the fine-tuned network
-    #[arg(long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = output)]
     out: PathBuf,
-    /// Print one JSON object instead of text
-    #[arg(long)]
-    json: bool,
-}
-
-/// The object printed by `fine-tune --json`.
-#[derive(Serialize)]
-struct Report {
-    training_samples: usize,
-    validation_samples: usize,
-    test_samples: usize,
-    /// Mean error of z on the test frames, in mm.
-    z_mm_before: f64,
-    z_mm_after: f64,
-    /// Mean error of z on the simulated test set of the network, in mm.
-    simulated_z_mm_before: f64,
-    simulated_z_mm_after: f64,
 }
 
 impl FineTune {
     pub(super) fn run(self) -> Result<(), Failure> {
-        check_writable(&self.out)?;
         if is_same(&self.network, &self.out) {
             let message = "--network and --out name the same file: give --out another name";
             return Err(Failure::Arguments(message.to_owned()));
         }
+        check_output("--out", &self.out)?;
         let mut file = NetworkFile::load(&self.network)?;
-        let no_array = || Failure::NoArray {
-            path: self.network.clone(),
-            reason: "frames of known presses need a model of the sensor; give a network of train --sensor",
+        let no_array = || {
+            let message = "it is the network of a recording: frames of known presses need a model of the sensor; give a \
+                           network of train --sensor";
+            Failure::at(&self.network, message)
         };
         let simulation = file.problem.sensor.ok_or_else(no_array)?;
         let settings = file.settings;
         // Samples outside are not presses, or require answers that the network was not trained for.
-        let frames = self
-            .frames
-            .read(&simulation.sensor, Some(&simulation.scene), self.json)?;
+        let frames = self.frames.read(&simulation.sensor, Some(&simulation.scene))?;
         let read = simulation.scene.rows.read(simulation.sensor.scale.rows());
         let read = read.map_err(decoupler_core::dataset::DatasetError::from)?;
         let frames = frames
@@ -451,53 +418,53 @@ impl FineTune {
         let (split, test) = divided.map_err(decoupler_core::evaluation::RunError::from)?;
         let mut training = settings.training;
         training.stopping.epochs = self.epochs.unwrap_or(training.stopping.epochs);
-        let bar = progress_bar(self.json, 1, "fine-tuning {spinner}");
+        let bar = progress_bar(1, "fine-tuning {spinner}");
         let tuned = fine_tune(&file.network, &split, training, memory_budget(), &Job::UNINTERRUPTED);
         bar.finish_and_clear();
         let tuned = tuned?;
         let stroke_mm = simulation.stroke_mm();
         let errors = |set: &Dataset, networks: &Networks| Errors::measure(set, &networks.decouple(set), stroke_mm);
         let simulated = simulation.draw_test(settings.seed)?;
-        let report = Report {
-            training_samples: split.training.samples(),
-            validation_samples: split.validation.as_ref().map_or(0, Dataset::samples),
-            test_samples: test.samples(),
-            z_mm_before: errors(&test, &file.network).z_mm,
-            z_mm_after: errors(&test, &tuned).z_mm,
-            simulated_z_mm_before: file.scores.network.nodes().map_or(f64::NAN, |errors| errors.z_mm),
-            simulated_z_mm_after: errors(&simulated, &tuned).z_mm,
-        };
+        let samples = [Some(&split.training), split.validation.as_ref(), Some(&test)];
+        let samples = samples.map(|set| set.map_or(0, Dataset::samples));
+        let before = errors(&test, &file.network).z_mm;
+        let after = errors(&test, &tuned).z_mm;
+        let simulated_before = file.scores.network.nodes().map_or(f64::NAN, |errors| errors.z_mm);
+        let simulated = errors(&simulated, &tuned);
         // The errors in the file remain those on the simulated test set, to which the baselines refer.
-        file.scores.network = TestErrors::Nodes(errors(&simulated, &tuned));
+        file.scores.network = TestErrors::Nodes(simulated);
         file.network = tuned;
         file.save(&self.out)?;
-        if self.json {
-            return print_object(&report);
+        if after >= before {
+            warn(
+                "the frames did not lower the error on the test frames: keep the original network, or give more frames",
+            );
         }
-        print(|out| {
+        let object = || {
+            json!({
+                "training_samples": samples[0],
+                "validation_samples": samples[1],
+                "test_samples": samples[2],
+                "z_mm_before": before,
+                "z_mm_after": after,
+                "simulated_z_mm_before": simulated_before,
+                "simulated_z_mm_after": simulated.z_mm,
+            })
+        };
+        print(object, |out| {
+            let [training, validation, test] = samples;
             writeln!(
                 out,
-                "{} row-wires trained, {} for validation, {} for testing",
-                report.training_samples, report.validation_samples, report.test_samples
+                "{training} row-wires trained, {validation} for validation, {test} for testing"
             )?;
-            let mm = format_number;
-            writeln!(
-                out,
-                "Mean error of z on the test frames: {} mm before, {} mm after",
-                mm(report.z_mm_before),
-                mm(report.z_mm_after)
-            )?;
-            writeln!(
-                out,
-                "Mean error of z on the simulated test set: {} mm before, {} mm after",
-                mm(report.simulated_z_mm_before),
-                mm(report.simulated_z_mm_after)
-            )?;
-            if report.z_mm_after >= report.z_mm_before {
+            for (frames, before, after) in [
+                ("test frames", before, after),
+                ("simulated test set", simulated_before, simulated.z_mm),
+            ] {
+                let [before, after] = [before, after].map(format_number);
                 writeln!(
                     out,
-                    "Warning: the frames did not lower the error on the test frames: keep the original network, or give more \
-                     frames"
+                    "Mean error of z on the {frames}: {before} mm before, {after} mm after"
                 )?;
             }
             Ok(())

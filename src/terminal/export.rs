@@ -1,20 +1,17 @@
-use std::{
-    io::Write,
-    path::{Path, PathBuf},
-};
+use std::path::PathBuf;
 
 use clap::Args;
-use decoupler_core::text::Named;
+use decoupler_core::{problem::Channel, text::Named};
 use decoupler_files::export::{
     NetworkFile,
     bundle::{BundleDecoder, BundleError, BundleFormat, BundlePrecision, BundleReport, ExportedDecoder, export_bundle},
     format_number, is_same,
 };
-use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::{
     failure::Failure,
-    output::{print, print_object},
+    output::{input, print, value},
     samples::sets,
 };
 
@@ -39,7 +36,7 @@ use super::{
 #[derive(Args)]
 pub(super) struct Export {
     /// Network saved by train --out or by the window
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = input)]
     network: PathBuf,
     #[arg(long, value_name = "DECODER", default_value_t = BundleDecoder::Chosen, value_parser = BundleDecoder::parse, help = BundleDecoder::help())]
     decoder: BundleDecoder,
@@ -50,11 +47,8 @@ pub(super) struct Export {
     #[arg(long, value_name = "f64|f32|fixed16", default_value_t, value_parser = BundlePrecision::parse)]
     precision: BundlePrecision,
     /// Folder to create, which must not exist or must be an empty folder
-    #[arg(long, value_name = "PATH")]
+    #[arg(short, long, value_name = "PATH")]
     out: PathBuf,
-    /// Print one JSON object instead of text
-    #[arg(long)]
-    json: bool,
 }
 
 impl Export {
@@ -70,99 +64,34 @@ impl Export {
         let decoder = if self.decoder == BundleDecoder::Chosen {
             ExportedDecoder::from(&file)
         } else {
-            ExportedDecoder::of_run(&file, sets(&file.setup(), self.json)?, self.decoder)?
+            ExportedDecoder::of_run(&file, sets(&file.setup())?, self.decoder)?
         };
         let report = export_bundle(decoder, self.format, self.precision, &self.out)?;
-        if self.json {
-            print_json(&report)
-        } else {
-            print_text(&report)
-        }
+        print(|| object(&report), |out| out.write_all(text(&report).as_bytes()))
     }
 }
 
-/// The object printed by `export --json`.
-#[derive(Serialize)]
-struct Report<'a> {
-    path: &'a Path,
-    format: String,
-    precision: String,
-    files: Vec<File<'a>>,
-    verified_vectors: usize,
-    golden_vectors: usize,
-    checks: Vec<Check>,
-    /// Maximum of all checks, relative to `output_range_mm`, or for a recording to the range of each target.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    deviation: Option<f64>,
-    /// Largest deviation to be expected, with that by rounding the readings.
-    limit: f64,
-    /// Change by rounding only the readings, at most, for `f32`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    change_by_rounding_readings: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    output_range_mm: Option<f64>,
-    /// Error bound for all coordinates of an array, in mm.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error_bound_mm: Option<f64>,
-    /// Error bound of each target of a recording, in its unit.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    error_bounds: Vec<Bound<'a>>,
-    remarks: &'a [String],
+/// The object printed by `export --json`. Deviations are relative to `output_range_mm`, or for a recording to the range of
+/// each target.
+fn object(report: &BundleReport) -> Value {
+    let file = |(name, bytes): &(String, u64)| json!({"name": name, "bytes": bytes});
+    let mut object = value(report);
+    object["files"] = report.files.iter().map(file).collect();
+    if let Some(deviation) = report.deviation() {
+        object["deviation"] = deviation.into();
+    }
+    // Of all coordinates of an array, or of each target of a recording.
+    let bound = |(output, bound): &(Channel, f64)| json!({"name": output.name, "unit": output.unit, "bound": bound});
+    match &report.bounds[..] {
+        [] => {}
+        [(_, bound), ..] if report.output_range_mm.is_some() => object["error_bound_mm"] = (*bound).into(),
+        bounds => object["error_bounds"] = bounds.iter().map(bound).collect(),
+    }
+    object
 }
 
-#[derive(Serialize)]
-struct File<'a> {
-    name: &'a str,
-    bytes: u64,
-}
-
-#[derive(Serialize)]
-struct Bound<'a> {
-    name: &'a str,
-    unit: Option<&'a str>,
-    bound: f64,
-}
-
-#[derive(Serialize)]
-struct Check {
-    evaluator: &'static str,
-    deviation: f64,
-}
-
-/// Prints one JSON object.
-pub(super) fn print_json(report: &BundleReport) -> Result<(), Failure> {
-    let files = report.files.iter().map(|(name, bytes)| File { name, bytes: *bytes });
-    let checks = report.checks.iter().map(|check| Check {
-        evaluator: check.evaluator,
-        deviation: check.deviation,
-    });
-    let bounds = report.bounds.iter().map(|(output, bound)| Bound {
-        name: &output.name,
-        unit: output.unit.as_deref(),
-        bound: *bound,
-    });
-    let is_array = report.output_range_mm.is_some();
-    let printed = Report {
-        path: &report.path,
-        format: report.format.to_string(),
-        precision: report.precision.to_string(),
-        files: files.collect(),
-        verified_vectors: report.verified,
-        golden_vectors: report.golden,
-        checks: checks.collect(),
-        deviation: report.deviation(),
-        limit: report.limit,
-        change_by_rounding_readings: report.rounding,
-        output_range_mm: report.output_range_mm,
-        error_bound_mm: report.bounds.first().filter(|_| is_array).map(|(_, bound)| *bound),
-        error_bounds: bounds.filter(|_| !is_array).collect(),
-        remarks: &report.remarks,
-    };
-    print_object(&printed)
-}
-
-/// Prints the files, and the deviations from the network.
-pub(super) fn print_text(report: &BundleReport) -> Result<(), Failure> {
+/// The files, and the deviations from the network.
+fn text(report: &BundleReport) -> String {
     let (inputs, relative) = match report.output_range_mm {
         Some(range) => (
             "readings of a row-wire",
@@ -194,5 +123,5 @@ pub(super) fn print_text(report: &BundleReport) -> Result<(), Failure> {
     for remark in &report.remarks {
         text += &format!("Note: {remark}.\n");
     }
-    print(|output| output.write_all(text.as_bytes()))
+    text
 }

@@ -1,17 +1,18 @@
 use std::{
     error::Error as StdError,
-    fmt,
+    fmt::Display,
+    fs,
     io::{self, ErrorKind},
-    path::PathBuf,
+    path::{Path, PathBuf},
 };
 
 use decoupler_core::{
-    calibration::CalibrationError, dataset::DatasetError, evaluation::RunError, sensor::SensorError, text::counted,
+    calibration::CalibrationError, dataset::DatasetError, evaluation::RunError, sensor::SensorError,
     training::SettingError,
 };
 use decoupler_files::{
     export::{DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError},
-    import::{Cure, ImportError, ReadError, SetupError},
+    import::{Cure, ImportError, SetupError},
     live::SessionError,
     machine::system_cause,
 };
@@ -34,49 +35,30 @@ pub(super) enum Failure {
     Document(#[from] DocumentError),
     #[error(transparent)]
     Bundle(#[from] BundleError),
-    #[error("'{}': {source}", .path.display())]
-    Resume { path: PathBuf, source: RunError },
+    /// In this file.
+    #[error("'{}': {}", .0.display(), .1)]
+    At(PathBuf, String),
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    #[error("'{}': line {line}: {source} (--where)", .path.display())]
-    Press {
-        path: PathBuf,
-        line: u64,
-        source: CalibrationError,
-    },
     #[error("{}", .0.with_cure(in_arguments))]
     Import(#[from] ImportError),
     #[error(transparent)]
     Setup(SetupError),
-    #[error("'{}': its recording '{}' is missing; give its new path with --data FILE", .checkpoint.display(), .recording.display())]
-    MissingRecording { checkpoint: PathBuf, recording: PathBuf },
-    #[error("'{}' is the network of a recording: {reason}", .path.display())]
-    NoArray { path: PathBuf, reason: &'static str },
-    #[error("{0}")]
-    Interrupted(Interruption),
-    #[error("interrupted after {done} of {trials} trials")]
-    InterruptedTrials { done: usize, trials: usize },
+    /// By Ctrl-C, SIGTERM or SIGHUP.
+    #[error("interrupted{0}")]
+    Interrupted(String),
     #[error("{place}: {cause}; only earlier results are printed")]
     TradeOff { place: String, cause: Box<Failure> },
-    #[error("interrupted after {}", counted(*.done, "point"))]
-    InterruptedTrade { done: usize },
-    #[error("interrupted")]
-    InterruptedFollow,
-    #[error(transparent)]
-    Specification(#[from] SpecificationError),
-    #[error("interrupted after {done} of {trials} trials; the same command trains the rest")]
-    InterruptedSweep { done: usize, trials: usize },
     #[error("{failed} of {trials} trials failed, for the reasons above; the others are kept")]
     FailedTrials { failed: usize, trials: usize },
     #[error(transparent)]
     SweepFolder(#[from] SweepFolderError),
-    #[error("'{}' lacks trials: {missing} missing, {conflicting} conflicting, {unreadable} files unreadable; run the sweep again for missing ones, and delete the wrong file of those that conflict{}", .out.display(), if *.is_kept { "; the table there has more trials, or cannot be read, and is left as it is" } else { "" })]
+    #[error("'{}' lacks trials: {missing} missing, {conflicting} conflicting, {unreadable} files unreadable; run the sweep again for missing ones, and delete the wrong file of those that conflict", .out.display())]
     IncompleteSweep {
         missing: usize,
         conflicting: usize,
         unreadable: usize,
         out: PathBuf,
-        is_kept: bool,
     },
     #[error(transparent)]
     Session(#[from] SessionError),
@@ -90,37 +72,10 @@ pub(super) enum Failure {
     Files(Vec<PictureError>),
     #[error("cannot write to standard output: {}", system_cause(.0))]
     Output(io::Error),
+    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
+    Read { path: PathBuf, source: io::Error },
     #[error("cannot open '{}': {}", .path.display(), system_cause(.source))]
     Open { path: PathBuf, source: io::Error },
-    #[error("'{}': {source}", .path.display())]
-    Resistances { path: PathBuf, source: ReadError },
-    #[error("'{}': line {line}: there is no network for row {row}; train with samples of it", .path.display())]
-    UnknownRow { path: PathBuf, line: u64, row: usize },
-    #[error("'{}': it has no column '{column}' with the row number of each line, which is needed because each row has its own network; add it", .path.display())]
-    NoRowWires { path: PathBuf, column: String },
-    #[error("'{}': {lines} lines are not a multiple of {rows} rows: each snapshot needs one line per row-wire; add the missing lines, or a column named row with the row number of each line", .path.display())]
-    PartOfSnapshot { path: PathBuf, lines: usize, rows: usize },
-    #[error("'{}': line {line}: the resistances are so far outside the training range that the network's output is not a finite number; check them", .path.display())]
-    NoAnswer { path: PathBuf, line: u64 },
-}
-
-/// A training stopped by Ctrl-C, SIGTERM or SIGHUP.
-#[derive(Debug)]
-pub(super) struct Interruption {
-    /// Last completed epoch.
-    pub(super) epoch: usize,
-    /// Command that resumes the training.
-    pub(super) resume: Option<String>,
-}
-
-impl fmt::Display for Interruption {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "interrupted after epoch {}; ", self.epoch)?;
-        match &self.resume {
-            Some(command) => write!(f, "to resume: {command}"),
-            None => write!(f, "use --checkpoint FILE to be able to resume"),
-        }
-    }
 }
 
 fn joined(errors: &[PictureError]) -> String {
@@ -157,12 +112,21 @@ fn in_arguments(cure: &Cure) -> String {
 }
 
 impl Failure {
+    pub(super) fn at(path: &Path, message: impl Display) -> Self {
+        Self::At(path.to_owned(), message.to_string())
+    }
+
+    pub(super) fn make_folder(path: &Path) -> Result<(), Self> {
+        fs::create_dir_all(path).map_err(|source| Self::MakeFolder {
+            path: path.to_owned(),
+            source,
+        })
+    }
+
     /// Exit status of the program.
     pub(super) fn status(&self) -> u8 {
         match self {
             Self::Arguments(_) | Self::Bundle(BundleError::Choice(_)) => 2,
-            Self::Specification(SpecificationError::Read { .. }) => 1,
-            Self::Specification(_) => 2,
             Self::Import(ImportError::Columns(_)) => 2,
             // A division or a memory that does not fit the samples is an argument; their shape is not.
             Self::Import(ImportError::Dataset(
@@ -171,11 +135,7 @@ impl Failure {
             Self::Import(ImportError::Dataset(_)) => 2,
             Self::Run(error) if is_argument_error(error) => 2,
             Self::Dataset(DatasetError::Count(_) | DatasetError::Scene(_)) => 2,
-            Self::Interrupted(_)
-            | Self::InterruptedTrials { .. }
-            | Self::InterruptedTrade { .. }
-            | Self::InterruptedSweep { .. }
-            | Self::InterruptedFollow => interruption::status(),
+            Self::Interrupted(_) => interruption::status(),
             _ => 1,
         }
     }
@@ -202,28 +162,4 @@ fn is_argument_error(error: &RunError) -> bool {
             | RunError::Memory { .. }
             | RunError::Division(_)
     ) && !matches!(error, RunError::Division(DatasetError::Sensor { .. }))
-}
-
-/// Maximum number of trials of a sweep. Every program that works on a sweep reads all of them.
-pub(super) const MAX_TRIALS: usize = 100_000;
-
-/// Errors of a specification.
-#[derive(Debug, Error)]
-pub(super) enum SpecificationError {
-    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
-    Read { path: PathBuf, source: io::Error },
-    #[error(
-        "'{}' is not a specification: {message}; write {{\"train\": {{OPTION: VALUE, ...}}, \"axes\": {{OPTION: [VALUE, ...], \
-         ...}}}} with the options of decoupler train",
-        .path.display()
-    )]
-    Layout { path: PathBuf, message: String },
-    #[error("'{}': {place}: {message}", .path.display())]
-    Option {
-        path: PathBuf,
-        place: String,
-        message: String,
-    },
-    #[error("'{}': its axes have more than {MAX_TRIALS} combinations; give fewer values, or several specifications", .0.display())]
-    TooMany(PathBuf),
 }

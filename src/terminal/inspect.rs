@@ -8,26 +8,31 @@ use std::{
 
 use clap::Args;
 use decoupler_core::{
-    dataset::Dataset,
-    evaluation::RunSets,
+    dataset::{Dataset, Seed},
+    evaluation::{
+        RunSets, RunSettings,
+        recorded::{Determinacy, Determination, Findings},
+    },
+    job::Job,
     problem::{Channel, TargetPosition},
-    text::counted,
+    scene::RowModel,
+    text::{capitalised, counted},
 };
 use decoupler_files::{
-    export::{Cell, Table, TableColumn, describe_positions, format_number},
-    import::{
-        ColumnKind, ColumnSummary, Dialect, Dropped, FileReport, Inspection, JoinReport, Recording, Recordings,
-        TimeSummary,
+    export::{
+        Cell, RecipeFile, RecipeSource, Table, TableColumn, describe_positions, describe_target, describe_warnings,
+        format_below_one, format_number,
     },
+    import::{ColumnKind, ColumnSummary, FileReport, Inspection, Plan, Recording, Recordings, TimeSummary},
 };
-use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::{
     failure::Failure,
-    findings::StudyArguments,
-    import_arguments::ImportArguments,
-    output::{print, print_object},
-    samples::with_bar,
+    import_arguments::{ImportArguments, RecipeArguments},
+    output::{check_output, joined, output, print, value, warn},
+    samples::{with_bar, working_folder},
+    seed,
 };
 
 /// List the columns of a recording, and measure how well its readings determine targets
@@ -37,83 +42,79 @@ use super::{
 /// arguments of train --data, it measures on held-out samples how well the readings determine each target, by ridge and kernel
 /// ridge regression and with confidence intervals, how optimistic a random split would be, and what may be a leak.
 #[derive(Args)]
+#[command(allow_negative_numbers = true)]
 pub(super) struct Inspect {
     #[command(flatten)]
     import: ImportArguments,
     #[command(flatten)]
+    rest: RecipeArguments,
+    #[command(flatten)]
     study: StudyArguments,
-    /// Print one JSON object instead of text
-    #[arg(long)]
-    json: bool,
-}
-
-#[derive(Serialize)]
-struct Report<'a> {
-    file: &'a Path,
-    format: String,
-    dialect: Option<Dialect>,
-    #[serde(flatten)]
-    inspection: Inspection,
+    /// Write a recipe (JSON) of this import and its split instead, with which train --recipe uses the recording
+    #[arg(short = 'o', long, value_name = "FILE", value_parser = output)]
+    recipe_out: Option<PathBuf>,
 }
 
 impl Inspect {
-    pub(super) fn run(self) -> Result<(), Failure> {
+    pub(super) fn run(mut self) -> Result<(), Failure> {
+        self.import.rest = self.rest;
+        if let Some(path) = &self.recipe_out {
+            return write_recipe(&self.import.plan(&self.study.inputs)?, path);
+        }
         if self.study.are_given() || self.import.has_roles() {
-            return self.study.run(&self.import, self.json);
+            return self.study.run(&self.import);
         }
+        let (mut objects, mut texts) = (Vec::new(), Vec::new());
         let files = self.import.only_files()?;
-        let mut reports = Vec::new();
         for file in &files {
-            let (inspection, table) = with_bar(self.json, |watch| {
-                Inspection::read(file, self.import.dialect.choice(), self.import.time.as_deref(), watch)
+            let (inspection, table) = with_bar(|watch| {
+                Inspection::read(file, self.import.rest.dialect(), self.import.time.as_deref(), watch)
             })?;
-            reports.push(Report {
-                file,
-                format: table.format.to_string(),
-                dialect: table.dialect().copied(),
-                inspection,
-            });
+            let format = table.format.to_string();
+            inspection.warnings.iter().for_each(warn);
+            let of_file = json!({"file": file.to_string_lossy(), "format": format, "dialect": table.dialect()});
+            objects.push(joined([of_file, value(&inspection)]));
+            texts.push((file, format, inspection));
         }
-        match &reports[..] {
-            [report] if self.json => print_object(report),
-            reports if self.json => print_object(&Reports { files: reports }),
-            reports => print(|out| {
-                for (number, report) in reports.iter().enumerate() {
-                    if number > 0 {
-                        writeln!(out)?;
-                    }
-                    report.write(out)?;
+        let object = || match &mut objects[..] {
+            [object] => object.take(),
+            objects => json!({"files": objects}),
+        };
+        print(object, |out| {
+            for (number, (file, format, inspection)) in texts.iter().enumerate() {
+                if number > 0 {
+                    writeln!(out)?;
                 }
-                Ok(())
-            }),
-        }
+                let (rows, columns) = (inspection.rows, inspection.columns.len());
+                let size = format!("{} × {}", counted(rows, "row"), counted(columns, "column"));
+                writeln!(out, "{}: {size}\n{format}\n", file.display())?;
+                write!(out, "{}", columns_table(&inspection.columns).aligned())?;
+                if let Some(time) = &inspection.time {
+                    write_time(time, out)?;
+                }
+            }
+            Ok(())
+        })
     }
 }
 
-/// Reports on several files, as JSON.
-#[derive(Serialize)]
-struct Reports<'a> {
-    files: &'a [Report<'a>],
-}
-
-impl Report<'_> {
-    fn write(&self, out: &mut impl Write) -> io::Result<()> {
-        let inspection = &self.inspection;
-        writeln!(
-            out,
-            "{}: {} × {}",
-            self.file.display(),
-            counted(inspection.rows, "row"),
-            counted(inspection.columns.len(), "column")
-        )?;
-        writeln!(out, "{}\n", self.format)?;
-        write!(out, "{}", columns_table(&inspection.columns).aligned())?;
-        if let Some(time) = &inspection.time {
-            write_time(time, out)?;
-        }
-        let mut warnings = inspection.warnings.iter();
-        warnings.try_for_each(|warning| writeln!(out, "Warning: {warning}"))
-    }
+/// Writes the recipe of a plan that can be imported, and prints what it reads.
+fn write_recipe(plan: &Plan, path: &Path) -> Result<(), Failure> {
+    check_output("--recipe-out", path)?;
+    let recording = with_bar(|watch| plan.recording(working_folder(), watch))?;
+    RecipeFile::save(RecipeSource::Recording(plan.clone()), path)?;
+    recording.warnings.iter().for_each(warn);
+    let object = || {
+        let samples = json!({"rows": recording.rows, "samples": recording.set.samples()});
+        joined([
+            samples,
+            json!({"files": files([&recording]), "dropped": recording.dropped}),
+        ])
+    };
+    print(object, |out| {
+        write_files([&recording], out)?;
+        writeln!(out, "{}", counted(recording.set.samples(), "sample"))
+    })
 }
 
 /// Table of the columns of a file.
@@ -189,7 +190,7 @@ fn bars(histogram: &[usize]) -> String {
     histogram.iter().map(|count| HEIGHTS[height(count)]).collect()
 }
 
-fn write_time(time: &TimeSummary, out: &mut impl Write) -> io::Result<()> {
+fn write_time(time: &TimeSummary, out: &mut dyn Write) -> io::Result<()> {
     let guessed = if time.is_guessed {
         " (assumed to be the time)"
     } else {
@@ -214,89 +215,50 @@ fn write_time(time: &TimeSummary, out: &mut impl Write) -> io::Result<()> {
     writeln!(out)
 }
 
-/// Samples of a recording.
-#[derive(Serialize)]
+/// Samples of a recording, and how they are divided, as JSON and as text.
+#[derive(Default)]
 pub(super) struct RecordingReport {
-    files: Vec<FileFound>,
-    inputs: Vec<Channel>,
-    /// Rule of the split: time, group, random or file.
-    split: String,
-    test_fraction: f64,
-    /// Number of rows of the files, including dropped ones.
-    rows: usize,
-    /// Number of training samples.
-    samples: usize,
-    validation_samples: usize,
-    test_samples: usize,
-    dropped: Vec<Dropped>,
-    /// Positions of targets, for those that have one.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    positions: Vec<Position>,
-    #[serde(skip)]
-    positions_text: Option<String>,
-}
-
-/// Position of a target on the skin.
-#[derive(Serialize)]
-struct Position {
-    target: String,
-    x_mm: f64,
-    y_mm: f64,
-}
-
-/// A file with its detected format.
-#[derive(Serialize)]
-pub(super) struct FileFound {
-    path: PathBuf,
-    format: String,
-    rows: usize,
-    columns: usize,
-    join: Option<JoinReport>,
+    pub(super) object: Value,
+    pub(super) text: Vec<u8>,
 }
 
 impl RecordingReport {
-    pub(super) fn new(sets: &RunSets, recordings: &Recordings) -> Self {
-        let plan = &recordings.recorded.plan;
+    pub(super) fn new(sets: &RunSets, recordings: &Recordings) -> io::Result<Self> {
         let all = || once(&recordings.training).chain(&recordings.test);
         let recording = &recordings.training;
-        let position = |&TargetPosition { target, x_mm, y_mm }: &TargetPosition| Position {
-            target: recording.targets[target].name.clone(),
-            x_mm,
-            y_mm,
+        let training = sets.split.training.samples();
+        let validation = sets.split.validation.as_ref().map_or(0, Dataset::samples);
+        let test = sets.test.samples();
+        let split = match recordings.test {
+            Some(_) => "file".to_owned(),
+            None => recordings.recorded.plan.division.by.to_string(),
         };
-        let samples = sets.split.training.samples();
-        let validation_samples = sets.split.validation.as_ref().map_or(0, Dataset::samples);
-        let test_samples = sets.test.samples();
-        Self {
-            files: files(all()),
-            inputs: recording.inputs.clone(),
-            split: match recordings.test {
-                Some(_) => "file".to_owned(),
-                None => plan.division.by.to_string(),
-            },
-            test_fraction: test_samples as f64 / (samples + validation_samples + test_samples) as f64,
-            rows: all().map(|recording| recording.rows).sum(),
-            samples,
-            validation_samples,
-            test_samples,
-            dropped: all().flat_map(|recording| recording.dropped.iter().cloned()).collect(),
-            positions: recording.positions.iter().map(position).collect(),
-            positions_text: describe_positions(&recording.positions),
+        let mut object = json!({
+            "files": files(all()),
+            "inputs": recording.inputs,
+            "split": split,
+            "test_fraction": test as f64 / (training + validation + test) as f64,
+            "rows": all().map(|recording| recording.rows).sum::<usize>(),
+            "samples": training,
+            "validation_samples": validation,
+            "test_samples": test,
+            "dropped": Vec::from_iter(all().flat_map(|recording| &recording.dropped)),
+        });
+        let position = |&TargetPosition { target, x_mm, y_mm }: &TargetPosition| json!({"target": recording.targets[target].name, "x_mm": x_mm, "y_mm": y_mm});
+        if !recording.positions.is_empty() {
+            object["positions"] = recording.positions.iter().map(position).collect();
         }
-    }
-
-    /// Writes the files, and how their samples are divided.
-    pub(super) fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        write_files(&self.files, self.rows, &self.dropped, out)?;
+        let mut text = Vec::new();
+        write_files(all(), &mut text)?;
+        let samples = counted(training, "sample");
         writeln!(
-            out,
-            "{} for training, {} for validation, {} for testing (split by {})",
-            counted(self.samples, "sample"),
-            self.validation_samples,
-            self.test_samples,
-            self.split
+            text,
+            "{samples} for training, {validation} for validation, {test} for testing (split by {split})"
         )?;
-        self.positions_text.iter().try_for_each(|text| writeln!(out, "{text}"))
+        if let Some(positions) = describe_positions(&recording.positions) {
+            writeln!(text, "{positions}")?;
+        }
+        Ok(Self { object, text })
     }
 }
 
@@ -305,34 +267,30 @@ pub(super) fn import_warnings(recordings: &Recordings) -> Vec<String> {
     Recording::warnings_of(once(&recordings.training).chain(&recordings.test))
 }
 
-pub(super) fn files<'a>(recordings: impl Iterator<Item = &'a Recording>) -> Vec<FileFound> {
-    let found = |report: &FileReport| FileFound {
-        path: report.path.clone(),
-        format: report.format.to_string(),
-        rows: report.rows,
-        columns: report.columns,
-        join: report.join,
+/// The files of recordings, with their formats.
+pub(super) fn files<'a>(recordings: impl IntoIterator<Item = &'a Recording>) -> Value {
+    let found = |file: &FileReport| {
+        json!({
+            "path": file.path.to_string_lossy(),
+            "format": file.format.to_string(),
+            "rows": file.rows,
+            "columns": file.columns,
+            "join": file.join,
+        })
     };
-    recordings
-        .flat_map(|recording| recording.files.iter().map(found))
-        .collect()
+    let files = recordings.into_iter().flat_map(|recording| &recording.files);
+    files.map(found).collect()
 }
 
-pub(super) fn write_files(
-    files: &[FileFound],
-    rows: usize,
-    dropped: &[Dropped],
+/// Writes the files of recordings, and the rows that were dropped.
+pub(super) fn write_files<'a>(
+    recordings: impl IntoIterator<Item = &'a Recording>,
     out: &mut dyn Write,
 ) -> io::Result<()> {
-    for file in files {
-        writeln!(
-            out,
-            "{}: {} × {}, {}",
-            file.path.display(),
-            counted(file.rows, "row"),
-            counted(file.columns, "column"),
-            file.format
-        )?;
+    let recordings = Vec::from_iter(recordings);
+    for file in recordings.iter().flat_map(|recording| &recording.files) {
+        let size = format!("{} × {}", counted(file.rows, "row"), counted(file.columns, "column"));
+        writeln!(out, "{}: {size}, {}", file.path.display(), file.format)?;
         if let Some(join) = file.join {
             let offset = join.median_offset.map_or_else(String::new, |offset| {
                 format!(", median {} apart", format_number(offset.abs()))
@@ -346,22 +304,110 @@ pub(super) fn write_files(
             )?;
         }
     }
-    for Dropped {
-        reason,
-        rows: count,
-        first_line,
-    } in dropped
-    {
-        writeln!(
-            out,
-            "{count} of {rows} rows dropped: {reason} (first on line {first_line})"
-        )?;
+    let rows: usize = recordings.iter().map(|recording| recording.rows).sum();
+    for dropped in recordings.iter().flat_map(|recording| &recording.dropped) {
+        let (count, reason, line) = (dropped.rows, &dropped.reason, dropped.first_line);
+        writeln!(out, "{count} of {rows} rows dropped: {reason} (first on line {line})")?;
     }
     Ok(())
 }
 
-pub(super) fn write_warnings(warnings: &[String], out: &mut dyn Write) -> io::Result<()> {
-    warnings
-        .iter()
-        .try_for_each(|warning| writeln!(out, "Warning: {warning}"))
+// How well the readings determine the targets.
+#[derive(Args)]
+pub(super) struct StudyArguments {
+    /// Columns of the sensor readings; with --targets, measure how well they determine the targets
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
+    pub(super) inputs: Vec<String>,
+    /// Seed of all random numbers [default: 0]
+    #[arg(long, value_parser = seed)]
+    seed: Option<u64>,
+}
+
+impl StudyArguments {
+    /// Returns `true` if any of them is given.
+    pub(super) fn are_given(&self) -> bool {
+        !self.inputs.is_empty() || self.seed.is_some()
+    }
+
+    /// Measures and prints how well the readings of a recording determine its targets.
+    pub(super) fn run(&self, import: &ImportArguments) -> Result<(), Failure> {
+        let plan = import.plan(&self.inputs)?;
+        import.refuse_held_out()?;
+        let recording = with_bar(|watch| plan.recording(working_folder(), watch))?;
+        let mut settings = RunSettings::measured(RowModel::Shared);
+        settings.seed = self.seed.map_or(settings.seed, Seed);
+        let by = plan.division.by;
+        let findings = recording.findings(&settings, by, &Job::UNINTERRUPTED)?;
+        recording.warnings.iter().for_each(warn);
+        describe_warnings(&recording, by, &findings).iter().for_each(warn);
+        let (samples, folds) = (recording.set.samples(), findings.record.folds);
+        let object = || {
+            let targets = recording.targets.iter().enumerate();
+            json!({
+                "files": files([&recording]),
+                "rows": recording.rows,
+                "samples": samples,
+                "dropped": recording.dropped,
+                "split": by.to_string(),
+                "folds": folds,
+                "seed": settings.seed.0,
+                "targets": Vec::from_iter(targets.map(|(index, channel)| target(index, channel, &findings))),
+            })
+        };
+        print(object, |out| {
+            write_files([&recording], out)?;
+            writeln!(
+                out,
+                "{samples} samples, {folds} folds by {by}; 95 % confidence intervals from blocks or groups of samples\n"
+            )?;
+            for (channel, of) in recording.targets.iter().zip(&findings.targets) {
+                write!(out, "{}", capitalised(&describe_target(&channel.name, of)))?;
+                if let (Ok(ridge), Some(kernel)) = (of.ridge, of.kernel) {
+                    let [ridge, kernel] = [ridge, kernel].map(|of| format_below_one(of.r2.value, 2));
+                    write!(out, " (ridge {ridge}, kernel ridge {kernel})")?;
+                }
+                writeln!(out)?;
+            }
+            writeln!(out)?;
+            for (index, channel) in recording.targets.iter().enumerate() {
+                writeln!(
+                    out,
+                    "{}",
+                    capitalised(&findings.comparison.sentence(index, &channel.name))
+                )?;
+            }
+            writeln!(out)
+        })
+    }
+}
+
+/// Findings on a target; `r2` is that of the better of ridge and kernel ridge regression, and `split` has the RMSE of a model
+/// with honest and with random folds.
+fn target(index: usize, channel: &Channel, findings: &Findings) -> Value {
+    let of = &findings.targets[index];
+    let (best, comparison) = (of.best(), &findings.comparison);
+    let r2 = |determination: Option<Determination>| determination.map(|of| of.r2);
+    let [rmse, random_rmse] = comparison.rmse[index];
+    json!({
+        "name": channel.name,
+        "unit": channel.unit,
+        "r2": r2(best.map(|(determination, _)| determination)),
+        "better": best.map(|(_, is_kernel)| if is_kernel { "kernel" } else { "ridge" }),
+        "standing": best.map(|(determination, _)| match determination.determinacy() {
+            Determinacy::Determined => "determined",
+            Determinacy::WeaklyDetermined => "weakly determined",
+            Determinacy::Uncertain => "uncertain",
+            Determinacy::NotDetermined => "not determined",
+        }),
+        "sentence": describe_target(&channel.name, of),
+        "r2_ridge": r2(of.ridge.ok()),
+        "r2_kernel": r2(of.kernel),
+        "split": {
+            "by": comparison.by.to_string(),
+            "model": comparison.model,
+            "rmse": rmse,
+            "random_rmse": random_rmse,
+            "sentence": comparison.sentence(index, &channel.name),
+        },
+    })
 }

@@ -11,7 +11,12 @@ use decoupler_core::evaluation::Run;
 pub use decoupler_files::export::exit_leaving_nothing;
 use decoupler_files::{export::Checkpointing, import::Recorded};
 
-use super::{failure::Failure, output::messages};
+use super::{
+    failure::Failure,
+    output::{messages, warn},
+    settings_arguments::RARELY,
+    within,
+};
 use crate::signals::on_termination;
 
 /// Exit status of a command ended by Ctrl-C: 128 plus the number of the signal, as in shells.
@@ -83,17 +88,17 @@ impl Drop for Graceful {
 #[derive(Args)]
 pub(super) struct CheckpointArguments {
     /// File in which the training is saved at intervals and at its end, so that it can be resumed
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", hide_short_help = true, help_heading = "Output")]
     pub(super) checkpoint: Option<PathBuf>,
     /// Resume the training saved in --checkpoint, with bit-identical results
     ///
-    /// All settings come from the file. --epochs, --goal, --max-fail and --min-gradient change when to stop; another
-    /// --method (or --set) continues from the current weights with that method. All other arguments must be as in
+    /// All settings come from the file. --epochs and --set goal, max-fail and min-gradient change when to stop; another
+    /// --method (or its --set) continues from the current weights with that method. All other arguments must be as in
     /// the file.
-    #[arg(long, requires = "checkpoint")]
+    #[arg(long, requires = "checkpoint", hide_short_help = true, help_heading = "Output")]
     pub(super) resume: bool,
     /// Seconds between two checkpoints
-    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds, requires = "checkpoint")]
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = within(0.0..=86_400.0, "a number of seconds from 0 to 86400"), requires = "checkpoint", hide_short_help = true, help_heading = RARELY)]
     checkpoint_interval: f64,
 }
 
@@ -111,13 +116,6 @@ pub(super) fn check_same<T: fmt::Display>(
         ))),
         None => Ok(()),
     }
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    /// A day.
-    const LONGEST: f64 = 86_400.0;
-    let seconds = text.parse().ok().filter(|seconds| (0.0..=LONGEST).contains(seconds));
-    seconds.ok_or_else(|| format!("give a number of seconds from 0 to {LONGEST}"))
 }
 
 impl CheckpointArguments {
@@ -143,7 +141,6 @@ impl CheckpointArguments {
 /// Saves `run` if due. A failure is only reported, and training continues until the next attempt.
 pub(super) fn save_if_due(checkpointing: &mut Checkpointing, run: &Run) {
     if let Some(error) = checkpointing.save_if_due(run) {
-        // There is no one to report to if this fails.
-        let _ = writeln!(messages(), "warning: {error}; training continues");
+        warn(format_args!("{error}; training continues"));
     }
 }

@@ -1,7 +1,5 @@
 //! Calibration of prediction intervals and of the drift monitor after a training on a recording.
 
-use std::io::Write;
-
 use clap::ValueEnum;
 use decoupler_core::{
     evaluation::{Intervals, Run, RunError},
@@ -13,7 +11,10 @@ use decoupler_files::{
     import::SetupSets,
 };
 
-use super::{interruption::Graceful, output::messages};
+use super::{
+    interruption::Graceful,
+    output::{note, warn},
+};
 
 /// When to calibrate 90 % prediction intervals by cross-validation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -41,14 +42,14 @@ pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) {
         None => {
             let time = Intervals::time(run);
             if let Some(time) = time.filter(|time| when == WhenCalibrated::Auto && *time > Intervals::MAX_TIME) {
-                note(&format!(
+                note(format_args!(
                     "No prediction intervals: they take about {}; give --intervals always",
                     format_duration(time)
                 ));
                 return;
             }
             if let Some(time) = time.filter(|time| time.as_secs_f64() > 2.0) {
-                note(&format!(
+                note(format_args!(
                     "Calibrating the prediction intervals by cross-validation takes about {}",
                     format_duration(time)
                 ));
@@ -62,31 +63,26 @@ pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) {
         Ok(intervals) => run.set_intervals(intervals),
         // The training is complete without them.
         Err(RunError::Cancelled(_)) => note("No prediction intervals: interrupted"),
-        Err(reason) => note(&format!("No prediction intervals: {reason}")),
+        Err(reason) => note(format_args!("No prediction intervals: {reason}")),
     }
-}
-
-fn note(message: &str) {
-    // There is no one to report to if this fails.
-    let _ = writeln!(messages(), "{message}");
 }
 
 /// Reports why drift of the readings of a recording's network is not monitored, if it is not.
 pub(super) fn note_unmonitored(file: &NetworkFile) {
     if let (Err(reason), None) = (&file.drift, &file.problem.sensor) {
-        note(&format!("Drift of the readings is not monitored: {reason}"));
+        note(format_args!("Drift of the readings is not monitored: {reason}"));
     }
 }
 
 /// Reports that a drift of a stream has begun or ended at this line.
 pub(super) fn note_drift(file: &NetworkFile, line: u64, drift: &Drift) {
     if drift.has_ended {
-        note(&format!(
+        note(format_args!(
             "line {line}: since line {}, the readings look like the training readings again",
             drift.last + 1
         ));
     } else {
-        note(&warning(
+        warn(warning(
             file,
             &format!("line {line} (since line {})", drift.first),
             drift,
@@ -97,7 +93,7 @@ pub(super) fn note_drift(file: &NetworkFile, line: u64, drift: &Drift) {
 fn warning(file: &NetworkFile, lines: &str, drift: &Drift) -> String {
     let block = file.drift.as_ref().map_or(1, DriftReference::readings_per_block);
     format!(
-        "warning: {lines}: the readings no longer look like the training readings ({}), and the prediction intervals do \
+        "{lines}: the readings no longer look like the training readings ({}), and the prediction intervals do \
          not hold: check the sensor and its connection, re-zero it, or train with recent samples; in readings like those \
          of the training, a false alarm occurs on average once in {} lines or less often",
         drift.describe(&file.problem.inputs),
@@ -140,7 +136,7 @@ impl<'a> DriftWarnings<'a> {
         let Some(monitor) = &self.monitor else { return };
         let needed = (monitor.reference().readings_per_block() * monitor.reference().blocks_in_a_row()) as u64;
         if self.lines < needed {
-            note(&format!(
+            note(format_args!(
                 "Drift of the readings is not monitored: this takes at least {needed} lines, and there are {}",
                 self.lines
             ));
@@ -148,10 +144,10 @@ impl<'a> DriftWarnings<'a> {
         let drifts = self.ended.iter().chain(monitor.drift());
         for drift in drifts.clone().take(MAX_LISTED) {
             let lines = format!("lines {} to {}", drift.first, drift.last);
-            note(&warning(self.file, &lines, drift));
+            warn(warning(self.file, &lines, drift));
         }
         if let more @ 1.. = drifts.count().saturating_sub(MAX_LISTED) {
-            note(&format!("warning: and {more} more such parts of the file"));
+            warn(format_args!("and {more} more such parts of the file"));
         }
     }
 }

@@ -9,13 +9,10 @@
 mod calibrate;
 mod cross_validation;
 mod decode;
-mod errors_report;
 mod export;
 mod failure;
 mod file_patterns;
-mod findings;
 mod follow;
-mod follow_answers;
 mod import_arguments;
 mod inspect;
 mod interruption;
@@ -26,41 +23,51 @@ mod samples;
 mod settings_arguments;
 mod sweep;
 mod trade;
-mod trade_report;
 mod train;
 mod train_report;
 
 pub use decoupler_files::export::exit_leaving_nothing;
 
-use std::{error::Error, ffi::OsString, io::Write, ops::RangeInclusive, process::ExitCode};
+use std::{
+    error::Error,
+    ffi::OsString,
+    io::Write,
+    ops::{RangeBounds, RangeInclusive},
+    path::PathBuf,
+    process::ExitCode,
+};
 
 use calibrate::Calibrate;
-use clap::{Parser, Subcommand, error::ErrorKind};
+use clap::{CommandFactory, Parser, Subcommand, error::ErrorKind};
+use clap_complete::Shell;
 use decode::{Decode, FineTune};
 use decoupler_files::machine::limit_memory;
 use export::Export;
 use failure::Failure;
 use inspect::Inspect;
-use output::messages;
+use output::{OutputArguments, messages};
 use reproduce::Reproduce;
 use samples::Simulate;
+use settings_arguments::RARELY;
 use sweep::Sweep;
 use trade::Trade;
 use train::Train;
 
-/// Opens the window and returns when it is closed.
-pub type Window = fn() -> Result<(), Box<dyn Error>>;
+/// Opens the window with these files, and returns when it is closed.
+pub type Window = fn(Vec<PathBuf>) -> Result<(), Box<dyn Error>>;
 
 /// Decouples flexible tactile sensor arrays with back-propagation networks.
 ///
-/// Without a command it opens the window.
+/// Without a command it opens the window; decoupler FILE… opens it with these files.
 #[derive(Parser)]
 #[command(name = "decoupler", version, max_term_width = 100)]
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
+    #[command(flatten)]
+    output: OutputArguments,
     /// Memory that trainings may use, and reading a file, in GB [default: that of the machine, and half of the free memory]
-    #[arg(long, value_name = "GB", global = true, value_parser = gigabytes)]
+    #[arg(long, value_name = "GB", global = true, hide_short_help = true, help_heading = RARELY, value_parser = within(f64::MIN_POSITIVE.., "a number of GB above 0, for example 16"))]
     memory_limit: Option<f64>,
 }
 
@@ -76,6 +83,11 @@ enum Command {
     Reproduce(Reproduce),
     Trade(Box<Trade>),
     Sweep(Box<Sweep>),
+    /// Print a script that completes commands and options in a shell
+    Completions {
+        /// Shell for which to write it
+        shell: Shell,
+    },
 }
 
 /// Runs the command in `arguments` (program name first), and returns the exit status. Without a command it opens
@@ -86,7 +98,17 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
 
 /// As [`run`], for a program that passes the status on as a number.
 pub fn run_for_status<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, window: Window) -> u8 {
-    let done = match Arguments::try_parse_from(arguments) {
+    let arguments = Vec::from_iter(arguments.into_iter().map(Into::into));
+    let files = arguments.iter().skip(1).map(PathBuf::from);
+    let begins_with_command = arguments.get(1).is_none_or(|word| {
+        let commands = Arguments::command();
+        commands.get_subcommands().any(|command| *command.get_name() == **word)
+    });
+    let done = match Arguments::try_parse_from(&arguments) {
+        // Only files, and no command.
+        Err(_) if !begins_with_command && files.clone().all(|file| file.exists()) => {
+            window(files.collect()).map_err(Failure::Window)
+        }
         Ok(arguments) => arguments.run(window),
         // Help and version are not errors; a closed output needs neither.
         Err(message) if matches!(message.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
@@ -98,13 +120,7 @@ pub fn run_for_status<A: Into<OsString> + Clone>(arguments: impl IntoIterator<It
         Err(failure) if !failure.is_broken_pipe() => {
             // There is no one to report to if this fails.
             let _ = match &failure {
-                Failure::Interrupted(_)
-                | Failure::InterruptedTrials { .. }
-                | Failure::InterruptedTrade { .. }
-                | Failure::InterruptedSweep { .. }
-                | Failure::InterruptedFollow => {
-                    writeln!(messages(), "{failure}")
-                }
+                Failure::Interrupted(_) => writeln!(messages(), "{failure}"),
                 _ => writeln!(messages(), "error: {}", without_long_words(&failure.to_string())),
             };
             failure.status()
@@ -121,6 +137,7 @@ impl Arguments {
         if let Some(gigabytes) = self.memory_limit {
             limit_memory(gigabytes);
         }
+        self.output.apply();
         match self.command {
             Some(Command::Train(train)) => train.run(),
             Some(Command::Inspect(inspect)) => inspect.run(),
@@ -132,8 +149,12 @@ impl Arguments {
             Some(Command::Reproduce(reproduce)) => reproduce.run(),
             Some(Command::Trade(trade)) => trade.run(),
             Some(Command::Sweep(sweep)) => sweep.run(),
+            Some(Command::Completions { shell }) => {
+                clap_complete::generate(shell, &mut Arguments::command(), "decoupler", &mut std::io::stdout());
+                Ok(())
+            }
             None => {
-                window().map_err(Failure::Window)?;
+                window(Vec::new()).map_err(Failure::Window)?;
                 // A file that takes too long to write is not left incomplete.
                 exit_leaving_nothing(0)
             }
@@ -149,19 +170,23 @@ pub(super) fn count(allowed: RangeInclusive<usize>) -> impl Fn(&str) -> Result<u
     }
 }
 
-/// Parses a finite number that is not negative.
-pub(super) fn number(text: &str) -> Result<f64, String> {
-    let number = text
-        .parse()
-        .ok()
-        .filter(|number: &f64| number.is_finite() && *number >= 0.0);
-    number.ok_or_else(|| "give a number from 0, for example 1e-7".to_owned())
+/// Returns a parser of numbers in `allowed`; `what` completes "give …".
+pub(super) fn within(
+    allowed: impl RangeBounds<f64> + Clone,
+    what: &'static str,
+) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| {
+        let number = text
+            .parse()
+            .ok()
+            .filter(|number: &f64| number.is_finite() && allowed.contains(number));
+        number.ok_or_else(|| format!("give {what}"))
+    }
 }
 
-/// Parses a size in GB.
-fn gigabytes(text: &str) -> Result<f64, String> {
-    let size = text.parse().ok().filter(|size: &f64| size.is_finite() && *size > 0.0);
-    size.ok_or_else(|| "give a number of GB above 0, for example 16".to_owned())
+/// Parses a finite number that is not negative.
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    within(0.0.., "a number from 0, for example 1e-7")(text)
 }
 
 /// Parses a seed.
@@ -228,7 +253,7 @@ mod tests {
             ("train --array 10x6", "10x10_5x30"),
             ("train --method sgd", "lm, br, scg"),
             ("train extra", "unexpected argument 'extra'"),
-            ("decode --network n", "--input <FILE> --output <FILE>"),
+            ("decode --network n", "--data <FILE> --out <FILE>"),
             ("trian", "unrecognized subcommand 'trian'"),
             ("train --seed", "a value is required"),
         ];

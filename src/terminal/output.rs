@@ -1,9 +1,14 @@
 //! Output of the terminal, and readings of a file for a network, line by line.
 
 use std::{
+    fmt::Display,
     fs::File,
     io::{self, Stderr, Write, stderr, stdout},
-    path::Path,
+    path::{Path, PathBuf},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Duration,
 };
 
@@ -12,25 +17,120 @@ use decoupler_core::{
     text::{is_unprintable, printable},
 };
 use decoupler_files::{
-    export::NetworkFile,
+    export::{NetworkFile, check_writable},
     import::{self, InputTable, KeptColumn, ReadingsFile, Recipe},
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use ndarray::Array2;
 use serde::Serialize;
+use serde_json::Value;
 
 use super::{failure::Failure, samples::with_bar};
 
-/// Prints one JSON object on standard output.
-pub(super) fn print_object(object: &impl Serialize) -> Result<(), Failure> {
-    let mut output = stdout().lock();
-    let written = serde_json::to_writer(&mut output, object).map_err(io::Error::from);
-    written.and_then(|()| writeln!(output)).map_err(Failure::Output)
+/// Options of every command that say how it writes.
+#[derive(clap::Args, Default)]
+pub(super) struct OutputArguments {
+    /// Print one JSON object instead of text and progress
+    #[arg(long, global = true, hide_short_help = true)]
+    json: bool,
+    /// Show no progress and no notes, only results, warnings and errors
+    #[arg(short, long, global = true, hide_short_help = true)]
+    quiet: bool,
+    /// Replace files that exist
+    #[arg(long, global = true, overrides_with = "force", hide_short_help = true)]
+    force: bool,
 }
 
-/// Prints the output of `write` on standard output.
-pub(super) fn print(write: impl FnOnce(&mut Printable<io::StdoutLock>) -> io::Result<()>) -> Result<(), Failure> {
-    write(&mut Printable(stdout().lock())).map_err(Failure::Output)
+static IS_JSON: AtomicBool = AtomicBool::new(false);
+static IS_QUIET: AtomicBool = AtomicBool::new(false);
+static IS_FORCED: AtomicBool = AtomicBool::new(false);
+/// True if a file is written to standard output, and what is printed goes to standard error.
+static IS_TAKEN: AtomicBool = AtomicBool::new(false);
+/// Warnings so far.
+static WARNINGS: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+impl OutputArguments {
+    pub(super) fn apply(&self) {
+        IS_JSON.store(self.json, Ordering::Relaxed);
+        IS_QUIET.store(self.quiet, Ordering::Relaxed);
+        IS_FORCED.store(self.force, Ordering::Relaxed);
+    }
+}
+
+pub(super) fn is_json() -> bool {
+    IS_JSON.load(Ordering::Relaxed)
+}
+
+/// Parses the name of a file to read; `-` is standard input.
+pub(super) fn input(text: &str) -> Result<PathBuf, String> {
+    Ok(if text == "-" { "/dev/stdin" } else { text }.into())
+}
+
+/// Parses the name of a file to write; `-` is standard output.
+pub(super) fn output(text: &str) -> Result<PathBuf, String> {
+    let is_standard = text == "-";
+    IS_TAKEN.fetch_or(is_standard, Ordering::Relaxed);
+    Ok(if is_standard { "/dev/stdout" } else { text }.into())
+}
+
+/// Checks that a file can be written, and replaces no other without `--force`.
+pub(super) fn check_output(option: &str, path: &Path) -> Result<(), Failure> {
+    check_writable(path)?;
+    if path != Path::new("/dev/stdout") && path.is_file() && !IS_FORCED.load(Ordering::Relaxed) {
+        let path = path.display();
+        let message = format!("{option} '{path}' exists: give another name, or --force to replace it");
+        return Err(Failure::Arguments(message));
+    }
+    Ok(())
+}
+
+/// Warns on standard error; the object that `--json` prints lists all warnings.
+pub(super) fn warn(message: impl Display) {
+    let message = message.to_string();
+    // There is no one to report to if this fails.
+    let _ = writeln!(messages(), "warning: {message}");
+    WARNINGS.lock().unwrap_or_else(PoisonError::into_inner).push(message);
+}
+
+/// Says something on standard error that is neither a warning nor a result.
+pub(super) fn note(message: impl Display) {
+    if !IS_QUIET.load(Ordering::Relaxed) {
+        // There is no one to report to if this fails.
+        let _ = writeln!(messages(), "{message}");
+    }
+}
+
+/// Prints a result: with `--json` one object, to which the warnings are added, otherwise as text.
+pub(super) fn print(
+    object: impl FnOnce() -> Value,
+    text: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), Failure> {
+    let mut out: Box<dyn Write> = match IS_TAKEN.load(Ordering::Relaxed) {
+        true => Box::new(stderr()),
+        false => Box::new(stdout().lock()),
+    };
+    let written = if is_json() {
+        let mut object = object();
+        object["warnings"] = WARNINGS.lock().unwrap_or_else(PoisonError::into_inner).clone().into();
+        writeln!(out, "{object}")
+    } else {
+        text(&mut Printable(out))
+    };
+    written.map_err(Failure::Output)
+}
+
+/// Returns an object with the fields of all `parts`.
+pub(super) fn joined(parts: impl IntoIterator<Item = Value>) -> Value {
+    let objects = parts.into_iter().filter_map(|part| match part {
+        Value::Object(fields) => Some(fields),
+        _ => None,
+    });
+    Value::Object(objects.flatten().collect())
+}
+
+/// Serialises a result, which has only text keys.
+pub(super) fn value(of: &impl Serialize) -> Value {
+    serde_json::to_value(of).expect("a result has only text keys")
 }
 
 /// Returns standard error for messages.
@@ -58,9 +158,9 @@ impl<W: Write> Write for Printable<W> {
     }
 }
 
-/// Progress bar of `steps` with this template; hidden with JSON output and if standard error is not a terminal.
-pub(super) fn progress_bar(is_hidden: bool, steps: usize, template: &str) -> ProgressBar {
-    if is_hidden {
+/// Progress bar of `steps` with this template; hidden with `--json` or `--quiet`, and if standard error is not a terminal.
+pub(super) fn progress_bar(steps: usize, template: &str) -> ProgressBar {
+    if is_json() || IS_QUIET.load(Ordering::Relaxed) {
         return ProgressBar::hidden();
     }
     let bar = ProgressBar::new(steps as u64);
@@ -100,7 +200,7 @@ pub(super) fn read(
 /// Reads the columns named like the inputs, or as many unnamed columns as there are inputs, from a file of any format.
 fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Readings, Failure> {
     let has_rows = file.network.only().is_none();
-    let table = with_bar(true, |watch| recipe.read_inputs(input, &file.problem, has_rows, watch))?;
+    let table = with_bar(|watch| recipe.read_inputs(input, &file.problem, has_rows, watch))?;
     let InputTable {
         readings,
         row_wires,
@@ -112,27 +212,28 @@ fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Rea
     } = table;
     warn_if_torn(input, torn_line);
     for warning in warnings {
-        // There is no one to report to if this fails.
-        let _ = writeln!(messages(), "warning: '{}': {warning}", input.display());
+        warn(format_args!("'{}': {warning}", input.display()));
     }
     let row_indices = match (row_wires, &file.row_wires) {
         _ if !has_rows => vec![0; lines.len()],
         (Some(of_lines), Some(read)) => {
             let index = |(row_wire, &line): (usize, &u64)| {
                 let index = read.binary_search(&row_wire);
-                index.map_err(|_| Failure::UnknownRow {
-                    path: input.to_owned(),
-                    line,
-                    row: row_wire + 1,
-                })
+                let row = row_wire + 1;
+                let message = format_args!("line {line}: there is no network for row {row}; train with samples of it");
+                index.map_err(|_| Failure::at(input, message))
             };
             of_lines.into_iter().zip(&lines).map(index).collect::<Result<_, _>>()?
         }
         _ => {
-            return Err(Failure::NoRowWires {
-                path: input.to_owned(),
-                column: recipe.row_wire.clone().unwrap_or_default(),
-            });
+            let column = recipe.row_wire.as_deref().unwrap_or_default();
+            return Err(Failure::at(
+                input,
+                format_args!(
+                    "it has no column '{column}' with the row number of each line, which is needed because each row has its \
+                     own network; add it"
+                ),
+            ));
         }
     };
     Ok(Readings {
@@ -146,12 +247,10 @@ fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Rea
 /// Reports a last line that is cut off, as by a full disk, and was left out.
 fn warn_if_torn(input: &Path, line: Option<u64>) {
     if let Some(line) = line {
-        let input = input.display();
-        // There is no one to report to if this fails.
-        let _ = writeln!(
-            messages(),
-            "warning: '{input}': line {line}, the last, is cut off and left out"
-        );
+        warn(format_args!(
+            "'{}': line {line}, the last, is cut off and left out",
+            input.display()
+        ));
     }
 }
 
@@ -166,10 +265,7 @@ fn read_resistances(
         path: input.to_owned(),
         source,
     })?;
-    let unreadable = |source| Failure::Resistances {
-        path: input.to_owned(),
-        source,
-    };
+    let unreadable = |error| Failure::at(input, error);
     let read = scene.rows.read(sensor.scale.rows()).map_err(DatasetError::from)?;
     let mut readings = ReadingsFile::new(opened, file.line_parser(false, true)?);
     while let Some(block) = readings.read(BLOCK).map_err(unreadable)? {
@@ -188,11 +284,14 @@ fn read_resistances(
     warn_if_torn(input, readings.torn_line());
     let lines = readings.lines_in_turn();
     if readings.torn_line().is_none() && !lines.is_multiple_of(read.len()) {
-        return Err(Failure::PartOfSnapshot {
-            path: input.to_owned(),
-            lines,
-            rows: read.len(),
-        });
+        let rows = read.len();
+        return Err(Failure::at(
+            input,
+            format_args!(
+                "{lines} lines are not a multiple of {rows} rows: each snapshot needs one line per row-wire; add the missing \
+                 lines, or a column named row with the row number of each line"
+            ),
+        ));
     }
     Ok(())
 }

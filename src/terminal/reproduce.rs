@@ -1,6 +1,5 @@
 use std::{
     collections::BTreeSet,
-    fs,
     io::{self, Write},
     path::{Path, PathBuf},
     time::{Duration, Instant},
@@ -10,9 +9,9 @@ use clap::{Args, ValueEnum};
 use decoupler_core::{
     dataset::{Seed, SplitBy},
     evaluation::{
-        CrossValidation, ErrorMeasure, MAX_STARTS, RunError,
+        ErrorMeasure, MAX_STARTS, RunError,
         experiments::{
-            self, Axis, AxisKind, Experiment, ExperimentResults, Figure, PaperTable, TrialSamples, run_experiments,
+            self, Axis, AxisKind, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments,
             worker_threads,
         },
     },
@@ -22,7 +21,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        ExperimentTable, Table, atomic_write, cells_table, check_writable, describe_conditions, describe_failures,
+        ExperimentTable, Table, atomic_write, cells_table, describe_conditions, describe_failures,
         describe_worse_than_mean,
         figures::{PictureError, PictureFormat},
         format_duration, trials_table, write_experiment_markdown,
@@ -30,13 +29,13 @@ use decoupler_files::{
     figure::experiment_figure,
     machine::memory_budget,
 };
-use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::{
     count,
     failure::Failure,
     interruption::Graceful,
-    output::{print, print_object, progress_bar},
+    output::{check_output, print, progress_bar, warn},
     seed,
 };
 
@@ -69,19 +68,16 @@ pub(super) struct Reproduce {
     /// Unit of the folds of Table 2: single samples, as in the paper, or whole snapshots, which keeps training and test
     /// samples of the same moment apart
     #[arg(long, value_enum, default_value = "sample")]
-    folds: Unit,
+    fold_unit: Unit,
     /// Number of folds of Table 2
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(2..=1000))]
-    k: usize,
+    #[arg(long, value_name = "K", default_value_t = 10, value_parser = count(2..=1000))]
+    folds: usize,
     /// Number of times the samples of Table 2 are shuffled into new folds for each seed
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(1..=1000))]
     repeats: usize,
     /// Folder for the tables as CSV and Markdown and their figures as SVG and PNG; created if missing
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print one JSON object instead of text and progress
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -123,11 +119,7 @@ impl Reproduce {
             .flat_map(|results| &results.cells)
             .map(|cell| cell.expected)
             .sum();
-        let bar = progress_bar(
-            self.json,
-            trials,
-            "{bar:30} {pos} of {len} trials, {elapsed} elapsed, {msg}",
-        );
+        let bar = progress_bar(trials, "{bar:30} {pos} of {len} trials, {elapsed} elapsed, {msg}");
         bar.set_message("estimating the time left");
         let graceful = Graceful::begin();
         let mut done = 0;
@@ -156,16 +148,17 @@ impl Reproduce {
         let folder = self.out.iter();
         let written = folder.flat_map(|folder| reproduced.iter().flat_map(|table| write_files(folder, table)));
         let unwritten: Vec<PictureError> = written.filter_map(Result::err).collect();
-        if self.json {
-            print_json(&reproduced, begun.elapsed())?;
-        } else {
-            print_text(&reproduced, begun.elapsed())?;
-        }
+        let took = begun.elapsed();
+        reproduced
+            .iter()
+            .flat_map(|(_, results)| describe_worse_than_mean(results))
+            .for_each(warn);
+        print(|| object(&reproduced, took), |out| write_text(&reproduced, took, out))?;
         if !unwritten.is_empty() {
             return Err(Failure::Files(unwritten));
         }
         if done < trials {
-            return Err(Failure::InterruptedTrials { done, trials });
+            return Err(Failure::Interrupted(format!(" after {done} of {trials} trials")));
         }
         Ok(())
     }
@@ -200,9 +193,9 @@ impl Reproduce {
             _ => {}
         }
         if let Some(cross_validation) = &mut experiment.cross_validation {
-            cross_validation.folds = self.k;
+            cross_validation.folds = self.folds;
             cross_validation.repeats = self.repeats;
-            cross_validation.by = match self.folds {
+            cross_validation.by = match self.fold_unit {
                 Unit::Sample => SplitBy::Random,
                 Unit::Snapshot => SplitBy::Group,
             };
@@ -226,12 +219,9 @@ fn files(folder: &Path, table: PaperTable) -> [PathBuf; 5] {
 
 /// Creates the folder and checks that every file can be written, before training starts.
 fn prepare_folder(folder: &Path, tables: &[PaperTable]) -> Result<(), Failure> {
-    fs::create_dir_all(folder).map_err(|source| Failure::MakeFolder {
-        path: folder.to_owned(),
-        source,
-    })?;
+    Failure::make_folder(folder)?;
     let paths = tables.iter().flat_map(|&table| files(folder, table));
-    Ok(paths.into_iter().try_for_each(|path| check_writable(&path))?)
+    paths.into_iter().try_for_each(|path| check_output("--out", &path))
 }
 
 /// Writes every file of a table, even if others fail.
@@ -253,106 +243,55 @@ fn write_files(folder: &Path, (table, results): &Reproduced) -> [Result<(), Pict
 type Reproduced = (PaperTable, ExperimentResults);
 
 /// The object printed by `reproduce --json`.
-#[derive(Serialize)]
-struct Report {
-    seconds: f64,
-    is_complete: bool,
-    tables: Vec<TableReport>,
-}
-
-#[derive(Serialize)]
-struct TableReport {
-    table: u8,
-    title: &'static str,
-    conditions: String,
-    seeds: usize,
-    cross_validation: Option<CrossValidation>,
-    is_complete: bool,
-    cells: Vec<CellReport>,
-    failures: Vec<String>,
-    /// Cells with networks that are worse than the training mean.
-    remarks: Vec<String>,
-}
-
-/// Figures of a cell of an array.
-#[derive(Serialize)]
-struct CellReport {
-    array: ArrayScale,
-    hidden: usize,
-    samples: usize,
-    method: &'static str,
-    epochs: usize,
-    starts: usize,
-    seed: Seed,
-    trials: usize,
-    expected_trials: usize,
-    z_percent: Figure,
-    x_percent: Figure,
-    y_percent: Figure,
-    z_mm: Figure,
-    mean_z_percent: Option<f64>,
-    linear_z_percent: Option<f64>,
-    epochs_run: Option<f64>,
-    training_seconds: Option<f64>,
-    epoch_ms: Option<f64>,
-}
-
-impl CellReport {
-    /// `None` for a recording, which does not occur in the paper's tables.
-    fn of(cell: &experiments::Cell) -> Option<Self> {
-        let figure = |measure| cell.error(measure);
-        let settings = cell.settings;
-        let simulation = settings.simulation()?;
-        Some(Self {
-            array: simulation.sensor.scale,
-            hidden: settings.hidden,
-            samples: simulation.samples,
-            method: settings.training.method.short_name(),
-            epochs: settings.training.stopping.epochs,
-            starts: settings.starts,
-            seed: settings.seed,
-            trials: cell.trials.len(),
-            expected_trials: cell.expected,
-            z_percent: figure(ErrorMeasure::ZPercent)?,
-            x_percent: figure(ErrorMeasure::XPercent)?,
-            y_percent: figure(ErrorMeasure::YPercent)?,
-            z_mm: figure(ErrorMeasure::ZMm)?,
-            mean_z_percent: cell.mean_percent(),
-            linear_z_percent: cell.linear_percent(),
-            epochs_run: cell.epochs_run(),
-            training_seconds: cell.training_seconds(),
-            epoch_ms: cell.epoch_ms(),
+fn object(reproduced: &[Reproduced], took: Duration) -> Value {
+    let table = |(table, results): &Reproduced| {
+        json!({
+            "table": table.number(),
+            "title": table.title(),
+            "conditions": describe_conditions(&results.experiment),
+            "seeds": results.experiment.seeds,
+            "cross_validation": results.experiment.cross_validation,
+            "is_complete": results.is_complete(),
+            "cells": Vec::from_iter(results.cells.iter().filter_map(cell_object)),
+            "failures": describe_failures(results),
+            "remarks": describe_worse_than_mean(results),
         })
-    }
-}
-
-/// Prints one JSON object.
-fn print_json(reproduced: &[Reproduced], took: Duration) -> Result<(), Failure> {
-    let table = |(table, results): &Reproduced| TableReport {
-        table: table.number(),
-        title: table.title(),
-        conditions: describe_conditions(&results.experiment),
-        seeds: results.experiment.seeds,
-        cross_validation: results.experiment.cross_validation,
-        is_complete: results.is_complete(),
-        cells: results.cells.iter().filter_map(CellReport::of).collect(),
-        failures: describe_failures(results),
-        remarks: describe_worse_than_mean(results),
     };
-    let report = Report {
-        seconds: took.as_secs_f64(),
-        is_complete: reproduced.iter().all(|(_, results)| results.is_complete()),
-        tables: reproduced.iter().map(table).collect(),
-    };
-    print_object(&report)
+    json!({
+        "seconds": took.as_secs_f64(),
+        "is_complete": reproduced.iter().all(|(_, results)| results.is_complete()),
+        "tables": Vec::from_iter(reproduced.iter().map(table)),
+    })
 }
 
-/// Prints each table with its conditions.
-fn print_text(reproduced: &[Reproduced], took: Duration) -> Result<(), Failure> {
-    print(|output| write_text(reproduced, took, output))
+/// Figures of a cell of an array; `None` for a recording, which does not occur in the paper's tables.
+fn cell_object(cell: &experiments::Cell) -> Option<Value> {
+    let settings = cell.settings;
+    let simulation = settings.simulation()?;
+    Some(json!({
+        "array": simulation.sensor.scale,
+        "hidden": settings.hidden,
+        "samples": simulation.samples,
+        "method": settings.training.method.short_name(),
+        "epochs": settings.training.stopping.epochs,
+        "starts": settings.starts,
+        "seed": settings.seed,
+        "trials": cell.trials.len(),
+        "expected_trials": cell.expected,
+        "z_percent": cell.error(ErrorMeasure::ZPercent)?,
+        "x_percent": cell.error(ErrorMeasure::XPercent)?,
+        "y_percent": cell.error(ErrorMeasure::YPercent)?,
+        "z_mm": cell.error(ErrorMeasure::ZMm)?,
+        "mean_z_percent": cell.mean_percent(),
+        "linear_z_percent": cell.linear_percent(),
+        "epochs_run": cell.epochs_run(),
+        "training_seconds": cell.training_seconds(),
+        "epoch_ms": cell.epoch_ms(),
+    }))
 }
 
-fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -> io::Result<()> {
+/// Writes each table with its conditions.
+fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut dyn Write) -> io::Result<()> {
     let mut notes = BTreeSet::new();
     for (table, results) in reproduced {
         writeln!(
@@ -367,9 +306,6 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -
         notes.insert(table.note);
         for failure in describe_failures(results) {
             writeln!(out, "{failure}")?;
-        }
-        for remark in describe_worse_than_mean(results) {
-            writeln!(out, "Warning: {remark}")?;
         }
         writeln!(out)?;
     }

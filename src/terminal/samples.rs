@@ -22,17 +22,19 @@ use decoupler_files::{
     machine::memory_budget,
 };
 
+use serde_json::json;
+
 use super::{
     count,
     failure::Failure,
-    output::{messages, progress_bar},
+    output::{check_output, note, output, print, progress_bar, warn},
     settings_arguments::{OfSimulate, SettingsArguments},
 };
 
 /// Draws or reads the samples of `setup`.
-pub(super) fn sets(setup: &Setup, is_json: bool) -> Result<SetupSets, Failure> {
+pub(super) fn sets(setup: &Setup) -> Result<SetupSets, Failure> {
     announce(setup.settings())?;
-    let sets = following(setup, is_json, |on_progress| {
+    let sets = following(setup, |on_progress| {
         setup.sets(working_folder(), &Job::UNINTERRUPTED, on_progress)
     });
     Ok(sets?)
@@ -41,10 +43,12 @@ pub(super) fn sets(setup: &Setup, is_json: bool) -> Result<SetupSets, Failure> {
 /// Calls `read`, which reads or draws the samples of `setup` without cancellation, with a progress bar if it reads files.
 pub(super) fn following<T>(
     setup: &Setup,
-    is_json: bool,
     read: impl FnOnce(&mut dyn FnMut(Progress)) -> Result<T, SetupError>,
 ) -> Result<T, SetupError> {
-    with_bar(is_json || setup.plan().is_none(), |watch| {
+    if setup.plan().is_none() {
+        return read(&mut |_| ());
+    }
+    with_bar(|watch| {
         read(&mut |progress| {
             let _ = watch(progress);
         })
@@ -52,8 +56,8 @@ pub(super) fn following<T>(
 }
 
 /// Calls `import` with a progress bar of the bytes read.
-pub(super) fn with_bar<T>(is_hidden: bool, import: impl FnOnce(&mut dyn FnMut(Progress) -> ControlFlow<()>) -> T) -> T {
-    let bar = progress_bar(is_hidden, 1, "reading {bytes} of {total_bytes}");
+pub(super) fn with_bar<T>(import: impl FnOnce(&mut dyn FnMut(Progress) -> ControlFlow<()>) -> T) -> T {
+    let bar = progress_bar(1, "reading {bytes} of {total_bytes}");
     let result = import(&mut |progress| {
         bar.set_length(progress.of.unwrap_or(progress.bytes));
         bar.set_position(progress.bytes);
@@ -86,8 +90,7 @@ pub(super) fn announce_recording(setup: &Setup, sets: &SetupSets) {
     if setup.plan().is_some()
         && let Some(text) = describe_recorded_workload(settings, size)
     {
-        // There is no one to report to if this fails.
-        let _ = writeln!(messages(), "{text}");
+        note(text);
     }
 }
 
@@ -98,8 +101,7 @@ pub(super) fn announce_recording(setup: &Setup, sets: &SetupSets) {
 pub(super) fn announce_workload(workload: &Workload) -> Result<(), RunError> {
     workload.check_memory(memory_budget())?;
     if workload.is_large() {
-        // There is no one to report to if this fails.
-        let _ = writeln!(messages(), "{}", describe_workload(workload));
+        note(describe_workload(workload));
     }
     Ok(())
 }
@@ -129,27 +131,26 @@ pub(super) struct Simulate {
     #[command(flatten)]
     scene: SettingsArguments<OfSimulate>,
     /// File to write instead of standard output
-    #[arg(long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = output)]
     out: Option<PathBuf>,
 }
 
 impl Simulate {
     pub(super) fn run(self) -> Result<(), Failure> {
-        match &self.out {
-            Some(path) => {
-                let mut file = AtomicFile::create(path)?;
-                self.write(&mut file, |source| WriteError::io(path, source).into())?;
-                Ok(file.commit()?)
-            }
-            None => {
-                let mut output = BufWriter::new(stdout().lock());
-                self.write(&mut output, Failure::Output)?;
-                output.flush().map_err(Failure::Output)
-            }
-        }
+        let Some(path) = &self.out else {
+            let mut written = BufWriter::new(stdout().lock());
+            self.write(&mut written, Failure::Output)?;
+            return written.flush().map_err(Failure::Output);
+        };
+        check_output("--out", path)?;
+        let mut file = AtomicFile::create(path)?;
+        let samples = self.write(&mut file, |source| WriteError::io(path, source).into())?;
+        file.commit()?;
+        print(|| json!({"samples": samples}), |_| Ok(()))
     }
 
-    fn write(&self, writer: &mut dyn Write, refused: impl Fn(std::io::Error) -> Failure) -> Result<(), Failure> {
+    /// Writes the samples and returns their number.
+    fn write(&self, writer: &mut dyn Write, refused: impl Fn(std::io::Error) -> Failure) -> Result<usize, Failure> {
         let settings = self.scene.settings(None)?;
         let (Simulation { sensor, scene, .. }, seed) = (settings.drawn()?, settings.seed);
         let array = sensor.scale;
@@ -184,7 +185,7 @@ impl Simulate {
             };
             write_samples(&set, decoded_mm.as_ref(), first + 1, writer).map_err(&refused)?;
         }
-        Ok(())
+        Ok(snapshots * rows.len())
     }
 
     /// The given decoder with trained networks; none if none is given.
@@ -204,14 +205,7 @@ impl Simulate {
             let of_network = remarks
                 .filter(|(row, _)| *row == "network")
                 .map(|(_, remark)| remark.to_string());
-            for warning in run
-                .defect()
-                .map(|defect| defect.to_string())
-                .into_iter()
-                .chain(of_network)
-            {
-                eprintln!("Warning: {warning}");
-            }
+            run.defect().into_iter().chain(of_network).for_each(warn);
             Some(run.network())
         } else {
             None

@@ -1,8 +1,8 @@
 //! Options of the settings of a run, from the table of settings.
 
-use std::marker::PhantomData;
+use std::{collections::HashSet, marker::PhantomData};
 
-use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
+use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, error::ErrorKind};
 use decoupler_core::{
     dataset::Simulation,
     decoupling::DecoderKind,
@@ -19,6 +19,9 @@ use super::{count, failure::Failure, interruption::check_same};
 
 /// Rows of the table of settings that a command offers.
 pub(super) trait Offer: Send + Sync {
+    /// `true` if the command trains networks by a method that is given.
+    const OF_METHOD: bool = false;
+
     /// Returns `true` if the command offers this row.
     fn has(option: &RunOption) -> bool;
 }
@@ -33,6 +36,8 @@ pub(super) struct OfTrade;
 pub(super) struct OfSimulate;
 
 impl Offer for OfTrain {
+    const OF_METHOD: bool = true;
+
     fn has(option: &RunOption) -> bool {
         option.setting.name != "hidden"
     }
@@ -54,7 +59,19 @@ impl Offer for OfSimulate {
 /// Settings that were given, in the order of the table.
 pub(super) struct Given<O> {
     values: Vec<(&'static RunOption, Value)>,
+    /// Settings of the method.
+    of_method: Vec<(String, f64)>,
     of: PhantomData<O>,
+}
+
+fn offered<O: Offer>() -> impl Iterator<Item = &'static RunOption> {
+    RUN_OPTIONS.iter().filter(|option| O::has(option))
+}
+
+/// Returns the option of a setting as it is typed, without the first two dashes.
+fn typed(option: &RunOption) -> String {
+    let word = option.setting.word("-");
+    if option.is_rare() { format!("set {word}") } else { word }
 }
 
 /// Reads a value and checks it against its row.
@@ -67,30 +84,60 @@ fn parsed(option: &'static RunOption, text: &str) -> Result<Value, SettingError>
     Ok(setting.get(&run).unwrap_or(value))
 }
 
-fn argument(option: &'static RunOption) -> Arg {
-    let (setting, word) = (&option.setting, option.setting.word("-"));
-    let default = match option.default {
-        "" => String::new(),
-        default => format!(" [default: {default}]"),
-    };
-    // Options have no full stop at the end.
-    let mut help = setting.help.trim_end_matches('.').to_owned();
-    if setting.name == "method" {
-        let names = Method::all().map(|method| method.short_name());
-        help += &format!(": {}", names.join(", "));
+/// Returns the explanation of a setting; options have no full stop at the end.
+fn help(option: &RunOption) -> String {
+    let help = option.setting.help.trim_end_matches('.');
+    match option.default {
+        "" => help.to_owned(),
+        default => format!("{help} [default: {default}]"),
     }
-    let argument = Arg::new(word.clone()).long(word).value_name(option.form);
-    let argument = argument.help(format!("{help}{default}"));
-    if setting.name == "inputs" {
-        return argument.value_delimiter(',').action(ArgAction::Append);
-    }
-    argument.value_parser(move |text: &str| parsed(option, text))
 }
+
+fn argument(option: &'static RunOption) -> Arg {
+    /// Settings that `-h` shows.
+    const USUAL: [&str; 4] = ["array", "inputs", "epochs", "seed"];
+    let (setting, word) = (&option.setting, option.setting.word("-"));
+    let heading = match option.part {
+        Part::Array | Part::Scene => "Simulated array",
+        Part::Network | Part::Training | Part::Random => "Network and training",
+    };
+    let argument = Arg::new(word.clone())
+        .long(word)
+        .value_name(option.form)
+        .help(help(option))
+        .help_heading(heading)
+        .hide_short_help(!USUAL.contains(&setting.name));
+    match setting.name {
+        "inputs" => argument.value_delimiter(',').action(ArgAction::Append),
+        _ => argument.value_parser(move |text: &str| parsed(option, text)),
+    }
+}
+
+/// The option for the settings that are rarely changed, and for those of the method.
+fn set<O: Offer>() -> Arg {
+    let rare = offered::<O>().filter(|option| option.is_rare());
+    let rare = rare.map(|option| format!("{}: {}", option.setting.word("-"), help(option)));
+    let mut texts = vec!["Change a setting that is rarely changed; may be repeated".to_owned()];
+    texts.extend(rare);
+    texts.extend(O::OF_METHOD.then(|| format!("Settings of the methods: {}", method_settings())));
+    Arg::new("set")
+        .long("set")
+        .value_name("NAME=VALUE")
+        .action(ArgAction::Append)
+        .help(texts.join("; "))
+        .help_heading(RARELY)
+        .hide_short_help(true)
+}
+
+/// Heading of the last options.
+pub(super) const RARELY: &str = "Rarely needed";
 
 impl<O: Offer> Args for Given<O> {
     fn augment_args(command: Command) -> Command {
-        let offered = RUN_OPTIONS.iter().filter(|option| O::has(option));
-        offered.fold(command, |command, option| command.arg(argument(option)))
+        let usual = offered::<O>().filter(|option| !option.is_rare());
+        usual
+            .fold(command, |command, option| command.arg(argument(option)))
+            .arg(set::<O>())
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -100,20 +147,43 @@ impl<O: Offer> Args for Given<O> {
 
 impl<O: Offer> FromArgMatches for Given<O> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        let value = |option: &'static RunOption| {
+        let refused = |message: String| clap::Error::raw(ErrorKind::ValueValidation, message);
+        let mut set = Vec::new();
+        for text in matches.get_many::<String>("set").into_iter().flatten() {
+            let assignment = text.split_once('=').map(|(name, value)| (name.trim(), value.trim()));
+            set.push(assignment.ok_or_else(|| refused("--set: write NAME=VALUE, for example mu=0.01".to_owned()))?);
+        }
+        let mut values = Vec::new();
+        for option in offered::<O>() {
             let word = option.setting.word("-");
             let value = match option.setting.name {
-                "inputs" => {
-                    let names = Vec::from_iter(matches.get_many::<String>(&word)?.map(String::as_str));
-                    Value::Text(names.join(","))
+                _ if option.is_rare() => {
+                    let texts = set.extract_if(.., |(name, _)| *name == word).map(|(_, text)| text);
+                    let parsed = texts.last().map(|text| parsed(option, text)).transpose();
+                    parsed.map_err(|error| refused(format!("--set {error}")))?
                 }
-                _ => matches.get_one::<Value>(&word)?.clone(),
+                "inputs" => matches.get_many::<String>(&word).map(|names| {
+                    let names = Vec::from_iter(names.map(String::as_str));
+                    Value::Text(names.join(","))
+                }),
+                _ => matches.get_one::<Value>(&word).cloned(),
             };
-            Some((option, value))
-        };
-        let offered = RUN_OPTIONS.iter().filter(|option| O::has(option));
+            values.extend(value.map(|value| (option, value)));
+        }
+        let of_method = set.into_iter().map(|(name, value)| {
+            let is_known = O::OF_METHOD && Method::all().iter().any(|method| has(method, name));
+            match value.parse() {
+                _ if !is_known => Err(format!(
+                    "--set {name}: there is no such setting; there are {}",
+                    names::<O>()
+                )),
+                Ok(value) => Ok((name.to_owned(), value)),
+                Err(_) => Err(format!("--set {name}: '{value}' is not a number")),
+            }
+        });
         Ok(Self {
-            values: offered.filter_map(value).collect(),
+            values,
+            of_method: of_method.collect::<Result<_, _>>().map_err(refused)?,
             of: PhantomData,
         })
     }
@@ -124,16 +194,35 @@ impl<O: Offer> FromArgMatches for Given<O> {
     }
 }
 
+fn has(method: &Method, name: &str) -> bool {
+    method.settings().any(|setting| setting.word("-") == name)
+}
+
+/// Names that `--set` takes.
+fn names<O: Offer>() -> String {
+    let rare = offered::<O>()
+        .filter(|option| option.is_rare())
+        .map(|option| option.setting.word("-"));
+    let mut names = Vec::from_iter(rare);
+    if O::OF_METHOD {
+        let of_methods = Method::all().into_iter().flat_map(|method| method.settings());
+        names.extend(of_methods.map(|setting| setting.word("-")));
+        let mut seen = HashSet::new();
+        names.retain(|name| seen.insert(name.clone()));
+    }
+    names.join(", ")
+}
+
 // Scene and array, and the decoders that are used.
 #[derive(Args)]
 pub(super) struct SettingsArguments<O: Offer> {
     /// Settings that other arguments start from: those of the paper, or the best ones measured [default: paper]
-    #[arg(long, value_name = "paper|best", value_parser = Preset::parse)]
+    #[arg(long, value_name = "paper|best", value_parser = Preset::parse, help_heading = "Simulated array")]
     pub(super) preset: Option<Preset>,
     #[command(flatten)]
     given: Given<O>,
     /// Decoders to use, separated by commas: mean, ridge, network, rbf, fuzzy, newton, polish
-    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = DecoderKind::parse)]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = DecoderKind::parse, hide_short_help = true)]
     pub(super) decoder: Vec<DecoderKind>,
 }
 
@@ -213,11 +302,7 @@ impl<O: Offer> SettingsArguments<O> {
             let setting = &option.setting;
             let is_columns = setting.name == "inputs" && settings.simulation().is_none();
             if !is_columns && !setting.applies(&settings) {
-                return Err(Failure::Arguments(format!(
-                    "--{}: {}",
-                    setting.word("-"),
-                    instead(option)
-                )));
+                return Err(Failure::Arguments(format!("--{}: {}", typed(option), instead(option))));
             }
             if let ("inputs", Value::Text(names), true) = (setting.name, value, settings.simulation().is_some())
                 && names.contains(',')
@@ -275,17 +360,17 @@ fn instead(option: &RunOption) -> &'static str {
 pub(super) struct TrainingArguments {
     #[command(flatten)]
     pub(super) scene: SettingsArguments<OfTrain>,
-    /// Hidden nodes. For a recording, auto chooses settings by cross-validation on the training samples, within --budget
+    /// Hidden nodes, or auto: the program chooses the settings [default: 12; auto for a recording]
+    ///
+    /// For a recording, auto chooses settings by cross-validation on the training samples, within --budget
     /// (60 seconds of one core by default): the readings, their logarithms or reciprocals; with --time, no memory, or averages
     /// with time constants from a few samples to a tenth of the recording if they are clearly better; 2 to 64 hidden nodes;
     /// min-max scaling or whitening; lm or br, or scg with weight decay where inputs are too many for the samples; the number of
     /// epochs, up to 400 (3000 of scg); and weights that begin random or at ridge regression. The answer is the best convex
     /// combination of the training mean, ridge, kernel ridge and up to four networks. What else is given here is kept. It is
-    /// the default for a recording if no setting of network or training is given [default: 12; auto for a recording]
-    #[arg(long, value_name = "N|auto", value_parser = hidden_nodes)]
+    /// the default for a recording if no setting of network or training is given.
+    #[arg(long, value_name = "N|auto", value_parser = hidden_nodes, help_heading = "Network and training")]
     hidden: Option<HiddenNodes>,
-    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment, help = settings_help())]
-    set: Vec<(String, f64)>,
 }
 
 /// Number of hidden nodes.
@@ -317,7 +402,8 @@ impl TrainingArguments {
     pub(super) fn is_auto(&self) -> bool {
         let given = self.scene.given.values.iter();
         let mut of_training = given.filter(|(option, _)| matches!(option.part, Part::Network | Part::Training));
-        let is_any_given = self.hidden.is_some() || !self.set.is_empty() || of_training.next().is_some();
+        let is_any_given =
+            self.hidden.is_some() || !self.scene.given.of_method.is_empty() || of_training.next().is_some();
         self.asks_for_auto() || !is_any_given
     }
 
@@ -339,7 +425,7 @@ impl TrainingArguments {
                 return Err(Failure::Arguments(message));
             }
         }
-        let is_method_given = is_given("method") || !self.set.is_empty();
+        let is_method_given = is_given("method") || !self.scene.given.of_method.is_empty();
         Ok(AutoFixed {
             hidden: self.hidden(),
             method: is_method_given.then_some(settings.training.method),
@@ -406,7 +492,7 @@ impl TrainingArguments {
         let asked = self.completed(self.scene.applied(asked)?)?;
         for option in RUN_OPTIONS.iter().filter(|option| option.part != Part::Training) {
             let [now, then] = [&asked, before].map(|run| option.setting.get(run).map(|value| value.to_string()));
-            check_same(&option.setting.word("-"), now, then.unwrap_or_default())?;
+            check_same(&typed(option), now, then.unwrap_or_default())?;
         }
         if let Some(plan) = saved.plan() {
             let columns = self.scene.columns();
@@ -420,13 +506,12 @@ impl TrainingArguments {
     /// Sets the given settings of the method.
     fn set_method(&self, training: &mut TrainingSettings) -> Result<(), Failure> {
         let method = &mut training.method;
-        for (name, value) in &self.set {
+        for (name, value) in &self.scene.given.of_method {
             let short_name = method.short_name();
             match method.settings().find(|setting| setting.word("-") == *name) {
                 Some(setting) => setting.set(method, &Value::Number(*value))?,
                 None => {
-                    let names = method.settings().map(|setting| setting.word("-"));
-                    let names = names.collect::<Vec<_>>().join(", ");
+                    let names = Vec::from_iter(method.settings().map(|setting| setting.word("-"))).join(", ");
                     let message = format!("--set {name}: {short_name} has no such setting; it has {names}");
                     return Err(Failure::Arguments(message));
                 }
@@ -436,32 +521,25 @@ impl TrainingArguments {
     }
 }
 
-fn assignment(text: &str) -> Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, for example mu=0.01")?;
-    let value = value.trim().parse().map_err(|_| format!("'{value}' is not a number"))?;
-    Ok((name.trim().to_owned(), value))
-}
-fn settings_help() -> String {
+/// Names and defaults of the settings of each method.
+fn method_settings() -> String {
     let of = |method: Method| {
-        let recorded = if method == Method::bayesian_regularization() {
-            Method::recorded_regularization()
-        } else {
-            method
+        let recorded = match method {
+            Method::BayesianRegularization(_) => Method::recorded_regularization(),
+            method => method,
         };
         let list = method.settings().filter_map(|setting| {
-            let (name, default) = (setting.word("-"), setting.number(&method)?);
-            let recorded = setting.number(&recorded)?;
-            Some(if recorded == default {
-                format!("{name} (default {default})")
+            let (name, default, recorded) = (setting.word("-"), setting.number(&method)?, setting.number(&recorded)?);
+            let recorded = if recorded == default {
+                String::new()
             } else {
-                format!("{name} (default {default}; {recorded} for a recording)")
-            })
+                format!("; {recorded} for a recording")
+            };
+            Some(format!("{name} (default {default}{recorded})"))
         });
-        let list = list.collect::<Vec<_>>().join(", ");
-        format!("{} has {list}", method.short_name())
+        format!("{} has {}", method.short_name(), Vec::from_iter(list).join(", "))
     };
-    let methods = Method::all().map(of).join("; ");
-    format!("Change a setting of the method; may be repeated: {methods}")
+    Method::all().map(of).join("; ")
 }
 
 #[cfg(test)]
@@ -482,9 +560,9 @@ mod tests {
     fn the_defaults_in_the_help_match_the_library() {
         assert_eq!(parsed("train").settings(None).unwrap(), RunSettings::default());
         let line = "train --preset paper --rows all --axes z --loading random --inputs resistance --scaling minmax \
-                    --noise 0 --noise-in both --array 10x10_5x30 --hidden 12 --starts 1 --method lm --epochs 1000 \
-                    --goal 0 --max-fail 6 --min-gradient 1e-7 --samples 1000 --test-samples 100 --validation-samples \
-                    200 --seed 0";
+                    --noise 0 --set noise-in=both --array 10x10_5x30 --hidden 12 --starts 1 --method lm --epochs 1000 \
+                    --set goal=0 --set max-fail=6 --set min-gradient=1e-7 --samples 1000 --set test-samples=100 \
+                    --set validation-samples=200 --seed 0";
         assert_eq!(parsed(line).settings(None).unwrap(), RunSettings::default());
     }
 
@@ -509,7 +587,7 @@ mod tests {
         };
         assert_eq!(rules("train --method lm"), (300, 6));
         assert_eq!(rules("train --method scg"), (2000, 100));
-        assert_eq!(rules("train --method rp --epochs 300 --max-fail 6"), (300, 6));
+        assert_eq!(rules("train --method rp --epochs 300 --set max-fail=6"), (300, 6));
     }
 
     /// Another value than the default of each setting, so that a new one cannot be forgotten here.
@@ -543,18 +621,20 @@ mod tests {
         ];
         for (option, (name, value)) in RUN_OPTIONS.iter().zip(values) {
             assert_eq!(option.setting.name, name);
-            let settings = parsed(&format!("train --{} {value}", option.setting.word("-")))
-                .settings(None)
-                .unwrap();
+            let given = |value: &str| match option.is_rare() {
+                true => format!("--set={}={value}", option.setting.word("-")),
+                false => format!("--{}={value}", option.setting.word("-")),
+            };
+            let settings = parsed(&format!("train {}", given(value))).settings(None).unwrap();
             assert_ne!(settings, RunSettings::default(), "{name}");
             let command = train_command(&settings.into(), None).unwrap();
             let command = command.strip_prefix("decoupler ").unwrap();
             assert_eq!(parsed(command).settings(None).unwrap(), settings, "{command}");
             for wrong in ["", "-1", "nan", "1e999", "no such name"] {
-                let line = ["train".to_owned(), format!("--{}={wrong}", option.setting.word("-"))];
+                let line = ["train".to_owned(), given(wrong)];
                 let arguments = TrainingArguments::augment_args(Command::new("train")).try_get_matches_from(line);
-                let settings =
-                    arguments.map(|found| TrainingArguments::from_arg_matches(&found).unwrap().settings(None));
+                let arguments = arguments.and_then(|found| TrainingArguments::from_arg_matches(&found));
+                let settings = arguments.map(|arguments| arguments.settings(None));
                 assert!(matches!(settings, Err(_) | Ok(Err(_))), "{name} {wrong}");
             }
         }
@@ -565,10 +645,10 @@ mod tests {
         let lines = [
             "train",
             "train --preset best --array 10x6_3x18 --hidden 7 --seed 18446744073709551615",
-            "train --rows 3 --axes xyz --loading smooth:2.5 --noise 1e-3 --noise-ohm 0.1 --adc-bits 12 --drift 0.0123 \
-             --noise-in training --inputs log --scaling whiten --starts 4",
-            "train --loading indenter:flat-punch --method gdm --set learning-rate=0.3 --epochs 77 --goal 1e-5 \
-             --max-fail 9 --min-gradient 0 --samples 123 --test-samples 17 --validation-samples 0",
+            "train --rows 3 --axes xyz --loading smooth:2.5 --noise 1e-3 --set noise-ohm=0.1 --set adc-bits=12 --set \
+             drift=0.0123 --set noise-in=training --inputs log --scaling whiten --starts 4",
+            "train --loading indenter:flat-punch --method gdm --set learning-rate=0.3 --epochs 77 --set goal=1e-5 --set \
+             max-fail=9 --set min-gradient=0 --samples 123 --set test-samples=17 --set validation-samples=0",
         ];
         for line in lines {
             let settings = parsed(&line.split_whitespace().collect::<Vec<_>>().join(" "))

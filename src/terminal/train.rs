@@ -1,21 +1,19 @@
-use std::{
-    io::Write,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::ProgressBar;
 
 use super::{
     cross_validation::optimism as optimism_of,
-    failure::{Failure, Interruption},
+    failure::Failure,
     import_arguments::ImportArguments,
     interruption::{CheckpointArguments, Graceful, save_if_due},
     intervals::{WhenCalibrated, calibrate, note_unmonitored},
-    output::{messages, progress_bar},
+    output::{check_output, input, is_json, output, progress_bar, warn},
     samples::{announce, announce_recording, following, sets, working_folder},
-    settings_arguments::TrainingArguments,
+    settings_arguments::{RARELY, TrainingArguments},
     train_report::Trained,
+    within,
 };
 use decoupler_core::{
     decoupling::DecoderKind,
@@ -49,33 +47,33 @@ use decoupler_files::{
 #[command(allow_negative_numbers = true)]
 pub(super) struct Train {
     #[command(flatten)]
-    pub(super) training: TrainingArguments,
-    #[command(flatten)]
     pub(super) import: ImportArguments,
-    #[command(flatten)]
-    pub(super) checkpoint: CheckpointArguments,
     /// Sensor model written by calibrate, instead of --array
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["array", "resume", "data", "recipe"])]
+    #[arg(long, value_name = "FILE", value_parser = input, conflicts_with_all = ["array", "resume", "data", "recipe"], hide_short_help = true, help_heading = "Simulated array")]
     sensor: Option<PathBuf>,
     /// File for the network, for use in the window or with decode
-    #[arg(long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = output, help_heading = "Output")]
     pub(super) out: Option<PathBuf>,
     /// File for a report with errors, figures, settings and the command that repeats the run, as one HTML page
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = output, help_heading = "Output")]
     pub(super) report: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) training: TrainingArguments,
+    #[command(flatten)]
+    pub(super) checkpoint: CheckpointArguments,
+    /// Test on every sample by cross-validation with this many folds, divided by --split
+    #[arg(long, value_name = "K", conflicts_with_all = ["test_data", "resume"], hide_short_help = true, help_heading = RARELY)]
+    pub(super) folds: Option<usize>,
     /// Time on one core that a choice of settings (--hidden auto) and the training may take, estimated from their work, so
     /// that the choice is the same on every machine [default: 60]
-    #[arg(long, value_name = "SECONDS", value_parser = budget)]
+    #[arg(long, value_name = "SECONDS", value_parser = within(1.0..=86_400.0, "seconds from 1 to 86400, for example 60"), hide_short_help = true, help_heading = RARELY)]
     budget: Option<f64>,
     /// When to calibrate the 90 % prediction intervals of a recording's targets. After a choice of settings (--hidden
     /// auto), this takes no time; otherwise the training samples are cross-validated, which takes four times as long as the
     /// training: auto if that is at most a minute. Simulated arrays have none: theirs would hold for the scene, not for a
     /// sensor, and the errors of each node already describe the scene
-    #[arg(long, value_name = "WHEN", default_value = "auto")]
+    #[arg(long, value_name = "WHEN", default_value = "auto", hide_short_help = true, help_heading = RARELY)]
     pub(super) intervals: WhenCalibrated,
-    /// Print one JSON object instead of text and progress
-    #[arg(long)]
-    pub(super) json: bool,
 }
 
 impl Train {
@@ -87,7 +85,7 @@ impl Train {
             Some(path) => self.resume(path)?,
             None => {
                 let setup = self.setup()?;
-                if let Some(folds) = self.import.folds {
+                if let Some(folds) = self.folds {
                     self.training
                         .refuse_auto("--folds measures the same settings in every fold")?;
                     return self.cross_validate(&setup, folds);
@@ -98,11 +96,10 @@ impl Train {
                         (chosen.setup, chosen.sets)
                     }
                     false => {
-                        let sets = sets(&setup, self.json)?;
+                        let sets = sets(&setup)?;
                         (setup, sets)
                     }
                 };
-                self.import.save_recipe(&setup)?;
                 announce_recording(&setup, &sets);
                 let run = sets.run(&setup, None, &Job::UNINTERRUPTED)?;
                 (run, sets)
@@ -128,24 +125,22 @@ impl Train {
             }
         }
         let defect = run.defect();
-        let reported = self.report.as_ref().map_or(Ok(()), |path| {
-            let report = RunReport {
-                name: None,
-                file: &file,
-                defect: defect.as_deref(),
-                decoders: &decoders,
-                test: run.test(),
-            };
-            report.save(path)
-        });
+        let report = RunReport {
+            name: None,
+            file: &file,
+            defect: defect.as_deref(),
+            decoders: &decoders,
+            test: run.test(),
+        };
+        let reported = self.report.as_ref().map_or(Ok(()), |path| report.save(path));
         let trained = Trained {
             run: &run,
-            file: &file,
             sets: &sets,
-            decoders: &decoders,
+            report,
             optimism: &optimism,
         };
-        trained.print(self.json)?;
+        trained.warnings().into_iter().for_each(warn);
+        trained.print()?;
         measured?;
         first_failure([saved.map_err(Failure::from), reported.map_err(Failure::from), end])
     }
@@ -171,12 +166,16 @@ impl Train {
                 .refuse_auto("settings are chosen for a recording (--data) with one network for all rows")?;
         }
         let chooses = setup.can_choose() && self.training.is_auto();
-        if self.budget.is_some() && !chooses {
-            let message = "--budget: it is for a choice of settings; give --data and --hidden auto, or leave it out";
-            return Err(Failure::Arguments(message.to_owned()));
-        }
-        if !chooses && self.import.fixed_memory()?.1 {
-            let message = "--memory auto: it is for a choice of settings; give spans, or --hidden auto";
+        let refused = if chooses {
+            None
+        } else if self.budget.is_some() {
+            Some("--budget: it is for a choice of settings; give --data and --hidden auto, or leave it out")
+        } else if self.import.fixed_history()?.1 {
+            Some("--history auto: it is for a choice of settings; give spans, or --hidden auto")
+        } else {
+            None
+        };
+        if let Some(message) = refused {
             return Err(Failure::Arguments(message.to_owned()));
         }
         Ok(chooses)
@@ -184,8 +183,8 @@ impl Train {
 
     /// Chooses the settings of `setup`, with a progress bar of the budget.
     fn choose(&self, setup: &Setup) -> Result<ChosenSetup, Failure> {
-        let bar = progress_bar(self.json, 100, "{bar:20} {msg}");
-        let (memory, tries_memory) = self.import.fixed_memory()?;
+        let bar = progress_bar(100, "{bar:20} {msg}");
+        let (memory, tries_memory) = self.import.fixed_history()?;
         let fixed = AutoFixed {
             memory,
             tries_memory,
@@ -234,7 +233,10 @@ impl Train {
                 return Err(Failure::Arguments(message));
             }
         }
-        files.iter().try_for_each(|(_, path)| Ok(check_writable(path)?))
+        let mut written = files.iter().filter(|(name, _)| **name != "--checkpoint");
+        written.try_for_each(|(name, path)| check_output(name, path))?;
+        let checkpoint = self.checkpoint.checkpoint.iter();
+        checkpoint.into_iter().try_for_each(|path| Ok(check_writable(path)?))
     }
 
     /// Resumes the training of a checkpoint.
@@ -247,10 +249,7 @@ impl Train {
                 let message = "--data: the checkpoint belongs to a simulated array; leave it out to resume";
                 return Err(Failure::Arguments(message.to_owned()));
             }
-            None => {
-                self.import.check_unused()?;
-                self.import.save_recipe(&saved)?;
-            }
+            None => self.import.check_unused()?,
         }
         let training = self.training.resumed(&saved)?;
         if let Some(recorded) = &mut file.recorded {
@@ -259,21 +258,15 @@ impl Train {
                 return Err(ImportError::Irregular(file).into());
             }
             if let Some(missing) = recorded.missing().first() {
-                return Err(Failure::MissingRecording {
-                    checkpoint: path.to_owned(),
-                    recording: missing.to_path_buf(),
-                });
+                let missing = missing.display();
+                let message = format_args!("its recording '{missing}' is missing; give its new path with --data FILE");
+                return Err(Failure::at(path, message));
             }
         }
         announce(&file.settings)?;
-        let resumed = following(&saved, self.json, |on_progress| {
-            file.resume(&Job::UNINTERRUPTED, on_progress)
-        });
+        let resumed = following(&saved, |on_progress| file.resume(&Job::UNINTERRUPTED, on_progress));
         let (mut run, mut sets) = resumed.map_err(|error| match error {
-            SetupError::Run(source) => Failure::Resume {
-                path: path.to_owned(),
-                source,
-            },
+            SetupError::Run(source) => Failure::at(path, source),
             error => error.into(),
         })?;
         if training != saved.settings().training {
@@ -303,7 +296,6 @@ impl Train {
     /// terminal.
     fn train(&self, run: &mut Run, checkpointing: Option<Checkpointing>) -> Result<(), Failure> {
         let bar = progress_bar(
-            self.json,
             run.settings().training.stopping.epochs,
             "{bar:30} epoch {pos} of {len}, {msg}, at most {eta} left",
         );
@@ -329,13 +321,14 @@ impl Train {
         }
         drop(graceful);
         if is_interrupted {
-            let resume = self
-                .checkpoint
-                .checkpoint
-                .as_deref()
-                .map(|path| self.resume_command(path));
-            let epoch = furthest(run);
-            return Err(Failure::Interrupted(Interruption { epoch, resume }));
+            let resume = match &self.checkpoint.checkpoint {
+                Some(path) => format!("to resume: {}", self.resume_command(path)),
+                None => "use --checkpoint FILE to be able to resume".to_owned(),
+            };
+            return Err(Failure::Interrupted(format!(
+                " after epoch {}; {resume}",
+                furthest(run)
+            )));
         }
         Ok(())
     }
@@ -343,22 +336,19 @@ impl Train {
     /// Command that resumes the training.
     fn resume_command(&self, checkpoint: &Path) -> String {
         let mut command = format!("decoupler train --checkpoint {} --resume", quoted(checkpoint));
-        if let Some(path) = &self.out {
-            command += &format!(" --out {}", quoted(path));
+        for (name, path) in [("out", &self.out), ("report", &self.report)] {
+            if let Some(path) = path {
+                command += &format!(" --{name} {}", quoted(path));
+            }
         }
-        if let Some(path) = &self.report {
-            command += &format!(" --report {}", quoted(path));
+        if self.out.is_some() || self.report.is_some() {
+            command += " --force";
         }
-        if self.json {
+        if is_json() {
             command += " --json";
         }
         command
     }
-}
-
-fn budget(text: &str) -> Result<f64, String> {
-    let seconds = text.parse().ok().filter(|seconds| (1.0..=86_400.0).contains(seconds));
-    seconds.ok_or_else(|| "give seconds from 1 to 86400, for example 60".to_owned())
 }
 
 /// Returns the first failure, and prints the others.
@@ -366,8 +356,7 @@ fn first_failure(ends: impl IntoIterator<Item = Result<(), Failure>>) -> Result<
     let mut failures = ends.into_iter().filter_map(Result::err);
     let Some(first) = failures.next() else { return Ok(()) };
     for other in failures {
-        // There is no one to report to if this fails.
-        let _ = writeln!(messages(), "{other}");
+        warn(other);
     }
     Err(first)
 }

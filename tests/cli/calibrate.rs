@@ -78,7 +78,7 @@ fn a_real_sensor_is_calibrated_and_a_network_trained_and_fine_tuned() {
     }
     let residual = |name: &str| report[name].as_f64().unwrap();
     assert!(residual("residual") < 1.2e-3 && residual("nominal_residual") > 1e-2);
-    let train = "--rows known --inputs conductance --loading smooth:4 --noise 1e-3 --samples 400 --validation-samples 80 \
+    let train = "--rows known --inputs conductance --loading smooth:4 --noise 1e-3 --samples 400 --set validation-samples=80 \
                  --hidden 6 --epochs 15 --decoder mean --json";
     json(
         &format!("train --sensor sensor.json {train} --out calibrated.json"),
@@ -151,15 +151,9 @@ fn arguments_that_divide_frames_are_refused() {
     record(folder.path());
     let path = folder.path();
     let trained =
-        format!("train --array {ARRAY} --samples 40 --test-samples 8 --epochs 1 --decoder mean --out net.json");
+        format!("train --array {ARRAY} --samples 40 --set test-samples=8 --epochs 1 --decoder mean --out net.json");
     assert!(decoupler(&trained, path).status.success());
-    for argument in [
-        "--folds 5",
-        "--test-fraction 0.5",
-        "--validation-fraction 0.5",
-        "--split time",
-        "--test-data none.csv",
-    ] {
+    for argument in ["--split time", "--test-data none.csv"] {
         for command in [
             format!("calibrate --array {ARRAY} {FRAMES} {argument}"),
             format!("fine-tune --network net.json {FRAMES} --epochs 1 --out tuned.json {argument}"),
@@ -185,7 +179,7 @@ fn impossible_readings_and_depths_are_refused_with_their_line() {
     let path = folder.path();
     let trained = decoupler(
         &format!(
-            "train --array {ARRAY} --samples 40 --validation-samples 0 --test-samples 8 --epochs 1 --out net.json"
+            "train --array {ARRAY} --samples 40 --set validation-samples=0 --set test-samples=8 --epochs 1 --out net.json"
         ),
         path,
     );
@@ -236,7 +230,7 @@ fn a_wrong_array_scale_causes_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path());
     let output = decoupler(&format!("calibrate --array 4x4_4x12 {FRAMES}"), folder.path());
-    let text = String::from_utf8(output.stdout).unwrap();
+    let text = String::from_utf8(output.stderr).unwrap();
     assert!(
         text.contains("standard deviations from nominal values") && text.contains("check the array scale"),
         "{text}"

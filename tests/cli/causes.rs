@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::terminal::decoupler;
 
-const SMALL: &str = "train --array 2x3_2x9 --samples 40 --test-samples 10 --hidden 2 --epochs 3 --decoder mean";
+const SMALL: &str = "train --array 2x3_2x9 --samples 40 --set test-samples=10 --hidden 2 --epochs 3 --decoder mean";
 
 /// Standard error and status of the program.
 fn refused(arguments: &str) -> (String, i32) {
@@ -30,7 +30,7 @@ fn contradictory_arguments_end_with_status_2_and_the_given_numbers() {
             "mu is 1e12, above largest mu, which is 1e10: lower mu, or raise largest mu",
         ),
         (
-            "train --array 10x2_2x6 --samples 100000 --validation-samples 900010",
+            "train --array 10x2_2x6 --samples 100000 --set validation-samples=900010",
             "100000 training and 900010 validation samples, held together as whole snapshots of 10 rows, are 1000010: \
              the limit is 1000000; give fewer for validation",
         ),
@@ -59,15 +59,15 @@ fn system_errors_of_files_are_explained_with_a_remedy() {
     fs::write(at("file"), "").unwrap();
     let cases = [
         (
-            format!("decode --network {} --input a.csv --output b.csv", at("none.json")),
+            format!("decode --network {} --data a.csv --out b.csv", at("none.json")),
             "there is no such file or folder; check the name",
         ),
         (
-            format!("decode --network {} --input a.csv --output b.csv", at("folder")),
+            format!("decode --network {} --data a.csv --out b.csv", at("folder")),
             "it is a folder; give the name of a file",
         ),
         (
-            format!("decode --network {}/a --input a.csv --output b.csv", at("file")),
+            format!("decode --network {}/a --data a.csv --out b.csv", at("file")),
             "a part of the path is a file, not a folder",
         ),
         (
@@ -125,17 +125,17 @@ fn an_untrained_network_is_reported_with_cause_and_remedy() {
             "mu to 0.005 (now 1e300)",
         ),
         (
-            "--method lm --goal 1e9",
+            "--method lm --set goal=1e9",
             "no better than its random start after 0 epochs (goal reached)",
             "set a lower goal",
         ),
     ];
     for (arguments, cause, cure) in cases {
         let arguments = format!("{SMALL} {arguments}");
-        let text = String::from_utf8(decoupler(&arguments, folder.path()).stdout).unwrap();
+        let text = String::from_utf8(decoupler(&arguments, folder.path()).stderr).unwrap();
         let line = text
             .lines()
-            .find(|line| line.starts_with("Warning: ") && line.contains(cause));
+            .find(|line| line.starts_with("warning: ") && line.contains(cause));
         assert!(line.is_some_and(|line| line.contains(cure)), "{arguments}: {text}");
         let json = decoupler(&format!("{arguments} --json"), folder.path()).stdout;
         let json: Value = serde_json::from_slice(&json).unwrap();
@@ -149,7 +149,7 @@ fn an_untrained_network_is_reported_with_cause_and_remedy() {
     }
     let ordinary = String::from_utf8(
         decoupler(
-            &format!("{SMALL} --epochs 30 --validation-samples 0").replace("--epochs 3 ", ""),
+            &format!("{SMALL} --epochs 30 --set validation-samples=0").replace("--epochs 3 ", ""),
             folder.path(),
         )
         .stdout,

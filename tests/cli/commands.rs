@@ -29,7 +29,8 @@ fn failure(arguments: &str, folder: &Path, status: i32) -> String {
 fn success(arguments: &str, folder: &Path) -> String {
     let output = decoupler(arguments, folder);
     let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && errors.is_empty(), "{arguments}: {errors}");
+    let are_warnings = errors.lines().all(|line| line.starts_with("warning: "));
+    assert!(output.status.success() && are_warnings, "{arguments}: {errors}");
     String::from_utf8(output.stdout).unwrap()
 }
 
@@ -77,13 +78,13 @@ fn invalid_arguments_end_with_status_2() {
     let cases = [
         ("train --hidden 0", "from 1 to 512"),
         ("train --hidden twelve", "from 1 to 512"),
-        ("train --samples 0", "samples is 0: it must be from 1"),
+        ("train --samples 0", "from 1 to 1e6"),
         ("train --samples -5", "not a whole number"),
-        ("train --test-samples 0", "from 1"),
-        ("train --validation-samples 1000001", "from 0 to 1e6"),
+        ("train --set test-samples=0", "from 1"),
+        ("train --set validation-samples=1000001", "from 0 to 1e6"),
         ("train --epochs 0", "from 1"),
-        ("train --seed -1", "whole number"),
-        ("train --seed 18446744073709551616", "whole number"),
+        ("train --seed -1", "not a whole number"),
+        ("train --seed 18446744073709551616", "not a whole number"),
         ("train --array 10x6", "M1xM2_M3xM4"),
         ("train --array 10x6_3x0", "column-wires (M4)"),
         ("train --method adam", "lm, br, scg"),
@@ -96,7 +97,7 @@ fn invalid_arguments_end_with_status_2() {
         ("train --sed 1", "--seed"),
         ("simulate --samples 0", "from 1"),
         ("simulate --array 0x1_1x1", "row-wires (M1)"),
-        ("decode --network n.json", "--input <FILE>"),
+        ("decode --network n.json", "--data <FILE>"),
         ("trian", "'train'"),
     ];
     for (arguments, expected) in cases {
@@ -196,7 +197,7 @@ fn simulate_and_decode_agree_with_the_library() {
         folder,
     );
     success(
-        "decode --network network.json --input samples.csv --output decoded.csv",
+        "decode --network network.json --data samples.csv --out decoded.csv",
         folder,
     );
     assert_eq!(names(folder), ["decoded.csv", "network.json", "samples.csv"]);
@@ -253,7 +254,7 @@ fn files_that_cannot_be_decoded_leave_nothing() {
     for (sentence, text, expected) in cases {
         fs::write(folder.join("input.csv"), text).unwrap();
         let text = failure(
-            "decode --network network.json --input input.csv --output out.csv",
+            "decode --network network.json --data input.csv --out out.csv",
             folder,
             1,
         );
@@ -263,9 +264,9 @@ fn files_that_cannot_be_decoded_leave_nothing() {
         );
         assert_eq!(names(folder), ["input.csv", "network.json"], "{sentence}");
     }
-    let missing = "decode --network network.json --input none.csv --output out.csv";
+    let missing = "decode --network network.json --data none.csv --out out.csv";
     assert!(failure(missing, folder, 1).contains("cannot open 'none.csv'"));
-    let damaged = "decode --network input.csv --input input.csv --output out.csv";
+    let damaged = "decode --network input.csv --data input.csv --out out.csv";
     assert!(failure(damaged, folder, 1).contains("not a network file"));
 }
 

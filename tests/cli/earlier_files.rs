@@ -68,7 +68,7 @@ fn networks_give_the_same_answers() {
     ] {
         let folder = files();
         success(
-            &format!("decode --network {network} --input {input} --output found.csv"),
+            &format!("decode --network {network} --data {input} --out found.csv"),
             folder.path(),
         );
         assert_same(&text(&folder, "found.csv"), &text(&folder, expected), 1e-12);
@@ -89,7 +89,7 @@ fn a_checkpoint_continues_with_the_same_epochs() {
     );
     let decoded = |network: &str| {
         success(
-            &format!("decode --network {network} --input press.csv --output decoded.csv"),
+            &format!("decode --network {network} --data press.csv --out decoded.csv"),
             folder.path(),
         );
         // Without the half-widths, whose held-out answers were not yet limited to the range in training.
@@ -159,10 +159,7 @@ fn kept_runs_are_listed_and_one_that_cannot_be_opened_is_named() {
 fn files_of_a_later_version_are_refused() {
     let folder = files();
     for (name, arguments) in [
-        (
-            "array.json",
-            "decode --network array.json --input array.csv --output d.csv",
-        ),
+        ("array.json", "decode --network array.json --data array.csv --out d.csv"),
         (
             "training.checkpoint",
             "train --checkpoint training.checkpoint --resume --epochs 8",

@@ -27,7 +27,7 @@ fn trained() -> TempDir {
     let small = "--array 2x2_2x6 --rows known";
     succeed(
         &format!(
-            "train {small} --samples 100 --validation-samples 0 --test-samples 10 --hidden 2 --epochs 2 --decoder mean --out n.json"
+            "train {small} --samples 100 --set validation-samples=0 --set test-samples=10 --hidden 2 --epochs 2 --decoder mean --out n.json"
         ),
         folder.path(),
     );
@@ -47,7 +47,7 @@ fn lines(folder: &Path, name: &str) -> Vec<String> {
 fn readings_of_an_array_that_are_cut_off_are_decoded_up_to_there() {
     let folder = trained();
     let folder = folder.path();
-    let decode = "decode --network n.json --input readings.csv --output out.csv";
+    let decode = "decode --network n.json --data readings.csv --out out.csv";
     succeed(decode, folder);
     let whole = lines(folder, "out.csv");
     let readings = fs::read(folder.join("readings.csv")).unwrap();
@@ -74,7 +74,7 @@ fn a_recording_that_is_cut_off_is_trained_on_and_decoded_up_to_there() {
             "train --data data.csv --inputs t,u --targets d --hidden 2 --epochs 2 --decoder mean --intervals never --out n.json",
             folder,
         );
-        let message = succeed("decode --network n.json --input data.csv --output out.csv", folder);
+        let message = succeed("decode --network n.json --data data.csv --out out.csv", folder);
         let is_torn = cut == 5;
         assert_eq!(
             message.contains("line 61, the last, is cut off"),
@@ -88,72 +88,12 @@ fn a_recording_that_is_cut_off_is_trained_on_and_decoded_up_to_there() {
 #[test]
 fn a_network_is_read_once_also_from_a_pipe() {
     let folder = trained();
-    let script = "\"$0\" decode --network <(cat n.json) --input readings.csv --output out.csv";
+    let script = "\"$0\" decode --network <(cat n.json) --data readings.csv --out out.csv";
     let mut command = Command::new("bash");
     command.args(["-c", script, env!("CARGO_BIN_EXE_decoupler")]);
     let output = command.current_dir(folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert_eq!(lines(folder.path(), "out.csv").len(), 9);
-}
-
-#[test]
-fn an_incomplete_table_does_not_replace_a_larger_one() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    fs::write(
-        folder.join("sweep.json"),
-        r#"{"train": {"array": "10x6_3x18", "samples": 100, "epochs": 2, "decoder": ["ridge"]}, "axes": {"hidden": [2, 3], "seed": [0, 1]}}"#,
-    )
-    .unwrap();
-    succeed("sweep --spec sweep.json --out runs", folder);
-    for table in ["table.csv", "table.json"] {
-        succeed(&format!("sweep --merge runs --out {table}"), folder);
-    }
-    let trial = names(&folder.join("runs")).into_iter().next();
-    fs::remove_file(folder.join("runs").join(trial.unwrap())).unwrap();
-    for table in ["table.csv", "table.json"] {
-        let before = fs::read(folder.join(table)).unwrap();
-        let output = decoupler(&format!("sweep --merge runs --spec sweep.json --out {table}"), folder);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{message}");
-        assert!(
-            message.contains("the table there has more trials, or cannot be read, and is left as it is"),
-            "{message}"
-        );
-        assert_eq!(fs::read(folder.join(table)).unwrap(), before, "{table}");
-    }
-    let output = decoupler("sweep --merge runs --spec sweep.json --out new.csv", folder);
-    assert!(output.status.code() == Some(1) && lines(folder, "new.csv").len() == 4);
-}
-
-#[test]
-fn an_incomplete_table_does_not_replace_one_that_cannot_be_read() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    let specification = r#"{"train": {"array": "10x6_3x18", "samples": 100, "epochs": 2, "decoder": ["ridge"]}, "axes": {"seed": [0, 1]}}"#;
-    fs::write(folder.join("sweep.json"), specification).unwrap();
-    succeed("sweep --spec sweep.json --out runs", folder);
-    for table in ["table.csv", "table.json"] {
-        succeed(&format!("sweep --merge runs --out {table}"), folder);
-    }
-    let runs = folder.join("runs");
-    let mut trials = names(&runs).into_iter();
-    fs::remove_file(runs.join(trials.next().unwrap())).unwrap();
-    // A number of cells that changes, and a text that is cut off.
-    for (table, damage) in [("table.csv", "1,2\n"), ("table.json", "")] {
-        let path = folder.join(table);
-        let whole = fs::read_to_string(&path).unwrap();
-        let damaged = match damage {
-            "" => whole[..whole.len() - 10].to_owned(),
-            line => whole.lines().next().unwrap().to_owned() + "\n" + line,
-        };
-        fs::write(&path, &damaged).unwrap();
-        let output = decoupler(&format!("sweep --merge runs --spec sweep.json --out {table}"), folder);
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{message}");
-        assert!(message.contains("cannot be read, and is left as it is"), "{message}");
-        assert_eq!(fs::read_to_string(&path).unwrap(), damaged, "{table}");
-    }
 }
 
 fn export(folder: &Path, variable: (&str, &Path)) -> Output {

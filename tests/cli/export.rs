@@ -11,7 +11,7 @@ use crate::{folders::names, terminal::decoupler};
 fn trained(scene: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let arguments = format!(
-        "train --array 3x2_2x6 --samples 90 --validation-samples 0 --test-samples 9 --hidden 3 --epochs 5 {scene} \
+        "train --array 3x2_2x6 --samples 90 --set validation-samples=0 --set test-samples=9 --hidden 3 --epochs 5 {scene} \
          --decoder mean --out n.json"
     );
     let output = decoupler(&arguments, folder.path());
@@ -50,7 +50,7 @@ fn an_exported_network_agrees_with_decode() {
         ["README.txt", "golden.csv", "metadata.json", "network.onnx"]
     );
     let output = decoupler(
-        "decode --network n.json --input bundle/golden.csv --output decoded.csv",
+        "decode --network n.json --data bundle/golden.csv --out decoded.csv",
         folder.path(),
     );
     assert!(output.status.success());

@@ -46,7 +46,7 @@ fn failure(arguments: &str, folder: &Path) -> String {
 fn a_pattern_or_a_folder_is_one_experiment_split_by_file() {
     let folder = sessions();
     let report = json(
-        &format!("train --data press_?.csv {TRAIN} --save-recipe recipe.json"),
+        &format!("train --data press_?.csv {TRAIN} --recipe-out recipe.json"),
         folder.path(),
     );
     assert_eq!(
@@ -98,7 +98,7 @@ fn derived_columns_are_inputs_that_decode_computes_again() {
     // The difference of the readings is twice the force.
     assert!(report["targets"][0]["rmse"].as_f64().unwrap() < 0.01, "{report}");
     let decoded = decoupler(
-        "decode --network network.json --input press_1.csv --output decoded.csv",
+        "decode --network network.json --data press_1.csv --out decoded.csv",
         folder.path(),
     );
     assert!(decoded.status.success(), "{decoded:?}");

@@ -13,7 +13,8 @@ use tempfile::TempDir;
 
 use crate::{live, terminal::decoupler};
 
-const SMALL: &str = "--array 2x2_2x6 --samples 400 --validation-samples 0 --test-samples 10 --hidden 3 --epochs 5";
+const SMALL: &str =
+    "--array 2x2_2x6 --samples 400 --set validation-samples=0 --set test-samples=10 --hidden 3 --epochs 5";
 
 /// A folder with a network, `n.json`, readings of 20 snapshots, `readings.csv`, and the output of `decode` for them,
 /// `decoded.csv`.
@@ -22,7 +23,7 @@ fn trained(scene: &str) -> TempDir {
     for arguments in [
         format!("train {SMALL} {scene} --decoder mean --out n.json"),
         format!("simulate --array 2x2_2x6 --samples 40 {scene} --seed 1 --out readings.csv"),
-        "decode --network n.json --input readings.csv --output decoded.csv".to_owned(),
+        "decode --network n.json --data readings.csv --out decoded.csv".to_owned(),
     ] {
         let output = decoupler(&arguments, folder.path());
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -95,14 +96,14 @@ fn frames_of_the_live_view_have_the_answers_of_decode() {
 fn a_file_or_pipe_is_decoded_as_by_decode() {
     let folder = trained("--rows known");
     let expected = read(&folder, "decoded.csv");
-    let output = decoupler("decode --network n.json --follow --input readings.csv", folder.path());
+    let output = decoupler("decode --network n.json --follow --data readings.csv", folder.path());
     assert_same(String::from_utf8(output.stdout).unwrap().lines(), expected.lines());
     let report = String::from_utf8(output.stderr).unwrap();
     assert!(
         report.contains("40 lines decoded") && report.contains("0 bad, 0 dropped; latency p50"),
         "{report}"
     );
-    assert!(report.contains("trained without noise; give --noise"), "{report}");
+    assert!(report.contains("trained without noise; give --fault-noise"), "{report}");
     // Without names, in order; row numbers are not needed.
     let lines = device_lines(&folder);
     let plain = lines.iter().map(|line| line.split_once(',').unwrap().1.to_owned());
@@ -128,7 +129,7 @@ fn whole_snapshots_and_json_are_supported() {
     let snapshots: String = lines.chunks(2).map(snapshot).collect();
     fs::write(folder.path().join("snapshots.csv"), snapshots).unwrap();
     let output = decoupler(
-        "decode --network n.json --follow --format jsonl --input snapshots.csv",
+        "decode --network n.json --follow --format jsonl --data snapshots.csv",
         folder.path(),
     );
     let decoded = read(&folder, "decoded.csv");
@@ -171,7 +172,7 @@ fn garbage_is_counted_reported_and_skipped() {
     let long = "7".repeat(1 << 20) + "\n";
     let text = format!("{}{long}", lines.concat());
     fs::write(folder.path().join("noisy.csv"), text).unwrap();
-    let output = decoupler("decode --network n.json --follow --input noisy.csv", folder.path());
+    let output = decoupler("decode --network n.json --follow --data noisy.csv", folder.path());
     assert!(output.status.success());
     let decoded = read(&folder, "decoded.csv");
     let kept = decoded
@@ -202,7 +203,7 @@ fn a_fault_is_named_and_left_out() {
         format!("simulate --array 2x2_2x6 --samples 40 {noise} --seed 1 --fault stuck:4=low --out faulty.csv");
     assert!(decoupler(&simulate, folder.path()).status.success());
     let output = decoupler(
-        "decode --network n.json --follow --format jsonl --input faulty.csv",
+        "decode --network n.json --follow --format jsonl --data faulty.csv",
         folder.path(),
     );
     let report = String::from_utf8(output.stderr).unwrap();
@@ -310,7 +311,7 @@ fn a_stream_without_line_ends_is_reported() {
     let folder = trained("--rows known");
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let arguments = format!(
-        "decode --network n.json --follow --input tcp:{}",
+        "decode --network n.json --follow --data tcp:{}",
         listener.local_addr().unwrap()
     );
     let mut running = Running::new(&arguments, &folder);
@@ -357,7 +358,7 @@ fn a_serial_device_is_read_from_a_line_end_on() {
     let _held = fs::File::open(&name).unwrap();
     drop(port);
     let mut running = Running::new(
-        &format!("decode --network n.json --follow --input {name}:115200"),
+        &format!("decode --network n.json --follow --data {name}:115200"),
         &folder,
     );
     let lines = device_lines(&folder);
@@ -381,7 +382,7 @@ fn a_socket_is_read_until_it_closes_and_sends_row_numbers() {
     let folder = trained("--rows known");
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
-    let arguments = format!("decode --network n.json --follow --input tcp:{address}");
+    let arguments = format!("decode --network n.json --follow --data tcp:{address}");
     let mut running = Running::new(&arguments, &folder);
     let lines = device_lines(&folder);
     let (mut stream, _) = listener.accept().unwrap();
@@ -430,7 +431,7 @@ fn a_header_without_a_resistance_and_a_stream_without_a_frame_end_with_an_error(
     ] {
         fs::write(folder.path().join("bad.csv"), &text).unwrap();
         let output = decoupler(
-            "decode --network n.json --follow --noise 1e-3 --input bad.csv",
+            "decode --network n.json --follow --fault-noise 1e-3 --data bad.csv",
             folder.path(),
         );
         let message = String::from_utf8(output.stderr).unwrap();
@@ -461,17 +462,17 @@ fn sources_that_cannot_be_opened_are_explained_in_one_line() {
         ("missing.csv:1", 1, "cannot open 'missing.csv:1'"),
     ] {
         let output = decoupler(
-            &format!("decode --network n.json --follow --noise 1e-3 --input {input}"),
+            &format!("decode --network n.json --follow --fault-noise 1e-3 --data {input}"),
             folder.path(),
         );
         let message = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(status), "{message}");
         assert!(message.contains(words) && message.lines().count() == 1, "{message}");
     }
-    let output = decoupler("decode --network n.json --follow --output x.csv", folder.path());
+    let output = decoupler("decode --network n.json --follow --out x.csv", folder.path());
     assert_eq!(output.status.code(), Some(2));
     let output = decoupler(
-        "decode --network n.json --input x.csv --output y.csv --report 1",
+        "decode --network n.json --data x.csv --out y.csv --status 1",
         folder.path(),
     );
     assert_eq!(output.status.code(), Some(2));

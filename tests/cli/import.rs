@@ -7,6 +7,7 @@ use std::{
     process::{Command, Stdio},
 };
 
+use decoupler_files::export::{NetworkFile, RecipeFile};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -82,7 +83,7 @@ fn a_network_is_trained_on_joined_files_and_evaluated_for_each_target() {
 #[test]
 fn a_recipe_trains_the_same_network_and_folds_test_every_sample() {
     let folder = recordings();
-    let first = json(&format!("{TRAIN} --save-recipe import.json --json"), folder.path());
+    let first = json(&format!("{TRAIN} --recipe-out import.json --json"), folder.path());
     let again = json(
         "train --recipe import.json --hidden 6 --starts 1 --epochs 60 --json",
         folder.path(),
@@ -113,15 +114,11 @@ fn a_checkpoint_resumes_unless_its_samples_have_changed() {
         ("--split", "random"),
         ("--inputs", "c3"),
         ("--scaling", "whiten"),
-        ("--test-fraction", "0.5"),
-        ("--validation-fraction", "0.4"),
         ("--folds", "3"),
         ("--test-data", "states.csv"),
-        ("--save-recipe", "other.json"),
-        ("--skip-lines", "1"),
         ("--rows", "known"),
         ("--noise", "0.1"),
-        ("--drift", "0.1"),
+        ("--set", "drift=0.1"),
         ("--array", "4x3_2x8"),
         ("--samples", "10"),
         ("--loading", "indenter"),
@@ -137,8 +134,7 @@ fn a_checkpoint_resumes_unless_its_samples_have_changed() {
             folder.path(),
             2,
         );
-        let named = message.contains(argument) || (argument == "--skip-lines" && message.contains("layout"));
-        assert!(named, "{argument}: {message}");
+        assert!(message.contains(argument), "{argument}: {message}");
     }
     let resumed = json("train --checkpoint c.json --resume --epochs 60 --json", folder.path());
     assert_eq!(
@@ -253,7 +249,7 @@ fn the_network_of_a_recording_decodes_files_and_lines_by_column_names() {
     let folder = recordings();
     json(&format!("{TRAIN} --out n.json --json"), folder.path());
     let output = decoupler(
-        "decode --network n.json --input sensor.csv --output decoded.csv",
+        "decode --network n.json --data sensor.csv --out decoded.csv",
         folder.path(),
     );
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -304,7 +300,7 @@ fn the_network_of_a_recording_decodes_files_and_lines_by_column_names() {
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(message.contains("line 7: 2 cells where 3 are needed"), "{message}");
     let message = failure(
-        "decode --network n.json --input states.csv --output x.csv --noise 1",
+        "decode --network n.json --data states.csv --out x.csv --fault-noise 1",
         folder.path(),
         2,
     );
@@ -330,8 +326,8 @@ fn with_two_inputs() -> TempDir {
 fn columns_are_matched_by_name_in_files_and_streams() {
     let folder = with_two_inputs();
     let write = |text: &str| fs::write(folder.path().join("in.csv"), text).unwrap();
-    let follow = || decoupler("decode --network n.json --follow --input in.csv", folder.path());
-    let decode = || decoupler("decode --network n.json --input in.csv --output out.csv", folder.path());
+    let follow = || decoupler("decode --network n.json --follow --data in.csv", folder.path());
+    let decode = || decoupler("decode --network n.json --data in.csv --out out.csv", folder.path());
     let answers = |text: &str| {
         let lines = text.lines().skip(1);
         lines
@@ -457,7 +453,7 @@ fn positions_of_targets_are_reported_kept_in_the_recipe_and_checked_by_line() {
     let positions = |text: &str| fs::write(folder.path().join("taxels.csv"), text).unwrap();
     positions("target,x,y\nstates.c2,0,0\nstates.c3,4,0\n");
     let arguments = TRAIN.replace("--unit states.c2=mm", "--positions taxels.csv");
-    let output = decoupler(&format!("{arguments} --save-recipe import.json"), folder.path());
+    let output = decoupler(&format!("{arguments} --recipe-out import.json"), folder.path());
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(text.contains("2 targets have positions: a grid of 2 × 1"), "{text}");
     let report = json("train --recipe import.json --hidden 2 --epochs 3 --json", folder.path());
@@ -477,18 +473,17 @@ fn positions_of_targets_are_reported_kept_in_the_recipe_and_checked_by_line() {
         "{message}"
     );
     let message = failure("inspect --data sensor.csv --positions taxels.csv", folder.path(), 2);
-    assert!(
-        message.contains("--positions needs --inputs and --targets"),
-        "{message}"
-    );
+    assert!(message.contains("--targets <COLUMNS>"), "{message}");
 }
 
 #[test]
 fn a_recipe_of_a_simulated_array_trains_the_same_network() {
     let folder = tempfile::tempdir().unwrap();
-    let array = "--array 4x3_2x9 --axes xyz --noise 1e-3 --samples 60 --test-samples 20";
+    let array = "--array 4x3_2x9 --axes xyz --noise 1e-3 --samples 60 --set test-samples=20";
     let train = "train --hidden 3 --epochs 5 --decoder mean --json";
-    let first = json(&format!("{train} {array} --save-recipe array.json"), folder.path());
+    let first = json(&format!("{train} {array} --out n.json"), folder.path());
+    let settings = NetworkFile::load(&folder.path().join("n.json")).unwrap().settings;
+    RecipeFile::save(*settings.simulation().unwrap(), &folder.path().join("array.json")).unwrap();
     let again = json(&format!("{train} --recipe array.json"), folder.path());
     assert_eq!((&first["errors"], &first["scene"]), (&again["errors"], &again["scene"]));
     // Arguments change what the recipe describes.

@@ -6,6 +6,7 @@ mod automatic;
 mod calibrate;
 mod causes;
 mod commands;
+mod conventions;
 mod earlier_files;
 #[cfg(unix)]
 mod ends;

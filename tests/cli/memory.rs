@@ -56,15 +56,12 @@ fn a_memory_removes_creep_and_goes_with_the_network() {
     let folder = creeping();
     let rmse = |report: &serde_json::Value| report["targets"][0]["rmse"].as_f64().unwrap();
     let without = json(&format!("{TRAIN} --json"), folder.path());
-    let with = json(&format!("{TRAIN} --memory 0.5s,2s --out n.json --json"), folder.path());
+    let with = json(&format!("{TRAIN} --history 0.5s,2s --out n.json --json"), folder.path());
     assert!(rmse(&with) < 0.2 * rmse(&without), "{} {}", rmse(&with), rmse(&without));
-    let text = succeed(&format!("{TRAIN} --memory 0.5s,2s"), folder.path());
-    assert!(
-        text.contains("3 inputs (1 reading and their memory: averages over 0.5s, 2s)"),
-        "{text}"
-    );
+    let text = succeed(&format!("{TRAIN} --history 0.5s,2s"), folder.path());
+    assert!(text.contains("Memory: averages over 0.5s, 2s"), "{text}");
     succeed(
-        "decode --network n.json --input readings.csv --output decoded.csv",
+        "decode --network n.json --data readings.csv --out decoded.csv",
         folder.path(),
     );
     let decoded = answers(&fs::read_to_string(folder.path().join("decoded.csv")).unwrap());
@@ -79,13 +76,13 @@ fn a_memory_removes_creep_and_goes_with_the_network() {
         rmse(&with)
     );
     // A stream with times, and one without, at the interval of the training.
-    let streamed = succeed("decode --network n.json --follow --input readings.csv", folder.path());
+    let streamed = succeed("decode --network n.json --follow --data readings.csv", folder.path());
     let readings = fs::read_to_string(folder.path().join("readings.csv")).unwrap();
     let untimed = readings
         .lines()
         .map(|line| format!("{}\n", line.split_once(',').unwrap().1));
     fs::write(folder.path().join("untimed.csv"), untimed.collect::<String>()).unwrap();
-    let without_times = succeed("decode --network n.json --follow --input untimed.csv", folder.path());
+    let without_times = succeed("decode --network n.json --follow --data untimed.csv", folder.path());
     // The times are copied as they came.
     let header = streamed.lines().next().unwrap();
     assert!(header.starts_with("t,"), "{header}");
@@ -98,7 +95,7 @@ fn a_memory_removes_creep_and_goes_with_the_network() {
     };
     assert_eq!(times(&streamed), times(&readings));
     let objects = succeed(
-        "decode --network n.json --follow --format jsonl --input readings.csv",
+        "decode --network n.json --follow --format jsonl --data readings.csv",
         folder.path(),
     );
     let object: serde_json::Value = serde_json::from_str(objects.lines().nth(1).unwrap()).unwrap();
@@ -120,13 +117,13 @@ fn a_stream_is_decoded_like_a_file_with_derived_columns_and_a_memory() {
     let derive = "--derive d=u-start(1s) --derive q=u/start(5)";
     succeed(
         &format!(
-            "{} {derive} --memory 0.5s --out n.json",
+            "{} {derive} --history 0.5s --out n.json",
             TRAIN.replace("--inputs u", "--inputs d,q")
         ),
         folder.path(),
     );
-    let decode = "decode --network n.json --input readings.csv";
-    succeed(&format!("{decode} --output decoded.csv"), folder.path());
+    let decode = "decode --network n.json --data readings.csv";
+    succeed(&format!("{decode} --out decoded.csv"), folder.path());
     let decoded = answers(&fs::read_to_string(folder.path().join("decoded.csv")).unwrap());
     let output = decoupler(&format!("{decode} --follow"), folder.path());
     let warnings = String::from_utf8(output.stderr).unwrap();
@@ -142,7 +139,7 @@ fn a_stream_is_decoded_like_a_file_with_derived_columns_and_a_memory() {
     }
     // A stream without one of the columns is refused with the reason.
     fs::write(folder.path().join("other.csv"), "t,v\n0,1\n").unwrap();
-    let message = refused("decode --network n.json --follow --input other.csv", folder.path());
+    let message = refused("decode --network n.json --follow --data other.csv", folder.path());
     assert!(message.contains("there is no column 'd'"), "{message}");
 }
 
@@ -150,17 +147,17 @@ fn a_stream_is_decoded_like_a_file_with_derived_columns_and_a_memory() {
 fn memories_are_kept_in_recipes_and_refused_where_they_are_not_possible() {
     let folder = creeping();
     succeed(
-        &format!("{TRAIN} --lags 5,0.5s --differences --save-recipe r.json --out a.json"),
+        &format!("{TRAIN} --lags 5,0.5s --differences --recipe-out r.json --out a.json"),
         folder.path(),
     );
     let recipe = fs::read_to_string(folder.path().join("r.json")).unwrap();
     assert!(recipe.contains("\"lags\"") && recipe.contains("\"0.5s\""), "{recipe}");
     let message = refused(
-        "train --data press.csv --inputs u --targets force --memory 2s",
+        "train --data press.csv --inputs u --targets force --history 2s",
         folder.path(),
     );
     assert!(message.contains("a memory of 2s needs times"), "{message}");
-    let message = refused(&format!("{TRAIN} --memory 2h"), folder.path());
+    let message = refused(&format!("{TRAIN} --history 2h"), folder.path());
     assert!(message.contains("write a number of samples as in 20"), "{message}");
     let message = refused(
         "export --network a.json --format c99 --precision fixed16 --out c",
@@ -175,7 +172,7 @@ fn memories_are_kept_in_recipes_and_refused_where_they_are_not_possible() {
 #[test]
 fn every_format_exports_the_history_with_golden_readings_in_series() {
     let folder = creeping();
-    let memory = "--memory 0.5s,40 --lags 3,0.2s --differences --out n.json";
+    let memory = "--history 0.5s,40 --lags 3,0.2s --differences --out n.json";
     succeed(&format!("{TRAIN} {memory}"), folder.path());
     for (format, precision, file) in [
         ("c99", "f64", "c99_f64_decode.c"),
@@ -304,10 +301,7 @@ fn files_and_streams_are_decoded_with_the_past_of_training() {
         let in_training = report["targets"][0]["r2"].as_f64().unwrap();
         assert!(in_training > 0.9999, "{clock:?}: R² {in_training} in training");
         let truth = column(&fs::read_to_string(folder.path().join("press.csv")).unwrap(), "force");
-        succeed(
-            "decode --network n.json --input press.csv --output d.csv",
-            folder.path(),
-        );
+        succeed("decode --network n.json --data press.csv --out d.csv", folder.path());
         let decoded = column(&fs::read_to_string(folder.path().join("d.csv")).unwrap(), "force");
         let of_file = r2(&decoded, &truth);
         assert!(
@@ -315,7 +309,7 @@ fn files_and_streams_are_decoded_with_the_past_of_training() {
             "{clock:?}: R² {of_file} by decode, {in_training} in training"
         );
         let followed = column(
-            &succeed("decode --network n.json --follow --input press.csv", folder.path()),
+            &succeed("decode --network n.json --follow --data press.csv", folder.path()),
             "force",
         );
         assert_eq!(followed.len(), decoded.len());
@@ -340,7 +334,7 @@ fn files_and_streams_are_decoded_with_the_past_of_training() {
 #[test]
 fn a_file_with_rows_out_of_order_is_decoded_in_order_of_time() {
     let folder = creeping();
-    succeed(&format!("{TRAIN} --memory 0.5s,2s --out n.json"), folder.path());
+    succeed(&format!("{TRAIN} --history 0.5s,2s --out n.json"), folder.path());
     let sorted = fs::read_to_string(folder.path().join("readings.csv")).unwrap();
     let (header, lines) = sorted.split_once('\n').unwrap();
     let lines = Vec::from_iter(lines.lines());
@@ -352,7 +346,7 @@ fn a_file_with_rows_out_of_order_is_decoded_in_order_of_time() {
     .unwrap();
     let decode = |input: &str| {
         decoupler(
-            &format!("decode --network n.json --input {input} --output d.csv"),
+            &format!("decode --network n.json --data {input} --out d.csv"),
             folder.path(),
         )
     };
@@ -372,21 +366,18 @@ fn a_file_with_rows_out_of_order_is_decoded_in_order_of_time() {
 #[test]
 fn lines_without_a_time_are_left_out_by_file_and_stream_alike() {
     let folder = creeping();
-    succeed(&format!("{TRAIN} --memory 0.5s,2s --out n.json"), folder.path());
+    succeed(&format!("{TRAIN} --history 0.5s,2s --out n.json"), folder.path());
     let readings = fs::read_to_string(folder.path().join("readings.csv")).unwrap();
     let damaged = readings.replace("\n5.5,", "\nnan,").replace("\n7.25,", "\n,");
     fs::write(folder.path().join("damaged.csv"), damaged).unwrap();
-    let output = decoupler(
-        "decode --network n.json --input damaged.csv --output d.csv",
-        folder.path(),
-    );
+    let output = decoupler("decode --network n.json --data damaged.csv --out d.csv", folder.path());
     let warnings = String::from_utf8_lossy(&output.stderr);
     assert!(
         warnings.contains("2 lines without a time") && warnings.contains("line 112"),
         "{warnings}"
     );
     let decoded = answers(&fs::read_to_string(folder.path().join("d.csv")).unwrap());
-    let output = decoupler("decode --network n.json --follow --input damaged.csv", folder.path());
+    let output = decoupler("decode --network n.json --follow --data damaged.csv", folder.path());
     let warnings = String::from_utf8_lossy(&output.stderr);
     assert!(
         warnings.contains("598 lines decoded") && warnings.contains("2 bad"),
@@ -409,10 +400,10 @@ fn a_memory_shorter_than_an_interval_is_refused() {
         format!("{header}\n{}", lines.collect::<String>()),
     )
     .unwrap();
-    let message = refused(&format!("{TRAIN} --memory 0.5s"), folder.path());
+    let message = refused(&format!("{TRAIN} --history 0.5s"), folder.path());
     assert!(
         message.contains("0.5s is shorter than the usual interval") && message.contains("50.0 s"),
         "{message}"
     );
-    succeed(&format!("{TRAIN} --memory 0.5s --unit t=ms"), folder.path());
+    succeed(&format!("{TRAIN} --history 0.5s --unit t=ms"), folder.path());
 }

@@ -60,7 +60,7 @@ fn golden_vectors_in_the_users_units_agree_with_decode() {
     assert_eq!((&report["limit"], report.get("output_range_mm")), (&1e-12.into(), None));
     let golden = folder.path().join("bundle/golden.csv");
     let output = decoupler(
-        "decode --network n.json --input bundle/golden.csv --output decoded.csv",
+        "decode --network n.json --data bundle/golden.csv --out decoded.csv",
         folder.path(),
     );
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -107,7 +107,7 @@ fn answers_have_calibrated_intervals_and_drift_is_reported() {
     let without = json(&format!("{train} without.json --intervals never"), folder.path());
     assert_eq!(without["targets"][0].get("interval"), None);
     let decode = |input: &str| {
-        let command = format!("decode --network n.json --input {input} --output {input}.out");
+        let command = format!("decode --network n.json --data {input} --out {input}.out");
         let output = decoupler(&command, folder.path());
         let message = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.success(), "{message}");
@@ -162,7 +162,7 @@ fn answers_have_calibrated_intervals_and_drift_is_reported() {
     // A stream has the same answers and half-widths as the file, and the same warning.
     let follow = |input: &str| {
         let output = decoupler(
-            &format!("decode --network n.json --follow --input {input}"),
+            &format!("decode --network n.json --follow --data {input}"),
             folder.path(),
         );
         let [answers, message] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
@@ -208,8 +208,8 @@ fn readings_without_a_drift_monitor_give_the_reason() {
         let train = format!("train --data some.csv --inputs {inputs} --targets y --hidden 2 --epochs 5 --out n.json");
         for command in [
             &train,
-            "decode --network n.json --input some.csv --output out.csv",
-            "decode --network n.json --follow --input some.csv",
+            "decode --network n.json --data some.csv --out out.csv",
+            "decode --network n.json --follow --data some.csv",
         ] {
             let output = decoupler(command, path);
             let message = String::from_utf8(output.stderr).unwrap();
@@ -412,11 +412,7 @@ fn options_that_need_targets_are_refused_without_them() {
         ("inspect", "--data: name the file"),
         (
             "inspect --data r.csv --inputs a --targets x --test-data r.csv",
-            "leave the test files out",
-        ),
-        (
-            "inspect --data r.csv --inputs a --targets x --folds 9",
-            "analysed in five folds",
+            "--test-data: a recording is analysed by cross-validation",
         ),
         (
             "inspect --data r.csv --inputs a --targets x --test-fraction 0.3",
@@ -471,7 +467,7 @@ fn a_single_press_is_learnt_wherever_it_is_and_what_its_test_lacks_is_said() {
         let is_first = warnings.contains("the first part was held out for testing in its place");
         assert_eq!(is_first, press.start == 880, "{press:?}: {warnings}");
         // The press itself is learnt.
-        let output = decoupler("decode --network n.json --input r.csv --output o.csv", folder.path());
+        let output = decoupler("decode --network n.json --data r.csv --out o.csv", folder.path());
         assert!(output.status.success(), "{press:?}");
         let decoded = fs::read_to_string(folder.path().join("o.csv")).unwrap();
         let middle = decoded.lines().nth(press.start + 51).unwrap();

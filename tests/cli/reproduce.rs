@@ -10,7 +10,8 @@ use crate::terminal::decoupler;
 #[test]
 fn the_terminal_prints_every_cell_next_to_the_published_figures() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = "reproduce --seeds 2 --epochs 3 --starts 1 --k 3 --repeats 2 --hidden 6,7 --out tables/new --json";
+    let arguments =
+        "reproduce --seeds 2 --epochs 3 --starts 1 --folds 3 --repeats 2 --hidden 6,7 --out tables/new --json";
     let output = decoupler(arguments, folder.path());
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -88,7 +89,7 @@ fn invalid_reproductions_are_refused_in_one_line() {
         ("--hidden 6,0", 2, "'0' for '--hidden"),
         ("--arrays 10x6", 2, "not an array scale"),
         ("--seeds 0", 2, "from 1"),
-        ("--k 11 --folds snapshot", 2, "11 folds of 10 snapshots"),
+        ("--folds 11 --fold-unit snapshot", 2, "11 folds of 10 snapshots"),
         ("--out file", 1, "cannot create the folder 'file'"),
     ];
     for (arguments, status, expected) in cases {

@@ -17,7 +17,8 @@ fn failure(arguments: &str, folder: &Path, status: i32) -> String {
     text
 }
 
-const SMALL: &str = "--array 3x4_2x12 --hidden 4 --epochs 20 --samples 300 --validation-samples 30 --test-samples 30";
+const SMALL: &str =
+    "--array 3x4_2x12 --hidden 4 --epochs 20 --samples 300 --set validation-samples=30 --set test-samples=30";
 
 #[test]
 fn training_reports_decoders_model_based_errors_and_size_of_the_scene() {
@@ -100,27 +101,24 @@ fn simulated_samples_are_decoded_row_by_row() {
             assert!((number(coordinate) - number(coordinate + 12)).abs() < 1e-9);
         }
     }
-    success("decode --network net.json --input all.csv --output in_order.csv", path);
+    success("decode --network net.json --data all.csv --out in_order.csv", path);
     // The same readings without the row column, and in another order with it.
     let without: Vec<String> = all.iter().map(|line| line[2..14].join(",")).collect();
     fs::write(path.join("without.csv"), without.join("\n")).unwrap();
     success(
-        "decode --network net.json --input without.csv --output without_out.csv",
+        "decode --network net.json --data without.csv --out without_out.csv",
         path,
     );
     assert_eq!(lines("without_out.csv"), lines("in_order.csv"));
     let mut turned: Vec<String> = all.iter().map(|line| line.join(",")).collect();
     turned[1..].reverse();
     fs::write(path.join("turned.csv"), turned.join("\n")).unwrap();
-    success(
-        "decode --network net.json --input turned.csv --output turned_out.csv",
-        path,
-    );
+    success("decode --network net.json --data turned.csv --out turned_out.csv", path);
     let mut expected = lines("in_order.csv");
     expected[1..].reverse();
     assert_eq!(lines("turned_out.csv"), expected);
     fs::write(path.join("part.csv"), without[..6].join("\n")).unwrap();
-    let message = failure("decode --network net.json --input part.csv --output x.csv", path, 1);
+    let message = failure("decode --network net.json --data part.csv --out x.csv", path, 1);
     assert!(message.contains("lines are not a multiple of 3 rows"), "{message}");
     success(
         "simulate --array 3x4_2x12 --rows 2 --samples 4 --noise 1e-3 --out row.csv",
@@ -134,7 +132,7 @@ fn simulated_samples_are_decoded_row_by_row() {
 #[test]
 fn a_trade_off_is_reported_in_text_and_json() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = "trade --array 2x3_2x9 --hidden 2,3 --epochs 5 --samples 60 --test-samples 20 --noise 0,1e-2 \
+    let arguments = "trade --array 2x3_2x9 --hidden 2,3 --epochs 5 --samples 60 --set test-samples=20 --noise 0,1e-2 \
                      --under-percent 1e-6 --under-us 1e9";
     let report: Value = serde_json::from_str(&success(&format!("{arguments} --json"), folder.path())).unwrap();
     let levels = report["levels"].as_array().unwrap();
@@ -145,12 +143,8 @@ fn a_trade_off_is_reported_in_text_and_json() {
         let points = level["points"].as_array().unwrap();
         assert_eq!(points.len(), 2 * (5 + 2 * 3));
         assert!(points.iter().any(|point| point["on_decoding_front"] == true));
-        assert!(
-            level["most_accurate_under"]["command"]
-                .as_str()
-                .unwrap()
-                .contains("--preset")
-        );
+        let command = level["most_accurate_under"]["command"].as_str().unwrap();
+        assert!(command.starts_with("decoupler train --array 2x3_2x9"), "{command}");
     }
     assert!(levels[0]["fastest_under"]["point"].is_u64());
     assert_eq!(levels[1]["fastest_under"]["point"], Value::Null, "noise forbids it");
@@ -168,7 +162,7 @@ fn a_trade_off_is_reported_in_text_and_json() {
 #[test]
 fn a_point_worse_than_the_mean_has_a_remark() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = "trade --array 2x3_2x9 --hidden 2 --epochs 30 --samples 40 --test-samples 20 --noise 3e-1 --noise-in test \
+    let arguments = "trade --array 2x3_2x9 --hidden 2 --epochs 30 --samples 40 --set test-samples=20 --noise 3e-1 --set noise-in=test \
                      --preset paper --decoder mean,ridge,network";
     let report: Value = serde_json::from_str(&success(&format!("{arguments} --json"), folder.path())).unwrap();
     let points = report["levels"][0]["points"].as_array().unwrap();
@@ -180,9 +174,9 @@ fn a_point_worse_than_the_mean_has_a_remark() {
         let remark = point["remarks"][0].as_str().unwrap();
         assert!(remark.contains("times that of always answering the mean"), "{remark}");
     }
-    let text = success(arguments, folder.path());
+    let text = String::from_utf8(decoupler(arguments, folder.path()).stderr).unwrap();
     assert!(
-        text.contains("Warning: Network, paper preset, 2 hidden: ") || text.contains("Warning: Ridge, paper preset: "),
+        text.contains("warning: Network, paper preset, 2 hidden: ") || text.contains("warning: Ridge, paper preset: "),
         "{text}"
     );
 }
@@ -199,7 +193,7 @@ fn errors_are_named() {
         ("train --scaling none", "minmax or whiten"),
         ("train --noise -1", "from 0"),
         ("train --noise 2", "from 0 to 1"),
-        ("train --noise 0,1", "not a number"),
+        ("train --noise 0,1", "is not a number"),
         ("train --decoder knn", "rbf, fuzzy, newton or polish"),
         ("simulate --decoder mean,ridge", "only one here"),
         ("trade --hidden 0", "from 1"),

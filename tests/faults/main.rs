@@ -27,7 +27,10 @@ use folders::names;
 
 fn run(arguments: &str, folder: &Path, faults: Option<&Faults>) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
-    command.args(arguments.split_whitespace()).current_dir(folder);
+    command
+        .args(arguments.split_whitespace())
+        .arg("--force")
+        .current_dir(folder);
     if let Some(faults) = faults {
         faults.preload(&mut command, folder);
     }
@@ -47,8 +50,7 @@ fn contents(path: &Path) -> Option<Vec<Vec<u8>>> {
     fs::read(path).ok().map(|bytes| vec![bytes])
 }
 
-const ARRAY: &str =
-    "--array 2x2_2x6 --samples 40 --validation-samples 0 --test-samples 10 --hidden 2 --epochs 1 --decoder mean";
+const ARRAY: &str = "--array 2x2_2x6 --samples 40 --set validation-samples=0 --set test-samples=10 --hidden 2 --epochs 1 --decoder mean";
 
 const RECORDING: &str =
     "--data data.csv --inputs t,u --targets d --hidden 2 --epochs 1 --decoder mean --intervals never";
@@ -80,7 +82,7 @@ fn prepared() -> TempDir {
         "simulate --array 2x2_2x6 --samples 4 --out readings.csv",
         "simulate --array 2x2_2x6 --samples 40 --out presses.csv",
         "calibrate --array 2x2_2x6 @frames --out nominal.json",
-        "train --sensor nominal.json --rows known --samples 40 --validation-samples 0 --test-samples 10 --hidden 2 \
+        "train --sensor nominal.json --rows known --samples 40 --set validation-samples=0 --set test-samples=10 --hidden 2 \
          --epochs 1 --decoder mean --out fitted.json",
         "sweep --spec sweep.json --out runs",
     ] {
@@ -108,9 +110,9 @@ enum Before {
 /// A command that writes one file or folder, its name, and what is there before.
 type Written = (&'static str, &'static str, Before);
 
-/// Commands that write one file. `inspect` and `trade` write none, nor does `decode --follow`, and those of `simulate`
-/// with faults, and of `--save-recipe` elsewhere, are written by the same code.
-const FILES: [Written; 16] = [
+/// Commands that write one file. `trade` writes none, nor does `decode --follow`, and those of `simulate` with faults are
+/// written by the same code.
+const FILES: [Written; 15] = [
     ("simulate --array 2x2_2x6 --samples 6 --out", "out.csv", Before::AnyFile),
     (
         "simulate --array 2x2_2x6 --samples 6 --decoder newton --out",
@@ -119,7 +121,6 @@ const FILES: [Written; 16] = [
     ),
     ("train @ --out", "out.json", Before::AnyFile),
     ("train @ --report", "report.html", Before::AnyFile),
-    ("train @ --save-recipe", "recipe.json", Before::AnyFile),
     ("train @ --checkpoint", "checkpoint.json", Before::Nothing),
     (
         "train --epochs 3 --resume --checkpoint",
@@ -129,17 +130,17 @@ const FILES: [Written; 16] = [
     ("train @recording --out", "recorded.json", Before::AnyFile),
     ("train @recording --report", "recorded.html", Before::AnyFile),
     (
-        "train @recording --save-recipe",
+        "inspect --data data.csv --inputs t,u --targets d --recipe-out",
         "recorded_recipe.json",
         Before::AnyFile,
     ),
     (
-        "decode --network n.json --input readings.csv --output",
+        "decode --network n.json --data readings.csv --out",
         "decoded.csv",
         Before::AnyFile,
     ),
     (
-        "decode --network recording.json --input data.csv --output",
+        "decode --network recording.json --data data.csv --out",
         "decoded_recording.csv",
         Before::AnyFile,
     ),

@@ -9,11 +9,11 @@ use crate::{
 };
 
 const CALLS: [&str; 4] = [
-    "simulate --array 1x1_1x3 --samples 2 --seed 17 --noise 1e-3 --noise-ohm 0.5 --adc-bits 12 --drift 1e-4",
-    "simulate --array 2x2_1x3 --samples 2 --rows known --axes xyz --loading smooth:2.5 --noise-in test",
-    "train --array 1x1_1x3 --samples 6 --validation-samples 0 --test-samples 2 --hidden 1 --epochs 2 --decoder mean \
-     --method lm --set mu=0.01 --set largest-mu=1e10 --goal 1e-9 --min-gradient 1e-7 --max-fail 3 --json",
-    "train --array 1x1_1x3 --samples 6 --validation-samples 0 --test-samples 2 --hidden 1 --epochs 2 --decoder mean \
+    "simulate --array 1x1_1x3 --samples 2 --seed 17 --noise 1e-3 --set noise-ohm=0.5 --set adc-bits=12 --set drift=1e-4",
+    "simulate --array 2x2_1x3 --samples 2 --rows known --axes xyz --loading smooth:2.5 --set noise-in=test",
+    "train --array 1x1_1x3 --samples 6 --set validation-samples=0 --set test-samples=2 --hidden 1 --epochs 2 --decoder mean \
+     --method lm --set mu=0.01 --set largest-mu=1e10 --set goal=1e-9 --set min-gradient=1e-7 --set max-fail=3 --json",
+    "train --array 1x1_1x3 --samples 6 --set validation-samples=0 --set test-samples=2 --hidden 1 --epochs 2 --decoder mean \
      --method scg --set sigma=1e-5 --inputs log --scaling whiten --seed 3",
 ];
 

@@ -311,15 +311,7 @@ fn row_wires_in_readings_claim_only_the_memory_that_they_need() {
                  --out n.json";
     let (is_trained, message) = ended(&Vec::from_iter(train.split_whitespace()), folder.path());
     assert!(is_trained, "{message}");
-    let decode = [
-        "decode",
-        "--network",
-        "n.json",
-        "--input",
-        "in.csv",
-        "--output",
-        "out.csv",
-    ];
+    let decode = ["decode", "--network", "n.json", "--data", "in.csv", "--out", "out.csv"];
     fs::write(folder.path().join("in.csv"), "t (s),row,a,b\n0,1,1,2\n1,10000,1,2\n").unwrap();
     let (is_read, message) = ended(&decode, folder.path());
     assert!(is_read, "{message}");

@@ -52,7 +52,7 @@ fn names_of_files_are_printed_without_control_characters() {
         for arguments in [
             &["inspect", "--data", name][..],
             &["train", "--data", name, "--inputs", "a", "--targets", "b"],
-            &["decode", "--network", name, "--input", name, "--output", "out.csv"],
+            &["decode", "--network", name, "--data", name, "--out", "out.csv"],
         ] {
             let output = limited(arguments, folder.path());
             for text in [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes)) {
@@ -107,9 +107,9 @@ fn the_original_of_a_changed_name_is_kept_and_finds_its_column() {
         "decode",
         "--network",
         "n.json",
-        "--input",
+        "--data",
         "data.csv",
-        "--output",
+        "--out",
         "out.csv",
     ]);
 }

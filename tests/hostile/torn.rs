@@ -42,22 +42,16 @@ fn torn_and_mislabelled_files_are_refused_or_read() {
 
 /// A file that commands read, and such a command; the command writes nothing but its outputs.
 const READ: [(&str, &str); 12] = [
-    (
-        "n.json",
-        "decode --network n.json --input readings.csv --output out.csv",
-    ),
+    ("n.json", "decode --network n.json --data readings.csv --out out.csv"),
     ("n.json", "export --network n.json --format numpy --out out"),
-    ("r.json", "decode --network r.json --input press.csv --output out.csv"),
+    ("r.json", "decode --network r.json --data press.csv --out out.csv"),
     (
         "readings.csv",
-        "decode --network n.json --input readings.csv --output out.csv",
+        "decode --network n.json --data readings.csv --out out.csv",
     ),
-    ("readings.csv", "decode --network n.json --follow --input readings.csv"),
-    (
-        "press.csv",
-        "decode --network r.json --input press.csv --output out.csv",
-    ),
-    ("press.csv", "decode --network r.json --follow --input press.csv"),
+    ("readings.csv", "decode --network n.json --follow --data readings.csv"),
+    ("press.csv", "decode --network r.json --data press.csv --out out.csv"),
+    ("press.csv", "decode --network r.json --follow --data press.csv"),
     (
         "c.checkpoint",
         "train --checkpoint c.checkpoint --resume --out out.json",
@@ -68,7 +62,7 @@ const READ: [(&str, &str); 12] = [
     ),
     (
         "sensor.json",
-        "train --sensor sensor.json --samples 6 --test-samples 2 --validation-samples 0 --hidden 1 --epochs 1 --out out.json",
+        "train --sensor sensor.json --samples 6 --set test-samples=2 --set validation-samples=0 --hidden 1 --epochs 1 --out out.json",
     ),
     ("spec.json", "sweep --spec spec.json --out out"),
     ("runs/TRIAL", "sweep --merge runs --out out.csv"),
@@ -84,7 +78,7 @@ fn run(arguments: &str, folder: &Path) {
 
 /// Makes one file of every kind, and returns the name of the trial of a sweep.
 fn make(folder: &Path) -> String {
-    let small = "--samples 12 --test-samples 4 --validation-samples 4 --hidden 1 --epochs 2";
+    let small = "--samples 12 --set test-samples=4 --set validation-samples=4 --hidden 1 --epochs 2";
     let array = "--array 2x2_1x3";
     run(
         &format!("train {array} {small} --decoder mean --checkpoint c.checkpoint --out n.json"),

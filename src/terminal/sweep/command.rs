@@ -1,31 +1,40 @@
 use std::{
     fs::{self, File, TryLockError},
-    io::Write,
     num::NonZero,
+    panic::resume_unwind,
     path::{Path, PathBuf},
     str::FromStr,
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
     time::Instant,
 };
 
-use clap::Args;
-use decoupler_core::{evaluation::experiments::worker_threads, text::counted};
-use decoupler_files::export::{
-    MergedSweep, SweepTableFormat, Trial, TrialId, WriteError, atomic_write, check_writable, format_duration,
+use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, FromArgMatches};
+use decoupler_core::{
+    evaluation::{RUN_OPTIONS, RunError, RunOption, experiments::worker_threads},
+    text::counted,
 };
-use serde::Serialize;
+use decoupler_files::export::{
+    MergedSweep, SweepTableFormat, Trial, TrialId, WriteError, atomic_write, format_duration,
+};
+use serde_json::json;
+
+use indicatif::ProgressBar;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::{
-    filling::{Filled, fill},
     specification::{Specification, TrainOptions},
-    trials::Trials,
+    trials::{Trials, train},
 };
 use crate::terminal::{
     count,
     failure::Failure,
     import_arguments::ImportArguments,
     interruption::Graceful,
-    output::{print, print_object, progress_bar},
+    output::{check_output, input, print, progress_bar, value, warn},
     seed,
 };
 
@@ -49,12 +58,12 @@ use crate::terminal::{
 #[derive(Args)]
 pub(in crate::terminal) struct Sweep {
     /// Specification of the trials, as JSON
-    #[arg(long, value_name = "FILE", required_unless_present_any = ["merge", "axes"])]
+    #[arg(long, value_name = "FILE", value_parser = input, required_unless_present_any = ["merge", "varied"])]
     spec: Option<PathBuf>,
     #[command(flatten)]
     given: SweepArguments,
     /// Folder for the results, created if missing; with --merge the table, as CSV or JSON depending on the file extension
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
     /// Train only part I of N parts, which together contain every trial once
     #[arg(long, value_name = "I/N", conflicts_with = "merge")]
@@ -66,22 +75,9 @@ pub(in crate::terminal) struct Sweep {
     /// have not begun
     #[arg(long, value_name = "DIR", num_args = 1..)]
     merge: Vec<PathBuf>,
-    /// Print one JSON object instead of text and progress
-    #[arg(long)]
-    json: bool,
 }
 
 const MAX_THREADS: usize = 1024;
-
-#[derive(Serialize)]
-struct FilledReport {
-    trials: usize,
-    present: usize,
-    trained: usize,
-    elsewhere: usize,
-    failed: usize,
-    seconds: f64,
-}
 
 impl Sweep {
     pub(in crate::terminal) fn run(self) -> Result<(), Failure> {
@@ -96,53 +92,46 @@ impl Sweep {
     fn fill(&self, trials: &Trials) -> Result<(), Failure> {
         let begun = Instant::now();
         let folder = &self.out;
-        fs::create_dir_all(folder).map_err(|source| Failure::MakeFolder {
-            path: folder.clone(),
-            source,
-        })?;
+        Failure::make_folder(folder)?;
         let positions = self.shard.unwrap_or_default().positions(trials.count());
         let of_shard = positions.len();
-        let bar = progress_bar(self.json, of_shard, "{bar:30} {pos} of {len} trials, {elapsed} elapsed");
+        let bar = progress_bar(of_shard, "{bar:30} {pos} of {len} trials, {elapsed} elapsed");
         let stop = Stop::begin();
         let threads = self.threads.and_then(NonZero::new).unwrap_or_else(worker_threads);
         let threads = NonZero::new(of_shard).map_or(threads, |trials| threads.min(trials));
         let filled = fill(folder, trials, positions, threads, &bar, &stop);
         bar.finish_and_clear();
         let filled = filled?;
-        let Filled {
-            present,
-            trained,
-            elsewhere,
-            failed,
-        } = filled;
-        if self.json {
-            print_object(&FilledReport {
-                trials: of_shard,
-                present,
-                trained,
-                elsewhere,
-                failed,
-                seconds: begun.elapsed().as_secs_f64(),
-            })?;
-        } else {
-            let time = format_duration(begun.elapsed());
+        let count = |of: Attempt| filled.iter().filter(|attempt| **attempt == of).count();
+        let [present, trained, elsewhere, failed] =
+            [Attempt::Present, Attempt::Trained, Attempt::Elsewhere, Attempt::Failed].map(count);
+        let seconds = begun.elapsed();
+        let object = || {
+            json!({
+                "trials": of_shard,
+                "present": present,
+                "trained": trained,
+                "elsewhere": elsewhere,
+                "failed": failed,
+                "seconds": seconds.as_secs_f64(),
+            })
+        };
+        print(object, |output| {
+            let (trials, time) = (counted(of_shard, "trial"), format_duration(seconds));
             let elsewhere = match elsewhere {
                 0 => String::new(),
                 count => format!("{count} left to other programs that train them, "),
             };
-            print(|output| {
-                writeln!(
-                    output,
-                    "{}: {present} already done, {trained} trained, {elsewhere}{failed} failed, in {time}",
-                    counted(of_shard, "trial")
-                )
-            })?;
-        }
+            writeln!(
+                output,
+                "{trials}: {present} already done, {trained} trained, {elsewhere}{failed} failed, in {time}"
+            )
+        })?;
         match stop.graceful.is_end_requested() {
-            true if filled.total() < of_shard => Err(Failure::InterruptedSweep {
-                done: present + trained,
-                trials: of_shard,
-            }),
+            true if filled.len() < of_shard => Err(Failure::Interrupted(format!(
+                " after {} of {of_shard} trials; the same command trains the rest",
+                present + trained
+            ))),
             _ if failed > 0 => Err(Failure::FailedTrials {
                 failed,
                 trials: of_shard,
@@ -161,26 +150,16 @@ impl Sweep {
             );
             Failure::Arguments(message)
         })?;
-        check_writable(out)?;
+        check_output("--out", out)?;
         let mut merged = MergedSweep::read(&self.merge)?;
         if let Some(trials) = specified {
             let missing = (0..trials.count()).filter(|&position| !merged.has(trials.id(position)));
             merged.missing = missing.map(|position| trials.describe(position)).collect();
         }
-        // A table that cannot be read may have more trials.
-        let has_fewer = || {
-            format
-                .trials_in(out)
-                .is_some_and(|trials| trials <= merged.trials.len())
-        };
-        let is_kept = !merged.is_whole() && !has_fewer();
-        if !is_kept {
-            atomic_write(out, |writer| format.write(&merged, writer))?;
-        }
-        if self.json {
-            print_object(&merged)?;
-        } else {
-            print(|output| {
+        atomic_write(out, |writer| format.write(&merged, writer))?;
+        print(
+            || value(&merged),
+            |output| {
                 for (what, trials) in [("missing", &merged.missing), ("conflicting", &merged.conflicting)] {
                     for trial in trials {
                         writeln!(output, "{what}: {trial}")?;
@@ -191,8 +170,8 @@ impl Sweep {
                 }
                 let trials = counted(merged.trials.len(), "trial");
                 writeln!(output, "{trials}; digest of options and results: {}", merged.digest)
-            })?;
-        }
+            },
+        )?;
         if merged.is_whole() {
             return Ok(());
         }
@@ -201,8 +180,102 @@ impl Sweep {
             conflicting: merged.conflicting.len(),
             unreadable: merged.damaged.len(),
             out: out.clone(),
-            is_kept,
         })
+    }
+}
+
+/// Trains those of the trials at `positions` that neither have a result in `folder` nor are being trained by another program,
+/// each on one of `threads` threads. Returns early once `stop` is requested.
+///
+/// # Errors
+/// If results cannot be written. A trial that cannot be trained is reported on standard error, and the others continue.
+fn fill(
+    folder: &Path,
+    trials: &Trials,
+    positions: impl Iterator<Item = usize> + Send,
+    threads: NonZero<usize>,
+    bar: &ProgressBar,
+    stop: &Stop,
+) -> Result<Vec<Attempt>, Failure> {
+    let threads = threads.get();
+    let pool = |_| {
+        ThreadPoolBuilder::new()
+            .num_threads(1)
+            .thread_name(|_| "trial".to_owned())
+            .build()
+    };
+    let pools: Result<Vec<ThreadPool>, _> = (0..threads).map(pool).collect();
+    let pools = pools.map_err(|error| Failure::Run(RunError::Threads(error.to_string())))?;
+    let positions = Mutex::new(positions);
+    let next = || positions.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let work = || {
+        let mut options = TrainOptions::new();
+        let mut filled = Vec::new();
+        while let Some(position) = next().filter(|_| !stop.is_requested()) {
+            match attempt(folder, trials, position, threads, stop, &mut options)? {
+                Ok(Some(attempt)) => filled.push(attempt),
+                Ok(None) => break,
+                Err(failure) => {
+                    let trial = trials.describe(position);
+                    bar.suspend(|| warn(format_args!("{trial}: {failure}; the other trials continue")));
+                    filled.push(Attempt::Failed);
+                }
+            }
+            bar.inc(1);
+        }
+        Ok(filled)
+    };
+    thread::scope(|scope| {
+        let workers = pools.iter().map(|pool| {
+            scope.spawn(|| {
+                let worked: Result<Vec<Attempt>, WriteError> = pool.install(work);
+                worked.inspect_err(|_| stop.fail())
+            })
+        });
+        // All are started before the first is joined.
+        let workers = Vec::from_iter(workers).into_iter();
+        // The panic of the scope itself would not contain the reason.
+        let worked = workers.map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        Ok(worked.collect::<Result<Vec<_>, _>>()?.concat())
+    })
+}
+
+/// What became of a trial.
+#[derive(Clone, Copy, PartialEq)]
+enum Attempt {
+    /// Finished before.
+    Present,
+    Trained,
+    /// In training by another program, and left to it.
+    Elsewhere,
+    Failed,
+}
+
+/// Trains the trial at `position` unless it is finished or being trained; `None` if it was stopped, and saved in a checkpoint.
+fn attempt(
+    folder: &Path,
+    trials: &Trials,
+    position: usize,
+    parallel: usize,
+    stop: &Stop,
+    options: &mut TrainOptions,
+) -> Result<Result<Option<Attempt>, Failure>, WriteError> {
+    let claim = match Claim::take(folder, trials.id(position))? {
+        Claimed::Ours(claim) => claim,
+        Claimed::Done => return Ok(Ok(Some(Attempt::Present))),
+        Claimed::Theirs => return Ok(Ok(Some(Attempt::Elsewhere))),
+    };
+    match trials
+        .get(position, options)
+        .and_then(|trial| train(&trial, &claim, parallel, || stop.is_requested()))
+    {
+        Ok(Some(trial)) => {
+            trial.save_in(folder)?;
+            claim.finish();
+            Ok(Ok(Some(Attempt::Trained)))
+        }
+        Ok(None) => Ok(Ok(None)),
+        Err(failure) => Ok(Err(failure)),
     }
 }
 
@@ -301,7 +374,7 @@ impl Claim {
 #[command(next_help_heading = "Without a specification")]
 pub(super) struct SweepArguments {
     #[command(flatten)]
-    axes: AxisArguments,
+    axes: Axes,
     /// Columns of --data that the network reads, separated by commas
     #[arg(
         long,
@@ -312,67 +385,82 @@ pub(super) struct SweepArguments {
     )]
     inputs: Vec<String>,
     /// Number of consecutive seeds [default: 1]
-    #[arg(long, value_name = "N", value_parser = count(1..=1000), requires = "axes", conflicts_with = "spec")]
+    #[arg(long, value_name = "N", value_parser = count(1..=1000), requires = "varied", conflicts_with = "spec")]
     seeds: Option<usize>,
     /// First seed [default: 0]
-    #[arg(long, value_name = "SEED", value_parser = seed, requires = "axes", conflicts_with = "spec")]
+    #[arg(long, value_name = "SEED", value_parser = seed, requires = "varied", conflicts_with = "spec")]
     seed: Option<u64>,
     #[command(flatten)]
     import: ImportArguments,
 }
 
-// Values of the varied options.
-#[derive(Args)]
-#[group(id = "axes", multiple = true, conflicts_with_all = ["spec", "merge"])]
-struct AxisArguments {
-    /// Numbers of hidden nodes
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    hidden: Vec<String>,
-    /// Training methods
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    method: Vec<String>,
-    /// Scalings of the inputs: minmax, whiten
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    scaling: Vec<String>,
-    /// Maximum numbers of epochs
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    epochs: Vec<String>,
-    /// Numbers of trainings from different random weights
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    starts: Vec<String>,
-    /// Array scales, without --data
-    #[arg(long, value_name = "LIST", value_delimiter = ',', conflicts_with_all = ["data", "recipe"])]
-    array: Vec<String>,
-    /// Numbers of training samples, without --data
-    #[arg(long, value_name = "LIST", value_delimiter = ',', conflicts_with_all = ["data", "recipe"])]
-    samples: Vec<String>,
+/// Options of the settings, each with values separated by commas.
+struct Axes(Vec<(String, Vec<String>)>);
+
+impl Axes {
+    /// Settings that can be varied, by their options.
+    fn offered() -> impl Iterator<Item = (String, &'static RunOption)> {
+        let varied = RUN_OPTIONS.iter();
+        let varied = varied.filter(|row| !row.is_rare() && !["inputs", "seed"].contains(&row.setting.name));
+        varied.map(|row| (row.setting.word("-"), row))
+    }
+}
+
+impl Args for Axes {
+    fn augment_args(command: Command) -> Command {
+        let group = ArgGroup::new("varied")
+            .multiple(true)
+            .conflicts_with_all(["spec", "merge"]);
+        let group = group.args(Self::offered().map(|(word, _)| word));
+        let argument = |(word, row): (String, &RunOption)| {
+            let argument = Arg::new(word.clone())
+                .long(word)
+                .value_name("LIST")
+                .value_delimiter(',');
+            argument
+                .action(ArgAction::Append)
+                .help(row.setting.help.trim_end_matches('.'))
+        };
+        command.args(Self::offered().map(argument)).group(group)
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl FromArgMatches for Axes {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let given = Self::offered().filter_map(|(word, _)| {
+            let values = matches.get_many::<String>(&word)?.cloned().collect();
+            Some((word, values))
+        });
+        Ok(Self(given.collect()))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
 }
 
 impl SweepArguments {
     /// Trials described by the arguments.
     pub(super) fn trials(&self) -> Result<Trials, Failure> {
-        let recording = self.import.given(&self.inputs)?;
-        let holds_out = self.import.holds_out();
-        let axes = &self.axes;
-        let axes = [
-            ("array", &axes.array),
-            ("samples", &axes.samples),
-            ("scaling", &axes.scaling),
-            ("hidden", &axes.hidden),
-            ("method", &axes.method),
-            ("epochs", &axes.epochs),
-            ("starts", &axes.starts),
-        ];
-        let mut axes = Vec::from_iter(axes.into_iter().filter(|(_, values)| !values.is_empty()));
+        let recording = match self.import.is_given() {
+            true => Some(self.import.plan(&self.inputs)?),
+            false => None,
+        };
+        if recording.is_none() {
+            self.import.check_unused()?;
+        }
         let first = self.seed.unwrap_or(0);
         let seeds = (0..self.seeds.unwrap_or(1) as u64).map(|number| first.wrapping_add(number).to_string());
-        let seeds = Vec::from_iter(seeds);
-        axes.push(("seed", &seeds));
-        let shared = recording.iter().filter(|_| holds_out);
-        let shared = shared.map(|plan| format!("--validation-fraction={}", plan.division.validation_fraction));
+        let mut axes = self.axes.0.clone();
+        axes.push(("seed".to_owned(), seeds.collect()));
         let mut train = TrainOptions::new();
-        let specification = Specification::of_arguments(recording.clone(), shared.collect(), axes, &mut train)?;
-        Ok(Trials::of(specification, &mut train)?)
+        let specification = Specification::of_arguments(recording, self.import.holds_out(), axes, &mut train)?;
+        Trials::of(specification, &mut train)
     }
 }
 

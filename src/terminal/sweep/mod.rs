@@ -3,7 +3,6 @@
 //! programs, on any machines with access to the folder, can fill it together, stop at any moment and be started again.
 
 mod command;
-mod filling;
 mod specification;
 mod trials;
 

@@ -1,12 +1,12 @@
 use std::{
-    fmt,
+    fmt::{self, Display},
     fs::File,
     io::{self, Read},
     path::{Path, PathBuf},
 };
 
-use clap::{ArgAction, Args, Command, FromArgMatches};
-use decoupler_core::{decoupling::DecoderKind, text::in_one_line};
+use clap::{Arg, ArgAction, Args, Command, FromArgMatches};
+use decoupler_core::{decoupling::DecoderKind, evaluation::RUN_OPTIONS, text::in_one_line};
 use decoupler_files::{
     export::RecipeSource,
     import::{Plan, Setup},
@@ -18,11 +18,14 @@ use serde::{
 use serde_json::Value;
 
 use crate::terminal::{
-    failure::{Failure, MAX_TRIALS, SpecificationError},
-    import_arguments::ImportArguments,
+    failure::Failure,
+    import_arguments::{ImportArguments, RecipeArguments},
     one_line,
     settings_arguments::TrainingArguments,
 };
+
+/// Maximum number of trials of a sweep. Every program that works on a sweep reads all of them.
+const MAX_TRIALS: usize = 100_000;
 
 /// Maximum size of a specification file in bytes.
 const LARGEST_BYTES: u64 = 1 << 24;
@@ -36,6 +39,8 @@ pub(super) struct Specification {
     pub(super) axes: Vec<Axis>,
     /// Recording shared by all trials; its paths are absolute.
     pub(super) recording: Option<Plan>,
+    /// `true` if its share for validation is given, which otherwise follows from the method.
+    pub(super) holds_out: bool,
 }
 
 /// A varied option and its values.
@@ -63,24 +68,34 @@ struct Layout {
 
 impl Specification {
     /// Reads the file at `path` and checks each option and value separately.
-    pub(super) fn read(path: &Path, train: &mut TrainOptions) -> Result<Self, SpecificationError> {
-        let text = read_text(path).map_err(|source| SpecificationError::Read {
+    pub(super) fn read(path: &Path, train: &mut TrainOptions) -> Result<Self, Failure> {
+        let text = read_text(path).map_err(|source| Failure::Read {
             path: path.to_owned(),
             source,
         })?;
-        let layout: Layout = serde_json::from_str(&text).map_err(|error| SpecificationError::Layout {
-            path: path.to_owned(),
-            message: in_one_line(&error.to_string()),
+        let layout: Layout = serde_json::from_str(&text).map_err(|error| {
+            Failure::Arguments(format!(
+                "'{}' is not a specification: {}; write {{\"train\": {{OPTION: VALUE, ...}}, \"axes\": {{OPTION: [VALUE, ...], \
+                 ...}}}} with the options of decoupler train",
+                path.display(),
+                in_one_line(&error.to_string())
+            ))
         })?;
+        let holds_out = (layout.recording.as_ref()).is_some_and(|plan| plan.division.validation_fraction > 0.0);
+        Self::of(path, layout, holds_out, train)
+    }
+
+    fn of(path: &Path, layout: Layout, holds_out: bool, train: &mut TrainOptions) -> Result<Self, Failure> {
         let mut specification = Self {
             path: path.to_owned(),
             shared: Vec::new(),
             axes: Vec::new(),
+            holds_out,
             recording: layout.recording.map(|plan| plan.within(folder(path)).absolute()),
         };
         if let Some(file) = specification.recording.as_ref().and_then(Plan::irregular) {
             let message = format!("'{}' is a pipe or device; give a file", file.display());
-            return Err(specification.error("recording".to_owned(), message));
+            return Err(specification.error("recording", message));
         }
         for (option, value) in &layout.train.0 {
             let words = specification.words(option, value, &format!("train.{option}"), train)?;
@@ -88,8 +103,8 @@ impl Specification {
         }
         for (option, values) in &layout.axes.0 {
             if layout.train.0.iter().any(|(other, _)| other == option) {
-                let message = "it is also in train; remove it from one of the two".to_owned();
-                return Err(specification.error(format!("axes.{option}"), message));
+                let message = "it is also in train; remove it from one of the two";
+                return Err(specification.error(&format!("axes.{option}"), message));
             }
             let axis = specification.axis(option, values, train)?;
             specification.axes.push(axis);
@@ -101,34 +116,30 @@ impl Specification {
     /// Specification from command-line arguments: each axis has values separated by commas.
     pub(super) fn of_arguments(
         recording: Option<Plan>,
-        shared: Vec<String>,
-        axes: Vec<(&str, &Vec<String>)>,
+        holds_out: bool,
+        axes: Vec<(String, Vec<String>)>,
         train: &mut TrainOptions,
-    ) -> Result<Self, SpecificationError> {
-        let mut specification = Self {
-            path: PathBuf::from("the arguments"),
-            shared,
-            axes: Vec::new(),
-            recording: recording.map(|plan| plan.absolute()),
+    ) -> Result<Self, Failure> {
+        let value = |text: String| text.parse().map_or_else(|_| Value::from(&*text), Value::Number);
+        let axes = axes
+            .into_iter()
+            .map(|(option, values)| (option, values.into_iter().map(value).collect()));
+        let layout = Layout {
+            train: UniqueKeys::default(),
+            axes: UniqueKeys(axes.collect()),
+            recording,
         };
-        for (option, values) in axes {
-            let value = |text: &String| text.parse().map_or_else(|_| Value::from(&**text), Value::Number);
-            let values = values.iter().map(value);
-            let axis = specification.axis(option, &values.collect(), train)?;
-            specification.axes.push(axis);
-        }
-        specification.count()?;
-        Ok(specification)
+        Self::of(Path::new("the arguments"), layout, holds_out, train)
     }
 
-    fn axis(&self, option: &str, values: &Value, train: &mut TrainOptions) -> Result<Axis, SpecificationError> {
+    fn axis(&self, option: &str, values: &Value, train: &mut TrainOptions) -> Result<Axis, Failure> {
         let Some(values) = values.as_array().filter(|values| !values.is_empty()) else {
             let message = format!("{values} is not a list of values; write [VALUE, ...]");
-            return Err(self.error(format!("axes.{option}"), message));
+            return Err(self.error(&format!("axes.{option}"), message));
         };
         let values = values.iter().enumerate().map(|(index, value)| {
             let place = format!("axes.{option}, value {}", index + 1);
-            Ok(AxisValue {
+            Ok::<_, Failure>(AxisValue {
                 value: value.clone(),
                 words: self.words(option, value, &place, train)?,
             })
@@ -146,7 +157,7 @@ impl Specification {
         value: &Value,
         place: &str,
         train: &mut TrainOptions,
-    ) -> Result<Vec<String>, SpecificationError> {
+    ) -> Result<Vec<String>, Failure> {
         let value = if TrainOptions::is_path(option) {
             &located(value, folder(&self.path))
         } else {
@@ -159,16 +170,21 @@ impl Specification {
             }
             Ok(words)
         });
-        accepted.map_err(|message| self.error(place.to_owned(), message))
+        accepted.map_err(|message| self.error(place, message))
     }
 
     /// Number of trials.
-    pub(super) fn count(&self) -> Result<usize, SpecificationError> {
+    pub(super) fn count(&self) -> Result<usize, Failure> {
         let counts = self.axes.iter().map(|axis| axis.values.len());
         let count = counts.into_iter().try_fold(1, usize::checked_mul);
         count
             .filter(|count| *count <= MAX_TRIALS)
-            .ok_or_else(|| SpecificationError::TooMany(self.path.clone()))
+            .ok_or_else(|| {
+                let path = self.path.display();
+                Failure::Arguments(format!(
+                    "'{path}': its axes have more than {MAX_TRIALS} combinations; give fewer values, or several specifications"
+                ))
+            })
     }
 
     /// The varied options of the trial at `position`, each with its value.
@@ -205,12 +221,9 @@ impl Specification {
     }
 
     /// An error at `place` of the file.
-    pub(super) fn error(&self, place: String, message: String) -> SpecificationError {
-        SpecificationError::Option {
-            path: self.path.clone(),
-            place: in_one_line(&place),
-            message: in_one_line(&message),
-        }
+    pub(super) fn error(&self, place: &str, message: impl Display) -> Failure {
+        let (place, message) = (in_one_line(place), in_one_line(&message.to_string()));
+        Failure::Arguments(format!("'{}': {place}: {message}", self.path.display()))
     }
 }
 
@@ -279,15 +292,7 @@ impl<'de> Visitor<'de> for Entries {
 }
 
 /// Options of `train` that name its files and its output; a sweep has its own.
-const OF_ONE_RUN: [&str; 7] = [
-    "checkpoint",
-    "resume",
-    "checkpoint-interval",
-    "out",
-    "json",
-    "save-recipe",
-    "folds",
-];
+const OF_ONE_RUN: [&str; 6] = ["checkpoint", "resume", "checkpoint-interval", "out", "json", "folds"];
 
 /// Options whose values are paths.
 const PATHS: [&str; 6] = ["data", "join", "positions", "recipe", "test-data", "test-join"];
@@ -299,10 +304,10 @@ pub(super) struct TrialArguments {
 }
 
 impl TrialArguments {
-    /// Setup of the trial, on samples of `recording` if it is given; paths are absolute.
-    pub(super) fn setup(&self, recording: Option<&Plan>) -> Result<Setup, Failure> {
+    /// Setup of a trial of `specification`; paths are absolute.
+    pub(super) fn setup(&self, specification: &Specification) -> Result<Setup, Failure> {
         let columns = self.training.scene.columns();
-        let source = match recording {
+        let source = match &specification.recording {
             Some(_) if self.import.is_given() || !columns.is_empty() => {
                 let message = "the specification has a recording; leave --data, --recipe and --inputs out";
                 return Err(Failure::Arguments(message.to_owned()));
@@ -310,8 +315,7 @@ impl TrialArguments {
             Some(recording) => Some(RecipeSource::Recording(self.import.divided(recording.clone())?)),
             None => self.import.source(&columns)?,
         };
-        let holds_out =
-            self.import.holds_out() || recording.is_some_and(|plan| plan.division.validation_fraction > 0.0);
+        let holds_out = self.import.holds_out() || specification.holds_out;
         let source = source.map(|source| match source {
             RecipeSource::Recording(plan) => RecipeSource::Recording(plan.absolute()),
             simulated @ RecipeSource::Simulated(_) => simulated,
@@ -336,7 +340,8 @@ pub(super) struct TrainOptions(Command);
 impl TrainOptions {
     pub(super) fn new() -> Self {
         let command = Command::new("train").disable_help_flag(true);
-        Self(ImportArguments::augment_args(TrainingArguments::augment_args(command)))
+        let command = ImportArguments::augment_args(TrainingArguments::augment_args(command));
+        Self(RecipeArguments::augment_args(command))
     }
 
     /// Converts an option and its value from a specification to command-line arguments. Each is one word, so that no
@@ -345,21 +350,30 @@ impl TrainOptions {
     /// # Errors
     /// If the option is unknown, or the value is not a number, a text or a list of them.
     pub(super) fn words(&self, option: &str, value: &Value) -> Result<Vec<String>, String> {
-        let mut arguments = self.0.get_arguments();
         if OF_ONE_RUN.contains(&option) {
             return Err("a sweep manages its results and checkpoints itself; leave this option out".to_owned());
         }
-        let Some(argument) = arguments.find(|argument| argument.get_long() == Some(option)) else {
+        // A setting that is rarely changed has no option of its own.
+        let rare = RUN_OPTIONS
+            .iter()
+            .any(|row| row.is_rare() && row.setting.word("-") == option);
+        let (long, prefix) = if rare {
+            ("set", format!("{option}="))
+        } else {
+            (option, String::new())
+        };
+        let mut arguments = self.0.get_arguments();
+        let Some(argument) = arguments.find(|argument| argument.get_long() == Some(long)) else {
             return Err(self.unknown());
         };
-        let is_repeated = matches!(argument.get_action(), ArgAction::Append);
+        let is_repeated = !rare && matches!(argument.get_action(), ArgAction::Append);
         let word = |value: &Value| {
             let text = match value {
                 Value::String(text) => text.clone(),
                 Value::Number(number) => number.to_string(),
                 _ => return Err(format!("{value} is neither a number nor a text in quotes")),
             };
-            Ok(format!("--{option}={text}"))
+            Ok(format!("--{long}={prefix}{text}"))
         };
         match value {
             Value::Array(values) if is_repeated && !values.is_empty() => values.iter().map(word).collect(),
@@ -372,21 +386,23 @@ impl TrainOptions {
     }
 
     fn unknown(&self) -> String {
-        let names: Vec<_> = self
-            .0
-            .get_arguments()
-            .filter_map(|argument| argument.get_long())
-            .filter(|name| !OF_ONE_RUN.contains(name))
-            .collect();
-        format!("train has no such option; it has {}", names.join(", "))
+        let options = self.0.get_arguments().filter_map(Arg::get_long).map(str::to_owned);
+        let rare = RUN_OPTIONS
+            .iter()
+            .filter(|row| row.is_rare())
+            .map(|row| row.setting.word("-"));
+        let names = options.chain(rare).filter(|name| !OF_ONE_RUN.contains(&&**name));
+        format!("train has no such option; it has {}", Vec::from_iter(names).join(", "))
     }
 
     /// Returns `true` if the option does not depend on others.
     pub(super) fn is_independent(&self, option: &str) -> bool {
-        let of_import = ImportArguments::augment_args(Command::new("import"));
+        let of_import = RecipeArguments::augment_args(ImportArguments::augment_args(Command::new("import")));
         let is_division = ["split", "test-fraction", "validation-fraction"].contains(&option);
-        let mut names = of_import.get_arguments().filter_map(|argument| argument.get_long());
-        is_division || !names.any(|name| name == option)
+        is_division
+            || !of_import
+                .get_arguments()
+                .any(|argument| argument.get_long() == Some(option))
     }
 
     /// Returns `true` if the values of the option are paths.
@@ -404,12 +420,13 @@ impl TrainOptions {
             .0
             .try_get_matches_from_mut(line)
             .map_err(|error| one_line(&error))?;
-        let training = TrainingArguments::from_arg_matches_mut(&mut matches);
-        let import = ImportArguments::from_arg_matches_mut(&mut matches);
-        Ok(TrialArguments {
-            training: training.map_err(|error| one_line(&error))?,
-            import: import.map_err(|error| one_line(&error))?,
-        })
+        let mut parsed = || {
+            let mut import = ImportArguments::from_arg_matches_mut(&mut matches)?;
+            import.rest = RecipeArguments::from_arg_matches_mut(&mut matches)?;
+            let training = TrainingArguments::from_arg_matches_mut(&mut matches)?;
+            Ok(TrialArguments { training, import })
+        };
+        parsed().map_err(|error: clap::Error| one_line(&error))
     }
 }
 
@@ -486,8 +503,8 @@ mod tests {
             train_options(&arguments.settings(None).unwrap(), &arguments.scene.decoders())
         };
         for (option, value, with) in cases {
-            let words: Vec<_> = [format!("--{option}={value}"), with.to_owned()].into();
-            let words: Vec<_> = words.into_iter().filter(|word| !word.is_empty()).collect();
+            let mut words = train.words(option, &value.into()).unwrap();
+            words.extend((!with.is_empty()).then(|| with.to_owned()));
             let arguments = train.parse(&words).unwrap().training;
             let (settings, decoders) = (
                 arguments.settings(None).unwrap(),
@@ -500,13 +517,11 @@ mod tests {
             assert_eq!(decoders_in_order(&back.scene.decoders()), decoders, "{option}");
         }
         let training = TrainingArguments::augment_args(Command::new("train"));
-        let offered: Vec<_> = training
-            .get_arguments()
-            .filter_map(|argument| argument.get_long())
-            .collect();
+        let options = training.get_arguments().filter_map(Arg::get_long).map(str::to_owned);
+        let offered = options.chain(RUN_OPTIONS.iter().map(|row| row.setting.word("-")));
         let tested = cases.map(|(option, ..)| option);
-        for option in &offered {
-            assert!(tested.contains(option), "{option}");
+        for option in offered {
+            assert!(tested.contains(&&*option), "{option}");
         }
     }
 }

@@ -1,5 +1,6 @@
 use std::{
     collections::HashMap,
+    fmt::Display,
     ops::ControlFlow,
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
@@ -14,7 +15,7 @@ use decoupler_core::{
 use decoupler_files::{
     export::{
         CheckpointFile, Checkpointing, NetworkFile, Trial, TrialId, TrialOptions, decoders_in_order, recording_options,
-        train_options,
+        report::RunReport, train_options,
     },
     import::{ImportError, Plan, Setup, SetupSets, file_crc32},
     machine::memory_budget,
@@ -26,11 +27,7 @@ use super::{
     specification::{Specification, TrainOptions},
 };
 use crate::terminal::{
-    failure::{Failure, SpecificationError},
-    interruption::save_if_due,
-    samples::sets,
-    train::measure_decoders,
-    train_report::Trained,
+    failure::Failure, interruption::save_if_due, samples::sets, train::measure_decoders, train_report::Trained,
 };
 
 /// All trials of a specification, without duplicates, each accepted by `train`.
@@ -54,14 +51,14 @@ pub(super) struct PlannedTrial {
 
 impl Trials {
     /// Reads the specification at `path`.
-    pub(super) fn read(path: &Path) -> Result<Self, SpecificationError> {
+    pub(super) fn read(path: &Path) -> Result<Self, Failure> {
         let mut train = TrainOptions::new();
         let specification = Specification::read(path, &mut train)?;
         Self::of(specification, &mut train)
     }
 
     /// Plans the trials of `specification`.
-    pub fn of(specification: Specification, train: &mut TrainOptions) -> Result<Self, SpecificationError> {
+    pub fn of(specification: Specification, train: &mut TrainOptions) -> Result<Self, Failure> {
         let mut trials = Self {
             specification,
             ids: Vec::new(),
@@ -70,7 +67,7 @@ impl Trials {
         let mut positions = HashMap::new();
         for position in 0..trials.specification.count()? {
             let trial = trials.parsed(position, train);
-            let trial = trial.map_err(|failure| trials.error(position, failure.to_string()))?;
+            let trial = trial.map_err(|failure| trials.error(position, failure))?;
             if let Some(first) = positions.insert(trial.id, position) {
                 let first = trials.describe(first);
                 let message = format!("the same options as {first}; leave one of the values out");
@@ -84,7 +81,7 @@ impl Trials {
     fn parsed(&self, position: usize, train: &mut TrainOptions) -> Result<PlannedTrial, Failure> {
         let words = self.specification.words_at(position);
         let arguments = train.parse(words).map_err(Failure::Arguments)?;
-        let setup = arguments.setup(self.specification.recording.as_ref())?;
+        let setup = arguments.setup(&self.specification)?;
         if setup.plan().is_none() {
             // The array has the rows of the scene.
             TrainingSize::drawn(setup.settings())?;
@@ -122,9 +119,9 @@ impl Trials {
     }
 
     /// The trial at `position`.
-    pub(super) fn get(&self, position: usize, train: &mut TrainOptions) -> Result<PlannedTrial, SpecificationError> {
+    pub(super) fn get(&self, position: usize, train: &mut TrainOptions) -> Result<PlannedTrial, Failure> {
         let trial = self.parsed(position, train);
-        trial.map_err(|failure| self.error(position, failure.to_string()))
+        trial.map_err(|failure| self.error(position, failure))
     }
 
     pub(super) fn count(&self) -> usize {
@@ -140,8 +137,8 @@ impl Trials {
         format!("trial {} ({})", position + 1, self.specification.describe(position))
     }
 
-    fn error(&self, position: usize, message: String) -> SpecificationError {
-        self.specification.error(self.describe(position), message)
+    fn error(&self, position: usize, message: impl Display) -> Failure {
+        self.specification.error(&self.describe(position), message)
     }
 }
 
@@ -166,7 +163,7 @@ pub(super) fn train(
     let (mut run, sets, before) = match resumed(trial, claim) {
         Some(resumed) => resumed,
         None => {
-            let sets = sets(&trial.setup, true)?;
+            let sets = sets(&trial.setup)?;
             let run = sets.run(&trial.setup, None, &Job::UNINTERRUPTED)?;
             (run, sets, Duration::ZERO)
         }
@@ -194,12 +191,18 @@ pub(super) fn train(
     measure_decoders(&trial.decoders, &file, &sets, &mut decoders)?;
     let trained = Trained {
         run: &run,
-        file: &file,
         sets: &sets,
-        decoders: &decoders,
+        report: RunReport {
+            name: None,
+            file: &file,
+            defect: None,
+            decoders: &decoders,
+            test: run.test(),
+        },
         optimism: &[],
     };
-    let mut report = serde_json::to_value(trained.report()?).expect("a report has only text keys");
+    let mut report = trained.object()?;
+    report["warnings"] = trained.warnings().into();
     if sets.recorded().is_some() {
         make_comparable(&mut report);
     }

@@ -61,6 +61,8 @@ pub struct DecouplerWindow {
     pub(super) memory: Option<Memory>,
     pub(super) wake: Wake,
     pub(super) ctx: Context,
+    /// Files that the window was opened with.
+    pub(super) given: Vec<PathBuf>,
 }
 
 impl DecouplerWindow {
@@ -110,6 +112,7 @@ impl DecouplerWindow {
             remembered,
             wake,
             ctx: ctx.clone(),
+            given: Vec::new(),
         };
         if let Some(damage) = damage {
             window.notices.fail(Matter::Memory, damage);

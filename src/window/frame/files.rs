@@ -212,11 +212,11 @@ const PACKAGES: &str = "on a bare Debian, install libxcursor1 libxi6 libxkbcommo
 /// Time between two checkpoints of a running training.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(10);
 
-/// Opens the window and returns when it is closed.
+/// Opens the window with these files, as if they were dropped on it, and returns when it is closed.
 ///
 /// # Errors
 /// If there is no display, or no OpenGL on it.
-pub fn open() -> Result<(), OpenError> {
+pub fn open(files: Vec<PathBuf>) -> Result<(), OpenError> {
     let displays = ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"];
     if cfg!(target_os = "linux") && displays.iter().all(|name| std::env::var_os(name).is_none()) {
         return Err(OpenError::NoDisplay);
@@ -246,7 +246,8 @@ pub fn open() -> Result<(), OpenError> {
         ..NativeOptions::default()
     };
     let create = |creation: &eframe::CreationContext<'_>| {
-        let window = DecouplerWindow::new(&creation.egui_ctx, Desktop::Native, file);
+        let mut window = DecouplerWindow::new(&creation.egui_ctx, Desktop::Native, file);
+        window.given = files;
         let window = match &folders {
             Some(folders) => window
                 .keeping_runs(folders.data_dir().join("runs"))
@@ -332,9 +333,13 @@ impl DecouplerWindow {
     /// Gives files dropped on the window to the view that takes them, and shows it.
     pub(super) fn take_dropped(&mut self, ctx: &Context, effects: &mut Vec<Effect>) {
         let dropped = ctx.input_mut(|input| std::mem::take(&mut input.raw.dropped_files));
-        let paths: Vec<PathBuf> = dropped.iter().map(|file| file.path().to_owned()).collect();
+        let mut paths: Vec<PathBuf> = dropped.iter().map(|file| file.path().to_owned()).collect();
         // A question must be answered first.
-        if paths.is_empty() || self.is_asked() {
+        if self.is_asked() {
+            return;
+        }
+        paths.append(&mut self.given);
+        if paths.is_empty() {
             return;
         }
         let place = self

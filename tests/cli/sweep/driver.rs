@@ -14,7 +14,10 @@ use tempfile::TempDir;
 
 pub(crate) fn command(arguments: &str, folder: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
-    command.args(arguments.split_whitespace()).current_dir(folder);
+    command
+        .args(arguments.split_whitespace())
+        .arg("--force")
+        .current_dir(folder);
     command
 }
 
@@ -26,7 +29,8 @@ pub(crate) fn success(arguments: &str, folder: &Path) -> String {
     let output = run(arguments, folder);
     let errors = String::from_utf8_lossy(&output.stderr);
     // The recordings here are short.
-    let is_note = |line: &str| line.starts_with("Drift of the readings is not monitored");
+    let is_note =
+        |line: &str| line.starts_with("Drift of the readings is not monitored") || line.starts_with("warning: ");
     assert!(
         output.status.success() && errors.lines().all(is_note),
         "{arguments}: {errors}"

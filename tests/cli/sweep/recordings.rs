@@ -105,7 +105,7 @@ fn arguments_a_recipe_and_a_recording_in_the_specification_are_the_same_trials()
     assert_eq!(trials(&of_arguments).len(), 8);
     assert_eq!(shared(&of_arguments, &whole), 4, "seed 0 is shared, seed 1 is not");
     success(
-        &format!("train {data} --epochs 1 --save-recipe press.recipe --json"),
+        &format!("train {data} --epochs 1 --recipe-out press.recipe --json"),
         folder,
     );
     let axes = json!({"hidden": [2, 4], "method": ["lm"], "seed": [0, 7]});

@@ -22,7 +22,7 @@ fn an_invalid_specification_is_refused_with_option_place_and_remedy() {
         (
             r#"{"axes": {"hiden": [1]}}"#,
             2,
-            "axes.hiden, value 1: train has no such option; it has preset, array, rows",
+            "axes.hiden, value 1: train has no such option; it has preset, array",
         ),
         (
             r#"{"axes": {}, "train": {"out": "a"}}"#,

@@ -117,21 +117,28 @@ impl CalibrationError {
 ///
 /// Only differences of coordinates matter, so the x of the first row-wire is the origin and stays, and the y of the first
 /// column-wire cancels: rows are centred over the column-wires.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::Display)]
 pub enum SensorParameter {
     /// Distance of the undeformed row-wires above the column-wires.
+    #[strum(to_string = "height")]
     Height,
     /// Distance between row-wires.
+    #[strum(to_string = "row pitch")]
     RowPitch,
     /// Distance between the nodes on a row-wire.
+    #[strum(to_string = "node pitch")]
     NodePitch,
     /// Distance between column-wires.
+    #[strum(to_string = "column pitch")]
     ColumnPitch,
     /// x of the first node on each column-wire.
+    #[strum(to_string = "x of the first column node")]
     ColumnNodeX,
     /// Distance between the nodes on a column-wire.
+    #[strum(to_string = "column node pitch")]
     ColumnNodePitch,
     /// Resistance per millimetre of rubber, g.
+    #[strum(to_string = "resistance per millimetre")]
     Resistivity,
 }
 
@@ -185,20 +192,6 @@ impl SensorParameter {
             Self::ColumnNodePitch => &mut geometry.column_node_pitch_mm,
             Self::Resistivity => &mut model.resistivity_ohm_per_mm,
         }
-    }
-}
-
-impl fmt::Display for SensorParameter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Height => "height",
-            Self::RowPitch => "row pitch",
-            Self::NodePitch => "node pitch",
-            Self::ColumnPitch => "column pitch",
-            Self::ColumnNodeX => "x of the first column node",
-            Self::ColumnNodePitch => "column node pitch",
-            Self::Resistivity => "resistance per millimetre",
-        })
     }
 }
 

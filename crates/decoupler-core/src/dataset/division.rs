@@ -1,5 +1,3 @@
-use std::fmt;
-
 use rand::{Rng, seq::SliceRandom};
 use serde::{Deserialize, Serialize};
 
@@ -167,7 +165,10 @@ pub struct Split {
 ///
 /// Neighbouring frames of a recording are nearly the same, so a test sample whose neighbours are in the training set
 /// gives an optimistic error (Roberts et al. 2017, doi:10.1111/ecog.02881: blocks in time or by group).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
+)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum SplitBy {
     /// Blocks in the order of the samples, the last one for the test (the first, if only the last has changes of the
@@ -186,20 +187,6 @@ pub enum SplitBy {
 impl Named for SplitBy {
     const WHAT: &'static str = "a split";
     const ALL: &'static [Self] = &SplitBy::ALL;
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Time => "time",
-            Self::Group => "group",
-            Self::Random => "random",
-        }
-    }
-}
-
-impl fmt::Display for SplitBy {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
 }
 
 impl SplitBy {

@@ -1,26 +1,49 @@
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
+use strum::EnumMessage;
 
 use crate::text::Named;
 
 /// Method of decoding the readings of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::Display, strum::EnumMessage, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum DecoderKind {
     /// Mean of the training set, independent of the readings.
+    #[strum(message = "Training mean")]
+    #[strum(detailed_message = "Always answers the mean of the training set")]
     Mean,
     /// Affine map fitted by ridge regression.
+    #[strum(message = "Ridge")]
+    #[strum(
+        detailed_message = "The best affine map of the chosen inputs: ridge regression, with the penalty of each target chosen by cross-validation"
+    )]
     Ridge,
     /// Network trained on the samples.
+    #[strum(message = "Network")]
+    #[strum(detailed_message = "The trained network, in 64 or in 32 bits")]
     Network,
     /// Radial-basis network: Gaussians around centres.
+    #[strum(serialize = "rbf")]
+    #[strum(message = "Radial basis")]
+    #[strum(
+        detailed_message = "A radial-basis network by kernel ridge regression: Gaussians around all training samples, or around 1000 of more than 4000, their width and penalties chosen by cross-validation"
+    )]
     RadialBasis,
     /// Fuzzy rules with affine consequents: a Takagi-Sugeno system.
+    #[strum(message = "Fuzzy rules")]
+    #[strum(
+        detailed_message = "A Takagi-Sugeno system: fuzzy rules with affine consequents, their number chosen by cross-validation"
+    )]
     Fuzzy,
     /// Gauss-Newton method on Eq. (2), with noise and prior if the scene has noise or the equations do not determine
     /// the answer.
+    #[strum(message = "Newton")]
+    #[strum(
+        detailed_message = "Newton's method on Eq. (2) from mid-stroke, with restarts if that fails; with noise and prior if the scene has noise or the readings do not determine the answer"
+    )]
     Newton,
     /// Network followed by at most [`DecoderKind::POLISH_STEPS`] Gauss-Newton steps.
+    #[strum(message = "Network + Newton")]
+    #[strum(detailed_message = "The network's answer, improved by at most three Newton steps")]
     Polish,
 }
 
@@ -32,15 +55,6 @@ pub enum Precision {
     Double,
     /// 32 bits.
     Single,
-}
-
-/// Properties of a decoder.
-struct Entry {
-    /// Name in the terminal and in files.
-    name: &'static str,
-    /// Name in tables, charts and forms.
-    title: &'static str,
-    meaning: &'static str,
 }
 
 impl DecoderKind {
@@ -58,57 +72,17 @@ impl DecoderKind {
     /// Largest number of steps of [`DecoderKind::Polish`].
     pub const POLISH_STEPS: usize = 3;
 
-    const fn entry(self) -> Entry {
-        match self {
-            Self::Mean => Entry {
-                name: "mean",
-                title: "Training mean",
-                meaning: "Always answers the mean of the training set",
-            },
-            Self::Ridge => Entry {
-                name: "ridge",
-                title: "Ridge",
-                meaning: "The best affine map of the chosen inputs: ridge regression, with the penalty of each target chosen by cross-validation",
-            },
-            Self::Network => Entry {
-                name: "network",
-                title: "Network",
-                meaning: "The trained network, in 64 or in 32 bits",
-            },
-            Self::RadialBasis => Entry {
-                name: "rbf",
-                title: "Radial basis",
-                meaning: "A radial-basis network by kernel ridge regression: Gaussians around all training samples, or around 1000 of more than 4000, their width and penalties chosen by cross-validation",
-            },
-            Self::Fuzzy => Entry {
-                name: "fuzzy",
-                title: "Fuzzy rules",
-                meaning: "A Takagi-Sugeno system: fuzzy rules with affine consequents, their number chosen by cross-validation",
-            },
-            Self::Newton => Entry {
-                name: "newton",
-                title: "Newton",
-                meaning: "Newton's method on Eq. (2) from mid-stroke, with restarts if that fails; with noise and prior if the scene has noise or the readings do not determine the answer",
-            },
-            Self::Polish => Entry {
-                name: "polish",
-                title: "Network + Newton",
-                meaning: "The network's answer, improved by at most three Newton steps",
-            },
-        }
-    }
-
     /// Returns the name in tables, charts and forms; a network in single precision is named as such.
     pub fn name(self, precision: Precision) -> &'static str {
         match (self, precision) {
             (Self::Network, Precision::Single) => "Network f32",
-            _ => self.entry().title,
+            _ => self.get_message().unwrap_or_default(),
         }
     }
 
     /// Returns a sentence that describes the method of decoding.
     pub fn meaning(self) -> &'static str {
-        self.entry().meaning
+        self.get_detailed_message().unwrap_or_default()
     }
 
     /// Returns `true` if the decoder uses the trained network.
@@ -133,17 +107,6 @@ impl DecoderKind {
 impl Named for DecoderKind {
     const WHAT: &'static str = "a decoder";
     const ALL: &'static [Self] = &Self::ALL;
-
-    fn name(self) -> &'static str {
-        self.entry().name
-    }
-}
-
-impl fmt::Display for DecoderKind {
-    /// Writes the name used in the terminal and in files.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(Named::name(*self))
-    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::{MAX_STARTS, RunSettings, Source};
 use crate::{
     dataset::{LARGEST_SAMPLES, Simulation},
     network::LARGEST_HIDDEN,
-    scene::{Noise, RowModel, Rows},
+    scene::Noise,
     sensor::{ArrayScale, SensorError, SensorModel},
     settings::{Field, Kind, Method, STOPPING, Setting},
 };
@@ -14,12 +14,19 @@ use crate::{
 pub struct RunOption {
     /// Part of the settings to which it belongs.
     pub part: Part,
-    /// Form of the value, for help.
+    /// Form of the value, for help; empty for a setting that is [rarely](Self::is_rare) changed.
     pub form: &'static str,
     /// Default in words; empty where it follows from a preset.
     pub default: &'static str,
     /// The row: explanation, allowed values, access.
     pub setting: Setting<RunSettings>,
+}
+
+impl RunOption {
+    /// Returns `true` for a setting that is rarely changed, which has no option of its own: `--set` changes it.
+    pub fn is_rare(&self) -> bool {
+        self.form.is_empty()
+    }
 }
 
 /// Part of the settings of a run.
@@ -106,36 +113,28 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
     ),
     option(
         Part::Scene,
-        ("noise ohm", "OHM", "0"),
+        ("noise ohm", "", "0"),
         NOISE,
         "Noise of each reading (standard deviation) in ohm.",
         |run| Some(Field::Number(&mut noise(run)?.additive_ohm)),
     ),
     option(
         Part::Scene,
-        ("adc bits", "N", "no rounding"),
-        Kind::Text,
+        ("adc bits", "", "no rounding"),
+        Kind::Integer(1, Noise::MAX_BITS as u64),
         "Resolution of the analogue-to-digital converter, in bits.",
-        |run| {
-            let bits = &mut noise(run)?.converter_bits;
-            let text = bits.map_or(String::new(), |bits| bits.to_string());
-            Some(Field::text(text, bits, |text| {
-                let bits = text.parse().ok().filter(|bits| (1..=Noise::MAX_BITS).contains(bits));
-                bits.map(Some)
-                    .ok_or(format!("give a whole number from 1 to {}", Noise::MAX_BITS))
-            }))
-        },
+        |run| Some(Field::Optional(&mut noise(run)?.converter_bits)),
     ),
     option(
         Part::Scene,
-        ("drift", "REL", "0"),
+        ("drift", "", "0"),
         NOISE,
         "Gain error shared by all readings of a snapshot, e.g. from temperature (standard deviation, relative).",
         |run| Some(Field::Number(&mut noise(run)?.drift)),
     ),
     option(
         Part::Scene,
-        ("noise in", "both|training|test", "both"),
+        ("noise in", "", "both"),
         Kind::Choice,
         "Samples to which noise is added.",
         |run| Some(Field::named(&mut noise(run)?.sets)),
@@ -149,14 +148,14 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
     ),
     option(
         Part::Array,
-        ("test samples", "N", "100"),
+        ("test samples", "", "100"),
         SAMPLES,
         "Test samples, on which the printed errors are measured.",
         |run| Some(Field::Count(&mut run.simulation_mut()?.test_samples)),
     ),
     option(
         Part::Array,
-        ("validation samples", "N", "200"),
+        ("validation samples", "", "200"),
         Kind::Integer(0, LARGEST_SAMPLES as u64),
         "Validation samples, which select the best weights and end the training; 0 for none.",
         |run| Some(Field::Count(&mut run.simulation_mut()?.validation_samples)),
@@ -173,7 +172,7 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
     ),
     option(
         Part::Network,
-        ("combine", "best|mean", "best"),
+        ("combine", "", "best"),
         Kind::Choice,
         "How several starts become one network: best keeps the one with the lowest validation error, mean averages their \
          answers.",
@@ -181,7 +180,7 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
     ),
     option(
         Part::Network,
-        ("begin", "random|ridge", "random"),
+        ("begin", "", "random"),
         Kind::Choice,
         "Weights with which a training begins: random, or ridge regression with random weights added.",
         |run| Some(Field::named(&mut run.initialization)),
@@ -217,29 +216,19 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
         STOPPING[0].help,
         |run| (STOPPING[0].field)(&mut run.training.stopping),
     ),
-    option(
-        Part::Training,
-        ("goal", "MSE", "0"),
-        STOPPING[1].kind,
-        STOPPING[1].help,
-        |run| (STOPPING[1].field)(&mut run.training.stopping),
-    ),
-    option(
-        Part::Training,
-        ("min gradient", "LENGTH", "1e-7"),
-        STOPPING[2].kind,
-        STOPPING[2].help,
-        |run| (STOPPING[2].field)(&mut run.training.stopping),
-    ),
-    option(
-        Part::Training,
+    stopping(1, ("goal", "", "0"), |run| {
+        (STOPPING[1].field)(&mut run.training.stopping)
+    }),
+    stopping(2, ("min gradient", "", "1e-7"), |run| {
+        (STOPPING[2].field)(&mut run.training.stopping)
+    }),
+    stopping(
+        3,
         (
             "max fail",
-            "N",
+            "",
             "6; 100 for a recording with a method that follows gradients",
         ),
-        STOPPING[3].kind,
-        STOPPING[3].help,
         |run| (STOPPING[3].field)(&mut run.training.stopping),
     ),
     option(
@@ -266,27 +255,23 @@ const fn option(
     }
 }
 
+/// A rule that ends a training.
+const fn stopping(
+    rule: usize,
+    texts: (&'static str, &'static str, &'static str),
+    field: fn(&mut RunSettings) -> Option<Field<'_>>,
+) -> RunOption {
+    option(Part::Training, texts, STOPPING[rule].kind, STOPPING[rule].help, field)
+}
+
 fn noise(run: &mut RunSettings) -> Option<&mut Noise> {
     Some(&mut run.simulation_mut()?.scene.noise)
 }
 
 /// Rows that are read; of a recording, one network for all or one for each.
 fn rows(run: &mut RunSettings) -> Option<Field<'_>> {
-    match &mut run.source {
-        Source::Simulated(Simulation { scene, .. }) => {
-            Some(Field::text(scene.rows.to_string(), &mut scene.rows, str::parse))
-        }
-        Source::Measured { rows } => {
-            let text = match rows {
-                RowModel::Shared => Rows::All,
-                RowModel::Each => Rows::Known,
-            };
-            Some(Field::text(text.to_string(), rows, |text| match text.parse() {
-                Ok(Rows::All) => Ok(RowModel::Shared),
-                Ok(Rows::Known) => Ok(RowModel::Each),
-                Ok(Rows::One(_)) => Err("choose one row of a recording with --where, for example \"row=3\"".to_owned()),
-                Err(error) => Err(error.to_string()),
-            }))
-        }
-    }
+    Some(match &mut run.source {
+        Source::Simulated(Simulation { scene, .. }) => Field::text(scene.rows.to_string(), &mut scene.rows, str::parse),
+        Source::Measured { rows } => Field::named(rows),
+    })
 }

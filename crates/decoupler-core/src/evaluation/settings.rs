@@ -1,5 +1,3 @@
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
 
 use super::{PublishedErrors, RunError};
@@ -24,15 +22,20 @@ pub struct RunSettings {
     /// Number of starts: trainings from different random initialisations.
     pub starts: usize,
     /// How several starts become one network.
-    #[serde(default, skip_serializing_if = "Combination::is_best")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub combine: Combination,
     /// Weights with which a training begins.
-    #[serde(default, skip_serializing_if = "Initialization::is_random")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub initialization: Initialization,
     /// Training method, its settings, and the stopping rules.
     pub training: TrainingSettings,
     /// Seed from which all randomness follows.
     pub seed: Seed,
+}
+
+/// Returns `true` for the default, which files leave out.
+pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// Source of the samples of a run.
@@ -69,7 +72,10 @@ impl Source {
 }
 
 /// How several starts become the network that a run answers with.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
+)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum Combination {
     /// The network of the start with the lowest validation error, or training error if nothing is held out.
@@ -81,32 +87,16 @@ pub enum Combination {
     Mean,
 }
 
-impl Combination {
-    fn is_best(&self) -> bool {
-        *self == Self::Best
-    }
-}
-
 impl Named for Combination {
     const WHAT: &'static str = "a combination of starts";
     const ALL: &'static [Self] = &[Self::Best, Self::Mean];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Best => "best",
-            Self::Mean => "mean",
-        }
-    }
-}
-
-impl fmt::Display for Combination {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
 }
 
 /// Weights with which a training begins.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
+)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum Initialization {
     /// Random weights ([Nguyen and Widrow](crate::network::nguyen_widrow)).
@@ -117,28 +107,9 @@ pub enum Initialization {
     Ridge,
 }
 
-impl Initialization {
-    pub(super) fn is_random(&self) -> bool {
-        *self == Self::Random
-    }
-}
-
 impl Named for Initialization {
     const WHAT: &'static str = "an initialisation";
     const ALL: &'static [Self] = &[Self::Random, Self::Ridge];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Random => "random",
-            Self::Ridge => "ridge",
-        }
-    }
-}
-
-impl fmt::Display for Initialization {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
 }
 
 /// Maximum number of starts in a run: enough for the distribution of its results, and limited for memory.
@@ -283,7 +254,8 @@ impl RunSettings {
 }
 
 /// Preset settings of a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::Display, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum Preset {
     /// As in the paper: one network for all rows, resistances scaled to [−1, 1].
     #[default]
@@ -333,19 +305,6 @@ impl Preset {
 impl Named for Preset {
     const WHAT: &'static str = "a preset";
     const ALL: &'static [Self] = &Self::ALL;
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Paper => "paper",
-            Self::Best => "best",
-        }
-    }
-}
-
-impl fmt::Display for Preset {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 use std::{hint::black_box, time::Instant};
 
+use strum::EnumMessage;
+
 use super::{Coverage, Errors, PublishedErrors, Scores, TargetErrors, TestErrors, recorded::HysteresisLoop};
 use crate::{
     dataset::Dataset,
@@ -31,33 +33,50 @@ pub struct ErrorRow {
 }
 
 /// A measure of error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumMessage)]
 pub enum ErrorMeasure {
     /// AveZerr, in percent.
+    #[strum(message = "Mean |decoupled z − z| / |z| over samples and nodes, in percent of the coordinate (AveZerr)")]
     ZPercent,
     /// AveXerr, in percent.
+    #[strum(message = "Mean |decoupled x − x| / |x| over samples and nodes, in percent of the coordinate (AveXerr)")]
     XPercent,
     /// AveYerr, in percent.
+    #[strum(message = "Mean |decoupled y − y| / |y| over samples and nodes, in percent of the coordinate (AveYerr)")]
     YPercent,
     /// Mean |decoupled z − z|, in millimetres.
+    #[strum(message = "Mean |decoupled z − z|, in millimetres")]
     ZMm,
     /// Mean |decoupled z − z|, in percent of the stroke.
+    #[strum(message = "Mean |decoupled z − z|, in percent of the distance a node can travel")]
     ZStrokePercent,
     /// Largest |decoupled z − z|, in millimetres.
+    #[strum(message = "Largest |decoupled z − z| of any node, in millimetres")]
     WorstMm,
     /// Root mean squared error, in the unit of the target.
+    #[strum(message = "Root mean squared error, in the unit of the target")]
     Rmse,
     /// Mean absolute error, in the unit of the target.
+    #[strum(message = "Mean absolute error, in the unit of the target")]
     Mae,
     /// Coefficient of determination R².
+    #[strum(
+        message = "Share of the target's variance that the answers explain: 1 is exact, 0 is no better than the mean"
+    )]
     R2,
     /// Largest absolute error, in the unit of the target.
+    #[strum(message = "Largest absolute error, in the unit of the target")]
     Worst,
     /// Mean absolute error in percent of the range of the target.
+    #[strum(message = "Mean absolute error in percent of the range of the target")]
     RangePercent,
     /// Share of the samples within their intervals, in percent.
+    #[strum(
+        message = "Share of the test samples whose target is within its 90 % interval, in percent: about 90 if they are like the training samples"
+    )]
     CoveragePercent,
     /// Mean half-width of the intervals, in the unit of the target.
+    #[strum(message = "Mean half-width of the 90 % intervals, in the unit of the target")]
     HalfWidth,
 }
 
@@ -122,32 +141,7 @@ impl ErrorMeasure {
 
     /// Returns the definition in a sentence.
     pub fn definition(self) -> &'static str {
-        match self {
-            Self::ZPercent => {
-                "Mean |decoupled z − z| / |z| over samples and nodes, in percent of the coordinate (AveZerr)"
-            }
-            Self::XPercent => {
-                "Mean |decoupled x − x| / |x| over samples and nodes, in percent of the coordinate (AveXerr)"
-            }
-            Self::YPercent => {
-                "Mean |decoupled y − y| / |y| over samples and nodes, in percent of the coordinate (AveYerr)"
-            }
-            Self::ZMm => "Mean |decoupled z − z|, in millimetres",
-            Self::ZStrokePercent => "Mean |decoupled z − z|, in percent of the distance a node can travel",
-            Self::WorstMm => "Largest |decoupled z − z| of any node, in millimetres",
-            Self::Rmse => "Root mean squared error, in the unit of the target",
-            Self::Mae => "Mean absolute error, in the unit of the target",
-            Self::R2 => {
-                "Share of the target's variance that the answers explain: 1 is exact, 0 is no better than the mean"
-            }
-            Self::Worst => "Largest absolute error, in the unit of the target",
-            Self::RangePercent => "Mean absolute error in percent of the range of the target",
-            Self::CoveragePercent => {
-                "Share of the test samples whose target is within its 90 % interval, in percent: about 90 if they are like the \
-                 training samples"
-            }
-            Self::HalfWidth => "Mean half-width of the 90 % intervals, in the unit of the target",
-        }
+        self.get_message().unwrap_or_default()
     }
 
     /// Returns this measure of the errors of a target; `None` for measures of nodes, and where it is undefined.

@@ -1,5 +1,3 @@
-use std::fmt;
-
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
@@ -35,13 +33,15 @@ impl InputChoice {
 }
 
 /// Choice of the scaling of the inputs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, strum::Display, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum ScalingChoice {
     /// Each channel scaled to [−1, 1], as in the paper.
     #[default]
     MinMax,
     /// Principal components scaled to unit variance, or to less where they are below the noise.
+    #[strum(serialize = "whiten")]
     Whitening,
 }
 
@@ -67,19 +67,6 @@ pub(crate) enum InputScaling {
 impl Named for ScalingChoice {
     const WHAT: &'static str = "a scaling";
     const ALL: &'static [Self] = &[Self::MinMax, Self::Whitening];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::MinMax => "minmax",
-            Self::Whitening => "whiten",
-        }
-    }
-}
-
-impl fmt::Display for ScalingChoice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
 }
 
 impl Inputs {

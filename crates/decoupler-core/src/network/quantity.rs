@@ -1,5 +1,3 @@
-use std::fmt;
-
 use ndarray::{Array2, ArrayView1, ArrayView2, CowArray, Ix2};
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +6,10 @@ use crate::{numerics::root_mean_square, text::Named};
 use super::NetworkError;
 
 /// Quantity computed from a resistance R as the input of a decoder.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
+)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
     /// R in ohm, as in the paper.
@@ -17,6 +18,7 @@ pub enum Quantity {
     /// 1/R in siemens. By Eq. (2) it is a plain sum over nodes, and so the most nearly linear in the deformation.
     Conductance,
     /// ln R, in which relative errors are additive.
+    #[strum(serialize = "log")]
     LogResistance,
     /// The reading itself, in any unit and with any sign, for measured data other than resistances.
     Raw,
@@ -117,21 +119,6 @@ impl Domain {
 impl Named for Quantity {
     const WHAT: &'static str = "an input";
     const ALL: &'static [Self] = &Quantity::ALL;
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Resistance => "resistance",
-            Self::Conductance => "conductance",
-            Self::LogResistance => "log",
-            Self::Raw => "raw",
-        }
-    }
-}
-
-impl fmt::Display for Quantity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
 }
 
 /// Rounding error of a reading in units in the last place, from computing the resistance and from the arithmetic that

@@ -10,8 +10,6 @@ pub(crate) use noise::standard_normal;
 pub use noise::{Noise, NoiseSource, NoisySets};
 pub use rows::{RowModel, Rows};
 
-use std::fmt;
-
 use glam::DVec3;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -174,7 +172,8 @@ impl Deformation {
 }
 
 /// Movement of the nodes, which determines the unknowns of each node.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, strum::Display, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Movement {
     /// Downwards only, as in the paper.
@@ -190,19 +189,6 @@ pub enum Movement {
 impl Named for Movement {
     const WHAT: &'static str = "a choice of axes";
     const ALL: &'static [Self] = &[Self::Z, Self::SIDEWAYS];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Z => "z",
-            Self::Xyz { .. } => "xyz",
-        }
-    }
-}
-
-impl fmt::Display for Movement {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
 }
 
 impl Movement {

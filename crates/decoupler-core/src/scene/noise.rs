@@ -31,7 +31,8 @@ pub struct Noise {
 }
 
 /// Data sets whose readings have noise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum NoisySets {
     /// Training and test samples: the network is trained for the noise.
@@ -46,14 +47,6 @@ pub enum NoisySets {
 impl Named for NoisySets {
     const WHAT: &'static str = "a choice of sets";
     const ALL: &'static [Self] = &[Self::Both, Self::Training, Self::Test];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Both => "both",
-            Self::Training => "training",
-            Self::Test => "test",
-        }
-    }
 }
 
 /// Largest additive noise for which the squares of readings remain finite.

@@ -3,6 +3,7 @@ use std::{fmt, str::FromStr};
 use serde::{Deserialize, Serialize};
 
 use super::SceneError;
+use crate::text::Named;
 
 /// Row-wires read, and the sharing of decoders among them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,13 +19,20 @@ pub enum Rows {
 }
 
 /// Sharing of decoders among row-wires.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, strum::IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
 pub enum RowModel {
     /// One decoder for all row-wires, which does not know the row it reads.
+    #[strum(serialize = "all")]
     Shared,
     /// One decoder per row-wire read: the electronics know which one they address.
+    #[strum(serialize = "known")]
     Each,
+}
+
+impl Named for RowModel {
+    const WHAT: &'static str = "possible for a recording, of which --where chooses a row, for example \"row=3\"";
+    const ALL: &'static [Self] = &[Self::Shared, Self::Each];
 }
 
 impl RowModel {

@@ -3,22 +3,46 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, EnumProperty};
 
 use super::{METHOD, Setting, SettingError};
 use crate::{sensor::short, text::UnknownName};
 
-/// A training method with its settings.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// A training method with its settings. Its texts: short name, full name and a sentence; the name of the value recorded as
+/// [`EpochRecord::parameter`](crate::training::EpochRecord::parameter); and advice, in the imperative, for a training that
+/// diverged or did not lower the error.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Serialize, Deserialize, strum::EnumMessage, strum::EnumProperty, strum::IntoStaticStr,
+)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Method {
     /// Damped Gauss-Newton steps (`trainlm`). The normal equations are factored or, where factoring costs more (for
     /// wide networks, depending on their shape and the number of samples), solved by conjugate gradients to a relative
     /// residual of 1e-8. After 500 iterations a residual of 1e-3 is accepted; with a larger one the step is rejected.
+    #[strum(serialize = "lm", message = "Levenberg-Marquardt", props(parameter = "mu"))]
+    #[strum(
+        detailed_message = "Damped Gauss-Newton steps: the fewest epochs, and here also the shortest training time."
+    )]
+    #[strum(props(remedy = "try another seed, more samples, or fewer hidden nodes"))]
     LevenbergMarquardt(Damping),
     /// Levenberg-Marquardt that keeps the weights as small as the data permit (`trainbr`). The normal equations are
     /// always factored, since the method needs the trace of their inverse.
+    #[strum(serialize = "br", message = "Bayesian regularisation", props(parameter = "mu"))]
+    #[strum(
+        detailed_message = "Levenberg-Marquardt with a penalty on the weights whose strength is estimated from the data: for few or noisy samples."
+    )]
+    #[strum(props(remedy = "try another seed, more samples, or Levenberg-Marquardt (lm)"))]
     BayesianRegularization(RegularizationSettings),
     /// Møller's scaled conjugate gradient (`trainscg`).
+    #[strum(
+        serialize = "scg",
+        message = "Scaled conjugate gradient",
+        props(parameter = "lambda")
+    )]
+    #[strum(
+        detailed_message = "Conjugate directions, step length from the curvature: little memory, for very large networks."
+    )]
+    #[strum(props(remedy = "try another seed, or Levenberg-Marquardt (lm)"))]
     ScaledConjugateGradient {
         /// Length of the finite difference from which the curvature is estimated.
         sigma: f64,
@@ -30,6 +54,13 @@ pub enum Method {
         decay: f64,
     },
     /// Resilient back-propagation (`trainrp`).
+    #[strum(
+        serialize = "rp",
+        message = "Resilient back-propagation",
+        props(parameter = "mean step length")
+    )]
+    #[strum(detailed_message = "Each weight has its own step length and uses only the sign of its slope.")]
+    #[strum(props(remedy = "lower the first and the largest step length, or try another seed"))]
     Resilient {
         /// Step length of every weight in the first epoch (delta0).
         first_length: f64,
@@ -41,6 +72,13 @@ pub enum Method {
         largest_length: f64,
     },
     /// Gradient descent with momentum and an adaptive learning rate (`traingdx`).
+    #[strum(
+        serialize = "gdx",
+        message = "Adaptive rate with momentum",
+        props(parameter = "learning rate")
+    )]
+    #[strum(detailed_message = "Gradient descent with momentum whose learning rate grows while the error falls.")]
+    #[strum(props(remedy = "lower the learning rate, run more epochs, or try another seed"))]
     AdaptiveDescent {
         /// Initial step length relative to the length of the gradient.
         learning_rate: f64,
@@ -54,6 +92,13 @@ pub enum Method {
         largest_error_increase: f64,
     },
     /// Gradient descent with momentum of steps (`traingdm`).
+    #[strum(
+        serialize = "gdms",
+        message = "Momentum of steps",
+        props(parameter = "learning rate")
+    )]
+    #[strum(detailed_message = "Gradient descent that mixes the previous step into each step, as traingdm does.")]
+    #[strum(props(remedy = "change the learning rate, run more epochs, or try another method"))]
     StepMomentum {
         /// Step length relative to the length of the gradient.
         learning_rate: f64,
@@ -61,6 +106,15 @@ pub enum Method {
         momentum: f64,
     },
     /// Gradient descent with momentum of gradients, Eq. (11).
+    #[strum(
+        serialize = "gdm",
+        message = "Momentum, Eq. (11)",
+        props(parameter = "learning rate")
+    )]
+    #[strum(
+        detailed_message = "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does."
+    )]
+    #[strum(props(remedy = "change the learning rate, run more epochs, or try another method"))]
     Momentum {
         /// Step length relative to the length of the gradient (alpha).
         learning_rate: f64,
@@ -68,6 +122,9 @@ pub enum Method {
         momentum: f64,
     },
     /// Conventional back-propagation, Eq. (5)-(10) (`traingd`).
+    #[strum(serialize = "gd", message = "Gradient descent", props(parameter = "learning rate"))]
+    #[strum(detailed_message = "Conventional back-propagation, Eq. (5)-(10): a step down the gradient each epoch.")]
+    #[strum(props(remedy = "change the learning rate, run more epochs, or try another method"))]
     GradientDescent {
         /// Step length relative to the length of the gradient.
         learning_rate: f64,
@@ -139,16 +196,6 @@ impl RegularizationSettings {
             ..Self::default()
         }
     }
-}
-
-/// Texts that describe a method.
-struct Description {
-    short_name: &'static str,
-    name: &'static str,
-    summary: &'static str,
-    parameter_name: &'static str,
-    /// Advice for a training that diverged or did not lower the error, in the imperative.
-    remedy: &'static str,
 }
 
 impl Default for Method {
@@ -235,86 +282,24 @@ impl Method {
         Self::named(self.short_name()).unwrap_or(*self)
     }
 
-    fn description(&self) -> Description {
-        match self {
-            Self::LevenbergMarquardt(_) => Description {
-                short_name: "lm",
-                name: "Levenberg-Marquardt",
-                summary: "Damped Gauss-Newton steps: the fewest epochs, and here also the shortest training time.",
-                parameter_name: "mu",
-                remedy: "try another seed, more samples, or fewer hidden nodes",
-            },
-            Self::BayesianRegularization(_) => Description {
-                short_name: "br",
-                name: "Bayesian regularisation",
-                summary: "Levenberg-Marquardt with a penalty on the weights whose strength is estimated from the data: for few or \
-                          noisy samples.",
-                parameter_name: "mu",
-                remedy: "try another seed, more samples, or Levenberg-Marquardt (lm)",
-            },
-            Self::ScaledConjugateGradient { .. } => Description {
-                short_name: "scg",
-                name: "Scaled conjugate gradient",
-                summary: "Conjugate directions, step length from the curvature: little memory, for very large networks.",
-                parameter_name: "lambda",
-                remedy: "try another seed, or Levenberg-Marquardt (lm)",
-            },
-            Self::Resilient { .. } => Description {
-                short_name: "rp",
-                name: "Resilient back-propagation",
-                summary: "Each weight has its own step length and uses only the sign of its slope.",
-                parameter_name: "mean step length",
-                remedy: "lower the first and the largest step length, or try another seed",
-            },
-            Self::AdaptiveDescent { .. } => Description {
-                short_name: "gdx",
-                name: "Adaptive rate with momentum",
-                summary: "Gradient descent with momentum whose learning rate grows while the error falls.",
-                parameter_name: "learning rate",
-                remedy: "lower the learning rate, run more epochs, or try another seed",
-            },
-            Self::StepMomentum { .. } => Description {
-                short_name: "gdms",
-                name: "Momentum of steps",
-                summary: "Gradient descent that mixes the previous step into each step, as traingdm does.",
-                parameter_name: "learning rate",
-                remedy: "change the learning rate, run more epochs, or try another method",
-            },
-            Self::Momentum { .. } => Description {
-                short_name: "gdm",
-                name: "Momentum, Eq. (11)",
-                summary: "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does.",
-                parameter_name: "learning rate",
-                remedy: "change the learning rate, run more epochs, or try another method",
-            },
-            Self::GradientDescent { .. } => Description {
-                short_name: "gd",
-                name: "Gradient descent",
-                summary: "Conventional back-propagation, Eq. (5)-(10): a step down the gradient each epoch.",
-                parameter_name: "learning rate",
-                remedy: "change the learning rate, run more epochs, or try another method",
-            },
-        }
-    }
-
     /// Short name for the terminal and tables.
     pub fn short_name(&self) -> &'static str {
-        self.description().short_name
+        self.into()
     }
 
     /// Full name.
     pub fn name(&self) -> &'static str {
-        self.description().name
+        self.get_message().unwrap_or_default()
     }
 
     /// Description of the method in one sentence.
     pub fn summary(&self) -> &'static str {
-        self.description().summary
+        self.get_detailed_message().unwrap_or_default()
     }
 
     /// Name of the value recorded as [`EpochRecord::parameter`](crate::training::EpochRecord::parameter).
     pub fn parameter_name(&self) -> &'static str {
-        self.description().parameter_name
+        self.get_str("parameter").unwrap_or_default()
     }
 
     /// Returns `true` for a method whose steps follow gradients: it needs many short epochs, and its validation error
@@ -341,12 +326,7 @@ impl Method {
             if let (Some(value), Some(limit)) = (number(name), number(limit_name))
                 && value > limit
             {
-                return Err(SettingError::AboveLimit {
-                    name,
-                    value,
-                    limit_name,
-                    limit,
-                });
+                return Err(SettingError::AboveLimit(name, value, limit_name, limit));
             }
         }
         Ok(())
@@ -361,7 +341,10 @@ impl Method {
             let name = setting.name;
             (value != default).then(|| format!("{name} to {} (now {})", short(default), short(value)))
         });
-        let (changes, remedy) = (Vec::from_iter(changes).join(", "), self.description().remedy);
+        let (changes, remedy) = (
+            Vec::from_iter(changes).join(", "),
+            self.get_str("remedy").unwrap_or_default(),
+        );
         if changes.is_empty() {
             return remedy.to_owned();
         }

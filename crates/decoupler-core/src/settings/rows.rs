@@ -46,6 +46,8 @@ pub enum Field<'a> {
     Count(&'a mut usize),
     /// Integer of 64 bits, such as a seed.
     Integer(&'a mut u64),
+    /// Integer that may be absent; it then has no value, which is its default.
+    Optional(&'a mut Option<u8>),
     /// Name or text, and how it is read; an error is a sentence that says what is possible instead.
     Text(String, ReadText<'a>),
 }
@@ -88,50 +90,21 @@ impl Display for Value {
     }
 }
 
-/// Error for an invalid setting.
+/// Error for an invalid setting, which each variant names first.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SettingError {
-    /// A setting is out of its range.
-    #[error("{name} is {}: it must be from {} to {}", short(*.value), short(*.range.start()), short(*.range.end()))]
-    Range {
-        /// Name of the setting.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Allowed values.
-        range: RangeInclusive<f64>,
-    },
-    /// An integer setting has a fraction.
-    #[error("{name} is {}: it must be a whole number", short(*.value))]
-    NotWhole {
-        /// Name of the setting.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// An initial value is above the largest that the method may reach.
-    #[error(
-        "{name} is {}, above {limit_name}, which is {}: lower {name}, or raise {limit_name}",
-        short(*.value), short(*.limit)
-    )]
-    AboveLimit {
-        /// Name of the setting.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Name of the setting that limits it.
-        limit_name: &'static str,
-        /// Value of the limit.
-        limit: f64,
-    },
-    /// A text is not a value of the setting.
-    #[error("{name}: {message}")]
-    Text {
-        /// Name of the setting.
-        name: &'static str,
-        /// What is wrong, and what is possible instead.
-        message: String,
-    },
+    /// A value is out of its range.
+    #[error("{} is {}: it must be from {} to {}", .0, short(*.1), short(*.2.start()), short(*.2.end()))]
+    Range(&'static str, f64, RangeInclusive<f64>),
+    /// The value of an integer has a fraction.
+    #[error("{} is {}: it must be a whole number", .0, short(*.1))]
+    NotWhole(&'static str, f64),
+    /// An initial value is above the largest that the method may reach, whose name and value follow.
+    #[error("{} is {}, above {}, which is {}: lower {}, or raise {}", .0, short(*.1), .2, short(*.3), .0, .2)]
+    AboveLimit(&'static str, f64, &'static str, f64),
+    /// A text is not a value of the setting; what is wrong, and what is possible instead.
+    #[error("{0}: {1}")]
+    Text(&'static str, String),
 }
 
 impl<S: Clone> Setting<S> {
@@ -146,6 +119,7 @@ impl<S: Clone> Setting<S> {
             Field::Number(value) => Value::Number(*value),
             Field::Count(value) => Value::Integer(*value as u64),
             Field::Integer(value) => Value::Integer(*value),
+            Field::Optional(value) => Value::Integer((*value)?.into()),
             Field::Text(text, _) => Value::Text(text),
         })
     }
@@ -172,6 +146,9 @@ impl<S: Clone> Setting<S> {
                 *field = usize::try_from(*value).unwrap_or(usize::MAX);
             }
             (Some(Field::Integer(field)), Value::Integer(value)) => *field = *value,
+            (Some(Field::Optional(field)), Value::Integer(value)) => {
+                *field = Some((*value).try_into().unwrap_or(u8::MAX));
+            }
             (Some(Field::Text(_, read)), Value::Text(text)) => {
                 read(text).map_err(|message| self.refusal(message))?;
             }
@@ -190,10 +167,10 @@ impl<S: Clone> Setting<S> {
         };
         let name = self.name;
         if !range.contains(&value) {
-            return Err(SettingError::Range { name, value, range });
+            return Err(SettingError::Range(name, value, range));
         }
         if matches!(self.kind, Kind::Integer(..)) && value.fract() != 0.0 {
-            return Err(SettingError::NotWhole { name, value });
+            return Err(SettingError::NotWhole(name, value));
         }
         Ok(())
     }
@@ -236,8 +213,7 @@ impl<S: Clone> Setting<S> {
     }
 
     fn refusal(&self, message: String) -> SettingError {
-        let name = self.name;
-        SettingError::Text { name, message }
+        SettingError::Text(self.name, message)
     }
 
     /// Returns the name with `between` in place of its spaces, as an option or a keyword.

@@ -11,14 +11,16 @@ pub(crate) use format::{cleaned, cleaned_if_any, escaped_if_any};
 use thiserror::Error;
 
 /// An enum whose variants have names, as typed by users and written in files and tables.
-pub trait Named: Copy + PartialEq + 'static {
+pub trait Named: Copy + PartialEq + Into<&'static str> + 'static {
     /// What a variant is, with its article: "a scaling".
     const WHAT: &'static str;
     /// All variants, in the order offered to the user.
     const ALL: &'static [Self];
 
     /// Returns the name.
-    fn name(self) -> &'static str;
+    fn name(self) -> &'static str {
+        self.into()
+    }
 
     /// Returns the variant of this name, without surrounding blanks.
     ///

@@ -1,7 +1,5 @@
 //! The reasons why a training ends, and defects of a training that has ended.
 
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
 
 use super::{EpochRecord, Method, Trainer};
@@ -57,25 +55,33 @@ fn diverged_in(history: &[EpochRecord], reason: StopReason) -> Option<usize> {
 }
 
 /// Reason why a training ended: a result, not an error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
     /// The maximum number of epochs was run.
+    #[strum(to_string = "all epochs done")]
     EpochsReached,
     /// The training error reached the goal.
+    #[strum(to_string = "goal reached")]
     GoalReached,
     /// The length of the gradient reached its lower limit.
+    #[strum(to_string = "gradient below its limit: no further progress possible")]
     GradientSmall,
     /// No step with a damping mu up to its limit lowers the error.
+    #[strum(to_string = "mu above its limit: no step lowers the error")]
     MuLarge,
     /// The scale lambda of the scaled conjugate gradient overflowed: no step along its direction lowers the error.
+    #[strum(to_string = "lambda above its limit: no step lowers the error")]
     LambdaLarge,
     /// The validation error did not reach a new best for [`StoppingRules::max_fail`](super::StoppingRules::max_fail) epochs.
+    #[strum(to_string = "validation error no longer falls")]
     ValidationRose,
     /// The error or its gradient was no longer finite, or the training error was above its initial value when the
     /// validation failures reached their limit. The best weights before that are kept.
+    #[strum(to_string = "diverged: the error grew above that of the start")]
     Diverged,
     /// The user stopped the training.
+    #[strum(to_string = "stopped by you")]
     Stopped,
 }
 
@@ -104,21 +110,6 @@ impl StopReason {
     /// or the method found no further step.
     pub(super) fn depends_on_rules(self) -> bool {
         !matches!(self, Self::Stopped | Self::Diverged | Self::MuLarge | Self::LambdaLarge)
-    }
-}
-
-impl fmt::Display for StopReason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::EpochsReached => "all epochs done",
-            Self::GoalReached => "goal reached",
-            Self::GradientSmall => "gradient below its limit: no further progress possible",
-            Self::MuLarge => "mu above its limit: no step lowers the error",
-            Self::LambdaLarge => "lambda above its limit: no step lowers the error",
-            Self::ValidationRose => "validation error no longer falls",
-            Self::Diverged => "diverged: the error grew above that of the start",
-            Self::Stopped => "stopped by you",
-        })
     }
 }
 

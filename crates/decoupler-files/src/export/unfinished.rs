@@ -116,7 +116,11 @@ impl UnfinishedFolder {
 
 /// Folder of the file `path`.
 pub(super) fn folder_of(path: &Path) -> &Path {
-    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    // Standard input and output are where the program runs.
+    let is_standard = [Path::new("/dev/stdin"), Path::new("/dev/stdout")].contains(&path);
+    let parent = path
+        .parent()
+        .filter(|parent| !parent.as_os_str().is_empty() && !is_standard);
     parent.unwrap_or(Path::new("."))
 }
 

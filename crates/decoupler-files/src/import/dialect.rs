@@ -6,7 +6,10 @@ use encoding_rs_io::DecodeReaderBytesBuilder;
 use serde::{Deserialize, Serialize};
 
 /// Character between the cells of a row.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
+)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum Separator {
     /// `,`
@@ -23,7 +26,10 @@ pub enum Separator {
 }
 
 /// Character before the decimal places.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
+)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum Decimal {
     /// `1.5`
@@ -34,21 +40,28 @@ pub enum Decimal {
 }
 
 /// Encoding of a text file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
+)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "kebab-case")]
 pub enum Encoding {
     /// UTF-8, with or without a byte-order mark.
     #[default]
     #[serde(rename = "utf-8")]
+    #[strum(serialize = "utf-8")]
     Utf8,
     /// ISO 8859-1.
     #[serde(rename = "latin-1")]
+    #[strum(serialize = "latin-1")]
     Latin1,
     /// UTF-16, little-endian.
     #[serde(rename = "utf-16le")]
+    #[strum(serialize = "utf-16le")]
     Utf16Le,
     /// UTF-16, big-endian.
     #[serde(rename = "utf-16be")]
+    #[strum(serialize = "utf-16be")]
     Utf16Be,
 }
 
@@ -98,16 +111,6 @@ impl Named for Separator {
     const WHAT: &'static str = "a separator";
     /// In the order in which they are tried.
     const ALL: &'static [Self] = &[Self::Comma, Self::Semicolon, Self::Tab, Self::Bar, Self::Space];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Comma => "comma",
-            Self::Semicolon => "semicolon",
-            Self::Tab => "tab",
-            Self::Bar => "bar",
-            Self::Space => "space",
-        }
-    }
 }
 
 impl Separator {
@@ -141,13 +144,6 @@ impl Separator {
 impl Named for Decimal {
     const WHAT: &'static str = "a decimal separator";
     const ALL: &'static [Self] = &[Self::Point, Self::Comma];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Point => "point",
-            Self::Comma => "comma",
-        }
-    }
 }
 
 impl Decimal {
@@ -167,15 +163,6 @@ impl Decimal {
 impl Named for Encoding {
     const WHAT: &'static str = "an encoding";
     const ALL: &'static [Self] = &[Self::Utf8, Self::Latin1, Self::Utf16Le, Self::Utf16Be];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Utf8 => "utf-8",
-            Self::Latin1 => "latin-1",
-            Self::Utf16Le => "utf-16le",
-            Self::Utf16Be => "utf-16be",
-        }
-    }
 }
 
 impl fmt::Display for Dialect {
@@ -184,9 +171,7 @@ impl fmt::Display for Dialect {
         write!(
             f,
             "separator {}, decimal {}, {header}, {}",
-            self.separator.name(),
-            self.decimal.name(),
-            self.encoding.name()
+            self.separator, self.decimal, self.encoding
         )?;
         if self.sep_line {
             write!(f, ", a sep= line")?;

@@ -213,7 +213,7 @@ impl AxisForm {
         let is_between = |letter: char| letter == ',' || letter == ';' || letter.is_whitespace();
         let words = self.values.split(is_between).filter(|word| !word.is_empty());
         Axis::parse(self.kind, words).map_err(|error| {
-            let SettingError::Text { message, .. } = error else {
+            let SettingError::Text(_, message) = error else {
                 return ListError::Value(error);
             };
             let (name, example) = (axis_label(self.kind), axis_example(self.kind));

@@ -182,7 +182,7 @@ pub enum TriedModel {
         /// Epochs after which the error was lowest.
         epochs: usize,
         /// Weights with which the trainings begin.
-        #[serde(default, skip_serializing_if = "Initialization::is_random")]
+        #[serde(default, skip_serializing_if = "super::settings::is_default")]
         begin: Initialization,
         /// `true` if they learn what ridge regression leaves.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]

@@ -9,7 +9,9 @@ use decoupler_core::{
 use thiserror::Error;
 
 /// Format in which a decoder is exported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::Display, strum::IntoStaticStr, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum BundleFormat {
     /// ONNX graph.
     Onnx,
@@ -22,12 +24,18 @@ pub enum BundleFormat {
 }
 
 /// Numbers with which a bundle computes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::Display, strum::IntoStaticStr, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum BundlePrecision {
     /// 64-bit floating point.
     #[default]
+    #[strum(serialize = "f64")]
+    #[serde(rename = "f64")]
     Double,
     /// 32-bit floating point.
+    #[strum(serialize = "f32")]
+    #[serde(rename = "f32")]
     Single,
     /// Integers with 16-bit weights and activations.
     Fixed16,
@@ -128,40 +136,11 @@ impl BundleFormat {
 impl Named for BundleFormat {
     const WHAT: &'static str = "a format";
     const ALL: &'static [Self] = &[Self::Onnx, Self::C99, Self::Matlab, Self::NumPy];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Onnx => "onnx",
-            Self::C99 => "c99",
-            Self::Matlab => "matlab",
-            Self::NumPy => "numpy",
-        }
-    }
 }
 
 impl Named for BundlePrecision {
     const WHAT: &'static str = "a precision";
     const ALL: &'static [Self] = &[Self::Double, Self::Single, Self::Fixed16];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Double => "f64",
-            Self::Single => "f32",
-            Self::Fixed16 => "fixed16",
-        }
-    }
-}
-
-impl fmt::Display for BundleFormat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl fmt::Display for BundlePrecision {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
 }
 
 /// Decoder that is exported as a bundle.
@@ -246,12 +225,14 @@ impl Named for BundleDecoder {
         Self::Linear,
         Self::Chosen,
     ];
+}
 
-    fn name(self) -> &'static str {
-        match self {
-            Self::Kind(kind) => Named::name(kind),
-            Self::Linear => "linear",
-            Self::Chosen => "chosen",
+impl From<BundleDecoder> for &'static str {
+    fn from(decoder: BundleDecoder) -> Self {
+        match decoder {
+            BundleDecoder::Kind(kind) => kind.into(),
+            BundleDecoder::Linear => "linear",
+            BundleDecoder::Chosen => "chosen",
         }
     }
 }

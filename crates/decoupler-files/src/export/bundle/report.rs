@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use decoupler_core::{decoupling::DecodeError, evaluation::RunError, problem::Channel, text::counted};
+use serde::Serialize;
 use thiserror::Error;
 
 use super::{
@@ -15,7 +16,7 @@ use crate::{
 };
 
 /// Files written by an export, and their deviation from the decoder.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct BundleReport {
     /// Form of the bundle.
@@ -25,10 +26,13 @@ pub struct BundleReport {
     /// The folder.
     pub path: PathBuf,
     /// Names of its files, with their sizes in bytes.
+    #[serde(skip)]
     pub files: Vec<(String, u64)>,
     /// Number of readings by which the accuracy was found, and how many of them the bundle contains.
+    #[serde(rename = "verified_vectors")]
     pub verified: usize,
     /// See [`Self::verified`].
+    #[serde(rename = "golden_vectors")]
     pub golden: usize,
     /// Evaluations of the bundle.
     pub checks: Vec<BundleCheck>,
@@ -37,17 +41,20 @@ pub struct BundleReport {
     pub limit: f64,
     /// Change of the targets by rounding the readings to single precision, at most, relative as [`Self::limit`]; `None` for
     /// other precisions.
+    #[serde(rename = "change_by_rounding_readings", skip_serializing_if = "Option::is_none")]
     pub rounding: Option<f64>,
     /// Widest range of a coordinate in training, in mm; `None` for own data.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub output_range_mm: Option<f64>,
     /// Proven bounds on the errors in fixed point: of any coordinate of an array, or of each target; empty otherwise.
+    #[serde(skip)]
     pub bounds: Vec<(Channel, f64)>,
     /// Remarks for the user, with cause and cure.
     pub remarks: Vec<String>,
 }
 
 /// An evaluation of a bundle.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BundleCheck {
     /// Name of the program that evaluated it.
     pub evaluator: &'static str,

@@ -25,13 +25,13 @@ impl fmt::Display for CommandGap {
 }
 
 /// Returns the terminal command that trains with `setup`. Options that have their default value are omitted. A plan
-/// that was read from `recipe` is given by that file.
+/// that was read from `recipe` is given by that file; one that needs a recipe is first written to a recipe by another command.
 ///
 /// # Errors
 /// Settings for which the terminal has no option.
 pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, CommandGap> {
     let settings = setup.settings();
-    let mut options = Vec::new();
+    let (mut of_plan, mut options) = (Vec::new(), Vec::new());
     let mut usual = RunSettings::default();
     match (settings.simulation(), setup.plan()) {
         (Some(simulation), _) => check_simulation(simulation)?,
@@ -42,10 +42,18 @@ pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, Com
                 "the quantity of the inputs",
             )])?;
             check_plan(plan, recipe)?;
-            options = file_options(plan, recipe);
-            // The recipe may have another division.
-            let usual_fraction = recipe.is_none().then(|| settings.validation_fraction());
-            options.extend(division_options(plan, usual_fraction));
+            of_plan = file_options(plan, recipe);
+            match recipe {
+                // It has the fractions, but may have another rule.
+                Some(_) => of_plan.push(("split".into(), plan.division.by.to_string())),
+                None => of_plan.extend(division_options(plan, Some(settings.validation_fraction()))),
+            }
+            let is_named = |wanted: &str| of_plan.iter().any(|(name, _)| name == wanted);
+            // A recipe fixes the fraction, which otherwise follows from the method.
+            if IN_RECIPE.iter().any(|name| is_named(name)) && recipe.is_none() && !is_named("validation-fraction") {
+                let fraction = plan.division.validation_fraction.to_string();
+                of_plan.push(("validation-fraction".into(), fraction));
+            }
             // Without it, settings are chosen.
             options.push(("hidden".into(), settings.hidden.to_string()));
             usual.hidden = settings.hidden;
@@ -64,11 +72,46 @@ pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, Com
         }
     }
     options.extend(changed_options(settings, &usual).map(|(word, value)| (word.into(), value)));
+    let (in_recipe, direct): (Vec<_>, Vec<_>) = of_plan.into_iter().partition(|(name, _)| IN_RECIPE.contains(&&**name));
+    let [in_recipe, direct, options] = [in_recipe, direct, options].map(|options| written(&options));
+    Ok(match &*in_recipe {
+        "" => format!("decoupler train{direct}{options}"),
+        _ => format!(
+            "decoupler inspect{direct}{in_recipe} --recipe-out recipe.json && decoupler train --recipe recipe.json{options}"
+        ),
+    })
+}
+
+/// Options that only a recipe has.
+const IN_RECIPE: [&str; 16] = [
+    "test-join",
+    "test-fraction",
+    "validation-fraction",
+    "join-time",
+    "join-limit",
+    "lags",
+    "differences",
+    "derive",
+    "missing",
+    "unit",
+    "positions",
+    "separator",
+    "decimal",
+    "header",
+    "encoding",
+    "skip-lines",
+];
+
+fn written(options: &[GivenOption]) -> String {
     let written = options.iter().map(|(name, value)| match &**value {
         "" => format!(" --{name}"),
-        value => format!(" --{name} {}", quoted(Path::new(value))),
+        value => {
+            // Otherwise it would be taken for an option.
+            let between = if value.starts_with('-') { "=" } else { " " };
+            format!(" --{name}{between}{}", quoted(Path::new(value)))
+        }
     });
-    Ok("decoupler train".to_owned() + &String::from_iter(written))
+    written.collect()
 }
 
 /// An option and its value, empty if it has none.
@@ -79,7 +122,10 @@ pub fn changed_options(settings: &RunSettings, usual: &RunSettings) -> impl Iter
     RUN_OPTIONS.iter().filter_map(|option| {
         let setting = &option.setting;
         let (value, usual) = (setting.get(settings)?, setting.get(usual));
-        (Some(&value) != usual.as_ref()).then(|| (setting.word("-"), value.to_string()))
+        (Some(&value) != usual.as_ref()).then(|| match (setting.word("-"), option.is_rare()) {
+            (word, true) => ("set".to_owned(), format!("{word}={value}")),
+            (word, false) => (word, value.to_string()),
+        })
     })
 }
 
@@ -237,7 +283,7 @@ fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
         ("group", texts(group)),
         ("row-wire", texts(row_wire)),
         ("lags", texts(&spans(|memory| &memory.lags))),
-        ("memory", texts(&spans(|memory| &memory.averages))),
+        ("history", texts(&spans(|memory| &memory.averages))),
         ("differences", Vec::from_iter(has_differences.then(String::new))),
         ("where", texts(conditions)),
         ("derive", texts(derive)),

@@ -44,6 +44,17 @@ impl Block {
     }
 }
 
+/// Returns the blocks as text for a terminal; figures are left out.
+pub(super) fn text(blocks: &[Block]) -> String {
+    let written = |block: &Block| match block {
+        Block::Heading(heading) => format!("\n{heading}\n"),
+        Block::Text(text) | Block::Note(text) | Block::Warning(text) | Block::Command(text) => format!("{text}\n"),
+        Block::Table(table, _) => table.aligned(),
+        Block::Figure(..) => String::new(),
+    };
+    blocks.iter().map(written).collect()
+}
+
 /// Returns the report as one self-contained document. Elements are closed as in XML, which lets XML parsers read it too.
 pub(super) fn document(title: &str, blocks: &[Block]) -> String {
     let title = escaped_html(title);

@@ -13,7 +13,7 @@ use std::{fmt::Display, path::Path, time::Duration};
 
 use self::{
     command::{division_options, file_options},
-    html::{Block, document},
+    html::{Block, document, text},
     pictures::pictures,
 };
 use super::{
@@ -25,7 +25,8 @@ use crate::import::Setup;
 use decoupler_core::{
     dataset::{Dataset, Simulation},
     evaluation::{
-        DecoderReport, ErrorTable, Errors, Outlook, RUN_OPTIONS, RunOption, StartRecord, TestErrors, error_remarks,
+        Combination, DecoderReport, ErrorTable, Errors, Outlook, RUN_OPTIONS, RunOption, StartRecord, TestErrors,
+        best_start, error_remarks,
         recorded::{Determination, HysteresisLoop},
     },
     problem::Channel,
@@ -34,6 +35,7 @@ use decoupler_core::{
     text::{capitalised, counted},
     training::StopReason,
 };
+use ndarray::Array2;
 use serde_json::json;
 
 /// A run to be reported: of a simulated array or a recording.
@@ -72,18 +74,41 @@ impl RunReport<'_> {
         document(&self.title(), &self.blocks(folder))
     }
 
+    /// Returns the report as text for a terminal: without its warnings, figures and command.
+    ///
+    /// # Panics
+    /// If the test set does not belong to the run.
+    pub fn text(&self) -> String {
+        let setup = self.setup(Path::new(""));
+        let (_, loops) = self.answers(&setup);
+        let mut blocks = vec![Block::Note(self.summary())];
+        blocks.extend(self.results(&loops));
+        blocks.extend(self.training(&setup));
+        text(&blocks)
+    }
+
+    fn setup(&self, folder: &Path) -> Setup {
+        let recorded = self.file.recorded.as_ref().map(|recorded| recorded.relative_to(folder));
+        let setup = Setup::of(self.file.settings, recorded.map(|recorded| recorded.plan));
+        setup.expect("a file of a recording has its plan")
+    }
+
+    /// Answers to the test set, and the loops of loading and unloading in them.
+    fn answers(&self, setup: &Setup) -> (Array2<f64>, Vec<Option<HysteresisLoop>>) {
+        let answers = self.file.decoder().answers_to(self.test);
+        let loops = setup.plan().map_or_else(Vec::new, |plan| {
+            HysteresisLoop::of_test(self.test, answers.view(), plan.test_order())
+        });
+        (answers, loops)
+    }
+
     fn blocks(&self, folder: &Path) -> Vec<Block> {
         let Self { file, test, .. } = *self;
-        let recorded = file.recorded.as_ref().map(|recorded| recorded.relative_to(folder));
-        let setup = Setup::of(file.settings, recorded.map(|recorded| recorded.plan));
-        let setup = setup.expect("a file of a recording has its plan");
-        let answers = file.decoder().answers_to(test);
-        let loops = setup.plan().map_or_else(Vec::new, |plan| {
-            HysteresisLoop::of_test(test, answers.view(), plan.test_order())
-        });
+        let setup = self.setup(folder);
+        let (answers, loops) = self.answers(&setup);
         let sentence = |remark: String| Block::Warning(capitalised(remark.trim_end_matches('.')) + ".");
         let mut blocks = vec![Block::Note(self.summary())];
-        blocks.extend(self.remarks(&setup, &answers).into_iter().map(sentence));
+        blocks.extend(self.remarks_on(&setup, &answers).into_iter().map(sentence));
         blocks.extend(self.results(&loops));
         blocks.push(Block::Heading("Figures"));
         let pictures = pictures(file, test, &answers, &loops).into_iter();
@@ -114,8 +139,13 @@ impl RunReport<'_> {
                  a network has to beat.",
             ),
         ];
+        let model_based = file.scores.baselines.model_based.as_ref();
+        if model_based.and_then(TestErrors::nodes).is_some_and(Errors::is_rounding) {
+            let text = "The model-based error is nothing but rounding: the readings determine the deformation, and no ratio \
+                        to it is given.";
+            blocks.push(Block::Note(text.to_owned()));
+        }
         if !decoders.is_empty() {
-            let model_based = file.scores.baselines.model_based.as_ref();
             blocks.extend([
                 Block::Heading("Decoders"),
                 Block::Table(decoder_table(&file.problem, decoders, model_based), "Network"),
@@ -134,7 +164,16 @@ impl RunReport<'_> {
         let Self { file, .. } = *self;
         let mut blocks = Vec::new();
         if file.training.starts.len() > 1 {
-            blocks.extend([Block::Heading("Starts"), Block::Table(self.starts_table(), "")]);
+            let best = best_start(&file.training.starts).map_or(0, |best| best + 1);
+            let note = match file.settings.combine {
+                Combination::Best => format!("Number {best}, with the lowest error, is kept."),
+                Combination::Mean => format!("The network is their mean; number {best} has the lowest error."),
+            };
+            blocks.extend([
+                Block::Heading("Starts"),
+                Block::Table(self.starts_table(), ""),
+                Block::Note(note),
+            ]);
         }
         if let Some(search) = file.recorded.as_ref().and_then(|recorded| recorded.search.as_ref()) {
             blocks.extend([
@@ -189,7 +228,15 @@ impl RunReport<'_> {
     }
 
     /// Returns all warnings and remarks on the run, with cause and remedy.
-    fn remarks(&self, setup: &Setup, answers: &ndarray::Array2<f64>) -> Vec<String> {
+    ///
+    /// # Panics
+    /// If the test set does not belong to the run.
+    pub fn remarks(&self) -> Vec<String> {
+        let setup = self.setup(Path::new(""));
+        self.remarks_on(&setup, &self.file.decoder().answers_to(self.test))
+    }
+
+    fn remarks_on(&self, setup: &Setup, answers: &Array2<f64>) -> Vec<String> {
         let Self { file, .. } = *self;
         let NetworkFile { problem, scores, .. } = file;
         let mut remarks = Vec::from_iter(self.defect.map(str::to_owned));
@@ -209,12 +256,6 @@ impl RunReport<'_> {
                 ));
             }
             remarks.extend(scores.baselines.model_based_note().map(str::to_owned));
-            let model_based = scores.baselines.model_based.as_ref().and_then(TestErrors::nodes);
-            let is_rounding = model_based.is_some_and(Errors::is_rounding).then_some(
-                "the model-based error is nothing but rounding: the readings determine the deformation, and no ratio to it \
-                 is given",
-            );
-            remarks.extend(is_rounding.map(str::to_owned));
         }
         if let Some(plan) = setup.plan() {
             let measured = Determination::measure(self.test, answers.view(), plan.division.by);

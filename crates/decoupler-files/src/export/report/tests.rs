@@ -234,7 +234,8 @@ fn a_report_of_a_recording_has_its_errors_figures_and_command() {
     assert_eq!(
         command.text(),
         Some(
-            "decoupler train --data press.csv --inputs a,b --targets d1..d4 --positions taxels.csv --hidden 2 --epochs 5"
+            "decoupler inspect --data press.csv --inputs a,b --targets d1..d4 --positions taxels.csv --validation-fraction 0 \
+             --recipe-out recipe.json && decoupler train --recipe recipe.json --hidden 2 --epochs 5"
         )
     );
     // In a report in another folder, the path of the recording is relative to that folder.
@@ -276,8 +277,9 @@ fn the_command_of_a_recording_names_files_columns_and_division() {
     };
     assert_eq!(
         command(&plan, settings, None).unwrap(),
-        "decoupler train --data press.csv --join 'my states.csv' --join-time t2 --join-limit 0.5 --inputs c2..c5 --targets \
-         force --time t --group session --where 't>0' --missing -1 --split group --hidden 12"
+        "decoupler inspect --data press.csv --join 'my states.csv' --inputs c2..c5 --targets force --time t --group session \
+         --where 't>0' --split group --join-time t2 --join-limit 0.5 --missing=-1 --validation-fraction 0 --recipe-out \
+         recipe.json && decoupler train --recipe recipe.json --hidden 12"
     );
     // The default method has different settings for recordings; with other methods, a part of the samples is held out
     // for validation.
@@ -287,12 +289,12 @@ fn the_command_of_a_recording_names_files_columns_and_division() {
     plan.division.validation_fraction = 0.0;
     let text = command(&plan, other, None).unwrap();
     assert!(
-        text.ends_with("--split random --validation-fraction 0 --hidden 12 --method lm"),
+        text.ends_with("--validation-fraction 0 --recipe-out recipe.json && decoupler train --recipe recipe.json --hidden 12 --method lm"),
         "{text}"
     );
     assert_eq!(
         command(&plan, settings, Some("recipe.json")).unwrap(),
-        "decoupler train --recipe recipe.json --split random --test-fraction 0.2 --validation-fraction 0 --hidden 12"
+        "decoupler train --recipe recipe.json --split random --hidden 12"
     );
     plan.import.join[0].stem = Some("other".to_owned());
     assert!(command(&plan, settings, None).unwrap_err().contains("joined files"));

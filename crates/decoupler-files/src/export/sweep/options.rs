@@ -96,12 +96,10 @@ pub fn train_options(settings: &RunSettings, decoders: &[DecoderKind]) -> TrialO
         let setting = &option.setting;
         let value = setting.get(settings)?;
         // Left out at their defaults, so that trials keep the names they had before these options existed.
-        let is_left_out = ["combine", "begin", "adc bits"].contains(&setting.name) && setting.get(&defaults)? == value;
+        let is_left_out = ["combine", "begin"].contains(&setting.name) && setting.get(&defaults)? == value;
         let value = match value {
             // Negative zero is written as zero.
             settings::Value::Number(value) => Value::from(value + 0.0),
-            // As a number, which it is.
-            settings::Value::Text(bits) if setting.name == "adc bits" => json!(bits.parse::<u64>().ok()),
             value => json!(value),
         };
         (!is_left_out).then(|| (setting.word("-"), value))

@@ -2,7 +2,6 @@ use std::{
     cmp::Ordering,
     collections::{BTreeMap, BTreeSet},
     ffi::OsStr,
-    fs,
     io::{self, Write},
     path::{Path, PathBuf},
 };
@@ -194,25 +193,6 @@ impl SweepTableFormat {
             "csv" => Some(Self::Csv),
             "json" => Some(Self::Json),
             _ => None,
-        }
-    }
-
-    /// Returns the number of trials in the table at `path`, 0 if there is no file, or `None` if the file cannot be read as a
-    /// table.
-    pub fn trials_in(self, path: &Path) -> Option<usize> {
-        // Reading a pipe or device would wait for its other end.
-        if !path.is_file() {
-            return Some(0);
-        }
-        match self {
-            Self::Csv => {
-                let mut records = csv::Reader::from_path(path).ok()?.into_byte_records();
-                records.try_fold(0, |trials, record| record.ok().map(|_| trials + 1))
-            }
-            Self::Json => {
-                let table: serde_json::Value = serde_json::from_slice(&fs::read(path).ok()?).ok()?;
-                Some(table.get("trials")?.as_array()?.len())
-            }
         }
     }
 
