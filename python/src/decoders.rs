@@ -116,7 +116,7 @@ impl FittedDecoder {
                     counted(found, "reading")
                 ));
             }
-            decode(&mut *decoder, view, indices.as_deref()).map_err(|error| error.to_string())
+            decode(&mut decoder, view, indices.as_deref()).map_err(|error| error.to_string())
         })?;
         Ok(answers.into_pyarray(py))
     }

@@ -202,7 +202,7 @@ impl Network {
                 .map_or(view, |features| MatrixView::Double(features.view()));
             // A panic leaves only buffers behind, which the next call overwrites.
             let mut decoder = self.decoder.lock().unwrap_or_else(PoisonError::into_inner);
-            decode(&mut *decoder, view, indices.as_deref())
+            decode(&mut decoder, view, indices.as_deref())
         })
     }
 }
