@@ -46,14 +46,14 @@ pub(super) struct Follow {
     #[arg(long, conflicts_with = "out")]
     pub(super) follow: bool,
     /// With --follow: output format [default: csv]
-    #[arg(long, value_name = "csv|jsonl", hide_possible_values = true, conflicts_with = "out")]
+    #[arg(long, value_name = "csv|jsonl", hide_possible_values = true, requires = "follow")]
     format: Option<Form>,
     /// With --follow: report rate and latency on standard error every N seconds; always at the end, and on SIGUSR1
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "out")]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, requires = "follow")]
     status: Option<Duration>,
     /// With --follow: relative noise of the readings (standard deviation) assumed in fault detection [default: that of
     /// the network's scene]
-    #[arg(long, value_name = "REL", value_parser = number, conflicts_with = "out")]
+    #[arg(long, value_name = "REL", value_parser = number, requires = "follow")]
     fault_noise: Option<f64>,
 }
 

@@ -271,7 +271,7 @@ fn more_epochs_and_another_method_continue_from_the_current_weights() {
     let line = format!("{RESUME} --method lm --set mu=0.1 --epochs 25 --out network.json");
     let text = success(&line, folder);
     assert!(
-        text.contains("Momentum, Eq. (11)") && text.contains("from epoch 21: Levenberg-Marquardt"),
+        text.contains("Momentum, Eq. (11)") && text.contains("Method from epoch 21"),
         "{text}"
     );
     let file = network(&folder.join("network.json"));

@@ -105,12 +105,12 @@ fn arguments_a_recipe_and_a_recording_in_the_specification_are_the_same_trials()
     assert_eq!(trials(&of_arguments).len(), 8);
     assert_eq!(shared(&of_arguments, &whole), 4, "seed 0 is shared, seed 1 is not");
     success(
-        &format!("train {data} --epochs 1 --recipe-out press.recipe --json"),
+        &format!("inspect {data} --validation-fraction 0.2 --recipe-out press.recipe --json"),
         folder,
     );
     let axes = json!({"hidden": [2, 4], "method": ["lm"], "seed": [0, 7]});
     let recipe = json!({
-        "train": {"recipe": "press.recipe", "epochs": 8, "validation-fraction": 0.2},
+        "train": {"recipe": "press.recipe", "epochs": 8},
         "axes": axes,
     });
     let recording = json!({
