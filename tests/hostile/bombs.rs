@@ -307,10 +307,12 @@ fn row_wires_in_readings_claim_only_the_memory_that_they_need() {
         header.to_owned() + &rows.collect::<String>(),
     )
     .unwrap();
-    let train = "train --data press.csv --inputs a,b --targets force --time t --row-wire row --lags 100000 --hidden 1 --epochs 1 \
-                 --out n.json";
-    let (is_trained, message) = ended(&Vec::from_iter(train.split_whitespace()), folder.path());
-    assert!(is_trained, "{message}");
+    let inspect = "inspect --data press.csv --inputs a,b --targets force --time t --row-wire row --lags 100000 --recipe-out r.json";
+    let train = "train --recipe r.json --hidden 1 --epochs 1 --out n.json";
+    for command in [inspect, train] {
+        let (is_done, message) = ended(&Vec::from_iter(command.split_whitespace()), folder.path());
+        assert!(is_done, "{command}: {message}");
+    }
     let decode = ["decode", "--network", "n.json", "--data", "in.csv", "--out", "out.csv"];
     fs::write(folder.path().join("in.csv"), "t (s),row,a,b\n0,1,1,2\n1,10000,1,2\n").unwrap();
     let (is_read, message) = ended(&decode, folder.path());

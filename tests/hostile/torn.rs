@@ -92,10 +92,8 @@ fn make(folder: &Path) -> String {
     )
     .unwrap();
     let columns = "--data press.csv --inputs a,b --targets force --time t";
-    run(
-        &format!("train {columns} --hidden 1 --epochs 2 --save-recipe recipe.json --out r.json"),
-        folder,
-    );
+    run(&format!("inspect {columns} --recipe-out recipe.json"), folder);
+    run("train --recipe recipe.json --hidden 1 --epochs 2 --out r.json", folder);
     fs::write(
         folder.join("readings.csv"),
         "row,r_1,r_2,r_3\n1,100,200,300\n2,150,250,350\n1,101,201,301\n2,151,251,351\n",
