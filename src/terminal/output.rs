@@ -201,41 +201,14 @@ pub(super) fn read(
 fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Readings, Failure> {
     let has_rows = file.network.only().is_none();
     let table = with_bar(|watch| recipe.read_inputs(input, &file.problem, has_rows, watch))?;
-    let InputTable {
-        readings,
-        row_wires,
-        lines,
-        torn_line,
-        warnings,
-        kept,
-        times_s: _,
-    } = table;
-    warn_if_torn(input, torn_line);
-    for warning in warnings {
+    warn_if_torn(input, table.torn_line);
+    for warning in &table.warnings {
         warn(format_args!("'{}': {warning}", input.display()));
     }
-    let row_indices = match (row_wires, &file.row_wires) {
-        _ if !has_rows => vec![0; lines.len()],
-        (Some(of_lines), Some(read)) => {
-            let index = |(row_wire, &line): (usize, &u64)| {
-                let index = read.binary_search(&row_wire);
-                let row = row_wire + 1;
-                let message = format_args!("line {line}: there is no network for row {row}; train with samples of it");
-                index.map_err(|_| Failure::at(input, message))
-            };
-            of_lines.into_iter().zip(&lines).map(index).collect::<Result<_, _>>()?
-        }
-        _ => {
-            let column = recipe.row_wire.as_deref().unwrap_or_default();
-            return Err(Failure::at(
-                input,
-                format_args!(
-                    "it has no column '{column}' with the row number of each line, which is needed because each row has its \
-                     own network; add it"
-                ),
-            ));
-        }
-    };
+    let row_indices = file.row_indices(&table).map_err(|reason| Failure::at(input, reason))?;
+    let InputTable {
+        readings, lines, kept, ..
+    } = table;
     Ok(Readings {
         values: readings,
         lines,

@@ -59,7 +59,11 @@ fn a_memory_removes_creep_and_goes_with_the_network() {
     let with = json(&format!("{TRAIN} --history 0.5s,2s --out n.json --json"), folder.path());
     assert!(rmse(&with) < 0.2 * rmse(&without), "{} {}", rmse(&with), rmse(&without));
     let text = succeed(&format!("{TRAIN} --history 0.5s,2s"), folder.path());
-    assert!(text.lines().any(|line| line.starts_with("History") && line.ends_with("0.5s,2s")), "{text}");
+    assert!(
+        text.lines()
+            .any(|line| line.starts_with("History") && line.ends_with("0.5s,2s")),
+        "{text}"
+    );
     succeed(
         "decode --network n.json --data readings.csv --out decoded.csv",
         folder.path(),

@@ -16,7 +16,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::{
     AtomicFile, DocumentError, DocumentKind, TrainingRecord, WriteError, document::PROGRAM, unfinished::folder_of,
 };
-use crate::import::{LineParser, Recipe, Recorded, Setup, SetupError};
+use crate::import::{InputTable, LineParser, Recipe, Recorded, Setup, SetupError};
 
 const KIND: DocumentKind = DocumentKind::Network;
 
@@ -220,6 +220,33 @@ impl NetworkFile {
         let has_rows = self.network.only().is_none();
         let row_wires = self.row_wires.clone().filter(|_| has_rows);
         LineParser::of_recording(&self.problem, recipe, row_wires)
+    }
+
+    /// Returns the index of the network of each line of `table`; 0 if one network reads all.
+    ///
+    /// # Errors
+    /// If the row-wire of a line is not known or has no network, as a sentence about the file.
+    pub fn row_indices(&self, table: &InputTable) -> Result<Vec<usize>, String> {
+        if self.network.only().is_some() {
+            return Ok(vec![0; table.lines.len()]);
+        }
+        let (recorded, read) = (self.recorded.as_ref(), self.row_wires.as_deref().unwrap_or_default());
+        let Some(of_lines) = &table.row_wires else {
+            let column = recorded.and_then(|recorded| recorded.plan.import.row_wire.as_deref());
+            return Err(format!(
+                "it has no column '{}' with the row number of each line, which is needed because each row has its own \
+                 network; add it",
+                column.unwrap_or_default()
+            ));
+        };
+        let index = |(row_wire, line): (&usize, &u64)| {
+            let unknown = |_| {
+                let row = row_wire + 1;
+                format!("line {line}: there is no network for row {row}; train with samples of it")
+            };
+            read.binary_search(row_wire).map_err(unknown)
+        };
+        of_lines.iter().zip(&table.lines).map(index).collect()
     }
 
     /// Setup of the run.

@@ -126,18 +126,10 @@ impl Recording {
         let has_rows = file.network.only().is_none();
         let recipe = recipe.unwrap_or_default();
         let table = recipe.read_inputs(path, &file.problem, has_rows, &mut watch(job, &mut |_| ()))?;
-        let mut row_indices = Vec::new();
-        if has_rows {
-            let read = file.row_wires.as_deref().unwrap_or_default();
-            let reason = "it has no column of row-wires, and there is a network for each";
-            let of_samples = table.row_wires.as_ref().ok_or_else(|| refused(path, reason))?;
-            for (&row, line) in of_samples.iter().zip(&table.lines) {
-                let index = read.iter().position(|read| *read == row);
-                let row = row + 1;
-                let unknown = || refused(path, format_args!("line {line}: there is no network for row {row}"));
-                row_indices.push(index.ok_or_else(unknown)?);
-            }
-        }
+        let row_indices = match has_rows {
+            true => file.row_indices(&table).map_err(|reason| refused(path, reason))?,
+            false => Vec::new(),
+        };
         let (samples, length) = table.readings.dim();
         Ok(Self {
             times_s: table.times_s.unwrap_or_else(|| vec![f64::NAN; samples]),
