@@ -431,13 +431,13 @@ fn the_spread_and_continue_fit_in_narrow_windows() {
         "{buttons:?}"
     );
     let column = driver.get("ERRORS ON THE TEST SET").rect().left();
-    let of_spread = |text: &str| text.starts_with("Spread of test Z %") || text.starts_with("test Z %, ");
+    let of_spread = |text: &str| text.starts_with("starts against test Z %") || text.starts_with("test Z %, ");
     let places: Vec<_> = driver
         .places()
         .into_iter()
         .filter(|(text, _)| of_spread(text))
         .collect();
-    assert_eq!(places.len(), 4, "the strip and three figures");
+    assert_eq!(places.len(), 4, "the chart and three figures");
     for (text, place) in places {
         assert!(
             place.left() >= column - 0.5 && place.right() <= 960.0,

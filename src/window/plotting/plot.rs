@@ -208,7 +208,8 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform
         }
     });
     shown.response.widget_info(|| {
-        let drawn = plot.series.iter().filter(|series| !series.points.is_empty());
+        let is_drawn = |series: &&Series| !series.points.is_empty() || matches!(series.form, Form::Across(_));
+        let drawn = plot.series.iter().filter(is_drawn);
         let names: Vec<&str> = drawn.map(|series| &*series.name).collect();
         let label = format!("{} against {}: {}", plot.y.name, plot.x.name, names.join(", "));
         WidgetInfo::labeled(Role::Image, true, label)
