@@ -86,7 +86,7 @@ pub fn titled_plots_ui(ui: &mut Ui, title: &str, figure: &PlotFigure) {
 }
 
 /// Minimum width of the legend and the notes next to a square plot.
-const NOTES_WIDTH: f32 = space(36);
+const NOTES_WIDTH: f32 = space(48);
 
 /// Draws the plots side by side in the remaining space, and the legend and the notes: next to a square plot if there is room,
 /// else above.
