@@ -177,7 +177,7 @@ impl TestErrors {
             measures.iter().find(is_infinite).map(|measure| measure.field())
         };
         match self {
-            Self::Nodes(errors) => first(&ErrorMeasure::OF_NODES, Figures::Nodes(errors)).map(str::to_owned),
+            Self::Nodes(errors) => first(ErrorMeasure::OF_NODES, Figures::Nodes(errors)).map(str::to_owned),
             Self::Targets(targets) => targets.iter().enumerate().find_map(|(index, errors)| {
                 let name = first(ErrorMeasure::OF_TARGETS, Figures::Target(errors))?;
                 Some(format!("{index}.{name}"))

@@ -98,9 +98,7 @@ impl Method {
         match *self {
             Self::LevenbergMarquardt(settings) => boxed(LevenbergMarquardt::new(settings, mlp, examples)),
             Self::BayesianRegularization(settings) => boxed(BayesianRegularization::new(settings, mlp, examples)),
-            Self::ScaledConjugateGradient { sigma, lambda, decay } => {
-                boxed(ScaledConjugateGradient::new(sigma, lambda, decay, mlp, examples))
-            }
+            Self::ScaledConjugateGradient(settings) => boxed(ScaledConjugateGradient::new(settings, mlp, examples)),
             _ => boxed(GradientDescent::new(*self, mlp, examples)),
         }
     }
@@ -127,7 +125,7 @@ impl Method {
                 plan.multiplications() + plan.trace_multiplications()
             }
             // Two evaluations of error and gradient: one for the curvature, one after the step.
-            Self::ScaledConjugateGradient { .. } => 4.0 * per_run,
+            Self::ScaledConjugateGradient(_) => 4.0 * per_run,
             // One run of the network over the samples, and the gradient.
             _ => 3.0 * per_run,
         }
