@@ -44,10 +44,10 @@ pub enum Part {
     Random,
 }
 
-const SAMPLES: Kind = Kind::Integer(1, LARGEST_SAMPLES as u64);
-const NOISE: Kind = Kind::Number(0.0, f64::MAX);
-const HIDDEN: Kind = Kind::Integer(1, LARGEST_HIDDEN as u64);
-const STARTS: Kind = Kind::Integer(1, MAX_STARTS as u64);
+pub(super) const SAMPLES: Kind = Kind::Integer(1, LARGEST_SAMPLES as u64);
+pub(super) const NOISE: Kind = Kind::Number(0.0, f64::MAX);
+pub(super) const HIDDEN: Kind = Kind::Integer(1, LARGEST_HIDDEN as u64);
+pub(super) const STARTS: Kind = Kind::Integer(1, MAX_STARTS as u64);
 
 /// Settings of a run except those of its method, in the order in which they are offered and set.
 pub static RUN_OPTIONS: [RunOption; 24] = [

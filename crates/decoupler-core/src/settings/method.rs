@@ -45,49 +45,34 @@ pub enum Method {
     #[strum(props(remedy = "try another seed, more samples, or Levenberg-Marquardt (lm)"))]
     BayesianRegularization(RegularizationSettings),
     /// Møller's scaled conjugate gradient (`trainscg`).
-    #[strum(
-        serialize = "scg",
-        message = "Scaled conjugate gradient",
-        props(parameter = "lambda")
-    )]
+    #[strum(serialize = "scg", message = "Scaled conjugate gradient")]
+    #[strum(props(parameter = "lambda"))]
     #[strum(
         detailed_message = "Conjugate directions, step length from the curvature: little memory, for very large networks."
     )]
     #[strum(props(remedy = "try another seed, or Levenberg-Marquardt (lm)"))]
     ScaledConjugateGradient(ConjugateSettings),
     /// Resilient back-propagation (`trainrp`).
-    #[strum(
-        serialize = "rp",
-        message = "Resilient back-propagation",
-        props(parameter = "mean step length")
-    )]
+    #[strum(serialize = "rp", message = "Resilient back-propagation")]
+    #[strum(props(parameter = "mean step length"))]
     #[strum(detailed_message = "Each weight has its own step length and uses only the sign of its slope.")]
     #[strum(props(remedy = "lower the first and the largest step length, or try another seed"))]
     Resilient(ResilientSettings),
     /// Gradient descent with momentum and an adaptive learning rate (`traingdx`).
-    #[strum(
-        serialize = "gdx",
-        message = "Adaptive rate with momentum",
-        props(parameter = "learning rate")
-    )]
+    #[strum(serialize = "gdx", message = "Adaptive rate with momentum")]
+    #[strum(props(parameter = "learning rate"))]
     #[strum(detailed_message = "Gradient descent with momentum whose learning rate grows while the error falls.")]
     #[strum(props(remedy = "lower the learning rate, run more epochs, or try another seed"))]
     AdaptiveDescent(AdaptiveSettings),
     /// Gradient descent with momentum of steps (`traingdm`).
-    #[strum(
-        serialize = "gdms",
-        message = "Momentum of steps",
-        props(parameter = "learning rate")
-    )]
+    #[strum(serialize = "gdms", message = "Momentum of steps")]
+    #[strum(props(parameter = "learning rate"))]
     #[strum(detailed_message = "Gradient descent that mixes the previous step into each step, as traingdm does.")]
     #[strum(props(remedy = "change the learning rate, run more epochs, or try another method"))]
     StepMomentum(MomentumSettings),
     /// Gradient descent with momentum of gradients, Eq. (11).
-    #[strum(
-        serialize = "gdm",
-        message = "Momentum, Eq. (11)",
-        props(parameter = "learning rate")
-    )]
+    #[strum(serialize = "gdm", message = "Momentum, Eq. (11)")]
+    #[strum(props(parameter = "learning rate"))]
     #[strum(
         detailed_message = "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does."
     )]

@@ -51,6 +51,15 @@ pub struct AdaptiveState {
     pub(super) step: Vec<f64>,
 }
 
+/// State of resilient back-propagation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResilientState {
+    /// Gradient of the previous epoch.
+    pub(super) previous_gradient: Vec<f64>,
+    /// Step length of each weight.
+    pub(super) lengths: Vec<f64>,
+}
+
 /// Largest learning rate, which keeps a long run of accepted steps from overflowing.
 const MAX_RATE: f64 = 1e300;
 
@@ -66,10 +75,10 @@ impl GradientDescent {
                 learning_rate: settings.learning_rate,
                 step: zeros,
             }),
-            Method::Resilient(settings) => MethodState::Resilient {
+            Method::Resilient(settings) => MethodState::Resilient(ResilientState {
                 lengths: vec![settings.first_length; zeros.len()],
                 previous_gradient: zeros,
-            },
+            }),
             _ => MethodState::GradientDescent,
         };
         let now = backpropagation.evaluate(mlp, examples);
@@ -108,14 +117,8 @@ impl GradientDescent {
             (Method::AdaptiveDescent(settings), MethodState::AdaptiveDescent(state)) => {
                 add_momentum(weights, &mut state.step, state.learning_rate, settings.momentum);
             }
-            (
-                Method::Resilient(settings),
-                MethodState::Resilient {
-                    previous_gradient,
-                    lengths,
-                },
-            ) => {
-                let lengths = lengths.iter_mut().zip(previous_gradient);
+            (Method::Resilient(settings), MethodState::Resilient(state)) => {
+                let lengths = state.lengths.iter_mut().zip(&mut state.previous_gradient);
                 for ((weight, slope), (length, before)) in weights.zip(lengths) {
                     // Compares signs, since the product of two tiny slopes would be 0.
                     let factor = match (*slope > 0.0, *slope < 0.0, *before > 0.0, *before < 0.0) {
@@ -178,7 +181,7 @@ impl Algorithm for GradientDescent {
     fn parameter(&self) -> f64 {
         match (&self.state, self.method) {
             (MethodState::AdaptiveDescent(state), _) => state.learning_rate,
-            (MethodState::Resilient { lengths, .. }, _) => lengths.iter().sum::<f64>() / lengths.len() as f64,
+            (MethodState::Resilient(state), _) => state.lengths.iter().sum::<f64>() / state.lengths.len() as f64,
             (_, Method::GradientDescent { learning_rate }) => learning_rate,
             (_, Method::Momentum(settings) | Method::StepMomentum(settings)) => settings.learning_rate,
             _ => f64::NAN,

@@ -3,9 +3,11 @@ use strum::VariantArray;
 
 use super::Trial;
 use crate::{
-    dataset::{DatasetError, Division, LARGEST_SAMPLES, Seed, SplitBy},
-    evaluation::{CrossValidation, MAX_STARTS, PublishedErrors, RunError, RunSettings},
-    network::LARGEST_HIDDEN,
+    dataset::{DatasetError, Division, Seed, SplitBy},
+    evaluation::{
+        CrossValidation, PublishedErrors, RunError, RunSettings,
+        options::{HIDDEN, NOISE, SAMPLES, STARTS},
+    },
     sensor::ArrayScale,
     settings::{EPOCHS, Field, Kind, Setting, SettingError, Value},
     training::{Method, StoppingRules, TrainingError},
@@ -48,10 +50,6 @@ pub enum AxisKind {
     Seed,
 }
 
-const HIDDEN: Kind = Kind::Integer(1, LARGEST_HIDDEN as u64);
-const SAMPLES: Kind = Kind::Integer(1, LARGEST_SAMPLES as u64);
-const STARTS: Kind = Kind::Integer(1, MAX_STARTS as u64);
-
 /// Settings of a cell that an axis can vary, in the order of [`AxisKind`], which is the one offered to the user.
 static ROWS: [Setting<Cell>; 11] = [
     row("hidden nodes", HIDDEN, |cell| {
@@ -65,7 +63,7 @@ static ROWS: [Setting<Cell>; 11] = [
         let source = cell.settings.simulation_mut()?;
         Some(Field::Count(&mut source.samples))
     }),
-    row("noise", Kind::Number(0.0, f64::MAX), |cell| {
+    row("noise", NOISE, |cell| {
         let source = cell.settings.simulation_mut()?;
         Some(Field::Number(&mut source.scene.noise.relative))
     }),
@@ -303,11 +301,7 @@ impl Experiment {
         if let Some(empty) = self.axes().find(|axis| axis.values.is_empty()) {
             return Err(RunError::NoValues(empty.kind.name()));
         }
-        if self
-            .second_axis
-            .as_ref()
-            .is_some_and(|second| second.kind == self.axis.kind)
-        {
+        if self.second_axis.as_ref().map(|second| second.kind) == Some(self.axis.kind) {
             return Err(RunError::SameAxes(self.axis.kind.name()));
         }
         let (repeats, folds) = self.repeats_and_folds();
@@ -342,10 +336,9 @@ impl Experiment {
                 });
             }
             let mut cell = self.cell(0, 0);
-            let mut values = 0..axis.values.len();
-            values
-                .try_for_each(|index| axis.apply(index, &mut cell))
-                .map_err(TrainingError::from)?;
+            for index in 0..axis.values.len() {
+                axis.apply(index, &mut cell).map_err(TrainingError::from)?;
+            }
         }
         Ok(())
     }
