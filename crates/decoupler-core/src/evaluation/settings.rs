@@ -55,6 +55,12 @@ pub enum Source {
     },
 }
 
+impl From<Simulation> for Source {
+    fn from(simulation: Simulation) -> Self {
+        Self::Simulated(simulation)
+    }
+}
+
 impl Source {
     /// Returns the row model: one network shared by all row-wires, or one per row-wire.
     pub fn row_model(&self) -> RowModel {
@@ -119,7 +125,7 @@ impl Default for RunSettings {
 impl From<Simulation> for RunSettings {
     /// Returns the paper's settings for samples of this simulation.
     fn from(simulation: Simulation) -> Self {
-        Self::of(Source::Simulated(simulation), InputChoice::PAPER)
+        Self::of(simulation.into(), InputChoice::PAPER)
     }
 }
 
