@@ -78,10 +78,10 @@ fn invalid_arguments_end_with_status_2() {
     let cases = [
         ("train --hidden 0", "from 1 to 512"),
         ("train --hidden twelve", "from 1 to 512"),
-        ("train --samples 0", "from 1 to 1e6"),
+        ("train --samples 0", "from 1 to 1000000"),
         ("train --samples -5", "not a whole number"),
         ("train --set test-samples=0", "from 1"),
-        ("train --set validation-samples=1000001", "from 0 to 1e6"),
+        ("train --set validation-samples=1000001", "from 0 to 1000000"),
         ("train --epochs 0", "from 1"),
         ("train --seed -1", "not a whole number"),
         ("train --seed 18446744073709551616", "not a whole number"),

@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::Simulation,
     evaluation::{Outlook, Preset, RunSettings},
     network::{InputChoice, Quantity, ScalingChoice},
-    scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Radii, Rows, Scene},
+    scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Radii, Rows, Scene, TiltedBody},
     training::StoppingRules,
 };
 use decoupler_files::export::format_number;
@@ -204,10 +204,10 @@ fn only_the_settings_of_the_current_choices_are_shown() {
         panic!("{:?}", driver.state().draft.simulation().unwrap().scene)
     };
     let (smallest, largest) = (8.0, 8.0);
-    let cylinder = IndenterShape::Cylinder {
+    let cylinder = IndenterShape::Cylinder(TiltedBody {
         radius_mm: Radii { smallest, largest },
         largest_tilt_degrees: 12.0,
-    };
+    });
     assert_eq!(indenter.shape, cylinder, "the largest radius follows the smallest");
     choose(&mut driver, "Shape", "Edge");
     shows(&driver, &["Shape", "Largest tilt", "Spread"]);

@@ -15,6 +15,7 @@ pub use limits::check_presses;
 use std::fmt;
 
 use glam::DVec3;
+use strum::VariantArray;
 use thiserror::Error;
 
 use crate::{
@@ -117,7 +118,7 @@ impl CalibrationError {
 ///
 /// Only differences of coordinates matter, so the x of the first row-wire is the origin and stays, and the y of the first
 /// column-wire cancels: rows are centred over the column-wires.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::Display)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::Display, strum::VariantArray)]
 pub enum SensorParameter {
     /// Distance of the undeformed row-wires above the column-wires.
     #[strum(to_string = "height")]
@@ -144,15 +145,7 @@ pub enum SensorParameter {
 
 impl SensorParameter {
     /// Every parameter.
-    pub const ALL: [Self; 7] = [
-        Self::Height,
-        Self::RowPitch,
-        Self::NodePitch,
-        Self::ColumnPitch,
-        Self::ColumnNodeX,
-        Self::ColumnNodePitch,
-        Self::Resistivity,
-    ];
+    pub const ALL: [Self; 7] = *Self::VARIANTS.as_array().expect("there are seven");
 
     /// Index in [`Self::ALL`].
     fn index(self) -> usize {

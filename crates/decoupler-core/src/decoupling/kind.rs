@@ -1,10 +1,21 @@
 use serde::{Deserialize, Serialize};
-use strum::EnumMessage;
+use strum::{EnumMessage, VariantArray};
 
 use crate::text::Named;
 
 /// Method of decoding the readings of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::Display, strum::EnumMessage, strum::IntoStaticStr)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Hash,
+    strum::Display,
+    strum::EnumMessage,
+    strum::IntoStaticStr,
+    strum::VariantArray,
+)]
 #[strum(serialize_all = "lowercase")]
 pub enum DecoderKind {
     /// Mean of the training set, independent of the readings.
@@ -59,15 +70,7 @@ pub enum Precision {
 
 impl DecoderKind {
     /// All decoders, in the order offered to the user.
-    pub const ALL: [Self; 7] = [
-        Self::Mean,
-        Self::Ridge,
-        Self::Network,
-        Self::RadialBasis,
-        Self::Fuzzy,
-        Self::Newton,
-        Self::Polish,
-    ];
+    pub const ALL: [Self; 7] = *Self::VARIANTS.as_array().expect("there are seven");
 
     /// Largest number of steps of [`DecoderKind::Polish`].
     pub const POLISH_STEPS: usize = 3;

@@ -177,7 +177,7 @@ impl TestErrors {
             measures.iter().find(is_infinite).map(|measure| measure.field())
         };
         match self {
-            Self::Nodes(errors) => first(&ErrorMeasure::OF_NODES, Figures::Nodes(errors)).map(str::to_owned),
+            Self::Nodes(errors) => first(ErrorMeasure::OF_NODES, Figures::Nodes(errors)).map(str::to_owned),
             Self::Targets(targets) => targets.iter().enumerate().find_map(|(index, errors)| {
                 let name = first(ErrorMeasure::OF_TARGETS, Figures::Target(errors))?;
                 Some(format!("{index}.{name}"))
@@ -264,11 +264,9 @@ impl TargetErrors {
 
 /// Returns the smallest and the largest value.
 pub(crate) fn extremes(values: ArrayView1<'_, f64>) -> (f64, f64) {
-    values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
-            (low.min(value), high.max(value))
-        })
+    let none = (f64::INFINITY, f64::NEG_INFINITY);
+    let widen = |(low, high): (f64, f64), &value: &f64| (low.min(value), high.max(value));
+    values.iter().fold(none, widen)
 }
 
 /// Returns `true` if the values differ by more than rounding.

@@ -44,10 +44,10 @@ pub enum Part {
     Random,
 }
 
-const SAMPLES: Kind = Kind::Integer(1, LARGEST_SAMPLES as u64);
-const NOISE: Kind = Kind::Number(0.0, f64::MAX);
-const HIDDEN: Kind = Kind::Integer(1, LARGEST_HIDDEN as u64);
-const STARTS: Kind = Kind::Integer(1, MAX_STARTS as u64);
+pub(super) const SAMPLES: Kind = Kind::Integer(1, LARGEST_SAMPLES as u64);
+pub(super) const NOISE: Kind = Kind::Number(0.0, f64::MAX);
+pub(super) const HIDDEN: Kind = Kind::Integer(1, LARGEST_HIDDEN as u64);
+pub(super) const STARTS: Kind = Kind::Integer(1, MAX_STARTS as u64);
 
 /// Settings of a run except those of its method, in the order in which they are offered and set.
 pub static RUN_OPTIONS: [RunOption; 24] = [
@@ -205,32 +205,18 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
             ))
         },
     ),
-    option(
-        Part::Training,
-        (
-            "epochs",
-            "N",
-            "1000; for a recording 300, or 2000 with a method that follows gradients (scg, rp, gd…)",
-        ),
-        STOPPING[0].kind,
-        STOPPING[0].help,
-        |run| (STOPPING[0].field)(&mut run.training.stopping),
-    ),
-    stopping(1, ("goal", "", "0"), |run| {
-        (STOPPING[1].field)(&mut run.training.stopping)
-    }),
-    stopping(2, ("min gradient", "", "1e-7"), |run| {
-        (STOPPING[2].field)(&mut run.training.stopping)
-    }),
-    stopping(
-        3,
-        (
-            "max fail",
-            "",
-            "6; 100 for a recording with a method that follows gradients",
-        ),
-        |run| (STOPPING[3].field)(&mut run.training.stopping),
-    ),
+    stopping::<0>((
+        "epochs",
+        "N",
+        "1000; for a recording 300, or 2000 with a method that follows gradients (scg, rp, gd…)",
+    )),
+    stopping::<1>(("goal", "", "0")),
+    stopping::<2>(("min gradient", "", "1e-7")),
+    stopping::<3>((
+        "max fail",
+        "",
+        "6; 100 for a recording with a method that follows gradients",
+    )),
     option(
         Part::Random,
         ("seed", "N", "0"),
@@ -255,13 +241,12 @@ const fn option(
     }
 }
 
-/// A rule that ends a training.
-const fn stopping(
-    rule: usize,
-    texts: (&'static str, &'static str, &'static str),
-    field: fn(&mut RunSettings) -> Option<Field<'_>>,
-) -> RunOption {
-    option(Part::Training, texts, STOPPING[rule].kind, STOPPING[rule].help, field)
+/// Rule number `RULE`, from 0, of those that end a training.
+const fn stopping<const RULE: usize>(texts: (&'static str, &'static str, &'static str)) -> RunOption {
+    let Setting { kind, help, .. } = STOPPING[RULE];
+    option(Part::Training, texts, kind, help, |run| {
+        (STOPPING[RULE].field)(&mut run.training.stopping)
+    })
 }
 
 fn noise(run: &mut RunSettings) -> Option<&mut Noise> {

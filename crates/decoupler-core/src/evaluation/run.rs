@@ -185,11 +185,8 @@ impl Run {
 
     /// Returns the states of all trainings for [`Self::new`]: start by start, and in each row by row.
     pub fn states(&self) -> Vec<TrainerState> {
-        self.starts
-            .iter()
-            .flat_map(StartTrainer::rows)
-            .map(Trainer::state)
-            .collect()
+        let trainers = self.starts.iter().flat_map(StartTrainer::rows);
+        trainers.map(Trainer::state).collect()
     }
 
     /// Returns the test set.
@@ -289,12 +286,10 @@ impl Run {
             let network = self.network().decoder_program(&self.problem, None);
             self.errors_of(&ProgramDecoder::new(network).answers_to(&self.test))
         };
+        let several = self.combined().filter(|combined| !combined.others.is_empty());
         Some(Scores {
             network: self.errors(),
-            network_alone: self
-                .combined()
-                .filter(|combined| !combined.others.is_empty())
-                .map(|_| alone()),
+            network_alone: several.map(|_| alone()),
             baselines: self.baselines.clone()?,
             coverage: self.coverage().to_vec(),
         })

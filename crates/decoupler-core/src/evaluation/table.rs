@@ -1,6 +1,6 @@
 use std::{hint::black_box, time::Instant};
 
-use strum::EnumMessage;
+use strum::{EnumMessage, VariantArray};
 
 use super::{Coverage, Errors, PublishedErrors, Scores, TargetErrors, TestErrors, recorded::HysteresisLoop};
 use crate::{
@@ -32,8 +32,8 @@ pub struct ErrorRow {
     pub errors: Vec<Option<f64>>,
 }
 
-/// A measure of error.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumMessage)]
+/// A measure of error: those of nodes, those of targets, and those of their intervals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumMessage, strum::VariantArray)]
 pub enum ErrorMeasure {
     /// AveZerr, in percent.
     #[strum(message = "Mean |decoupled z − z| / |z| over samples and nodes, in percent of the coordinate (AveZerr)")]
@@ -70,14 +70,14 @@ pub enum ErrorMeasure {
     /// Mean absolute error in percent of the range of the target.
     #[strum(message = "Mean absolute error in percent of the range of the target")]
     RangePercent,
+    /// Mean half-width of the intervals, in the unit of the target.
+    #[strum(message = "Mean half-width of the 90 % intervals, in the unit of the target")]
+    HalfWidth,
     /// Share of the samples within their intervals, in percent.
     #[strum(
         message = "Share of the test samples whose target is within its 90 % interval, in percent: about 90 if they are like the training samples"
     )]
     CoveragePercent,
-    /// Mean half-width of the intervals, in the unit of the target.
-    #[strum(message = "Mean half-width of the 90 % intervals, in the unit of the target")]
-    HalfWidth,
 }
 
 /// Name of the row of the network.
@@ -91,23 +91,8 @@ const MODEL_BASED: &str = "model-based";
 const ALL_TARGETS: &str = "all targets";
 
 impl ErrorMeasure {
-    pub(super) const OF_NODES: [Self; 6] = [
-        Self::ZPercent,
-        Self::XPercent,
-        Self::YPercent,
-        Self::ZMm,
-        Self::ZStrokePercent,
-        Self::WorstMm,
-    ];
-    const OF_TARGETS_WITH_INTERVALS: [Self; 7] = [
-        Self::Rmse,
-        Self::Mae,
-        Self::R2,
-        Self::Worst,
-        Self::RangePercent,
-        Self::HalfWidth,
-        Self::CoveragePercent,
-    ];
+    pub(super) const OF_NODES: &[Self] = Self::VARIANTS.split_at(Self::Rmse as usize).0;
+    const OF_TARGETS_WITH_INTERVALS: &[Self] = Self::VARIANTS.split_at(Self::Rmse as usize).1;
     pub(super) const OF_TARGETS: &[Self] = Self::OF_TARGETS_WITH_INTERVALS.split_at(5).0;
 
     /// Name in files, heading, and fixed unit.
@@ -248,7 +233,7 @@ impl ErrorTable {
     /// Adds the measures of the intervals of what is used.
     fn add_coverage(&mut self, coverage: Option<Coverage>) {
         let used = self.used();
-        self.measures = &ErrorMeasure::OF_TARGETS_WITH_INTERVALS;
+        self.measures = ErrorMeasure::OF_TARGETS_WITH_INTERVALS;
         let added = &self.measures[ErrorMeasure::OF_TARGETS.len()..];
         for row in &mut self.rows {
             let coverage = coverage.as_ref().filter(|_| row.name == used);
@@ -260,7 +245,7 @@ impl ErrorTable {
     /// Returns the tables of these errors, each with its name.
     pub fn of_errors(problem: &Problem, rows: &[(&'static str, &TestErrors)]) -> Vec<Self> {
         if problem.has_nodes() {
-            let measures = &ErrorMeasure::OF_NODES;
+            let measures = ErrorMeasure::OF_NODES;
             let row = |(name, errors): &(&'static str, &TestErrors)| {
                 Some(ErrorRow::new(name, measures, Figures::Nodes(errors.nodes()?)))
             };

@@ -5,7 +5,7 @@ mod noise;
 mod rows;
 
 pub(crate) use loading::DeformationSampler;
-pub use loading::{Indenter, IndenterShape, Loading, Radii};
+pub use loading::{Indenter, IndenterShape, Loading, Radii, TiltedBody};
 pub(crate) use noise::standard_normal;
 pub use noise::{Noise, NoiseSource, NoisySets};
 pub use rows::{RowModel, Rows};

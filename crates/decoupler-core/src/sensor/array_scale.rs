@@ -13,10 +13,8 @@ pub const LARGEST_COUNT: usize = 512;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct ArrayScale {
-    rows: usize,
-    nodes_per_row: usize,
-    nodes_per_column: usize,
-    columns: usize,
+    /// M1 to M4.
+    counts: [usize; 4],
 }
 
 impl ArrayScale {
@@ -29,71 +27,57 @@ impl ArrayScale {
 
     /// `M4 = 3·M2` as the paper requires: as many equations per row-wire as coordinates.
     const fn derived(rows: usize, nodes_per_row: usize, nodes_per_column: usize) -> Self {
-        Self {
-            rows,
-            nodes_per_row,
-            nodes_per_column,
-            columns: 3 * nodes_per_row,
-        }
+        let counts = [rows, nodes_per_row, nodes_per_column, 3 * nodes_per_row];
+        Self { counts }
     }
 
-    /// Creates an array of `rows` (M1) row-wires with `nodes_per_row` (M2) nodes over `columns` (M4) column-wires with
-    /// `nodes_per_column` (M3) nodes.
+    /// Creates an array of M1 row-wires with M2 nodes over M4 column-wires with M3 nodes from `[M1, M2, M3, M4]`.
     ///
     /// # Errors
     /// If a count is outside `1..=LARGEST_COUNT`.
-    pub fn new(
-        rows: usize,
-        nodes_per_row: usize,
-        nodes_per_column: usize,
-        columns: usize,
-    ) -> Result<Self, SensorError> {
-        for (what, count) in [
-            ("row-wires (M1)", rows),
-            ("nodes on a row-wire (M2)", nodes_per_row),
-            ("nodes on a column-wire (M3)", nodes_per_column),
-            ("column-wires (M4)", columns),
-        ] {
+    pub fn new(counts: [usize; 4]) -> Result<Self, SensorError> {
+        let names = [
+            "row-wires (M1)",
+            "nodes on a row-wire (M2)",
+            "nodes on a column-wire (M3)",
+            "column-wires (M4)",
+        ];
+        for (what, count) in names.into_iter().zip(counts) {
             if !(1..=LARGEST_COUNT).contains(&count) {
                 return Err(SensorError::Count { what, count });
             }
         }
-        Ok(Self {
-            rows,
-            nodes_per_row,
-            nodes_per_column,
-            columns,
-        })
+        Ok(Self { counts })
     }
 
     /// Returns M1, the number of row-wires on top.
     pub fn rows(self) -> usize {
-        self.rows
+        self.counts[0]
     }
 
     /// Returns M2, the number of nodes on each row-wire.
     pub fn nodes_per_row(self) -> usize {
-        self.nodes_per_row
+        self.counts[1]
     }
 
     /// Returns M3, the number of nodes on each column-wire.
     pub fn nodes_per_column(self) -> usize {
-        self.nodes_per_column
+        self.counts[2]
     }
 
     /// Returns M4, the number of column-wires at the bottom: of resistances read for each row-wire.
     pub fn columns(self) -> usize {
-        self.columns
+        self.counts[3]
     }
 
     /// Returns 3·M2, the number of coordinates of the nodes of one row-wire.
     pub fn coordinates_per_row(self) -> usize {
-        3 * self.nodes_per_row
+        3 * self.nodes_per_row()
     }
 
     /// Returns a note for the user if the array departs from the paper's rule M4 = 3·M2.
     pub fn note(self) -> Option<String> {
-        let equations = self.columns;
+        let equations = self.columns();
         let coordinates = self.coordinates_per_row();
         (equations != coordinates).then(|| {
             let kind = if equations < coordinates { "fewer" } else { "more" };
@@ -121,18 +105,13 @@ impl FromStr for ArrayScale {
             pair[0] = first.trim().parse().map_err(|_| form())?;
             pair[1] = second.trim().parse().map_err(|_| form())?;
         }
-        Self::new(counts[0], counts[1], counts[2], counts[3])
+        Self::new(counts)
     }
 }
 
 impl fmt::Display for ArrayScale {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            rows,
-            nodes_per_row,
-            nodes_per_column,
-            columns,
-        } = self;
+        let [rows, nodes_per_row, nodes_per_column, columns] = self.counts;
         f.pad(&format!("{rows}×{nodes_per_row}_{nodes_per_column}×{columns}"))
     }
 }

@@ -1,5 +1,7 @@
 //! Training methods with their settings.
 
+#![expect(missing_docs, reason = "strum derives methods without documentation")]
+
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -12,7 +14,16 @@ use crate::{sensor::short, text::UnknownName};
 /// [`EpochRecord::parameter`](crate::training::EpochRecord::parameter); and advice, in the imperative, for a training that
 /// diverged or did not lower the error.
 #[derive(
-    Clone, Copy, Debug, PartialEq, Serialize, Deserialize, strum::EnumMessage, strum::EnumProperty, strum::IntoStaticStr,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Serialize,
+    Deserialize,
+    strum::EnumMessage,
+    strum::EnumProperty,
+    strum::EnumTryAs,
+    strum::IntoStaticStr,
 )]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Method {
@@ -34,93 +45,39 @@ pub enum Method {
     #[strum(props(remedy = "try another seed, more samples, or Levenberg-Marquardt (lm)"))]
     BayesianRegularization(RegularizationSettings),
     /// Møller's scaled conjugate gradient (`trainscg`).
-    #[strum(
-        serialize = "scg",
-        message = "Scaled conjugate gradient",
-        props(parameter = "lambda")
-    )]
+    #[strum(serialize = "scg", message = "Scaled conjugate gradient")]
+    #[strum(props(parameter = "lambda"))]
     #[strum(
         detailed_message = "Conjugate directions, step length from the curvature: little memory, for very large networks."
     )]
     #[strum(props(remedy = "try another seed, or Levenberg-Marquardt (lm)"))]
-    ScaledConjugateGradient {
-        /// Length of the finite difference from which the curvature is estimated.
-        sigma: f64,
-        /// Initial scale of the curvature.
-        lambda: f64,
-        /// Factor on the sum of the squared weights, which is added to the sum of the squared errors. Files from before
-        /// this setting existed lack it.
-        #[serde(default)]
-        decay: f64,
-    },
+    ScaledConjugateGradient(ConjugateSettings),
     /// Resilient back-propagation (`trainrp`).
-    #[strum(
-        serialize = "rp",
-        message = "Resilient back-propagation",
-        props(parameter = "mean step length")
-    )]
+    #[strum(serialize = "rp", message = "Resilient back-propagation")]
+    #[strum(props(parameter = "mean step length"))]
     #[strum(detailed_message = "Each weight has its own step length and uses only the sign of its slope.")]
     #[strum(props(remedy = "lower the first and the largest step length, or try another seed"))]
-    Resilient {
-        /// Step length of every weight in the first epoch (delta0).
-        first_length: f64,
-        /// Factor on a weight's step length while its slope keeps its sign.
-        length_increase: f64,
-        /// Factor on a weight's step length when its slope changes sign.
-        length_decrease: f64,
-        /// Largest step of a weight in one epoch (deltamax).
-        largest_length: f64,
-    },
+    Resilient(ResilientSettings),
     /// Gradient descent with momentum and an adaptive learning rate (`traingdx`).
-    #[strum(
-        serialize = "gdx",
-        message = "Adaptive rate with momentum",
-        props(parameter = "learning rate")
-    )]
+    #[strum(serialize = "gdx", message = "Adaptive rate with momentum")]
+    #[strum(props(parameter = "learning rate"))]
     #[strum(detailed_message = "Gradient descent with momentum whose learning rate grows while the error falls.")]
     #[strum(props(remedy = "lower the learning rate, run more epochs, or try another seed"))]
-    AdaptiveDescent {
-        /// Initial step length relative to the length of the gradient.
-        learning_rate: f64,
-        /// Share of the previous step in each step, below 1.
-        momentum: f64,
-        /// Factor on the learning rate after a step that lowers the error.
-        rate_increase: f64,
-        /// Factor on the learning rate after a rejected step.
-        rate_decrease: f64,
-        /// A step that raises the error by more than this factor is rejected.
-        largest_error_increase: f64,
-    },
+    AdaptiveDescent(AdaptiveSettings),
     /// Gradient descent with momentum of steps (`traingdm`).
-    #[strum(
-        serialize = "gdms",
-        message = "Momentum of steps",
-        props(parameter = "learning rate")
-    )]
+    #[strum(serialize = "gdms", message = "Momentum of steps")]
+    #[strum(props(parameter = "learning rate"))]
     #[strum(detailed_message = "Gradient descent that mixes the previous step into each step, as traingdm does.")]
     #[strum(props(remedy = "change the learning rate, run more epochs, or try another method"))]
-    StepMomentum {
-        /// Step length relative to the length of the gradient.
-        learning_rate: f64,
-        /// Share of the previous step in each step, below 1.
-        momentum: f64,
-    },
+    StepMomentum(MomentumSettings),
     /// Gradient descent with momentum of gradients, Eq. (11).
-    #[strum(
-        serialize = "gdm",
-        message = "Momentum, Eq. (11)",
-        props(parameter = "learning rate")
-    )]
+    #[strum(serialize = "gdm", message = "Momentum, Eq. (11)")]
+    #[strum(props(parameter = "learning rate"))]
     #[strum(
         detailed_message = "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does."
     )]
     #[strum(props(remedy = "change the learning rate, run more epochs, or try another method"))]
-    Momentum {
-        /// Step length relative to the length of the gradient (alpha).
-        learning_rate: f64,
-        /// Share of the previous gradient in each step (eta).
-        momentum: f64,
-    },
+    Momentum(MomentumSettings),
     /// Conventional back-propagation, Eq. (5)-(10) (`traingd`).
     #[strum(serialize = "gd", message = "Gradient descent", props(parameter = "learning rate"))]
     #[strum(detailed_message = "Conventional back-propagation, Eq. (5)-(10): a step down the gradient each epoch.")]
@@ -198,6 +155,60 @@ impl RegularizationSettings {
     }
 }
 
+/// Settings of the scaled conjugate gradient.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConjugateSettings {
+    /// Length of the finite difference from which the curvature is estimated.
+    pub sigma: f64,
+    /// Initial scale of the curvature.
+    pub lambda: f64,
+    /// Factor on the sum of the squared weights, which is added to the sum of the squared errors. Files from before
+    /// this setting existed lack it.
+    #[serde(default)]
+    pub decay: f64,
+}
+
+/// Settings of resilient back-propagation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ResilientSettings {
+    /// Step length of every weight in the first epoch (delta0).
+    pub first_length: f64,
+    /// Factor on a weight's step length while its slope keeps its sign.
+    pub length_increase: f64,
+    /// Factor on a weight's step length when its slope changes sign.
+    pub length_decrease: f64,
+    /// Largest step of a weight in one epoch (deltamax).
+    pub largest_length: f64,
+}
+
+/// Settings of gradient descent with momentum and an adaptive learning rate.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AdaptiveSettings {
+    /// Initial step length relative to the length of the gradient.
+    pub learning_rate: f64,
+    /// Share of the previous step in each step, below 1.
+    pub momentum: f64,
+    /// Factor on the learning rate after a step that lowers the error.
+    pub rate_increase: f64,
+    /// Factor on the learning rate after a rejected step.
+    pub rate_decrease: f64,
+    /// A step that raises the error by more than this factor is rejected.
+    pub largest_error_increase: f64,
+}
+
+/// Settings of gradient descent with momentum, of steps or of gradients.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MomentumSettings {
+    /// Step length relative to the length of the gradient (alpha).
+    pub learning_rate: f64,
+    /// Share of the previous step, below 1, or of the previous gradient (eta) in each step.
+    pub momentum: f64,
+}
+
 impl Default for Method {
     fn default() -> Self {
         Self::LevenbergMarquardt(Damping::default())
@@ -206,10 +217,10 @@ impl Default for Method {
 
 impl Method {
     /// Momentum of gradients with the field's usual defaults.
-    pub const MOMENTUM: Self = Self::Momentum {
+    pub const MOMENTUM: Self = Self::Momentum(MomentumSettings {
         learning_rate: 0.01,
         momentum: 0.9,
-    };
+    });
 
     /// Returns every method with its defaults, in the order offered to the user.
     pub fn all() -> [Self; 8] {
@@ -217,23 +228,23 @@ impl Method {
             Self::default(),
             Self::bayesian_regularization(),
             Self::scaled_conjugate_gradient(0.0),
-            Self::Resilient {
+            Self::Resilient(ResilientSettings {
                 first_length: 0.07,
                 length_increase: 1.2,
                 length_decrease: 0.5,
                 largest_length: 50.0,
-            },
-            Self::AdaptiveDescent {
+            }),
+            Self::AdaptiveDescent(AdaptiveSettings {
                 learning_rate: 0.01,
                 momentum: 0.9,
                 rate_increase: 1.05,
                 rate_decrease: 0.7,
                 largest_error_increase: 1.04,
-            },
-            Self::StepMomentum {
+            }),
+            Self::StepMomentum(MomentumSettings {
                 learning_rate: 0.01,
                 momentum: 0.9,
-            },
+            }),
             Self::MOMENTUM,
             Self::GradientDescent { learning_rate: 0.01 },
         ]
@@ -264,11 +275,11 @@ impl Method {
 
     /// Returns the scaled conjugate gradient with this weight decay and the field's usual defaults.
     pub fn scaled_conjugate_gradient(decay: f64) -> Self {
-        Self::ScaledConjugateGradient {
+        Self::ScaledConjugateGradient(ConjugateSettings {
             sigma: 5e-5,
             lambda: 5e-7,
             decay,
-        }
+        })
     }
 
     /// Returns the settings of this method.

@@ -5,7 +5,9 @@ mod method;
 mod rows;
 mod training;
 
-pub use method::{Damping, Method, RegularizationSettings};
+pub use method::{
+    AdaptiveSettings, ConjugateSettings, Damping, Method, MomentumSettings, RegularizationSettings, ResilientSettings,
+};
 pub use rows::{Field, Kind, Setting, SettingError, Value};
 use training::METHOD;
 pub use training::{EPOCHS, StoppingRules, TrainingSettings};

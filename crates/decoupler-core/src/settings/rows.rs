@@ -23,16 +23,20 @@ pub struct Setting<S: 'static> {
     pub field: fn(&mut S) -> Option<Field<'_>>,
 }
 
-/// Allowed values of a setting.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Allowed values of a setting, and in words what a value is.
+#[derive(Clone, Copy, Debug, PartialEq, strum::Display)]
 pub enum Kind {
     /// Number with its smallest and largest value.
+    #[strum(to_string = "a number")]
     Number(f64, f64),
     /// Integer with its smallest and largest value.
+    #[strum(to_string = "a whole number")]
     Integer(u64, u64),
     /// One of the names, as [`Field::Text`] lists them in its error.
+    #[strum(to_string = "a name")]
     Choice,
     /// Text of a form of its own, such as an array scale.
+    #[strum(to_string = "a text")]
     Text,
 }
 
@@ -90,12 +94,32 @@ impl Display for Value {
     }
 }
 
+impl Kind {
+    /// Returns the text of a number of this kind: one that counts has all its digits.
+    fn number(self, number: f64) -> String {
+        match self {
+            Self::Integer(..) if number.abs() < 1e15 => number.to_string(),
+            _ => short(number),
+        }
+    }
+
+    /// Describes the range of a number: `0 or more`, `from 1 to 1000000`.
+    fn limits(self) -> String {
+        match self {
+            Self::Number(min, f64::MAX) => format!("{} or more", short(min)),
+            Self::Number(min, max) => format!("from {} to {}", short(min), short(max)),
+            Self::Integer(min, max) => format!("from {min} to {max}"),
+            Self::Choice | Self::Text => self.to_string(),
+        }
+    }
+}
+
 /// Error for an invalid setting, which each variant names first.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum SettingError {
     /// A value is out of its range.
-    #[error("{} is {}: it must be from {} to {}", .0, short(*.1), short(*.2.start()), short(*.2.end()))]
-    Range(&'static str, f64, RangeInclusive<f64>),
+    #[error("{} is {}: it must be {}", .0, .2.number(*.1), .2.limits())]
+    Range(&'static str, f64, Kind),
     /// The value of an integer has a fraction.
     #[error("{} is {}: it must be a whole number", .0, short(*.1))]
     NotWhole(&'static str, f64),
@@ -167,7 +191,7 @@ impl<S: Clone> Setting<S> {
         };
         let name = self.name;
         if !range.contains(&value) {
-            return Err(SettingError::Range(name, value, range));
+            return Err(SettingError::Range(name, value, self.kind));
         }
         if matches!(self.kind, Kind::Integer(..)) && value.fract() != 0.0 {
             return Err(SettingError::NotWhole(name, value));
@@ -222,17 +246,6 @@ impl<S: Clone> Setting<S> {
     }
 }
 
-impl Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Number(..) => "a number",
-            Self::Integer(..) => "a whole number",
-            Self::Choice => "a name",
-            Self::Text => "a text",
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -271,6 +284,15 @@ mod tests {
             ("1,5", "step length: '1,5' is not a number"),
         ] {
             assert_eq!(LENGTH.parse(text).unwrap_err().to_string(), message);
+        }
+        let open = Kind::Number(0.0, f64::MAX);
+        let counted = Kind::Integer(0, 1_000_000);
+        for (value, kind, message) in [
+            (2.1, LENGTH.kind, "length is 2.1: it must be from 0 to 2"),
+            (-1.0, open, "length is -1: it must be 0 or more"),
+            (1_000_001.0, counted, "length is 1000001: it must be from 0 to 1000000"),
+        ] {
+            assert_eq!(SettingError::Range("length", value, kind).to_string(), message);
         }
         for (length, is_valid) in [(0.0, true), (2.0, true), (2.1, false), (f64::NAN, false)] {
             LENGTH.set(&mut two, &Value::Number(length)).unwrap();

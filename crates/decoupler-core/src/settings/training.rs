@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Damping, Field, Kind, Method, RegularizationSettings, Setting, SettingError};
+use super::{Damping, Field, Kind, Method, Setting, SettingError};
 
 /// Method and stopping rules of a training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -154,104 +154,84 @@ pub(super) static METHOD: &[Setting<Method>] = &[
         "Groups of weights, each with its own strength of regularisation. 1: all together. 2: hidden layer and output \
          layer. 3: the biases of the hidden layer separate, too. 4: all biases separate. From 2 on, output biases are \
          drawn towards the means of the targets, not towards 0.",
-        |method| Some(Field::Number(&mut regularization(method)?.groups)),
+        |method| Some(Field::Number(&mut method.try_as_bayesian_regularization_mut()?.groups)),
     ),
     Setting::new(
         "own noise",
         Kind::Integer(0, 1),
         "1: every target has its own noise level, so that a noisy or jittering target does not spoil the others, if \
          there are at least as many samples as weights. 0: one noise level for all.",
-        |method| Some(Field::Number(&mut regularization(method)?.own_noise)),
+        |method| {
+            Some(Field::Number(
+                &mut method.try_as_bayesian_regularization_mut()?.own_noise,
+            ))
+        },
     ),
     Setting::new(
         "sigma",
         Kind::Number(1e-12, 1.0),
         "Length of the finite difference from which the curvature is estimated.",
-        |method| match method {
-            Method::ScaledConjugateGradient { sigma, .. } => Some(Field::Number(sigma)),
-            _ => None,
-        },
+        |method| Some(Field::Number(&mut method.try_as_scaled_conjugate_gradient_mut()?.sigma)),
     ),
     Setting::new(
         "lambda",
         LENGTH,
         "Initial scale of the curvature: it shortens steps where the error is not convex.",
-        |method| match method {
-            Method::ScaledConjugateGradient { lambda, .. } => Some(Field::Number(lambda)),
-            _ => None,
+        |method| {
+            Some(Field::Number(
+                &mut method.try_as_scaled_conjugate_gradient_mut()?.lambda,
+            ))
         },
     ),
     Setting::new(
         "weight decay",
         Kind::Number(0.0, 1e12),
         "Penalty on large weights: this times the sum of the squared weights is added to the sum of the squared errors.",
-        |method| match method {
-            Method::ScaledConjugateGradient { decay, .. } => Some(Field::Number(decay)),
-            _ => None,
-        },
+        |method| Some(Field::Number(&mut method.try_as_scaled_conjugate_gradient_mut()?.decay)),
     ),
     Setting::new(
         "first step length",
         LENGTH,
         "Step length of every weight in the first epoch (delta0).",
-        |method| match method {
-            Method::Resilient { first_length, .. } => Some(Field::Number(first_length)),
-            _ => None,
-        },
+        |method| Some(Field::Number(&mut method.try_as_resilient_mut()?.first_length)),
     ),
     Setting::new(
         "length increase",
         GROWTH,
         "Factor on a weight's step length while its slope keeps its sign.",
-        |method| match method {
-            Method::Resilient { length_increase, .. } => Some(Field::Number(length_increase)),
-            _ => None,
-        },
+        |method| Some(Field::Number(&mut method.try_as_resilient_mut()?.length_increase)),
     ),
     Setting::new(
         "length decrease",
         REDUCTION,
         "Factor on a weight's step length when its slope changes sign.",
-        |method| match method {
-            Method::Resilient { length_decrease, .. } => Some(Field::Number(length_decrease)),
-            _ => None,
-        },
+        |method| Some(Field::Number(&mut method.try_as_resilient_mut()?.length_decrease)),
     ),
     Setting::new(
         "largest step length",
         LENGTH,
         "Largest step of a weight in one epoch (deltamax).",
-        |method| match method {
-            Method::Resilient { largest_length, .. } => Some(Field::Number(largest_length)),
-            _ => None,
-        },
+        |method| Some(Field::Number(&mut method.try_as_resilient_mut()?.largest_length)),
     ),
     Setting::new(
         "learning rate",
         LENGTH,
         "Initial step length relative to the length of the gradient; it adapts from there.",
-        |method| match method {
-            Method::AdaptiveDescent { learning_rate, .. } => Some(Field::Number(learning_rate)),
-            _ => None,
-        },
+        |method| Some(Field::Number(&mut method.try_as_adaptive_descent_mut()?.learning_rate)),
     ),
     Setting::new(
         "learning rate",
         LENGTH,
         "Step length relative to the length of the gradient (alpha).",
-        |method| match method {
-            Method::Momentum { learning_rate, .. } => Some(Field::Number(learning_rate)),
-            _ => None,
-        },
+        |method| Some(Field::Number(&mut method.try_as_momentum_mut()?.learning_rate)),
     ),
     Setting::new(
         "learning rate",
         LENGTH,
         "Step length relative to the length of the gradient.",
         |method| match method {
-            Method::GradientDescent { learning_rate } | Method::StepMomentum { learning_rate, .. } => {
-                Some(Field::Number(learning_rate))
-            }
+            Method::GradientDescent { learning_rate } => Some(Field::Number(learning_rate)),
+            Method::StepMomentum(settings) => Some(Field::Number(&mut settings.learning_rate)),
             _ => None,
         },
     ),
@@ -259,19 +239,15 @@ pub(super) static METHOD: &[Setting<Method>] = &[
         "momentum",
         Kind::Number(0.0, 1.0),
         "Share of the previous gradient in each step (eta), from 0 to 1.",
-        |method| match method {
-            Method::Momentum { momentum, .. } => Some(Field::Number(momentum)),
-            _ => None,
-        },
+        |method| Some(Field::Number(&mut method.try_as_momentum_mut()?.momentum)),
     ),
     Setting::new(
         "momentum",
         Kind::Number(0.0, MAX_MOMENTUM),
         "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.",
         |method| match method {
-            Method::AdaptiveDescent { momentum, .. } | Method::StepMomentum { momentum, .. } => {
-                Some(Field::Number(momentum))
-            }
+            Method::AdaptiveDescent(settings) => Some(Field::Number(&mut settings.momentum)),
+            Method::StepMomentum(settings) => Some(Field::Number(&mut settings.momentum)),
             _ => None,
         },
     ),
@@ -279,29 +255,22 @@ pub(super) static METHOD: &[Setting<Method>] = &[
         "rate increase",
         GROWTH,
         "Factor on the learning rate after a step that lowers the error.",
-        |method| match method {
-            Method::AdaptiveDescent { rate_increase, .. } => Some(Field::Number(rate_increase)),
-            _ => None,
-        },
+        |method| Some(Field::Number(&mut method.try_as_adaptive_descent_mut()?.rate_increase)),
     ),
     Setting::new(
         "rate decrease",
         REDUCTION,
         "Factor on the learning rate after a rejected step.",
-        |method| match method {
-            Method::AdaptiveDescent { rate_decrease, .. } => Some(Field::Number(rate_decrease)),
-            _ => None,
-        },
+        |method| Some(Field::Number(&mut method.try_as_adaptive_descent_mut()?.rate_decrease)),
     ),
     Setting::new(
         "largest error increase",
         Kind::Number(1.0, 1e6),
         "A step that raises the error by more than this factor is rejected.",
-        |method| match method {
-            Method::AdaptiveDescent {
-                largest_error_increase, ..
-            } => Some(Field::Number(largest_error_increase)),
-            _ => None,
+        |method| {
+            Some(Field::Number(
+                &mut method.try_as_adaptive_descent_mut()?.largest_error_increase,
+            ))
         },
     ),
 ];
@@ -314,17 +283,10 @@ fn damping(method: &mut Method) -> Option<&mut Damping> {
     }
 }
 
-fn regularization(method: &mut Method) -> Option<&mut RegularizationSettings> {
-    match method {
-        Method::BayesianRegularization(settings) => Some(settings),
-        _ => None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::Value;
+    use crate::settings::{RegularizationSettings, Value};
 
     #[test]
     fn integer_settings_reject_fractions() {

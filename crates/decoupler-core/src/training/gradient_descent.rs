@@ -51,6 +51,15 @@ pub struct AdaptiveState {
     pub(super) step: Vec<f64>,
 }
 
+/// State of resilient back-propagation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResilientState {
+    /// Gradient of the previous epoch.
+    pub(super) previous_gradient: Vec<f64>,
+    /// Step length of each weight.
+    pub(super) lengths: Vec<f64>,
+}
+
 /// Largest learning rate, which keeps a long run of accepted steps from overflowing.
 const MAX_RATE: f64 = 1e300;
 
@@ -60,16 +69,16 @@ impl GradientDescent {
         let mut backpropagation = Backpropagation::new(mlp);
         let zeros = vec![0.0; mlp.weights().len()];
         let mut state = match method {
-            Method::Momentum { .. } => MethodState::Momentum(zeros),
-            Method::StepMomentum { .. } => MethodState::StepMomentum(zeros),
-            Method::AdaptiveDescent { learning_rate, .. } => MethodState::AdaptiveDescent(AdaptiveState {
-                learning_rate,
+            Method::Momentum(_) => MethodState::Momentum(zeros),
+            Method::StepMomentum(_) => MethodState::StepMomentum(zeros),
+            Method::AdaptiveDescent(settings) => MethodState::AdaptiveDescent(AdaptiveState {
+                learning_rate: settings.learning_rate,
                 step: zeros,
             }),
-            Method::Resilient { first_length, .. } => MethodState::Resilient {
-                lengths: vec![first_length; zeros.len()],
+            Method::Resilient(settings) => MethodState::Resilient(ResilientState {
+                lengths: vec![settings.first_length; zeros.len()],
                 previous_gradient: zeros,
-            },
+            }),
             _ => MethodState::GradientDescent,
         };
         let now = backpropagation.evaluate(mlp, examples);
@@ -95,51 +104,29 @@ impl GradientDescent {
             (Method::GradientDescent { learning_rate }, _) => {
                 weights.for_each(|(weight, slope)| *weight -= learning_rate * slope);
             }
-            (
-                Method::Momentum {
-                    learning_rate: rate,
-                    momentum,
-                },
-                MethodState::Momentum(previous),
-            ) => {
+            (Method::Momentum(settings), MethodState::Momentum(previous)) => {
+                let (rate, momentum) = (settings.learning_rate, settings.momentum);
                 for ((weight, slope), previous) in weights.zip(previous) {
                     *weight -= rate * ((1.0 - momentum) * slope + momentum * *previous);
                     *previous = *slope;
                 }
             }
-            (
-                Method::StepMomentum {
-                    learning_rate,
-                    momentum,
-                },
-                MethodState::StepMomentum(previous),
-            ) => {
-                add_momentum(weights, previous, learning_rate, momentum);
+            (Method::StepMomentum(settings), MethodState::StepMomentum(previous)) => {
+                add_momentum(weights, previous, settings.learning_rate, settings.momentum);
             }
-            (Method::AdaptiveDescent { momentum, .. }, MethodState::AdaptiveDescent(state)) => {
-                add_momentum(weights, &mut state.step, state.learning_rate, momentum);
+            (Method::AdaptiveDescent(settings), MethodState::AdaptiveDescent(state)) => {
+                add_momentum(weights, &mut state.step, state.learning_rate, settings.momentum);
             }
-            (
-                Method::Resilient {
-                    length_increase,
-                    length_decrease,
-                    largest_length,
-                    ..
-                },
-                MethodState::Resilient {
-                    previous_gradient,
-                    lengths,
-                },
-            ) => {
-                let lengths = lengths.iter_mut().zip(previous_gradient);
+            (Method::Resilient(settings), MethodState::Resilient(state)) => {
+                let lengths = state.lengths.iter_mut().zip(&mut state.previous_gradient);
                 for ((weight, slope), (length, before)) in weights.zip(lengths) {
                     // Compares signs, since the product of two tiny slopes would be 0.
                     let factor = match (*slope > 0.0, *slope < 0.0, *before > 0.0, *before < 0.0) {
-                        (true, _, true, _) | (_, true, _, true) => length_increase,
-                        (true, _, _, true) | (_, true, true, _) => length_decrease,
+                        (true, _, true, _) | (_, true, _, true) => settings.length_increase,
+                        (true, _, _, true) | (_, true, true, _) => settings.length_decrease,
                         _ => 1.0,
                     };
-                    *length = (*length * factor).min(largest_length);
+                    *length = (*length * factor).min(settings.largest_length);
                     if *slope != 0.0 {
                         *weight -= length.copysign(*slope);
                     }
@@ -169,19 +156,11 @@ impl Algorithm for GradientDescent {
         self.candidate.weights_mut().copy_from_slice(mlp.weights());
         self.move_candidate();
         let then = self.backpropagation.evaluate(&self.candidate, examples);
-        if let (
-            Method::AdaptiveDescent {
-                rate_increase,
-                rate_decrease,
-                largest_error_increase,
-                ..
-            },
-            MethodState::AdaptiveDescent(state),
-        ) = (self.method, &mut self.state)
+        if let (Method::AdaptiveDescent(settings), MethodState::AdaptiveDescent(state)) = (self.method, &mut self.state)
         {
-            let bearable = then.mse <= largest_error_increase * self.now.mse;
+            let bearable = then.mse <= settings.largest_error_increase * self.now.mse;
             if !bearable || then.if_finite().is_err() {
-                state.learning_rate *= rate_decrease;
+                state.learning_rate *= settings.rate_decrease;
                 for (step, slope) in state.step.iter_mut().zip(&self.gradient) {
                     let next = -state.learning_rate * slope;
                     *step = if next.is_finite() { next } else { 0.0 };
@@ -189,7 +168,7 @@ impl Algorithm for GradientDescent {
                 return Ok(self.now);
             }
             if then.mse < self.now.mse {
-                state.learning_rate = (state.learning_rate * rate_increase).min(MAX_RATE);
+                state.learning_rate = (state.learning_rate * settings.rate_increase).min(MAX_RATE);
             }
         }
         std::mem::swap(mlp, &mut self.candidate);
@@ -202,13 +181,9 @@ impl Algorithm for GradientDescent {
     fn parameter(&self) -> f64 {
         match (&self.state, self.method) {
             (MethodState::AdaptiveDescent(state), _) => state.learning_rate,
-            (MethodState::Resilient { lengths, .. }, _) => lengths.iter().sum::<f64>() / lengths.len() as f64,
-            (
-                _,
-                Method::GradientDescent { learning_rate }
-                | Method::Momentum { learning_rate, .. }
-                | Method::StepMomentum { learning_rate, .. },
-            ) => learning_rate,
+            (MethodState::Resilient(state), _) => state.lengths.iter().sum::<f64>() / state.lengths.len() as f64,
+            (_, Method::GradientDescent { learning_rate }) => learning_rate,
+            (_, Method::Momentum(settings) | Method::StepMomentum(settings)) => settings.learning_rate,
             _ => f64::NAN,
         }
     }
@@ -225,20 +200,23 @@ impl Algorithm for GradientDescent {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::training::examples::tests::{random_examples, random_mlp};
+    use crate::training::{
+        AdaptiveSettings, MomentumSettings,
+        examples::tests::{random_examples, random_mlp},
+    };
 
     fn start(method: Method, mlp: &Mlp, examples: &Examples) -> (GradientDescent, Evaluation) {
         GradientDescent::new(method, mlp, examples)
     }
 
     fn adaptive(learning_rate: f64) -> Method {
-        Method::AdaptiveDescent {
+        Method::AdaptiveDescent(AdaptiveSettings {
             learning_rate,
             momentum: 0.9,
             rate_increase: 1.05,
             rate_decrease: 0.7,
             largest_error_increase: 1.04,
-        }
+        })
     }
 
     #[test]
@@ -249,10 +227,10 @@ mod tests {
             backpropagation.evaluate(mlp, &examples);
             backpropagation.gradient
         };
-        let of_gradients = Method::Momentum {
+        let of_gradients = Method::Momentum(MomentumSettings {
             learning_rate: 0.1,
             momentum: 0.7,
-        };
+        });
         let mut method = start(of_gradients, &mlp, &examples).0;
         let (start, g0) = (mlp.weights().to_vec(), gradient(&mlp));
         method.step(&mut mlp, &examples).unwrap();

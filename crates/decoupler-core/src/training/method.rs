@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Evaluation, Examples, Method, StopReason,
     bayesian_regularization::{BayesianRegularization, BayesianState},
-    gradient_descent::{AdaptiveState, GradientDescent},
+    gradient_descent::{AdaptiveState, GradientDescent, ResilientState},
     levenberg_marquardt::LevenbergMarquardt,
     normal_equations::Plan,
     scaled_conjugate_gradient::{ConjugateState, ScaledConjugateGradient},
@@ -53,12 +53,7 @@ pub enum MethodState {
     /// State of [`Method::ScaledConjugateGradient`].
     ScaledConjugateGradient(ConjugateState),
     /// State of [`Method::Resilient`].
-    Resilient {
-        /// Gradient of the previous epoch.
-        previous_gradient: Vec<f64>,
-        /// Step length of each weight.
-        lengths: Vec<f64>,
-    },
+    Resilient(ResilientState),
     /// State of [`Method::AdaptiveDescent`].
     AdaptiveDescent(AdaptiveState),
     /// Previous step of [`Method::StepMomentum`].
@@ -75,10 +70,7 @@ impl MethodState {
         let vectors = match self {
             Self::LevenbergMarquardt { .. } | Self::BayesianRegularization(_) | Self::GradientDescent => Vec::new(),
             Self::ScaledConjugateGradient(state) => vec![&state.p[..], &state.r],
-            Self::Resilient {
-                previous_gradient,
-                lengths,
-            } => vec![&previous_gradient[..], lengths],
+            Self::Resilient(state) => vec![&state.previous_gradient[..], &state.lengths],
             Self::AdaptiveDescent(state) => vec![&state.step[..]],
             Self::StepMomentum(previous) | Self::Momentum(previous) => vec![&previous[..]],
         };
@@ -98,9 +90,7 @@ impl Method {
         match *self {
             Self::LevenbergMarquardt(settings) => boxed(LevenbergMarquardt::new(settings, mlp, examples)),
             Self::BayesianRegularization(settings) => boxed(BayesianRegularization::new(settings, mlp, examples)),
-            Self::ScaledConjugateGradient { sigma, lambda, decay } => {
-                boxed(ScaledConjugateGradient::new(sigma, lambda, decay, mlp, examples))
-            }
+            Self::ScaledConjugateGradient(settings) => boxed(ScaledConjugateGradient::new(settings, mlp, examples)),
             _ => boxed(GradientDescent::new(*self, mlp, examples)),
         }
     }
@@ -127,7 +117,7 @@ impl Method {
                 plan.multiplications() + plan.trace_multiplications()
             }
             // Two evaluations of error and gradient: one for the curvature, one after the step.
-            Self::ScaledConjugateGradient { .. } => 4.0 * per_run,
+            Self::ScaledConjugateGradient(_) => 4.0 * per_run,
             // One run of the network over the samples, and the gradient.
             _ => 3.0 * per_run,
         }

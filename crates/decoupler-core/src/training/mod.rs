@@ -19,7 +19,10 @@ mod scaled_conjugate_gradient;
 mod tests;
 mod trainer;
 
-pub use crate::settings::{Damping, Method, RegularizationSettings, SettingError, StoppingRules, TrainingSettings};
+pub use crate::settings::{
+    AdaptiveSettings, ConjugateSettings, Damping, Method, MomentumSettings, RegularizationSettings, ResilientSettings,
+    SettingError, StoppingRules, TrainingSettings,
+};
 pub use checkpoint::TrainerState;
 pub use ending::StopReason;
 pub use examples::Examples;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Evaluation, Examples, StopReason,
+    ConjugateSettings, Evaluation, Examples, StopReason,
     activations::Backpropagation,
     method::{Algorithm, MethodState},
 };
@@ -15,10 +15,7 @@ use crate::network::Mlp;
 /// the quadratic model predicts the error. An epoch is one iteration, even if its step is rejected. With weight decay E
 /// includes the penalty on the weights; the errors returned do not.
 pub(super) struct ScaledConjugateGradient {
-    /// Length of the finite difference from which the curvature is estimated.
-    sigma: f64,
-    /// Factor on the sum of the squared weights in E.
-    decay: f64,
+    settings: ConjugateSettings,
     state: ConjugateState,
     now: Evaluation,
     /// E at the weights: the mean squared error and the penalty.
@@ -47,18 +44,17 @@ pub struct ConjugateState {
 
 impl ScaledConjugateGradient {
     /// Starts with these settings of [`Method::ScaledConjugateGradient`](super::Method::ScaledConjugateGradient).
-    pub(super) fn new(sigma: f64, lambda: f64, decay: f64, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
+    pub(super) fn new(settings: ConjugateSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);
-        let (now, objective) = penalized(&mut backpropagation, decay, mlp, examples);
+        let (now, objective) = penalized(&mut backpropagation, settings.decay, mlp, examples);
         let r: Vec<f64> = backpropagation.gradient.iter().map(|slope| -slope).collect();
         let method = Self {
-            sigma,
-            decay,
+            settings,
             state: ConjugateState {
                 p: r.clone(),
                 r,
                 delta: 0.0,
-                lambda,
+                lambda: settings.lambda,
                 lambda_bar: 0.0,
                 success: true,
                 since_restart: 0,
@@ -77,7 +73,7 @@ impl ScaledConjugateGradient {
         for (target, (weight, p)) in self.moved.weights_mut().iter_mut().zip(moved) {
             *target = weight + length * p;
         }
-        penalized(&mut self.backpropagation, self.decay, &self.moved, examples)
+        penalized(&mut self.backpropagation, self.settings.decay, &self.moved, examples)
     }
 
     /// Updates residual and direction (Møller's step 7) after an accepted step with μ = pᵀr.
@@ -115,7 +111,7 @@ impl Algorithm for ScaledConjugateGradient {
             return Err(StopReason::Diverged);
         }
         if self.state.success {
-            let sigma = self.sigma / square.sqrt();
+            let sigma = self.settings.sigma / square.sqrt();
             self.evaluate_along(mlp, sigma, examples);
             let differences = self.backpropagation.gradient.iter().zip(&self.state.r);
             let along = differences.zip(&self.state.p).map(|((slope, r), p)| p * (slope + r));
@@ -204,10 +200,15 @@ mod tests {
     use super::*;
     use crate::training::examples::tests::{random_examples, random_mlp};
 
+    fn start(lambda: f64, decay: f64, mlp: &Mlp, examples: &Examples) -> (ScaledConjugateGradient, Evaluation) {
+        let sigma = 5e-5;
+        ScaledConjugateGradient::new(ConjugateSettings { sigma, lambda, decay }, mlp, examples)
+    }
+
     #[test]
     fn an_overflow_of_lambda_is_not_reported_as_a_small_gradient() {
         let (mut mlp, examples) = (random_mlp(3, 4, 2, 1), random_examples(50, 3, 2, 2));
-        let (mut method, start) = ScaledConjugateGradient::new(5e-5, 1e300, 0.0, &mlp, &examples);
+        let (mut method, start) = start(1e300, 0.0, &mlp, &examples);
         assert!(start.gradient_norm > 0.1);
         let reason = (0..100).find_map(|_| method.step(&mut mlp, &examples).err());
         assert_eq!(reason, Some(StopReason::LambdaLarge));
@@ -222,7 +223,7 @@ mod tests {
             let squares: f64 = mlp.weights().iter().map(|weight| weight * weight).sum();
             Backpropagation::new(mlp).evaluate(mlp, &examples).mse + DECAY * squares / 100.0
         };
-        let (mut method, start) = ScaledConjugateGradient::new(5e-5, 5e-7, DECAY, &mlp, &examples);
+        let (mut method, start) = start(5e-7, DECAY, &mlp, &examples);
         let before = objective(&mlp);
         let last = (0..2000)
             .map_while(|_| method.step(&mut mlp, &examples).ok())

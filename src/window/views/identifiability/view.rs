@@ -184,7 +184,7 @@ fn array_ui(ui: &mut Ui, scale: &mut ArrayScale) {
     let (name, usual) = ("Nodes on each column", usual.nodes_per_column());
     count_ui(ui, name, hint, &mut nodes, limits(usual));
     stepped_slider_ui(ui, name, &mut nodes, usual, 1..=20, 1.0);
-    if let Ok(changed) = ArrayScale::new(scale.rows(), scale.nodes_per_row(), nodes, columns) {
+    if let Ok(changed) = ArrayScale::new([scale.rows(), scale.nodes_per_row(), nodes, columns]) {
         *scale = changed;
     }
     let rows = counted(scale.rows(), "row-wire");

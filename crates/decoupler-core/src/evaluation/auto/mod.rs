@@ -227,10 +227,10 @@ impl fmt::Display for TriedModel {
             } => {
                 write!(f, "{starts} × {hidden} hidden nodes, {}", method.short_name())?;
                 // Candidates that differ in nothing else.
-                if let Method::ScaledConjugateGradient { decay, .. } = method
-                    && *decay > 0.0
+                if let Method::ScaledConjugateGradient(settings) = method
+                    && settings.decay > 0.0
                 {
-                    write!(f, ", decay {decay:.2}")?;
+                    write!(f, ", decay {:.2}", settings.decay)?;
                 }
                 f.write_str(if *is_on_residual { ", added to ridge" } else { "" })
             }

@@ -218,7 +218,7 @@ impl Search<'_> {
             Err(error) => return Err(error),
         };
         let (max_epochs, patience) = match settings.training.method {
-            Method::ScaledConjugateGradient { .. } => SHORT_EPOCHS,
+            Method::ScaledConjugateGradient(_) => SHORT_EPOCHS,
             _ => EPOCHS,
         };
         let max_epochs = self.fixed.epochs.unwrap_or(max_epochs);

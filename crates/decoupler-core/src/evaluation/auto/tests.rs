@@ -409,10 +409,10 @@ fn many_inputs_for_few_samples_get_weight_decay() {
         &mut |_| (),
     )
     .unwrap();
-    let Method::ScaledConjugateGradient { decay, .. } = choice.settings.training.method else {
+    let Method::ScaledConjugateGradient(settings) = choice.settings.training.method else {
         panic!("{:?}", choice.record);
     };
-    assert!(decay > 0.0);
+    assert!(settings.decay > 0.0);
     let ridge = choice
         .record
         .tried

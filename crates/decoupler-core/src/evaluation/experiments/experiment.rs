@@ -1,10 +1,13 @@
 use serde::{Deserialize, Serialize};
+use strum::VariantArray;
 
 use super::Trial;
 use crate::{
-    dataset::{DatasetError, Division, LARGEST_SAMPLES, Seed, SplitBy},
-    evaluation::{CrossValidation, MAX_STARTS, PublishedErrors, RunError, RunSettings},
-    network::LARGEST_HIDDEN,
+    dataset::{DatasetError, Division, Seed, SplitBy},
+    evaluation::{
+        CrossValidation, PublishedErrors, RunError, RunSettings,
+        options::{HIDDEN, NOISE, SAMPLES, STARTS},
+    },
     sensor::ArrayScale,
     settings::{EPOCHS, Field, Kind, Setting, SettingError, Value},
     training::{Method, StoppingRules, TrainingError},
@@ -20,7 +23,7 @@ pub struct Axis {
 }
 
 /// Setting that an axis varies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, strum::VariantArray)]
 #[serde(rename_all = "snake_case")]
 pub enum AxisKind {
     /// Number of hidden nodes.
@@ -47,65 +50,54 @@ pub enum AxisKind {
     Seed,
 }
 
-const HIDDEN: Kind = Kind::Integer(1, LARGEST_HIDDEN as u64);
-const SAMPLES: Kind = Kind::Integer(1, LARGEST_SAMPLES as u64);
-const STARTS: Kind = Kind::Integer(1, MAX_STARTS as u64);
-
 /// Settings of a cell that an axis can vary, in the order of [`AxisKind`], which is the one offered to the user.
-static ROWS: [(AxisKind, Setting<Cell>); 11] = [
-    row(AxisKind::Hidden, "hidden nodes", HIDDEN, |cell| {
+static ROWS: [Setting<Cell>; 11] = [
+    row("hidden nodes", HIDDEN, |cell| {
         Some(Field::Count(&mut cell.settings.hidden))
     }),
-    row(AxisKind::Array, "array", Kind::Text, |cell| {
+    row("array", Kind::Text, |cell| {
         let scale = &mut cell.settings.simulation_mut()?.sensor.scale;
         Some(Field::text(scale.to_string(), scale, str::parse))
     }),
-    row(AxisKind::Samples, "samples", SAMPLES, |cell| {
+    row("samples", SAMPLES, |cell| {
         let source = cell.settings.simulation_mut()?;
         Some(Field::Count(&mut source.samples))
     }),
-    row(AxisKind::Noise, "noise", Kind::Number(0.0, f64::MAX), |cell| {
+    row("noise", NOISE, |cell| {
         let source = cell.settings.simulation_mut()?;
         Some(Field::Number(&mut source.scene.noise.relative))
     }),
-    row(AxisKind::Inputs, "inputs", Kind::Choice, |cell| {
+    row("inputs", Kind::Choice, |cell| {
         cell.settings.simulation()?;
         Some(Field::named(&mut cell.settings.inputs.quantity))
     }),
-    row(AxisKind::Scaling, "scaling", Kind::Choice, |cell| {
+    row("scaling", Kind::Choice, |cell| {
         Some(Field::named(&mut cell.settings.inputs.scaling))
     }),
-    row(AxisKind::Method, "method", Kind::Choice, |cell| {
+    row("method", Kind::Choice, |cell| {
         let method = &mut cell.settings.training.method;
         Some(Field::text(method.short_name().to_owned(), method, Method::named))
     }),
-    row(AxisKind::Epochs, EPOCHS.name, EPOCHS.kind, |cell| {
+    row(EPOCHS.name, EPOCHS.kind, |cell| {
         (EPOCHS.field)(&mut cell.settings.training.stopping)
     }),
-    row(AxisKind::Starts, "starts", STARTS, |cell| {
-        Some(Field::Count(&mut cell.settings.starts))
-    }),
-    row(AxisKind::Split, "split", Kind::Choice, |cell| {
+    row("starts", STARTS, |cell| Some(Field::Count(&mut cell.settings.starts))),
+    row("split", Kind::Choice, |cell| {
         Some(Field::named(&mut cell.division.as_mut()?.by))
     }),
-    row(AxisKind::Seed, "seed", Kind::Integer(0, u64::MAX), |cell| {
+    row("seed", Kind::Integer(0, u64::MAX), |cell| {
         Some(Field::Integer(&mut cell.settings.seed.0))
     }),
 ];
 
-const fn row(
-    axis: AxisKind,
-    name: &'static str,
-    kind: Kind,
-    field: fn(&mut Cell) -> Option<Field<'_>>,
-) -> (AxisKind, Setting<Cell>) {
-    (axis, Setting::new(name, kind, "", field))
+const fn row(name: &'static str, kind: Kind, field: fn(&mut Cell) -> Option<Field<'_>>) -> Setting<Cell> {
+    Setting::new(name, kind, "", field)
 }
 
 impl AxisKind {
     /// Returns the row of the table of settings.
     pub fn setting(self) -> &'static Setting<Cell> {
-        &ROWS[self as usize].1
+        &ROWS[self as usize]
     }
 
     /// Name of the setting.
@@ -120,8 +112,8 @@ impl AxisKind {
             division: settings.simulation().is_none().then(Division::default),
             ..Cell::default()
         };
-        let rows = ROWS.iter().filter(move |(_, setting)| setting.applies(&cell));
-        rows.map(|(kind, _)| *kind)
+        let kinds = Self::VARIANTS.iter().copied();
+        kinds.filter(move |kind| kind.setting().applies(&cell))
     }
 }
 
@@ -309,11 +301,7 @@ impl Experiment {
         if let Some(empty) = self.axes().find(|axis| axis.values.is_empty()) {
             return Err(RunError::NoValues(empty.kind.name()));
         }
-        if self
-            .second_axis
-            .as_ref()
-            .is_some_and(|second| second.kind == self.axis.kind)
-        {
+        if self.second_axis.as_ref().map(|second| second.kind) == Some(self.axis.kind) {
             return Err(RunError::SameAxes(self.axis.kind.name()));
         }
         let (repeats, folds) = self.repeats_and_folds();
@@ -348,10 +336,9 @@ impl Experiment {
                 });
             }
             let mut cell = self.cell(0, 0);
-            let mut values = 0..axis.values.len();
-            values
-                .try_for_each(|index| axis.apply(index, &mut cell))
-                .map_err(TrainingError::from)?;
+            for index in 0..axis.values.len() {
+                axis.apply(index, &mut cell).map_err(TrainingError::from)?;
+            }
         }
         Ok(())
     }
@@ -464,6 +451,15 @@ mod tests {
             }
         }
         assert_eq!(published, 11);
+    }
+
+    #[test]
+    fn every_axis_has_the_row_of_its_setting() {
+        assert_eq!(AxisKind::VARIANTS.len(), ROWS.len());
+        for kind in AxisKind::VARIANTS {
+            let in_file = serde_json::to_value(kind).unwrap();
+            assert!(kind.name().starts_with(in_file.as_str().unwrap()), "{kind:?}");
+        }
     }
 
     #[test]

@@ -22,12 +22,10 @@ pub struct ExperimentResults {
 impl ExperimentResults {
     /// Creates empty results.
     pub fn new(experiment: Experiment) -> Self {
+        let simulation = experiment.base.simulation();
         Self {
             cells: experiment.cells(),
-            problem: experiment
-                .base
-                .simulation()
-                .map(|simulation| Arc::new(simulation.problem())),
+            problem: simulation.map(|simulation| Arc::new(simulation.problem())),
             experiment,
         }
     }

@@ -24,7 +24,8 @@ pub struct Indenter {
 }
 
 /// Shape of an indenter. A tilt is the largest slope relative to the surface; the slope is drawn from 0 to the tilt.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum IndenterShape {
     /// A ball.
@@ -33,24 +34,25 @@ pub enum IndenterShape {
         radius_mm: Radii,
     },
     /// The flat end of a round bar.
-    FlatPunch {
-        /// Radius.
-        radius_mm: Radii,
-        /// Largest slope of its face.
-        largest_tilt_degrees: f64,
-    },
+    #[strum(serialize = "flat punch")]
+    FlatPunch(TiltedBody),
     /// A bar lying across the whole surface, in any direction.
-    Cylinder {
-        /// Radius.
-        radius_mm: Radii,
-        /// Largest slope along its axis.
-        largest_tilt_degrees: f64,
-    },
+    Cylinder(TiltedBody),
     /// The straight edge of a large block, in any direction; one side of it is pressed.
     Edge {
         /// Largest slope along the edge.
         largest_tilt_degrees: f64,
     },
+}
+
+/// Size and tilt of a round body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TiltedBody {
+    /// Radius.
+    pub radius_mm: Radii,
+    /// Largest slope: of the face of a punch, along the axis of a cylinder.
+    pub largest_tilt_degrees: f64,
 }
 
 /// A range of radii in millimetres, drawn uniformly.
@@ -66,10 +68,9 @@ pub struct Radii {
 impl Default for Indenter {
     /// Balls of 2 to 6 mm radius; the surface recovers with a decay length of 2 mm, the node pitch.
     fn default() -> Self {
+        let radius_mm = Self::RADIUS_MM;
         Self {
-            shape: IndenterShape::Sphere {
-                radius_mm: Self::RADIUS_MM,
-            },
+            shape: IndenterShape::Sphere { radius_mm },
             spread_mm: 2.0,
         }
     }
@@ -86,18 +87,15 @@ impl Indenter {
 
     /// Returns the four shapes with default sizes and tilts, in the order of [`IndenterShape`].
     pub fn all() -> [Self; 4] {
-        let radius_mm = Self::RADIUS_MM;
-        let largest_tilt_degrees = Self::TILT_DEGREES;
+        let (radius_mm, largest_tilt_degrees) = (Self::RADIUS_MM, Self::TILT_DEGREES);
+        let body = TiltedBody {
+            radius_mm,
+            largest_tilt_degrees,
+        };
         let shapes = [
             IndenterShape::Sphere { radius_mm },
-            IndenterShape::FlatPunch {
-                radius_mm,
-                largest_tilt_degrees,
-            },
-            IndenterShape::Cylinder {
-                radius_mm,
-                largest_tilt_degrees,
-            },
+            IndenterShape::FlatPunch(body),
+            IndenterShape::Cylinder(body),
             IndenterShape::Edge { largest_tilt_degrees },
         ];
         shapes.map(|shape| Self {
@@ -108,26 +106,16 @@ impl Indenter {
 
     /// Returns the name of the shape.
     pub fn name(&self) -> &'static str {
-        match self.shape {
-            IndenterShape::Sphere { .. } => "sphere",
-            IndenterShape::FlatPunch { .. } => "flat punch",
-            IndenterShape::Cylinder { .. } => "cylinder",
-            IndenterShape::Edge { .. } => "edge",
-        }
+        self.shape.into()
     }
 
     /// Returns the radius in mm, if the shape has one, and the largest tilt in degrees.
     pub fn radius_mm_and_tilt_degrees(&self) -> (Option<Radii>, f64) {
         match self.shape {
             IndenterShape::Sphere { radius_mm } => (Some(radius_mm), 0.0),
-            IndenterShape::FlatPunch {
-                radius_mm,
-                largest_tilt_degrees,
+            IndenterShape::FlatPunch(body) | IndenterShape::Cylinder(body) => {
+                (Some(body.radius_mm), body.largest_tilt_degrees)
             }
-            | IndenterShape::Cylinder {
-                radius_mm,
-                largest_tilt_degrees,
-            } => (Some(radius_mm), largest_tilt_degrees),
             IndenterShape::Edge { largest_tilt_degrees } => (None, largest_tilt_degrees),
         }
     }

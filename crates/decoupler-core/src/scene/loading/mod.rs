@@ -4,7 +4,7 @@ mod indenter;
 mod press;
 mod sampler;
 
-pub use indenter::{Indenter, IndenterShape, Radii};
+pub use indenter::{Indenter, IndenterShape, Radii, TiltedBody};
 pub(crate) use sampler::DeformationSampler;
 
 use std::{fmt, str::FromStr};
@@ -33,9 +33,7 @@ impl fmt::Display for Loading {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::RandomNodes => f.pad("random"),
-            Self::SmoothField {
-                correlation_length_mm: length,
-            } => f.pad(&format!("smooth:{length}")),
+            Self::SmoothField { correlation_length_mm } => f.pad(&format!("smooth:{correlation_length_mm}")),
             Self::Indenter(indenter) => f.pad(&format!("indenter:{}", indenter.name().replace(' ', "-"))),
         }
     }

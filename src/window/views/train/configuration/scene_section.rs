@@ -205,14 +205,9 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
     }
     let (radius, tilt) = match &mut indenter.shape {
         IndenterShape::Sphere { radius_mm } => (Some(radius_mm), None),
-        IndenterShape::FlatPunch {
-            radius_mm,
-            largest_tilt_degrees,
+        IndenterShape::FlatPunch(body) | IndenterShape::Cylinder(body) => {
+            (Some(&mut body.radius_mm), Some(&mut body.largest_tilt_degrees))
         }
-        | IndenterShape::Cylinder {
-            radius_mm,
-            largest_tilt_degrees,
-        } => (Some(radius_mm), Some(largest_tilt_degrees)),
         IndenterShape::Edge { largest_tilt_degrees } => (None, Some(largest_tilt_degrees)),
     };
     if let Some(radius) = radius {

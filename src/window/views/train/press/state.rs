@@ -3,7 +3,7 @@ use std::sync::Arc;
 use decoupler_core::{
     evaluation::RunSettings,
     network::Networks,
-    scene::{Indenter, IndenterShape, Radii},
+    scene::{Indenter, IndenterShape, Radii, TiltedBody},
 };
 use decoupler_files::figure::surface::{Sight, Surface};
 use eframe::egui::{Id, Rect};
@@ -317,16 +317,14 @@ impl Finger {
             largest: self.radius_mm,
         };
         let largest_tilt_degrees = 0.0;
+        let body = TiltedBody {
+            radius_mm,
+            largest_tilt_degrees,
+        };
         let shape = match self.tool {
             Tool::Sphere => IndenterShape::Sphere { radius_mm },
-            Tool::FlatPunch => IndenterShape::FlatPunch {
-                radius_mm,
-                largest_tilt_degrees,
-            },
-            Tool::Cylinder => IndenterShape::Cylinder {
-                radius_mm,
-                largest_tilt_degrees,
-            },
+            Tool::FlatPunch => IndenterShape::FlatPunch(body),
+            Tool::Cylinder => IndenterShape::Cylinder(body),
             Tool::Edge => IndenterShape::Edge { largest_tilt_degrees },
             Tool::OneNode => return None,
         };
