@@ -237,7 +237,15 @@ def test_a_recording_is_imported_with_the_division_of_the_program(folder, record
 
 def test_a_network_with_a_memory_decodes_consecutive_samples(folder, recorded):
     _, test = recorded
-    file = trained(folder, "--history", "1,2", "--method", "lm", "--epochs", "10", "--hidden", "3")
+    files = ["--data", "train.csv", "--test-data", "test.csv"]
+    columns = ["--inputs", "a,b,c", "--targets", "force,angle", "--lags", "1,2"]
+    done = program("inspect", *files, *columns, "--recipe-out", "lags.json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    settings = ["--method", "lm", "--epochs", "10", "--hidden", "3"]
+    done = program("train", "--recipe", "lags.json", *settings, "--out", "network.json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    file = load_network(folder / "network.json")
+    (folder / "network.json").unlink()
     answers = file.predict(test[NAMES].to_numpy())
     assert answers.shape == (60, 2)
     # The first sample has no past, so it is not decoded as in the middle of the stream.
@@ -262,9 +270,7 @@ def test_a_memory_continues_as_in_the_program(tmp_path):
     for arguments in [["inspect", "--data", "train.csv", *columns, *past], ["train", *training]]:
         done = program(*arguments, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
-    done = program(
-        "decode", "--network", "network.json", "--data", "train.csv", "--out", "decoded.csv", cwd=tmp_path
-    )
+    done = program("decode", "--network", "network.json", "--data", "train.csv", "--out", "decoded.csv", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     expected = pd.read_csv(tmp_path / "decoded.csv")["force"]
     network = load_network(tmp_path / "network.json")

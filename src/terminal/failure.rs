@@ -64,18 +64,15 @@ pub(super) enum Failure {
     Session(#[from] SessionError),
     #[error(transparent)]
     Sensor(SensorError),
-    #[error("cannot create the folder '{}': {}", .path.display(), system_cause(.source))]
-    MakeFolder { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Write(#[from] WriteError),
     #[error("{}", joined(.0))]
     Files(Vec<PictureError>),
     #[error("cannot write to standard output: {}", system_cause(.0))]
     Output(io::Error),
-    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
-    Read { path: PathBuf, source: io::Error },
-    #[error("cannot open '{}': {}", .path.display(), system_cause(.source))]
-    Open { path: PathBuf, source: io::Error },
+    /// What cannot be done with a path, and the cause.
+    #[error("cannot {} '{}': {}", .0, .1.display(), system_cause(.2))]
+    Path(&'static str, PathBuf, io::Error),
 }
 
 fn joined(errors: &[PictureError]) -> String {
@@ -117,17 +114,13 @@ impl Failure {
     }
 
     pub(super) fn make_folder(path: &Path) -> Result<(), Self> {
-        fs::create_dir_all(path).map_err(|source| Self::MakeFolder {
-            path: path.to_owned(),
-            source,
-        })
+        fs::create_dir_all(path).map_err(|error| Self::Path("create the folder", path.to_owned(), error))
     }
 
     /// Exit status of the program.
     pub(super) fn status(&self) -> u8 {
         match self {
-            Self::Arguments(_) | Self::Bundle(BundleError::Choice(_)) => 2,
-            Self::Import(ImportError::Columns(_)) => 2,
+            Self::Arguments(_) | Self::Bundle(BundleError::Choice(_)) | Self::Import(ImportError::Columns(_)) => 2,
             // A division or a memory that does not fit the samples is an argument; their shape is not.
             Self::Import(ImportError::Dataset(
                 DatasetError::Empty { .. } | DatasetError::Length { .. } | DatasetError::RowWire { .. },

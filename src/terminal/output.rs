@@ -234,10 +234,7 @@ fn read_resistances(
     input: &Path,
     take: &mut dyn FnMut(Readings) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
-    let opened = File::open(input).map_err(|source| Failure::Open {
-        path: input.to_owned(),
-        source,
-    })?;
+    let opened = File::open(input).map_err(|error| Failure::Path("open", input.to_owned(), error))?;
     let unreadable = |error| Failure::at(input, error);
     let read = scene.rows.read(sensor.scale.rows()).map_err(DatasetError::from)?;
     let mut readings = ReadingsFile::new(opened, file.line_parser(false, true)?);

@@ -69,10 +69,7 @@ struct Layout {
 impl Specification {
     /// Reads the file at `path` and checks each option and value separately.
     pub(super) fn read(path: &Path, train: &mut TrainOptions) -> Result<Self, Failure> {
-        let text = read_text(path).map_err(|source| Failure::Read {
-            path: path.to_owned(),
-            source,
-        })?;
+        let text = read_text(path).map_err(|error| Failure::Path("read", path.to_owned(), error))?;
         let layout: Layout = serde_json::from_str(&text).map_err(|error| {
             Failure::Arguments(format!(
                 "'{}' is not a specification: {}; write {{\"train\": {{OPTION: VALUE, ...}}, \"axes\": {{OPTION: [VALUE, ...], \
