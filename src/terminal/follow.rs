@@ -46,14 +46,14 @@ pub(super) struct Follow {
     #[arg(long, conflicts_with = "out")]
     pub(super) follow: bool,
     /// With --follow: output format [default: csv]
-    #[arg(long, value_name = "csv|jsonl", hide_possible_values = true, requires = "follow")]
+    #[arg(long, value_name = "csv|jsonl", hide_possible_values = true, conflicts_with = "out")]
     format: Option<Form>,
     /// With --follow: report rate and latency on standard error every N seconds; always at the end, and on SIGUSR1
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, requires = "follow")]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "out")]
     status: Option<Duration>,
     /// With --follow: relative noise of the readings (standard deviation) assumed in fault detection [default: that of
     /// the network's scene]
-    #[arg(long, value_name = "REL", value_parser = number, requires = "follow")]
+    #[arg(long, value_name = "REL", value_parser = number, conflicts_with = "out")]
     fault_noise: Option<f64>,
 }
 
@@ -72,8 +72,8 @@ impl Follow {
     pub(super) fn run(&self, input: &Path, file: NetworkFile) -> Result<(), Failure> {
         let noise = self.noise_of(&file)?;
         let input = input.to_str();
-        let input = input.ok_or_else(|| wrong("--input", "its name is not UTF-8"))?;
-        let source: Source = input.parse().map_err(|error| wrong("--input", error))?;
+        let input = input.ok_or_else(|| wrong("--data", "its name is not UTF-8"))?;
+        let source: Source = input.parse().map_err(|error| wrong("--data", error))?;
         let file = Arc::new(file);
         note_unmonitored(&file);
         let asked = Arc::new(AtomicBool::new(false));

@@ -304,7 +304,7 @@ fn the_network_of_a_recording_decodes_files_and_lines_by_column_names() {
         folder.path(),
         2,
     );
-    assert!(message.contains("--follow"), "{message}");
+    assert!(message.contains("cannot be used with '--fault-noise"), "{message}");
 }
 
 /// A network with the inputs x1 and x2, `n.json`; y = x1 - 2 x2.
