@@ -51,6 +51,7 @@ pub use self::{
     atomic::*, checkpoint_file::*, experiment_tables::*, network_file::*, recipe_file::*, run_folder::*, samples::*,
     sensor_file::*, sweep::*, table::*, tables::*, trade_tables::*,
 };
+pub use crate::csv_row::{csv_cell, write_csv_row};
 pub use decoupler_core::text::{format_below_one, format_duration, format_number, format_percent, format_r2};
 pub use document::{DocumentError, DocumentKind};
 pub use unfinished::exit_leaving_nothing;

@@ -18,7 +18,7 @@ use super::{
     progress::Watched,
     sheet_claims::{self, LARGEST, OF_CELL, Rectangle, outside},
 };
-use crate::{export::csv_cell, machine::ReadingBudget};
+use crate::{csv_row::csv_cell, machine::ReadingBudget};
 
 /// Reads the sheet with most numbers of an Excel file, or of an OpenDocument file with `is_ods`.
 ///
