@@ -191,7 +191,7 @@ fn errors_are_named() {
         ("train --loading smooth", "smooth:MM"),
         ("train --inputs volts", "resistance, conductance or log"),
         ("train --scaling none", "minmax or whiten"),
-        ("train --noise -1", "from 0"),
+        ("train --noise -1", "0 or more"),
         ("train --noise 2", "from 0 to 1"),
         ("train --noise 0,1", "is not a number"),
         ("train --decoder knn", "rbf, fuzzy, newton or polish"),

@@ -313,7 +313,8 @@ fn row_wires_in_readings_claim_only_the_memory_that_they_need() {
         let (is_done, message) = ended(&Vec::from_iter(command.split_whitespace()), folder.path());
         assert!(is_done, "{command}: {message}");
     }
-    let decode = ["decode", "--network", "n.json", "--data", "in.csv", "--out", "out.csv"];
+    let decode = "decode --network n.json --data in.csv --out out.csv --force".split(' ');
+    let decode = Vec::from_iter(decode);
     fs::write(folder.path().join("in.csv"), "t (s),row,a,b\n0,1,1,2\n1,10000,1,2\n").unwrap();
     let (is_read, message) = ended(&decode, folder.path());
     assert!(is_read, "{message}");
