@@ -76,7 +76,7 @@ def test_arrays_are_values():
         (lambda: SensorArray().identifiability(axes="y"), "not a choice of axes"),
         (lambda: SensorArray().identifiability(noise=-1.0), "noise is -1"),
         (lambda: simulate(samples=0), "samples is 0"),
-        (lambda: simulate(samples=10**9), "samples is 1e9: it must be from 1"),
+        (lambda: simulate(samples=10**9), "it must be from 1 to 1000000"),
         (lambda: simulate(rows=11), "row 11 does not exist"),
         (lambda: simulate(loading="brick"), "is not a loading"),
         (lambda: simulate(axes="xy"), "is not a choice of axes"),
