@@ -108,7 +108,9 @@ fn several_starts_keep_the_best_and_show_how_all_spread() {
         }
         let kept = run.leader_number() + 1;
         expected.push(format!("Start {kept} is kept: it has the lowest {deciding}."));
-        expected.push(format!("starts against {of_test}: other starts, kept start, quartiles, median"));
+        expected.push(format!(
+            "starts against {of_test}: other starts, kept start, quartiles, median"
+        ));
         opened.driver.assert_shows(&expected);
 
         opened.change(|settings| settings.starts = 1);
