@@ -96,16 +96,17 @@ impl From<SetupError> for Failure {
     }
 }
 
-/// The cure of an import error in terms of arguments.
+/// The cure of an import error in terms of arguments, of which some are only for recipes.
 fn in_arguments(cure: &Cure) -> String {
-    match cure {
+    let cure = match cure {
         Cure::CallMissing(text) => format!("correct it, or declare it as missing with --missing \"{text}\""),
         Cure::NameTimes => "name the columns of their times with --time and --join-time".to_owned(),
         Cure::NameJoinedTime => "name it with --join-time".to_owned(),
         Cure::GiveLimit => "give the limit with --join-limit".to_owned(),
         Cure::GiveJoinedFiles => "give as many --test-join as --join".to_owned(),
-        other => other.to_string(),
-    }
+        other => return other.to_string(),
+    };
+    cure + " in a recipe (decoupler inspect --recipe-out)"
 }
 
 impl Failure {

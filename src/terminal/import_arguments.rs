@@ -119,7 +119,7 @@ pub(super) struct RecipeArguments {
     /// within a group and across no gap in time (over fifty usual intervals)
     #[arg(long, value_name = "SPANS", value_delimiter = ',', requires = "roles")]
     lags: Vec<Span>,
-    /// The past as its difference from the present reading; without --lags and --history, from the sample before
+    /// The past as its difference from the current reading; without --lags and --history, from the sample before
     #[arg(long, requires = "roles")]
     differences: bool,
     /// Time column of a joined file, without its stem; once, or once for each --join [default: as --time]
@@ -152,16 +152,16 @@ pub(super) struct RecipeArguments {
     #[arg(long, value_name = "FILE", requires = "test_data", num_args = 1.., value_parser = input)]
     test_join: Vec<PathBuf>,
     /// Separator of the cells of text files [default: detected]
-    #[arg(long, value_name = "comma|semicolon|tab|bar|space", value_parser = Separator::parse)]
+    #[arg(long, value_name = "comma|semicolon|tab|bar|space", value_parser = Separator::named)]
     separator: Option<Separator>,
     /// Decimal separator of text files [default: detected]
-    #[arg(long, value_name = "point|comma", value_parser = Decimal::parse)]
+    #[arg(long, value_name = "point|comma", value_parser = Decimal::named)]
     decimal: Option<Decimal>,
     /// Whether the first row of text files has the names of the columns [default: detected]
     #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
     header: Option<bool>,
     /// Encoding of text files [default: detected]
-    #[arg(long, value_name = "utf-8|latin-1|utf-16le|utf-16be", value_parser = Encoding::parse)]
+    #[arg(long, value_name = "utf-8|latin-1|utf-16le|utf-16be", value_parser = |text: &str| Encoding::parse(&text.to_lowercase()))]
     encoding: Option<Encoding>,
     /// Number of lines of text files to skip before the table [default: 0]
     #[arg(long, value_name = "N")]
@@ -278,23 +278,22 @@ impl ImportArguments {
 
     /// Refuses arguments by which samples are divided.
     pub(super) fn refuse_division(&self, message: impl Fn(&str) -> String) -> Result<(), Failure> {
-        let given = [
-            (self.split.is_some(), "--split"),
+        refuse(&[(self.split.is_some(), "--split")], &message)?;
+        refuse(&self.held_out(), message)
+    }
+
+    /// Arguments that hold samples out, and whether they are given.
+    fn held_out(&self) -> [(bool, &'static str); 3] {
+        [
             (self.rest.test_fraction.is_some(), "--test-fraction"),
             (self.rest.validation_fraction.is_some(), "--validation-fraction"),
             (!self.test_data.is_empty(), "--test-data"),
-        ];
-        refuse(&given, message)
+        ]
     }
 
     /// Refuses samples held out where cross-validation tests on every sample.
     pub(super) fn refuse_held_out(&self) -> Result<(), Failure> {
-        let given = [
-            (self.rest.test_fraction.is_some(), "--test-fraction"),
-            (self.rest.validation_fraction.is_some(), "--validation-fraction"),
-            (!self.test_data.is_empty(), "--test-data"),
-        ];
-        refuse(&given, |argument| {
+        refuse(&self.held_out(), |argument| {
             format!(
                 "{argument}: a recording is analysed by cross-validation; leave it out, or write a recipe with --recipe-out"
             )

@@ -100,13 +100,15 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
 pub fn run_for_status<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, window: Window) -> u8 {
     let arguments = Vec::from_iter(arguments.into_iter().map(Into::into));
     let files = arguments.iter().skip(1).map(PathBuf::from);
-    let begins_with_command = arguments.get(1).is_none_or(|word| {
+    output::begin();
+    let begins_with_command = || {
         let commands = Arguments::command();
-        commands.get_subcommands().any(|command| *command.get_name() == **word)
-    });
+        let is_command = |word: &OsString| commands.get_subcommands().any(|command| *command.get_name() == **word);
+        arguments.get(1).is_none_or(is_command)
+    };
     let done = match Arguments::try_parse_from(&arguments) {
         // Only files, and no command.
-        Err(_) if !begins_with_command && files.clone().all(|file| file.exists()) => {
+        Err(_) if !begins_with_command() && files.clone().all(|file| file.exists()) => {
             window(files.collect()).map_err(Failure::Window)
         }
         Ok(arguments) => arguments.run(window),

@@ -49,6 +49,12 @@ static IS_TAKEN: AtomicBool = AtomicBool::new(false);
 /// Warnings so far.
 static WARNINGS: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
+/// Forgets an earlier command of the same process, before arguments are parsed.
+pub(super) fn begin() {
+    IS_TAKEN.store(false, Ordering::Relaxed);
+    WARNINGS.lock().unwrap_or_else(PoisonError::into_inner).clear();
+}
+
 impl OutputArguments {
     pub(super) fn apply(&self) {
         IS_JSON.store(self.json, Ordering::Relaxed);

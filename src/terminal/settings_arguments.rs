@@ -345,10 +345,10 @@ fn instead(option: &RunOption) -> &'static str {
         "array" => "a recording (--data) has no array; leave it out",
         "samples" => "all rows of a recording (--data) are used; choose some with --where",
         "test samples" => {
-            "a share of a recording (--data) is held out for testing; give --test-fraction or --test-data"
+            "a share of a recording (--data) is held out for testing; give --test-data, or --test-fraction in a recipe (decoupler inspect --recipe-out)"
         }
         "validation samples" => {
-            "a share of a recording (--data) is held out for validation; give --validation-fraction"
+            "a share of a recording (--data) is held out for validation; give --validation-fraction in a recipe (decoupler inspect --recipe-out)"
         }
         "axes" | "loading" => "a recording (--data) has no scene; leave it out",
         _ => "a recording (--data) has its own noise; leave it out",

@@ -494,3 +494,19 @@ fn a_recipe_of_a_simulated_array_trains_the_same_network() {
     let message = failure("trade --recipe array.json", folder.path(), 1);
     assert!(message.contains("is the recipe of a simulated array"), "{message}");
 }
+
+#[test]
+fn separators_are_named_or_typed_and_names_of_encodings_have_any_case() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.csv"), "u;v\n1,5;2\n2,5;3\n").unwrap();
+    for layout in [
+        "--separator ; --decimal , --encoding UTF-8",
+        "--separator semicolon --decimal comma --encoding utf-8",
+    ] {
+        let report = json(&format!("inspect --data a.csv {layout} --json"), folder.path());
+        assert_eq!(
+            report["format"], "text: separator semicolon, decimal comma, a header, utf-8",
+            "{report}"
+        );
+    }
+}

@@ -240,7 +240,7 @@ fn fill(
     })
 }
 
-/// What became of a trial.
+/// Outcome of a trial.
 #[derive(Clone, Copy, PartialEq)]
 enum Attempt {
     /// Finished before.

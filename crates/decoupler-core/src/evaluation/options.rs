@@ -167,7 +167,7 @@ pub static RUN_OPTIONS: [RunOption; 24] = [
         Part::Network,
         ("starts", "N", "1"),
         STARTS,
-        "Number of trainings from different random weights, which --combine makes one network.",
+        "Number of trainings from different random weights, which the setting combine makes one network.",
         |run| Some(Field::Count(&mut run.starts)),
     ),
     option(

@@ -63,7 +63,7 @@ impl DocumentKind {
     fn cure(self) -> &'static str {
         match self {
             Self::Network => "copy or save it again",
-            Self::Recipe => "correct it, or write it again with --save-recipe",
+            Self::Recipe => "correct it, or write it again with inspect --recipe-out",
             Self::Sensor => "correct it, or calibrate again",
             Self::Checkpoint => "copy it again, or start a new training",
             Self::RunList => "name the run or choose A and B again",

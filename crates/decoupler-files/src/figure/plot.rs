@@ -157,7 +157,7 @@ impl Series {
 }
 
 impl Plot {
-    /// A plot of those of these series that have something to draw.
+    /// A plot of the series that have something to draw.
     pub fn new(x: PlotAxis, y: PlotAxis, series: impl IntoIterator<Item = Series>) -> Self {
         let is_drawn = |series: &Series| !series.points.is_empty() || matches!(series.form, Form::Across(_));
         Self {

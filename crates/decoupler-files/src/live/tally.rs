@@ -26,7 +26,7 @@ pub struct Tally {
     pub error_mm: Option<f64>,
     /// Time of the last frame, or at which it was first asked for silence.
     last: Option<Instant>,
-    /// Beginning of the present span, and its frames.
+    /// Beginning of the current span, and its frames.
     begun: Option<Instant>,
     frames: u32,
     /// Number of errors in this span, and their sum in millimetres.

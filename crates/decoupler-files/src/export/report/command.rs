@@ -8,7 +8,7 @@ use std::{
 
 use crate::import::{DialectChoice, Plan, Recipe, Setup};
 use decoupler_core::{
-    dataset::{Division, Memory, Simulation, Span, SplitBy},
+    dataset::{Division, Memory, Simulation, Span},
     evaluation::{RUN_OPTIONS, RunOption, RunSettings},
     scene::RowModel,
     text::Named as _,
@@ -209,8 +209,8 @@ pub(super) fn division_options(plan: &Plan, usual: Option<f64>) -> Vec<GivenOpti
     let (division, default) = (plan.division, Division::default());
     let is_given = |is_default: bool| usual.is_none() || !is_default;
     let mut options = Vec::new();
-    let has_default_rule = !plan.import.has_groups() || default.by == SplitBy::Group;
-    if is_given(has_default_rule && division.by == default.by) {
+    // Groups are the rule where there are some, and time is the default of recipes.
+    if is_given(!plan.import.has_groups() && division.by == default.by) {
         options.push(("split".into(), division.by.to_string()));
     }
     if plan.test.is_none() && is_given(division.test_fraction == default.test_fraction) {
