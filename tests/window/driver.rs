@@ -314,13 +314,22 @@ impl Driver {
         self.click_by(&By::new().role(Role::Button).label(label));
     }
 
-    /// Clicks the leftmost of the buttons with this label, which in the Train view is the one of the configuration.
+    /// Picks an option of a list, the leftmost button with its label, which in the Train view is the one of the
+    /// configuration. The list is clicked until it is open: events from the worker may move it away from the pointer.
     #[track_caller]
-    pub(crate) fn click_leftmost_button(&mut self, label: &str) {
-        let by = By::new().role(Role::Button).label(label);
-        let nodes = self.harness.get_all(by);
-        let leftmost = nodes.min_by(|one, other| one.rect().left().total_cmp(&other.rect().left()));
-        leftmost.unwrap().click();
+    pub(crate) fn choose(&mut self, list: &str, option: &str) {
+        let by = By::new().role(Role::Button).label(option);
+        let closed = self.harness.query_all(by.clone()).count();
+        for _ in 0..5 {
+            self.click(list);
+            let options = self.harness.query_all(by.clone());
+            if options.count() > closed {
+                break;
+            }
+        }
+        let options = self.harness.get_all(by);
+        let leftmost = options.min_by(|one, other| one.rect().left().total_cmp(&other.rect().left()));
+        leftmost.expect("`get_all` returns at least one").click();
         self.harness.run_steps(2);
         self.harness.remove_cursor();
         self.harness.step();

@@ -11,12 +11,6 @@ use decoupler_files::export::format_number;
 
 use crate::driver::{Driver, small, table_of, trained};
 
-/// Picks an option of a list.
-fn choose(driver: &mut Driver, list: &str, option: &str) {
-    driver.click(list);
-    driver.click_leftmost_button(option);
-}
-
 /// Waits until the test set of the draft is displayed.
 fn wait_for_scene(driver: &mut Driver) {
     driver.wait("the scene's test set", |driver| {
@@ -94,7 +88,7 @@ fn noise_inputs_and_scaling_reach_the_librarys_settings() {
     driver.enter("Converter bits", "14");
     driver.enter("Drift", "0.7");
     driver.click_button("Test");
-    choose(&mut driver, "Inputs", "Log-resistance");
+    driver.choose("Inputs", "Log-resistance");
     driver.click_button("Whitening");
     let draft = driver.state().draft;
     let noise = Noise {
@@ -179,7 +173,7 @@ fn only_the_settings_of_the_current_choices_are_shown() {
         }
     };
     shows(&driver, &[]);
-    choose(&mut driver, "Loading", "Smooth field");
+    driver.choose("Loading", "Smooth field");
     shows(&driver, &["Correlation length"]);
     driver.enter("Correlation length", "6.5");
     let correlation_length_mm = 6.5;
@@ -187,13 +181,13 @@ fn only_the_settings_of_the_current_choices_are_shown() {
         driver.state().draft.simulation().unwrap().scene.loading,
         Loading::SmoothField { correlation_length_mm }
     );
-    choose(&mut driver, "Loading", "Indenter");
+    driver.choose("Loading", "Indenter");
     shows(&driver, &["Shape", "Radius from", "Radius to", "Spread"]);
     assert_eq!(
         driver.state().draft.simulation().unwrap().scene.loading,
         Loading::Indenter(Indenter::default())
     );
-    choose(&mut driver, "Shape", "Cylinder");
+    driver.choose("Shape", "Cylinder");
     shows(
         &driver,
         &["Shape", "Radius from", "Radius to", "Largest tilt", "Spread"],
@@ -209,9 +203,9 @@ fn only_the_settings_of_the_current_choices_are_shown() {
         largest_tilt_degrees: 12.0,
     });
     assert_eq!(indenter.shape, cylinder, "the largest radius follows the smallest");
-    choose(&mut driver, "Shape", "Edge");
+    driver.choose("Shape", "Edge");
     shows(&driver, &["Shape", "Largest tilt", "Spread"]);
-    choose(&mut driver, "Loading", "Random nodes");
+    driver.choose("Loading", "Random nodes");
     driver.click_button("One");
     driver.click_button("x, y, z");
     shows(&driver, &["Row", "Largest shift"]);
