@@ -1,7 +1,7 @@
 //! Plots drawn by `egui_plot`, with its axes, grid, zoom and tooltips, in places of the axes: a logarithmic axis is
 //! linear in the logarithm.
 
-use decoupler_files::figure::{Form, Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PlotFigure, Series, TickRule};
+use decoupler_files::figure::{Form, Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PlotFigure, Scale, Series};
 use eframe::egui::{
     Color32, FontId, Id, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, Ui, UiBuilder, Vec2, WidgetInfo,
     accesskit::Role,
@@ -181,7 +181,7 @@ fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform
         .height(space.y)
         .custom_x_axes(vec![axis_hints(AxisHints::new_x(), &plot.x, 24.0)])
         .custom_y_axes(vec![axis_hints(AxisHints::new_y(), &plot.y, 12.0)])
-        .show_axes([true, plot.y.ticks != TickRule::Nothing])
+        .show_axes([true, plot.y.scale != Scale::Hidden])
         .x_grid_spacer(|input| marks(&plot.x, &input, NUMBER[0]))
         .y_grid_spacer(|input| marks(&plot.y, &input, NUMBER[1]))
         .grid_spacing(Rangef::new(MIN_GRID, 300.0))

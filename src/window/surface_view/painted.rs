@@ -62,9 +62,8 @@ impl Painted {
     }
 
     fn new(surface: &Surface, theme: &Theme, ui: &Ui, rect: Rect, camera: OrbitCamera) -> Self {
-        let colours = theme.colours(&surface.quantity, surface.colours);
         let measure = |text: &str| measure(ui.painter(), text);
-        let drawing = surface.lay_out(camera, bounds(rect), &measure, colours);
+        let drawing = surface.lay_out(camera, bounds(rect), &measure, &theme.errors);
         Self {
             surface: surface.clone(),
             camera,
@@ -178,10 +177,8 @@ impl ColourBar<'_> {
                 .rect_stroke(rect, corner, Stroke::new(1.0, colour), StrokeKind::Inside);
         }
         let painter = ui.painter_at(rect);
-        let map = self.theme.colours(&self.scale.quantity, self.scale.colours);
-        let shapes = self
-            .scale
-            .lay_out_scale(bounds(rect), map, &|text| measure(&painter, text));
+        let measure = |text: &str| measure(&painter, text);
+        let shapes = self.scale.lay_out_scale(bounds(rect), &measure, &self.theme.errors);
         paint(&painter, &self.theme.palette, &shapes);
         response
     }

@@ -14,7 +14,7 @@ use std::sync::OnceLock;
 
 use eframe::egui::Color32;
 
-use decoupler_files::figure::{ColourMap, Rgb, SequentialMap, surface::Quantity};
+use decoupler_files::figure::{ColourMap, Rgb};
 
 /// Dark or light theme.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,15 +55,6 @@ impl Theme {
             is_dark,
             palette,
             errors: ColourMap::diverging(palette.error_stops.map(|stop| [stop.r(), stop.g(), stop.b()])),
-        }
-    }
-
-    /// Returns the colour map of the values of a surface; `sequential` is used unless the quantity diverges.
-    pub fn colours(&self, quantity: &Quantity, sequential: SequentialMap) -> &ColourMap {
-        if quantity.is_diverging() {
-            &self.errors
-        } else {
-            sequential.colours()
         }
     }
 }

@@ -9,26 +9,19 @@ const MAX_PARTS: f64 = 8.0;
 /// Values beyond this have no place, because differences between them would overflow.
 const LARGEST: f64 = 1e300;
 
-/// Scale of an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AxisScale {
-    /// Linear.
-    Linear,
-    /// Logarithmic; values that are not positive are left out.
-    Logarithmic,
-}
-
-/// Values at which an axis has ticks.
+/// Scale of an axis with its ticks.
 #[derive(Clone, Debug, PartialEq)]
-pub enum TickRule {
-    /// Round numbers; on a logarithmic axis decades, and 2 and 5 between them where there is room.
-    Round,
-    /// Multiples of this number; of 1, for integers.
-    Every(f64),
-    /// The values 0, 1, 2 … with these names.
+pub enum Scale {
+    /// Ticks at round numbers.
+    Linear,
+    /// Ticks at decades, and at 2 and 5 between them where there is room; values that are not positive are left out.
+    Logarithmic,
+    /// Linear, with ticks at multiples of this number; of 1, for integers.
+    Multiples(f64),
+    /// Linear, with ticks at the values 0, 1, 2 …, which have these names.
     Names(Vec<String>),
-    /// No values: the axis is not drawn.
-    Nothing,
+    /// Linear, without ticks: the axis is not drawn.
+    Hidden,
 }
 
 /// An axis of a plot. A *place* is a position along it: the value itself, or its decimal logarithm.
@@ -36,10 +29,8 @@ pub enum TickRule {
 pub struct PlotAxis {
     /// Name of the quantity, with its unit.
     pub name: String,
-    /// Linear or logarithmic.
-    pub scale: AxisScale,
-    /// Rule that places the ticks.
-    pub ticks: TickRule,
+    /// Positions of the values and of the ticks.
+    pub scale: Scale,
     /// Values that are always in view; if one is the minimum or maximum, the axis ends there.
     pub includes: Vec<f64>,
     /// Values beyond this range are drawn at its ends.
@@ -56,23 +47,35 @@ pub struct Ticks {
 }
 
 impl PlotAxis {
-    /// A linear axis.
-    pub fn linear(name: impl Into<String>) -> Self {
+    /// An axis of this scale.
+    pub fn new(name: impl Into<String>, scale: Scale) -> Self {
         Self {
             name: name.into(),
-            scale: AxisScale::Linear,
-            ticks: TickRule::Round,
+            scale,
             includes: Vec::new(),
             limits: None,
         }
     }
 
+    /// A linear axis.
+    pub fn linear(name: impl Into<String>) -> Self {
+        Self::new(name, Scale::Linear)
+    }
+
     /// A logarithmic axis.
     pub fn logarithmic(name: impl Into<String>) -> Self {
-        Self {
-            scale: AxisScale::Logarithmic,
-            ..Self::linear(name)
-        }
+        Self::new(name, Scale::Logarithmic)
+    }
+
+    /// An axis with ticks at integers only.
+    pub fn integers(name: impl Into<String>) -> Self {
+        Self::new(name, Scale::Multiples(1.0))
+    }
+
+    /// An axis of values with names, with room for all of them.
+    pub fn of_names(name: impl Into<String>, names: Vec<String>) -> Self {
+        let end = names.len() as f64 - 0.5;
+        Self::new(name, Scale::Names(names)).including([-0.5, end])
     }
 
     /// The axis with these values always in view.
@@ -80,19 +83,6 @@ impl PlotAxis {
     pub fn including(mut self, values: impl IntoIterator<Item = f64>) -> Self {
         self.includes.extend(values);
         self
-    }
-
-    /// The axis with ticks by this rule.
-    #[must_use]
-    pub fn ticked(mut self, ticks: TickRule) -> Self {
-        self.ticks = ticks;
-        self
-    }
-
-    /// The axis with ticks at integers only.
-    #[must_use]
-    pub fn whole(self) -> Self {
-        self.ticked(TickRule::Every(1.0))
     }
 
     /// The axis on which values beyond `limits` are drawn at the ends of that range.
@@ -107,17 +97,17 @@ impl PlotAxis {
         let limits = self.limits.as_ref();
         let within = limits.map_or(value, |limits| value.max(*limits.start()).min(*limits.end()));
         let place = match self.scale {
-            AxisScale::Linear => within,
-            AxisScale::Logarithmic if value > 0.0 => within.log10(),
-            AxisScale::Logarithmic => return None,
+            Scale::Logarithmic if value > 0.0 => within.log10(),
+            Scale::Logarithmic => return None,
+            _ => within,
         };
         (place.abs() < LARGEST).then_some(place)
     }
 
     /// Returns a value as text: `12`, `0.0123`, the name of a named value.
     pub fn value_text(&self, value: f64) -> String {
-        match &self.ticks {
-            TickRule::Names(_) => self.tick_text(value, 1.0),
+        match &self.scale {
+            Scale::Names(_) => self.tick_text(value, 1.0),
             _ if value.fract() == 0.0 && value.abs() < 1e9 => format!("{value:.0}").replace('-', "−"),
             _ => format_number(value).replace('-', "−"),
         }
@@ -145,12 +135,12 @@ impl PlotAxis {
             return Ticks::default();
         }
         let least = apart.max(width / MAX_PARTS);
-        match (&self.ticks, self.scale) {
-            (TickRule::Nothing, _) => Ticks::default(),
-            (TickRule::Round, AxisScale::Linear) => Ticks::at_multiples(range, round_step(least)),
-            (TickRule::Round, AxisScale::Logarithmic) => logarithmic_ticks(range, apart, least),
-            (TickRule::Every(unit), _) => Ticks::at_multiples(range, unit * round_step(least / unit).max(1.0)),
-            (TickRule::Names(names), _) => {
+        match &self.scale {
+            Scale::Linear => Ticks::at_multiples(range, round_step(least)),
+            Scale::Logarithmic => logarithmic_ticks(range, apart, least),
+            Scale::Multiples(unit) => Ticks::at_multiples(range, unit * round_step(least / unit).max(1.0)),
+            Scale::Hidden => Ticks::default(),
+            Scale::Names(names) => {
                 // The width is that of a number of six characters.
                 let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
                 let needed = apart * (longest + 2) as f64 / 6.0;
@@ -161,12 +151,20 @@ impl PlotAxis {
         }
     }
 
+    /// Returns the positions of the ticks in a range of places, from 0 to 1, with their numbers, which are separated by at
+    /// least `apart`.
+    pub(crate) fn numbers(&self, range: &RangeInclusive<f64>, apart: f32) -> Vec<(f64, String)> {
+        let ticks = self.ticks(range, f64::from(apart) * (range.end() - range.start()));
+        let number = |&place: &f64| (share(place, range), self.tick_text(place, ticks.step));
+        ticks.places.iter().map(number).collect()
+    }
+
     /// Returns the text at a tick, given the distance to the next.
     pub fn tick_text(&self, place: f64, step: f64) -> String {
-        match (&self.ticks, self.scale) {
-            (TickRule::Names(names), _) => names.get(place.round() as usize).cloned().unwrap_or_default(),
-            (_, AxisScale::Linear) => tick_text(place, step),
-            (_, AxisScale::Logarithmic) => power_text(place),
+        match &self.scale {
+            Scale::Names(names) => names.get(place.round() as usize).cloned().unwrap_or_default(),
+            Scale::Logarithmic => power_text(place),
+            _ => tick_text(place, step),
         }
     }
 }
@@ -186,7 +184,7 @@ pub(super) fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
 }
 
 /// Returns the position of `place` in its range, from 0 to 1.
-pub fn share(place: f64, range: &RangeInclusive<f64>) -> f64 {
+pub(super) fn share(place: f64, range: &RangeInclusive<f64>) -> f64 {
     (place - range.start()) / (range.end() - range.start())
 }
 
@@ -313,7 +311,7 @@ mod tests {
 
     #[test]
     fn counts_have_no_ticks_between_integers() {
-        let axis = PlotAxis::linear("").whole();
+        let axis = PlotAxis::integers("");
         assert_eq!(texts(&axis, [-0.08, 1.08], 150.0, 16.0), ["0", "1"]);
         assert_eq!(
             texts(&axis, [-0.08, 6.4], 150.0, 16.0),
@@ -324,7 +322,7 @@ mod tests {
     #[test]
     fn names_are_at_their_values_and_thinned_where_crowded() {
         let names = ["10×6_3×18", "10×8_4×24", "10×10_5×30"].map(str::to_owned).to_vec();
-        let axis = PlotAxis::linear("array").ticked(TickRule::Names(names.clone()));
+        let axis = PlotAxis::new("array", Scale::Names(names.clone()));
         assert_eq!(texts(&axis, [-0.5, 2.5], 400.0, 36.0), names);
         assert_eq!(texts(&axis, [-0.5, 2.5], 150.0, 36.0), [&*names[0], &*names[2]]);
         assert_eq!(axis.value_text(1.0), names[1]);

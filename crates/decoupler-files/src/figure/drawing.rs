@@ -177,6 +177,12 @@ impl Bounds {
         0.5 * (self.min + self.max)
     }
 
+    /// Returns the point of a place on two axes with these ranges, whose origin is the lower left corner.
+    pub(crate) fn at(&self, [x, y]: [f64; 2], [x_range, y_range]: &[RangeInclusive<f64>; 2]) -> Vec2 {
+        let [right, up] = [share(x, x_range), 1.0 - share(y, y_range)].map(|share| share as f32);
+        self.min + Vec2::new(right, up) * self.size()
+    }
+
     /// The corners, clockwise from the upper left one.
     pub fn corners(&self) -> [Vec2; 4] {
         let Self { min, max } = *self;
@@ -287,7 +293,7 @@ impl<'a> Labels<'a> {
 }
 
 const BAR_WIDTH: f32 = 12.0;
-const BAR_STEPS: usize = 128;
+const BAR_STEPS: u8 = 128;
 /// Room for a number on a colour scale.
 const BAR_NUMBER: f32 = 26.0;
 
@@ -305,20 +311,18 @@ pub(super) fn lay_out_scale(
     if height < 20.0 || !(width.is_finite() && width > 0.0) {
         return Vec::new();
     }
-    let step = height / BAR_STEPS as f32;
-    let pieces = (0..BAR_STEPS).map(|at| {
-        let colour = colours.at((at as f32 + 0.5) / BAR_STEPS as f32);
-        let min = Vec2::new(bar.min.x, bar.max.y - step * (at + 1) as f32);
-        Bounds::of_size(min, Vec2::new(BAR_WIDTH, step)).area(Ink::Rgb(colour))
+    let at = |share: f64| Vec2::new(bar.max.x, bar.max.y - height * share as f32);
+    let pieces = (0..BAR_STEPS).map(|piece| {
+        let [low, middle, high] = [0.0, 0.5, 1.0].map(|part| (f64::from(piece) + part) / f64::from(BAR_STEPS));
+        let corners = [at(low), at(high) - Vec2::new(BAR_WIDTH, 0.0)];
+        Bounds::of(corners).area(Ink::Rgb(colours.at(middle as f32)))
     });
     let mut shapes: Vec<Shape> = pieces.collect();
     shapes.push(bar.outline(Stroke::new(Ink::Edge, 1.0)));
-    let ticks = axis.ticks(range, width * f64::from(BAR_NUMBER / height));
-    for &place in &ticks.places {
-        let at = Vec2::new(bar.max.x, bar.max.y - height * share(place, range) as f32);
-        shapes.push(Shape::line(at, at + Vec2::new(4.0, 0.0), Ink::Edge, 1.0));
-        let text = axis.tick_text(place, ticks.step);
-        shapes.push(Shape::text(at + Vec2::new(7.0, 0.0), Align::Start, Ink::Label, text));
+    for (share, text) in axis.numbers(range, BAR_NUMBER / height) {
+        let (tick, number) = (Vec2::new(4.0, 0.0), Vec2::new(7.0, 0.0));
+        shapes.push(Shape::line(at(share), at(share) + tick, Ink::Edge, 1.0));
+        shapes.push(Shape::text(at(share) + number, Align::Start, Ink::Label, text));
     }
     let beyond = Vec2::new(area.max.x - 0.5 * measure(&axis.name).y, bar.middle().y);
     shapes.push(Shape::text(beyond, Align::Upright, Ink::Label, &*axis.name));

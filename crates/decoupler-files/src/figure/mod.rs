@@ -18,7 +18,7 @@ mod of_trade_off;
 mod plot;
 pub mod surface;
 
-pub use axis::{AxisScale, PlotAxis, TickRule, Ticks, share, tick_text};
+pub use axis::{PlotAxis, Scale, Ticks, tick_text};
 pub use colour_map::{ColourMap, Rgb, SequentialMap, is_light};
 pub use drawing::{Align, Bounds, Colour, Ink, Measure, Shape, Stroke};
 pub use heat_map::{HeatMap, HeatMapDrawing};
@@ -36,7 +36,7 @@ pub use of_trade_off::{
     TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure, training_time,
 };
 pub use plot::{Form, LineAt, Plot, PlotFigure, PlotPoint, Series};
-pub use surface::{SectionNodes, section_figure};
+pub use surface::section_figure;
 
 use decoupler_core::decoupling::DecoderKind;
 use surface::SurfaceFigure;

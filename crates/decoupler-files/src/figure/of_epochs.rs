@@ -66,11 +66,9 @@ pub fn loss_figure(history: &[EpochRecord], stages: &[Stage], best_epoch: usize)
         ("test", Hue::Orange, TEST),
     ];
     let curves = curves.map(|(name, hue, of)| curve(name, hue, LineStyle::Solid, drawn, of));
-    let (name, at) = (
-        format!("best weights, epoch {best_epoch}"),
-        LineAt::X(best_epoch as f64),
-    );
-    let best = Series::across(name, at, Hue::Grey, LineStyle::Dashed).listed(Some("best weights"));
+    let name = format!("best weights, epoch {best_epoch}");
+    let best = Series::across(name, LineAt::X(best_epoch as f64), Hue::Grey, LineStyle::Dashed);
+    let best = best.listed(Some("best weights"));
     let series = curves.into_iter().chain(stage_lines(stages)).chain([best]);
     over_epochs(bounded("mse (scaled)", history, TRAINING), series).into()
 }
@@ -79,13 +77,13 @@ pub fn loss_figure(history: &[EpochRecord], stages: &[Stage], best_epoch: usize)
 pub fn training_state_figure(history: &[EpochRecord], stages: &[Stage]) -> PlotFigure {
     let drawn = &*outlined(history);
     // A little more than from 0 to 1: lines do not coincide with the frame.
-    let failures = PlotAxis::linear("validation failures").including([-0.1, 1.1]);
+    let failures = PlotAxis::integers("validation failures").including([-0.1, 1.1]);
     let parameter = PlotAxis::logarithmic(parameter_name(stages)).limited(PARAMETERS);
     let curve = |hue: Hue, of: OfEpoch| curve("", hue, LineStyle::Solid, drawn, of).listed(None);
     let plots = [
         (bounded("gradient", history, GRADIENT), curve(Hue::Blue, GRADIENT)),
         (parameter, curve(Hue::Orange, PARAMETER)),
-        (failures.whole(), curve(Hue::Green, FAILURES).stepped()),
+        (failures, curve(Hue::Green, FAILURES).stepped()),
     ];
     let plots = plots.map(|(y, mut curve)| {
         curve.name.clone_from(&y.name);
@@ -175,13 +173,14 @@ fn outlined(history: &[EpochRecord]) -> Cow<'_, [EpochRecord]> {
 fn extremes(stretch: &[EpochRecord]) -> Vec<EpochRecord> {
     let mut places = vec![0, stretch.len() - 1];
     for of in QUANTITIES {
-        let values = stretch.iter().map(of).enumerate();
-        let values = values.map(|(place, value)| (place, value.filter(|value| value.is_finite())));
-        let finite = values.clone().filter_map(|(place, value)| Some((place, value?)));
+        let values = stretch.iter().map(|epoch| of(epoch).filter(|value| value.is_finite()));
+        let finite = values
+            .clone()
+            .enumerate()
+            .filter_map(|(place, value)| Some((place, value?)));
         let ends = super::extremes(finite, |(_, value)| *value);
         places.extend(ends.into_iter().flat_map(|(lowest, highest)| [lowest.0, highest.0]));
-        let mut missing = values.filter(|(_, value)| value.is_none());
-        places.extend(missing.next().map(|(place, _)| place));
+        places.extend(values.clone().position(|value| value.is_none()));
     }
     places.sort_unstable();
     places.dedup();

@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use super::{
     Figure, Hue, LineStyle, Look, Marker,
-    axis::{PlotAxis, TickRule},
+    axis::PlotAxis,
     colour_map::SequentialMap,
     heat_map::HeatMap,
     plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
@@ -110,13 +110,9 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
         Series::new("published", published, points(|cell| cell.percent().published)),
         Series::new("ours: median, smallest to largest", ours_look, ours),
     ];
-    let x = PlotAxis::linear(axis.kind.name());
     let x = match is_number {
-        true => x.whole(),
-        false => {
-            let names = x.ticked(TickRule::Names(labels(axis)));
-            names.including([-0.5, axis.values.len() as f64 - 0.5])
-        }
+        true => PlotAxis::integers(axis.kind.name()),
+        false => PlotAxis::of_names(axis.kind.name(), labels(axis)),
     };
     // R² along the axis, which nodes of an array do not have.
     let r2 = |(x, cell): &(f64, &Cell)| Some(median_point(*x, &cell.error(ErrorMeasure::R2)?));
@@ -160,7 +156,7 @@ fn repeats(results: &ExperimentResults) -> PlotFigure {
     let cells: Vec<(String, Hue)> = names.zip(HUES.into_iter().cycle()).collect();
     let count = if experiment.recording.is_some() { 1 } else { 3 };
     let plots = errors.into_iter().take(count).map(|(y, measure)| {
-        let x = PlotAxis::linear(if experiment.seeds == 1 { "repeat" } else { "trial" });
+        let x = PlotAxis::integers(if experiment.seeds == 1 { "repeat" } else { "trial" });
         let of_cells = || results.cells.iter().zip(&cells);
         let series = of_cells().map(|(cell, (name, hue))| {
             let points = trial_points(experiment, cell, measure);
@@ -171,8 +167,7 @@ fn repeats(results: &ExperimentResults) -> PlotFigure {
             let line = Series::across(format!("{name}, published"), at, *hue, LineStyle::Dashed);
             Some(line.listed(Some(name)))
         });
-        let x = x.including([0.5, trials as f64 + 0.5]).whole();
-        Plot::new(x, y, series.chain(lines))
+        Plot::new(x.including([0.5, trials as f64 + 0.5]), y, series.chain(lines))
     });
     let plots = Vec::from_iter(plots);
     let median = |cell: &Cell| cell.error(ErrorMeasure::YPercent)?.median;
@@ -201,6 +196,7 @@ mod tests {
     use std::num::NonZero;
 
     use super::*;
+    use crate::figure::axis::Scale;
     use decoupler_core::{
         dataset::{Seed, SplitBy},
         evaluation::{
@@ -271,7 +267,7 @@ mod tests {
         let published = |plot: &Plot| plot.lines_across().map(|(_, at)| at).collect::<Vec<_>>();
         assert_eq!(published(&repeats.plots[0]), [LineAt::Y(2.01), LineAt::Y(3.35)]);
         let arrays = plots_of(PaperTable::ArrayScales);
-        assert!(matches!(&arrays.plots[0].x.ticks, TickRule::Names(names) if names[1] == "10×8_4×24"));
+        assert!(matches!(&arrays.plots[0].x.scale, Scale::Names(names) if names[1] == "10×8_4×24"));
     }
 
     #[test]

@@ -170,30 +170,20 @@ impl TargetSurface {
     /// Surfaces of a sample: the actual values, the decoded ones, and decoded minus actual. `actual` and `decoded` have an
     /// entry for each target, `range` is that of the values.
     pub fn surfaces(&self, actual: &[f64], decoded: &[f64], range: RangeInclusive<f64>) -> [Surface; 3] {
-        let errors = Vec::from_iter(decoded.iter().zip(actual).map(|(decoded, actual)| decoded - actual));
-        let of_nodes = self.nodes.iter().map(|node| errors[node.target].abs());
-        let largest = of_nodes.filter(|error| error.is_finite()).fold(0.0, f64::max);
+        let nodes = [actual, decoded].map(|values| {
+            let node = |node: &TargetPosition| DVec3::new(node.x_mm, node.y_mm, values[node.target]);
+            self.nodes.iter().map(node).collect()
+        });
+        let [value, error] = [Quantity::Target, Quantity::TargetError].map(|of_unit| of_unit(self.unit.clone()));
         // Rounding errors are not distinguished by colour.
-        let largest = largest.max(1e-9 * (range.end() - range.start()));
-        let value = Quantity::Target(self.unit.clone());
-        let error = Quantity::TargetError(self.unit.clone());
-        [
-            self.surface("Actual", actual, value.clone(), range.clone()),
-            self.surface("Decoded", decoded, value, range),
-            self.surface("Error", &errors, error, -largest..=largest),
-        ]
+        let least = 1e-9 * (range.end() - range.start());
+        Surface::compared("Decoded", &self.map, nodes, [value, error], range, least)
     }
 
     /// Returns the range of the targets at the nodes; `ranges` are the minimum and maximum of each target.
     pub fn range_of(&self, ranges: &[(f64, f64)]) -> RangeInclusive<f64> {
         let (low, high) = ends(self.nodes.iter().flat_map(|node| <[f64; 2]>::from(ranges[node.target])));
         low..=high
-    }
-
-    fn surface(&self, title: &str, of_targets: &[f64], quantity: Quantity, range: RangeInclusive<f64>) -> Surface {
-        let nodes = self.nodes.iter();
-        let nodes = nodes.map(|node| DVec3::new(node.x_mm, node.y_mm, of_targets[node.target]));
-        Surface::through(title, &self.map, nodes.collect::<Vec<_>>(), quantity, range)
     }
 }
 

@@ -14,7 +14,7 @@ use ndarray::Array2;
 
 use super::{
     Hue, LineStyle, Look, Marker,
-    axis::{PlotAxis, TickRule},
+    axis::{PlotAxis, Scale},
     colour_map::SequentialMap,
     heat_map::HeatMap,
     plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
@@ -53,12 +53,10 @@ pub fn sample_figure(targets: &[Channel], actual: &[f64], decoded: &[f64], range
         true => titled("value", unit),
         false => "% of the target's range".to_owned(),
     };
-    let ticks = match has_names {
-        true => TickRule::Names(targets.iter().map(|target| target.name.clone()).collect()),
-        false => TickRule::Every(1.0),
+    let x = match has_names {
+        true => PlotAxis::of_names("target", targets.iter().map(|target| target.name.clone()).collect()),
+        false => PlotAxis::integers("target").including([0.5, targets.len() as f64 + 0.5]),
     };
-    let ends = [first - 0.5, first + targets.len() as f64 - 0.5];
-    let x = PlotAxis::linear("target").ticked(ticks).including(ends);
     let series = [series("actual", ACTUAL, actual), series("decoded", DECODED, decoded)];
     Plot::new(x, PlotAxis::linear(y), series).into()
 }
@@ -87,9 +85,9 @@ pub fn singular_values_figure(rows: &[Identifiability], worst: usize, hidden_bel
         Series::across("noise hides values below", at, Hue::Orange, LineStyle::Dashed)
     });
     let unknowns = rows.get(worst).map_or(1, Identifiability::unknowns);
-    let x = PlotAxis::linear("deformation pattern, best seen first").including([0.5, unknowns as f64 + 0.5]);
+    let x = PlotAxis::integers("deformation pattern, best seen first").including([0.5, unknowns as f64 + 0.5]);
     let y = PlotAxis::logarithmic("singular value of ∂ ln R/∂u (1/mm)");
-    Plot::new(x.whole(), y, others.chain(strongest).chain(noise)).into()
+    Plot::new(x, y, others.chain(strongest).chain(noise)).into()
 }
 
 /// The paper's Fig. 6: z of the nodes at these positions, row by row; actual as squares, decoupled as discs, each with a
@@ -117,7 +115,7 @@ pub fn node_figure(
     let actual = series("actual", ACTUAL, actual_mm, &[]);
     let decoupled = series("decoupled", DECODED, decoupled_mm, spread_mm.unwrap_or_default());
     // A tick at the last node of a row.
-    let x = PlotAxis::linear("node, row by row").ticked(TickRule::Every(nodes_per_row as f64));
+    let x = PlotAxis::new("node, row by row", Scale::Multiples(nodes_per_row as f64));
     Plot::new(x, PlotAxis::linear("z (mm)"), [actual, decoupled]).into()
 }
 
@@ -134,7 +132,7 @@ pub fn starts_figure(axis: &str, results: &[Option<f64>], kept: usize, spread: &
         });
         Series::new(name, Look::marker(hue, Marker::Disc), points).listed(None)
     };
-    let y = PlotAxis::linear("starts").including([-1.0, 3.0]);
+    let y = PlotAxis::new("starts", Scale::Hidden).including([-1.0, 3.0]);
     let quartiles = LineAt::Between([spread.lower_quartile, spread.upper_quartile]);
     let series = [
         dots("other starts", Hue::Grey, false),
@@ -142,7 +140,7 @@ pub fn starts_figure(axis: &str, results: &[Option<f64>], kept: usize, spread: &
         Series::across("quartiles", quartiles, Hue::Grey, None).listed(None),
         Series::across("median", LineAt::X(spread.median), Hue::Grey, LineStyle::Solid).listed(None),
     ];
-    Plot::new(PlotAxis::linear(axis), y.ticked(TickRule::Nothing), series).into()
+    Plot::new(PlotAxis::linear(axis), y, series).into()
 }
 
 const HUES: [Hue; 6] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Violet, Hue::Cyan, Hue::Red];

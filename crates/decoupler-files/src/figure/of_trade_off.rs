@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use decoupler_core::{
-    decoupling::{DecoderKind, Precision},
+    decoupling::Precision,
     evaluation::{Preset, TradeOffPoint, fastest_under, most_accurate_under, pareto_front},
     text::{capitalised, format_duration, format_number, format_percent},
 };
@@ -91,20 +91,23 @@ impl TradeOffLevel {
 /// and hollow marks 32 bits. Also shows the Pareto front with the names of its points, the model-based error, and the
 /// answers to the two questions with their limits.
 pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotFigure {
-    let has = |is_so: &dyn Fn(&TradeOffPoint) -> bool| level.points.iter().any(is_so);
-    let of_preset = |preset| has(&|point| point.preset == Some(preset));
-    let is_single = has(&|point| point.report.precision == Precision::Single);
+    let has = |is_so: fn(&TradeOffPoint) -> bool| level.points.iter().any(is_so);
     let marks = [
-        (of_preset(Preset::Paper), "discs: paper preset"),
-        (of_preset(Preset::Best), "diamonds: best preset"),
-        (is_single, "hollow: 32 bits"),
+        (has(|point| point.preset == Some(Preset::Paper)), "discs: paper preset"),
+        (has(|point| point.preset == Some(Preset::Best)), "diamonds: best preset"),
+        (
+            has(|point| point.report.precision == Precision::Single),
+            "hollow: 32 bits",
+        ),
     ];
-    let marks = marks
-        .into_iter()
-        .filter_map(|(is_there, mark)| is_there.then_some(mark));
-    let note = capitalised(&Vec::from_iter(marks).join(", "));
-    let plots = TradeOffCost::ALL.map(|cost| plot(level, limits, cost));
-    PlotFigure::new(plots, (!note.is_empty()).then(|| format!("{note}.")))
+    let marks = Vec::from_iter(
+        marks
+            .into_iter()
+            .filter(|(is_there, _)| *is_there)
+            .map(|(_, mark)| mark),
+    );
+    let note = (!marks.is_empty()).then(|| format!("{}.", capitalised(&marks.join(", "))));
+    PlotFigure::new(TradeOffCost::ALL.map(|cost| plot(level, limits, cost)), note)
 }
 
 fn marker(preset: Option<Preset>, precision: Precision) -> Marker {
@@ -118,47 +121,44 @@ fn marker(preset: Option<Preset>, precision: Precision) -> Marker {
 
 fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> Plot {
     let at = |point: &TradeOffPoint| <[f64; 2]>::from(cost.of(point));
-    let is_on_front = level.front(cost);
-    let points = || level.points.iter().zip(&is_on_front);
-    let front = points().filter(|(point, is_on_front)| **is_on_front && point.percent().is_finite());
-    let mut front: Vec<[f64; 2]> = front.map(|(point, _)| at(point)).collect();
+    let mut points = Vec::from_iter(level.points.iter().zip(level.front(cost)));
+    let front = points
+        .iter()
+        .filter(|(point, is_on_front)| *is_on_front && point.percent().is_finite());
+    let mut front = Vec::from_iter(front.map(|(point, _)| at(point)));
     front.sort_by(|a, b| a[0].total_cmp(&b[0]));
     // Nothing better was measured between two points of the front.
     let front = Series::new("Pareto front", Look::line(Hue::Grey, LineStyle::Solid), front).stepped();
     let mut series = vec![front];
-    for kind in DecoderKind::ALL {
-        for &precision in kind.precisions() {
-            for preset in Preset::ALL.into_iter().map(Some).chain([None]) {
-                let is_of = |(point, _): &(&TradeOffPoint, &bool)| {
-                    (point.report.kind, point.report.precision, point.preset) == (kind, precision, preset)
-                };
-                let points = points().filter(is_of).map(|(point, is_on_front)| {
-                    let note = format!("{}\n{}", point_name(point), point_facts(point).join("\n"));
-                    let mut drawn = PlotPoint::from(at(point)).noted(note);
-                    drawn.label = is_on_front.then(|| named(point, ""));
-                    drawn
-                });
-                let look = Look::marker(Hue::of_decoder(kind), marker(preset, precision));
-                let mut name = kind.name(precision).to_owned();
-                if let Some(preset) = preset {
-                    name += &format!(", {preset} preset");
-                }
-                series.push(Series::new(name, look, points).listed(Some(kind.name(Precision::Double))));
-            }
-        }
+    let look = |(point, _): &(&TradeOffPoint, bool)| {
+        let preset = point.preset.map_or(u8::MAX, |preset| preset as u8);
+        (point.report.kind as u8, point.report.precision as u8, preset)
+    };
+    points.sort_by_key(look);
+    for alike in points.chunk_by(|one, other| look(one) == look(other)) {
+        let (preset, kind, precision) = (alike[0].0.preset, alike[0].0.report.kind, alike[0].0.report.precision);
+        let points = alike.iter().map(|&(point, is_on_front)| PlotPoint {
+            label: is_on_front.then(|| named(point, None)),
+            ..PlotPoint::from(at(point)).noted(format!("{}\n{}", point_name(point), point_facts(point).join("\n")))
+        });
+        let name = kind.name(precision);
+        let name = preset.map_or_else(|| name.to_owned(), |preset| format!("{name}, {preset} preset"));
+        let look = Look::marker(Hue::of_decoder(kind), marker(preset, precision));
+        series.push(Series::new(name, look, points).listed(Some(kind.name(Precision::Double))));
     }
-    let questions = [
-        format!("fastest under {}", format_percent(limits.percent)),
-        format!("most accurate under {}", frame_time(limits.microseconds)),
-    ];
     // The questions and their limits are about decoding.
     let is_decoding = cost == TradeOffCost::Decoding;
+    let [time, percent] = [limits.microseconds, limits.percent];
+    let questions = [
+        format!("fastest under {}", format_percent(percent)),
+        format!("most accurate under {}", frame_time(time)),
+    ];
     for (answer, name) in level.answers(limits).into_iter().zip(questions) {
-        if let Some(answer) = answer.and_then(|answer| level.points.get(answer)) {
-            let mut point = PlotPoint::from(at(answer));
-            point.label = is_decoding.then(|| name.clone());
-            series.push(Series::new(name, Look::marker(Hue::Blue, Marker::Halo), [point]).listed(None));
-        }
+        let point = answer.map(|answer| PlotPoint {
+            label: is_decoding.then(|| name.clone()),
+            ..at(&level.points[answer]).into()
+        });
+        series.push(Series::new(name, Look::marker(Hue::Blue, Marker::Halo), point).listed(None));
     }
     let error = match level.noise {
         Some(_) => "Z error (%)",
@@ -166,51 +166,40 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
     };
     let model_based = level.points.first().and_then(|point| point.model_based);
     let model_based = model_based.filter(|errors| !errors.is_rounding());
-    let model_based = model_based.and_then(|errors| errors.z_percent).map(|percent| {
+    series.extend(model_based.and_then(|errors| errors.z_percent).map(|percent| {
         let at = LineAt::Y(percent);
         Series::across("model-based", at, Hue::Ink, LineStyle::Dashed)
-    });
-    series.extend(model_based);
-    // Limits are shown if they are within the range of the points.
-    let is_among = |limit: f64, axis: usize| {
+    }));
+    let lines = [
+        ("longest time", time, LineAt::X(time)),
+        ("largest error", percent, LineAt::Y(percent)),
+    ];
+    for (axis, (name, limit, line)) in lines.into_iter().enumerate().filter(|_| is_decoding) {
+        // Limits are shown if they are within the range of the points.
         let values = level.points.iter().map(|point| at(point)[axis]);
         let (low, high) = ends(values.filter(|value| value.log10().is_finite()));
-        is_decoding && (low..=high).contains(&limit)
-    };
-    let [time, percent] = [limits.microseconds, limits.percent];
-    let limits = [
-        (is_among(time, 0), "longest time", LineAt::X(time)),
-        (is_among(percent, 1), "largest error", LineAt::Y(percent)),
-    ];
-    series.extend(
-        limits
-            .into_iter()
-            .filter(|(is_shown, ..)| *is_shown)
-            .map(|(_, name, at)| {
-                let line = Series::across(name, at, Hue::Blue, LineStyle::Dotted);
-                line.listed(Some("limits asked for"))
-            }),
-    );
+        if (low..=high).contains(&limit) {
+            let line = Series::across(name, line, Hue::Blue, LineStyle::Dotted);
+            series.push(line.listed(Some("limits asked for")));
+        }
+    }
     Plot::new(PlotAxis::logarithmic(cost.name()), PlotAxis::logarithmic(error), series)
 }
 
 /// `Network f32, best preset, 12 hidden`.
 pub fn point_name(point: &TradeOffPoint) -> String {
-    let how = match (point.preset, point.method()) {
-        (Some(preset), _) => format!(", {preset} preset"),
-        (None, Some(method)) => format!(", {}", method.short_name()),
-        (None, None) => String::new(),
-    };
-    named(point, &how)
+    let method = || Some(point.method()?.short_name().to_owned());
+    named(
+        point,
+        point.preset.map(|preset| format!("{preset} preset")).or_else(method),
+    )
 }
 
 /// The decoder of a point with its hidden nodes, and `how` it was trained.
-fn named(point: &TradeOffPoint, how: &str) -> String {
-    let name = point.report.kind.name(point.report.precision);
-    match point.hidden() {
-        Some(hidden) => format!("{name}{how}, {hidden} hidden"),
-        None => format!("{name}{how}"),
-    }
+fn named(point: &TradeOffPoint, how: Option<String>) -> String {
+    let name = point.report.kind.name(point.report.precision).to_owned();
+    let hidden = point.hidden().map(|hidden| format!("{hidden} hidden"));
+    Vec::from_iter([Some(name), how, hidden].into_iter().flatten()).join(", ")
 }
 
 /// `3.59 µs`, `1.94 ms`.

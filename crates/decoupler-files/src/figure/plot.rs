@@ -5,7 +5,7 @@ use glam::Vec2;
 
 use super::{
     Hue, LineStyle, Look, Marker,
-    axis::{AxisScale, PlotAxis, TickRule},
+    axis::{PlotAxis, Scale},
     drawing::{Bounds, Labels, Measure, Shape},
     extremes, unique_by,
 };
@@ -252,21 +252,12 @@ impl Plot {
         words
     }
 
-    /// Returns the entries of the legend with their looks.
-    pub fn keys(&self) -> Vec<(&str, Look)> {
-        let named = self.series.iter().filter_map(|series| {
-            let key = series.key.as_deref().filter(|key| !key.is_empty())?;
-            Some((key, series.look))
-        });
-        unique_by(named, |(key, _)| *key)
-    }
-
     /// Describes the plot in a sentence: its axes, the course of each curve, the extent of each cloud of points,
     /// the highest bar.
     pub fn summary(&self) -> String {
         let scale = match self.y.scale {
-            AxisScale::Logarithmic => " on a logarithmic scale",
-            AxisScale::Linear => "",
+            Scale::Logarithmic => " on a logarithmic scale",
+            _ => "",
         };
         let series = self.series.iter().filter_map(|series| self.words_about(series));
         let parts = Vec::from_iter(series).join("; ");
@@ -288,7 +279,7 @@ impl Plot {
         let (first, last) = (points.first()?, points.last()?);
         let (lowest, highest) = extremes(points.iter(), |point| point.y)?;
         // An axis without values only keeps the points apart.
-        let has_values = self.y.ticks != TickRule::Nothing;
+        let has_values = self.y.scale != Scale::Hidden;
         let at = |point: &PlotPoint| match has_values {
             true => format!("{} at {}", self.y.value_text(point.y), self.x.value_text(point.x)),
             false => self.x.value_text(point.x),
@@ -406,7 +397,9 @@ impl PlotFigure {
 
     /// Returns the entries of the legends of all plots, each once.
     pub fn keys(&self) -> Vec<(&str, Look)> {
-        unique_by(self.plots.iter().flat_map(Plot::keys), |(key, _)| *key)
+        let series = self.plots.iter().flat_map(|plot| &plot.series);
+        let keys = series.filter_map(|series| Some((series.key.as_deref()?, series.look)));
+        unique_by(keys.filter(|(key, _)| !key.is_empty()), |(key, _)| *key)
     }
 
     /// Describes the figure in one sentence per plot, followed by its notes.

@@ -18,9 +18,9 @@ use decoupler_core::{
 use decoupler_files::{
     export::{NetworkFile, figures::PictureFormat, report::RunReport},
     figure::{
-        Decoded, Figure, RegressionLine, SectionNodes, TradeOffLevel, TradeOffLimits, compared_losses_figure,
-        experiment_figure, histogram_figure, loss_figure, node_figure, position_error_map, readings_figure,
-        regression_figure, sample_figure, section_figure, singular_values_figure, starts_figure,
+        Decoded, Figure, RegressionLine, TradeOffLevel, TradeOffLimits, compared_losses_figure, experiment_figure,
+        histogram_figure, loss_figure, node_figure, position_error_map, readings_figure, regression_figure,
+        sample_figure, section_figure, singular_values_figure, starts_figure,
         surface::{Quantity, Section, SectionLine, Surface, SurfaceFigure, ViewMode},
         targets_over_time_figure, trade_off_figure, training_state_figure, value_pairs,
     },
@@ -100,12 +100,8 @@ fn gallery_of_printed_figures() {
         line: SectionLine::RowWire(4),
         at_mm: 12.0,
     };
-    let cut = |surface: usize, nodes_mm| SectionNodes {
-        values_mm: &surfaces[surface].values,
-        nodes_mm,
-    };
     let read: Vec<usize> = (0..10).collect();
-    let of_section = section_figure(&section, &map, &read, cut(0, &nodes), Some(cut(1, &decoded)), 4.0..=5.0);
+    let of_section = section_figure(&section, &read, &surfaces[0], Some(&surfaces[1]));
     draw("section", of_section);
     for mode in [ViewMode::ThreeD, ViewMode::Top] {
         let figure = SurfaceFigure {

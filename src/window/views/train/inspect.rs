@@ -4,7 +4,7 @@ use decoupler_core::{evaluation::NodeAddress, text::counted};
 use decoupler_files::{
     export::format_number,
     figure::{
-        ErrorBins, Hue, LineAt, LineStyle, PlotFigure, SectionNodes, Series, pair_address, pair_sample, section_figure,
+        ErrorBins, Hue, LineAt, LineStyle, PlotFigure, Series, pair_address, pair_sample, section_figure,
         surface::{Section, SectionLine},
     },
 };
@@ -14,7 +14,7 @@ use glam::DVec2;
 use crate::window::{
     plotting::DrawnPlot,
     shared::{Look, Shared},
-    test_view::{Frame, HeightScale, Positions, RecordedTest, TestView},
+    test_view::{Positions, RecordedTest, TestView},
     theme::{Theme, semibold, space, type_size},
     views::train::{charts_card::BottomTab, drawn::Frames, view::TrainView},
     widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui, explained_options_ui},
@@ -409,32 +409,10 @@ impl SectionChoice {
 
 /// Returns the figure of the section through the displayed surfaces.
 pub fn section_of(choice: &SectionChoice, test: &TestView, frames: &Frames, look: Look) -> PlotFigure {
-    fn cut(frame: &Frame) -> SectionNodes<'_> {
-        SectionNodes {
-            values_mm: &frame.grid_mm,
-            nodes_mm: &frame.nodes_mm,
-        }
-    }
-    let decoupled = frames.decoupled.as_ref().map(|(decoupled, _)| decoupled);
-    let fitted = || {
-        let both = [Some(&frames.actual), decoupled]
-            .into_iter()
-            .flatten()
-            .filter_map(Frame::range_mm);
-        both.reduce(|one, other| one.start().min(*other.start())..=one.end().max(*other.end()))
-    };
-    let heights_mm = match look.heights {
-        HeightScale::Stroke => None,
-        HeightScale::Fitted => fitted(),
-    };
-    section_figure(
-        &choice.section(test),
-        &test.surface,
-        &test.rows,
-        cut(&frames.actual),
-        decoupled.map(cut),
-        heights_mm.unwrap_or_else(|| test.z_range_mm()),
-    )
+    let surface = |frame| test.heights("", frame, look.style());
+    let decoupled = frames.decoupled.as_ref().map(|(decoupled, _)| surface(decoupled));
+    let (section, actual) = (choice.section(test), surface(&frames.actual));
+    section_figure(&section, &test.rows, &actual, decoupled.as_ref())
 }
 
 const DIRECTIONS: [(Along, &str, &str); 2] = [

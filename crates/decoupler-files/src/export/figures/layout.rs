@@ -1,12 +1,12 @@
 //! The layout of figures in print: plots within their axes, the legend above them, surfaces side by side.
 
-use std::sync::OnceLock;
+use std::{ops::RangeInclusive, sync::OnceLock};
 
 use glam::Vec2;
 
-use super::picture::{Canvas, PAGE_WIDTH, Picture, TEXT, measure};
+use super::picture::{Layer, PAGE_WIDTH, Picture, TEXT, measure};
 use crate::figure::{
-    Align, Bounds, ColourMap, Figure, Form, HeatMap, Hue, Ink, Plot, PlotFigure, Rgb, Series, Shape, Stroke, share,
+    Align, Bounds, ColourMap, Figure, Form, HeatMap, Hue, Ink, Plot, PlotFigure, Series, Shape, Stroke,
     surface::{Surface, SurfaceFigure},
 };
 
@@ -61,24 +61,19 @@ fn draw_plots(figure: &PlotFigure) -> Picture {
         top += LINE;
     }
     top += 12.0;
-    let mut canvas = Canvas::new(Vec2::new(width, top + plot_height + BOTTOM));
-    canvas.draw(shapes);
-    for (index, plot) in figure.plots.iter().enumerate() {
+    let plots = figure.plots.iter().enumerate().flat_map(|(index, plot)| {
         let corner = Vec2::new(slot * index as f32 + LEFT, top);
-        let area = Bounds::of_size(corner, Vec2::new(plot_width, plot_height));
-        draw_plot(plot, area, &mut canvas);
-    }
-    canvas.finish()
+        lay_out(plot, Bounds::of_size(corner, Vec2::new(plot_width, plot_height)))
+    });
+    let layers = std::iter::once((None, shapes)).chain(plots);
+    Picture::new(Vec2::new(width, top + plot_height + BOTTOM), &Vec::from_iter(layers))
 }
 
-/// Draws the plot within `area`; names and numbers are outside it.
-fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
-    let ranges @ [x_range, y_range] = &plot.ranges();
-    let at = |[x, y]: [f64; 2]| {
-        let [right, up] = [share(x, x_range), 1.0 - share(y, y_range)].map(|share| share as f32);
-        area.min + Vec2::new(right, up) * area.size()
-    };
-    let (mut bands, mut lines, mut shapes) = (Vec::new(), Vec::new(), Vec::new());
+/// Lays the plot out within `area`; names and numbers are outside it.
+fn lay_out(plot: &Plot, area: Bounds) -> [Layer; 2] {
+    let ranges @ [_, y_range] = &plot.ranges();
+    let at = |place: [f64; 2]| area.at(place, ranges);
+    let (mut behind, mut lines, mut shapes) = (Vec::new(), Vec::new(), Vec::new());
     for (Series { look, .. }, line) in plot.lines_across() {
         let Some(corners) = plot.corners(line, ranges) else {
             continue;
@@ -86,11 +81,10 @@ fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
         let [from, to] = corners.map(at);
         match look.line {
             Some(style) => lines.push(Shape::Line(vec![from, to], style.stroke(look.hue))),
-            None => bands.push(Bounds::of([from, to]).area(Ink::Hue(look.hue).at(0.12))),
+            None => behind.push(Bounds::of([from, to]).area(Ink::Hue(look.hue).at(0.12))),
         }
     }
-    canvas.draw(bands);
-    canvas.draw(axes(plot, area, ranges));
+    behind.extend(axes(plot, area, ranges));
     for series in &plot.series {
         let Form::Bars(width) = series.form else { continue };
         for (_, [x, y]) in plot.placed(series) {
@@ -103,27 +97,27 @@ fn draw_plot(plot: &Plot, area: Bounds, canvas: &mut Canvas) {
     }
     shapes.extend(lines);
     for series in &plot.series {
-        if let Some(style) = series.look.line {
+        let look = series.look;
+        if let Some(style) = look.line {
             let stretches = plot.stretches(series).into_iter();
             let stretches = stretches.map(|places| places.into_iter().map(at).collect());
-            shapes.extend(stretches.map(|points| Shape::Line(points, style.stroke(series.look.hue))));
+            shapes.extend(stretches.map(|points| Shape::Line(points, style.stroke(look.hue))));
         }
-        for (point, place) in plot.placed(series) {
+        for (point, [x, _]) in plot.placed(series) {
             let Some(ends) = point.bar else { continue };
-            let [low, high] = plot.bar_ends(ends, y_range).map(|end| at([place[0], end]));
+            let [low, high] = plot.bar_ends(ends, y_range).map(|end| at([x, end]));
             let cap = Vec2::new(3.0, 0.0);
             let lines = [[low, high], [low - cap, low + cap], [high - cap, high + cap]];
-            shapes.extend(lines.map(|[from, to]| Shape::line(from, to, series.look.hue, 1.1)));
+            shapes.extend(lines.map(|[from, to]| Shape::line(from, to, look.hue, 1.1)));
         }
-        let marks = plot.placed(series).filter_map(|(_, place)| series.look.mark(at(place)));
-        shapes.extend(marks);
+        shapes.extend(plot.placed(series).filter_map(|(_, place)| look.mark(at(place))));
     }
     shapes.extend(plot.lay_out_labels(area, at, &measure));
-    canvas.draw_clipped(area, shapes);
+    [(None, behind), (Some(area), shapes)]
 }
 
 /// Grid, ticks, numbers and names of both axes, and the frame.
-fn axes(plot: &Plot, area: Bounds, ranges: &[std::ops::RangeInclusive<f64>; 2]) -> Vec<Shape> {
+fn axes(plot: &Plot, area: Bounds, ranges: &[RangeInclusive<f64>; 2]) -> Vec<Shape> {
     let (mut grid, mut edges, mut texts) = (Vec::new(), Vec::new(), Vec::new());
     // The name of the y axis is next to its longest number.
     let mut widest = measure("0.0").x;
@@ -135,11 +129,8 @@ fn axes(plot: &Plot, area: Bounds, ranges: &[std::ops::RangeInclusive<f64>; 2]) 
         (&plot.y, 28.0, up, right, Vec2::NEG_X, 7.0, Align::End),
     ];
     for ((axis, number, along, across, away, beyond, align), range) in axes.into_iter().zip(ranges) {
-        let number = f64::from(number / along.length());
-        let ticks = axis.ticks(range, number * (range.end() - range.start()));
-        for &place in &ticks.places {
-            let from = corner + along * share(place, range) as f32;
-            let text = axis.tick_text(place, ticks.step);
+        for (share, text) in axis.numbers(range, number / along.length()) {
+            let from = corner + along * share as f32;
             if align == Align::End {
                 widest = widest.max(measure(&text).x);
             }
@@ -153,16 +144,14 @@ fn axes(plot: &Plot, area: Bounds, ranges: &[std::ops::RangeInclusive<f64>; 2]) 
     let beside = Vec2::new(area.min.x - 19.0 - widest, area.middle().y);
     texts.push(Shape::text(beside, Align::Upright, TEXT_INK, &*plot.y.name));
     edges.push(area.outline(Stroke::new(DIM, 1.0)));
-    grid.into_iter().chain(edges).chain(texts).collect()
+    [grid, edges, texts].concat()
 }
 
 fn draw_map(map: &HeatMap) -> Picture {
     let longest = map.columns.iter().map(|name| measure(name).x).fold(0.0, f32::max);
     let height = (34.0 * map.values.nrows() as f32 + 40.0).max(190.0) + longest;
-    let mut canvas = Canvas::new(Vec2::new(500.0, height));
     let area = Bounds::of_size(Vec2::new(8.0, 14.0), Vec2::new(484.0, height - 22.0));
-    canvas.draw(map.lay_out(area, &measure).shapes);
-    canvas.finish()
+    Picture::new(Vec2::new(500.0, height), &[(None, map.lay_out(area, &measure).shapes)])
 }
 
 /// Room for the title of a card of a surface.
@@ -171,53 +160,51 @@ const TITLE: f32 = 22.0;
 /// Draws surfaces side by side, as wide as a page. A colour bar is drawn to the right of the last card that it belongs to.
 fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
     const KEY: f32 = Surface::SCALE_WIDTH;
-    let scales: Vec<_> = figure.surfaces.iter().map(Surface::scale).collect();
-    let has_key = |card: usize| scales.get(card + 1) != Some(&scales[card]);
-    let keys = (0..scales.len()).filter(|&card| has_key(card)).count();
-    let width = (PAGE_WIDTH - keys as f32 * KEY) / scales.len().max(1) as f32;
+    let surfaces = &figure.surfaces;
+    let has_key = |card: usize| surfaces.get(card + 1).map(Surface::scale) != Some(surfaces[card].scale());
+    let keys = (0..surfaces.len()).filter(|&card| has_key(card)).count();
+    let width = (PAGE_WIDTH - keys as f32 * KEY) / surfaces.len().max(1) as f32;
     let height = (0.98 * width).clamp(206.0, 400.0);
-    let (mut cards, mut corner) = (Vec::new(), Vec2::new(0.0, TITLE));
-    for (card, surface) in figure.surfaces.iter().enumerate() {
-        let bounds = Bounds::of_size(corner, Vec2::new(width, height));
-        let drawing = surface.lay_out(figure.camera, bounds, &measure, colours(surface));
-        cards.push((bounds, surface, drawing));
-        corner.x += width + if has_key(card) { KEY } else { 0.0 };
-    }
     let below = TITLE + height + 0.5 * LINE;
-    let has_notes = cards.iter().any(|(_, _, drawing)| drawing.note.is_some());
-    let last = below + if has_notes { LINE } else { 0.0 };
-    let mut canvas = Canvas::new(Vec2::new(PAGE_WIDTH, last + 0.6 * LINE));
-    for (card, (bounds, surface, drawing)) in cards.into_iter().enumerate() {
+    let (mut layers, mut left, mut last) = (Vec::new(), 0.0, below);
+    for (card, surface) in surfaces.iter().enumerate() {
+        let bounds = Bounds::of_size(Vec2::new(left, TITLE), Vec2::new(width, height));
+        let drawing = surface.lay_out(figure.camera, bounds, &measure, errors());
         let title = Vec2::new(bounds.middle().x, 0.5 * TITLE);
-        canvas.draw([Shape::text(title, Align::Middle, TEXT_INK, &*surface.title)]);
+        layers.push((None, vec![Shape::text(title, Align::Middle, TEXT_INK, &*surface.title)]));
         let section = figure.section.map(|section| section.shapes(surface, &drawing.sight));
         let dots = drawing.dots.shapes(figure.marked_node, &figure.lit_nodes);
         let shapes = drawing.frame.into_iter().chain(drawing.mesh.shapes());
-        canvas.draw_clipped(bounds, shapes.chain(section.into_iter().flatten()).chain(dots));
+        let shapes = shapes.chain(section.into_iter().flatten()).chain(dots);
+        layers.push((Some(bounds), shapes.collect()));
+        left += width;
+        let mut beside = Vec::new();
         if has_key(card) {
-            let corner = Vec2::new(bounds.max.x, bounds.min.y);
-            let area = Bounds::of_size(corner, Vec2::new(KEY, height));
-            canvas.draw(surface.lay_out_scale(area, colours(surface), &measure));
+            let area = Bounds::of_size(Vec2::new(left, TITLE), Vec2::new(KEY, height));
+            beside = surface.lay_out_scale(area, &measure, errors());
+            left += KEY;
         }
-        let at = Vec2::new(bounds.min.x + 16.0, below);
-        let write = |note| Shape::text(at, Align::Start, Ink::Hue(Hue::Orange), note);
-        canvas.draw(drawing.note.map(write));
+        if let Some(note) = drawing.note {
+            let at = Vec2::new(bounds.min.x + 16.0, below);
+            beside.push(Shape::text(at, Align::Start, Ink::Hue(Hue::Orange), note));
+            last = below + LINE;
+        }
+        layers.push((None, beside));
     }
-    canvas.draw([Shape::text(Vec2::new(16.0, last), Align::Start, DIM, figure.note())]);
-    canvas.finish()
+    let note = Shape::text(Vec2::new(16.0, last), Align::Start, DIM, figure.note());
+    layers.push((None, vec![note]));
+    Picture::new(Vec2::new(PAGE_WIDTH, last + 0.6 * LINE), &layers)
 }
 
-fn colours(surface: &Surface) -> &'static ColourMap {
-    static DIVERGING: OnceLock<ColourMap> = OnceLock::new();
-    const STOPS: [Rgb; 5] = [
+/// Colours of errors on white paper.
+fn errors() -> &'static ColourMap {
+    static ERRORS: OnceLock<ColourMap> = OnceLock::new();
+    let stops = [
         [0x0b, 0x3d, 0x91],
         [0x5b, 0x9b, 0xe6],
         [0xff; 3],
         [0xf0, 0x87, 0x5a],
         [0x9a, 0x2c, 0x06],
     ];
-    match surface.quantity.is_diverging() {
-        true => DIVERGING.get_or_init(|| ColourMap::diverging(STOPS)),
-        false => surface.colours.colours(),
-    }
+    ERRORS.get_or_init(|| ColourMap::diverging(stops))
 }

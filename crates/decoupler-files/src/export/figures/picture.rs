@@ -26,7 +26,8 @@ pub struct Picture {
 }
 
 /// File format of a figure.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::EnumString, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase", ascii_case_insensitive)]
 pub enum PictureFormat {
     /// Lines and text, sharp at any size.
     Svg,
@@ -52,10 +53,7 @@ pub enum PictureError {
 impl PictureFormat {
     /// File name extension, without the dot.
     pub fn extension(self) -> &'static str {
-        match self {
-            Self::Svg => "svg",
-            Self::Png => "png",
-        }
+        self.into()
     }
 
     /// Returns the format given by the extension of `path`.
@@ -63,10 +61,8 @@ impl PictureFormat {
     /// # Errors
     /// The name ends neither in .svg nor in .png.
     pub fn of_path(path: &Path) -> Result<Self, PictureError> {
-        let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        let formats = [Self::Svg, Self::Png].into_iter();
-        let mut named = formats.filter(|format| format.extension() == extension);
-        named.next().ok_or_else(|| PictureError::Name(path.to_owned()))
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        extension.parse().map_err(|_| PictureError::Name(path.to_owned()))
     }
 }
 
@@ -74,6 +70,32 @@ impl PictureFormat {
 const DOTS_PER_INCH: f32 = 300.0;
 
 impl Picture {
+    /// Draws layers from back to front on a page of this size.
+    pub(super) fn new(size: Vec2, layers: &[Layer]) -> Self {
+        let mut body = Vec::new();
+        for (layer, (clip, shapes)) in layers.iter().enumerate() {
+            body.extend(clip.map(|area| {
+                let [[x, y], [width, height]] = [area.min, area.size()].map(|part| part.to_array().map(number));
+                format!(
+                    r##"<clipPath id="c{layer}"><rect x="{x}" y="{y}" width="{width}" height="{height}"/></clipPath><g clip-path="url(#c{layer})">"##
+                )
+            }));
+            body.extend(shapes.iter().map(element));
+            body.extend(clip.map(|_| "</g>".to_owned()));
+        }
+        let [[width, height], print] = [size, size * SCALE].map(|size| size.to_array().map(number));
+        let ([print_width, print_height], body) = (print, body.join("\n"));
+        let svg = format!(
+            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{print_width}pt" height="{print_height}pt" viewBox="0 0 {width} {height}" font-family="'Inter Tabular', Inter, Helvetica, Arial, sans-serif" font-size="{TEXT}" stroke-width=".4" stroke-linejoin="round">
+<rect width="{width}" height="{height}" fill="#ffffff"/>
+{body}
+</svg>
+"##
+        );
+        let share = size.x / PAGE_WIDTH;
+        Self { svg, share }
+    }
+
     /// The figure as SVG. Its text names the program's font and common substitutes.
     pub fn svg(&self) -> &str {
         &self.svg
@@ -230,89 +252,44 @@ pub(super) fn measure(text: &str) -> Vec2 {
     Vec2::new(text.chars().map(width).sum(), 1.2) * TEXT
 }
 
-/// A drawing of shapes.
-pub(super) struct Canvas {
-    size: Vec2,
-    body: String,
-    clips: usize,
-}
+/// Shapes in their order, clipped to an area if there is one.
+pub(super) type Layer = (Option<Bounds>, Vec<Shape>);
 
-impl Canvas {
-    pub fn new(size: Vec2) -> Self {
-        let (body, clips) = (String::new(), 0);
-        Self { size, body, clips }
-    }
-
-    /// Draws shapes in their order.
-    pub fn draw(&mut self, shapes: impl IntoIterator<Item = Shape>) {
-        for shape in shapes {
-            let element = match shape {
-                Shape::Line(points, stroke) => {
-                    let (path, style) = (coordinates(&points), stroke_style(&stroke));
-                    format!(r#"<path d="M{path}" fill="none"{style}/>"#)
-                }
-                Shape::Area(corners, colour) => {
-                    // A hairline in its own colour closes the seam of an area to its neighbours; a translucent area has crisp
-                    // edges instead, because the hairlines would be visible.
-                    let edge = match colour.opacity < 1.0 {
-                        true => r#" shape-rendering="crispEdges""#.to_owned(),
-                        false => paint("stroke", colour),
-                    };
-                    let (path, fill) = (coordinates(&corners), paint("fill", colour));
-                    format!(r#"<path d="M{path}z"{fill}{edge}/>"#)
-                }
-                Shape::Disc(at, radius, colour) => circle(at, radius, &paint("fill", colour)),
-                Shape::Ring(at, radius, stroke) => {
-                    circle(at, radius, &format!(r#" fill="none"{}"#, stroke_style(&stroke)))
-                }
-                Shape::Text(at, align, ink, text) => {
-                    // From the middle of the height to the base line.
-                    let below = 0.36 * TEXT;
-                    let [x, right, y, down] = [at.x, at.x + below, at.y, at.y + below].map(number);
-                    let (place, anchor) = match align {
-                        Align::Upright => (format!(r#"transform="translate({right} {y}) rotate(-90)""#), "middle"),
-                        Align::Start => (format!(r#"x="{x}" y="{down}""#), "start"),
-                        Align::Middle => (format!(r#"x="{x}" y="{down}""#), "middle"),
-                        Align::End => (format!(r#"x="{x}" y="{down}""#), "end"),
-                    };
-                    let (fill, text) = (paint("fill", ink.into()), escaped(&text));
-                    format!(r#"<text {place} text-anchor="{anchor}"{fill}>{text}</text>"#)
-                }
-            };
-            self.put(&element);
+/// Draws a shape.
+fn element(shape: &Shape) -> String {
+    match shape {
+        Shape::Line(points, stroke) => {
+            let (path, style) = (coordinates(points), stroke_style(stroke));
+            format!(r#"<path d="M{path}" fill="none"{style}/>"#)
         }
-    }
-
-    /// Draws shapes, clipped to `area`.
-    pub fn draw_clipped(&mut self, area: Bounds, shapes: impl IntoIterator<Item = Shape>) {
-        self.clips += 1;
-        let (clip, [x, y]) = (self.clips, area.min.to_array().map(number));
-        let [width, height] = area.size().to_array().map(number);
-        self.put(&format!(
-            r##"<clipPath id="c{clip}"><rect x="{x}" y="{y}" width="{width}" height="{height}"/></clipPath><g clip-path="url(#c{clip})">"##
-        ));
-        self.draw(shapes);
-        self.put("</g>");
-    }
-
-    fn put(&mut self, element: &str) {
-        self.body += element;
-        self.body.push('\n');
-    }
-
-    pub fn finish(self) -> Picture {
-        let [width, height] = self.size.to_array().map(number);
-        let print = self.size * SCALE;
-        let [print_width, print_height] = print.to_array().map(number);
-        let body = self.body;
-        let svg = format!(
-            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{print_width}pt" height="{print_height}pt" viewBox="0 0 {width} {height}" font-family="'Inter Tabular', Inter, Helvetica, Arial, sans-serif" font-size="{TEXT}" stroke-width=".4" stroke-linejoin="round">
-<rect width="{width}" height="{height}" fill="#ffffff"/>
-{body}</svg>
-"##
-        );
-        let share = self.size.x / PAGE_WIDTH;
-        Picture { svg, share }
+        Shape::Area(corners, colour) => {
+            // A hairline in its own colour closes the seam of an area to its neighbours; a translucent area has crisp
+            // edges instead, because the hairlines would be visible.
+            let edge = match colour.opacity < 1.0 {
+                true => r#" shape-rendering="crispEdges""#.to_owned(),
+                false => paint("stroke", *colour),
+            };
+            let (path, fill) = (coordinates(corners), paint("fill", *colour));
+            format!(r#"<path d="M{path}z"{fill}{edge}/>"#)
+        }
+        Shape::Disc(at, radius, colour) => circle(*at, *radius, &paint("fill", *colour)),
+        Shape::Ring(at, radius, stroke) => circle(*at, *radius, &format!(r#" fill="none"{}"#, stroke_style(stroke))),
+        Shape::Text(at, align, ink, text) => {
+            // From the middle of the height to the base line.
+            let below = 0.36 * TEXT;
+            let [x, right, y, down] = [at.x, at.x + below, at.y, at.y + below].map(number);
+            let anchor = match align {
+                Align::Start => "start",
+                Align::Middle | Align::Upright => "middle",
+                Align::End => "end",
+            };
+            let place = match align {
+                Align::Upright => format!(r#"transform="translate({right} {y}) rotate(-90)""#),
+                _ => format!(r#"x="{x}" y="{down}""#),
+            };
+            let (fill, text) = (paint("fill", (*ink).into()), escaped(text));
+            format!(r#"<text {place} text-anchor="{anchor}"{fill}>{text}</text>"#)
+        }
     }
 }
 

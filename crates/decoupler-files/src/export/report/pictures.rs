@@ -126,13 +126,8 @@ fn array_surfaces(
         let rows = samples.iter().map(|&sample| coordinates_mm.row(sample).to_vec());
         Vec::from_iter(rows.flat_map(|row| Vec::from_iter(row.chunks_exact(3).map(DVec3::from_slice))))
     };
-    let (actual, decoupled) = (nodes(test.targets()), nodes(decoupled_mm.view()));
-    let pairs = actual.iter().zip(&decoupled);
-    let error = Vec::from_iter(pairs.map(|(actual, decoupled)| actual.with_z(decoupled.z - actual.z)));
+    let nodes = [test.targets(), decoupled_mm.view()].map(nodes);
     let heights = geometry.height_mm - source.stroke_mm()..=geometry.height_mm;
-    let errors_mm = error.iter().map(|node| node.z.abs()).filter(|z| z.is_finite());
-    // Errors below a nanometre are not distinguished by colour.
-    let largest_mm = errors_mm.fold(1e-6, f64::max);
     let place = rows.iter().position(|&row| row == worst.row)?;
     let caption = format!(
         "Snapshot {} of the test set, which has the node with the largest error (row {}, node {}, marked).",
@@ -140,13 +135,9 @@ fn array_surfaces(
         worst.row + 1,
         worst.node + 1
     );
-    let surfaces = [
-        ("Actual", actual, Quantity::Height, heights.clone()),
-        ("Decoupled", decoupled, Quantity::Height, heights),
-        ("Error", error, Quantity::Error, -largest_mm..=largest_mm),
-    ];
-    let surfaces =
-        surfaces.map(|(title, nodes, quantity, range)| Surface::through(title, &map, nodes, quantity, range));
+    let quantities = [Quantity::Height, Quantity::Error];
+    // Errors below a nanometre are not distinguished by colour.
+    let surfaces = Surface::compared("Decoupled", &map, nodes, quantities, heights, 1e-6);
     let marked = place * scale.nodes_per_row() + worst.node;
     Some((caption, from_above(surfaces, marked)))
 }

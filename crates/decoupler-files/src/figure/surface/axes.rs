@@ -6,7 +6,7 @@ use glam::{DVec3, Vec2};
 
 use super::camera::{OrbitCamera, PlotBox, Sight};
 use crate::figure::{
-    axis::{PlotAxis, Ticks, step_for, tick_text},
+    axis::{PlotAxis, step_for, tick_text},
     drawing::{Bounds, Ink, Labels, Measure, Shape},
 };
 
@@ -76,21 +76,25 @@ impl<'a> Axes<'a> {
                 _ => plot_box.min_mm[axis]..=plot_box.max_mm[axis],
             };
             let edge = Edge::new(&sight, axis, starts[axis], &range, measure);
-            for &value in &edge.ticks.places {
-                let text = tick_text(value, edge.ticks.step);
-                put(edge.point(&sight, value), edge.away, TICK + GAP, 0, &text);
+            for (place_mm, text) in &edge.numbers {
+                put(sight.drawn(*place_mm), edge.away, TICK + GAP, 0, text);
             }
             edge
         });
         // Names are placed last, beyond the numbers: that of an upright axis above it.
-        for edge in edges.iter().filter(|edge| !edge.ticks.places.is_empty()) {
-            let (axis, high) = (edge.axis, plot_box.max_mm[edge.axis]);
-            let middle = 0.5 * (plot_box.min_mm[axis] + high);
-            let (value, away, gap) = match axis == 2 || (sight.is_above && axis == 1) {
-                true => (high, Vec2::NEG_Y, GAP + 1.0),
-                false => (middle, edge.away, TICK + 2.0 * GAP),
+        for (axis, edge) in edges.iter().enumerate().filter(|(_, edge)| !edge.numbers.is_empty()) {
+            let (share, away, gap) = match axis == 2 || (sight.is_above && axis == 1) {
+                true => (1.0, Vec2::NEG_Y, GAP + 1.0),
+                false => (0.5, edge.away, TICK + 2.0 * GAP),
             };
-            put(edge.point(&sight, value), away, gap, 20, names[axis]);
+            let value = plot_box.min_mm.lerp(plot_box.max_mm, share)[axis];
+            put(
+                sight.drawn(moved(starts[axis], axis, value)),
+                away,
+                gap,
+                20,
+                names[axis],
+            );
         }
         let near = near_x | near_y;
         let mut lines = Vec::new();
@@ -100,11 +104,11 @@ impl<'a> Axes<'a> {
         };
         let back = plot_box.corner_mm(3 - near);
         // At each tick of x and y, a line across the floor and one up a back wall; at each tick of z, one across each wall.
-        for edge in edges.iter().filter(|_| !sight.is_above) {
-            let [one, other] = [[1, 2], [0, 2], [0, 1]][edge.axis];
-            for &value in &edge.ticks.places {
+        for (axis, edge) in edges.iter().enumerate().filter(|_| !sight.is_above) {
+            let [one, other] = [[1, 2], [0, 2], [0, 1]][axis];
+            for (place_mm, _) in &edge.numbers {
                 for (along, fixed) in [(one, other), (other, one)] {
-                    let from = moved(moved(plot_box.min_mm, edge.axis, value), fixed, back[fixed]);
+                    let from = moved(moved(plot_box.min_mm, axis, place_mm[axis]), fixed, back[fixed]);
                     segment([from, moved(from, along, plot_box.max_mm[along])], Ink::Grid);
                 }
             }
@@ -118,9 +122,9 @@ impl<'a> Axes<'a> {
                 segment([from, to].map(|corner| plot_box.corner_mm(corner)), Ink::Edge);
             }
         }
-        for edge in &edges {
-            let ticks = edge.ticks.places.iter().map(|&value| edge.point(&sight, value));
-            lines.extend(ticks.map(|from| Shape::line(from, from + edge.away * TICK, Ink::Edge, 1.0)));
+        for Edge { away, numbers } in &edges {
+            let ticks = numbers.iter().map(|(place_mm, _)| sight.drawn(*place_mm));
+            lines.extend(ticks.map(|from| Shape::line(from, from + away * TICK, Ink::Edge, 1.0)));
         }
         Self { sight, labels, lines }
     }
@@ -128,37 +132,33 @@ impl<'a> Axes<'a> {
 
 /// One axis as drawn: an edge of the box with its ticks.
 struct Edge {
-    axis: usize,
-    from_mm: DVec3,
     /// Unit vector on the screen away from the box.
     away: Vec2,
-    /// Empty if the edge is too short.
-    ticks: Ticks,
+    /// Places of the ticks, with their numbers; empty if the edge is too short.
+    numbers: Vec<(DVec3, String)>,
 }
 
 impl Edge {
     fn new(sight: &Sight, axis: usize, from_mm: DVec3, range: &RangeInclusive<f64>, measure: Measure<'_>) -> Self {
-        let ends = [range.start(), range.end()];
-        let [start, end] = ends.map(|end| sight.drawn(moved(from_mm, axis, *end)));
+        let ends = [*range.start(), *range.end()];
+        let ends_mm = ends.map(|end| moved(from_mm, axis, end));
+        let [start, end] = ends_mm.map(|end_mm| sight.drawn(end_mm));
         let (length, along) = ((end - start).length(), (end - start).normalize_or_zero());
         let across = Vec2::new(along.y, -along.x);
         let is_outwards = across.dot(0.5 * (start + end) - sight.bounds().middle()) >= 0.0;
-        let sizes = ends.map(|end| measure(&tick_text(*end, step_for(range, 8))));
+        let sizes = ends.map(|end| measure(&tick_text(end, step_for(range, 8))));
         let size = sizes[0].max(sizes[1]) + Vec2::new(8.0, 5.0);
         let apart = (size / along.abs().max(Vec2::splat(1e-3))).min_element().max(20.0);
         // In perspective, the far end of an edge is shorter than the average.
-        let apart_mm = f64::from(apart / (0.8 * length)) * (range.end() - range.start());
-        let ticks = (length >= SHORTEST_AXIS).then(|| PlotAxis::linear("").ticks(range, apart_mm));
+        let numbers = match length >= SHORTEST_AXIS {
+            true => PlotAxis::linear("").numbers(range, apart / (0.8 * length)),
+            false => Vec::new(),
+        };
+        let at = |(share, text)| (ends_mm[0].lerp(ends_mm[1], share), text);
         Self {
-            axis,
-            from_mm,
             away: if is_outwards { across } else { -across },
-            ticks: ticks.unwrap_or_default(),
+            numbers: numbers.into_iter().map(at).collect(),
         }
-    }
-
-    fn point(&self, sight: &Sight, value: f64) -> Vec2 {
-        sight.drawn(moved(self.from_mm, self.axis, value))
     }
 }
 

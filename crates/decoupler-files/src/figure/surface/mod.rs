@@ -16,7 +16,7 @@ mod section;
 pub use camera::{OrbitCamera, Ray, Sight};
 pub use mesh::{Mesh, Piece, Vertex};
 pub use nodes::Dots;
-pub use section::{Section, SectionLine, SectionNodes, section_figure};
+pub use section::{Section, SectionLine, section_figure};
 
 use std::{ops::RangeInclusive, sync::Arc};
 
@@ -91,15 +91,46 @@ impl Surface {
         }
     }
 
+    /// The surfaces through actual and decoded nodes of `map`, over `range`, and through decoded minus actual ones, whose
+    /// range is symmetric about zero and at least ± `least`. The quantities are those of values and of errors.
+    pub fn compared(
+        decoded: &str,
+        map: &Arc<SurfaceMap>,
+        nodes: [Vec<DVec3>; 2],
+        [value, error]: [Quantity; 2],
+        range: RangeInclusive<f64>,
+        least: f64,
+    ) -> [Self; 3] {
+        let pairs = nodes[0].iter().zip(&nodes[1]);
+        let errors = Vec::from_iter(pairs.map(|(actual, decoded)| actual.with_z(decoded.z - actual.z)));
+        let sizes = errors.iter().map(|node| node.z.abs());
+        let largest = sizes.filter(|size| size.is_finite()).fold(least, f64::max);
+        let [actual_nodes, decoded_nodes] = nodes;
+        [
+            Self::through("Actual", map, actual_nodes, value.clone(), range.clone()),
+            Self::through(decoded, map, decoded_nodes, value, range),
+            Self::through("Error", map, errors, error, -largest..=largest),
+        ]
+    }
+
     /// Width of a colour scale with its numbers, in points.
     pub const SCALE_WIDTH: f32 = 72.0;
 
-    /// Lays the colour scale out in `area` in the colours of `map`; empty if the area or the range is too small.
-    pub fn lay_out_scale(&self, area: Bounds, map: &ColourMap, measure: Measure<'_>) -> Vec<Shape> {
+    /// Returns the colours of its values: `errors` if they diverge from zero.
+    fn colour_map<'a>(&self, errors: &'a ColourMap) -> &'a ColourMap {
+        match self.quantity.is_diverging() {
+            true => errors,
+            false => self.colours.colours(),
+        }
+    }
+
+    /// Lays the colour scale out in `area`, that of `errors` if values diverge from zero; empty if the area or the range is
+    /// too small.
+    pub fn lay_out_scale(&self, area: Bounds, measure: Measure<'_>, errors: &ColourMap) -> Vec<Shape> {
         let margin = Vec2::new(0.0, 14.0);
         let area = Bounds::of([area.min + margin, area.max - margin]);
         let axis = PlotAxis::linear(self.quantity.axis_name());
-        lay_out_scale(area, &axis, &self.range, map, measure)
+        lay_out_scale(area, &axis, &self.range, self.colour_map(errors), measure)
     }
 
     /// Returns what determines the colour of a value.
@@ -151,8 +182,8 @@ impl Surface {
         format!("{range} over {nodes}, {what} at x {x}, y {y} mm")
     }
 
-    /// Lays the surface out in `card`, as `camera` sees it, with its values in these colours.
-    pub fn lay_out(&self, camera: OrbitCamera, card: Bounds, measure: Measure<'_>, colours: &ColourMap) -> Drawing {
+    /// Lays the surface out in `card`, as `camera` sees it; `errors` are the colours of values that diverge from zero.
+    pub fn lay_out(&self, camera: OrbitCamera, card: Bounds, measure: Measure<'_>, errors: &ColourMap) -> Drawing {
         let (plot_box, camera) = match self.mode {
             ViewMode::ThreeD => {
                 let room = (card.size() - LABELS).max(Vec2::ONE);
@@ -165,7 +196,10 @@ impl Surface {
         let axes = Axes::new(measure, inner, plot_box, camera, &range, names);
         let sight = axes.sight;
         let (mesh, dots) = match self.values.len() == self.map.grid().len() {
-            true => (Mesh::new(self, &sight, colours), Dots::new(self, &sight)),
+            true => (
+                Mesh::new(self, &sight, self.colour_map(errors)),
+                Dots::new(self, &sight),
+            ),
             false => Default::default(),
         };
         let mut frame = axes.lines;

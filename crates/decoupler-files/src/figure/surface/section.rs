@@ -1,9 +1,7 @@
 //! Sections of surfaces along a wire, and their figure.
 
-use std::ops::RangeInclusive;
-
 use decoupler_core::{
-    surface::{Grid, SurfaceMap},
+    surface::Grid,
     text::{capitalised, format_number},
 };
 use glam::{DVec3, Vec2};
@@ -95,25 +93,9 @@ pub(super) fn cell(points_mm: &[f64], at_mm: f64) -> Option<usize> {
     (after > 0 && at_mm <= points_mm[points_mm.len() - 1]).then(|| (after - 1).min(points_mm.len() - 2))
 }
 
-/// A surface to be cut, with its nodes.
-#[derive(Clone, Copy, Debug)]
-pub struct SectionNodes<'a> {
-    /// Values on the grid of the map, in millimetres.
-    pub values_mm: &'a [f64],
-    /// The nodes row by row; a cut along a row-wire shows those on it.
-    pub nodes_mm: &'a [DVec3],
-}
-
-/// Actual and decoupled z along a wire, with the nodes on it. `rows` are the row-wires read, from 0, and `heights_mm` are
-/// always in view. Sections beyond the nodes are marked as extrapolated.
-pub fn section_figure(
-    section: &Section,
-    map: &SurfaceMap,
-    rows: &[usize],
-    actual: SectionNodes<'_>,
-    decoupled: Option<SectionNodes<'_>>,
-    heights_mm: RangeInclusive<f64>,
-) -> PlotFigure {
+/// Actual and decoupled z along a wire, with the nodes on it. `rows` are the row-wires read, from 0; the ranges of the surfaces
+/// are always in view. Sections beyond the nodes are marked as extrapolated.
+pub fn section_figure(section: &Section, rows: &[usize], actual: &Surface, decoupled: Option<&Surface>) -> PlotFigure {
     let (axis, place): (_, fn(&DVec3) -> f64) = match section.line {
         SectionLine::RowWire(_) => ("y", |place| place.y),
         SectionLine::ColumnWire(_) => ("x", |place| place.x),
@@ -122,44 +104,42 @@ pub fn section_figure(
         let decoupled = decoupled.map(|surface| ("decoupled", Hue::Blue, Marker::Disc, surface));
         std::iter::once(("actual", Hue::Grey, Marker::Square, actual)).chain(decoupled)
     };
+    let name = section.line.name();
+    let title = capitalised(&name);
+    let heights_mm = shown().flat_map(|(.., surface)| [*surface.range.start(), *surface.range.end()]);
+    let x = PlotAxis::linear(format!("{axis} along {name} (mm)"));
+    let y = PlotAxis::linear("z (mm)").including(heights_mm);
     let curves = shown().map(|(name, hue, _, surface)| {
-        let curve = section.curve_mm(map.grid(), surface.values_mm);
+        let curve = section.curve_mm(surface.map.grid(), &surface.values);
         let curve = curve.iter().map(|at| [place(at), at.z]);
         Series::new(name, Look::line(hue, LineStyle::Solid), curve)
     });
-    let name = section.line.name();
-    let title = capitalised(&name);
-    let nodes = shown().map(|(name, hue, marker, surface)| {
-        let points = on_wire(section.line, rows, surface.nodes_mm).map(|(node, of_row)| {
-            let at = surface.nodes_mm[node];
-            let note = format!("{title}, node {}\n{name} z: {} mm", of_row + 1, format_number(at.z));
-            PlotPoint::from([place(&at), at.z]).of_item(node).noted(note)
-        });
-        Series::new(format!("{name} nodes"), Look::marker(hue, marker), points).listed(None)
-    });
-    let x = PlotAxis::linear(format!("{axis} along {name} (mm)"));
-    let y = PlotAxis::linear("z (mm)").including([*heights_mm.start(), *heights_mm.end()]);
-    let mut plot = Plot::new(x, y, curves.chain(nodes));
-    if plot.keys().is_empty() {
+    let mut plot = Plot::new(x, y, curves);
+    if plot.series.is_empty() {
         let note = format!("{title} lies beyond the nodes: there is no surface above it.");
         return PlotFigure::new([plot], [note]);
     }
-    plot.series.extend(beyond(section.line, map));
+    plot.series.extend(shown().filter_map(|(name, hue, marker, surface)| {
+        let row = rows.iter().position(|&row| section.line == SectionLine::RowWire(row))?;
+        let per_row = surface.nodes.len() / rows.len();
+        // A column-wire passes below the surface, between the nodes.
+        let points = surface.nodes.iter().enumerate().skip(row * per_row).take(per_row);
+        let points = points.map(|(node, at)| {
+            let note = format!(
+                "{title}, node {}\n{name} z: {} mm",
+                node % per_row + 1,
+                format_number(at.z)
+            );
+            PlotPoint::from([place(at), at.z]).of_item(node).noted(note)
+        });
+        Some(Series::new(format!("{name} nodes"), Look::marker(hue, marker), points).listed(None))
+    }));
+    plot.series.extend(beyond(section.line, actual.map.grid()));
     plot.into()
 }
 
-/// The nodes on a row-wire: their numbers among all and on the wire. None for a column-wire, which passes below the surface
-/// between them.
-fn on_wire(line: SectionLine, rows: &[usize], nodes_mm: &[DVec3]) -> impl Iterator<Item = (usize, usize)> + use<> {
-    let row = rows.iter().position(|&row| line == SectionLine::RowWire(row));
-    let per_row = nodes_mm.len() / rows.len().max(1);
-    let on_wire = row.map(|row| (0..per_row).map(move |of_row| (row * per_row + of_row, of_row)));
-    on_wire.into_iter().flatten()
-}
-
 /// The stretches on which the surface is extrapolated.
-fn beyond(line: SectionLine, map: &SurfaceMap) -> impl Iterator<Item = Series> {
-    let grid = map.grid();
+fn beyond(line: SectionLine, grid: &Grid) -> impl Iterator<Item = Series> {
     let (points_mm, inside) = match line {
         SectionLine::RowWire(_) => (grid.y_mm(), grid.inside_y()),
         SectionLine::ColumnWire(_) => (grid.x_mm(), grid.inside_x()),
@@ -236,7 +216,12 @@ mod tests {
 
 #[cfg(test)]
 mod figure_tests {
+    use std::sync::Arc;
+
+    use decoupler_core::surface::SurfaceMap;
+
     use super::*;
+    use crate::figure::surface::Quantity;
 
     const X: [f64; 3] = [8.0, 9.0, 10.0];
     const Y: [f64; 4] = [3.0, 5.0, 7.0, 9.0];
@@ -247,24 +232,12 @@ mod figure_tests {
     }
 
     fn figure(line: SectionLine, at_mm: f64) -> PlotFigure {
-        let map = SurfaceMap::new(&X, &Y).unwrap();
-        let [actual, decoupled] = [nodes(|x, y| 4.0 + 0.05 * x - 0.02 * y), nodes(|_, y| 4.5 - 0.01 * y)];
-        let values =
-            [&actual, &decoupled].map(|nodes| map.evaluate(&nodes.iter().map(|node| node.z).collect::<Vec<_>>()));
-        let cut = |place: usize, nodes| SectionNodes {
-            values_mm: &values[place],
-            nodes_mm: nodes,
-        };
-        let section = Section { line, at_mm };
+        let map = Arc::new(SurfaceMap::new(&X, &Y).unwrap());
+        let surface = |nodes: Vec<DVec3>| Surface::through("", &map, nodes, Quantity::Height, 4.0..=5.0);
+        let actual = surface(nodes(|x, y| 4.0 + 0.05 * x - 0.02 * y));
+        let decoupled = surface(nodes(|_, y| 4.5 - 0.01 * y));
         // Row-wires 3, 5 and 8 are read.
-        section_figure(
-            &section,
-            &map,
-            &[2, 4, 7],
-            cut(0, &actual),
-            Some(cut(1, &decoupled)),
-            4.0..=5.0,
-        )
+        section_figure(&Section { line, at_mm }, &[2, 4, 7], &actual, Some(&decoupled))
     }
 
     #[test]
