@@ -1,9 +1,10 @@
 //! Colour maps, baked into tables.
 
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 
 use colorgrad::{BlendMode, Color, Gradient, GradientBuilder, LinearGradient};
 use serde::{Deserialize, Serialize};
+use strum::EnumMessage as _;
 
 /// Red, green, blue.
 pub type Rgb = [u8; 3];
@@ -12,14 +13,19 @@ const ENTRIES: usize = 256;
 
 /// Sequential colour maps from which the reader can choose. Their lightness increases evenly, which keeps them readable
 /// in grey and for colour-blind readers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::EnumMessage, strum::IntoStaticStr,
+)]
 pub enum SequentialMap {
     /// Blue, green, yellow: matplotlib's default.
     #[default]
+    #[strum(message = "From blue over green to yellow, even in lightness.")]
     Viridis,
     /// Blue, grey, yellow: looks the same with all kinds of colour vision (Nuñez, Anderton and Renslow 2018).
+    #[strum(message = "From blue over grey to yellow: looks nearly the same to readers with any colour vision.")]
     Cividis,
     /// Black, purple, orange, pale yellow.
+    #[strum(message = "From black over purple and orange to pale yellow, even in lightness.")]
     Inferno,
 }
 
@@ -29,42 +35,32 @@ impl SequentialMap {
 
     /// Returns its usual name.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Viridis => "Viridis",
-            Self::Cividis => "Cividis",
-            Self::Inferno => "Inferno",
-        }
+        self.into()
     }
 
     /// Description in a sentence.
     pub fn meaning(self) -> &'static str {
-        match self {
-            Self::Viridis => "From blue over green to yellow, even in lightness.",
-            Self::Cividis => "From blue over grey to yellow: looks nearly the same to readers with any colour vision.",
-            Self::Inferno => "From black over purple and orange to pale yellow, even in lightness.",
-        }
+        self.get_message().expect("every map has a description")
     }
 
     /// Its colours.
     pub fn colours(self) -> &'static ColourMap {
         use colorgrad::preset::{cividis, inferno, viridis};
-        static MAPS: OnceLock<[ColourMap; 3]> = OnceLock::new();
-        let bake = || {
+        static MAPS: LazyLock<[ColourMap; 3]> = LazyLock::new(|| {
+            let (viridis, cividis, inferno) = (viridis(), cividis(), inferno());
             [
-                ColourMap::bake(&viridis()),
-                ColourMap::bake(&cividis()),
-                ColourMap::bake(&inferno()),
+                ColourMap::bake(&viridis),
+                ColourMap::bake(&cividis),
+                ColourMap::bake(&inferno),
             ]
-        };
-        &MAPS.get_or_init(bake)[self as usize]
+        });
+        &MAPS[self as usize]
     }
 }
 
 /// 256 colours over 0..=1.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ColourMap {
-    entries: Vec<Rgb>,
-}
+pub struct ColourMap(Vec<Rgb>);
 
 impl ColourMap {
     /// From most negative to most positive, blended in Oklab so that equal values of either sign look equally strong.
@@ -74,25 +70,23 @@ impl ColourMap {
         let gradient: LinearGradient = gradient.expect("five stops make a gradient");
         let mut map = Self::bake(&gradient);
         // With 256 entries there is no middle one; both entries next to zero get its exact colour.
-        map.entries[ENTRIES / 2 - 1] = stops[2];
-        map.entries[ENTRIES / 2] = stops[2];
+        map.0[ENTRIES / 2 - 1] = stops[2];
+        map.0[ENTRIES / 2] = stops[2];
         map
     }
 
     fn bake(gradient: &impl Gradient) -> Self {
-        let entry = |index: usize| {
-            let [red, green, blue, _] = gradient.at(index as f32 / (ENTRIES - 1) as f32).to_rgba8();
+        let rgb = |colour: Color| {
+            let [red, green, blue, _] = colour.to_rgba8();
             [red, green, blue]
         };
-        Self {
-            entries: (0..ENTRIES).map(entry).collect(),
-        }
+        Self(gradient.colors(ENTRIES).map(rgb).collect())
     }
 
     /// Returns the colour at `position` in 0..=1; beyond that, the colours of the ends.
     pub fn at(&self, position: f32) -> Rgb {
         // NaN becomes 0 in the conversion.
-        self.entries[((position.clamp(0.0, 1.0) * (ENTRIES - 1) as f32 + 0.5) as usize).min(ENTRIES - 1)]
+        self.0[((position.clamp(0.0, 1.0) * (ENTRIES - 1) as f32 + 0.5) as usize).min(ENTRIES - 1)]
     }
 }
 

@@ -259,11 +259,6 @@ impl<'a> Labels<'a> {
         Self { measure, placed }
     }
 
-    /// Returns the size of a text.
-    pub(super) fn size(&self, text: &str) -> Vec2 {
-        (self.measure)(text)
-    }
-
     /// Puts a text at the first of the best of these places for its middle, with this clearance to the other texts. `cost`
     /// rates a place; `None` rules it out. Returns false if there is no room.
     pub(super) fn place(
@@ -273,7 +268,7 @@ impl<'a> Labels<'a> {
         middles: impl Iterator<Item = Vec2>,
         cost: impl Fn(&Bounds) -> Option<usize>,
     ) -> bool {
-        let size = self.size(text);
+        let size = (self.measure)(text);
         let places = middles.map(|middle| Bounds::centred(middle, size));
         let free = places.filter(|place| self.bounds().all(|other| !other.grown(clearance).intersects(place)));
         let rated = free.filter_map(|place| Some((cost(&place)?, place)));

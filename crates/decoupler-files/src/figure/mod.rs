@@ -151,9 +151,9 @@ pub struct Look {
 }
 
 impl Look {
-    /// A line without symbols.
-    pub fn line(hue: Hue, style: LineStyle) -> Self {
-        let (line, marker) = (Some(style), None);
+    /// A line without symbols; without a style a filled area, such as a band or the bars of a histogram.
+    pub fn line(hue: Hue, style: impl Into<Option<LineStyle>>) -> Self {
+        let (line, marker) = (style.into(), None);
         Self { hue, line, marker }
     }
 
@@ -167,12 +167,6 @@ impl Look {
     pub fn joined(mut self, style: impl Into<Option<LineStyle>>) -> Self {
         self.line = style.into();
         self
-    }
-
-    /// A filled area: the bars of a histogram.
-    pub fn area(hue: Hue) -> Self {
-        let (line, marker) = (None, None);
-        Self { hue, line, marker }
     }
 }
 

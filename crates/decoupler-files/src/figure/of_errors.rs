@@ -121,7 +121,7 @@ pub fn histogram_figure(pairs: &[(f64, f64)], chosen: Option<usize>, of: Decoded
             let middle = bins.width * (bin as f64 - (BINS / 2) as f64);
             PlotPoint::from([middle, counts[bin] as f64]).of_item(bin)
         });
-        let mut series = Series::new(name, Look::area(hue), points).listed(None);
+        let mut series = Series::new(name, Look::line(hue, None), points).listed(None);
         series.form = Form::Bars(0.92 * bins.width);
         series
     };

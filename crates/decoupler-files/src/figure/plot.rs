@@ -121,10 +121,10 @@ impl Series {
 
     /// A line across the whole plot, or a band if it has no style; listed in the legend by its name.
     pub fn across(name: impl Into<String>, at: LineAt, hue: Hue, style: impl Into<Option<LineStyle>>) -> Self {
-        let (line, marker) = (style.into(), None);
-        let mut series = Self::new(name, Look { hue, line, marker }, [[0.0; 2]; 0]);
-        series.form = Form::Across(at);
-        series
+        Self {
+            form: Form::Across(at),
+            ..Self::new(name, Look::line(hue, style), [[0.0; 2]; 0])
+        }
     }
 
     /// The series with a value that is constant up to the next point.
@@ -200,7 +200,7 @@ impl Plot {
     /// Returns the stretches of the line of a series: a missing point leaves a gap.
     pub fn stretches(&self, series: &Series) -> Vec<Vec<[f64; 2]>> {
         let places = series.points.iter().map(|point| self.place(point.x, point.y));
-        unbroken(places).collect()
+        unbroken(places)
     }
 
     /// Returns the places of the ends of an error bar. Values without a place on a logarithmic axis are below its lower
@@ -338,11 +338,8 @@ impl Plot {
         let sides = [1.0, -1.0, 0.0].map(|x| [-1.0, 0.0, 1.0].map(|y| Vec2::new(x, y)));
         let mut labels = Labels::new(measure);
         for (at, text) in wanted {
-            let (sides, size) = (
-                sides.iter().flatten().filter(|side| **side != Vec2::ZERO),
-                labels.size(text),
-            );
-            let middles = sides.map(|side| at + side * (GAP + 0.5 * size));
+            let sides = sides.iter().flatten().filter(|side| **side != Vec2::ZERO);
+            let middles = sides.map(|side| at + side * (GAP + 0.5 * measure(text)));
             labels.place(text, -1e-3, middles, |place| {
                 let is_within = frame.contains(place.min) && frame.contains(place.max);
                 let covered = || marks.iter().filter(|mark| place.grown(2.0).contains(**mark)).count();
@@ -354,11 +351,12 @@ impl Plot {
 }
 
 /// Returns the stretches of at least two neighbours without a gap.
-pub(super) fn unbroken<T: Clone>(items: impl Iterator<Item = Option<T>>) -> impl Iterator<Item = Vec<T>> {
+pub(super) fn unbroken<T: Clone>(items: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     let items: Vec<Option<T>> = items.collect();
     let stretches = items.split(Option::is_none).filter(|stretch| stretch.len() > 1);
-    let stretches = stretches.map(|stretch| stretch.iter().flatten().cloned().collect());
-    stretches.collect::<Vec<_>>().into_iter()
+    stretches
+        .map(|stretch| stretch.iter().flatten().cloned().collect())
+        .collect()
 }
 
 /// Returns places along a line, which labels should avoid.
@@ -461,7 +459,7 @@ mod tests {
 
     #[test]
     fn everything_that_is_drawn_is_in_view() {
-        let look = Look::area(Hue::Blue);
+        let look = Look::line(Hue::Blue, None);
         let series = Series {
             form: Form::Bars(2.0),
             ..Series::new("bars", look, [[1.0, 5.0]])
@@ -546,7 +544,7 @@ mod tests {
 
     #[test]
     fn a_legend_lists_series_that_look_alike_once() {
-        let series = |name: &str, key| Series::new(name, Look::area(Hue::Blue), [[0.0, 1.0]]).listed(key);
+        let series = |name: &str, key| Series::new(name, Look::line(Hue::Blue, None), [[0.0, 1.0]]).listed(key);
         let line = Series::across("limit", LineAt::Y(1.0), Hue::Grey, LineStyle::Dashed);
         let all = [
             series("row 1", Some("rows")),
@@ -563,7 +561,7 @@ mod tests {
         assert_eq!(
             figure.keys(),
             [
-                ("rows", Look::area(Hue::Blue)),
+                ("rows", Look::line(Hue::Blue, None)),
                 ("limit", Look::line(Hue::Grey, LineStyle::Dashed))
             ]
         );

@@ -1,6 +1,6 @@
 //! The layout of figures in print: plots within their axes, the legend above them, surfaces side by side.
 
-use std::{ops::RangeInclusive, sync::OnceLock};
+use std::{ops::RangeInclusive, sync::LazyLock};
 
 use glam::Vec2;
 
@@ -154,6 +154,16 @@ fn draw_map(map: &HeatMap) -> Picture {
     Picture::new(Vec2::new(500.0, height), &[(None, map.lay_out(area, &measure).shapes)])
 }
 
+/// Colours of errors on white paper.
+static ERRORS: LazyLock<ColourMap> = LazyLock::new(|| {
+    ColourMap::diverging([
+        [0x0b, 0x3d, 0x91],
+        [0x5b, 0x9b, 0xe6],
+        [0xff; 3],
+        [0xf0, 0x87, 0x5a],
+        [0x9a, 0x2c, 0x06],
+    ])
+});
 /// Room for the title of a card of a surface.
 const TITLE: f32 = 22.0;
 
@@ -169,7 +179,7 @@ fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
     let (mut layers, mut left, mut last) = (Vec::new(), 0.0, below);
     for (card, surface) in surfaces.iter().enumerate() {
         let bounds = Bounds::of_size(Vec2::new(left, TITLE), Vec2::new(width, height));
-        let drawing = surface.lay_out(figure.camera, bounds, &measure, errors());
+        let drawing = surface.lay_out(figure.camera, bounds, &measure, &ERRORS);
         let title = Vec2::new(bounds.middle().x, 0.5 * TITLE);
         layers.push((None, vec![Shape::text(title, Align::Middle, TEXT_INK, &*surface.title)]));
         let section = figure.section.map(|section| section.shapes(surface, &drawing.sight));
@@ -181,7 +191,7 @@ fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
         let mut beside = Vec::new();
         if has_key(card) {
             let area = Bounds::of_size(Vec2::new(left, TITLE), Vec2::new(KEY, height));
-            beside = surface.lay_out_scale(area, &measure, errors());
+            beside = surface.lay_out_scale(area, &measure, &ERRORS);
             left += KEY;
         }
         if let Some(note) = drawing.note {
@@ -194,17 +204,4 @@ fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
     let note = Shape::text(Vec2::new(16.0, last), Align::Start, DIM, figure.note());
     layers.push((None, vec![note]));
     Picture::new(Vec2::new(PAGE_WIDTH, last + 0.6 * LINE), &layers)
-}
-
-/// Colours of errors on white paper.
-fn errors() -> &'static ColourMap {
-    static ERRORS: OnceLock<ColourMap> = OnceLock::new();
-    let stops = [
-        [0x0b, 0x3d, 0x91],
-        [0x5b, 0x9b, 0xe6],
-        [0xff; 3],
-        [0xf0, 0x87, 0x5a],
-        [0x9a, 0x2c, 0x06],
-    ];
-    ERRORS.get_or_init(|| ColourMap::diverging(stops))
 }

@@ -4,7 +4,7 @@
 use std::{
     io,
     path::{Path, PathBuf},
-    sync::{Arc, OnceLock},
+    sync::{Arc, LazyLock},
 };
 
 use decoupler_core::text::is_unprintable;
@@ -125,14 +125,14 @@ impl Picture {
     fn pixmap(&self) -> Result<tiny_skia::Pixmap, PictureError> {
         let options = usvg::Options {
             dpi: DOTS_PER_INCH,
-            fontdb: fonts(),
+            fontdb: Arc::clone(&FONTS),
             ..usvg::Options::default()
         };
-        let failed = |reason: String| PictureError::Pixels(reason);
-        let tree = usvg::Tree::from_str(&self.svg, &options).map_err(|error| failed(error.to_string()))?;
+        let tree =
+            usvg::Tree::from_str(&self.svg, &options).map_err(|error| PictureError::Pixels(error.to_string()))?;
         let size = tree.size().to_int_size();
         let pixels = tiny_skia::Pixmap::new(size.width(), size.height());
-        let mut pixels = pixels.ok_or_else(|| failed(format!("no memory for {size:?}")))?;
+        let mut pixels = pixels.ok_or_else(|| PictureError::Pixels(format!("no memory for {size:?}")))?;
         resvg::render(&tree, tiny_skia::Transform::default(), &mut pixels.as_mut());
         Ok(pixels)
     }
@@ -142,15 +142,11 @@ impl Picture {
     /// # Errors
     /// The path cannot be written.
     pub fn save(&self, format: PictureFormat, path: &Path) -> Result<(), PictureError> {
-        let png;
         let bytes = match format {
-            PictureFormat::Svg => self.svg.as_bytes(),
-            PictureFormat::Png => {
-                png = self.png()?;
-                &png
-            }
+            PictureFormat::Svg => self.svg.clone().into_bytes(),
+            PictureFormat::Png => self.png()?,
         };
-        atomic_write(path, |writer| io::Write::write_all(writer, bytes))?;
+        atomic_write(path, |writer| io::Write::write_all(writer, &bytes))?;
         Ok(())
     }
 
@@ -171,21 +167,12 @@ impl Picture {
 }
 
 /// Only the program's own fonts.
-fn fonts() -> Arc<usvg::fontdb::Database> {
-    static FONTS: OnceLock<Arc<usvg::fontdb::Database>> = OnceLock::new();
-    let load = || {
-        let mut fonts = usvg::fontdb::Database::new();
-        let faces: [&'static [u8]; 2] = [
-            include_bytes!("../../../../../assets/fonts/InterTabular-Regular.ttf"),
-            include_bytes!("../../../../../assets/fonts/InterTabular-SemiBold.ttf"),
-        ];
-        for face in faces {
-            fonts.load_font_source(usvg::fontdb::Source::Binary(Arc::new(face)));
-        }
-        Arc::new(fonts)
-    };
-    Arc::clone(FONTS.get_or_init(load))
-}
+static FONTS: LazyLock<Arc<usvg::fontdb::Database>> = LazyLock::new(|| {
+    let mut fonts = usvg::fontdb::Database::new();
+    fonts.load_font_data(include_bytes!("../../../../../assets/fonts/InterTabular-Regular.ttf").into());
+    fonts.load_font_data(include_bytes!("../../../../../assets/fonts/InterTabular-SemiBold.ttf").into());
+    Arc::new(fonts)
+});
 
 /// The roles of colours: each in print, dark enough for paper, and on a dark background.
 const PALETTE: [(Ink, Rgb, Rgb); 12] = [

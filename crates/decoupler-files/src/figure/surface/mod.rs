@@ -170,13 +170,11 @@ impl Surface {
         if lowest.z == highest.z {
             return format!("{range}, the same at {nodes}");
         }
-        let (what, furthest) = match self.quantity {
+        let (what, furthest) = match &self.quantity {
             Quantity::Height => ("lowest", lowest),
-            Quantity::Sensitivity | Quantity::Target(_) => ("largest", highest),
-            Quantity::Error | Quantity::Pattern | Quantity::TargetError(_) => {
-                let furthest = if -lowest.z > highest.z { lowest } else { highest };
-                ("furthest from zero", furthest)
-            }
+            quantity if !quantity.is_diverging() => ("largest", highest),
+            _ if -lowest.z > highest.z => ("furthest from zero", lowest),
+            _ => ("furthest from zero", highest),
         };
         let [x, y] = [furthest.x, furthest.y].map(|place_mm| format_number(place_mm).replace('-', "−"));
         format!("{range} over {nodes}, {what} at x {x}, y {y} mm")

@@ -43,37 +43,35 @@ impl SectionLine {
 }
 
 impl Section {
-    /// Returns the curve in which the plane cuts the surface of these `values` on a grid, linear between its points as the
-    /// surface is drawn; empty if it misses the grid.
-    pub fn curve_mm(&self, grid: &Grid, values: &[f64]) -> Vec<DVec3> {
-        let is_row = matches!(self.line, SectionLine::RowWire(_));
+    /// Returns the curve in which the plane cuts a surface, linear between the points of its grid as the surface is drawn;
+    /// empty if it misses the grid.
+    pub fn curve_mm(&self, surface: &Surface) -> Vec<DVec3> {
+        let (grid, is_row) = (surface.map.grid(), matches!(self.line, SectionLine::RowWire(_)));
         let (across, along) = across_and_along(is_row, grid.x_mm(), grid.y_mm());
-        let Some(before) = cell(across, self.at_mm).filter(|_| values.len() == grid.len()) else {
+        let Some(before) = cell(across, self.at_mm).filter(|_| surface.values.len() == grid.len()) else {
             return Vec::new();
         };
         let share = (self.at_mm - across[before]) / (across[before + 1] - across[before]);
-        let points = along.iter().enumerate().map(|(at, &at_mm)| {
-            let value = |across| {
+        let points = (0..along.len()).map(|at| {
+            let [low, high] = [before, before + 1].map(|across| {
                 let (ix, iy) = across_and_along(is_row, across, at);
-                values[grid.index(ix, iy)]
-            };
+                surface.place_mm([ix, iy])
+            });
             // At a grid point, where a wire through the nodes is up to rounding, a gap next to it does not matter.
-            let height = match share {
-                ..1e-9 => value(before),
-                0.999_999_999.. => value(before + 1),
-                _ => (1.0 - share) * value(before) + share * value(before + 1),
-            };
-            let (x, y) = across_and_along(is_row, self.at_mm, at_mm);
-            DVec3::new(x, y, height)
+            match share {
+                ..1e-9 => low,
+                0.999_999_999.. => high,
+                _ => low.lerp(high, share),
+            }
         });
         points.collect()
     }
 
     /// Returns the curve along the surface as it is drawn, in several pieces if it has gaps.
     pub fn shapes(&self, surface: &Surface, sight: &Sight) -> Vec<Shape> {
-        let curve = self.curve_mm(surface.map.grid(), &surface.values).into_iter();
+        let curve = self.curve_mm(surface).into_iter();
         let drawn = curve.map(|place| place.z.is_finite().then(|| sight.drawn(surface.drawn(place))));
-        let shapes = unbroken(drawn).flat_map(|points: Vec<Vec2>| {
+        let shapes = unbroken(drawn).into_iter().flat_map(|points: Vec<Vec2>| {
             let under = Stroke::new(Ink::Ground.at(0.7), 3.5);
             let over = Stroke::new(Hue::Orange, 1.8);
             [Shape::Line(points.clone(), under), Shape::Line(points, over)]
@@ -110,7 +108,7 @@ pub fn section_figure(section: &Section, rows: &[usize], actual: &Surface, decou
     let x = PlotAxis::linear(format!("{axis} along {name} (mm)"));
     let y = PlotAxis::linear("z (mm)").including(heights_mm);
     let curves = shown().map(|(name, hue, _, surface)| {
-        let curve = section.curve_mm(surface.map.grid(), &surface.values);
+        let curve = section.curve_mm(surface);
         let curve = curve.iter().map(|at| [place(at), at.z]);
         Series::new(name, Look::line(hue, LineStyle::Solid), curve)
     });
@@ -155,17 +153,19 @@ fn beyond(line: SectionLine, grid: &Grid) -> impl Iterator<Item = Series> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use decoupler_core::surface::SurfaceMap;
 
     use super::*;
+    use crate::figure::surface::Quantity;
 
     /// A plane over 3 × 4 nodes, which every interpolation reproduces.
-    fn plane() -> (SurfaceMap, Vec<f64>) {
+    fn plane() -> Surface {
         let (x, y) = ([8.0, 9.0, 10.0], [3.0, 5.0, 7.0, 9.0]);
-        let map = SurfaceMap::new(&x, &y).unwrap();
-        let nodes: Vec<f64> = x.iter().flat_map(|x| y.iter().map(move |y| height(*x, *y))).collect();
-        let values = map.evaluate(&nodes);
-        (map, values)
+        let map = SurfaceMap::shared(&x, &y).unwrap();
+        let places = x.iter().flat_map(|&x| y.map(|y| DVec3::new(x, y, height(x, y))));
+        Surface::through("", &map, Vec::from_iter(places), Quantity::Height, 4.0..=6.0)
     }
 
     fn height(x: f64, y: f64) -> f64 {
@@ -174,11 +174,11 @@ mod tests {
 
     #[test]
     fn a_plane_is_cut_in_straight_lines() {
-        let (map, values) = plane();
+        let plane = plane();
         for line in [SectionLine::RowWire(0), SectionLine::ColumnWire(4)] {
             // On nodes, between them, and in the margin beyond them.
             for at_mm in [9.0, 8.37, 9.999_999, 7.6] {
-                let curve = Section { line, at_mm }.curve_mm(map.grid(), &values);
+                let curve = Section { line, at_mm }.curve_mm(&plane);
                 assert!(curve.len() > 20, "{line:?} at {at_mm}");
                 for place in curve {
                     let fixed = if matches!(line, SectionLine::RowWire(_)) {
@@ -195,22 +195,23 @@ mod tests {
 
     #[test]
     fn nothing_is_cut_outside_the_surface_and_a_gap_next_to_a_wire_does_not_matter() {
-        let (map, mut values) = plane();
+        let mut surface = plane();
+        let map = Arc::clone(&surface.map);
         let grid = map.grid();
         let outside = Section {
             line: SectionLine::RowWire(0),
             at_mm: 2.0,
         };
-        assert!(outside.curve_mm(grid, &values).is_empty());
+        assert!(outside.curve_mm(&surface).is_empty());
         let row = grid.x_mm().iter().position(|x| (x - 9.0).abs() < 1e-9).unwrap();
         for iy in 0..grid.y_mm().len() {
-            values[grid.index(row + 1, iy)] = f64::NAN;
+            Arc::make_mut(&mut surface.values)[grid.index(row + 1, iy)] = f64::NAN;
         }
         let on = Section {
             line: SectionLine::RowWire(1),
             at_mm: 9.0 + 1e-13,
         };
-        assert!(on.curve_mm(grid, &values).iter().all(|place| place.z.is_finite()));
+        assert!(on.curve_mm(&surface).iter().all(|place| place.z.is_finite()));
     }
 }
 
