@@ -22,9 +22,7 @@ use decoupler_core::{
 use decoupler_files::{
     export::{
         ExperimentTable, Table, atomic_write, cells_table, describe_conditions, describe_failures,
-        describe_worse_than_mean,
-        figures::{PictureError, PictureFormat},
-        format_duration, trials_table, write_experiment_markdown,
+        describe_worse_than_mean, figures::PictureError, format_duration, trials_table, write_experiment_markdown,
     },
     figure::experiment_figure,
     machine::memory_budget,
@@ -234,8 +232,8 @@ fn write_files(folder: &Path, (table, results): &Reproduced) -> [Result<(), Pict
         atomic_write(&cells, |writer| cells_table(results).write_csv(writer)).map_err(PictureError::from),
         atomic_write(&trials, |writer| trials_table(results).write_csv(writer)).map_err(PictureError::from),
         atomic_write(&markdown, write_markdown).map_err(PictureError::from),
-        picture.save(PictureFormat::Svg, &svg),
-        picture.save(PictureFormat::Png, &png),
+        picture.save(&svg),
+        picture.save(&png),
     ]
 }
 

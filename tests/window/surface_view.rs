@@ -5,7 +5,6 @@ use std::sync::Arc;
 use decoupler::window::surface_view::{ColourBar, SurfaceView};
 use decoupler::window::theme::{self, Theme};
 use decoupler_core::surface::SurfaceMap;
-use decoupler_files::export::figures::PictureFormat;
 use decoupler_files::figure::surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode};
 use decoupler_files::figure::{Figure, SequentialMap};
 use eframe::egui::{self, Key, Modifiers, Vec2, vec2};
@@ -235,7 +234,7 @@ fn gallery() {
             let path = |renderer: &str| format!("target/gallery/{name}-{mode_name}-{renderer}.png");
             Figure::from(figure.clone())
                 .draw()
-                .save(PictureFormat::Png, path("print").as_ref())
+                .save(path("print").as_ref())
                 .unwrap();
             for is_dark in [true, false] {
                 let theme = theme_of(is_dark);

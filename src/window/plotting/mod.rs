@@ -9,5 +9,5 @@ mod plot;
 mod tests;
 
 pub use heat_map::{CellPointed, cells_ui, heat_map_ui};
-pub use paint::{bounds, colour, hue_colour, measure, paint, to_egui, to_glam};
+pub use paint::{bounds, colour, measure, paint, to_egui, to_glam};
 pub use plot::{DrawnPlot, Pointer, plots_ui, titled_plots_ui};

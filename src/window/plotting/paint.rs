@@ -1,6 +1,6 @@
 //! Shapes of figures, painted in the colours of the theme.
 
-use decoupler_files::figure::{Align, Bounds, Colour, Hue, Ink, Shape, Stroke};
+use decoupler_files::figure::{Align, Bounds, Colour, Ink, Shape, Stroke};
 use eframe::egui::{
     self, Color32, FontId, Mesh, Painter, Pos2, Rect, Ui,
     epaint::{PathShape, TextShape},
@@ -9,27 +9,20 @@ use glam::Vec2;
 
 use crate::window::theme::{Palette, Theme, rgb, type_size};
 
-/// Returns the colour of a hue in the theme.
-pub fn hue_colour(hue: Hue, palette: &Palette) -> Color32 {
-    match hue {
-        Hue::Blue => palette.accent,
-        Hue::Red => palette.bad,
-        Hue::Green => palette.good,
-        Hue::Orange => palette.warning,
-        Hue::Violet => palette.violet,
-        Hue::Cyan => palette.cyan,
-        Hue::Grey => palette.dim,
-        Hue::Ink => palette.text,
-    }
-}
-
 /// Returns a colour of a figure in the theme.
-pub fn colour(Colour { ink, opacity }: Colour, palette: &Palette) -> Color32 {
+pub fn colour(colour: impl Into<Colour>, palette: &Palette) -> Color32 {
+    let Colour { ink, opacity } = colour.into();
     let colour = match ink {
-        Ink::Hue(hue) => hue_colour(hue, palette),
+        Ink::Blue => palette.accent,
+        Ink::Red => palette.bad,
+        Ink::Green => palette.good,
+        Ink::Orange => palette.warning,
+        Ink::Violet => palette.violet,
+        Ink::Cyan => palette.cyan,
+        Ink::Grey | Ink::Label => palette.dim,
+        Ink::Text => palette.text,
         Ink::Grid => palette.line,
         Ink::Edge => palette.line.lerp_to_gamma(palette.dim, 0.45),
-        Ink::Label => palette.dim,
         Ink::Ground => palette.panel,
         Ink::Missing => palette.raised,
         Ink::Rgb(colour) => rgb(colour),
@@ -83,7 +76,7 @@ pub fn paint(painter: &Painter, palette: &Palette, shapes: &[Shape]) {
                 painter.circle_stroke(to_egui(*at), *radius, stroke(line, palette));
             }
             Shape::Text(at, align, ink, text) => {
-                let colour = colour((*ink).into(), palette);
+                let colour = colour(*ink, palette);
                 let galley = painter.layout_no_wrap(text.clone(), font(), colour);
                 let size = galley.size();
                 let left = match align {

@@ -1,7 +1,7 @@
 //! Plots drawn by `egui_plot`, with its axes, grid, zoom and tooltips, in places of the axes: a logarithmic axis is
 //! linear in the logarithm.
 
-use decoupler_files::figure::{Form, Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PlotFigure, Scale, Series};
+use decoupler_files::figure::{Form, Ink, LineAt, LineStyle, Marker, Plot, PlotAxis, PlotFigure, Scale, Series};
 use eframe::egui::{
     Color32, FontId, Id, Pos2, Rangef, Rect, Response, RichText, Sense, Stroke, Ui, UiBuilder, Vec2, WidgetInfo,
     accesskit::Role,
@@ -11,7 +11,7 @@ use egui_plot::{
     LineStyle as DrawnStyle, MarkerShape, PlotPoint as Place, PlotPoints, PlotTransform, PlotUi, Points, Span, VLine,
 };
 
-use super::paint::{bounds, hue_colour, measure, paint, paint_over, to_glam};
+use super::paint::{bounds, colour, measure, paint, paint_over, to_glam};
 use crate::window::{
     theme::{Palette, Theme, semibold, space, type_size},
     widgets::{dim_ui, focus_ring_ui},
@@ -246,8 +246,8 @@ fn tooltip_at(plot: &Plot, position: &HoverPosition<'_>) -> Option<String> {
     Some(plot.words(series, point))
 }
 
-fn stroke(hue: Hue, style: LineStyle, palette: &Palette) -> (Stroke, DrawnStyle) {
-    let colour = hue_colour(hue, palette);
+fn stroke(ink: Ink, style: LineStyle, palette: &Palette) -> (Stroke, DrawnStyle) {
+    let colour = colour(ink, palette);
     match style {
         LineStyle::Solid => (Stroke::new(1.8, colour), DrawnStyle::Solid),
         LineStyle::Dashed => (Stroke::new(1.4, colour), DrawnStyle::dashed_dense()),
@@ -259,11 +259,11 @@ fn stroke(hue: Hue, style: LineStyle, palette: &Palette) -> (Stroke, DrawnStyle)
 /// Draws spans and reference lines.
 fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
     for (Series { name, look, .. }, at) in plot.lines_across() {
-        let (stroke, style) = stroke(look.hue, look.line.unwrap_or(LineStyle::Solid), palette);
+        let (stroke, style) = stroke(look.ink, look.line.unwrap_or(LineStyle::Solid), palette);
         match at {
             LineAt::Between(ends) => {
                 if let [Some(from), Some(to)] = ends.map(|end| plot.x.place(end)) {
-                    let fill = hue_colour(look.hue, palette).gamma_multiply(SPAN_TINT);
+                    let fill = colour(look.ink, palette).gamma_multiply(SPAN_TINT);
                     let band = Span::new(name, from..=to).fill(fill);
                     plot_ui.span(band.border_color(Color32::TRANSPARENT));
                 }
@@ -284,7 +284,7 @@ fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
 
 fn draw_series(plot_ui: &mut PlotUi<'_>, plot: &Plot, series: &Series, palette: &Palette) {
     let name = &*series.name;
-    let colour = hue_colour(series.look.hue, palette);
+    let colour = colour(series.look.ink, palette);
     let [x_range, y_range] = plot.ranges();
     let (width, height) = (x_range.end() - x_range.start(), y_range.end() - y_range.start());
     if let Form::Bars(bar_width) = series.form {
@@ -294,7 +294,7 @@ fn draw_series(plot_ui: &mut PlotUi<'_>, plot: &Plot, series: &Series, palette: 
         plot_ui.bar_chart(chart.element_formatter(Box::new(|bar, _| bar.name.clone())));
     }
     if let (Form::Points, Some(style)) = (series.form, series.look.line) {
-        let (stroke, style) = stroke(series.look.hue, style, palette);
+        let (stroke, style) = stroke(series.look.ink, style, palette);
         for mut stretch in plot.stretches(series) {
             let is_stepped = stretch.windows(2).any(|ends| ends[0][0] == ends[1][0]);
             if is_stepped {

@@ -11,11 +11,7 @@ use std::{
 
 use decoupler_core::training::EpochRecord;
 use decoupler_files::{
-    export::{
-        Table, TableForm, atomic_write,
-        figures::{PictureError, PictureFormat},
-        write_loss_curves,
-    },
+    export::{Table, TableForm, atomic_write, figures::PictureError, write_loss_curves},
     figure::Figure,
 };
 
@@ -145,19 +141,19 @@ pub fn picture_exports<'a>(
     stem: String,
     figure: Result<impl Fn() -> Figure + Clone + 'a, String>,
 ) -> impl Iterator<Item = Export<'a>> {
-    let words = |format| match format {
-        PictureFormat::Svg => FileWords {
+    let formats = [
+        FileWords {
             kind: "picture as SVG",
             description: "The picture as shown, on a light background at publication size: lines and text, sharp at \
                           any size.",
             extensions: &["svg"],
         },
-        PictureFormat::Png => FileWords {
+        FileWords {
             kind: "picture as PNG",
             description: "The picture as shown, on a light background at publication size: pixels at 300 dpi.",
             extensions: &["png"],
         },
-    };
+    ];
     let name = name.to_owned();
     let copied = Export {
         group: ExportGroup::Figures,
@@ -172,20 +168,17 @@ pub fn picture_exports<'a>(
             })
         }),
     };
-    let files = [PictureFormat::Svg, PictureFormat::Png].into_iter().map(move |format| {
-        let words: FileWords = words(format);
+    let files = formats.into_iter().map(move |words| {
         let stem = stem.clone();
         Export {
             group: ExportGroup::Figures,
             name: name.clone(),
-            form: format.extension().to_uppercase(),
+            form: words.extensions[0].to_uppercase(),
             description: words.description,
             ask: figure.clone().map(|figure| -> Ask<'a> {
                 Box::new(move || {
                     let figure = figure();
-                    let write = move |path: &Path| -> Result<(), PictureError> {
-                        figure.draw().save(PictureFormat::of_path(path)?, path)
-                    };
+                    let write = move |path: &Path| -> Result<(), PictureError> { figure.draw().save(path) };
                     Effect::ChooseFile(FileTask::save(words, &stem, Contents::new(write)))
                 })
             }),

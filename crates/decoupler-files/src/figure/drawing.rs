@@ -6,32 +6,13 @@ use std::ops::RangeInclusive;
 use glam::Vec2;
 
 use super::{
-    Hue, LineStyle, Look, Marker,
+    Ink, LineStyle, Look, Marker,
     axis::{PlotAxis, share},
-    colour_map::{ColourMap, Rgb},
+    colour_map::ColourMap,
 };
 
 /// Returns the size of a text.
 pub type Measure<'a> = &'a dyn Fn(&str) -> Vec2;
-
-/// Role of a colour, which each renderer resolves by its palette.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Ink {
-    /// A series.
-    Hue(Hue),
-    /// Grid lines.
-    Grid,
-    /// Outlines and ticks.
-    Edge,
-    /// Numbers and names of axes.
-    Label,
-    /// The background of the card.
-    Ground,
-    /// A cell without a value.
-    Missing,
-    /// The same in every theme.
-    Rgb(Rgb),
-}
 
 impl Ink {
     pub(crate) const BLACK: Self = Self::Rgb([0; 3]);
@@ -55,12 +36,6 @@ pub struct Colour {
 impl From<Ink> for Colour {
     fn from(ink: Ink) -> Self {
         ink.at(1.0)
-    }
-}
-
-impl From<Hue> for Colour {
-    fn from(hue: Hue) -> Self {
-        Ink::Hue(hue).into()
     }
 }
 
@@ -203,7 +178,7 @@ impl Bounds {
 
 impl LineStyle {
     /// Returns the stroke of a line in this style.
-    pub(crate) fn stroke(self, hue: Hue) -> Stroke {
+    pub(crate) fn stroke(self, ink: Ink) -> Stroke {
         let (width, opacity, dashes) = match self {
             Self::Solid => (1.5, 1.0, None),
             Self::Dashed => (1.4, 1.0, Some([4.0, 3.0])),
@@ -211,7 +186,7 @@ impl LineStyle {
             Self::Fine => (0.8, 0.55, None),
         };
         Stroke {
-            colour: Ink::Hue(hue).at(opacity),
+            colour: ink.at(opacity),
             width,
             dashes,
         }
@@ -221,7 +196,7 @@ impl LineStyle {
 impl Look {
     /// Returns the symbol at a point.
     pub(crate) fn mark(self, at: Vec2) -> Option<Shape> {
-        let (colour, edge) = (Colour::from(self.hue), Stroke::new(self.hue, 1.4));
+        let (colour, edge) = (Colour::from(self.ink), Stroke::new(self.ink, 1.4));
         let diamond = [[0.0, -4.4], [4.4, 0.0], [0.0, 4.4], [-4.4, 0.0]].map(|corner| at + Vec2::from(corner));
         Some(match self.marker? {
             Marker::Dot => Shape::Disc(at, 1.25, colour),
@@ -239,8 +214,8 @@ impl Look {
         let right = left + Vec2::new(width, 0.0);
         let area = Bounds::of_size(left - Vec2::new(0.0, 4.0), Vec2::new(width, 8.0));
         let behind = match (self.line, self.marker) {
-            (Some(style), _) => Some(Shape::Line(vec![left, right], style.stroke(self.hue))),
-            (None, None) => Some(area.area(Ink::Hue(self.hue).at(0.3))),
+            (Some(style), _) => Some(Shape::Line(vec![left, right], style.stroke(self.ink))),
+            (None, None) => Some(area.area(self.ink.at(0.3))),
             (None, Some(_)) => None,
         };
         behind.into_iter().chain(self.mark(0.5 * (left + right))).collect()

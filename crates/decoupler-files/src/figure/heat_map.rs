@@ -7,10 +7,10 @@ use glam::Vec2;
 use ndarray::Array2;
 
 use super::{
-    Hue,
+    Ink,
     axis::{PlotAxis, ends, share},
     colour_map::{SequentialMap, is_light},
-    drawing::{Align, Bounds, Ink, Measure, Shape, lay_out_scale},
+    drawing::{Align, Bounds, Measure, Shape, lay_out_scale},
     extremes,
 };
 
@@ -134,7 +134,7 @@ impl HeatMap {
             let ink = match fill {
                 Some(fill) if is_light(fill) => Ink::BLACK,
                 Some(_) => Ink::WHITE,
-                None => Ink::Hue(Hue::Grey),
+                None => Ink::Grey,
             };
             if has_room {
                 write(bounds.middle().x, bounds.middle().y, Align::Middle, ink, &number);
@@ -153,15 +153,9 @@ impl HeatMap {
             let y = grid.min.y + (at as f32 + 0.5) * cell.y;
             write(grid.min.x - GAP, y, Align::End, Ink::Label, name);
         }
-        let (middle, bottom) = (grid.middle(), area.max.y - 0.5 * line);
+        let (middle, [left, bottom]) = (grid.middle(), [area.min.x + 0.5 * line, area.max.y - 0.5 * line]);
         write(middle.x, bottom, Align::Middle, Ink::Label, &self.x_name);
-        write(
-            area.min.x + 0.5 * line,
-            middle.y,
-            Align::Upright,
-            Ink::Label,
-            &self.y_name,
-        );
+        write(left, middle.y, Align::Upright, Ink::Label, &self.y_name);
         drawing.shapes.extend(texts);
         let scale = Bounds::of([Vec2::new(grid.max.x, grid.min.y), Vec2::new(area.max.x, grid.max.y)]);
         let scale = lay_out_scale(scale, &self.value_axis, &range, colours, measure);
@@ -171,18 +165,16 @@ impl HeatMap {
 
     /// Describes the map in a sentence: its values, and the places of their minimum and maximum.
     pub fn summary(&self) -> String {
-        let ((rows, columns), [x_name, y_name]) = (self.values.dim(), [&self.x_name, &self.y_name]);
-        let head = format!(
-            "{} over {y_name} and {x_name}, {rows} × {columns}",
-            self.value_axis.name
-        );
+        let ((rows, columns), x_name, y_name) = (self.values.dim(), &self.x_name, &self.y_name);
+        let name = &self.value_axis.name;
+        let head = format!("{name} over {y_name} and {x_name}, {rows} × {columns}");
         let finite = self.values.indexed_iter().filter(|(_, value)| value.is_finite());
         let Some((least, largest)) = extremes(finite, |(_, value)| **value) else {
             return format!("{head}: no values.");
         };
-        let at = |((row, column), value): ((usize, usize), &f64)| {
+        let at = |((row, column), &value): ((usize, usize), &f64)| {
             let (value, row, column) = (
-                self.value_axis.value_text(*value),
+                self.value_axis.value_text(value),
                 &self.rows[row],
                 &self.columns[column],
             );

@@ -20,7 +20,7 @@ pub mod surface;
 
 pub use axis::{PlotAxis, Scale, Ticks, tick_text};
 pub use colour_map::{ColourMap, Rgb, SequentialMap, is_light};
-pub use drawing::{Align, Bounds, Colour, Ink, Measure, Shape, Stroke};
+pub use drawing::{Align, Bounds, Colour, Measure, Shape, Stroke};
 pub use heat_map::{HeatMap, HeatMapDrawing};
 pub use of_epochs::{EpochOutline, compared_losses_figure, loss_figure, training_state_figure};
 pub use of_errors::{
@@ -70,10 +70,10 @@ impl From<SurfaceFigure> for Figure {
     }
 }
 
-/// Role of a colour. The window resolves it by its theme, print by a palette for white paper; in both, the hues can be
-/// distinguished in grey and by most colour-blind readers.
+/// Role of a colour. The window resolves it by its theme, print by a palette for white paper; in both, the hues of series can
+/// be distinguished in grey and by most colour-blind readers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Hue {
+pub enum Ink {
     /// The network's own result.
     Blue,
     /// A comparison that failed or differs most.
@@ -88,11 +88,23 @@ pub enum Hue {
     Cyan,
     /// References and baselines.
     Grey,
-    /// The colour of text: published values.
-    Ink,
+    /// Text, and published values.
+    Text,
+    /// Grid lines.
+    Grid,
+    /// Outlines and ticks.
+    Edge,
+    /// Numbers and names of axes.
+    Label,
+    /// The background of the card.
+    Ground,
+    /// A cell without a value.
+    Missing,
+    /// The same in every theme.
+    Rgb(Rgb),
 }
 
-impl Hue {
+impl Ink {
     /// The hue of a decoder in charts, a different one for each.
     pub fn of_decoder(kind: DecoderKind) -> Self {
         match kind {
@@ -143,7 +155,7 @@ pub enum Marker {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Look {
     /// Colour of everything.
-    pub hue: Hue,
+    pub ink: Ink,
     /// Line from point to point.
     pub line: Option<LineStyle>,
     /// Symbol at each point.
@@ -152,15 +164,15 @@ pub struct Look {
 
 impl Look {
     /// A line without symbols; without a style a filled area, such as a band or the bars of a histogram.
-    pub fn line(hue: Hue, style: impl Into<Option<LineStyle>>) -> Self {
+    pub fn line(ink: Ink, style: impl Into<Option<LineStyle>>) -> Self {
         let (line, marker) = (style.into(), None);
-        Self { hue, line, marker }
+        Self { ink, line, marker }
     }
 
     /// Symbols without a line.
-    pub const fn marker(hue: Hue, marker: Marker) -> Self {
+    pub const fn marker(ink: Ink, marker: Marker) -> Self {
         let (line, marker) = (None, Some(marker));
-        Self { hue, line, marker }
+        Self { ink, line, marker }
     }
 
     /// Symbols joined by a line.
@@ -208,7 +220,7 @@ mod tests {
             assert!(
                 others
                     .iter()
-                    .all(|&other| Hue::of_decoder(other) != Hue::of_decoder(kind)),
+                    .all(|&other| Ink::of_decoder(other) != Ink::of_decoder(kind)),
                 "{kind}"
             );
         }
@@ -225,7 +237,7 @@ mod summary_tests {
     use super::surface::{Quantity, Surface};
     use super::*;
     use crate::figure::{
-        Decoded, Hue, Look, Marker, SequentialMap, histogram_figure, node_figure, readings_figure, surface::ViewMode,
+        Decoded, Ink, Look, Marker, SequentialMap, histogram_figure, node_figure, readings_figure, surface::ViewMode,
     };
     use decoupler_core::surface::SurfaceMap;
 
@@ -233,7 +245,7 @@ mod summary_tests {
     fn a_curve_is_described_by_its_ends_and_extremes() {
         let curve = Series::new(
             "training",
-            Look::line(Hue::Blue, LineStyle::Solid),
+            Look::line(Ink::Blue, LineStyle::Solid),
             [[0.0, 1.5], [1.0, 2.5], [2.0, 0.01], [3.0, 0.25], [4.0, 0.0]],
         );
         let mut plot = Plot::new(
@@ -241,7 +253,7 @@ mod summary_tests {
             PlotAxis::logarithmic("mse (scaled)"),
             vec![curve],
         );
-        let line = |name: &str| Series::across(name, LineAt::X(2.0), Hue::Grey, LineStyle::Dashed);
+        let line = |name: &str| Series::across(name, LineAt::X(2.0), Ink::Grey, LineStyle::Dashed);
         plot.series
             .extend([line("best weights, epoch 2"), line("displayed network")]);
         // A zero has no place on a logarithmic axis and is left out.
@@ -270,7 +282,7 @@ mod summary_tests {
             node_figure(&nodes, None, None, 3).summary(),
             "z (mm) against node, row by row: 3 points of actual, z (mm) 4 to 5, node, row by row 1 to 3."
         );
-        let one = Series::new("run", Look::marker(Hue::Red, Marker::Disc), [[2.0, -0.5]]);
+        let one = Series::new("run", Look::marker(Ink::Red, Marker::Disc), [[2.0, -0.5]]);
         let plot = Plot::new(PlotAxis::linear("µs"), PlotAxis::linear("mm"), vec![one]);
         assert_eq!(plot.summary(), "mm against µs: run: −0.500 at 2.");
     }

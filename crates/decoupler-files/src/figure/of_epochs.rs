@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use decoupler_core::training::{EpochRecord, Stage};
 
 use super::{
-    Hue, LineStyle, Look,
+    Ink, LineStyle, Look,
     axis::PlotAxis,
     plot::{LineAt, Plot, PlotFigure, Series},
 };
@@ -24,10 +24,10 @@ const PARAMETER: OfEpoch = |epoch| Some(epoch.parameter);
 const FAILURES: OfEpoch = |epoch| Some(epoch.validation_failures as f64);
 
 /// The curve of a quantity over the epochs.
-fn curve(name: impl Into<String>, hue: Hue, style: LineStyle, history: &[EpochRecord], of: OfEpoch) -> Series {
+fn curve(name: impl Into<String>, ink: Ink, style: LineStyle, history: &[EpochRecord], of: OfEpoch) -> Series {
     let point = |epoch: &EpochRecord| Some([epoch.epoch as f64, of(epoch)?]);
     let points = history.iter().filter_map(point);
-    Series::new(name, Look::line(hue, style), points)
+    Series::new(name, Look::line(ink, style), points)
 }
 
 /// A logarithmic axis that keeps the curves of a diverged training readable: values far above the initial one are drawn at
@@ -51,7 +51,7 @@ fn stage_lines(stages: &[Stage]) -> impl Iterator<Item = Series> {
         // The next method continues from the last weights of the previous one.
         let changed = stage.first_epoch.saturating_sub(1);
         let name = format!("{} from epoch {changed}", stage.method.name());
-        let line = Series::across(name, LineAt::X(changed as f64), Hue::Grey, LineStyle::Fine);
+        let line = Series::across(name, LineAt::X(changed as f64), Ink::Grey, LineStyle::Fine);
         line.labelled(stage.method.short_name())
     })
 }
@@ -61,13 +61,13 @@ fn stage_lines(stages: &[Stage]) -> impl Iterator<Item = Series> {
 pub fn loss_figure(history: &[EpochRecord], stages: &[Stage], best_epoch: usize) -> PlotFigure {
     let drawn = &*outlined(history);
     let curves = [
-        ("training", Hue::Blue, TRAINING),
-        ("validation", Hue::Green, VALIDATION),
-        ("test", Hue::Orange, TEST),
+        ("training", Ink::Blue, TRAINING),
+        ("validation", Ink::Green, VALIDATION),
+        ("test", Ink::Orange, TEST),
     ];
-    let curves = curves.map(|(name, hue, of)| curve(name, hue, LineStyle::Solid, drawn, of));
+    let curves = curves.map(|(name, ink, of)| curve(name, ink, LineStyle::Solid, drawn, of));
     let name = format!("best weights, epoch {best_epoch}");
-    let best = Series::across(name, LineAt::X(best_epoch as f64), Hue::Grey, LineStyle::Dashed);
+    let best = Series::across(name, LineAt::X(best_epoch as f64), Ink::Grey, LineStyle::Dashed);
     let best = best.listed(Some("best weights"));
     let series = curves.into_iter().chain(stage_lines(stages)).chain([best]);
     over_epochs(bounded("mse (scaled)", history, TRAINING), series).into()
@@ -79,11 +79,11 @@ pub fn training_state_figure(history: &[EpochRecord], stages: &[Stage]) -> PlotF
     // A little more than from 0 to 1: lines do not coincide with the frame.
     let failures = PlotAxis::integers("validation failures").including([-0.1, 1.1]);
     let parameter = PlotAxis::logarithmic(parameter_name(stages)).limited(PARAMETERS);
-    let curve = |hue: Hue, of: OfEpoch| curve("", hue, LineStyle::Solid, drawn, of).listed(None);
+    let curve = |ink: Ink, of: OfEpoch| curve("", ink, LineStyle::Solid, drawn, of).listed(None);
     let plots = [
-        (bounded("gradient", history, GRADIENT), curve(Hue::Blue, GRADIENT)),
-        (parameter, curve(Hue::Orange, PARAMETER)),
-        (failures, curve(Hue::Green, FAILURES).stepped()),
+        (bounded("gradient", history, GRADIENT), curve(Ink::Blue, GRADIENT)),
+        (parameter, curve(Ink::Orange, PARAMETER)),
+        (failures, curve(Ink::Green, FAILURES).stepped()),
     ];
     let plots = plots.map(|(y, mut curve)| {
         curve.name.clone_from(&y.name);
@@ -98,10 +98,10 @@ pub fn compared_losses_figure(runs: [Option<(&str, &[EpochRecord])>; 2]) -> Plot
         ("training", LineStyle::Dashed, TRAINING),
         ("test", LineStyle::Solid, TEST),
     ];
-    let runs = runs.into_iter().zip([Hue::Blue, Hue::Orange]);
-    let series = runs.filter_map(|(run, hue)| run.map(|(name, history)| (name, outlined(history), hue)));
-    let series = series.flat_map(|(run, drawn, hue)| {
-        curves.map(|(name, style, of)| curve(format!("{run}, {name}"), hue, style, &drawn, of))
+    let runs = runs.into_iter().zip([Ink::Blue, Ink::Orange]);
+    let series = runs.filter_map(|(run, ink)| run.map(|(name, history)| (name, outlined(history), ink)));
+    let series = series.flat_map(|(run, drawn, ink)| {
+        curves.map(|(name, style, of)| curve(format!("{run}, {name}"), ink, style, &drawn, of))
     });
     let plot = over_epochs(PlotAxis::logarithmic("mse (scaled)"), series);
     PlotFigure::new([plot], ["Dashed: training; solid: test.".to_owned()])

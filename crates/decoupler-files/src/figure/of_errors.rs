@@ -6,7 +6,7 @@ use glam::DVec2;
 use ndarray::Array2;
 
 use super::{
-    Hue, LineStyle, Look, Marker,
+    Ink, LineStyle, Look, Marker,
     axis::{PlotAxis, ends},
     plot::{Form, LineAt, Plot, PlotFigure, PlotPoint, Series, thinned_places},
     titled, with_unit,
@@ -115,21 +115,21 @@ pub fn histogram_figure(pairs: &[(f64, f64)], chosen: Option<usize>, of: Decoded
     let (name, unit, [answer, samples]) = of.words();
     let bins = ErrorBins::new(pairs);
     let counts = bins.counts(pairs);
-    let bars = |name: &str, hue: Hue, is_chosen: bool| {
+    let bars = |name: &str, ink: Ink, is_chosen: bool| {
         let shown = (0..BINS).filter(|&bin| (Some(bin) == chosen) == is_chosen);
         let points = shown.map(|bin| {
             let middle = bins.width * (bin as f64 - (BINS / 2) as f64);
             PlotPoint::from([middle, counts[bin] as f64]).of_item(bin)
         });
-        let mut series = Series::new(name, Look::line(hue, None), points).listed(None);
+        let mut series = Series::new(name, Look::line(ink, None), points).listed(None);
         series.form = Form::Bars(0.92 * bins.width);
         series
     };
     let x = PlotAxis::linear(format!("error of {}, {answer} − actual", titled(name, unit)));
     let y = PlotAxis::linear(format!("{samples} of the test set")).including([0.0]);
-    let chosen = bars(&format!("chosen {samples}"), Hue::Orange, true);
-    let no_error = Series::across("no error", LineAt::X(0.0), Hue::Grey, LineStyle::Dashed);
-    Plot::new(x, y, [bars(samples, Hue::Blue, false), chosen, no_error]).into()
+    let chosen = bars(&format!("chosen {samples}"), Ink::Orange, true);
+    let no_error = Series::across("no error", LineAt::X(0.0), Ink::Grey, LineStyle::Dashed);
+    Plot::new(x, y, [bars(samples, Ink::Blue, false), chosen, no_error]).into()
 }
 
 /// Least-squares line through pairs of actual and decoded values, and the range of the actual ones. A regression figure
@@ -184,14 +184,14 @@ pub fn regression_figure(
     };
     let dots = Series::new(
         format!("{samples} of the test set"),
-        Look::marker(Hue::Blue, Marker::Dot),
+        Look::marker(Ink::Blue, Marker::Dot),
         dots,
     );
-    let equal = line("equal", Look::line(Hue::Ink, LineStyle::Dashed), &|actual| actual);
+    let equal = line("equal", Look::line(Ink::Text, LineStyle::Dashed), &|actual| actual);
     let (mut series, mut notes) = (vec![dots, equal], Vec::new());
     let fit = *fitted;
     if fit.correlation.is_finite() && fit.offset.is_finite() {
-        let look = Look::line(Hue::Orange, LineStyle::Solid);
+        let look = Look::line(Ink::Orange, LineStyle::Solid);
         series.push(line("fitted line", look, &|actual| fit.slope * actual + fit.offset));
         let sign = if fit.offset < 0.0 { '−' } else { '+' };
         let [slope, offset] = [fit.slope, fit.offset.abs()].map(format_number);

@@ -3,7 +3,7 @@
 use ndarray::Array2;
 
 use super::{
-    Figure, Hue, LineStyle, Look, Marker,
+    Figure, Ink, LineStyle, Look, Marker,
     axis::PlotAxis,
     colour_map::SequentialMap,
     heat_map::HeatMap,
@@ -84,21 +84,20 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
     // The value itself, or its index in the list.
     let position = |index: usize, cell: &Cell| if is_number { cell.settings.hidden } else { index } as f64;
     let cells = results.cells.iter().enumerate();
-    let mut cells: Vec<(f64, &Cell)> = cells.map(|(index, cell)| (position(index, cell), cell)).collect();
+    let mut cells = Vec::from_iter(cells.map(|(index, cell)| (position(index, cell), cell)));
     cells.sort_by(|one, other| one.0.total_cmp(&other.0));
     let points = |value: fn(&Cell) -> Option<f64>| {
         let points = cells.iter().filter_map(|(x, cell)| Some([*x, value(cell)?]));
         Vec::from_iter(points)
     };
-    let discs = Look::marker(Hue::Blue, Marker::Disc);
-    let squares = Look::marker(Hue::Ink, Marker::Square);
     // Categories are not joined by lines.
-    let join = |style: LineStyle| is_number.then_some(style);
-    let ours_look = discs.joined(join(LineStyle::Solid));
-    let published = squares.joined(join(LineStyle::Fine));
+    let look =
+        |ink: Ink, marker: Marker, style: LineStyle| Look::marker(ink, marker).joined(is_number.then_some(style));
+    let ours_look = look(Ink::Blue, Marker::Disc, LineStyle::Solid);
+    let published = look(Ink::Text, Marker::Square, LineStyle::Fine);
     let reference = match is_number {
-        true => Look::line(Hue::Grey, LineStyle::Dashed),
-        false => Look::marker(Hue::Grey, Marker::Ring),
+        true => Look::line(Ink::Grey, LineStyle::Dashed),
+        false => Look::marker(Ink::Grey, Marker::Ring),
     };
     let linear = match results.experiment.recording {
         None => "linear map",
@@ -125,9 +124,9 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
     // The suggestions of Eq. (12) and (13).
     let suggestions = results.problem.as_ref().filter(|_| is_number).map(|problem| {
         let (root, logarithm) = suggested_hidden(problem.feature_count(), problem.targets.len());
-        let root = LineAt::Between([root.start(), root.end()].map(|end| *end as f64));
-        let logarithm = Series::across("Eq. (13)", LineAt::X(logarithm as f64), Hue::Orange, LineStyle::Solid);
-        let root = Series::across("Eq. (12)", root, Hue::Orange, None);
+        let (root, logarithm) = ([*root.start() as f64, *root.end() as f64], logarithm as f64);
+        let logarithm = Series::across("Eq. (13)", LineAt::X(logarithm), Ink::Orange, LineStyle::Solid);
+        let root = Series::across("Eq. (12)", LineAt::Between(root), Ink::Orange, None);
         [root, logarithm.labelled("Eq. (13)")]
     });
     let plot = Plot::new(x, y, series.into_iter().chain(suggestions.into_iter().flatten()));
@@ -136,7 +135,7 @@ fn along_the_axis(results: &ExperimentResults) -> PlotFigure {
 
 /// The errors of every trial, one plot each for Z, X and Y; of a recording, the mean absolute error.
 fn repeats(results: &ExperimentResults) -> PlotFigure {
-    const HUES: [Hue; 4] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Grey];
+    const HUES: [Ink; 4] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Grey];
     let experiment = &results.experiment;
     let linear = |name: &str| PlotAxis::linear(name).including([0.0]);
     let ranked = match experiment.recording {
@@ -153,18 +152,18 @@ fn repeats(results: &ExperimentResults) -> PlotFigure {
     let trials = results.cells.iter().map(|cell| cell.expected).max().unwrap_or(1);
     let names = labels(&experiment.axis).into_iter();
     let names = names.map(|label| format!("{label} {}", experiment.axis.kind.name()));
-    let cells: Vec<(String, Hue)> = names.zip(HUES.into_iter().cycle()).collect();
+    let cells: Vec<(String, Ink)> = names.zip(HUES.into_iter().cycle()).collect();
     let count = if experiment.recording.is_some() { 1 } else { 3 };
     let plots = errors.into_iter().take(count).map(|(y, measure)| {
         let x = PlotAxis::integers(if experiment.seeds == 1 { "repeat" } else { "trial" });
         let of_cells = || results.cells.iter().zip(&cells);
-        let series = of_cells().map(|(cell, (name, hue))| {
+        let series = of_cells().map(|(cell, (name, ink))| {
             let points = trial_points(experiment, cell, measure);
-            Series::new(name, Look::marker(*hue, Marker::Disc), points)
+            Series::new(name, Look::marker(*ink, Marker::Disc), points)
         });
-        let lines = of_cells().filter_map(|(cell, (name, hue))| {
+        let lines = of_cells().filter_map(|(cell, (name, ink))| {
             let at = LineAt::Y(cell.error(measure)?.published?);
-            let line = Series::across(format!("{name}, published"), at, *hue, LineStyle::Dashed);
+            let line = Series::across(format!("{name}, published"), at, *ink, LineStyle::Dashed);
             Some(line.listed(Some(name)))
         });
         Plot::new(x.including([0.5, trials as f64 + 0.5]), y, series.chain(lines))

@@ -13,7 +13,7 @@ use glam::DVec3;
 use ndarray::{Array2, ArrayView2};
 
 use super::{
-    Hue, LineStyle, Look,
+    Ink, LineStyle, Look,
     axis::{PlotAxis, ends, step_for, tick_text},
     colour_map::SequentialMap,
     heat_map::HeatMap,
@@ -29,15 +29,15 @@ pub fn hysteresis_figure(found: &HysteresisLoop, target: &Channel) -> PlotFigure
     // The actual value at each level, and the mean ones of loading and unloading.
     let named = |name: &str, rmse| format!("{name}, RMSE {}", format_number(rmse));
     let branches = [
-        ("equal".to_owned(), Hue::Ink, LineStyle::Dashed),
-        (named("loading", found.loading.rmse), Hue::Blue, LineStyle::Solid),
-        (named("unloading", found.unloading.rmse), Hue::Orange, LineStyle::Solid),
+        ("equal".to_owned(), Ink::Text, LineStyle::Dashed),
+        (named("loading", found.loading.rmse), Ink::Blue, LineStyle::Solid),
+        (named("unloading", found.unloading.rmse), Ink::Orange, LineStyle::Solid),
     ];
     let series = |is_difference: bool| {
-        let branches = branches.iter().enumerate().map(|(branch, (name, hue, style))| {
+        let branches = branches.iter().enumerate().map(|(branch, (name, ink, style))| {
             let less = |level: &[f64; 3]| if is_difference { level[0] } else { 0.0 };
             let points = found.levels.iter().map(|level| [level[0], level[branch] - less(level)]);
-            Series::new(name, Look::line(*hue, *style), points)
+            Series::new(name, Look::line(*ink, *style), points)
         });
         Vec::from_iter(branches)
     };

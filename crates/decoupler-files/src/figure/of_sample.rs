@@ -13,7 +13,7 @@ use glam::DVec3;
 use ndarray::Array2;
 
 use super::{
-    Hue, LineStyle, Look, Marker,
+    Ink, LineStyle, Look, Marker,
     axis::{PlotAxis, Scale},
     colour_map::SequentialMap,
     heat_map::HeatMap,
@@ -22,8 +22,8 @@ use super::{
 };
 
 /// Looks of actual and of decoded values next to each other.
-const ACTUAL: Look = Look::marker(Hue::Grey, Marker::Square);
-const DECODED: Look = Look::marker(Hue::Blue, Marker::Disc);
+const ACTUAL: Look = Look::marker(Ink::Grey, Marker::Square);
+const DECODED: Look = Look::marker(Ink::Blue, Marker::Disc);
 
 /// Maximum number of targets whose names fit below the axis.
 const MAX_NAMES: usize = 12;
@@ -75,14 +75,14 @@ pub fn singular_values_figure(rows: &[Identifiability], worst: usize, hidden_bel
         let points = numbered.map(|(number, value)| [number as f64 + 1.0, *value]);
         Series::new(format!("row {}{more}", row.row + 1), look, points).listed(Some(key))
     };
-    let pale = Look::line(Hue::Grey, LineStyle::Fine);
+    let pale = Look::line(Ink::Grey, LineStyle::Fine);
     let others = rows.iter().enumerate().filter(|(index, _)| *index != worst);
     let others = others.map(|(_, row)| series(row, "", pale, "other rows"));
     let strong = DECODED.joined(LineStyle::Solid);
     let strongest = rows.get(worst).map(|row| series(row, ", worst", strong, "worst row"));
     let noise = (hidden_below_per_mm > 0.0).then(|| {
         let at = LineAt::Y(hidden_below_per_mm);
-        Series::across("noise hides values below", at, Hue::Orange, LineStyle::Dashed)
+        Series::across("noise hides values below", at, Ink::Orange, LineStyle::Dashed)
     });
     let unknowns = rows.get(worst).map_or(1, Identifiability::unknowns);
     let x = PlotAxis::integers("deformation pattern, best seen first").including([0.5, unknowns as f64 + 0.5]);
@@ -122,7 +122,7 @@ pub fn node_figure(
 /// Results of several starts of a training, as dots over `axis`: the start `kept` is highlighted, and a box reaches from the
 /// lower to the upper quartile, with a line at the median. Starts without a result have no dot.
 pub fn starts_figure(axis: &str, results: &[Option<f64>], kept: usize, spread: &Spread) -> PlotFigure {
-    let dots = |name: &str, hue: Hue, is_kept: bool| {
+    let dots = |name: &str, ink: Ink, is_kept: bool| {
         let all = results.iter().enumerate();
         let shown = all.filter(|(start, _)| (*start == kept) == is_kept);
         let points = shown.filter_map(|(start, result)| {
@@ -130,20 +130,20 @@ pub fn starts_figure(axis: &str, results: &[Option<f64>], kept: usize, spread: &
             // Three heights separate the dots of similar values.
             Some(PlotPoint::from([(*result)?, (start % 3) as f64]).noted(note))
         });
-        Series::new(name, Look::marker(hue, Marker::Disc), points).listed(None)
+        Series::new(name, Look::marker(ink, Marker::Disc), points).listed(None)
     };
     let y = PlotAxis::new("starts", Scale::Hidden).including([-1.0, 3.0]);
     let quartiles = LineAt::Between([spread.lower_quartile, spread.upper_quartile]);
     let series = [
-        dots("other starts", Hue::Grey, false),
-        dots("kept start", Hue::Blue, true),
-        Series::across("quartiles", quartiles, Hue::Grey, None).listed(None),
-        Series::across("median", LineAt::X(spread.median), Hue::Grey, LineStyle::Solid).listed(None),
+        dots("other starts", Ink::Grey, false),
+        dots("kept start", Ink::Blue, true),
+        Series::across("quartiles", quartiles, Ink::Grey, None).listed(None),
+        Series::across("median", LineAt::X(spread.median), Ink::Grey, LineStyle::Solid).listed(None),
     ];
     Plot::new(PlotAxis::linear(axis), y, series).into()
 }
 
-const HUES: [Hue; 6] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Violet, Hue::Cyan, Hue::Red];
+const HUES: [Ink; 6] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Violet, Ink::Cyan, Ink::Red];
 /// Maximum number of targets with their own colours and names; more targets are all drawn as fine lines.
 const MAX_CURVES: usize = 2 * HUES.len();
 
@@ -155,7 +155,7 @@ pub fn targets_over_time_figure(
     intervals: Option<&Intervals>,
 ) -> PlotFigure {
     let has_names = targets.len() <= MAX_CURVES;
-    let hue = |target: usize| HUES[target % HUES.len()];
+    let ink = |target: usize| HUES[target % HUES.len()];
     let series = |target: usize| {
         let style = match target / HUES.len() {
             _ if !has_names => LineStyle::Fine,
@@ -163,7 +163,7 @@ pub fn targets_over_time_figure(
             _ => LineStyle::Dashed,
         };
         let points = history.iter().map(|(time_s, values)| [*time_s, values[target]]);
-        let series = Series::new(&targets[target].name, Look::line(hue(target), style), points);
+        let series = Series::new(&targets[target].name, Look::line(ink(target), style), points);
         series.listed(has_names.then(|| targets[target].title()).as_deref())
     };
     let intervals = intervals.filter(|_| has_names);
@@ -173,7 +173,7 @@ pub fn targets_over_time_figure(
             Some([*time_s, values[target] + sign * half_width])
         });
         let name = format!("{}, {side} limit of the 90 % interval", targets[target].name);
-        Series::new(name, Look::line(hue(target), LineStyle::Fine), points).listed(None)
+        Series::new(name, Look::line(ink(target), LineStyle::Fine), points).listed(None)
     };
     let units = unique_by(targets.iter().map(|target| target.unit.as_deref()), |unit| *unit);
     let plots = units.into_iter().map(|unit| {

@@ -9,7 +9,7 @@ use decoupler_core::{
 };
 
 use super::{
-    Hue, LineStyle, Look, Marker,
+    Ink, LineStyle, Look, Marker,
     axis::{PlotAxis, ends},
     plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
 };
@@ -128,7 +128,7 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
     let mut front = Vec::from_iter(front.map(|(point, _)| at(point)));
     front.sort_by(|a, b| a[0].total_cmp(&b[0]));
     // Nothing better was measured between two points of the front.
-    let front = Series::new("Pareto front", Look::line(Hue::Grey, LineStyle::Solid), front).stepped();
+    let front = Series::new("Pareto front", Look::line(Ink::Grey, LineStyle::Solid), front).stepped();
     let mut series = vec![front];
     let look = |(point, _): &(&TradeOffPoint, bool)| {
         let preset = point.preset.map_or(u8::MAX, |preset| preset as u8);
@@ -143,7 +143,7 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         });
         let name = kind.name(precision);
         let name = preset.map_or_else(|| name.to_owned(), |preset| format!("{name}, {preset} preset"));
-        let look = Look::marker(Hue::of_decoder(kind), marker(preset, precision));
+        let look = Look::marker(Ink::of_decoder(kind), marker(preset, precision));
         series.push(Series::new(name, look, points).listed(Some(kind.name(Precision::Double))));
     }
     // The questions and their limits are about decoding.
@@ -158,7 +158,7 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
             label: is_decoding.then(|| name.clone()),
             ..at(&level.points[answer]).into()
         });
-        series.push(Series::new(name, Look::marker(Hue::Blue, Marker::Halo), point).listed(None));
+        series.push(Series::new(name, Look::marker(Ink::Blue, Marker::Halo), point).listed(None));
     }
     let error = match level.noise {
         Some(_) => "Z error (%)",
@@ -168,7 +168,7 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
     let model_based = model_based.filter(|errors| !errors.is_rounding());
     series.extend(model_based.and_then(|errors| errors.z_percent).map(|percent| {
         let at = LineAt::Y(percent);
-        Series::across("model-based", at, Hue::Ink, LineStyle::Dashed)
+        Series::across("model-based", at, Ink::Text, LineStyle::Dashed)
     }));
     let lines = [
         ("longest time", time, LineAt::X(time)),
@@ -179,7 +179,7 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         let values = level.points.iter().map(|point| at(point)[axis]);
         let (low, high) = ends(values.filter(|value| value.log10().is_finite()));
         if (low..=high).contains(&limit) {
-            let line = Series::across(name, line, Hue::Blue, LineStyle::Dotted);
+            let line = Series::across(name, line, Ink::Blue, LineStyle::Dotted);
             series.push(line.listed(Some("limits asked for")));
         }
     }

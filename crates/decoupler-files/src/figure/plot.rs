@@ -4,7 +4,7 @@ use decoupler_core::text::counted;
 use glam::Vec2;
 
 use super::{
-    Hue, LineStyle, Look, Marker,
+    Ink, LineStyle, Look, Marker,
     axis::{PlotAxis, Scale},
     drawing::{Bounds, Labels, Measure, Shape},
     extremes, unique_by,
@@ -120,10 +120,10 @@ impl Series {
     }
 
     /// A line across the whole plot, or a band if it has no style; listed in the legend by its name.
-    pub fn across(name: impl Into<String>, at: LineAt, hue: Hue, style: impl Into<Option<LineStyle>>) -> Self {
+    pub fn across(name: impl Into<String>, at: LineAt, ink: Ink, style: impl Into<Option<LineStyle>>) -> Self {
         Self {
             form: Form::Across(at),
-            ..Self::new(name, Look::line(hue, style), [[0.0; 2]; 0])
+            ..Self::new(name, Look::line(ink, style), [[0.0; 2]; 0])
         }
     }
 
@@ -267,42 +267,42 @@ impl Plot {
 
     /// Describes a series; `None` if no point of it is drawn.
     fn words_about(&self, series: &Series) -> Option<String> {
-        let name = &series.name;
-        match series.form {
-            Form::Across(LineAt::X(x)) if name.contains(&self.x.value_text(x)) => return Some(name.clone()),
-            Form::Across(LineAt::X(x)) => return Some(format!("{name} at {}", self.x.value_text(x))),
-            Form::Across(LineAt::Y(y)) => return Some(format!("{name} at {}", self.y.value_text(y))),
-            Form::Across(LineAt::Between(_)) => return None,
-            Form::Points | Form::Bars(_) => {}
+        let (name, x, y) = (&series.name, |x| self.x.value_text(x), |y| self.y.value_text(y));
+        if let Form::Across(line) = series.form {
+            return match line {
+                LineAt::X(at) if name.contains(&x(at)) => Some(name.clone()),
+                LineAt::X(at) => Some(format!("{name} at {}", x(at))),
+                LineAt::Y(at) => Some(format!("{name} at {}", y(at))),
+                LineAt::Between(_) => None,
+            };
         }
-        let points: Vec<&PlotPoint> = self.placed(series).map(|(point, _)| point).collect();
+        let points = Vec::from_iter(self.placed(series).map(|(point, _)| point));
         let (first, last) = (points.first()?, points.last()?);
         let (lowest, highest) = extremes(points.iter(), |point| point.y)?;
+        let (leftmost, rightmost) = extremes(points.iter(), |point| point.x)?;
         // An axis without values only keeps the points apart.
-        let has_values = self.y.scale != Scale::Hidden;
-        let at = |point: &PlotPoint| match has_values {
-            true => format!("{} at {}", self.y.value_text(point.y), self.x.value_text(point.x)),
-            false => self.x.value_text(point.x),
+        let at = |point: &PlotPoint| match self.y.scale {
+            Scale::Hidden => x(point.x),
+            _ => format!("{} at {}", y(point.y), x(point.x)),
         };
-        Some(if series.form != Form::Points {
-            format!("{}, the highest {}", counted(points.len(), "bar"), at(highest))
-        } else if points.len() == 1 {
-            format!("{name}: {}", at(first))
-        } else if series.look.line.is_some_and(|style| style != LineStyle::Fine) {
-            let extremes = [("lowest", lowest), ("highest", highest)].into_iter();
-            let inner = extremes.filter(|(_, point)| point.y != first.y && point.y != last.y);
-            let inner: String = inner.map(|(what, point)| format!(", {what} {}", at(point))).collect();
-            format!("{name} from {} to {}{inner}", at(first), at(last))
-        } else {
-            let range = |axis: &PlotAxis, low: f64, high: f64| {
-                format!(", {} {} to {}", axis.name, axis.value_text(low), axis.value_text(high))
-            };
-            let (leftmost, rightmost) = extremes(points.iter(), |point| point.x)?;
-            let mut words = format!("{} of {name}", counted(points.len(), "point"));
-            if has_values {
-                words += &range(&self.y, lowest.y, highest.y);
+        let is_curve = series.look.line.is_some_and(|style| style != LineStyle::Fine);
+        Some(match (points.len(), series.form) {
+            (bars, Form::Bars(_)) => format!("{}, the highest {}", counted(bars, "bar"), at(highest)),
+            (1, _) => format!("{name}: {}", at(first)),
+            _ if is_curve => {
+                let extremes = [("lowest", lowest), ("highest", highest)].into_iter();
+                let inner = extremes.filter(|(_, point)| point.y != first.y && point.y != last.y);
+                let inner: String = inner.map(|(what, point)| format!(", {what} {}", at(point))).collect();
+                format!("{name} from {} to {}{inner}", at(first), at(last))
             }
-            words + &range(&self.x, leftmost.x, rightmost.x)
+            (count, _) => {
+                let extents = [(&self.y, lowest.y, highest.y), (&self.x, leftmost.x, rightmost.x)].into_iter();
+                let extents = extents.filter(|(axis, ..)| axis.scale != Scale::Hidden);
+                let extents = extents.map(|(axis, low, high)| {
+                    format!(", {} {} to {}", axis.name, axis.value_text(low), axis.value_text(high))
+                });
+                format!("{} of {name}{}", counted(count, "point"), extents.collect::<String>())
+            }
         })
     }
 
@@ -415,7 +415,7 @@ impl PlotFigure {
             let lit = lit.filter(|point| point.item.is_some_and(&is_lit)).cloned();
             let points: Vec<PlotPoint> = lit.chain(others.iter().copied().map(PlotPoint::from)).collect();
             if !points.is_empty() {
-                let look = Look::marker(Hue::Ink, Marker::Halo);
+                let look = Look::marker(Ink::Text, Marker::Halo);
                 plot.series.push(Series::new("lit", look, points).listed(None));
             }
         }
@@ -437,7 +437,7 @@ mod tests {
 
     #[test]
     fn the_text_on_a_point_has_its_series_position_and_value() {
-        let look = Look::line(Hue::Blue, LineStyle::Solid);
+        let look = Look::line(Ink::Blue, LineStyle::Solid);
         let mut series = Series::new("test", look, [[12.0, 0.001_234]]);
         let plot = Plot::new(
             PlotAxis::linear("epoch"),
@@ -459,16 +459,16 @@ mod tests {
 
     #[test]
     fn everything_that_is_drawn_is_in_view() {
-        let look = Look::line(Hue::Blue, None);
+        let look = Look::line(Ink::Blue, None);
         let series = Series {
             form: Form::Bars(2.0),
             ..Series::new("bars", look, [[1.0, 5.0]])
         };
         let mut plot = Plot::new(PlotAxis::linear(""), PlotAxis::linear(""), vec![series]);
         plot.series.extend([
-            Series::across("x", LineAt::X(9.0), Hue::Grey, LineStyle::Dashed),
-            Series::across("y", LineAt::Y(-3.0), Hue::Grey, LineStyle::Dashed),
-            Series::across("band", LineAt::Between([-4.0, 3.0]), Hue::Grey, None),
+            Series::across("x", LineAt::X(9.0), Ink::Grey, LineStyle::Dashed),
+            Series::across("y", LineAt::Y(-3.0), Ink::Grey, LineStyle::Dashed),
+            Series::across("band", LineAt::Between([-4.0, 3.0]), Ink::Grey, None),
         ]);
         let [x, y] = plot.ranges();
         assert!([0.0, 2.0, 9.0, -4.0].iter().all(|value| x.contains(value)), "{x:?}");
@@ -505,7 +505,7 @@ mod tests {
     }
 
     const DISC: Look = Look {
-        hue: Hue::Blue,
+        ink: Ink::Blue,
         line: None,
         marker: Some(Marker::Disc),
     };
@@ -530,7 +530,7 @@ mod tests {
     #[test]
     fn a_label_keeps_clear_of_a_line_through_its_point() {
         let mut plot = labelled(DISC, &[[100.0, 6.0]]);
-        let line = Look::line(Hue::Blue, LineStyle::Solid);
+        let line = Look::line(Ink::Blue, LineStyle::Solid);
         plot.series.push(Series::new("", line, [[20.0, 6.0], [180.0, 6.0]]));
         let label = labels(&plot)[0];
         assert!(label.min.y > 6.0, "below, because there is no room above: {label:?}");
@@ -544,8 +544,8 @@ mod tests {
 
     #[test]
     fn a_legend_lists_series_that_look_alike_once() {
-        let series = |name: &str, key| Series::new(name, Look::line(Hue::Blue, None), [[0.0, 1.0]]).listed(key);
-        let line = Series::across("limit", LineAt::Y(1.0), Hue::Grey, LineStyle::Dashed);
+        let series = |name: &str, key| Series::new(name, Look::line(Ink::Blue, None), [[0.0, 1.0]]).listed(key);
+        let line = Series::across("limit", LineAt::Y(1.0), Ink::Grey, LineStyle::Dashed);
         let all = [
             series("row 1", Some("rows")),
             series("row 2", Some("rows")),
@@ -561,8 +561,8 @@ mod tests {
         assert_eq!(
             figure.keys(),
             [
-                ("rows", Look::line(Hue::Blue, None)),
-                ("limit", Look::line(Hue::Grey, LineStyle::Dashed))
+                ("rows", Look::line(Ink::Blue, None)),
+                ("limit", Look::line(Ink::Grey, LineStyle::Dashed))
             ]
         );
     }

@@ -16,7 +16,7 @@ use decoupler_core::{
     surface::SurfaceMap,
 };
 use decoupler_files::{
-    export::{NetworkFile, figures::PictureFormat, report::RunReport},
+    export::{NetworkFile, report::RunReport},
     figure::{
         Decoded, Figure, RegressionLine, TradeOffLevel, TradeOffLimits, compared_losses_figure, experiment_figure,
         histogram_figure, loss_figure, node_figure, position_error_map, readings_figure, regression_figure,
@@ -31,9 +31,9 @@ use ndarray::Array2;
 
 fn draw(name: &str, figure: impl Into<Figure>) {
     let picture = figure.into().draw();
-    for format in [PictureFormat::Svg, PictureFormat::Png] {
-        let path = format!("../../target/pictures/print-{name}.{}", format.extension());
-        picture.save(format, Path::new(&path)).unwrap();
+    for extension in ["svg", "png"] {
+        let path = format!("../../target/pictures/print-{name}.{extension}");
+        picture.save(Path::new(&path)).unwrap();
     }
 }
 

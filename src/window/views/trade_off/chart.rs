@@ -3,7 +3,7 @@
 use decoupler_core::evaluation::TradeOffPoint;
 use decoupler_files::{
     export::format_number,
-    figure::{Hue, PlotFigure, TradeOffCost, TradeOffLevel, frame_time, point_facts, point_name, training_time},
+    figure::{Ink, PlotFigure, TradeOffCost, TradeOffLevel, frame_time, point_facts, point_name, training_time},
 };
 use eframe::egui::{
     CursorIcon, Id, Pos2, Rect, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role,
@@ -11,7 +11,7 @@ use eframe::egui::{
 
 use super::PointWish;
 use crate::window::{
-    plotting::{Pointer, hue_colour, plots_ui},
+    plotting::{Pointer, colour, plots_ui},
     shared::{DecoderSource, decoder_forms_ui},
     theme::{Theme, semibold, type_size},
     widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView, claim_right_click, dim_ui},
@@ -194,7 +194,7 @@ pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) 
             .labelled(label)
             .selected(*marked == Some(number))
             .meaning(MEANING)
-            .dot(hue_colour(Hue::of_decoder(point.report.kind), palette))
+            .dot(colour(Ink::of_decoder(point.report.kind), palette))
     };
     let click = TableView::new("trade table", &columns)
         .clickable()

@@ -1,5 +1,5 @@
 use decoupler_files::figure::{
-    Decoded, ErrorBins, Figure, HeatMap, Hue, LineAt, LineStyle, PlotFigure, RegressionLine, Series, histogram_figure,
+    Decoded, ErrorBins, Figure, HeatMap, Ink, LineAt, LineStyle, PlotFigure, RegressionLine, Series, histogram_figure,
     hysteresis_figure, loss_figure, node_figure, regression_figure, sample_figure, training_state_figure,
 };
 use eframe::egui::{Key, Modifiers, Ui, UiBuilder};
@@ -261,7 +261,7 @@ fn figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
             let mut figure = loss_figure(run.outline.records(), &run.stages, result.best_epoch);
             if let (Some(epoch), Some(plot)) = (view.scrub.epoch(), figure.plots.first_mut()) {
                 let at = LineAt::X(epoch as f64);
-                let line = Series::across("displayed network", at, Hue::Orange, LineStyle::Solid);
+                let line = Series::across("displayed network", at, Ink::Orange, LineStyle::Solid);
                 plot.series.push(line);
             }
             figure

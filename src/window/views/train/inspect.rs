@@ -4,7 +4,7 @@ use decoupler_core::{evaluation::NodeAddress, text::counted};
 use decoupler_files::{
     export::format_number,
     figure::{
-        ErrorBins, Hue, LineAt, LineStyle, PlotFigure, Series, pair_address, pair_sample, section_figure,
+        ErrorBins, Ink, LineAt, LineStyle, PlotFigure, Series, pair_address, pair_sample, section_figure,
         surface::{Section, SectionLine},
     },
 };
@@ -99,7 +99,7 @@ pub fn with_lights(mut figure: PlotFigure, view: &TrainView, shared: &Shared) ->
                 } else {
                     "node under the pointer"
                 };
-                let line = Series::across(name, LineAt::X(decoded - actual), Hue::Orange, LineStyle::Solid);
+                let line = Series::across(name, LineAt::X(decoded - actual), Ink::Orange, LineStyle::Solid);
                 plot.series.push(line);
             }
             figure

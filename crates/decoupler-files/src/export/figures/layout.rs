@@ -6,7 +6,7 @@ use glam::Vec2;
 
 use super::picture::{Layer, PAGE_WIDTH, Picture, TEXT, measure};
 use crate::figure::{
-    Align, Bounds, ColourMap, Figure, Form, HeatMap, Hue, Ink, Plot, PlotFigure, Series, Shape, Stroke,
+    Align, Bounds, ColourMap, Figure, Form, HeatMap, Ink, Plot, PlotFigure, Series, Shape, Stroke,
     surface::{Surface, SurfaceFigure},
 };
 
@@ -23,8 +23,8 @@ impl Figure {
 
 /// Height of a line of text.
 const LINE: f32 = 1.6 * TEXT;
-const TEXT_INK: Ink = Ink::Hue(Hue::Ink);
-const DIM: Ink = Ink::Hue(Hue::Grey);
+const TEXT_INK: Ink = Ink::Text;
+const DIM: Ink = Ink::Grey;
 
 /// Room for the names and numbers of the axes of a plot, and its height.
 const LEFT: f32 = 70.0;
@@ -80,8 +80,8 @@ fn lay_out(plot: &Plot, area: Bounds) -> [Layer; 2] {
         };
         let [from, to] = corners.map(at);
         match look.line {
-            Some(style) => lines.push(Shape::Line(vec![from, to], style.stroke(look.hue))),
-            None => behind.push(Bounds::of([from, to]).area(Ink::Hue(look.hue).at(0.12))),
+            Some(style) => lines.push(Shape::Line(vec![from, to], style.stroke(look.ink))),
+            None => behind.push(Bounds::of([from, to]).area(look.ink.at(0.12))),
         }
     }
     behind.extend(axes(plot, area, ranges));
@@ -91,7 +91,7 @@ fn lay_out(plot: &Plot, area: Bounds) -> [Layer; 2] {
             let [left, right] = [-0.5, 0.5].map(|half| at([x + half * width, y]));
             if left.y < area.max.y {
                 let bar = Bounds::of([left, Vec2::new(right.x, area.max.y)]);
-                shapes.push(bar.area(series.look.hue));
+                shapes.push(bar.area(series.look.ink));
             }
         }
     }
@@ -101,14 +101,14 @@ fn lay_out(plot: &Plot, area: Bounds) -> [Layer; 2] {
         if let Some(style) = look.line {
             let stretches = plot.stretches(series).into_iter();
             let stretches = stretches.map(|places| places.into_iter().map(at).collect());
-            shapes.extend(stretches.map(|points| Shape::Line(points, style.stroke(look.hue))));
+            shapes.extend(stretches.map(|points| Shape::Line(points, style.stroke(look.ink))));
         }
         for (point, [x, _]) in plot.placed(series) {
             let Some(ends) = point.bar else { continue };
             let [low, high] = plot.bar_ends(ends, y_range).map(|end| at([x, end]));
             let cap = Vec2::new(3.0, 0.0);
             let lines = [[low, high], [low - cap, low + cap], [high - cap, high + cap]];
-            shapes.extend(lines.map(|[from, to]| Shape::line(from, to, look.hue, 1.1)));
+            shapes.extend(lines.map(|[from, to]| Shape::line(from, to, look.ink, 1.1)));
         }
         shapes.extend(plot.placed(series).filter_map(|(_, place)| look.mark(at(place))));
     }
@@ -196,7 +196,7 @@ fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
         }
         if let Some(note) = drawing.note {
             let at = Vec2::new(bounds.min.x + 16.0, below);
-            beside.push(Shape::text(at, Align::Start, Ink::Hue(Hue::Orange), note));
+            beside.push(Shape::text(at, Align::Start, Ink::Orange, note));
             last = below + LINE;
         }
         layers.push((None, beside));

@@ -7,4 +7,4 @@ mod layout;
 mod picture;
 
 pub(crate) use picture::dark_style;
-pub use picture::{Picture, PictureError, PictureFormat};
+pub use picture::{Picture, PictureError};

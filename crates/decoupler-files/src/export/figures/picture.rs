@@ -14,7 +14,7 @@ use thiserror::Error;
 
 use crate::{
     export::{WriteError, atomic_write},
-    figure::{Align, Bounds, Colour, Hue, Ink, Rgb, Shape, Stroke},
+    figure::{Align, Bounds, Colour, Ink, Rgb, Shape, Stroke},
 };
 
 /// A finished figure.
@@ -23,16 +23,6 @@ pub struct Picture {
     svg: String,
     /// Width as a share of that of the page.
     share: f32,
-}
-
-/// File format of a figure.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::EnumString, strum::IntoStaticStr)]
-#[strum(serialize_all = "lowercase", ascii_case_insensitive)]
-pub enum PictureFormat {
-    /// Lines and text, sharp at any size.
-    Svg,
-    /// Pixels, 300 to the inch.
-    Png,
 }
 
 /// Errors of writing a figure.
@@ -48,22 +38,6 @@ pub enum PictureError {
     /// The file.
     #[error(transparent)]
     Write(#[from] WriteError),
-}
-
-impl PictureFormat {
-    /// File name extension, without the dot.
-    pub fn extension(self) -> &'static str {
-        self.into()
-    }
-
-    /// Returns the format given by the extension of `path`.
-    ///
-    /// # Errors
-    /// The name ends neither in .svg nor in .png.
-    pub fn of_path(path: &Path) -> Result<Self, PictureError> {
-        let extension = path.extension().unwrap_or_default().to_string_lossy();
-        extension.parse().map_err(|_| PictureError::Name(path.to_owned()))
-    }
 }
 
 /// The minimum that journals require.
@@ -137,14 +111,16 @@ impl Picture {
         Ok(pixels)
     }
 
-    /// Writes the figure atomically.
+    /// Writes the figure atomically, as SVG or PNG by the extension of `path`.
     ///
     /// # Errors
-    /// The path cannot be written.
-    pub fn save(&self, format: PictureFormat, path: &Path) -> Result<(), PictureError> {
-        let bytes = match format {
-            PictureFormat::Svg => self.svg.clone().into_bytes(),
-            PictureFormat::Png => self.png()?,
+    /// The name ends neither in .svg nor in .png, or the path cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), PictureError> {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let bytes = match extension.to_str() {
+            Some("svg") => self.svg.clone().into_bytes(),
+            Some("png") => self.png()?,
+            _ => return Err(PictureError::Name(path.to_owned())),
         };
         atomic_write(path, |writer| io::Write::write_all(writer, &bytes))?;
         Ok(())
@@ -177,24 +153,24 @@ static FONTS: LazyLock<Arc<usvg::fontdb::Database>> = LazyLock::new(|| {
 /// The roles of colours: each in print, dark enough for paper, and on a dark background.
 const PALETTE: [(Ink, Rgb, Rgb); 12] = [
     (Ink::Ground, [0xff; 3], [0x1b, 0x1e, 0x24]),
-    (Ink::Hue(Hue::Ink), [0x1b, 0x24, 0x30], [0xe7, 0xea, 0xf0]),
-    (Ink::Hue(Hue::Grey), [0x5b, 0x64, 0x72], [0x98, 0xa2, 0xb3]),
+    (Ink::Text, [0x1b, 0x24, 0x30], [0xe7, 0xea, 0xf0]),
+    (Ink::Grey, [0x5b, 0x64, 0x72], [0x98, 0xa2, 0xb3]),
     (Ink::Grid, [0xe3, 0xe7, 0xee], [0x2c, 0x32, 0x3c]),
     (Ink::Edge, [0xa2, 0xa9, 0xb4], [0x5b, 0x64, 0x72]),
     (Ink::Missing, [0xf3, 0xf5, 0xf8], [0x24, 0x29, 0x32]),
-    (Ink::Hue(Hue::Blue), [0x1f, 0x6f, 0xeb], [0x5b, 0x9d, 0xff]),
-    (Ink::Hue(Hue::Red), [0xc6, 0x2f, 0x2f], [0xf0, 0x6a, 0x6a]),
-    (Ink::Hue(Hue::Green), [0x1a, 0x7f, 0x4b], [0x4c, 0xc3, 0x8a]),
-    (Ink::Hue(Hue::Orange), [0xa8, 0x64, 0x00], [0xf0, 0xa8, 0x3c]),
-    (Ink::Hue(Hue::Violet), [0x7a, 0x3e, 0xb1], [0xb5, 0x8a, 0xe6]),
-    (Ink::Hue(Hue::Cyan), [0x0b, 0x76, 0x8c], [0x4f, 0xc3, 0xd9]),
+    (Ink::Blue, [0x1f, 0x6f, 0xeb], [0x5b, 0x9d, 0xff]),
+    (Ink::Red, [0xc6, 0x2f, 0x2f], [0xf0, 0x6a, 0x6a]),
+    (Ink::Green, [0x1a, 0x7f, 0x4b], [0x4c, 0xc3, 0x8a]),
+    (Ink::Orange, [0xa8, 0x64, 0x00], [0xf0, 0xa8, 0x3c]),
+    (Ink::Violet, [0x7a, 0x3e, 0xb1], [0xb5, 0x8a, 0xe6]),
+    (Ink::Cyan, [0x0b, 0x76, 0x8c], [0x4f, 0xc3, 0xd9]),
 ];
 
 /// Returns a colour in print.
 fn rgb(ink: Ink) -> Rgb {
     match ink {
         Ink::Rgb(colour) => colour,
-        Ink::Label => rgb(Ink::Hue(Hue::Ink)),
+        Ink::Label => rgb(Ink::Text),
         _ => {
             let entry = PALETTE.iter().find(|(role, ..)| *role == ink);
             entry.expect("every role is in the palette").1

@@ -6,8 +6,9 @@ use glam::{DVec3, Vec2};
 
 use super::camera::{OrbitCamera, PlotBox, Sight};
 use crate::figure::{
+    Ink,
     axis::{PlotAxis, step_for, tick_text},
-    drawing::{Bounds, Ink, Labels, Measure, Shape},
+    drawing::{Bounds, Labels, Measure, Shape},
 };
 
 /// Length of a tick, in points.

@@ -6,9 +6,10 @@ use glam::{DVec3, Vec2};
 
 use super::{Surface, ViewMode, camera::Sight};
 use crate::figure::{
+    Ink,
     axis::{multiples, step_for},
     colour_map::{ColourMap, is_light},
-    drawing::{Colour, Ink, Shape},
+    drawing::{Colour, Shape},
 };
 
 const CONTOUR_LEVELS: usize = 10;

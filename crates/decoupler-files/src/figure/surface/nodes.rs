@@ -8,8 +8,8 @@ use super::{
     section::cell,
 };
 use crate::figure::{
-    Hue,
-    drawing::{Bounds, Ink, Shape, Stroke},
+    Ink,
+    drawing::{Bounds, Shape, Stroke},
 };
 
 /// Distance within which the pointer selects a node, in points.
@@ -67,26 +67,23 @@ impl Dots {
 
     /// Returns the dots in the order of painting, with rings around the nodes `lit` and a mark around one node.
     pub fn shapes(&self, marked: Option<usize>, lit: &[usize]) -> Vec<Shape> {
-        let mut shapes = Vec::new();
-        let accent = Ink::Hue(Hue::Blue);
         let ring = |at, radius, [under, over]: [f32; 2], ink: Ink| {
             let strokes = [Stroke::new(Ink::Ground.at(0.8), under), Stroke::new(ink, over)];
             strokes.map(|stroke| Shape::Ring(at, radius, stroke))
         };
-        let radius = self.radius();
+        let (mut shapes, radius) = (Vec::new(), self.radius());
         for dot in self.0.iter().flatten().filter(|_| radius > 0.0) {
             let opacity = if dot.is_hidden { HIDDEN_OPACITY } else { 1.0 };
-            let warning = Ink::Hue(Hue::Orange);
-            let ink = if dot.is_beyond { warning } else { Ink::WHITE };
+            let ink = if dot.is_beyond { Ink::Orange } else { Ink::WHITE };
             shapes.push(Shape::Disc(dot.at, radius + 0.75, Ink::BLACK.at(0.45 * opacity)));
             shapes.push(Shape::Disc(dot.at, radius, ink.at(opacity)));
         }
         for at in lit.iter().filter_map(|&node| self.position(node)) {
-            shapes.extend(ring(at, 4.5, [2.5, 1.5], accent));
+            shapes.extend(ring(at, 4.5, [2.5, 1.5], Ink::Blue));
         }
         if let Some(at) = marked.and_then(|node| self.position(node)) {
-            shapes.push(Shape::Disc(at, 3.0, accent.into()));
-            shapes.extend(ring(at, 6.5, [3.5, 1.5], Ink::Hue(Hue::Ink)));
+            shapes.push(Shape::Disc(at, 3.0, Ink::Blue.into()));
+            shapes.extend(ring(at, 6.5, [3.5, 1.5], Ink::Text));
         }
         shapes
     }
@@ -141,13 +138,11 @@ fn crossings(surface: &Surface, ray: &Ray) -> Vec<f64> {
         // It stays over one cell.
         return vec![-1.0, 1.0];
     }
-    let axes = [(surface.map.grid().x_mm(), 0), (surface.map.grid().y_mm(), 1)].into_iter();
-    let shares = axes.flat_map(|(points_mm, axis)| {
-        let lines = points_mm.iter();
-        lines.map(move |line| (line - ray.from_mm[axis]) / ray.direction[axis])
-    });
-    let ahead = shares.filter(|share| *share > 0.0 && share.is_finite());
-    let mut crossings: Vec<f64> = ahead.chain([0.0]).collect();
+    let (x_mm, y_mm) = (surface.map.grid().x_mm(), surface.map.grid().y_mm());
+    let on_x = x_mm.iter().map(|x| (x - ray.from_mm.x) / ray.direction.x);
+    let on_y = y_mm.iter().map(|y| (y - ray.from_mm.y) / ray.direction.y);
+    let ahead = on_x.chain(on_y).filter(|share| *share > 0.0 && share.is_finite());
+    let mut crossings = Vec::from_iter(ahead.chain([0.0]));
     crossings.sort_by(f64::total_cmp);
     crossings
 }

@@ -8,9 +8,9 @@ use glam::{DVec3, Vec2};
 
 use super::{Surface, camera::Sight};
 use crate::figure::{
-    Hue, LineStyle, Look, Marker,
+    Ink, LineStyle, Look, Marker,
     axis::PlotAxis,
-    drawing::{Ink, Shape, Stroke},
+    drawing::{Shape, Stroke},
     plot::{LineAt, Plot, PlotFigure, PlotPoint, Series, unbroken},
 };
 
@@ -73,7 +73,7 @@ impl Section {
         let drawn = curve.map(|place| place.z.is_finite().then(|| sight.drawn(surface.drawn(place))));
         let shapes = unbroken(drawn).into_iter().flat_map(|points: Vec<Vec2>| {
             let under = Stroke::new(Ink::Ground.at(0.7), 3.5);
-            let over = Stroke::new(Hue::Orange, 1.8);
+            let over = Stroke::new(Ink::Orange, 1.8);
             [Shape::Line(points.clone(), under), Shape::Line(points, over)]
         });
         shapes.collect()
@@ -99,25 +99,25 @@ pub fn section_figure(section: &Section, rows: &[usize], actual: &Surface, decou
         SectionLine::ColumnWire(_) => ("x", |place| place.x),
     };
     let shown = || {
-        let decoupled = decoupled.map(|surface| ("decoupled", Hue::Blue, Marker::Disc, surface));
-        std::iter::once(("actual", Hue::Grey, Marker::Square, actual)).chain(decoupled)
+        let decoupled = decoupled.map(|surface| ("decoupled", Ink::Blue, Marker::Disc, surface));
+        std::iter::once(("actual", Ink::Grey, Marker::Square, actual)).chain(decoupled)
     };
     let name = section.line.name();
     let title = capitalised(&name);
     let heights_mm = shown().flat_map(|(.., surface)| [*surface.range.start(), *surface.range.end()]);
     let x = PlotAxis::linear(format!("{axis} along {name} (mm)"));
     let y = PlotAxis::linear("z (mm)").including(heights_mm);
-    let curves = shown().map(|(name, hue, _, surface)| {
+    let curves = shown().map(|(name, ink, _, surface)| {
         let curve = section.curve_mm(surface);
         let curve = curve.iter().map(|at| [place(at), at.z]);
-        Series::new(name, Look::line(hue, LineStyle::Solid), curve)
+        Series::new(name, Look::line(ink, LineStyle::Solid), curve)
     });
     let mut plot = Plot::new(x, y, curves);
     if plot.series.is_empty() {
         let note = format!("{title} lies beyond the nodes: there is no surface above it.");
         return PlotFigure::new([plot], [note]);
     }
-    plot.series.extend(shown().filter_map(|(name, hue, marker, surface)| {
+    plot.series.extend(shown().filter_map(|(name, ink, marker, surface)| {
         let row = rows.iter().position(|&row| section.line == SectionLine::RowWire(row))?;
         let per_row = surface.nodes.len() / rows.len();
         // A column-wire passes below the surface, between the nodes.
@@ -130,7 +130,7 @@ pub fn section_figure(section: &Section, rows: &[usize], actual: &Surface, decou
             );
             PlotPoint::from([place(at), at.z]).of_item(node).noted(note)
         });
-        Some(Series::new(format!("{name} nodes"), Look::marker(hue, marker), points).listed(None))
+        Some(Series::new(format!("{name} nodes"), Look::marker(ink, marker), points).listed(None))
     }));
     plot.series.extend(beyond(section.line, actual.map.grid()));
     plot.into()
@@ -147,7 +147,7 @@ fn beyond(line: SectionLine, grid: &Grid) -> impl Iterator<Item = Series> {
     let bands = ends.into_iter().filter(|(from, to)| from < to);
     bands.map(|(from, to)| {
         let at = LineAt::Between([points_mm[from], points_mm[to]]);
-        Series::across("beyond the nodes", at, Hue::Grey, None)
+        Series::across("beyond the nodes", at, Ink::Grey, None)
     })
 }
 
