@@ -157,7 +157,7 @@ fn over_the_surfaces(number: usize) -> Vec<Event> {
 /// Prints the time per frame that the loss chart of a long training takes before it is painted.
 fn long_training() {
     const EPOCHS: usize = 1_000_000;
-    let mut outline = EpochOutline::new();
+    let mut outline = EpochOutline::default();
     let epochs: Vec<EpochRecord> = (0..EPOCHS)
         .map(|epoch| EpochRecord {
             epoch,

@@ -290,7 +290,7 @@ fn a_million_epochs_are_drawn_by_min_and_max_per_pixel() {
             validation_failures: 0,
         })
         .collect();
-    let mut outline = EpochOutline::new();
+    let mut outline = EpochOutline::default();
     history.chunks(10_000).for_each(|records| outline.extend(records));
     let figure = Figure::from(loss_figure(outline.records(), &[], 0));
     let mut curves = Vec::new();

@@ -87,7 +87,7 @@ impl RunView {
             test,
             baselines,
             history: Vec::new(),
-            outline: EpochOutline::new(),
+            outline: EpochOutline::default(),
             stages: Vec::new(),
             starts: Vec::new(),
             past: PastNetworks::default(),

@@ -131,11 +131,6 @@ pub struct EpochOutline {
 }
 
 impl EpochOutline {
-    /// Creates an empty outline.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Adds epochs. If they overlap earlier ones, because another start has become the best, the earlier ones are
     /// dropped.
     pub fn extend(&mut self, epochs: &[EpochRecord]) {
@@ -164,7 +159,7 @@ fn outlined(history: &[EpochRecord]) -> Cow<'_, [EpochRecord]> {
     if history.len() <= MAX_EPOCHS {
         return history.into();
     }
-    let mut outline = EpochOutline::new();
+    let mut outline = EpochOutline::default();
     outline.extend(history);
     outline.kept.into()
 }
@@ -265,7 +260,7 @@ mod tests {
     #[test]
     fn a_long_training_keeps_its_peaks_within_bounded_memory() {
         let history = history(200_000);
-        let mut outline = EpochOutline::new();
+        let mut outline = EpochOutline::default();
         for chunk in history.chunks(777) {
             outline.extend(chunk);
         }
@@ -287,7 +282,7 @@ mod tests {
     #[test]
     fn a_short_training_is_kept_whole_and_replaced_by_a_better_start() {
         let history = history(1000);
-        let mut outline = EpochOutline::new();
+        let mut outline = EpochOutline::default();
         outline.extend(&history[..400]);
         outline.extend(&history[400..]);
         assert_eq!(outline.records(), history);

@@ -12,8 +12,6 @@ use super::{
     titled, with_unit,
 };
 
-const BINS: usize = 41;
-
 /// Values that a network decodes.
 #[derive(Clone, Copy, Debug)]
 pub enum Decoded<'a> {
@@ -70,7 +68,7 @@ pub struct ErrorBins {
 
 impl ErrorBins {
     /// Number of bins.
-    pub const COUNT: usize = BINS;
+    pub const COUNT: usize = 41;
 
     /// Returns the bins that contain all finite errors of these pairs of actual and decoded values.
     pub fn new(pairs: &[(f64, f64)]) -> Self {
@@ -78,19 +76,19 @@ impl ErrorBins {
         let largest = errors.filter(|error| error.is_finite()).fold(0.0, f64::max);
         // Without errors, any width will do.
         let half = if largest > 0.0 { largest } else { 1.0 };
-        let width = half / (BINS / 2) as f64;
+        let width = half / (Self::COUNT / 2) as f64;
         Self { width }
     }
 
     /// Returns the bin of an error; `None` if it is not a number or beyond them.
     pub fn bin(&self, error: f64) -> Option<usize> {
-        let bin = (error / self.width).round() + (BINS / 2) as f64;
-        (0.0..BINS as f64).contains(&bin).then_some(bin as usize)
+        let bin = (error / self.width).round() + (Self::COUNT / 2) as f64;
+        (0.0..Self::COUNT as f64).contains(&bin).then_some(bin as usize)
     }
 
     /// Returns the range of errors in a bin, in the unit of the values.
     pub fn range(&self, bin: usize) -> [f64; 2] {
-        [-0.5, 0.5].map(|half| self.width * (bin as f64 - (BINS / 2) as f64 + half))
+        [-0.5, 0.5].map(|half| self.width * (bin as f64 - (Self::COUNT / 2) as f64 + half))
     }
 
     /// Returns the pairs in a bin, those with the largest error first.
@@ -102,8 +100,8 @@ impl ErrorBins {
         found
     }
 
-    fn counts(&self, pairs: &[(f64, f64)]) -> [usize; BINS] {
-        let mut counts = [0; BINS];
+    fn counts(&self, pairs: &[(f64, f64)]) -> [usize; Self::COUNT] {
+        let mut counts = [0; Self::COUNT];
         let bins = pairs.iter().filter_map(|(actual, decoded)| self.bin(decoded - actual));
         bins.for_each(|bin| counts[bin] += 1);
         counts
@@ -116,9 +114,9 @@ pub fn histogram_figure(pairs: &[(f64, f64)], chosen: Option<usize>, of: Decoded
     let bins = ErrorBins::new(pairs);
     let counts = bins.counts(pairs);
     let bars = |name: &str, ink: Ink, is_chosen: bool| {
-        let shown = (0..BINS).filter(|&bin| (Some(bin) == chosen) == is_chosen);
+        let shown = (0..ErrorBins::COUNT).filter(|&bin| (Some(bin) == chosen) == is_chosen);
         let points = shown.map(|bin| {
-            let middle = bins.width * (bin as f64 - (BINS / 2) as f64);
+            let middle = bins.width * (bin as f64 - (ErrorBins::COUNT / 2) as f64);
             PlotPoint::from([middle, counts[bin] as f64]).of_item(bin)
         });
         let mut series = Series::new(name, Look::line(ink, None), points).listed(None);
@@ -222,10 +220,16 @@ mod tests {
         let bins = ErrorBins::new(&pairs);
         let counts = bins.counts(&pairs);
         assert_eq!(counts.iter().sum::<usize>(), 5);
-        assert_eq!((counts[0], counts[BINS / 2], counts[BINS - 1]), (1, 2, 1));
+        assert_eq!(
+            (counts[0], counts[ErrorBins::COUNT / 2], counts[ErrorBins::COUNT - 1]),
+            (1, 2, 1)
+        );
         assert!((bins.width - 0.05).abs() < 1e-15);
-        assert_eq!(ErrorBins::new(&[]).counts(&[]), [0; BINS]);
-        assert_eq!(ErrorBins::new(&[(4.0, 4.0); 3]).counts(&[(4.0, 4.0); 3])[BINS / 2], 3);
+        assert_eq!(ErrorBins::new(&[]).counts(&[]), [0; ErrorBins::COUNT]);
+        assert_eq!(
+            ErrorBins::new(&[(4.0, 4.0); 3]).counts(&[(4.0, 4.0); 3])[ErrorBins::COUNT / 2],
+            3
+        );
     }
 
     #[test]

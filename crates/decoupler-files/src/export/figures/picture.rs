@@ -91,9 +91,7 @@ impl Picture {
     pub fn pixels(&self) -> Result<([usize; 2], Vec<u8>), PictureError> {
         let pixmap = self.pixmap()?;
         let size = [pixmap.width() as usize, pixmap.height() as usize];
-        let colours = pixmap.pixels().iter().map(|pixel| pixel.demultiply());
-        let bytes = colours.flat_map(|colour| [colour.red(), colour.green(), colour.blue(), colour.alpha()]);
-        Ok((size, bytes.collect()))
+        Ok((size, pixmap.take_demultiplied()))
     }
 
     fn pixmap(&self) -> Result<tiny_skia::Pixmap, PictureError> {

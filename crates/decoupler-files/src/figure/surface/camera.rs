@@ -1,6 +1,6 @@
 //! A camera that orbits the plot, and the projection from millimetres to points on the screen and back.
 
-use glam::{DVec2, DVec3, Vec2};
+use glam::{DMat3, DVec2, DVec3, Vec2};
 use serde::{Deserialize, Serialize};
 
 use crate::figure::drawing::Bounds;
@@ -98,10 +98,8 @@ pub struct Sight {
     /// The eye in box units, at the middle of the box if it is straight above.
     pub(super) eye: DVec3,
     pub(super) is_above: bool,
-    /// Unit vectors in box units: away from the eye, to the right and up on the screen.
-    forward: DVec3,
-    right: DVec3,
-    up: DVec3,
+    /// Turns box units to the right and down on the screen, and away from the eye.
+    view: DMat3,
     /// Points on the screen of a tangent of 1, or of a box unit from above.
     points: f64,
     /// The point on the screen where the eye looks.
@@ -131,9 +129,7 @@ impl Sight {
             plot_box,
             eye: camera.map_or(DVec3::ZERO, |_| towards_eye * (EYE_DISTANCE * half_diagonal)),
             is_above: camera.is_none(),
-            forward: -towards_eye,
-            right,
-            up: towards_eye.cross(right),
+            view: DMat3::from_cols(right, right.cross(towards_eye), -towards_eye).transpose(),
             points: 1.0,
             offset: DVec2::ZERO,
         };
@@ -162,9 +158,9 @@ impl Sight {
 
     /// Returns the point on the screen of a place.
     pub fn point(&self, place_mm: DVec3) -> DVec2 {
-        let apart = self.plot_box.unit(place_mm) - self.eye;
-        let depth = if self.is_above { 1.0 } else { apart.dot(self.forward) };
-        self.offset + DVec2::new(apart.dot(self.right), -apart.dot(self.up)) * (self.points / depth)
+        let seen = self.view * (self.plot_box.unit(place_mm) - self.eye);
+        let depth = if self.is_above { 1.0 } else { seen.z };
+        self.offset + seen.truncate() * (self.points / depth)
     }
 
     /// As [`Self::point`], for what is painted.
@@ -182,11 +178,11 @@ impl Sight {
 
     /// Returns the line of sight through a point on the screen.
     pub fn ray(&self, at: DVec2) -> Ray {
-        let (tangents, per_mm) = ((at - self.offset) / self.points, self.plot_box.per_mm);
-        let across = self.right * tangents.x - self.up * tangents.y;
+        let tangents = (at - self.offset) / self.points;
+        let millimetres = |depth: f64| self.view.transpose() * tangents.extend(depth) / self.plot_box.per_mm;
         let (from_mm, direction) = match self.is_above {
-            true => ((self.plot_box.middle_mm() + across / per_mm).with_z(0.0), self.forward),
-            false => (self.eye_mm(), (self.forward + across) / per_mm),
+            true => ((self.plot_box.middle_mm() + millimetres(0.0)).with_z(0.0), DVec3::NEG_Z),
+            false => (self.eye_mm(), millimetres(1.0)),
         };
         Ray { from_mm, direction }
     }
