@@ -152,7 +152,7 @@ impl PlotAxis {
     }
 
     /// Returns the positions of the ticks in a range of places, from 0 to 1, with their numbers, which are separated by at
-    /// least `apart`.
+    /// least the share `apart` of the range.
     pub(crate) fn numbers(&self, range: &RangeInclusive<f64>, apart: f32) -> Vec<(f64, String)> {
         let ticks = self.ticks(range, f64::from(apart) * (range.end() - range.start()));
         let number = |&place: &f64| (share(place, range), self.tick_text(place, ticks.step));
@@ -177,7 +177,7 @@ impl Ticks {
 }
 
 /// Returns the minimum and maximum; without values, the first is larger than the second.
-pub(super) fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
+pub(crate) fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(value), high.max(value))
     })

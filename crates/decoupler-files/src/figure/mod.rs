@@ -18,6 +18,7 @@ mod of_trade_off;
 mod plot;
 pub mod surface;
 
+pub(crate) use axis::ends;
 pub use axis::{PlotAxis, Scale, Ticks, tick_text};
 pub use colour_map::{ColourMap, Rgb, SequentialMap, is_light};
 pub use drawing::{Align, Bounds, Colour, Measure, Shape, Stroke};

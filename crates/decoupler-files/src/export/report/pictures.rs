@@ -6,8 +6,8 @@ use ndarray::{Array2, ArrayView2};
 use crate::{
     export::NetworkFile,
     figure::{
-        Decoded, Figure, RegressionLine, TargetSurface, histogram_figure, hysteresis_figure, loss_figure,
-        regression_figure,
+        Decoded, Figure, PlotFigure, RegressionLine, TargetSurface, ends, histogram_figure, hysteresis_figure,
+        loss_figure, regression_figure,
         surface::{Quantity, Surface, SurfaceFigure, ViewMode},
         training_state_figure, value_pairs,
     },
@@ -35,14 +35,14 @@ pub(super) fn pictures(
         None => target_surfaces(file, test, answers),
     };
     let mut pictures = Vec::from_iter(surfaces);
-    let mut add = |caption: String, figure: Figure| pictures.push((caption, figure));
+    let mut add = |caption: String, figure: PlotFigure| pictures.push((caption, figure.into()));
     add(
         "Mean squared error of every epoch, in scaled units.".to_owned(),
-        loss_figure(&training.history, &training.stages, training.best_epoch).into(),
+        loss_figure(&training.history, &training.stages, training.best_epoch),
     );
     add(
         "Gradient and the method's own quantities.".to_owned(),
-        training_state_figure(&training.history, &training.stages).into(),
+        training_state_figure(&training.history, &training.stages),
     );
     let mut add_errors = |index: Option<usize>, of: Decoded<'_>, captions: [String; 2]| {
         let pairs = value_pairs(test, answers, index);
@@ -50,9 +50,9 @@ pub(super) fn pictures(
         let [regression, histogram] = captions;
         add(
             regression,
-            regression_figure((pairs.len(), &|pair| pairs[pair]), &line, of).into(),
+            regression_figure((pairs.len(), &|pair| pairs[pair]), &line, of),
         );
-        add(histogram, histogram_figure(&pairs, None, of).into());
+        add(histogram, histogram_figure(&pairs, None, of));
     };
     if of_array.is_some() {
         let captions = [
@@ -76,7 +76,7 @@ pub(super) fn pictures(
             let name = &target.name;
             add(
                 format!("Mean decoded against actual values of {name} in the test set, loading and unloading."),
-                hysteresis_figure(found, target).into(),
+                hysteresis_figure(found, target),
             );
         }
     }
@@ -93,10 +93,8 @@ fn target_surfaces(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) ->
     let worst = nodes.filter_map(|(node, position)| Some((node, errors.get(position.target)?)));
     let (node, worst) = worst.max_by(|(_, one), (_, other)| one.worst.total_cmp(&other.worst))?;
     let targets = test.targets();
-    let ranges = targets.columns().into_iter().map(|column| {
-        let ends = |(low, high): (f64, f64), &value: &f64| (low.min(value), high.max(value));
-        column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), ends)
-    });
+    let columns = targets.columns().into_iter();
+    let ranges = columns.map(|column| ends(column.iter().copied()));
     let range = surface.range_of(&Vec::from_iter(ranges));
     let sample = Some(worst.worst_sample).filter(|&sample| sample < test.samples())?;
     let [actual, decoded] = [targets, answers.view()].map(|rows| rows.row(sample).to_vec());

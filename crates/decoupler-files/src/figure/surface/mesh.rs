@@ -122,29 +122,20 @@ pub(super) fn corners(ix: usize, iy: usize) -> [[usize; 2]; 4] {
 /// squares).
 fn crossings(corners: [DVec3; 4], level: f64, mut draw: impl FnMut([DVec3; 2])) {
     let is_low = corners.map(|corner| corner.z < level);
-    if is_low.iter().all(|is| *is == is_low[0]) {
-        return;
-    }
-    let mut ends = [DVec3::ZERO; 4];
-    let mut found = 0;
-    for (side, &a) in corners.iter().enumerate() {
-        let next = (side + 1) % 4;
-        if is_low[side] != is_low[next] {
-            ends[found] = a.lerp(corners[next], (level - a.z) / (corners[next].z - a.z));
-            found += 1;
-        }
-    }
-    let [w, x, y, z] = ends;
+    let sides = [0, 1, 2, 3].map(|side| (side, (side + 1) % 4)).into_iter();
+    let crossed = sides.filter(|&(from, to)| is_low[from] != is_low[to]);
+    let end = |(from, to): (usize, usize)| {
+        let (from, to) = (corners[from], corners[to]);
+        from.lerp(to, (level - from.z) / (to.z - from.z))
+    };
+    let ends = Vec::from_iter(crossed.map(end));
     // At a saddle the value in the middle decides which corners are connected.
     let middle_is_low = || corners.iter().map(|corner| corner.z).sum::<f64>() < 4.0 * level;
-    if found == 2 {
-        draw([w, x]);
-    } else if middle_is_low() == is_low[0] {
-        draw([w, x]);
-        draw([y, z]);
-    } else {
-        draw([z, w]);
-        draw([x, y]);
+    match ends[..] {
+        [w, x] => draw([w, x]),
+        [w, x, y, z] if middle_is_low() == is_low[0] => [[w, x], [y, z]].into_iter().for_each(draw),
+        [w, x, y, z] => [[z, w], [x, y]].into_iter().for_each(draw),
+        _ => {}
     }
 }
 

@@ -32,16 +32,6 @@ pub struct Section {
     pub at_mm: f64,
 }
 
-impl SectionLine {
-    /// Returns its name: "row-wire 3".
-    pub fn name(self) -> String {
-        match self {
-            Self::RowWire(row) => format!("row-wire {}", row + 1),
-            Self::ColumnWire(column) => format!("column-wire {}", column + 1),
-        }
-    }
-}
-
 impl Section {
     /// Returns the curve in which the plane cuts a surface, linear between the points of its grid as the surface is drawn;
     /// empty if it misses the grid.
@@ -94,15 +84,14 @@ pub(super) fn cell(points_mm: &[f64], at_mm: f64) -> Option<usize> {
 /// Actual and decoupled z along a wire, with the nodes on it. `rows` are the row-wires read, from 0; the ranges of the surfaces
 /// are always in view. Sections beyond the nodes are marked as extrapolated.
 pub fn section_figure(section: &Section, rows: &[usize], actual: &Surface, decoupled: Option<&Surface>) -> PlotFigure {
-    let (axis, place): (_, fn(&DVec3) -> f64) = match section.line {
-        SectionLine::RowWire(_) => ("y", |place| place.y),
-        SectionLine::ColumnWire(_) => ("x", |place| place.x),
+    let (name, axis, place): (_, _, fn(&DVec3) -> f64) = match section.line {
+        SectionLine::RowWire(row) => (format!("row-wire {}", row + 1), "y", |place| place.y),
+        SectionLine::ColumnWire(column) => (format!("column-wire {}", column + 1), "x", |place| place.x),
     };
     let shown = || {
         let decoupled = decoupled.map(|surface| ("decoupled", Ink::Blue, Marker::Disc, surface));
         std::iter::once(("actual", Ink::Grey, Marker::Square, actual)).chain(decoupled)
     };
-    let name = section.line.name();
     let title = capitalised(&name);
     let heights_mm = shown().flat_map(|(.., surface)| [*surface.range.start(), *surface.range.end()]);
     let x = PlotAxis::linear(format!("{axis} along {name} (mm)"));
