@@ -119,9 +119,10 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
         }
     };
     let name = format!("{}_", contents.name_of(id));
-    let expression = match operation {
-        Operation::Valid { of: x, domain } => {
-            let (x, plain) = (of(*x), contents.name_of(*x));
+    let operands = Vec::from_iter(operation.operands().into_iter().map(of));
+    let expression = match (operation, &operands[..]) {
+        (Operation::Valid { of, domain }, [x]) => {
+            let plain = contents.name_of(*of);
             let (is_valid, above) = match domain {
                 Domain::Positive => (format!("isfinite({x}(:)) & {x}(:) > 0"), " above 0"),
                 Domain::Finite => (format!("isfinite({x}(:))"), ""),
@@ -130,28 +131,21 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
                 "    if ~all({is_valid})\n        error('{plain}: give finite numbers{above}');\n    end\n"
             );
         }
-        Operation::Affine { of: x, weights, biases } => format!("{} * {} + {}", of(*x), of(*weights), of(*biases)),
-        Operation::SquaredDistances { of: x, points } => {
+        (Operation::Affine { .. }, [x, weights, biases]) => format!("{x} * {weights} + {biases}"),
+        (Operation::SquaredDistances { .. }, [x, points]) => {
             return format!(
                 "    {name} = zeros(size({x}, 1), {count});\n    for g = 1:{count}\n        \
                  {name}(:, g) = sum(({x} - {points}(:, g)') .^ 2, 2);\n    end\n",
-                x = of(*x),
-                points = of(*points),
                 count = contents.size(id),
             );
         }
-        Operation::Clip { of: x, low, high } => format!("min(max({}, {}), {})", of(*x), of(*low), of(*high)),
-        Operation::Concatenate(parts) => {
-            let parts = Vec::from_iter(parts.iter().map(|part| of(*part)));
-            format!("[{}]", parts.join(", "))
+        (Operation::Clip { .. }, [x, low, high]) => format!("min(max({x}, {low}), {high})"),
+        (Operation::Concatenate(_), parts) => format!("[{}]", parts.join(", ")),
+        (Operation::History { .. }, [x]) => {
+            return format!("    [{name}, state] = remember(state, {x}, time_s(mine));\n");
         }
-        Operation::History { of: x, .. } => {
-            return format!("    [{name}, state] = remember(state, {}, time_s(mine));\n", of(*x));
-        }
-        Operation::CountOutside { of: x, low, high } => {
-            format!("sum({x} < {} | {x} > {}, 2)", of(*low), of(*high), x = of(*x))
-        }
-        _ => infix(operation, ["./", "", ""], of),
+        (Operation::CountOutside { .. }, [x, low, high]) => format!("sum({x} < {low} | {x} > {high}, 2)"),
+        _ => infix(operation, ["./", "", ""], &operands),
     };
     format!("    {name} = {expression};\n")
 }

@@ -115,10 +115,10 @@ fn value(contents: &Contents, id: NodeId, precision: Precision) -> String {
 
 fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
     let (name, precision) = (contents.name_of(id), contents.precision_of(id));
-    let of = |id: NodeId| value(contents, id, precision);
-    let expression = match operation {
-        Operation::Valid { of, domain } => {
-            let x = contents.name_of(*of);
+    let operands = operation.operands().into_iter();
+    let operands = Vec::from_iter(operands.map(|operand| value(contents, operand, precision)));
+    let expression = match (operation, &operands[..]) {
+        (Operation::Valid { domain, .. }, [x]) => {
             let (is_valid, above) = match domain {
                 Domain::Positive => (format!("({x} > 0) & np.isfinite({x})"), " above 0"),
                 Domain::Finite => (format!("np.isfinite({x})"), ""),
@@ -127,24 +127,15 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
                 "    if not ({is_valid}).all():\n        raise ValueError(\"{x}: give finite numbers{above}\")\n"
             );
         }
-        Operation::Affine { of: x, weights, biases } => format!("{} @ {} + {}", of(*x), of(*weights), of(*biases)),
-        Operation::SquaredDistances { of: x, points } => {
-            format!(
-                "np.stack([(({} - point) ** 2).sum(axis=1) for point in {}.T], axis=1)",
-                of(*x),
-                of(*points)
-            )
+        (Operation::Affine { .. }, [x, weights, biases]) => format!("{x} @ {weights} + {biases}"),
+        (Operation::SquaredDistances { .. }, [x, points]) => {
+            format!("np.stack([(({x} - point) ** 2).sum(axis=1) for point in {points}.T], axis=1)")
         }
-        Operation::Clip { of: x, low, high } => format!("np.clip({}, {}, {})", of(*x), of(*low), of(*high)),
-        Operation::Concatenate(parts) => {
-            let parts = Vec::from_iter(parts.iter().map(|part| of(*part)));
-            format!("np.concatenate([{}], axis=1)", parts.join(", "))
-        }
-        Operation::History { of: x, .. } => format!("remember(state, {}[0], time_s)[None]", of(*x)),
-        Operation::CountOutside { of: x, low, high } => {
-            format!("(({x} < {}) | ({x} > {})).sum(axis=1)", of(*low), of(*high), x = of(*x))
-        }
-        _ => infix(operation, ["/", "np.", ""], of),
+        (Operation::Clip { .. }, [x, low, high]) => format!("np.clip({x}, {low}, {high})"),
+        (Operation::Concatenate(_), parts) => format!("np.concatenate([{}], axis=1)", parts.join(", ")),
+        (Operation::History { .. }, [x]) => format!("remember(state, {x}[0], time_s)[None]"),
+        (Operation::CountOutside { .. }, [x, low, high]) => format!("(({x} < {low}) | ({x} > {high})).sum(axis=1)"),
+        _ => infix(operation, ["/", "np.", ""], &operands),
     };
     format!("    {name} = {expression}\n")
 }
