@@ -3,6 +3,7 @@
 use decoupler_core::{
     dataset::{GAP, MemoryConstants, Span},
     decoupling::{Function, NodeId, Operation, Precision},
+    text::counted,
 };
 use ndarray::Array2;
 
@@ -218,6 +219,11 @@ impl Contents {
             true => format!("{} mm", format_number(relative * self.scales[0])),
             false => format!("{} % of its range in training", format_number(100.0 * relative)),
         }
+    }
+
+    /// The targets with their number.
+    pub(super) fn outputs_in_words(&self) -> String {
+        counted(self.outputs(), self.meaning.output())
     }
 
     /// The further parts of an answer, in words.

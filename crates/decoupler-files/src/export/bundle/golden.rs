@@ -5,7 +5,11 @@ use decoupler_core::{
     text::inert,
 };
 
-use super::{contents::Contents, exported_program::Limits};
+use super::{
+    contents::Contents,
+    exported_program::Limits,
+    exporting::{as_it_is, in_f32},
+};
 use crate::export::write_csv_row;
 
 /// Readings with the answers that the decoder gives to them.
@@ -64,12 +68,14 @@ impl Golden {
         program: &Program,
         outputs: usize,
     ) -> Result<Self, DecodeError> {
-        let answers = answers(&rows, program, |_, reading| reading)?;
+        let answers = answers(&rows, program, as_it_is)?;
         for (row, answer) in rows.iter_mut().zip(answers) {
             row.targets = answer[..outputs].to_vec();
         }
-        let printed = printed.min(rows.len());
-        Ok(Self { rows, printed })
+        Ok(Self {
+            printed: printed.min(rows.len()),
+            rows,
+        })
     }
 
     /// Leaves out the rows with a reading beyond its limits.
@@ -78,18 +84,13 @@ impl Golden {
             let mut readings = row.readings.iter().zip(&limits[row.row.min(limits.len() - 1)]);
             readings.all(|(reading, (low, high))| (low..=high).contains(&reading))
         };
-        self.printed = self.rows().iter().filter(|row| is_within(row)).count();
+        self.printed = self.printed().iter().filter(|row| is_within(row)).count();
         self.rows.retain(is_within);
     }
 
     /// Those in the bundle.
-    pub(super) fn rows(&self) -> &[GoldenRow] {
+    pub(super) fn printed(&self) -> &[GoldenRow] {
         &self.rows[..self.printed]
-    }
-
-    /// Number of all rows.
-    pub(super) fn count(&self) -> usize {
-        self.rows.len()
     }
 
     /// All rows.
@@ -131,7 +132,7 @@ impl Golden {
             }
         }
         let at_most = largest(sums.into_iter().flatten().zip(scales.iter().copied().cycle()));
-        let measured = self.deviation(program, scales, |_, reading| f64::from(reading as f32))?;
+        let measured = self.deviation(program, scales, in_f32)?;
         Ok(larger(at_most, measured))
     }
 
@@ -162,7 +163,7 @@ impl Golden {
         let mut write =
             |fields: Vec<String>| write_csv_row(fields, &mut bytes).expect("writing to memory does not fail");
         write(names);
-        for row in self.rows() {
+        for row in self.printed() {
             let mut fields = Vec::new();
             if is_sequence {
                 fields.push(u8::from(row.is_new_series).to_string());

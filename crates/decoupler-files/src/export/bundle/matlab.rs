@@ -37,10 +37,10 @@ fn function(contents: &Contents) -> String {
     let mut text = format!(
         "function [{returned}] = {name}({arguments})\n%{upper} {}.\n%   [{}] = {upper}({}) has a line of {} for each line of\n\
          %   {}{}.\n{legend}",
-        contents.meaning.purpose_without_stop(),
+        contents.meaning.purpose(),
         returned.to_uppercase(),
         arguments.to_uppercase(),
-        contents.meaning.outputs_in_words(contents.outputs()),
+        contents.outputs_in_words(),
         counted(channels, "reading"),
         contents.parts_in_words(),
     );

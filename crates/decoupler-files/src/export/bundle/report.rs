@@ -97,13 +97,13 @@ impl BundleReport {
 pub(super) fn readme(contents: &Contents, decoder: BundleDecoder, usage: &str, report: &BundleReport) -> String {
     let (meaning, noun, rows) = (&contents.meaning, contents.noun, contents.rows);
     let mut text = format!(
-        "{}, exported by {PROGRAM} as {}, {}.\n\n{}\nIt takes {} and returns {}{}.\n\n{}\n",
+        "{}, exported by {PROGRAM} as {}, {}.\n\n{}.\nIt takes {} and returns {}{}.\n\n{}\n",
         decoder.name(),
         report.format,
         report.precision,
         meaning.purpose(),
         counted(contents.channels(), "reading"),
-        meaning.outputs_in_words(contents.outputs()),
+        contents.outputs_in_words(),
         contents.parts_in_words(),
         meaning.legend().join("\n"),
     );

@@ -73,7 +73,7 @@ impl<'a> Header<'a> {
         let of_units = self.fixed.map(|fixed| fixed.units_in_words(&contents.meaning));
         let lines = contents.legend(&of_units.unwrap_or_default());
         let mut text = format!(
-            "/* {}\n   {} */\n#ifndef {upper}_DECODE_H\n#define {upper}_DECODE_H\n\n",
+            "/* {}.\n   {} */\n#ifndef {upper}_DECODE_H\n#define {upper}_DECODE_H\n\n",
             contents.meaning.purpose(),
             lines.join("\n   ")
         );
@@ -130,7 +130,7 @@ impl<'a> Header<'a> {
         };
         let about = wrapped(&format!(
             "Decodes {}.{row} Returns {upper}_OK, or leaves the answer as it is and returns what is wrong.{overflow}",
-            contents.meaning.sample()
+            contents.meaning.either("one row-wire", "one sample")
         ));
         let _ = write!(text, "/* {} */\n{};\n\n", about.join("\n   "), self.signature());
         text + "#ifdef __cplusplus\n}\n#endif\n\n#endif\n"

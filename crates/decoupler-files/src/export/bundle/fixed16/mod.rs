@@ -21,6 +21,7 @@ use self::{
     units::Units,
 };
 use super::{
+    contents::Contents,
     exported_program::{ExportedProgram, Limits, table},
     meaning::{Meaning, comment},
 };
@@ -101,15 +102,6 @@ pub(super) struct FixedTable {
     pub(super) values: Vec<i64>,
 }
 
-/// Steps from the changes of the readings to the targets.
-struct Chain {
-    /// The readings are compared with these constants.
-    reference: NodeId,
-    is_relative: bool,
-    /// Weights and biases of each layer.
-    layers: Vec<[NodeId; 2]>,
-}
-
 impl FixedProgram {
     /// Upper limit of the error bound, relative to the range of a target, above which there is a remark.
     pub(super) const USUAL_BOUND: f64 = 0.01;
@@ -119,24 +111,23 @@ impl FixedProgram {
     /// # Errors
     /// The range of the readings is not known, a step or a number has no form in integers, or the bound on the error is as
     /// large as the range of the targets.
-    pub(super) fn of(
-        exported: &ExportedProgram,
-        limits: Option<&Limits>,
-        meaning: &Meaning,
-        scales: &[f64],
-    ) -> Result<Self, FixedPointError> {
-        let chain = Chain::of(exported)?;
+    pub(super) fn of(contents: &Contents, limits: Option<&Limits>) -> Result<Self, FixedPointError> {
+        let Contents {
+            exported,
+            meaning,
+            scales,
+            ..
+        } = contents;
+        let (is_relative, reference, layers) = chain(exported)?;
         let limits = limits.ok_or(FixedPointError::NoRange)?;
         let cure = meaning.smaller_weights();
-        let nodes = exported.program.nodes();
         let rows = exported.program.rows();
-        let tables = |id: NodeId, row: usize| table(nodes, id, row);
-        let readings = Units::of_readings(meaning, limits)?;
-        let [weights, biases] = *chain.layers.last().expect("there is a layer of targets");
+        let tables = |id: NodeId, row: usize| table(exported.program.nodes(), id, row);
+        let [weights, biases] = *layers.last().expect("there is a layer of targets");
         let reach = |target: usize| {
             let of_row = |row: usize| {
                 let weights = tables(weights, row).column(target);
-                let most = match chain.layers.len() {
+                let most = match layers.len() {
                     // The targets of a single layer are sums of changes, whose size is that of the range.
                     1 => scales[target],
                     _ => weights.iter().map(|weight| weight.abs()).sum::<f64>(),
@@ -145,22 +136,20 @@ impl FixedProgram {
             };
             (0..rows).map(of_row).fold(0.0, f64::max)
         };
-        let targets = Units::of_targets(meaning, scales, reach);
         let mut fixed = Self {
-            is_relative: chain.is_relative,
+            is_relative,
             tangent: TangentTable::new(),
             rows,
             layers: Vec::new(),
             tables: Vec::new(),
             bounds: vec![0.0; exported.outputs()],
-            readings,
-            targets,
+            readings: Units::of_readings(meaning, limits)?,
+            targets: Units::of_targets(meaning, scales, reach),
         };
         for row in 0..rows {
             let limits = PerRow::each(limits.clone());
-            let numbers = [&chain.reference].into_iter().chain(chain.layers.iter().flatten());
-            let tables: Vec<&Array2<f64>> = numbers.map(|id| tables(*id, row)).collect();
-            let bounds = fixed.push_row(&tables, limits.at(row));
+            let layers = layers.iter().map(|layer| layer.map(|id| tables(id, row)));
+            let bounds = fixed.push_row(tables(reference, row), &Vec::from_iter(layers), limits.at(row));
             let bounds = bounds.map_err(|what| FixedPointError::Range { what, cure })?;
             for (target, (bound, of_row)) in fixed.bounds.iter_mut().zip(bounds).enumerate() {
                 *bound = bound.max(of_row * fixed.targets.unit(target));
@@ -180,10 +169,14 @@ impl FixedProgram {
         relative.fold(0.0, f64::max)
     }
 
-    /// Adds the numbers of a row-wire: its reference, then weights and biases of each layer. Returns bounds on the errors of
-    /// the targets in their units, or the name of what does not fit.
-    fn push_row(&mut self, tables: &[&Array2<f64>], limits: &[(f64, f64)]) -> Result<Vec<f64>, &'static str> {
-        let (reference, layers) = tables.split_first().expect("the reference comes first");
+    /// Adds the numbers of a row-wire, with weights and biases of each layer. Returns bounds on the errors of the targets in
+    /// their units, or the name of what does not fit.
+    fn push_row(
+        &mut self,
+        reference: &Array2<f64>,
+        layers: &[[&Array2<f64>; 2]],
+        limits: &[(f64, f64)],
+    ) -> Result<Vec<f64>, &'static str> {
         let channels = limits.iter().zip(reference.iter()).enumerate();
         let changes = channels.map(|(channel, (&limits, &reference))| {
             Change::of(self.is_relative, self.readings.per_one(channel), limits, reference)
@@ -192,18 +185,15 @@ impl FixedProgram {
         let shape = [changes.len()];
         let centres = changes.iter().map(|change| i64::from(change.centre));
         self.put("centres", "int32_t", &shape, centres);
-        let factors = changes.iter().map(|change| i64::from(change.multiplier().factor));
+        let (factors, shifts): (Vec<i64>, Vec<i64>) = changes.iter().map(Change::multiplier).unzip();
         self.put("factors", "int32_t", &shape, factors);
-        let shifts = changes.iter().map(|change| i64::from(change.multiplier().shift));
         self.put("factor_shifts", "uint8_t", &shape, shifts);
         // Each input is a number of 15 bits after the point times a slope, plus an offset.
         let mut slopes: Vec<f64> = changes.iter().map(Change::slope).collect();
         let mut offsets: Vec<f64> = changes.iter().map(|change| change.offset).collect();
         let mut errors: Vec<f64> = changes.iter().map(Change::error).collect();
-        let count = layers.len() / 2;
-        for (index, layer) in layers.chunks_exact(2).enumerate() {
-            let (weights, biases) = (layer[0], layer[1]);
-            let is_last = index + 1 == count;
+        for (index, [weights, biases]) in layers.iter().enumerate() {
+            let is_last = index + 1 == layers.len();
             let mut next_errors = Vec::new();
             let (mut whole_weights, mut whole_biases, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
             for (sum, weights) in weights.columns().into_iter().enumerate() {
@@ -245,10 +235,11 @@ impl FixedProgram {
             (slopes, offsets) = (vec![1.0; errors.len()], vec![0.0; errors.len()]);
         }
         let limits = limits.iter().enumerate();
-        let whole = limits.map(|(channel, &(low, high))| [low, high].map(|limit| self.readings.whole(channel, limit)));
-        let whole = Vec::from_iter(whole);
-        self.put("lowest", "int32_t", &shape, whole.iter().map(|limits| limits[0]));
-        self.put("highest", "int32_t", &shape, whole.iter().map(|limits| limits[1]));
+        let whole = limits
+            .map(|(channel, &(low, high))| (self.readings.whole(channel, low), self.readings.whole(channel, high)));
+        let (lowest, highest): (Vec<i64>, Vec<i64>) = whole.unzip();
+        self.put("lowest", "int32_t", &shape, lowest);
+        self.put("highest", "int32_t", &shape, highest);
         Ok(errors)
     }
 
@@ -308,40 +299,37 @@ impl FixedProgram {
     }
 }
 
-impl Chain {
-    /// The steps of a program.
-    ///
-    /// # Errors
-    /// A step has no form in integers.
-    fn of(exported: &ExportedProgram) -> Result<Self, FixedPointError> {
-        let operation = |id: NodeId| &exported.program.node(id).operation;
-        let mut layers = Vec::new();
-        let mut id = exported.targets;
-        loop {
-            id = match operation(id) {
-                Operation::Affine { of, weights, biases } => {
-                    layers.push([*weights, *biases]);
-                    *of
-                }
-                Operation::Map(Function::Tanh, of) if !layers.is_empty() => *of,
-                _ => break,
-            };
-        }
-        layers.reverse();
-        let difference = match operation(id) {
-            Operation::Divide(difference, readings) if is_valid(operation(*readings)) => *difference,
-            _ => id,
+/// The steps of a program from the changes of the readings to the targets: whether changes are relative, the constants with
+/// which readings are compared, and weights and biases of each layer.
+///
+/// # Errors
+/// A step has no form in integers.
+fn chain(exported: &ExportedProgram) -> Result<(bool, NodeId, Vec<[NodeId; 2]>), FixedPointError> {
+    let operation = |id: NodeId| &exported.program.node(id).operation;
+    let mut layers = Vec::new();
+    let mut id = exported.targets;
+    loop {
+        id = match operation(id) {
+            Operation::Affine { of, weights, biases } => {
+                layers.push([*weights, *biases]);
+                *of
+            }
+            Operation::Map(Function::Tanh, of) if !layers.is_empty() => *of,
+            _ => break,
         };
-        match operation(difference) {
-            Operation::Subtract(readings, reference) if is_valid(operation(*readings)) => Ok(Self {
-                reference: *reference,
-                is_relative: difference != id,
-                layers,
-            }),
-            Operation::Map(Function::Gaussian, _) => Err(FixedPointError::Step("Gaussians")),
-            Operation::Map(..) => Err(FixedPointError::Step("logarithms")),
-            _ => Err(FixedPointError::Step("history of readings")),
+    }
+    layers.reverse();
+    let difference = match operation(id) {
+        Operation::Divide(difference, readings) if is_valid(operation(*readings)) => *difference,
+        _ => id,
+    };
+    match operation(difference) {
+        Operation::Subtract(readings, reference) if is_valid(operation(*readings)) => {
+            Ok((difference != id, *reference, layers))
         }
+        Operation::Map(Function::Gaussian, _) => Err(FixedPointError::Step("Gaussians")),
+        Operation::Map(..) => Err(FixedPointError::Step("logarithms")),
+        _ => Err(FixedPointError::Step("history of readings")),
     }
 }
 

@@ -37,7 +37,7 @@ fn program(contents: &Contents) -> String {
          CONSTANTS = dict(np.load(pathlib.Path(__file__).with_name(\"{}.npz\")))\n\n\n\
          def compute({input}, index{state}):\n    \"\"\"Answers to samples of the row-wire with this index.\"\"\"\n    \
          c = CONSTANTS\n{body}    return ({parts},)\n\n\n",
-        contents.meaning.purpose_without_stop(),
+        contents.meaning.purpose(),
         contents.noun,
         parts = returned_parts(contents).join(", "),
     );
@@ -58,7 +58,7 @@ fn program(contents: &Contents) -> String {
     };
     let returned = format!(
         "Returns {}{}, each with a line for each sample.",
-        contents.meaning.outputs_in_words(contents.outputs()),
+        contents.outputs_in_words(),
         contents.parts_in_words()
     );
     if is_sequence {
