@@ -1,7 +1,7 @@
 use std::{path::PathBuf, sync::Arc};
 
 use decoupler_core::{
-    dataset::{Dataset, GAP, PerRow, Seed, Simulation, Stream},
+    dataset::{Dataset, GAP, Memory, PerRow, Seed, Simulation, Stream},
     decoupling::{Combined, Decoder, Function, NodeId, Operation, Precision, Program, decode_set},
     evaluation::{DecoderSet, HalfWidth, RunError, RunSettings, TargetErrors, TestErrors},
     network::{MinMax, Networks, Quantity},
@@ -185,21 +185,30 @@ impl ExportedDecoder {
     }
 
     fn meaning(&self) -> Meaning {
-        let problem = self.problem.clone();
-        // Comments of C have no Ω.
-        let in_ohm = |channel: Channel| Channel::new(channel.name, Some("ohm"));
-        Meaning {
-            is_array: problem.sensor.is_some(),
-            inputs: match problem.sensor {
-                Some(_) => problem.inputs.into_iter().map(in_ohm).collect(),
-                None => problem.inputs,
-            },
-            targets: problem.targets,
-            row_wires: match (&self.row_wires, self.rows()) {
-                (Some(row_wires), 2..) => row_wires.clone(),
-                _ => Vec::new(),
-            },
+        let Problem {
+            mut inputs,
+            targets,
+            sensor,
+            ..
+        } = self.problem.clone();
+        if sensor.is_some() {
+            // Comments of C have no Ω.
+            inputs = inputs
+                .into_iter()
+                .map(|channel| Channel::new(channel.name, Some("ohm")))
+                .collect();
         }
+        Meaning {
+            is_array: sensor.is_some(),
+            inputs,
+            targets,
+            row_wires: self.row_wires.clone().filter(|_| self.rows() > 1).unwrap_or_default(),
+        }
+    }
+
+    /// The memory of past readings, if the decoder takes any.
+    fn memory(&self) -> Option<&Memory> {
+        self.problem.memory.as_ref().filter(|memory| !memory.is_empty())
     }
 
     /// Limits of the readings, or of the features of a history, beyond which they count as outside: for all row-wires or for
@@ -222,45 +231,38 @@ impl ExportedDecoder {
     /// # Errors
     /// No readings could be drawn, or one cannot be decoded.
     pub(super) fn contents(&self, name: &str, precision: BundlePrecision) -> Result<Contents, BundleError> {
-        let problem = &self.problem;
-        let channels = problem.inputs.len();
-        let meaning = self.meaning();
+        let (channels, meaning) = (self.problem.inputs.len(), self.meaning());
         let unlimited = self
             .unlimited
             .as_ref()
             .filter(|_| precision == BundlePrecision::Fixed16);
         let mut program = unlimited.unwrap_or(&self.program).clone();
-        if let Some(memory) = problem.memory.as_ref().filter(|memory| !memory.is_empty()) {
+        if let Some(memory) = self.memory() {
             let with_history = program.with_history(memory, channels);
             program = with_history.map_err(|error| Box::new(RunError::from(error)))?;
         }
         let exported = ExportedProgram::of(&program, &self.half_widths, self.limits().as_ref());
         let (rows, printed) = self.readings(channels)?;
-        let golden = Golden::of(rows, printed, &program, exported.outputs())?;
-        let targets = &self.target_ranges;
         let outputs = exported.outputs();
         let scales = (0..outputs).map(|output| match meaning.is_array {
-            true => scale(targets, 0..outputs),
-            false => scale(targets, output..output + 1),
+            true => scale(&self.target_ranges, 0..outputs),
+            false => scale(&self.target_ranges, output..output + 1),
         });
-        let scales = scales.collect();
+        let is_drawn = self.test.is_none() && !meaning.is_array;
+        let note = "the golden readings are drawn from the range in training, because the recording was not found";
         let mut contents = Contents {
             name: name.to_owned(),
             noun: self.kind.noun(),
             precision,
             names: names(&exported, &meaning),
             rows: self.rows(),
+            golden: Golden::of(rows, printed, &program, outputs)?,
+            scales: scales.collect(),
             meaning,
             exported,
-            scales,
-            golden,
             metadata: Value::Null,
-            notes: Vec::new(),
+            notes: is_drawn.then(|| note.to_owned()).into_iter().collect(),
         };
-        if self.test.is_none() && problem.sensor.is_none() {
-            let note = "the golden readings are drawn from the range in training, because the recording was not found";
-            contents.notes.push(note.to_owned());
-        }
         contents.metadata = self.metadata(&contents);
         Ok(contents)
     }
@@ -278,7 +280,7 @@ impl ExportedDecoder {
             let row = if takes_row { set.row_index(sample) } else { 0 };
             GoldenRow::new(row, set.sample_readings(sample)[..channels].to_vec())
         };
-        let memory = self.problem.memory.as_ref().filter(|memory| !memory.is_empty());
+        let memory = self.memory();
         let mut rows = match (&self.problem.sensor, &self.test) {
             (Some(simulation), _) => {
                 let rows = simulation.rows().unwrap_or(1);
