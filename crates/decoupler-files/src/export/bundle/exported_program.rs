@@ -90,16 +90,11 @@ impl ExportedProgram {
 
     /// Indices of the nodes with sums of products.
     pub(super) fn layers(&self) -> Vec<usize> {
-        let index_of_layer = |(index, node): (usize, &Node)| match node.operation {
-            Operation::Affine { .. } | Operation::SquaredDistances { .. } => Some(index),
-            _ => None,
-        };
-        self.program
-            .nodes()
-            .iter()
-            .enumerate()
-            .filter_map(index_of_layer)
-            .collect()
+        let is_layer =
+            |operation: &Operation| matches!(operation, Operation::Affine { .. } | Operation::SquaredDistances { .. });
+        let nodes = self.program.nodes().iter().enumerate();
+        let layers = nodes.filter(|(_, node)| is_layer(&node.operation));
+        layers.map(|(index, _)| index).collect()
     }
 
     /// The parts of an answer.

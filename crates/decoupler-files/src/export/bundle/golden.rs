@@ -138,13 +138,15 @@ impl Golden {
 
     /// Changes of the targets if `program` decides and each reading is taken as `taken` says: rows × targets.
     fn changes(&self, program: &Program, taken: impl Fn(usize, f64) -> f64) -> Result<Vec<Vec<f64>>, DecodeError> {
-        let answers = answers(&self.rows, program, taken)?;
-        let pairs = self.rows.iter().zip(answers);
-        let of_row = |(row, answer): (&GoldenRow, Vec<f64>)| {
-            let targets = row.targets.iter().zip(answer);
-            targets.map(|(target, answer)| answer - target).collect()
-        };
-        Ok(pairs.map(of_row).collect())
+        let mut changes = answers(&self.rows, program, taken)?;
+        for (row, answer) in self.rows.iter().zip(&mut changes) {
+            answer.truncate(row.targets.len());
+            answer
+                .iter_mut()
+                .zip(&row.targets)
+                .for_each(|(answer, target)| *answer -= target);
+        }
+        Ok(changes)
     }
 
     /// The rows in the bundle as CSV: where a series begins and times if they matter, the row from 1 if it is an argument,
@@ -152,12 +154,17 @@ impl Golden {
     pub(super) fn csv(&self, contents: &Contents) -> String {
         let meaning = &contents.meaning;
         let (is_sequence, takes_row) = (contents.history().is_some(), contents.takes_row());
-        let of_sequence = ["new_series", "time_s"].iter().filter(|_| is_sequence);
-        let names = of_sequence
-            .chain(["row"].iter().filter(|_| takes_row))
-            .map(|&name| name.to_owned());
+        let mut names = Vec::new();
+        names.extend(
+            is_sequence
+                .then_some(["new_series", "time_s"])
+                .into_iter()
+                .flatten()
+                .map(str::to_owned),
+        );
+        names.extend(takes_row.then(|| "row".to_owned()));
         let channels = meaning.inputs.iter().chain(&meaning.targets);
-        let names = names.chain(channels.map(|channel| inert(&channel.name))).collect();
+        names.extend(channels.map(|channel| inert(&channel.name)));
         // User-defined names may contain commas and quotation marks.
         let mut bytes = Vec::new();
         let mut write =

@@ -8,7 +8,6 @@ use super::{
     BundleDecoder,
     choice::{BundleFormat, BundlePrecision, ChoiceError},
     contents::Contents,
-    fixed16::FixedPointError,
     meaning::wrapped,
 };
 use crate::{
@@ -197,9 +196,39 @@ pub enum BundleError {
         /// What to do.
         cure: String,
     },
-    /// The numbers do not fit 16 bits.
-    #[error(transparent)]
-    FixedPoint(#[from] FixedPointError),
+    /// Steps that have no form in integers (fixed16).
+    #[error("fixed16 has no {0}: give --precision f64 or f32")]
+    FixedStep(&'static str),
+    /// The file does not contain the range of the readings, which fixed16 needs.
+    #[error(
+        "fixed16 needs the range of the readings in training, which the network file does not have: train again, or give --precision f32"
+    )]
+    FixedNoRange,
+    /// Resistances that exceed 32 bits in every unit of fixed16.
+    #[error(
+        "fixed16 reads resistances up to 1e9 ohm, and in training they were up to {0:.1e} ohm: give --precision f32"
+    )]
+    FixedReading(f64),
+    /// Weights or outputs beyond the range of the numbers of fixed16.
+    #[error("fixed16 cannot hold the weights of {what}: {cure}, which keeps weights small, or give --precision f32")]
+    FixedRange {
+        /// A way to train a network with smaller weights.
+        cure: &'static str,
+        /// Name of the value that is too large.
+        what: &'static str,
+    },
+    /// An error bound of fixed16 that is too large.
+    #[error(
+        "in fixed point the error is only known to be below {bound:.3} times {scale}: {cure} (the decoder amplifies differences of its readings too much), or give --precision f32"
+    )]
+    FixedCoarse {
+        /// The bound, in proportion to the range.
+        bound: f64,
+        /// Name of the range.
+        scale: &'static str,
+        /// A way to train a network that amplifies less.
+        cure: &'static str,
+    },
     /// The C compiler refused the source, or its program failed.
     #[error("{step} failed: {reason}; nothing is left of the bundle")]
     SelfTest {

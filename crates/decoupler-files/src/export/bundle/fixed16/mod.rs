@@ -13,7 +13,6 @@ use decoupler_core::{
     decoupling::{Domain, Function, NodeId, Operation},
 };
 use ndarray::Array2;
-use thiserror::Error;
 
 pub(super) use self::scaled::{CONDUCTANCE_BITS, INPUT_BITS, LARGEST_INPUT, TangentTable};
 use self::{
@@ -24,47 +23,9 @@ use super::{
     contents::Contents,
     exported_program::{ExportedProgram, Limits, table},
     meaning::{Meaning, comment},
+    report::BundleError,
 };
 use crate::export::format_number;
-
-/// Reasons why a decoder cannot be exported in fixed point.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum FixedPointError {
-    /// Steps that have no form in integers.
-    #[error("fixed16 has no {0}: give --precision f64 or f32")]
-    Step(&'static str),
-    /// The file does not contain the range of the readings.
-    #[error(
-        "fixed16 needs the range of the readings in training, which the network file does not have: train again, or give --precision f32"
-    )]
-    NoRange,
-    /// Resistances that exceed 32 bits in every unit.
-    #[error(
-        "fixed16 reads resistances up to 1e9 ohm, and in training they were up to {0:.1e} ohm: give --precision f32"
-    )]
-    Reading(f64),
-    /// Weights or outputs beyond the range of the numbers.
-    #[error("fixed16 cannot hold the weights of {what}: {cure}, which keeps weights small, or give --precision f32")]
-    Range {
-        /// A way to train a network with smaller weights.
-        cure: &'static str,
-        /// Name of the value that is too large.
-        what: &'static str,
-    },
-    /// An error bound that is too large.
-    #[error(
-        "in fixed point the error is only known to be below {bound:.3} times {scale}: {cure} (the decoder amplifies differences of its readings too much), or give --precision f32"
-    )]
-    Coarse {
-        /// The bound, in proportion to the range.
-        bound: f64,
-        /// Name of the range.
-        scale: &'static str,
-        /// A way to train a network that amplifies less.
-        cure: &'static str,
-    },
-}
 
 /// Upper bound of a target in units for all inputs of the last layer.
 const LARGEST_TARGET: f64 = (1_u32 << 30) as f64;
@@ -111,7 +72,7 @@ impl FixedProgram {
     /// # Errors
     /// The range of the readings is not known, a step or a number has no form in integers, or the bound on the error is as
     /// large as the range of the targets.
-    pub(super) fn of(contents: &Contents, limits: Option<&Limits>) -> Result<Self, FixedPointError> {
+    pub(super) fn of(contents: &Contents, limits: Option<&Limits>) -> Result<Self, BundleError> {
         let Contents {
             exported,
             meaning,
@@ -119,7 +80,7 @@ impl FixedProgram {
             ..
         } = contents;
         let (is_relative, reference, layers) = chain(exported)?;
-        let limits = limits.ok_or(FixedPointError::NoRange)?;
+        let limits = limits.ok_or(BundleError::FixedNoRange)?;
         let cure = meaning.smaller_weights();
         let rows = exported.program.rows();
         let tables = |id: NodeId, row: usize| table(exported.program.nodes(), id, row);
@@ -150,7 +111,7 @@ impl FixedProgram {
             let limits = PerRow::each(limits.clone());
             let layers = layers.iter().map(|layer| layer.map(|id| tables(id, row)));
             let bounds = fixed.push_row(tables(reference, row), &Vec::from_iter(layers), limits.at(row));
-            let bounds = bounds.map_err(|what| FixedPointError::Range { what, cure })?;
+            let bounds = bounds.map_err(|what| BundleError::FixedRange { what, cure })?;
             for (target, (bound, of_row)) in fixed.bounds.iter_mut().zip(bounds).enumerate() {
                 *bound = bound.max(of_row * fixed.targets.unit(target));
             }
@@ -160,7 +121,7 @@ impl FixedProgram {
             return Ok(fixed);
         }
         let scale = meaning.scale();
-        Err(FixedPointError::Coarse { bound, scale, cure })
+        Err(BundleError::FixedCoarse { bound, scale, cure })
     }
 
     /// Largest bound relative to the scale of its target.
@@ -304,7 +265,7 @@ impl FixedProgram {
 ///
 /// # Errors
 /// A step has no form in integers.
-fn chain(exported: &ExportedProgram) -> Result<(bool, NodeId, Vec<[NodeId; 2]>), FixedPointError> {
+fn chain(exported: &ExportedProgram) -> Result<(bool, NodeId, Vec<[NodeId; 2]>), BundleError> {
     let operation = |id: NodeId| &exported.program.node(id).operation;
     let mut layers = Vec::new();
     let mut id = exported.targets;
@@ -327,9 +288,9 @@ fn chain(exported: &ExportedProgram) -> Result<(bool, NodeId, Vec<[NodeId; 2]>),
         Operation::Subtract(readings, reference) if is_valid(operation(*readings)) => {
             Ok((difference != id, *reference, layers))
         }
-        Operation::Map(Function::Gaussian, _) => Err(FixedPointError::Step("Gaussians")),
-        Operation::Map(..) => Err(FixedPointError::Step("logarithms")),
-        _ => Err(FixedPointError::Step("history of readings")),
+        Operation::Map(Function::Gaussian, _) => Err(BundleError::FixedStep("Gaussians")),
+        Operation::Map(..) => Err(BundleError::FixedStep("logarithms")),
+        _ => Err(BundleError::FixedStep("history of readings")),
     }
 }
 
