@@ -155,10 +155,8 @@ fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
     let doubles = |values: Vec<f64>| values.into_iter().map(double).collect();
     array("double", "per_second", doubles(per_second));
     array("double", "per_reading", doubles(per_reading));
-    let past = |value: &str| match constants.differences {
-        true => format!("now - {value}"),
-        false => value.to_owned(),
-    };
+    // A feature is the past or its difference from the reading.
+    let minus = if constants.differences { "readings[i] - " } else { "" };
     let channel_loop = format!("for (int i = 0; i < {channels}; ++i) {{");
     let loops = |count: usize, indent: &str, first: &str, body: &str| match count {
         0 => String::new(),
@@ -170,14 +168,13 @@ fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
         let body = format!("                state->{field}[k][i] = readings[i];\n");
         loops(count, "        ", "", &body)
     };
-    let now = "            const double now = readings[i];\n            ";
     let first = format!("        const int at = (state->latest - lags[k] + 1 + {kept}) % {kept};\n");
-    let body = format!("{now}*feature++ = {};\n", past("state->kept[at][i]"));
+    let body = format!("            *feature++ = {minus}state->kept[at][i];\n");
     let of_lags = loops(constants.lags.len(), "    ", &first, &body);
     let first = "        const double weight = -expm1(-(elapsed_s * per_second[k] + per_reading[k]));\n";
     let body = format!(
-        "{now}state->averages[k][i] += weight * (now - state->averages[k][i]);\n            *feature++ = {};\n",
-        past("state->averages[k][i]")
+        "            state->averages[k][i] += weight * (readings[i] - state->averages[k][i]);\n            \
+         *feature++ = {minus}state->averages[k][i];\n"
     );
     let of_averages = loops(averages, "    ", first, &body);
     let shifting = match kept {
