@@ -185,22 +185,16 @@ impl ExportedDecoder {
     }
 
     fn meaning(&self) -> Meaning {
-        let Problem {
-            mut inputs,
-            targets,
-            sensor,
-            ..
-        } = self.problem.clone();
-        if sensor.is_some() {
-            // Comments of C have no Ω.
-            inputs = inputs
-                .into_iter()
-                .map(|channel| Channel::new(channel.name, Some("ohm")))
-                .collect();
-        }
+        let Problem { inputs, targets, .. } = self.problem.clone();
+        let is_array = self.problem.sensor.is_some();
+        // Comments of C have no Ω.
+        let in_ohm = |channel: Channel| match is_array {
+            true => Channel::new(channel.name, Some("ohm")),
+            false => channel,
+        };
         Meaning {
-            is_array: sensor.is_some(),
-            inputs,
+            is_array,
+            inputs: inputs.into_iter().map(in_ohm).collect(),
             targets,
             row_wires: self.row_wires.clone().filter(|_| self.rows() > 1).unwrap_or_default(),
         }
@@ -334,9 +328,47 @@ impl ExportedDecoder {
 
     /// Collects the metadata of a bundle.
     fn metadata(&self, contents: &Contents) -> Value {
+        let list = |channels: &[Channel]| {
+            let channels = channels
+                .iter()
+                .map(|channel| (channel.name.clone(), channel.unit.clone()));
+            channels.unzip::<_, _, Vec<_>, Vec<_>>()
+        };
+        let ((inputs, input_units), (targets, target_units)) =
+            (list(&contents.meaning.inputs), list(&contents.meaning.targets));
+        let named = |errors: &TestErrors| {
+            let of = |(name, errors): (&String, &TargetErrors)| json!({ "name": name, "errors": errors });
+            targets.iter().zip(errors.targets()).map(of).collect::<Vec<_>>()
+        };
+        let row_wires = self.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
         let mut fields = match &self.problem.sensor {
-            Some(simulation) => self.of_array(simulation, contents),
-            None => self.of_recording(contents),
+            Some(Simulation {
+                sensor, scene, samples, ..
+            }) => json!({
+                "array": sensor.scale.to_string(),
+                "geometry": sensor.geometry,
+                "scene": scene,
+                "rows": scene.rows.to_string(),
+                "row_numbers": contents.takes_row().then_some([1, contents.rows]),
+                "inputs": { "names": inputs, "unit": "ohm" },
+                "outputs": { "names": targets, "unit": "mm" },
+                "training_samples": samples,
+                "errors": self.errors.nodes(),
+                "readings_in_training_ohm": self.ranges(),
+                "output_range_mm": contents.scales[0],
+            }),
+            None => json!({
+                "files": self.files,
+                "row_numbers": contents.takes_row().then(|| row_wires.collect::<Vec<_>>()),
+                "inputs": { "names": inputs, "units": input_units },
+                "memory": self.problem.memory,
+                "outputs": { "names": targets, "units": target_units },
+                "method": self.settings.training.method.short_name(),
+                "errors": named(&self.errors),
+                "errors_of_ridge": named(&self.errors_of_linear),
+                "readings_in_training": self.ranges(),
+                "output_ranges": contents.scales,
+            }),
         };
         fields["program"] = json!(PROGRAM);
         fields["trained_by"] = json!(self.trained_by);
@@ -351,50 +383,6 @@ impl ExportedDecoder {
             fields["hidden_nodes"] = json!(hidden.map(|(id, _)| contents.size(id)));
         }
         fields
-    }
-
-    fn of_array(&self, simulation: &Simulation, contents: &Contents) -> Value {
-        let (sensor, scene) = (&simulation.sensor, &simulation.scene);
-        let names = |channels: &[Channel]| Vec::from_iter(channels.iter().map(|channel| channel.name.clone()));
-        json!({
-            "array": sensor.scale.to_string(),
-            "geometry": sensor.geometry,
-            "scene": scene,
-            "rows": scene.rows.to_string(),
-            "row_numbers": contents.takes_row().then_some([1, contents.rows]),
-            "inputs": { "names": names(&contents.meaning.inputs), "unit": "ohm" },
-            "outputs": { "names": names(&contents.meaning.targets), "unit": "mm" },
-            "training_samples": simulation.samples,
-            "errors": self.errors.nodes(),
-            "readings_in_training_ohm": self.ranges(),
-            "output_range_mm": contents.scales[0],
-        })
-    }
-
-    fn of_recording(&self, contents: &Contents) -> Value {
-        let columns = |channels: &[Channel]| {
-            let (names, units): (Vec<_>, Vec<_>) =
-                channels.iter().map(|channel| (&channel.name, &channel.unit)).unzip();
-            json!({ "names": names, "units": units })
-        };
-        let named = |errors: &TestErrors| {
-            let of = |(channel, errors): (&Channel, &TargetErrors)| json!({ "name": channel.name, "errors": errors });
-            let targets = self.problem.targets.iter();
-            targets.zip(errors.targets()).map(of).collect::<Vec<_>>()
-        };
-        let row_wires = self.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
-        json!({
-            "files": self.files,
-            "row_numbers": contents.takes_row().then(|| row_wires.collect::<Vec<_>>()),
-            "inputs": columns(&self.problem.inputs),
-            "memory": self.problem.memory,
-            "outputs": columns(&self.problem.targets),
-            "method": self.settings.training.method.short_name(),
-            "errors": named(&self.errors),
-            "errors_of_ridge": named(&self.errors_of_linear),
-            "readings_in_training": self.ranges(),
-            "output_ranges": contents.scales,
-        })
     }
 
     /// Smallest and largest readings in training, row by row; with a history, of all features.
