@@ -64,19 +64,14 @@ impl AtomicFolder {
     ///
     /// # Errors
     /// Something has been created there in the meantime, or the operating system refuses.
-    pub(super) fn commit(self) -> Result<Vec<(String, u64)>, BundleError> {
-        let Self {
-            target,
-            folder,
-            mut files,
-        } = self;
-        if is_empty_folder(&target) {
-            fs::remove_dir(&target).map_err(|error| WriteError::io(&target, error))?;
+    pub(super) fn commit(mut self) -> Result<Vec<(String, u64)>, BundleError> {
+        let refused = |error| WriteError::io(&self.target, error);
+        if is_empty_folder(&self.target) {
+            fs::remove_dir(&self.target).map_err(refused)?;
         }
-        let persisted = folder.persist(&target);
-        persisted.map_err(|error| WriteError::io(&target, error))?;
-        files.sort();
-        Ok(files)
+        self.folder.persist(&self.target).map_err(refused)?;
+        self.files.sort();
+        Ok(self.files)
     }
 }
 
