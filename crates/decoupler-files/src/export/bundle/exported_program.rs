@@ -196,12 +196,11 @@ fn add_outside(builder: &mut Builder, program: &Program, limits: &Limits) -> Nod
     let of = first(|operation| matches!(operation, Operation::History { .. }))
         .or_else(|| first(|operation| matches!(operation, Operation::Valid { .. })))
         .expect("every decoder checks its readings");
-    let picks: [fn(&(f64, f64)) -> f64; 2] = [|limits| limits.0, |limits| limits.1];
-    let of_rows = picks.map(|pick| {
+    let side = |pick: fn(&(f64, f64)) -> f64| {
         let of_row = |limits: &Vec<_>| Array2::from_shape_fn((1, limits.len()), |(_, index)| pick(&limits[index]));
         limits.iter().map(of_row).collect()
-    });
-    builder.count_outside(NodeId::at(of), of_rows)
+    };
+    builder.count_outside(NodeId::at(of), [side(|limits| limits.0), side(|limits| limits.1)])
 }
 
 /// The program of the nodes that its output needs, and the new place of each.
