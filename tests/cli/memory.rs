@@ -210,6 +210,19 @@ fn every_format_exports_the_history_with_golden_readings_in_series() {
     }
 }
 
+/// A past of lags alone, or of averages alone, needs only a part of the state in C, which compiles without warnings.
+#[test]
+fn lags_and_averages_alone_are_exported_and_verified_in_c() {
+    let folder = creeping();
+    for (name, memory) in [("lags", "--lags 5"), ("averages", "--history 0.5s")] {
+        succeed(&format!("{TRAIN} {memory} --out {name}.json"), folder.path());
+        let export = format!("export --network {name}.json --format c99 --out {name} --json");
+        let report = json(&export, folder.path());
+        let limit = report["limit"].as_f64().unwrap();
+        assert!(report["deviation"].as_f64().unwrap_or(0.0) <= limit, "{name}: {report}");
+    }
+}
+
 #[test]
 fn names_in_the_golden_sequence_are_no_formulas() {
     let folder = creeping();

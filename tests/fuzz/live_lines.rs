@@ -47,7 +47,7 @@ fn split(bytes: &[u8], rng: &mut impl Rng) -> Vec<(u64, Vec<u8>)> {
     let mut found = Vec::new();
     loop {
         match lines.next(Duration::from_secs(5)) {
-            Ok(Some(line)) => found.push((line.number, line.text.unwrap().to_vec())),
+            Ok(Some(line)) => found.push((line.number, lines.text(&line).unwrap().to_vec())),
             Ok(None) => panic!("no line and no end"),
             Err(error) => {
                 assert!(error.is_none());

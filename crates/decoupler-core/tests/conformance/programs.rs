@@ -107,7 +107,7 @@ fn every_operation_by_hand() {
         ),
         (
             "count outside",
-            Box::new(|b, x| b.count_outside(x, [&[3.0, -1.0], &[3.0, 1.0]])),
+            Box::new(|b, x| b.count_outside(x, [vec![array![[3.0, -1.0]]], vec![array![[3.0, 1.0]]]])),
             vec![1.0],
         ),
     ];

@@ -47,12 +47,9 @@ pub enum FaultError {
          short-columns:COLUMN-COLUMN, gain:COLUMN=REL, stuck:COLUMN=low or stuck:COLUMN=high"
     )]
     Text(String),
-    /// The array has no such wire: kind, number and largest number.
+    /// The array has no such wire or node: kind, number and largest number.
     #[error("there is no {0} {1}; give 1 to {2}")]
-    Wire(&'static str, usize, usize),
-    /// The wire has no such node.
-    #[error("there is no node on a {0} {1}; give 1 to {2}")]
-    Node(&'static str, usize, usize),
+    Missing(String, usize, usize),
     /// The gain error is out of range.
     #[error("the gain error is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
     Gain(f64),
@@ -126,8 +123,10 @@ impl Fault {
             ),
         };
         match (self.wire, self.effect) {
-            _ if wire >= wires => Err(FaultError::Wire(kind, wire + 1, wires)),
-            (_, FaultEffect::Open(node)) if node >= nodes => Err(FaultError::Node(kind, node + 1, nodes)),
+            _ if wire >= wires => Err(FaultError::Missing(kind.to_owned(), wire + 1, wires)),
+            (_, FaultEffect::Open(node)) if node >= nodes => {
+                Err(FaultError::Missing(format!("node on a {kind}"), node + 1, nodes))
+            }
             (FaultyWire::Row(row), _) if !read.contains(&row) => Err(FaultError::NotRead(row + 1)),
             _ => Ok(()),
         }

@@ -149,7 +149,7 @@ impl LineInput {
         let number = line.number;
         (answer.line, answer.is_ended, answer.read_at) = (number, line.is_ended, Some(line.read_at));
         answer.time_s = line.read_at.saturating_duration_since(self.begun).as_secs_f64();
-        let Some(text) = line.text else {
+        let Some(text) = self.lines.text(&line) else {
             self.parser.count_bad();
             return SessionEvent::Bad(format!("line {number}: it is longer than {LONGEST_LINE} bytes"));
         };

@@ -26,16 +26,16 @@ pub struct Lines {
 }
 
 /// A line, its number and its time of arrival.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line<'a> {
+#[derive(Clone, Debug)]
+pub struct Line {
     /// Number in the source, from 1; dropped lines are counted.
     pub number: u64,
-    /// Bytes without LF; `None` if the line is longer than [`LONGEST_LINE`].
-    pub text: Option<&'a [u8]>,
     /// False for a last line without a line break, which may be cut off.
     pub is_ended: bool,
     /// Time when its last byte was read.
     pub read_at: Instant,
+    /// Place in the bytes of its batch; `None` for a line that is too long.
+    place: Option<Range<usize>>,
 }
 
 /// Overflow policy for lines that arrive faster than they are consumed.
@@ -118,7 +118,7 @@ impl Lines {
     ///
     /// # Errors
     /// Once the source has ended, with an error unless it ended normally.
-    pub fn next(&mut self, timeout: Duration) -> Result<Option<Line<'_>>, Option<io::Error>> {
+    pub fn next(&mut self, timeout: Duration) -> Result<Option<Line>, Option<io::Error>> {
         if self.batch.lines.is_empty() {
             self.batch.bytes.clear();
             let mut state = self.shared.lock();
@@ -140,13 +140,12 @@ impl Lines {
             self.batch.drop_old(Instant::now(), kept);
         }
         self.dropped += std::mem::take(&mut self.batch.dropped);
-        let line = self.batch.lines.pop_front();
-        Ok(line.map(|line| Line {
-            number: line.number,
-            text: line.place.map(|place| &self.batch.bytes[place]),
-            is_ended: line.is_ended,
-            read_at: line.read_at,
-        }))
+        Ok(self.batch.lines.pop_front())
+    }
+
+    /// Returns the bytes of the line that was returned last, without LF; `None` if it is longer than [`LONGEST_LINE`].
+    pub fn text(&self, line: &Line) -> Option<&[u8]> {
+        line.place.clone().map(|place| &self.batch.bytes[place])
     }
 }
 
@@ -207,18 +206,9 @@ impl Shared {
 #[derive(Debug, Default)]
 struct Batch {
     bytes: Vec<u8>,
-    lines: VecDeque<Entry>,
+    lines: VecDeque<Line>,
     /// Number of lines dropped from this batch.
     dropped: u64,
-}
-
-#[derive(Clone, Debug)]
-struct Entry {
-    number: u64,
-    /// Place in the bytes; `None` for a line that is too long.
-    place: Option<Range<usize>>,
-    is_ended: bool,
-    read_at: Instant,
 }
 
 impl Batch {
@@ -236,8 +226,10 @@ impl Batch {
             return;
         }
         let bytes = &self.bytes;
-        let text = |entry: &Entry| bytes[entry.place.clone().unwrap_or_default()].trim_ascii();
-        let has_names = |entry: &Entry| begins_like_header(text(entry)) && text(entry).contains(&b',');
+        let has_names = |line: &Line| {
+            let text = bytes[line.place.clone().unwrap_or_default()].trim_ascii();
+            begins_like_header(text) && text.contains(&b',')
+        };
         let names = self.lines.drain(..before - kept).rfind(has_names);
         self.lines.extend(names);
         self.lines.rotate_right(self.lines.len() - kept);
@@ -294,7 +286,7 @@ impl Splitter {
         if self.number > 1 || !self.skips_first || begins_like_header(self.partial.trim_ascii()) {
             let start = batch.bytes.len();
             batch.bytes.extend_from_slice(&self.partial);
-            batch.lines.push_back(Entry {
+            batch.lines.push_back(Line {
                 number: self.number,
                 place: (self.length < LONGEST_LINE).then_some(start..batch.bytes.len()),
                 is_ended,
@@ -316,7 +308,7 @@ mod tests {
         loop {
             match lines.next(Duration::from_secs(60)) {
                 Ok(Some(line)) => {
-                    let text = line.text.map(|text| String::from_utf8_lossy(text).into_owned());
+                    let text = lines.text(&line).map(|text| String::from_utf8_lossy(text).into_owned());
                     found.push((line.number, text));
                 }
                 Ok(None) => {}

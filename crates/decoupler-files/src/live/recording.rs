@@ -6,11 +6,27 @@ use std::{
 
 use crate::machine::system_cause;
 
+/// A recording, finished or in progress.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recorded {
+    /// Its file; empty for another writer.
+    pub path: PathBuf,
+    /// Number of frames.
+    pub frames: u64,
+    /// Time from the first to the last frame, in seconds.
+    pub seconds: f64,
+}
+
+/// A recording in progress, in a file.
+pub type RecordingFile = Recorder<File>;
+
 /// Writes frames with their times as CSV: one line per row-wire, with columns `time_s`, `row` (from 1) and `r_1` to
 /// `r_M4` in ohm. `decode` reads these files too. Every frame is flushed, so that the file ends with a complete line even
 /// if the program is terminated.
 #[derive(Debug)]
 pub struct Recorder<W: Write> {
+    /// The file and its length so far.
+    pub recorded: Recorded,
     /// Lines of one frame, written together.
     text: Vec<u8>,
     rows: Vec<usize>,
@@ -18,6 +34,7 @@ pub struct Recorder<W: Write> {
     writer: W,
     /// Bytes of the header and of the frames written completely.
     whole_bytes: u64,
+    first_s: f64,
 }
 
 impl<W: Write> Recorder<W> {
@@ -32,11 +49,13 @@ impl<W: Write> Recorder<W> {
         }
         text.push(b'\n');
         let mut recorder = Self {
+            recorded: Recorded::default(),
             text,
             rows: rows.to_vec(),
             channels,
             writer,
             whole_bytes: 0,
+            first_s: 0.0,
         };
         recorder.write()?;
         Ok(recorder)
@@ -59,7 +78,13 @@ impl<W: Write> Recorder<W> {
             }
             self.text.push(b'\n');
         }
-        self.write()
+        self.write()?;
+        if self.recorded.frames == 0 {
+            self.first_s = time_s;
+        }
+        self.recorded.frames += 1;
+        self.recorded.seconds = time_s - self.first_s;
+        Ok(())
     }
 
     fn write(&mut self) -> io::Result<()> {
@@ -68,26 +93,6 @@ impl<W: Write> Recorder<W> {
         self.whole_bytes += self.text.len() as u64;
         Ok(())
     }
-}
-
-/// A recording, finished or in progress.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Recorded {
-    /// Its file.
-    pub path: PathBuf,
-    /// Number of frames.
-    pub frames: u64,
-    /// Time from the first to the last frame, in seconds.
-    pub seconds: f64,
-}
-
-/// A recording in progress: every frame is written to the file as soon as it arrives.
-#[derive(Debug)]
-pub struct RecordingFile {
-    /// Its file and length so far.
-    pub recorded: Recorded,
-    recorder: Recorder<File>,
-    first_s: Option<f64>,
 }
 
 impl RecordingFile {
@@ -101,38 +106,27 @@ impl RecordingFile {
             fs::create_dir_all(folder)?;
             let (path, file) = new_file(folder)?;
             // A part of the header is no recording; the error is reported in any case.
-            let recorder = Recorder::new(file, rows, columns).inspect_err(|_| drop(fs::remove_file(&path)))?;
-            Ok((path, recorder))
+            let mut recorder = Self::new(file, rows, columns).inspect_err(|_| drop(fs::remove_file(&path)))?;
+            recorder.recorded.path = path;
+            Ok(recorder)
         };
-        let (path, recorder) = begin().map_err(|error| {
+        begin().map_err(|error: io::Error| {
             let (folder, cause) = (folder.display(), system_cause(&error));
             format!("cannot record to the folder '{folder}': {cause}")
-        })?;
-        Ok(Self {
-            recorded: Recorded {
-                path,
-                frames: 0,
-                seconds: 0.0,
-            },
-            recorder,
-            first_s: None,
         })
     }
 
-    /// Writes a frame.
+    /// Writes a frame to the file.
     ///
     /// # Errors
     /// If it cannot be written, with the reason; earlier frames stay in the file, and no part of this one.
-    pub(super) fn record(&mut self, time_s: f64, frame_ohm: &[f64]) -> Result<(), String> {
-        self.recorder.record(time_s, frame_ohm).map_err(|error| {
+    pub(super) fn record_whole(&mut self, time_s: f64, frame_ohm: &[f64]) -> Result<(), String> {
+        self.record(time_s, frame_ohm).map_err(|error| {
             // Readers leave out a part of a line, too.
-            let _ = self.recorder.writer.set_len(self.recorder.whole_bytes);
+            let _ = self.writer.set_len(self.whole_bytes);
             let (path, cause) = (self.recorded.path.display(), system_cause(&error));
             format!("the recording '{path}' has ended: {cause}; earlier frames are kept")
-        })?;
-        self.recorded.frames += 1;
-        self.recorded.seconds = time_s - *self.first_s.get_or_insert(time_s);
-        Ok(())
+        })
     }
 }
 

@@ -234,13 +234,8 @@ impl Replay {
     /// Returns the recorded time at `now`.
     fn time_s(&self, now: Instant) -> f64 {
         let (time_s, since) = self.anchor;
-        let passed = now.saturating_duration_since(since).as_secs_f64();
-        time_s
-            + if self.state.is_playing {
-                self.speed * passed
-            } else {
-                0.0
-            }
+        let since = if self.state.is_playing { since } else { now };
+        time_s + self.speed * now.saturating_duration_since(since).as_secs_f64()
     }
 
     /// Sets the number of recorded seconds per second, from 0.1 to 10.
@@ -270,11 +265,8 @@ impl Replay {
         if self.due.is_some() {
             return Some(now);
         }
-        let time_s = self
-            .recording
-            .times_s
-            .get(self.next)
-            .filter(|_| self.state.is_playing)?;
+        let next_s = self.recording.times_s.get(self.next);
+        let time_s = next_s.filter(|_| self.state.is_playing)?;
         let wait_s = (time_s - self.time_s(now)) / self.speed;
         Some(now + Duration::try_from_secs_f64(wait_s.max(0.0)).unwrap_or(Duration::MAX / 4))
     }
@@ -288,11 +280,8 @@ impl Replay {
         let due = *self.due.get_or_insert_with(|| {
             let first = self.next;
             let is_late = now_s - times_s[first] > self.speed * Lines::PATIENCE.as_secs_f64();
-            let due = if is_late {
-                self.recording.frame_at(now_s).max(first)
-            } else {
-                first
-            };
+            let latest = if is_late { self.recording.frame_at(now_s) } else { first };
+            let due = latest.max(first);
             tally.dropped += if self.keeps_all { 0 } else { (due - first) as u64 };
             self.next = due + 1;
             due

@@ -290,7 +290,7 @@ impl Session {
                         return SessionEvent::Nothing;
                     }
                     if let Some(recording) = &mut self.recording
-                        && let Err(reason) = recording.record(arrived.time_s, &array.frame_ohm)
+                        && let Err(reason) = recording.record_whole(arrived.time_s, &array.frame_ohm)
                     {
                         notes.push(Note::RecordingEnded(recording.recorded.clone(), reason));
                         self.recording = None;

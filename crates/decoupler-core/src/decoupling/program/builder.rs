@@ -35,6 +35,12 @@ impl Builder {
         Self { nodes: vec![readings] }
     }
 
+    /// Continues a program behind its last node.
+    pub fn extending(program: &Program) -> Self {
+        let nodes = program.nodes.clone();
+        Self { nodes }
+    }
+
     /// The node of the readings.
     pub fn readings(&self) -> NodeId {
         NodeId(0)
@@ -145,12 +151,13 @@ impl Builder {
         self.push(Operation::History { of, memory }, Precision::Double)
     }
 
-    /// Adds the number of values outside limits.
+    /// Adds the number of values outside limits: one vector of them for all row-wires, or one for each.
     ///
     /// # Panics
     /// If the sizes differ.
-    pub fn count_outside(&mut self, of: NodeId, [low, high]: [&[f64]; 2]) -> NodeId {
-        let [low, high] = [low, high].map(|values| self.constants(values, Precision::Double));
+    pub fn count_outside(&mut self, of: NodeId, limits: [Vec<Array2<f64>>; 2]) -> NodeId {
+        let padding = 0.0;
+        let [low, high] = limits.map(|tables| self.push(Operation::Select { tables, padding }, Precision::Double));
         self.push(Operation::CountOutside { of, low, high }, Precision::Double)
     }
 

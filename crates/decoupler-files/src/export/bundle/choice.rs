@@ -1,25 +1,36 @@
 //! What can be exported: decoders, formats and precisions.
 
-use std::fmt;
-
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
     text::Named,
 };
+use strum::{EnumMessage, VariantArray};
 use thiserror::Error;
 
 /// Format in which a decoder is exported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::Display, strum::IntoStaticStr, serde::Serialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, strum::Display, EnumMessage, strum::IntoStaticStr, VariantArray, serde::Serialize,
+)]
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum BundleFormat {
     /// ONNX graph.
+    #[strum(message = "ONNX", detailed_message = "a graph (opset 13) for ONNX runtimes")]
     Onnx,
     /// C99 source.
+    #[strum(
+        message = "C99",
+        detailed_message = "one header and one source in C, with a self-test"
+    )]
     C99,
     /// MATLAB or GNU Octave function.
+    #[strum(
+        message = "MATLAB/Octave",
+        detailed_message = "one function file for MATLAB and GNU Octave"
+    )]
     Matlab,
     /// Weights and a program for NumPy.
+    #[strum(message = "NumPy", detailed_message = "weights (.npz) and a decode.py")]
     NumPy,
 }
 
@@ -75,22 +86,7 @@ const RULES: &str = "it is only for comparison: export another decoder instead, 
 impl BundleFormat {
     /// Name of the format, as in sentences.
     pub fn title(self) -> &'static str {
-        match self {
-            Self::Onnx => "ONNX",
-            Self::C99 => "C99",
-            Self::Matlab => "MATLAB/Octave",
-            Self::NumPy => "NumPy",
-        }
-    }
-
-    /// What a folder of this format contains.
-    pub fn meaning(self) -> &'static str {
-        match self {
-            Self::Onnx => "a graph (opset 13) for ONNX runtimes",
-            Self::C99 => "one header and one source in C, with a self-test",
-            Self::Matlab => "one function file for MATLAB and GNU Octave",
-            Self::NumPy => "weights (.npz) and a decode.py",
-        }
+        self.get_message().unwrap_or_default()
     }
 
     /// Precisions in which the format is written, the most accurate first.
@@ -105,7 +101,10 @@ impl BundleFormat {
 
     /// Help text on all formats.
     pub fn help() -> String {
-        let all = Self::ALL.iter().map(|format| format!("{format}: {}", format.meaning()));
+        let contents = |format: &Self| format.get_detailed_message().unwrap_or_default();
+        let all = Self::VARIANTS
+            .iter()
+            .map(|format| format!("{format}: {}", contents(format)));
         Vec::from_iter(all).join("; ")
     }
 
@@ -135,7 +134,7 @@ impl BundleFormat {
 
 impl Named for BundleFormat {
     const WHAT: &'static str = "a format";
-    const ALL: &'static [Self] = &[Self::Onnx, Self::C99, Self::Matlab, Self::NumPy];
+    const ALL: &'static [Self] = Self::VARIANTS;
 }
 
 impl Named for BundlePrecision {
@@ -144,9 +143,11 @@ impl Named for BundlePrecision {
 }
 
 /// Decoder that is exported as a bundle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::Display, strum::IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum BundleDecoder {
     /// A decoder of the error tables.
+    #[strum(transparent)]
     Kind(DecoderKind),
     /// The linear map of the error table.
     Linear,
@@ -157,10 +158,8 @@ pub enum BundleDecoder {
 impl BundleDecoder {
     /// All decoders that can be exported.
     pub fn all() -> impl Iterator<Item = Self> {
-        <Self as Named>::ALL
-            .iter()
-            .copied()
-            .filter(|decoder| decoder.check().is_ok())
+        let all = <Self as Named>::ALL.iter().copied();
+        all.filter(|decoder| decoder.check().is_ok())
     }
 
     /// Checks that other programs can evaluate the decoder.
@@ -178,18 +177,15 @@ impl BundleDecoder {
 
     /// Help text on all decoders.
     pub fn help() -> String {
-        let line = |decoder: Self| {
-            let meaning = match decoder {
-                Self::Kind(kind) => kind.meaning(),
-                Self::Linear => "The linear map of the error table",
-                Self::Chosen => {
-                    "What the file answers with: the combination that a choice of settings found, or the network"
-                }
-            };
-            format!("{decoder}: {meaning}")
+        let meaning = |decoder: Self| match decoder {
+            Self::Kind(kind) => kind.meaning(),
+            Self::Linear => "The linear map of the error table",
+            Self::Chosen => {
+                "What the file answers with: the combination that a choice of settings found, or the network"
+            }
         };
-        let lines: Vec<String> = Self::all().map(line).collect();
-        format!("Decoder to export. {}", lines.join("; "))
+        let lines = Self::all().map(|decoder| format!("{decoder}: {}", meaning(decoder)));
+        format!("Decoder to export. {}", Vec::from_iter(lines).join("; "))
     }
 
     /// `true` for the trained network, and for the combination with it: those that a network file contains.
@@ -227,25 +223,9 @@ impl Named for BundleDecoder {
     ];
 }
 
-impl From<BundleDecoder> for &'static str {
-    fn from(decoder: BundleDecoder) -> Self {
-        match decoder {
-            BundleDecoder::Kind(kind) => kind.into(),
-            BundleDecoder::Linear => "linear",
-            BundleDecoder::Chosen => "chosen",
-        }
-    }
-}
-
 impl Default for BundleDecoder {
     fn default() -> Self {
         Self::Kind(DecoderKind::Network)
-    }
-}
-
-impl fmt::Display for BundleDecoder {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(Named::name(*self))
     }
 }
 

@@ -3,6 +3,7 @@
 use decoupler_core::{
     dataset::{GAP, MemoryConstants, Span},
     decoupling::{Function, NodeId, Operation, Precision},
+    text::counted,
 };
 use ndarray::Array2;
 
@@ -81,19 +82,15 @@ impl PrintedHistory {
     }
 }
 
-/// An operation as languages with infix operators write it, with the sign of a division, and the prefix and suffix of the names
-/// of functions.
-pub(super) fn infix(
-    operation: &Operation,
-    [divided, before, after]: [&str; 3],
-    of: impl Fn(NodeId) -> String,
-) -> String {
-    match operation {
-        Operation::Subtract(one, other) => format!("{} - {}", of(*one), of(*other)),
-        Operation::Divide(one, other) => format!("{} {divided} {}", of(*one), of(*other)),
-        Operation::Map(Function::Log1p, x) => format!("{before}log1p{after}({})", of(*x)),
-        Operation::Map(Function::Tanh, x) => format!("{before}tanh{after}({})", of(*x)),
-        Operation::Map(Function::Gaussian, x) => format!("{before}exp{after}(-{})", of(*x)),
+/// An operation on these operands as languages with infix operators write it, with the sign of a division, and the prefix and
+/// suffix of the names of functions.
+pub(super) fn infix(operation: &Operation, [divided, before, after]: [&str; 3], operands: &[String]) -> String {
+    match (operation, operands) {
+        (Operation::Subtract(..), [one, other]) => format!("{one} - {other}"),
+        (Operation::Divide(..), [one, other]) => format!("{one} {divided} {other}"),
+        (Operation::Map(Function::Log1p, _), [x]) => format!("{before}log1p{after}({x})"),
+        (Operation::Map(Function::Tanh, _), [x]) => format!("{before}tanh{after}({x})"),
+        (Operation::Map(Function::Gaussian, _), [x]) => format!("{before}exp{after}(-{x})"),
         _ => unreachable!("given, not exported, or written by every language in its own way"),
     }
 }
@@ -125,25 +122,29 @@ impl Contents {
 
     /// Constants with their names.
     pub(super) fn constants(&self) -> impl Iterator<Item = Constant<'_>> {
-        let operations = || self.exported.program.nodes().iter().map(|node| &node.operation);
-        operations().enumerate().filter_map(move |(index, operation)| {
-            let Operation::Select { tables, .. } = operation else {
+        let nodes = self.exported.program.nodes().iter().enumerate();
+        nodes.filter_map(|(index, node)| {
+            let Operation::Select { tables, .. } = &node.operation else {
                 return None;
             };
             let id = NodeId::at(index);
-            let is_matrix = |operation: &Operation| match operation {
-                Operation::Affine { weights: of, .. } | Operation::SquaredDistances { points: of, .. } => *of == id,
-                _ => false,
-            };
-            let dimensions = if operations().any(is_matrix) { 2 } else { 1 };
+            let dimensions = if self.is_matrix(id) { 2 } else { 1 };
             let of_rows = (tables.len() > 1).then_some(tables.len());
             let shape = of_rows.iter().chain(&tables[0].shape()[2 - dimensions..]);
             Some(Constant {
                 name: self.name_of(id),
-                precision: self.precision_of(id),
+                precision: node.precision,
                 shape: shape.copied().collect(),
                 tables,
             })
+        })
+    }
+
+    /// `true` for weights and points, which are matrices.
+    pub(super) fn is_matrix(&self, id: NodeId) -> bool {
+        self.exported.program.nodes().iter().any(|node| match &node.operation {
+            Operation::Affine { weights: of, .. } | Operation::SquaredDistances { points: of, .. } => *of == id,
+            _ => false,
         })
     }
 
@@ -218,6 +219,11 @@ impl Contents {
             true => format!("{} mm", format_number(relative * self.scales[0])),
             false => format!("{} % of its range in training", format_number(100.0 * relative)),
         }
+    }
+
+    /// The targets with their number.
+    pub(super) fn outputs_in_words(&self) -> String {
+        counted(self.outputs(), self.meaning.output())
     }
 
     /// The further parts of an answer, in words.

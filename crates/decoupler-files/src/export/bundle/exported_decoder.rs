@@ -1,9 +1,9 @@
 use std::{path::PathBuf, sync::Arc};
 
 use decoupler_core::{
-    dataset::{Dataset, GAP, PerRow, Seed, Simulation, Stream},
+    dataset::{Dataset, GAP, Memory, PerRow, Seed, Simulation, Stream},
     decoupling::{Combined, Decoder, Function, NodeId, Operation, Precision, Program, decode_set},
-    evaluation::{DecoderSet, HalfWidth, RunError, RunSets, RunSettings, TargetErrors, TestErrors},
+    evaluation::{DecoderSet, HalfWidth, RunError, RunSettings, TargetErrors, TestErrors},
     network::{MinMax, Networks, Quantity},
     problem::{Channel, Problem},
 };
@@ -23,7 +23,7 @@ use crate::{
     import::{Plan, Setup, SetupSets},
 };
 
-/// A decoder to be exported, with the meaning of its readings and targets.
+/// A decoder to be exported, with the meaning of its readings and targets, and facts about the samples to which it was fitted.
 pub struct ExportedDecoder {
     kind: BundleDecoder,
     program: Program,
@@ -35,17 +35,14 @@ pub struct ExportedDecoder {
     target_ranges: Vec<MinMax>,
     /// Errors on the test samples.
     errors: TestErrors,
+    /// Errors of the linear baseline on the test samples.
+    errors_of_linear: TestErrors,
     /// 90 % prediction intervals of the answers, if every target has one.
     half_widths: Vec<HalfWidth>,
     /// Test samples, if they are known.
     test: Option<Arc<Dataset>>,
-    origin: Origin,
-}
-
-/// Facts about the samples to which an exported decoder was fitted, for the metadata of its bundle.
-struct Origin {
     /// Program and version that trained or fitted it.
-    program: String,
+    trained_by: String,
     settings: RunSettings,
     /// Names, units and positions of readings and targets.
     problem: Problem,
@@ -53,8 +50,6 @@ struct Origin {
     row_wires: Option<Vec<usize>>,
     /// Names of the recordings without their folders; empty for a simulated array.
     files: Vec<String>,
-    /// Errors of the linear baseline on the test samples.
-    errors_of_linear: TestErrors,
 }
 
 impl From<&NetworkFile> for ExportedDecoder {
@@ -62,10 +57,7 @@ impl From<&NetworkFile> for ExportedDecoder {
     fn from(file: &NetworkFile) -> Self {
         // Without the recording, readings are drawn from the range in training.
         let test = file.recorded.as_ref().and_then(|_| file.test_set().ok());
-        Self {
-            test,
-            ..Self::of_file(file, BundleDecoder::Chosen)
-        }
+        Self::of_file(file, BundleDecoder::Chosen, test)
     }
 }
 
@@ -79,31 +71,55 @@ impl ExportedDecoder {
     pub fn of_run(file: &NetworkFile, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
         sets.check_saved(file.recorded.as_ref())?;
         if decoder.is_network() {
-            let test = Some(sets.sets.test);
-            return Ok(Self {
-                test,
-                ..Self::of_file(file, decoder)
-            });
+            return Ok(Self::of_file(file, decoder, Some(sets.sets.test)));
         }
-        Self::fit(Origin::of_file(file), sets.sets, decoder)
+        Ok(Self {
+            trained_by: file.program.clone(),
+            ..Self::of_setup(&file.setup(), sets, decoder)?
+        })
     }
 
-    /// Fits a decoder that needs no network to the training samples of `setup`, which are `sets`.
+    /// Fits a decoder that needs no network to the training samples of `setup`, which are `sets`, and measures it on the test
+    /// samples.
     ///
     /// # Errors
     /// As [`Self::of_run`], or if the decoder needs a network.
-    pub fn of_setup(setup: &Setup, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
+    pub fn of_setup(setup: &Setup, sets: SetupSets, kind: BundleDecoder) -> Result<Self, BundleError> {
+        kind.check()?;
         let (settings, sets) = (*setup.settings(), sets.sets);
-        let set = DecoderSet::new(settings, sets.split.training.clone(), None);
-        let origin = Origin {
-            program: PROGRAM.to_owned(),
-            problem: Problem::clone(&sets.problem),
+        let (training, problem) = (sets.split.training, Problem::clone(&sets.problem));
+        let of_row = |set: &Dataset| Ok::<_, BundleError>((MinMax::of(set.readings()), MinMax::of(set.targets())));
+        let in_training = PerRow::fit(&training, settings.source.row_model(), of_row)?;
+        let (reading_ranges, target_ranges): (_, Vec<_>) = in_training.values().iter().cloned().unzip();
+        let set = DecoderSet::new(settings, training, None);
+        let mut linear = set.linear().map_err(Box::new)?;
+        let errors = |decoder: &mut dyn Decoder| {
+            let answers = decode_set(decoder, &sets.test).map_err(|error| Box::new(RunError::from(error)))?;
+            Ok::<_, BundleError>(TestErrors::measure(&problem, &sets.test, &answers))
+        };
+        let errors_of_linear = errors(&mut *linear)?;
+        let decoder = match kind {
+            BundleDecoder::Linear => Some(linear),
+            BundleDecoder::Kind(kind) => set.decoder(kind, Precision::Double).map_err(Box::new)?,
+            BundleDecoder::Chosen => None,
+        };
+        let mut decoder = decoder.ok_or(BundleError::NoNetwork(kind))?;
+        Ok(Self {
+            kind,
+            program: decoder.program().expect("a decoder without a program is refused"),
+            unlimited: None,
+            reading_ranges,
+            target_ranges: target_ranges.into_iter().flatten().collect(),
+            errors: errors(&mut *decoder)?,
+            errors_of_linear,
+            half_widths: Vec::new(),
+            trained_by: PROGRAM.to_owned(),
+            settings,
             row_wires: sets.test.row_wires_read().map(<[usize]>::to_vec),
             files: file_names(setup.plan()),
-            errors_of_linear: errors(&mut *set.linear().map_err(Box::new)?, &sets.problem, &sets.test)?,
-            settings,
-        };
-        Self::fit(origin, sets, decoder)
+            test: Some(sets.test),
+            problem,
+        })
     }
 
     /// Exports networks that were trained on samples in memory, with the description of their channels and the row-wires
@@ -115,22 +131,33 @@ impl ExportedDecoder {
         problem: Problem,
         row_wires: Option<Vec<usize>>,
     ) -> Self {
-        let origin = Origin {
-            program: PROGRAM.to_owned(),
+        let all = networks.values().iter();
+        // A combination of the network alone differs from it only in the limits of the readings.
+        let of_several = combined.filter(|combined| !combined.others.is_empty());
+        Self {
+            program: networks.decoder_program(&problem, combined),
+            unlimited: of_several.is_none().then(|| networks.program(Precision::Double)),
+            kind: of_several.map_or_else(BundleDecoder::default, |_| BundleDecoder::Chosen),
+            target_ranges: all.clone().map(|network| network.outputs().clone()).collect(),
+            reading_ranges: all.map(|network| network.inputs().range().cloned()).collect(),
+            errors: TestErrors::Targets(Vec::new()),
+            errors_of_linear: TestErrors::Targets(Vec::new()),
+            half_widths: Vec::new(),
+            test: None,
+            trained_by: PROGRAM.to_owned(),
             settings,
             problem,
             row_wires,
             files: Vec::new(),
-            errors_of_linear: TestErrors::Targets(Vec::new()),
-        };
-        Self::of_trained(networks, combined, origin)
+        }
     }
 
-    /// Wraps what a file answers with, or its network alone.
-    fn of_file(file: &NetworkFile, decoder: BundleDecoder) -> Self {
+    /// Exports what a file answers with, or its network alone.
+    fn of_file(file: &NetworkFile, decoder: BundleDecoder, test: Option<Arc<Dataset>>) -> Self {
         let is_wanted = |combined: &&Combined| decoder == BundleDecoder::Chosen || combined.others.is_empty();
         let combined = file.combined().filter(is_wanted);
-        let exported = Self::of_trained(&file.network, combined, Origin::of_file(file));
+        let (problem, row_wires) = (file.problem.clone(), file.row_wires.clone());
+        let exported = Self::of_networks(&file.network, combined, file.settings, problem, row_wires);
         let alone = file.scores.network_alone.as_ref();
         let alone = alone.filter(|_| exported.kind != BundleDecoder::Chosen);
         // The intervals are those of what the file answers with.
@@ -138,58 +165,13 @@ impl ExportedDecoder {
         let half_widths = intervals.and_then(|intervals| intervals.targets.iter().cloned().collect());
         Self {
             errors: alone.unwrap_or(&file.scores.network).clone(),
+            errors_of_linear: file.scores.baselines.linear.clone(),
             half_widths: half_widths.unwrap_or_default(),
+            test,
+            trained_by: file.program.clone(),
+            files: file_names(file.recorded.as_ref().map(|recorded| &recorded.plan)),
             ..exported
         }
-    }
-
-    /// Wraps trained networks, which contain the ranges of their readings and targets, alone or in a combination.
-    fn of_trained(networks: &Networks, combined: Option<&Combined>, origin: Origin) -> Self {
-        let all = networks.values().iter();
-        // A combination of the network alone differs from it only in the limits of the readings.
-        let of_several = combined.filter(|combined| !combined.others.is_empty());
-        Self {
-            program: networks.decoder_program(&origin.problem, combined),
-            unlimited: of_several.is_none().then(|| networks.program(Precision::Double)),
-            kind: of_several.map_or_else(BundleDecoder::default, |_| BundleDecoder::Chosen),
-            target_ranges: all.clone().map(|network| network.outputs().clone()).collect(),
-            reading_ranges: all.map(|network| network.inputs().range().cloned()).collect(),
-            errors: TestErrors::Targets(Vec::new()),
-            half_widths: Vec::new(),
-            test: None,
-            origin,
-        }
-    }
-
-    /// Fits a decoder that needs no network to the training samples of `sets` and measures it on the test samples.
-    ///
-    /// # Errors
-    /// The decoder needs a network, the samples cannot be scaled or decoded, or no other program can compute what the decoder
-    /// does.
-    fn fit(origin: Origin, sets: RunSets, kind: BundleDecoder) -> Result<Self, BundleError> {
-        kind.check()?;
-        let training = sets.split.training;
-        let of_row = |set: &Dataset| Ok::<_, BundleError>((MinMax::of(set.readings()), MinMax::of(set.targets())));
-        let in_training = PerRow::fit(&training, origin.settings.source.row_model(), of_row)?;
-        let (reading_ranges, target_ranges): (_, Vec<_>) = in_training.values().iter().cloned().unzip();
-        let set = DecoderSet::new(origin.settings, training, None);
-        let decoder = match kind {
-            BundleDecoder::Linear => Some(set.linear().map_err(Box::new)?),
-            BundleDecoder::Kind(kind) => set.decoder(kind, Precision::Double).map_err(Box::new)?,
-            BundleDecoder::Chosen => None,
-        };
-        let mut decoder = decoder.ok_or(BundleError::NoNetwork(kind))?;
-        Ok(Self {
-            kind,
-            program: decoder.program().expect("a decoder without a program is refused"),
-            unlimited: None,
-            reading_ranges,
-            target_ranges: target_ranges.into_iter().flatten().collect(),
-            errors: errors(&mut *decoder, &sets.problem, &sets.test)?,
-            half_widths: Vec::new(),
-            test: Some(sets.test),
-            origin,
-        })
     }
 
     /// Kind of decoder.
@@ -203,21 +185,24 @@ impl ExportedDecoder {
     }
 
     fn meaning(&self) -> Meaning {
-        let problem = self.origin.problem.clone();
+        let Problem { inputs, targets, .. } = self.problem.clone();
+        let is_array = self.problem.sensor.is_some();
         // Comments of C have no Ω.
-        let in_ohm = |channel: Channel| Channel::new(channel.name, Some("ohm"));
+        let in_ohm = |channel: Channel| match is_array {
+            true => Channel::new(channel.name, Some("ohm")),
+            false => channel,
+        };
         Meaning {
-            is_array: problem.sensor.is_some(),
-            inputs: match problem.sensor {
-                Some(_) => problem.inputs.into_iter().map(in_ohm).collect(),
-                None => problem.inputs,
-            },
-            targets: problem.targets,
-            row_wires: match (&self.origin.row_wires, self.rows()) {
-                (Some(row_wires), 2..) => row_wires.clone(),
-                _ => Vec::new(),
-            },
+            is_array,
+            inputs: inputs.into_iter().map(in_ohm).collect(),
+            targets,
+            row_wires: self.row_wires.clone().filter(|_| self.rows() > 1).unwrap_or_default(),
         }
+    }
+
+    /// The memory of past readings, if the decoder takes any.
+    fn memory(&self) -> Option<&Memory> {
+        self.problem.memory.as_ref().filter(|memory| !memory.is_empty())
     }
 
     /// Limits of the readings, or of the features of a history, beyond which they count as outside: for all row-wires or for
@@ -240,45 +225,38 @@ impl ExportedDecoder {
     /// # Errors
     /// No readings could be drawn, or one cannot be decoded.
     pub(super) fn contents(&self, name: &str, precision: BundlePrecision) -> Result<Contents, BundleError> {
-        let problem = &self.origin.problem;
-        let channels = problem.inputs.len();
-        let meaning = self.meaning();
+        let (channels, meaning) = (self.problem.inputs.len(), self.meaning());
         let unlimited = self
             .unlimited
             .as_ref()
             .filter(|_| precision == BundlePrecision::Fixed16);
         let mut program = unlimited.unwrap_or(&self.program).clone();
-        if let Some(memory) = problem.memory.as_ref().filter(|memory| !memory.is_empty()) {
+        if let Some(memory) = self.memory() {
             let with_history = program.with_history(memory, channels);
             program = with_history.map_err(|error| Box::new(RunError::from(error)))?;
         }
         let exported = ExportedProgram::of(&program, &self.half_widths, self.limits().as_ref());
         let (rows, printed) = self.readings(channels)?;
-        let golden = Golden::of(rows, printed, &program, exported.outputs())?;
-        let targets = &self.target_ranges;
         let outputs = exported.outputs();
         let scales = (0..outputs).map(|output| match meaning.is_array {
-            true => scale(targets, 0..outputs),
-            false => scale(targets, output..output + 1),
+            true => scale(&self.target_ranges, 0..outputs),
+            false => scale(&self.target_ranges, output..output + 1),
         });
-        let scales = scales.collect();
+        let is_drawn = self.test.is_none() && !meaning.is_array;
+        let note = "the golden readings are drawn from the range in training, because the recording was not found";
         let mut contents = Contents {
             name: name.to_owned(),
             noun: self.kind.noun(),
             precision,
             names: names(&exported, &meaning),
             rows: self.rows(),
+            golden: Golden::of(rows, printed, &program, outputs)?,
+            scales: scales.collect(),
             meaning,
             exported,
-            scales,
-            golden,
             metadata: Value::Null,
-            notes: Vec::new(),
+            notes: is_drawn.then(|| note.to_owned()).into_iter().collect(),
         };
-        if self.test.is_none() && problem.sensor.is_none() {
-            let note = "the golden readings are drawn from the range in training, because the recording was not found";
-            contents.notes.push(note.to_owned());
-        }
         contents.metadata = self.metadata(&contents);
         Ok(contents)
     }
@@ -296,15 +274,15 @@ impl ExportedDecoder {
             let row = if takes_row { set.row_index(sample) } else { 0 };
             GoldenRow::new(row, set.sample_readings(sample)[..channels].to_vec())
         };
-        let memory = self.origin.problem.memory.as_ref().filter(|memory| !memory.is_empty());
-        let mut rows = match (&self.origin.problem.sensor, &self.test) {
+        let memory = self.memory();
+        let mut rows = match (&self.problem.sensor, &self.test) {
             (Some(simulation), _) => {
                 let rows = simulation.rows().unwrap_or(1);
                 let few = Simulation {
                     test_samples: ROWS[0].next_multiple_of(rows.max(1)),
                     ..*simulation
                 };
-                let set = few.draw_test(self.origin.settings.seed).map_err(Box::new)?;
+                let set = few.draw_test(self.settings.seed).map_err(Box::new)?;
                 let samples = 0..set.samples().min(2 * ROWS[0]);
                 samples.map(|sample| of_set(&set, sample)).collect()
             }
@@ -350,68 +328,61 @@ impl ExportedDecoder {
 
     /// Collects the metadata of a bundle.
     fn metadata(&self, contents: &Contents) -> Value {
-        let mut fields = match &self.origin.problem.sensor {
-            Some(simulation) => self.of_array(simulation, contents),
-            None => self.of_recording(contents),
+        let list = |channels: &[Channel]| {
+            let channels = channels
+                .iter()
+                .map(|channel| (channel.name.clone(), channel.unit.clone()));
+            channels.unzip::<_, _, Vec<_>, Vec<_>>()
+        };
+        let ((inputs, input_units), (targets, target_units)) =
+            (list(&contents.meaning.inputs), list(&contents.meaning.targets));
+        let named = |errors: &TestErrors| {
+            let of = |(name, errors): (&String, &TargetErrors)| json!({ "name": name, "errors": errors });
+            targets.iter().zip(errors.targets()).map(of).collect::<Vec<_>>()
+        };
+        let row_wires = self.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
+        let mut fields = match &self.problem.sensor {
+            Some(Simulation {
+                sensor, scene, samples, ..
+            }) => json!({
+                "array": sensor.scale.to_string(),
+                "geometry": sensor.geometry,
+                "scene": scene,
+                "rows": scene.rows.to_string(),
+                "row_numbers": contents.takes_row().then_some([1, contents.rows]),
+                "inputs": { "names": inputs, "unit": "ohm" },
+                "outputs": { "names": targets, "unit": "mm" },
+                "training_samples": samples,
+                "errors": self.errors.nodes(),
+                "readings_in_training_ohm": self.ranges(),
+                "output_range_mm": contents.scales[0],
+            }),
+            None => json!({
+                "files": self.files,
+                "row_numbers": contents.takes_row().then(|| row_wires.collect::<Vec<_>>()),
+                "inputs": { "names": inputs, "units": input_units },
+                "memory": self.problem.memory,
+                "outputs": { "names": targets, "units": target_units },
+                "method": self.settings.training.method.short_name(),
+                "errors": named(&self.errors),
+                "errors_of_ridge": named(&self.errors_of_linear),
+                "readings_in_training": self.ranges(),
+                "output_ranges": contents.scales,
+            }),
         };
         fields["program"] = json!(PROGRAM);
-        fields["trained_by"] = json!(self.origin.program);
+        fields["trained_by"] = json!(self.trained_by);
         fields["decoder"] = json!(self.kind.to_string());
         fields["takes_row"] = json!(contents.takes_row());
         fields["steps"] = json!(steps(contents));
         fields["precision"] = json!(contents.precision.to_string());
-        fields["seed"] = json!(self.origin.settings.seed);
+        fields["seed"] = json!(self.settings.seed);
         if self.kind == BundleDecoder::default() {
             let mut operations = contents.computed();
             let hidden = operations.find(|(_, operation)| matches!(operation, Operation::Map(Function::Tanh, _)));
             fields["hidden_nodes"] = json!(hidden.map(|(id, _)| contents.size(id)));
         }
         fields
-    }
-
-    fn of_array(&self, simulation: &Simulation, contents: &Contents) -> Value {
-        let (sensor, scene) = (&simulation.sensor, &simulation.scene);
-        let names = |channels: &[Channel]| Vec::from_iter(channels.iter().map(|channel| channel.name.clone()));
-        json!({
-            "array": sensor.scale.to_string(),
-            "geometry": sensor.geometry,
-            "scene": scene,
-            "rows": scene.rows.to_string(),
-            "row_numbers": contents.takes_row().then_some([1, contents.rows]),
-            "inputs": { "names": names(&contents.meaning.inputs), "unit": "ohm" },
-            "outputs": { "names": names(&contents.meaning.targets), "unit": "mm" },
-            "training_samples": simulation.samples,
-            "errors": self.errors.nodes(),
-            "readings_in_training_ohm": self.ranges(),
-            "output_range_mm": contents.scales[0],
-        })
-    }
-
-    fn of_recording(&self, contents: &Contents) -> Value {
-        let origin = &self.origin;
-        let columns = |channels: &[Channel]| {
-            let (names, units): (Vec<_>, Vec<_>) =
-                channels.iter().map(|channel| (&channel.name, &channel.unit)).unzip();
-            json!({ "names": names, "units": units })
-        };
-        let named = |errors: &TestErrors| {
-            let of = |(channel, errors): (&Channel, &TargetErrors)| json!({ "name": channel.name, "errors": errors });
-            let targets = origin.problem.targets.iter();
-            targets.zip(errors.targets()).map(of).collect::<Vec<_>>()
-        };
-        let row_wires = origin.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
-        json!({
-            "files": origin.files,
-            "row_numbers": contents.takes_row().then(|| row_wires.collect::<Vec<_>>()),
-            "inputs": columns(&origin.problem.inputs),
-            "memory": origin.problem.memory,
-            "outputs": columns(&origin.problem.targets),
-            "method": origin.settings.training.method.short_name(),
-            "errors": named(&self.errors),
-            "errors_of_ridge": named(&origin.errors_of_linear),
-            "readings_in_training": self.ranges(),
-            "output_ranges": contents.scales,
-        })
     }
 
     /// Smallest and largest readings in training, row by row; with a history, of all features.
@@ -478,26 +449,6 @@ fn steps(contents: &Contents) -> Vec<String> {
         })
     };
     contents.computed().filter_map(step).collect()
-}
-
-impl Origin {
-    /// The facts from the file of a trained network.
-    fn of_file(file: &NetworkFile) -> Self {
-        Self {
-            program: file.program.clone(),
-            settings: file.settings,
-            problem: file.problem.clone(),
-            row_wires: file.row_wires.clone(),
-            files: file_names(file.recorded.as_ref().map(|recorded| &recorded.plan)),
-            errors_of_linear: file.scores.baselines.linear.clone(),
-        }
-    }
-}
-
-/// Errors of a decoder on test samples.
-fn errors(decoder: &mut dyn Decoder, problem: &Problem, test: &Dataset) -> Result<TestErrors, BundleError> {
-    let answers = decode_set(decoder, test).map_err(|error| Box::new(RunError::from(error)))?;
-    Ok(TestErrors::measure(problem, test, &answers))
 }
 
 fn file_names(plan: Option<&Plan>) -> Vec<String> {

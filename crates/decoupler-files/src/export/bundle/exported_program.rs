@@ -1,7 +1,7 @@
 //! The program that is printed.
 
 use decoupler_core::{
-    decoupling::{Domain, Node, NodeId, Operation, Precision, Program},
+    decoupling::{Builder, Domain, Node, NodeId, Operation, Precision, Program},
     evaluation::HalfWidth,
 };
 use ndarray::Array2;
@@ -24,19 +24,19 @@ pub(super) type Limits = Vec<Vec<(f64, f64)>>;
 impl ExportedProgram {
     /// Extends the program of a decoder; its successive affine maps are joined.
     pub(super) fn of(program: &Program, half_widths: &[HalfWidth], limits: Option<&Limits>) -> Self {
-        let mut nodes = join_affine_maps(program);
         let targets = program.output();
-        let of_widths = (!half_widths.is_empty()).then(|| push_half_widths(&mut nodes, targets, half_widths));
-        let outside = limits.map(|limits| push_outside(&mut nodes, limits));
-        let parts = Vec::from_iter([Some(targets), of_widths, outside].into_iter().flatten());
-        let size = parts.iter().map(|part| nodes[part.index()].size).sum();
-        let output = push(&mut nodes, Operation::Concatenate(parts), size);
-        let (program, moved) = compact(&nodes, output);
+        let mut builder = Builder::extending(&join_affine_maps(program));
+        let widths = (!half_widths.is_empty()).then(|| add_half_widths(&mut builder, targets, half_widths));
+        let outside = limits.map(|limits| add_outside(&mut builder, program, limits));
+        let parts = [Some(targets), widths, outside].into_iter().flatten();
+        let output = builder.concatenate(&Vec::from_iter(parts));
+        let (program, moved) = compact(&builder.finish(output));
+        let moved = |id: NodeId| moved[id.index()];
         Self {
             program,
-            targets: moved[targets.index()],
-            half_widths: of_widths.map(|node| moved[node.index()]),
-            outside: outside.map(|node| moved[node.index()]),
+            targets: moved(targets),
+            half_widths: widths.map(moved),
+            outside: outside.map(moved),
         }
     }
 
@@ -90,16 +90,11 @@ impl ExportedProgram {
 
     /// Indices of the nodes with sums of products.
     pub(super) fn layers(&self) -> Vec<usize> {
-        let index_of_layer = |(index, node): (usize, &Node)| match node.operation {
-            Operation::Affine { .. } | Operation::SquaredDistances { .. } => Some(index),
-            _ => None,
-        };
-        self.program
-            .nodes()
-            .iter()
-            .enumerate()
-            .filter_map(index_of_layer)
-            .collect()
+        let is_layer =
+            |operation: &Operation| matches!(operation, Operation::Affine { .. } | Operation::SquaredDistances { .. });
+        let nodes = self.program.nodes().iter().enumerate();
+        let layers = nodes.filter(|(_, node)| is_layer(&node.operation));
+        layers.map(|(index, _)| index).collect()
     }
 
     /// The parts of an answer.
@@ -121,24 +116,6 @@ pub(super) fn are_positive(program: &Program) -> bool {
     operations.any(|operation| matches!(operation, Operation::Valid { domain, .. } if *domain == Domain::Positive))
 }
 
-fn push(nodes: &mut Vec<Node>, operation: Operation, size: usize) -> NodeId {
-    nodes.push(Node {
-        operation,
-        size,
-        precision: Precision::Double,
-    });
-    NodeId::at(nodes.len() - 1)
-}
-
-fn push_tables(nodes: &mut Vec<Node>, tables: Vec<Array2<f64>>) -> NodeId {
-    let size = tables[0].len();
-    push(nodes, Operation::Select { tables, padding: 0.0 }, size)
-}
-
-fn row(values: Vec<f64>) -> Array2<f64> {
-    Array2::from_shape_vec((1, values.len()), values).expect("a row of values")
-}
-
 /// The constants of node `id`, of row-wire `row`.
 pub(super) fn table(nodes: &[Node], id: NodeId, row: usize) -> &Array2<f64> {
     let tables = tables(nodes, id);
@@ -153,7 +130,7 @@ fn tables(nodes: &[Node], id: NodeId) -> &[Array2<f64>] {
 }
 
 /// Joins affine maps of affine maps: the constants that restore the units of targets need no layer of their own.
-fn join_affine_maps(program: &Program) -> Vec<Node> {
+fn join_affine_maps(program: &Program) -> Program {
     let mut nodes = program.nodes().to_vec();
     for index in 0..nodes.len() {
         let Operation::Affine { of, weights, biases } = nodes[index].operation else {
@@ -172,28 +149,24 @@ fn join_affine_maps(program: &Program) -> Vec<Node> {
         }
         let all = [weights, biases, first_weights, first_biases];
         let rows = all.map(|id| tables(&nodes, id).len()).into_iter().max().unwrap_or(1);
-        let (mut joined_weights, mut joined_biases) = (Vec::new(), Vec::new());
-        for row in 0..rows {
+        let joined = (0..rows).map(|row| {
             let [weights, biases, first_weights, first_biases] = all.map(|id| table(&nodes, id, row));
-            joined_weights.push(first_weights.dot(weights));
-            joined_biases.push(first_biases.dot(weights) + biases);
-        }
+            (first_weights.dot(weights), first_biases.dot(weights) + biases)
+        });
+        let (joined_weights, joined_biases): (Vec<_>, Vec<_>) = joined.unzip();
         for (id, tables) in [(weights, joined_weights), (biases, joined_biases)] {
             nodes[id.index()].size = tables[0].len();
             nodes[id.index()].operation = Operation::Select { tables, padding: 0.0 };
         }
-        nodes[index].operation = Operation::Affine {
-            of: first,
-            weights,
-            biases,
-        };
+        let of = first;
+        nodes[index].operation = Operation::Affine { of, weights, biases };
     }
-    nodes
+    Program::new(nodes, program.output())
 }
 
 /// Adds half-widths that are constant, or piecewise linear in the target: a constant and, for each segment, a slope times
 /// the target within it.
-fn push_half_widths(nodes: &mut Vec<Node>, targets: NodeId, half_widths: &[HalfWidth]) -> NodeId {
+fn add_half_widths(builder: &mut Builder, targets: NodeId, half_widths: &[HalfWidth]) -> NodeId {
     let count = half_widths.len();
     let segments = half_widths.iter().map(|of| of.by_answer.len().saturating_sub(1)).max();
     let segments = segments.unwrap_or(0).max(1);
@@ -210,35 +183,29 @@ fn push_half_widths(nodes: &mut Vec<Node>, targets: NodeId, half_widths: &[HalfW
             biases[target] -= slope * x0;
         }
     }
-    let clipped = low.into_iter().zip(high).map(|(low, high)| {
-        let [low, high] = [low, high].map(|values| push_tables(nodes, vec![row(values)]));
-        push(nodes, Operation::Clip { of: targets, low, high }, count)
-    });
+    let limits = low.iter().zip(&high);
+    let clipped = limits.map(|(low, high)| builder.clip(targets, [low, high], Precision::Double));
     let clipped = Vec::from_iter(clipped);
-    let of = push(nodes, Operation::Concatenate(clipped), segments * count);
-    let weights = push_tables(nodes, vec![weights]);
-    let biases = push_tables(nodes, vec![row(biases)]);
-    push(nodes, Operation::Affine { of, weights, biases }, count)
+    let of = builder.concatenate(&clipped);
+    builder.affine(of, weights, &biases, Precision::Double)
 }
 
 /// Adds the number of readings, or features of a history, outside of `limits`.
-fn push_outside(nodes: &mut Vec<Node>, limits: &Limits) -> NodeId {
-    let first = |is: fn(&Operation) -> bool| nodes.iter().position(|node| is(&node.operation));
+fn add_outside(builder: &mut Builder, program: &Program, limits: &Limits) -> NodeId {
+    let first = |is: fn(&Operation) -> bool| program.nodes().iter().position(|node| is(&node.operation));
     let of = first(|operation| matches!(operation, Operation::History { .. }))
         .or_else(|| first(|operation| matches!(operation, Operation::Valid { .. })))
         .expect("every decoder checks its readings");
     let side = |pick: fn(&(f64, f64)) -> f64| {
-        let of_rows = limits.iter().map(|of_row| row(of_row.iter().map(pick).collect()));
-        Vec::from_iter(of_rows)
+        let of_row = |limits: &Vec<_>| Array2::from_shape_fn((1, limits.len()), |(_, index)| pick(&limits[index]));
+        limits.iter().map(of_row).collect()
     };
-    let low = push_tables(nodes, side(|limits| limits.0));
-    let high = push_tables(nodes, side(|limits| limits.1));
-    let of = NodeId::at(of);
-    push(nodes, Operation::CountOutside { of, low, high }, 1)
+    builder.count_outside(NodeId::at(of), [side(|limits| limits.0), side(|limits| limits.1)])
 }
 
-/// The program of the nodes that the output needs, and the new place of each.
-fn compact(nodes: &[Node], output: NodeId) -> (Program, Vec<NodeId>) {
+/// The program of the nodes that its output needs, and the new place of each.
+fn compact(program: &Program) -> (Program, Vec<NodeId>) {
+    let (nodes, output) = (program.nodes(), program.output());
     let mut is_needed = vec![false; nodes.len()];
     (is_needed[0], is_needed[output.index()]) = (true, true);
     for index in (0..nodes.len()).rev() {

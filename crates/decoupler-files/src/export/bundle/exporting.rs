@@ -36,34 +36,35 @@ pub fn export_bundle(
     format.check_for(decoder.kind(), precision)?;
     let mut folder = AtomicFolder::create(path)?;
     let mut contents = decoder.contents(&identifier(path), precision)?;
-    let accuracy = match precision {
-        BundlePrecision::Double => in_double(&mut contents)?,
-        BundlePrecision::Single => in_single(&mut contents)?,
-        BundlePrecision::Fixed16 => in_fixed16(&mut contents, &decoder)?,
-    };
-    let (limit, rounding, fixed) = (accuracy.limit, accuracy.rounding, accuracy.fixed.as_ref());
-    let bounds = fixed.map(|fixed| contents.meaning.named(&fixed.bounds));
     let mut report = BundleReport {
         format,
         precision,
         path: path.to_owned(),
         files: Vec::new(),
-        verified: contents.golden.count(),
-        golden: contents.golden.rows().len(),
-        checks: accuracy.checks,
-        limit,
-        rounding,
+        verified: 0,
+        golden: 0,
+        checks: Vec::new(),
+        limit: 0.0,
+        rounding: None,
         output_range_mm: contents.meaning.is_array.then(|| contents.scales[0]),
-        bounds: bounds.unwrap_or_default(),
-        remarks: contents.notes.clone(),
+        bounds: Vec::new(),
+        remarks: Vec::new(),
     };
+    let mut fixed = None;
+    match precision {
+        BundlePrecision::Double => report.limit = in_double(&mut contents)?,
+        BundlePrecision::Single => in_single(&mut contents, &mut report)?,
+        BundlePrecision::Fixed16 => fixed = Some(in_fixed16(&mut contents, &mut report, &decoder)?),
+    }
+    (report.verified, report.golden) = (contents.golden.all().len(), contents.golden.printed().len());
+    report.remarks.clone_from(&contents.notes);
     contents.metadata["verification"] =
-        json!({ "limit": limit, "change_by_rounding_readings": rounding, "remarks": report.remarks });
+        json!({ "limit": report.limit, "change_by_rounding_readings": report.rounding, "remarks": report.remarks });
     let usage = match format {
         BundleFormat::Onnx => onnx::print(&contents, &mut folder)?,
         BundleFormat::NumPy => numpy::print(&contents, &mut folder)?,
         BundleFormat::Matlab => matlab::print(&contents, &mut folder)?,
-        BundleFormat::C99 => c99::print(&contents, fixed, &mut folder, &mut report)?,
+        BundleFormat::C99 => c99::print(&contents, fixed.as_ref(), &mut folder, &mut report)?,
     };
     folder.write("golden.csv", contents.golden.csv(&contents))?;
     folder.write("metadata.json", format!("{:#}\n", contents.metadata))?;
@@ -72,17 +73,13 @@ pub fn export_bundle(
     Ok(report)
 }
 
-/// What is known about the deviation of other programs.
-#[derive(Default)]
-struct Accuracy {
-    limit: f64,
-    rounding: Option<f64>,
-    checks: Vec<BundleCheck>,
-    fixed: Option<FixedProgram>,
+/// A reading as a program in double precision takes it.
+pub(super) fn as_it_is(_channel: usize, reading: f64) -> f64 {
+    reading
 }
 
 /// A reading as a program in single precision takes it.
-fn in_f32(_channel: usize, reading: f64) -> f64 {
+pub(super) fn in_f32(_channel: usize, reading: f64) -> f64 {
     f64::from(reading as f32)
 }
 
@@ -91,26 +88,24 @@ fn deviation_in_single(contents: &Contents, wide: usize) -> Result<f64, BundleEr
     let taken = contents.golden.all().iter().map(|row| row.rounded(in_f32)).collect();
     let of_taken = Golden::of(taken, 0, &contents.exported.program, contents.outputs())?;
     let single = contents.exported.in_single(wide).program;
-    Ok(of_taken.deviation(&single, &contents.scales, |_, reading| reading)?)
+    Ok(of_taken.deviation(&single, &contents.scales, as_it_is)?)
 }
 
-/// Double precision: the effect of rounding errors is measured by larger errors of the constants, in proportion.
-fn in_double(contents: &mut Contents) -> Result<Accuracy, BundleError> {
+/// Double precision: the effect of rounding errors is measured by larger errors of the constants, in proportion. Returns the
+/// limit.
+fn in_double(contents: &mut Contents) -> Result<f64, BundleError> {
     /// Relative errors of constants, far above those of double precision and small enough for proportion.
     const ERROR: f64 = 1.0 / (1_u64 << 44) as f64;
     /// Factor for other orders of the sums, other functions, and errors that do not cancel.
     const SAFETY: f64 = 64.0;
-    if !are_constants_finite(contents, f64::is_finite) {
-        return Err(BundleError::NotFinite(
-            "double precision",
-            "train again with other settings",
-        ));
-    }
+    check_constants(
+        contents,
+        f64::is_finite,
+        "double precision",
+        "train again with other settings",
+    )?;
     let disturbed = contents.exported.disturbed(ERROR);
-    let found = contents
-        .golden
-        .deviation(&disturbed, &contents.scales, |_, reading| reading)?;
-    let amplification = found / ERROR;
+    let amplification = contents.golden.deviation(&disturbed, &contents.scales, as_it_is)? / ERROR;
     let limit = DOUBLE.max(SAFETY * 0.5 * f64::EPSILON * amplification);
     if limit > DOUBLE {
         contents.notes.push(format!(
@@ -120,15 +115,12 @@ fn in_double(contents: &mut Contents) -> Result<Accuracy, BundleError> {
             contents.meaning.smaller_weights()
         ));
     }
-    Ok(Accuracy {
-        limit,
-        ..Accuracy::default()
-    })
+    Ok(limit)
 }
 
 /// Single precision for all layers if it is accurate enough, otherwise double precision for as few of the first layers as
 /// possible.
-fn in_single(contents: &mut Contents) -> Result<Accuracy, BundleError> {
+fn in_single(contents: &mut Contents, report: &mut BundleReport) -> Result<(), BundleError> {
     /// Part of the usual deviation that a single evaluation may use up.
     const PART: f64 = 0.2;
     /// Factor for other orders of the sums and other functions.
@@ -143,9 +135,8 @@ fn in_single(contents: &mut Contents) -> Result<Accuracy, BundleError> {
             });
         }
     }
-    if !are_constants_finite(contents, |value| (value as f32).is_finite()) {
-        return Err(BundleError::NotFinite("single precision", "give --precision f64"));
-    }
+    let is_finite = |value: f64| (value as f32).is_finite();
+    check_constants(contents, is_finite, "single precision", "give --precision f64")?;
     let rounding = contents.golden.rounding(&contents.exported.program, &contents.scales)?;
     let change = contents.in_words(rounding);
     let cure = cure(contents);
@@ -158,64 +149,57 @@ fn in_single(contents: &mut Contents) -> Result<Accuracy, BundleError> {
             contents.meaning.output(),
         ));
     }
-    let layers = contents.exported.layers().len();
+    let layers = contents.exported.layers();
     let (mut wide, mut found) = (0, deviation_in_single(contents, 0)?);
-    while (found.is_nan() || found >= PART * SINGLE) && wide < layers {
+    while (found.is_nan() || found >= PART * SINGLE) && wide < layers.len() {
         wide += 1;
         found = deviation_in_single(contents, wide)?;
     }
     if wide > 0 {
-        let first = contents.exported.layers()[wide - 1];
         contents.notes.push(format!(
             "the {} are computed in double precision, because their large products nearly cancel; the rest is in single precision",
-            contents.names[first].replace('_', " ")
+            contents.names[layers[wide - 1]].replace('_', " ")
         ));
     }
     let arithmetic = SINGLE.max(SAFETY * found);
     if found.is_nan() || arithmetic > LARGEST_ROUNDING {
-        return Err(BundleError::Unresolved {
-            change: contents.in_words(arithmetic),
-            cure,
-        });
+        let change = contents.in_words(arithmetic);
+        return Err(BundleError::Unresolved { change, cure });
     }
     contents.exported = contents.exported.in_single(wide);
-    let deviation = contents
-        .golden
-        .deviation(&contents.exported.program, &contents.scales, in_f32)?;
-    Ok(Accuracy {
-        limit: arithmetic + rounding,
-        rounding: Some(rounding),
-        checks: vec![BundleCheck {
-            evaluator: "this program in single precision",
-            deviation,
-        }],
-        fixed: None,
-    })
+    let program = &contents.exported.program;
+    (report.limit, report.rounding) = (arithmetic + rounding, Some(rounding));
+    report.checks.push(BundleCheck {
+        evaluator: "this program in single precision",
+        deviation: contents.golden.deviation(program, &contents.scales, in_f32)?,
+    });
+    Ok(())
 }
 
 /// The program in fixed point, with its golden readings.
-fn in_fixed16(contents: &mut Contents, decoder: &ExportedDecoder) -> Result<Accuracy, BundleError> {
+fn in_fixed16(
+    contents: &mut Contents,
+    report: &mut BundleReport,
+    decoder: &ExportedDecoder,
+) -> Result<FixedProgram, BundleError> {
     let limits = decoder.limits();
-    let fixed = FixedProgram::of(&contents.exported, limits.as_ref(), &contents.meaning, &contents.scales)?;
+    let fixed = FixedProgram::of(contents, limits.as_ref())?;
     // The bound holds for these.
     limits.iter().for_each(|limits| contents.golden.retain_within(limits));
-    let limit = fixed.relative_bound(&contents.scales);
+    report.limit = fixed.relative_bound(&contents.scales);
+    report.bounds = contents.meaning.named(&fixed.bounds);
     if contents.exported.half_widths.take().is_some() {
         contents.notes.push("fixed16 has no prediction intervals".to_owned());
     }
-    if limit > FixedProgram::USUAL_BOUND {
+    if report.limit > FixedProgram::USUAL_BOUND {
         contents.notes.push(format!(
             "the error is only known to be below {:.0} % of the range of the outputs; {} for a decoder that amplifies rounding \
              errors less",
-            100.0 * limit,
+            100.0 * report.limit,
             contents.meaning.smaller_weights()
         ));
     }
-    Ok(Accuracy {
-        limit,
-        fixed: Some(fixed),
-        ..Accuracy::default()
-    })
+    Ok(fixed)
 }
 
 /// Advice for a bundle in single precision that changes too much by rounding readings to it.
@@ -236,6 +220,15 @@ fn cure(contents: &Contents) -> String {
     format!("give --precision f64, or {smaller}")
 }
 
-fn are_constants_finite(contents: &Contents, is_finite: impl Fn(f64) -> bool) -> bool {
-    contents.constants().all(|constant| constant.values().all(&is_finite))
+/// Checks that all constants are finite in this precision.
+fn check_constants(
+    contents: &Contents,
+    is_finite: impl Fn(f64) -> bool,
+    precision: &'static str,
+    cure: &'static str,
+) -> Result<(), BundleError> {
+    match contents.constants().all(|constant| constant.values().all(&is_finite)) {
+        true => Ok(()),
+        false => Err(BundleError::NotFinite(precision, cure)),
+    }
 }

@@ -4,7 +4,10 @@ use std::{
 };
 
 use super::report::BundleError;
-use crate::export::{WriteError, unfinished::UnfinishedFolder};
+use crate::export::{
+    WriteError,
+    unfinished::{UnfinishedFolder, folder_of},
+};
 
 /// A folder that is filled under a temporary name next to its target and then renamed: it exists completely or not at
 /// all. Dropped before [`Self::commit`], it leaves nothing.
@@ -22,17 +25,15 @@ impl AtomicFolder {
     /// # Errors
     /// Something else is there, or its folder cannot be written.
     pub(super) fn create(target: &Path) -> Result<Self, BundleError> {
-        let name = target
-            .file_name()
-            .ok_or_else(|| BundleError::Exists(target.to_owned()))?;
-        let parent = target.parent().filter(|parent| !parent.as_os_str().is_empty());
-        let parent = parent.unwrap_or(Path::new("."));
+        let exists = || BundleError::Exists(target.to_owned());
+        let name = target.file_name().ok_or_else(exists)?;
+        let parent = folder_of(target);
         if !parent.is_dir() {
             let (path, folder) = (target.to_owned(), parent.to_owned());
             return Err(WriteError::NoFolder { path, folder }.into());
         }
         if fs::symlink_metadata(target).is_ok() && !is_empty_folder(target) {
-            return Err(BundleError::Exists(target.to_owned()));
+            return Err(exists());
         }
         let folder = UnfinishedFolder::begin(parent).map_err(|error| WriteError::io(target, error))?;
         Ok(Self {
@@ -63,19 +64,14 @@ impl AtomicFolder {
     ///
     /// # Errors
     /// Something has been created there in the meantime, or the operating system refuses.
-    pub(super) fn commit(self) -> Result<Vec<(String, u64)>, BundleError> {
-        let Self {
-            target,
-            folder,
-            mut files,
-        } = self;
-        if is_empty_folder(&target) {
-            fs::remove_dir(&target).map_err(|error| WriteError::io(&target, error))?;
+    pub(super) fn commit(mut self) -> Result<Vec<(String, u64)>, BundleError> {
+        let refused = |error| WriteError::io(&self.target, error);
+        if is_empty_folder(&self.target) {
+            fs::remove_dir(&self.target).map_err(refused)?;
         }
-        let persisted = folder.persist(&target);
-        persisted.map_err(|error| WriteError::io(&target, error))?;
-        files.sort();
-        Ok(files)
+        self.folder.persist(&self.target).map_err(refused)?;
+        self.files.sort();
+        Ok(self.files)
     }
 }
 
@@ -88,16 +84,11 @@ const LONGEST: usize = 40;
 
 /// Name for functions and files, after the folder of the bundle: lower-case letters, digits and underscores.
 pub(super) fn identifier(path: &Path) -> String {
-    let name = path
-        .file_stem()
-        .map(|name| name.to_string_lossy().to_lowercase())
-        .unwrap_or_default();
-    let plain: String = name
-        .chars()
-        .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })
-        .collect();
-    let words: Vec<_> = plain.split('_').filter(|word| !word.is_empty()).collect();
-    let mut joined = words.join("_");
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+    let words = name
+        .split(|c: char| !c.is_ascii_alphanumeric())
+        .filter(|word| !word.is_empty());
+    let mut joined = Vec::from_iter(words).join("_");
     if !joined.starts_with(|c: char| c.is_ascii_lowercase()) {
         joined.insert_str(0, if joined.is_empty() { "network" } else { "network_" });
     }

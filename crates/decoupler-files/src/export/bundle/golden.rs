@@ -5,7 +5,11 @@ use decoupler_core::{
     text::inert,
 };
 
-use super::{contents::Contents, exported_program::Limits};
+use super::{
+    contents::Contents,
+    exported_program::Limits,
+    exporting::{as_it_is, in_f32},
+};
 use crate::export::write_csv_row;
 
 /// Readings with the answers that the decoder gives to them.
@@ -64,12 +68,14 @@ impl Golden {
         program: &Program,
         outputs: usize,
     ) -> Result<Self, DecodeError> {
-        let answers = answers(&rows, program, |_, reading| reading)?;
+        let answers = answers(&rows, program, as_it_is)?;
         for (row, answer) in rows.iter_mut().zip(answers) {
             row.targets = answer[..outputs].to_vec();
         }
-        let printed = printed.min(rows.len());
-        Ok(Self { rows, printed })
+        Ok(Self {
+            printed: printed.min(rows.len()),
+            rows,
+        })
     }
 
     /// Leaves out the rows with a reading beyond its limits.
@@ -78,18 +84,13 @@ impl Golden {
             let mut readings = row.readings.iter().zip(&limits[row.row.min(limits.len() - 1)]);
             readings.all(|(reading, (low, high))| (low..=high).contains(&reading))
         };
-        self.printed = self.rows().iter().filter(|row| is_within(row)).count();
+        self.printed = self.printed().iter().filter(|row| is_within(row)).count();
         self.rows.retain(is_within);
     }
 
     /// Those in the bundle.
-    pub(super) fn rows(&self) -> &[GoldenRow] {
+    pub(super) fn printed(&self) -> &[GoldenRow] {
         &self.rows[..self.printed]
-    }
-
-    /// Number of all rows.
-    pub(super) fn count(&self) -> usize {
-        self.rows.len()
     }
 
     /// All rows.
@@ -131,19 +132,21 @@ impl Golden {
             }
         }
         let at_most = largest(sums.into_iter().flatten().zip(scales.iter().copied().cycle()));
-        let measured = self.deviation(program, scales, |_, reading| f64::from(reading as f32))?;
+        let measured = self.deviation(program, scales, in_f32)?;
         Ok(larger(at_most, measured))
     }
 
     /// Changes of the targets if `program` decides and each reading is taken as `taken` says: rows × targets.
     fn changes(&self, program: &Program, taken: impl Fn(usize, f64) -> f64) -> Result<Vec<Vec<f64>>, DecodeError> {
-        let answers = answers(&self.rows, program, taken)?;
-        let pairs = self.rows.iter().zip(answers);
-        let of_row = |(row, answer): (&GoldenRow, Vec<f64>)| {
-            let targets = row.targets.iter().zip(answer);
-            targets.map(|(target, answer)| answer - target).collect()
-        };
-        Ok(pairs.map(of_row).collect())
+        let mut changes = answers(&self.rows, program, taken)?;
+        for (row, answer) in self.rows.iter().zip(&mut changes) {
+            answer.truncate(row.targets.len());
+            answer
+                .iter_mut()
+                .zip(&row.targets)
+                .for_each(|(answer, target)| *answer -= target);
+        }
+        Ok(changes)
     }
 
     /// The rows in the bundle as CSV: where a series begins and times if they matter, the row from 1 if it is an argument,
@@ -151,18 +154,23 @@ impl Golden {
     pub(super) fn csv(&self, contents: &Contents) -> String {
         let meaning = &contents.meaning;
         let (is_sequence, takes_row) = (contents.history().is_some(), contents.takes_row());
-        let of_sequence = ["new_series", "time_s"].iter().filter(|_| is_sequence);
-        let names = of_sequence
-            .chain(["row"].iter().filter(|_| takes_row))
-            .map(|&name| name.to_owned());
+        let mut names = Vec::new();
+        names.extend(
+            is_sequence
+                .then_some(["new_series", "time_s"])
+                .into_iter()
+                .flatten()
+                .map(str::to_owned),
+        );
+        names.extend(takes_row.then(|| "row".to_owned()));
         let channels = meaning.inputs.iter().chain(&meaning.targets);
-        let names = names.chain(channels.map(|channel| inert(&channel.name))).collect();
+        names.extend(channels.map(|channel| inert(&channel.name)));
         // User-defined names may contain commas and quotation marks.
         let mut bytes = Vec::new();
         let mut write =
             |fields: Vec<String>| write_csv_row(fields, &mut bytes).expect("writing to memory does not fail");
         write(names);
-        for row in self.rows() {
+        for row in self.printed() {
             let mut fields = Vec::new();
             if is_sequence {
                 fields.push(u8::from(row.is_new_series).to_string());

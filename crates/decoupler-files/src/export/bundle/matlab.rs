@@ -11,6 +11,7 @@ use ndarray::Array2;
 use super::{
     contents::{Contents, PrintedHistory, infix},
     folder::AtomicFolder,
+    meaning::wrapped,
     report::BundleError,
 };
 
@@ -25,68 +26,57 @@ pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<St
 
 /// Text of the function file.
 fn function(contents: &Contents) -> String {
-    let name = format!("{}_decode", contents.name);
-    let (input, channels) = (contents.meaning.readings(), contents.channels());
-    let history = contents.history();
-    let parts = contents.parts();
+    let Contents {
+        name, meaning, rows, ..
+    } = contents;
+    let (name, input, channels) = (format!("{name}_decode"), meaning.readings(), contents.channels());
+    let (history, parts, arguments) = (contents.history(), contents.parts(), arguments(contents));
     let state = history.iter().map(|_| "state");
     let returned = Vec::from_iter(parts.iter().copied().chain(state)).join(", ");
-    let arguments = arguments(contents);
-    let legend = format!("%   {}\n", contents.legend("").join("\n%   "));
-    let upper = name.to_uppercase();
-    let mut text = format!(
-        "function [{returned}] = {name}({arguments})\n%{upper} {}.\n%   [{}] = {upper}({}) has a line of {} for each line of\n\
-         %   {}{}.\n{legend}",
-        contents.meaning.purpose_without_stop(),
-        returned.to_uppercase(),
-        arguments.to_uppercase(),
-        contents.meaning.outputs_in_words(contents.outputs()),
-        counted(channels, "reading"),
-        contents.parts_in_words(),
-    );
+    let mut legend = contents.legend("");
+    let mut row_check = "row = ones(samples, 1);\n".to_owned();
     if contents.takes_row() {
-        let rows = contents.rows;
-        let _ = writeln!(
-            text,
-            "%   ROW is the row of each sample, from 1 to {rows}; a scalar applies to all samples."
+        legend.push(format!(
+            "ROW is the row of each sample, from 1 to {rows}; a scalar applies to all samples."
+        ));
+        row_check = format!(
+            "if isscalar(row)\n    row = repmat(row, samples, 1);\nend\nif numel(row) ~= samples || \
+             ~all(ismember(row, 1:{rows}))\n    error('row: give the row of each sample, from 1 to {rows}');\nend\n"
         );
     }
     if let Some(about) = contents.state_in_words() {
-        let lines = super::meaning::wrapped(&format!(
+        legend.extend(wrapped(&format!(
             "TIME_S is the time of each sample in seconds, in order. STATE is [] at the start, and continues from an earlier \
              call. {about}"
-        ));
-        let _ = writeln!(text, "%   {}", lines.join("\n%   "));
+        )));
     }
-    let _ = write!(
-        text,
-        "\nsamples = size({input}, 1);\nif size({input}, 2) ~= {channels}\n    error('{input}: give {channels} columns');\nend\n"
+    let mut text = format!(
+        "function [{returned}] = {name}({arguments})\n%{upper} {purpose}.\n%   [{upper_returned}] = {upper}({upper_arguments}) has \
+         a line of {outputs} for each line of\n%   {readings}{others}.\n%   {legend}\n\nsamples = size({input}, 1);\n\
+         if size({input}, 2) ~= {channels}\n    error('{input}: give {channels} columns');\nend\n{row_check}",
+        upper = name.to_uppercase(),
+        purpose = meaning.purpose(),
+        upper_returned = returned.to_uppercase(),
+        upper_arguments = arguments.to_uppercase(),
+        outputs = contents.outputs_in_words(),
+        readings = counted(channels, "reading"),
+        others = contents.parts_in_words(),
+        legend = legend.join("\n%   "),
     );
-    text += &match contents.takes_row() {
-        true => format!(
-            "if isscalar(row)\n    row = repmat(row, samples, 1);\nend\nif numel(row) ~= samples || \
-             ~all(ismember(row, 1:{rows}))\n    error('row: give the row of each sample, from 1 to {rows}');\nend\n",
-            rows = contents.rows
-        ),
-        false => "row = ones(samples, 1);\n".to_owned(),
-    };
     for constant in contents.constants() {
         for (index, table) in constant.tables.iter().enumerate() {
             push_matrix(&mut text, &format!("{}_{{{}}}", constant.name, index + 1), table);
         }
     }
-    let sizes = contents.exported.parts().map(|id| contents.size(id));
-    for (part, size) in parts.iter().zip(sizes) {
-        let _ = writeln!(text, "{part} = zeros(samples, {size});");
+    for (part, id) in parts.iter().zip(contents.exported.parts()) {
+        text += &format!("{part} = zeros(samples, {});\n", contents.size(id));
     }
     let body = contents.body(|id, operation| statement(contents, id, operation));
     let taken = parts.iter().map(|part| format!("    {part}(mine, :) = {part}_;\n"));
-    let decoded = format!(
-        "    {input}_ = {input}(mine, :);\n{body}{}end\nend\n",
-        taken.collect::<String>()
-    );
+    let taken = taken.collect::<String>();
+    let decoded = format!("    {input}_ = {input}(mine, :);\n{body}{taken}end\nend\n");
     text + &match &history {
-        None => format!("for k = 1:{}\n    mine = find(row(:) == k);\n{decoded}", contents.rows),
+        None => format!("for k = 1:{rows}\n    mine = find(row(:) == k);\n{decoded}"),
         Some(history) => format!(
             "if isscalar(time_s)\n    time_s = repmat(time_s, samples, 1);\nend\n\
              if nargin < 3 || isempty(state)\n    state = zeros({rows}, {channels});\nend\n\
@@ -119,9 +109,10 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
         }
     };
     let name = format!("{}_", contents.name_of(id));
-    let expression = match operation {
-        Operation::Valid { of: x, domain } => {
-            let (x, plain) = (of(*x), contents.name_of(*x));
+    let operands = Vec::from_iter(operation.operands().into_iter().map(of));
+    let expression = match (operation, &operands[..]) {
+        (Operation::Valid { of, domain }, [x]) => {
+            let plain = contents.name_of(*of);
             let (is_valid, above) = match domain {
                 Domain::Positive => (format!("isfinite({x}(:)) & {x}(:) > 0"), " above 0"),
                 Domain::Finite => (format!("isfinite({x}(:))"), ""),
@@ -130,28 +121,21 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
                 "    if ~all({is_valid})\n        error('{plain}: give finite numbers{above}');\n    end\n"
             );
         }
-        Operation::Affine { of: x, weights, biases } => format!("{} * {} + {}", of(*x), of(*weights), of(*biases)),
-        Operation::SquaredDistances { of: x, points } => {
+        (Operation::Affine { .. }, [x, weights, biases]) => format!("{x} * {weights} + {biases}"),
+        (Operation::SquaredDistances { .. }, [x, points]) => {
             return format!(
                 "    {name} = zeros(size({x}, 1), {count});\n    for g = 1:{count}\n        \
                  {name}(:, g) = sum(({x} - {points}(:, g)') .^ 2, 2);\n    end\n",
-                x = of(*x),
-                points = of(*points),
                 count = contents.size(id),
             );
         }
-        Operation::Clip { of: x, low, high } => format!("min(max({}, {}), {})", of(*x), of(*low), of(*high)),
-        Operation::Concatenate(parts) => {
-            let parts = Vec::from_iter(parts.iter().map(|part| of(*part)));
-            format!("[{}]", parts.join(", "))
+        (Operation::Clip { .. }, [x, low, high]) => format!("min(max({x}, {low}), {high})"),
+        (Operation::Concatenate(_), parts) => format!("[{}]", parts.join(", ")),
+        (Operation::History { .. }, [x]) => {
+            return format!("    [{name}, state] = remember(state, {x}, time_s(mine));\n");
         }
-        Operation::History { of: x, .. } => {
-            return format!("    [{name}, state] = remember(state, {}, time_s(mine));\n", of(*x));
-        }
-        Operation::CountOutside { of: x, low, high } => {
-            format!("sum({x} < {} | {x} > {}, 2)", of(*low), of(*high), x = of(*x))
-        }
-        _ => infix(operation, ["./", "", ""], of),
+        (Operation::CountOutside { .. }, [x, low, high]) => format!("sum({x} < {low} | {x} > {high}, 2)"),
+        _ => infix(operation, ["./", "", ""], &operands),
     };
     format!("    {name} = {expression};\n")
 }

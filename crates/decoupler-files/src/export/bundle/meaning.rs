@@ -1,7 +1,4 @@
-use decoupler_core::{
-    problem::Channel,
-    text::{counted, is_unprintable},
-};
+use decoupler_core::{problem::Channel, text::is_unprintable};
 
 /// Meaning of the readings and outputs of an exported network, and the words for them in its files.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,11 +30,6 @@ impl Meaning {
         self.either("coordinate", "target")
     }
 
-    /// The unit of decoding.
-    pub(super) fn sample(&self) -> &'static str {
-        self.either("one row-wire", "one sample")
-    }
-
     /// Name of the range to which deviations are relative.
     pub(super) fn scale(&self) -> &'static str {
         self.either(
@@ -51,22 +43,12 @@ impl Meaning {
         self.either("train with noise (--noise)", "train with fewer hidden nodes or epochs")
     }
 
-    /// A sentence on what the decoder does.
+    /// A sentence on what the decoder does, without its full stop.
     pub(super) fn purpose(&self) -> &'static str {
         self.either(
-            "Decodes the readings of one row-wire of a tactile array in ohm into the coordinates of its nodes in mm.",
-            "Decodes readings into targets.",
+            "Decodes the readings of one row-wire of a tactile array in ohm into the coordinates of its nodes in mm",
+            "Decodes readings into targets",
         )
-    }
-
-    /// [`Self::purpose`] without its full stop.
-    pub(super) fn purpose_without_stop(&self) -> &'static str {
-        self.purpose().trim_end_matches('.')
-    }
-
-    /// The outputs with their number.
-    pub(super) fn outputs_in_words(&self, count: usize) -> String {
-        counted(count, self.output())
     }
 
     pub(super) fn either(&self, array: &'static str, own: &'static str) -> &'static str {

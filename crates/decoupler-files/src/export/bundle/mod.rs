@@ -27,6 +27,5 @@ pub use self::{
     choice::{BundleDecoder, BundleFormat, BundlePrecision, ChoiceError},
     exported_decoder::ExportedDecoder,
     exporting::export_bundle,
-    fixed16::FixedPointError,
     report::{BundleCheck, BundleError, BundleReport},
 };

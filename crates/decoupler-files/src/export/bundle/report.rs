@@ -8,7 +8,7 @@ use super::{
     BundleDecoder,
     choice::{BundleFormat, BundlePrecision, ChoiceError},
     contents::Contents,
-    fixed16::FixedPointError,
+    meaning::wrapped,
 };
 use crate::{
     export::{WriteError, document::PROGRAM, format_number},
@@ -95,37 +95,29 @@ impl BundleReport {
 
 /// Returns the README of a bundle: its usage and its accuracy.
 pub(super) fn readme(contents: &Contents, decoder: BundleDecoder, usage: &str, report: &BundleReport) -> String {
-    let (meaning, noun, rows) = (&contents.meaning, contents.noun, contents.rows);
+    let (meaning, noun, BundleReport { format, precision, .. }) = (&contents.meaning, contents.noun, report);
+    let rows = match contents.takes_row() {
+        true => format!("There is one {noun} for each row, from 1 to {}.\n", contents.rows),
+        false => String::new(),
+    };
+    let state = contents.state_in_words();
+    let state = state.map_or_else(String::new, |state| format!("\n{}\n", wrapped(&state).join("\n")));
+    let range = report.output_range_mm;
+    let range = range.map_or_else(String::new, |range| format!(" ({} mm)", format_number(range)));
     let mut text = format!(
-        "{}, exported by {PROGRAM} as {}, {}.\n\n{}\nIt takes {} and returns {}{}.\n\n{}\n",
-        decoder.name(),
-        report.format,
-        report.precision,
-        meaning.purpose(),
-        counted(contents.channels(), "reading"),
-        meaning.outputs_in_words(contents.outputs()),
-        contents.parts_in_words(),
-        meaning.legend().join("\n"),
-    );
-    if contents.takes_row() {
-        text += &format!("There is one {noun} for each row, from 1 to {rows}.\n");
-    }
-    text += &format!(
-        "\nUsage\n\n{usage}\nA line of readings has {}, a line of the answer {}.\n",
-        counted(contents.channels(), "number"),
-        counted(contents.outputs(), "number"),
-    );
-    if let Some(state) = contents.state_in_words() {
-        text += &format!("\n{}\n", super::meaning::wrapped(&state).join("\n"));
-    }
-    text += "\nAccuracy\n\n";
-    let range = report
-        .output_range_mm
-        .map_or_else(String::new, |range| format!(" ({} mm)", format_number(range)));
-    text += &format!(
-        "Answers agree with those of the {noun} within {:.1e} of {}{range}.\n",
-        report.limit,
-        meaning.scale()
+        "{name}, exported by {PROGRAM} as {format}, {precision}.\n\n{purpose}.\nIt takes {readings} and returns {targets}{parts}.\n\n\
+         {legend}\n{rows}\nUsage\n\n{usage}\nA line of readings has {inputs}, a line of the answer {outputs}.\n{state}\n\
+         Accuracy\n\nAnswers agree with those of the {noun} within {limit:.1e} of {scale}{range}.\n",
+        name = decoder.name(),
+        purpose = meaning.purpose(),
+        readings = counted(contents.channels(), "reading"),
+        targets = contents.outputs_in_words(),
+        parts = contents.parts_in_words(),
+        legend = meaning.legend().join("\n"),
+        inputs = counted(contents.channels(), "number"),
+        outputs = counted(contents.outputs(), "number"),
+        limit = report.limit,
+        scale = meaning.scale(),
     );
     for check in &report.checks {
         text += &format!("{}: largest deviation {:.1e}.\n", check.evaluator, check.deviation);
@@ -204,9 +196,39 @@ pub enum BundleError {
         /// What to do.
         cure: String,
     },
-    /// The numbers do not fit 16 bits.
-    #[error(transparent)]
-    FixedPoint(#[from] FixedPointError),
+    /// Steps that have no form in integers (fixed16).
+    #[error("fixed16 has no {0}: give --precision f64 or f32")]
+    FixedStep(&'static str),
+    /// The file does not contain the range of the readings, which fixed16 needs.
+    #[error(
+        "fixed16 needs the range of the readings in training, which the network file does not have: train again, or give --precision f32"
+    )]
+    FixedNoRange,
+    /// Resistances that exceed 32 bits in every unit of fixed16.
+    #[error(
+        "fixed16 reads resistances up to 1e9 ohm, and in training they were up to {0:.1e} ohm: give --precision f32"
+    )]
+    FixedReading(f64),
+    /// Weights or outputs beyond the range of the numbers of fixed16.
+    #[error("fixed16 cannot hold the weights of {what}: {cure}, which keeps weights small, or give --precision f32")]
+    FixedRange {
+        /// A way to train a network with smaller weights.
+        cure: &'static str,
+        /// Name of the value that is too large.
+        what: &'static str,
+    },
+    /// An error bound of fixed16 that is too large.
+    #[error(
+        "in fixed point the error is only known to be below {bound:.3} times {scale}: {cure} (the decoder amplifies differences of its readings too much), or give --precision f32"
+    )]
+    FixedCoarse {
+        /// The bound, in proportion to the range.
+        bound: f64,
+        /// Name of the range.
+        scale: &'static str,
+        /// A way to train a network that amplifies less.
+        cure: &'static str,
+    },
     /// The C compiler refused the source, or its program failed.
     #[error("{step} failed: {reason}; nothing is left of the bundle")]
     SelfTest {

@@ -47,16 +47,13 @@ pub(in crate::export::bundle) fn run_self_test(
     let trial = home.path().join("trial.c");
     let hello = "#include <math.h>\n#include <stdio.h>\nint main(void)\n{\n    return puts(\"\") < 0;\n}\n";
     let tried = std::fs::write(&trial, hello).and_then(|()| compile(&[&trial], &program, home.path()));
-    let reason = match tried {
-        Ok(output) if output.status.success() => None,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Some("no C compiler found"),
+    match tried {
+        Ok(output) if output.status.success() => {}
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Err("no C compiler found")),
         Err(error) if error.kind() == io::ErrorKind::TimedOut => {
-            Some("the C compiler 'cc' does not end with an empty program")
+            return Ok(Err("the C compiler 'cc' does not end with an empty program"));
         }
-        _ => Some("the C compiler 'cc' cannot compile an empty program"),
-    };
-    if let Some(reason) = reason {
-        return Ok(Err(reason));
+        _ => return Ok(Err("the C compiler 'cc' cannot compile an empty program")),
     }
     let output = compile(&[&sources[0], &sources[1]], &program, home.path());
     let output = output.map_err(|error| failed("compiling the C source", error.to_string()))?;

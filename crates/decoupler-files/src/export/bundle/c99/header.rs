@@ -1,5 +1,3 @@
-use std::fmt::Write;
-
 use super::type_name;
 use crate::export::bundle::{contents::Contents, fixed16::FixedProgram, meaning::wrapped};
 
@@ -68,72 +66,56 @@ impl<'a> Header<'a> {
 
     /// Text of the header file.
     pub(super) fn text(&self) -> String {
-        let (contents, upper) = (self.contents, self.upper());
-        let name = &contents.name;
-        let of_units = self.fixed.map(|fixed| fixed.units_in_words(&contents.meaning));
-        let lines = contents.legend(&of_units.unwrap_or_default());
-        let mut text = format!(
-            "/* {}\n   {} */\n#ifndef {upper}_DECODE_H\n#define {upper}_DECODE_H\n\n",
-            contents.meaning.purpose(),
-            lines.join("\n   ")
-        );
-        text += if self.fixed.is_some() {
-            "#include <stdint.h>\n\n"
-        } else {
-            ""
-        };
-        if contents.takes_row() {
-            let _ = writeln!(text, "#define {upper}_ROWS {}", contents.rows);
+        let Contents {
+            name,
+            noun,
+            meaning,
+            rows,
+            ..
+        } = self.contents;
+        let (contents, number, upper) = (self.contents, self.number, self.upper());
+        let (mut include, mut units, mut definitions) = ("", String::new(), String::new());
+        let mut overflow = format!(" Readings so extreme that the sums overflow give {upper}_BAD_READING.");
+        if let Some(fixed) = self.fixed {
+            (include, overflow) = ("#include <stdint.h>\n\n", String::new());
+            (units, definitions) = (fixed.units_in_words(meaning), fixed.unit_definitions(&upper, meaning));
         }
-        let (channels, outputs) = (contents.channels(), contents.outputs());
-        let _ = writeln!(
-            text,
-            "#define {upper}_CHANNELS {channels}\n#define {upper}_OUTPUTS {outputs}\n"
-        );
-        let of_units = self
-            .fixed
-            .map(|fixed| fixed.unit_definitions(&upper, &contents.meaning));
-        text += &of_units.unwrap_or_default();
-        text += "#ifdef __cplusplus\nextern \"C\" {\n#endif\n\n";
-        let _ = write!(
-            text,
-            "/* What the function returns. */\nenum {{\n    {upper}_OK = 0,\n    {upper}_NO_SUCH_ROW = -1,\n    \
-             {upper}_BAD_READING = -2\n}};\n\ntypedef struct {{\n    {} {}[{upper}_OUTPUTS];\n",
-            self.number, self.outputs
-        );
+        let (mut of_rows, mut about_rows) = (String::new(), String::new());
+        if contents.takes_row() {
+            of_rows = format!("#define {upper}_ROWS {rows}\n");
+            about_rows = format!(" Rows are counted from 1 to {rows}.");
+        }
+        let mut further = String::new();
         if contents.exported.half_widths.is_some() {
-            let _ = write!(
-                text,
-                "    /* Half-widths of the 90 % prediction intervals, valid for all answers together. */\n    \
-                 {} half_widths[{upper}_OUTPUTS];\n",
-                self.number
-            );
+            further += "    /* Half-widths of the 90 % prediction intervals, valid for all answers together. */\n";
+            further += &format!("    {number} half_widths[{upper}_OUTPUTS];\n");
         }
         if contents.exported.outside.is_some() {
-            let what = wrapped(&format!(
-                "{}, where the {} only guesses: 0 if there are none.",
-                contents.outside_in_words(),
-                contents.noun
-            ));
-            let what = what.join("\n       ");
-            let _ = writeln!(text, "    /* {what} */\n    int readings_outside;");
+            let what = contents.outside_in_words();
+            let what = wrapped(&format!("{what}, where the {noun} only guesses: 0 if there are none."));
+            further += &format!("    /* {} */\n    int readings_outside;\n", what.join("\n       "));
         }
-        let _ = write!(text, "}} {name}_answer;\n\n");
-        text += &self.state();
-        let row = match contents.takes_row() {
-            true => format!(" Rows are counted from 1 to {}.", contents.rows),
-            false => String::new(),
-        };
-        let overflow = match self.fixed {
-            Some(_) => String::new(),
-            None => format!(" Readings so extreme that the sums overflow give {upper}_BAD_READING."),
-        };
         let about = wrapped(&format!(
-            "Decodes {}.{row} Returns {upper}_OK, or leaves the answer as it is and returns what is wrong.{overflow}",
-            contents.meaning.sample()
+            "Decodes {}.{about_rows} Returns {upper}_OK, or leaves the answer as it is and returns what is wrong.{overflow}",
+            meaning.either("one row-wire", "one sample")
         ));
-        let _ = write!(text, "/* {} */\n{};\n\n", about.join("\n   "), self.signature());
-        text + "#ifdef __cplusplus\n}\n#endif\n\n#endif\n"
+        format!(
+            "/* {purpose}.\n   {legend} */\n#ifndef {upper}_DECODE_H\n#define {upper}_DECODE_H\n\n{include}{of_rows}\
+             #define {upper}_CHANNELS {channels}\n#define {upper}_OUTPUTS {outputs}\n\n{definitions}\
+             #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
+             /* What the function returns. */\nenum {{\n    {upper}_OK = 0,\n    {upper}_NO_SUCH_ROW = -1,\n    \
+             {upper}_BAD_READING = -2\n}};\n\ntypedef struct {{\n    {number} {targets}[{upper}_OUTPUTS];\n\
+             {further}}} {name}_answer;\n\n{state}/* {about} */\n{signature};\n\n\
+             #ifdef __cplusplus\n}}\n#endif\n\n#endif\n",
+            purpose = meaning.purpose(),
+            legend = contents.legend(&units).join("\n   "),
+            channels = contents.channels(),
+            outputs = contents.outputs(),
+            targets = self.outputs,
+            state = self.state(),
+            about = about.join("\n   "),
+            signature = self.signature(),
+        )
     }
 
     /// The state of a history, with its sizes.

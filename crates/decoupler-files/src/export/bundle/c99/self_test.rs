@@ -11,7 +11,7 @@ use crate::export::bundle::{exported_program::are_positive, golden::GoldenRow};
 pub(super) fn self_test(header: &Header<'_>, limit: f64) -> String {
     let contents = header.contents;
     let (name, is_sequence) = (&contents.name, contents.history().is_some());
-    let golden = contents.golden.rows();
+    let golden = contents.golden.printed();
     let mut text = format!(
         "/* Decodes the golden readings and compares the {}s with those of the {}, which takes the readings in double\n   \
              precision. Exits with 0 if they agree. */\n#include \"{name}_decode.h\"\n\n#include <math.h>\n#include <stdio.h>\n\n",

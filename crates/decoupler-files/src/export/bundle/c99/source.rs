@@ -54,19 +54,21 @@ fn value(contents: &Contents, id: NodeId, index: &str, precision: Precision) -> 
 fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operation) -> String {
     let (name, size, precision) = (contents.name_of(id), contents.size(id), contents.precision_of(id));
     let kind = type_name(precision);
-    let of = |id: NodeId, index: &str| value(contents, id, index, precision);
+    let operands = Vec::from_iter(operation.operands().into_iter().map(|operand| {
+        let index = if contents.is_matrix(operand) { "i][k" } else { "i" };
+        value(contents, operand, index, precision)
+    }));
     let declared = format!("    {kind} {name}[{size}];\n");
     let each = |size: usize, body: &str| format!("    for (int i = 0; i < {size}; ++i) {{\n        {body}\n    }}\n");
-    let assigned = |expression: String| declared.clone() + &each(size, &format!("{name}[i] = {expression};"));
-    let sums = |inputs: usize, body: &str| {
+    let assigned = |expression: &str| declared.clone() + &each(size, &format!("{name}[i] = {expression};"));
+    let sums = |inputs: NodeId, body: &str| {
         let inner = format!("for (int k = 0; k < {size}; ++k) {{\n            {body}\n        }}");
-        each(inputs, &inner)
+        each(contents.size(inputs), &inner)
     };
     let suffix = if precision == Precision::Single { "f" } else { "" };
-    match operation {
-        Operation::Valid { of, domain } => {
-            let reading = value(contents, *of, "i", contents.precision_of(*of));
-            let most = largest(contents.precision_of(*of));
+    match (operation, &operands[..]) {
+        (Operation::Valid { domain, .. }, [reading]) => {
+            let most = largest(precision);
             let lowest = match domain {
                 Domain::Positive => format!("{reading} > 0"),
                 Domain::Finite => format!("{reading} >= -{most}"),
@@ -75,50 +77,34 @@ fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operatio
             let refusal = format!("if (!({is_valid})) {{\n            return {upper}_BAD_READING;\n        }}");
             each(size, &refusal)
         }
-        Operation::Affine {
-            of: values,
-            weights,
-            biases,
-        } => {
-            let body = format!("{name}[k] += {} * {};", of(*values, "i"), of(*weights, "i][k"));
-            assigned(of(*biases, "i")) + &sums(contents.size(*values), &body)
+        (Operation::Affine { of, .. }, [x, weight, bias]) => {
+            assigned(bias) + &sums(*of, &format!("{name}[k] += {x} * {weight};"))
         }
-        Operation::SquaredDistances { of: values, points } => {
-            let body = format!(
-                "const {kind} apart = {} - {};\n            {name}[k] += apart * apart;",
-                of(*values, "i"),
-                of(*points, "i][k")
-            );
-            assigned("0".to_owned()) + &sums(contents.size(*values), &body)
+        (Operation::SquaredDistances { of, .. }, [x, point]) => {
+            let body = format!("const {kind} apart = {x} - {point};\n            {name}[k] += apart * apart;");
+            assigned("0") + &sums(*of, &body)
         }
-        Operation::Clip { of: values, low, high } => {
-            let (x, low, high) = (of(*values, "i"), of(*low, "i"), of(*high, "i"));
-            assigned(format!("{x} < {low} ? {low} : {x} > {high} ? {high} : {x}"))
+        (Operation::Clip { .. }, [x, low, high]) => {
+            assigned(&format!("{x} < {low} ? {low} : {x} > {high} ? {high} : {x}"))
         }
-        Operation::Concatenate(parts) => {
-            let mut text = declared.clone();
-            let mut first = 0;
-            for part in parts {
-                let shift = if first == 0 {
-                    String::new()
-                } else {
-                    format!("{first} + ")
-                };
-                text += &each(contents.size(*part), &format!("{name}[{shift}i] = {};", of(*part, "i")));
+        (Operation::Concatenate(parts), values) => {
+            let (mut text, mut shift, mut first) = (declared, String::new(), 0);
+            for (part, value) in parts.iter().zip(values) {
+                text += &each(contents.size(*part), &format!("{name}[{shift}i] = {value};"));
                 first += contents.size(*part);
+                shift = format!("{first} + ");
             }
             text
         }
-        Operation::History { .. } => {
+        (Operation::History { .. }, _) => {
             let readings = contents.meaning.readings();
             format!("{declared}    remember(state, time_s, {readings}, {name});\n")
         }
-        Operation::CountOutside { of: values, low, high } => {
-            let x = of(*values, "i");
-            let count = format!("{name} += !({x} >= {} && {x} <= {});", of(*low, "i"), of(*high, "i"));
-            format!("    int {name} = 0;\n") + &each(contents.size(*values), &count)
+        (Operation::CountOutside { of, .. }, [x, low, high]) => {
+            let count = format!("{name} += !({x} >= {low} && {x} <= {high});");
+            format!("    int {name} = 0;\n") + &each(contents.size(*of), &count)
         }
-        _ => assigned(infix(operation, ["/", "", suffix], |id| of(id, "i"))),
+        _ => assigned(&infix(operation, ["/", "", suffix], &operands)),
     }
 }
 
@@ -169,10 +155,8 @@ fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
     let doubles = |values: Vec<f64>| values.into_iter().map(double).collect();
     array("double", "per_second", doubles(per_second));
     array("double", "per_reading", doubles(per_reading));
-    let past = |value: &str| match constants.differences {
-        true => format!("now - {value}"),
-        false => value.to_owned(),
-    };
+    // A feature is the past or its difference from the reading.
+    let minus = if constants.differences { "readings[i] - " } else { "" };
     let channel_loop = format!("for (int i = 0; i < {channels}; ++i) {{");
     let loops = |count: usize, indent: &str, first: &str, body: &str| match count {
         0 => String::new(),
@@ -184,14 +168,13 @@ fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
         let body = format!("                state->{field}[k][i] = readings[i];\n");
         loops(count, "        ", "", &body)
     };
-    let now = "            const double now = readings[i];\n            ";
     let first = format!("        const int at = (state->latest - lags[k] + 1 + {kept}) % {kept};\n");
-    let body = format!("{now}*feature++ = {};\n", past("state->kept[at][i]"));
+    let body = format!("            *feature++ = {minus}state->kept[at][i];\n");
     let of_lags = loops(constants.lags.len(), "    ", &first, &body);
     let first = "        const double weight = -expm1(-(elapsed_s * per_second[k] + per_reading[k]));\n";
     let body = format!(
-        "{now}state->averages[k][i] += weight * (now - state->averages[k][i]);\n            *feature++ = {};\n",
-        past("state->averages[k][i]")
+        "            state->averages[k][i] += weight * (readings[i] - state->averages[k][i]);\n            \
+         *feature++ = {minus}state->averages[k][i];\n"
     );
     let of_averages = loops(averages, "    ", first, &body);
     let shifting = match kept {

@@ -13,7 +13,6 @@ use decoupler_core::{
     decoupling::{Domain, Function, NodeId, Operation},
 };
 use ndarray::Array2;
-use thiserror::Error;
 
 pub(super) use self::scaled::{CONDUCTANCE_BITS, INPUT_BITS, LARGEST_INPUT, TangentTable};
 use self::{
@@ -21,49 +20,12 @@ use self::{
     units::Units,
 };
 use super::{
+    contents::Contents,
     exported_program::{ExportedProgram, Limits, table},
     meaning::{Meaning, comment},
+    report::BundleError,
 };
 use crate::export::format_number;
-
-/// Reasons why a decoder cannot be exported in fixed point.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum FixedPointError {
-    /// Steps that have no form in integers.
-    #[error("fixed16 has no {0}: give --precision f64 or f32")]
-    Step(&'static str),
-    /// The file does not contain the range of the readings.
-    #[error(
-        "fixed16 needs the range of the readings in training, which the network file does not have: train again, or give --precision f32"
-    )]
-    NoRange,
-    /// Resistances that exceed 32 bits in every unit.
-    #[error(
-        "fixed16 reads resistances up to 1e9 ohm, and in training they were up to {0:.1e} ohm: give --precision f32"
-    )]
-    Reading(f64),
-    /// Weights or outputs beyond the range of the numbers.
-    #[error("fixed16 cannot hold the weights of {what}: {cure}, which keeps weights small, or give --precision f32")]
-    Range {
-        /// A way to train a network with smaller weights.
-        cure: &'static str,
-        /// Name of the value that is too large.
-        what: &'static str,
-    },
-    /// An error bound that is too large.
-    #[error(
-        "in fixed point the error is only known to be below {bound:.3} times {scale}: {cure} (the decoder amplifies differences of its readings too much), or give --precision f32"
-    )]
-    Coarse {
-        /// The bound, in proportion to the range.
-        bound: f64,
-        /// Name of the range.
-        scale: &'static str,
-        /// A way to train a network that amplifies less.
-        cure: &'static str,
-    },
-}
 
 /// Upper bound of a target in units for all inputs of the last layer.
 const LARGEST_TARGET: f64 = (1_u32 << 30) as f64;
@@ -101,15 +63,6 @@ pub(super) struct FixedTable {
     pub(super) values: Vec<i64>,
 }
 
-/// Steps from the changes of the readings to the targets.
-struct Chain {
-    /// The readings are compared with these constants.
-    reference: NodeId,
-    is_relative: bool,
-    /// Weights and biases of each layer.
-    layers: Vec<[NodeId; 2]>,
-}
-
 impl FixedProgram {
     /// Upper limit of the error bound, relative to the range of a target, above which there is a remark.
     pub(super) const USUAL_BOUND: f64 = 0.01;
@@ -119,24 +72,23 @@ impl FixedProgram {
     /// # Errors
     /// The range of the readings is not known, a step or a number has no form in integers, or the bound on the error is as
     /// large as the range of the targets.
-    pub(super) fn of(
-        exported: &ExportedProgram,
-        limits: Option<&Limits>,
-        meaning: &Meaning,
-        scales: &[f64],
-    ) -> Result<Self, FixedPointError> {
-        let chain = Chain::of(exported)?;
-        let limits = limits.ok_or(FixedPointError::NoRange)?;
+    pub(super) fn of(contents: &Contents, limits: Option<&Limits>) -> Result<Self, BundleError> {
+        let Contents {
+            exported,
+            meaning,
+            scales,
+            ..
+        } = contents;
+        let (is_relative, reference, layers) = chain(exported)?;
+        let limits = limits.ok_or(BundleError::FixedNoRange)?;
         let cure = meaning.smaller_weights();
-        let nodes = exported.program.nodes();
         let rows = exported.program.rows();
-        let tables = |id: NodeId, row: usize| table(nodes, id, row);
-        let readings = Units::of_readings(meaning, limits)?;
-        let [weights, biases] = *chain.layers.last().expect("there is a layer of targets");
+        let tables = |id: NodeId, row: usize| table(exported.program.nodes(), id, row);
+        let [weights, biases] = *layers.last().expect("there is a layer of targets");
         let reach = |target: usize| {
             let of_row = |row: usize| {
                 let weights = tables(weights, row).column(target);
-                let most = match chain.layers.len() {
+                let most = match layers.len() {
                     // The targets of a single layer are sums of changes, whose size is that of the range.
                     1 => scales[target],
                     _ => weights.iter().map(|weight| weight.abs()).sum::<f64>(),
@@ -145,23 +97,21 @@ impl FixedProgram {
             };
             (0..rows).map(of_row).fold(0.0, f64::max)
         };
-        let targets = Units::of_targets(meaning, scales, reach);
         let mut fixed = Self {
-            is_relative: chain.is_relative,
+            is_relative,
             tangent: TangentTable::new(),
             rows,
             layers: Vec::new(),
             tables: Vec::new(),
             bounds: vec![0.0; exported.outputs()],
-            readings,
-            targets,
+            readings: Units::of_readings(meaning, limits)?,
+            targets: Units::of_targets(meaning, scales, reach),
         };
         for row in 0..rows {
             let limits = PerRow::each(limits.clone());
-            let numbers = [&chain.reference].into_iter().chain(chain.layers.iter().flatten());
-            let tables: Vec<&Array2<f64>> = numbers.map(|id| tables(*id, row)).collect();
-            let bounds = fixed.push_row(&tables, limits.at(row));
-            let bounds = bounds.map_err(|what| FixedPointError::Range { what, cure })?;
+            let layers = layers.iter().map(|layer| layer.map(|id| tables(id, row)));
+            let bounds = fixed.push_row(tables(reference, row), &Vec::from_iter(layers), limits.at(row));
+            let bounds = bounds.map_err(|what| BundleError::FixedRange { what, cure })?;
             for (target, (bound, of_row)) in fixed.bounds.iter_mut().zip(bounds).enumerate() {
                 *bound = bound.max(of_row * fixed.targets.unit(target));
             }
@@ -171,7 +121,7 @@ impl FixedProgram {
             return Ok(fixed);
         }
         let scale = meaning.scale();
-        Err(FixedPointError::Coarse { bound, scale, cure })
+        Err(BundleError::FixedCoarse { bound, scale, cure })
     }
 
     /// Largest bound relative to the scale of its target.
@@ -180,10 +130,14 @@ impl FixedProgram {
         relative.fold(0.0, f64::max)
     }
 
-    /// Adds the numbers of a row-wire: its reference, then weights and biases of each layer. Returns bounds on the errors of
-    /// the targets in their units, or the name of what does not fit.
-    fn push_row(&mut self, tables: &[&Array2<f64>], limits: &[(f64, f64)]) -> Result<Vec<f64>, &'static str> {
-        let (reference, layers) = tables.split_first().expect("the reference comes first");
+    /// Adds the numbers of a row-wire, with weights and biases of each layer. Returns bounds on the errors of the targets in
+    /// their units, or the name of what does not fit.
+    fn push_row(
+        &mut self,
+        reference: &Array2<f64>,
+        layers: &[[&Array2<f64>; 2]],
+        limits: &[(f64, f64)],
+    ) -> Result<Vec<f64>, &'static str> {
         let channels = limits.iter().zip(reference.iter()).enumerate();
         let changes = channels.map(|(channel, (&limits, &reference))| {
             Change::of(self.is_relative, self.readings.per_one(channel), limits, reference)
@@ -192,18 +146,15 @@ impl FixedProgram {
         let shape = [changes.len()];
         let centres = changes.iter().map(|change| i64::from(change.centre));
         self.put("centres", "int32_t", &shape, centres);
-        let factors = changes.iter().map(|change| i64::from(change.multiplier().factor));
+        let (factors, shifts): (Vec<i64>, Vec<i64>) = changes.iter().map(Change::multiplier).unzip();
         self.put("factors", "int32_t", &shape, factors);
-        let shifts = changes.iter().map(|change| i64::from(change.multiplier().shift));
         self.put("factor_shifts", "uint8_t", &shape, shifts);
         // Each input is a number of 15 bits after the point times a slope, plus an offset.
         let mut slopes: Vec<f64> = changes.iter().map(Change::slope).collect();
         let mut offsets: Vec<f64> = changes.iter().map(|change| change.offset).collect();
         let mut errors: Vec<f64> = changes.iter().map(Change::error).collect();
-        let count = layers.len() / 2;
-        for (index, layer) in layers.chunks_exact(2).enumerate() {
-            let (weights, biases) = (layer[0], layer[1]);
-            let is_last = index + 1 == count;
+        for (index, [weights, biases]) in layers.iter().enumerate() {
+            let is_last = index + 1 == layers.len();
             let mut next_errors = Vec::new();
             let (mut whole_weights, mut whole_biases, mut shifts) = (Vec::new(), Vec::new(), Vec::new());
             for (sum, weights) in weights.columns().into_iter().enumerate() {
@@ -245,10 +196,11 @@ impl FixedProgram {
             (slopes, offsets) = (vec![1.0; errors.len()], vec![0.0; errors.len()]);
         }
         let limits = limits.iter().enumerate();
-        let whole = limits.map(|(channel, &(low, high))| [low, high].map(|limit| self.readings.whole(channel, limit)));
-        let whole = Vec::from_iter(whole);
-        self.put("lowest", "int32_t", &shape, whole.iter().map(|limits| limits[0]));
-        self.put("highest", "int32_t", &shape, whole.iter().map(|limits| limits[1]));
+        let whole = limits
+            .map(|(channel, &(low, high))| (self.readings.whole(channel, low), self.readings.whole(channel, high)));
+        let (lowest, highest): (Vec<i64>, Vec<i64>) = whole.unzip();
+        self.put("lowest", "int32_t", &shape, lowest);
+        self.put("highest", "int32_t", &shape, highest);
         Ok(errors)
     }
 
@@ -308,40 +260,37 @@ impl FixedProgram {
     }
 }
 
-impl Chain {
-    /// The steps of a program.
-    ///
-    /// # Errors
-    /// A step has no form in integers.
-    fn of(exported: &ExportedProgram) -> Result<Self, FixedPointError> {
-        let operation = |id: NodeId| &exported.program.node(id).operation;
-        let mut layers = Vec::new();
-        let mut id = exported.targets;
-        loop {
-            id = match operation(id) {
-                Operation::Affine { of, weights, biases } => {
-                    layers.push([*weights, *biases]);
-                    *of
-                }
-                Operation::Map(Function::Tanh, of) if !layers.is_empty() => *of,
-                _ => break,
-            };
-        }
-        layers.reverse();
-        let difference = match operation(id) {
-            Operation::Divide(difference, readings) if is_valid(operation(*readings)) => *difference,
-            _ => id,
+/// The steps of a program from the changes of the readings to the targets: whether changes are relative, the constants with
+/// which readings are compared, and weights and biases of each layer.
+///
+/// # Errors
+/// A step has no form in integers.
+fn chain(exported: &ExportedProgram) -> Result<(bool, NodeId, Vec<[NodeId; 2]>), BundleError> {
+    let operation = |id: NodeId| &exported.program.node(id).operation;
+    let mut layers = Vec::new();
+    let mut id = exported.targets;
+    loop {
+        id = match operation(id) {
+            Operation::Affine { of, weights, biases } => {
+                layers.push([*weights, *biases]);
+                *of
+            }
+            Operation::Map(Function::Tanh, of) if !layers.is_empty() => *of,
+            _ => break,
         };
-        match operation(difference) {
-            Operation::Subtract(readings, reference) if is_valid(operation(*readings)) => Ok(Self {
-                reference: *reference,
-                is_relative: difference != id,
-                layers,
-            }),
-            Operation::Map(Function::Gaussian, _) => Err(FixedPointError::Step("Gaussians")),
-            Operation::Map(..) => Err(FixedPointError::Step("logarithms")),
-            _ => Err(FixedPointError::Step("history of readings")),
+    }
+    layers.reverse();
+    let difference = match operation(id) {
+        Operation::Divide(difference, readings) if is_valid(operation(*readings)) => *difference,
+        _ => id,
+    };
+    match operation(difference) {
+        Operation::Subtract(readings, reference) if is_valid(operation(*readings)) => {
+            Ok((difference != id, *reference, layers))
         }
+        Operation::Map(Function::Gaussian, _) => Err(BundleError::FixedStep("Gaussians")),
+        Operation::Map(..) => Err(BundleError::FixedStep("logarithms")),
+        _ => Err(BundleError::FixedStep("history of readings")),
     }
 }
 

@@ -56,25 +56,13 @@ pub(super) fn whole_bias(bias: f64, bits: i32, weights: &[i32]) -> Option<(i64, 
     fits.then(|| (whole as i64, (bias - whole / scale).abs()))
 }
 
-/// A factor as an integer divided by a power of two.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Multiplier {
-    pub(super) factor: i32,
-    pub(super) shift: u8,
-}
+/// Relative rounding error of a [`multiplier`].
+const MULTIPLIER_ERROR: f64 = 1.0 / (1_u32 << 29) as f64;
 
-impl Multiplier {
-    /// Relative rounding error.
-    const ERROR: f64 = 1.0 / (1_u32 << 29) as f64;
-
-    /// Rounds a factor from about 1e-6 to 2²⁹.
-    fn of(factor: f64) -> Self {
-        let shift = (29 - factor.log2().floor() as i32).clamp(0, 60);
-        Self {
-            factor: (factor * 2.0_f64.powi(shift)).round() as i32,
-            shift: shift as u8,
-        }
-    }
+/// A factor from about 1e-6 to 2²⁹, rounded to an integer divided by a power of two: the integer and the power.
+fn multiplier(factor: f64) -> (i64, i64) {
+    let shift = (29 - factor.log2().floor() as i32).clamp(0, 60);
+    ((factor * 2.0_f64.powi(shift)).round() as i64, i64::from(shift))
 }
 
 /// Bits after the point of a relative change.
@@ -128,9 +116,9 @@ impl Change {
         }
     }
 
-    /// Factor that brings the span to the largest input.
-    pub(super) fn multiplier(&self) -> Multiplier {
-        Multiplier::of(f64::from(LARGEST_INPUT) / self.span)
+    /// Factor that brings the span to the largest input, as an integer divided by a power of two.
+    pub(super) fn multiplier(&self) -> (i64, i64) {
+        multiplier(f64::from(LARGEST_INPUT) / self.span)
     }
 
     /// Change per 1 of the input.
@@ -140,7 +128,7 @@ impl Change {
 
     /// Error of the input.
     pub(super) fn error(&self) -> f64 {
-        Multiplier::ERROR + HALF / f64::from(LARGEST_INPUT) + self.error / self.span
+        MULTIPLIER_ERROR + HALF / f64::from(LARGEST_INPUT) + self.error / self.span
     }
 }
 
@@ -228,9 +216,9 @@ mod tests {
     #[test]
     fn factors_keep_thirty_bits() {
         for factor in [1.5e-5, 0.3, 1.0, 77.7, 65534.0, 3.2e7] {
-            let Multiplier { factor: whole, shift } = Multiplier::of(factor);
-            let relative = f64::from(whole) / 2.0_f64.powi(i32::from(shift)) / factor - 1.0;
-            assert!(relative.abs() <= Multiplier::ERROR, "{factor}: {relative}");
+            let (whole, shift) = multiplier(factor);
+            let relative = whole as f64 / 2.0_f64.powi(shift as i32) / factor - 1.0;
+            assert!(relative.abs() <= MULTIPLIER_ERROR, "{factor}: {relative}");
         }
     }
 

@@ -1,5 +1,4 @@
-use super::FixedPointError;
-use crate::export::bundle::{exported_program::Limits, meaning::Meaning};
+use crate::export::bundle::{exported_program::Limits, meaning::Meaning, report::BundleError};
 
 /// Units of integers: each is 10^−`decimals` of the decoder's unit of the reading or target.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,7 +18,7 @@ impl Units {
     ///
     /// # Errors
     /// Resistances of an array are beyond all of these units.
-    pub(super) fn of_readings(meaning: &Meaning, limits: &Limits) -> Result<Self, FixedPointError> {
+    pub(super) fn of_readings(meaning: &Meaning, limits: &Limits) -> Result<Self, BundleError> {
         let largest = |channel: usize| {
             let limits = limits.iter().map(|of_row| of_row[channel]);
             limits.fold(0.0_f64, |largest, (low, high)| largest.max(low.abs()).max(high.abs()))
@@ -29,7 +28,7 @@ impl Units {
             let largest_ohm = channels.clone().map(largest).fold(0.0, f64::max);
             let fits = |&decimals: &i32| largest_ohm * ten_to(decimals) <= LARGEST_READING;
             let decimals = [9, 6, 3, 0].into_iter().find(fits);
-            vec![decimals.ok_or(FixedPointError::Reading(largest_ohm))?; channels.len()]
+            vec![decimals.ok_or(BundleError::FixedReading(largest_ohm))?; channels.len()]
         } else {
             channels
                 .map(|channel| max_decimals(largest(channel), LARGEST_READING))

@@ -22,64 +22,60 @@ pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<St
 
 /// Text of the program.
 fn program(contents: &Contents) -> String {
-    let (input, channels) = (contents.meaning.readings(), contents.channels());
-    let legend = format!("# {}\n", contents.legend("").join("\n# "));
-    let dtype = dtype(contents.outer_precision());
-    let (row, row_text) = match contents.takes_row() {
-        true => (", row", "; row: row of each sample, from 1"),
-        false => ("", ""),
-    };
-    let is_sequence = contents.history().is_some();
-    let state = if is_sequence { ", state, time_s" } else { "" };
-    let body = contents.body(|id, operation| statement(contents, id, operation));
-    let mut text = format!(
-        "\"\"\"{}; see README.txt.\"\"\"\n{legend}\nimport pathlib\n\nimport numpy as np\n\n\
-         CONSTANTS = dict(np.load(pathlib.Path(__file__).with_name(\"{}.npz\")))\n\n\n\
-         def compute({input}, index{state}):\n    \"\"\"Answers to samples of the row-wire with this index.\"\"\"\n    \
-         c = CONSTANTS\n{body}    return ({parts},)\n\n\n",
-        contents.meaning.purpose_without_stop(),
-        contents.noun,
-        parts = returned_parts(contents).join(", "),
-    );
-    if let Some(history) = contents.history() {
-        text += &remembering(contents, &history);
+    let Contents {
+        noun, meaning, rows, ..
+    } = contents;
+    let (input, channels) = (meaning.readings(), contents.channels());
+    let history = contents.history();
+    let (mut row, mut row_text, mut row_check) = ("", "", "    row = np.ones(len(r), int)\n".to_owned());
+    if contents.takes_row() {
+        row = if history.is_some() { ", row=1" } else { ", row" };
+        row_text = "; row: row of each sample, from 1";
+        row_check = format!(
+            "    row = np.broadcast_to(np.asarray(row), len(r))\n    if not np.isin(row, np.arange(1, {rows} + 1)).all():\n        \
+             raise ValueError(\"row: give rows from 1 to {rows}\")\n"
+        );
     }
     let check = format!(
         "    r = np.atleast_2d(np.asarray({input}, dtype={dtype}))\n    if r.shape[1] != {channels}:\n        \
-         raise ValueError(\"{input}: give {channels} columns\")\n"
+         raise ValueError(\"{input}: give {channels} columns\")\n{row_check}",
+        dtype = dtype(contents.outer_precision()),
     );
-    let row_check = match contents.takes_row() {
-        true => format!(
-            "    row = np.broadcast_to(np.asarray(row), len(r))\n    if not np.isin(row, np.arange(1, {rows} + 1)).all():\n        \
-             raise ValueError(\"row: give rows from 1 to {rows}\")\n",
-            rows = contents.rows,
-        ),
-        false => "    row = np.ones(len(r), int)\n".to_owned(),
-    };
     let returned = format!(
         "Returns {}{}, each with a line for each sample.",
-        contents.meaning.outputs_in_words(contents.outputs()),
+        contents.outputs_in_words(),
         contents.parts_in_words()
     );
-    if is_sequence {
-        return text
-            + &format!(
-                "def decode({input}, time_s, state=None{row}):\n    \"\"\"{returned} The last value is the state.\n\n    \
-                 {input}: samples x {channels}, in order of time; time_s: time of each in seconds, NaN where it is not known;\n    \
-                 state: None at the start, or the state to continue from{row_text}\n    \"\"\"\n{check}{row_check}    \
-                 time_s = np.broadcast_to(np.asarray(time_s, dtype=float), len(r))\n    \
-                 state = start() if state is None else np.array(state)\n    \
-                 answers = [compute(r[k : k + 1], row[k] - 1, state, time_s[k]) for k in range(len(r))]\n    \
-                 return (*(np.concatenate(part) for part in zip(*answers)), state)\n",
-                row = if contents.takes_row() { ", row=1" } else { "" },
-            );
-    }
-    text + &format!(
-        "def decode({input}{row}):\n    \"\"\"{returned}\n\n    {input}: samples x {channels}{row_text}\n    \"\"\"\n{check}{row_check}    \
-         answers = [compute(r[row == index + 1], index) for index in range({rows})]\n    \
-         joined = tuple(np.concatenate(part)[np.argsort(np.argsort(row, kind=\"stable\"), kind=\"stable\")] for part in zip(*answers))\n    \
-         return joined if len(joined) > 1 else joined[0]\n",
-        rows = contents.rows,
+    let (state, functions) = match &history {
+        Some(history) => (", state, time_s", remembering(contents, history)),
+        None => ("", String::new()),
+    };
+    let decode = match history {
+        Some(_) => format!(
+            "def decode({input}, time_s, state=None{row}):\n    \"\"\"{returned} The last value is the state.\n\n    \
+             {input}: samples x {channels}, in order of time; time_s: time of each in seconds, NaN where it is not known;\n    \
+             state: None at the start, or the state to continue from{row_text}\n    \"\"\"\n{check}    \
+             time_s = np.broadcast_to(np.asarray(time_s, dtype=float), len(r))\n    \
+             state = start() if state is None else np.array(state)\n    \
+             answers = [compute(r[k : k + 1], row[k] - 1, state, time_s[k]) for k in range(len(r))]\n    \
+             return (*(np.concatenate(part) for part in zip(*answers)), state)\n"
+        ),
+        None => format!(
+            "def decode({input}{row}):\n    \"\"\"{returned}\n\n    {input}: samples x {channels}{row_text}\n    \"\"\"\n{check}    \
+             answers = [compute(r[row == index + 1], index) for index in range({rows})]\n    \
+             joined = tuple(np.concatenate(part)[np.argsort(np.argsort(row, kind=\"stable\"), kind=\"stable\")] for part in zip(*answers))\n    \
+             return joined if len(joined) > 1 else joined[0]\n"
+        ),
+    };
+    format!(
+        "\"\"\"{purpose}; see README.txt.\"\"\"\n# {legend}\n\nimport pathlib\n\nimport numpy as np\n\n\
+         CONSTANTS = dict(np.load(pathlib.Path(__file__).with_name(\"{noun}.npz\")))\n\n\n\
+         def compute({input}, index{state}):\n    \"\"\"Answers to samples of the row-wire with this index.\"\"\"\n    \
+         c = CONSTANTS\n{body}    return ({parts},)\n\n\n{functions}{decode}",
+        purpose = meaning.purpose(),
+        legend = contents.legend("").join("\n# "),
+        body = contents.body(|id, operation| statement(contents, id, operation)),
+        parts = returned_parts(contents).join(", "),
     )
 }
 
@@ -115,10 +111,10 @@ fn value(contents: &Contents, id: NodeId, precision: Precision) -> String {
 
 fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
     let (name, precision) = (contents.name_of(id), contents.precision_of(id));
-    let of = |id: NodeId| value(contents, id, precision);
-    let expression = match operation {
-        Operation::Valid { of, domain } => {
-            let x = contents.name_of(*of);
+    let operands = operation.operands().into_iter();
+    let operands = Vec::from_iter(operands.map(|operand| value(contents, operand, precision)));
+    let expression = match (operation, &operands[..]) {
+        (Operation::Valid { domain, .. }, [x]) => {
             let (is_valid, above) = match domain {
                 Domain::Positive => (format!("({x} > 0) & np.isfinite({x})"), " above 0"),
                 Domain::Finite => (format!("np.isfinite({x})"), ""),
@@ -127,24 +123,15 @@ fn statement(contents: &Contents, id: NodeId, operation: &Operation) -> String {
                 "    if not ({is_valid}).all():\n        raise ValueError(\"{x}: give finite numbers{above}\")\n"
             );
         }
-        Operation::Affine { of: x, weights, biases } => format!("{} @ {} + {}", of(*x), of(*weights), of(*biases)),
-        Operation::SquaredDistances { of: x, points } => {
-            format!(
-                "np.stack([(({} - point) ** 2).sum(axis=1) for point in {}.T], axis=1)",
-                of(*x),
-                of(*points)
-            )
+        (Operation::Affine { .. }, [x, weights, biases]) => format!("{x} @ {weights} + {biases}"),
+        (Operation::SquaredDistances { .. }, [x, points]) => {
+            format!("np.stack([(({x} - point) ** 2).sum(axis=1) for point in {points}.T], axis=1)")
         }
-        Operation::Clip { of: x, low, high } => format!("np.clip({}, {}, {})", of(*x), of(*low), of(*high)),
-        Operation::Concatenate(parts) => {
-            let parts = Vec::from_iter(parts.iter().map(|part| of(*part)));
-            format!("np.concatenate([{}], axis=1)", parts.join(", "))
-        }
-        Operation::History { of: x, .. } => format!("remember(state, {}[0], time_s)[None]", of(*x)),
-        Operation::CountOutside { of: x, low, high } => {
-            format!("(({x} < {}) | ({x} > {})).sum(axis=1)", of(*low), of(*high), x = of(*x))
-        }
-        _ => infix(operation, ["/", "np.", ""], of),
+        (Operation::Clip { .. }, [x, low, high]) => format!("np.clip({x}, {low}, {high})"),
+        (Operation::Concatenate(_), parts) => format!("np.concatenate([{}], axis=1)", parts.join(", ")),
+        (Operation::History { .. }, [x]) => format!("remember(state, {x}[0], time_s)[None]"),
+        (Operation::CountOutside { .. }, [x, low, high]) => format!("(({x} < {low}) | ({x} > {high})).sum(axis=1)"),
+        _ => infix(operation, ["/", "np.", ""], &operands),
     };
     format!("    {name} = {expression}\n")
 }

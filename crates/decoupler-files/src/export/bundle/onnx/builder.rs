@@ -84,6 +84,12 @@ impl GraphBuilder {
         self.named(operation, inputs, attributes, &name)
     }
 
+    /// Adds the rows in a range of a value; `axis` is the name of that of the rows.
+    pub(super) fn rows(&mut self, of: &str, range: std::ops::Range<usize>, axis: &str) -> String {
+        let [first, end] = [range.start, range.end].map(|row| self.whole(&[1], &[row as i64]));
+        self.op("Slice", &[of, &first, &end, axis])
+    }
+
     /// Adds the number of true values of each line, as whole numbers (batch × 1).
     pub(super) fn count(&mut self, condition: &str) -> String {
         let ones = self.with("Cast", &[condition], &[("to", INT64)]);

@@ -11,21 +11,13 @@ impl Printer<'_> {
     /// Adds the features of the readings `now` (1 × channels, double), and the next state.
     pub(super) fn add_history(&mut self, now: &str, name: &str) {
         let history = self.contents.history().expect("there is a history");
-        let constants = &history.constants;
+        let (builder, constants) = (&mut self.builder, &history.constants);
         let (kept, averages, channels) = (history.kept, history.averages, constants.channels);
-        let builder = &mut self.builder;
         let axis = builder.whole(&[1], &[0]);
-        // Rows from `first` to `end` of a value.
-        macro_rules! rows {
-            ($of:expr, $first:expr, $end:expr) => {{
-                let [first, end] = [$first, $end].map(|row| builder.whole(&[1], &[row as i64]));
-                builder.op("Slice", &[$of, &first, &end, &axis])
-            }};
-        }
         let [zero, usual] = [0.0, constants.interval_s].map(|value| builder.scalar(DOUBLE, value));
-        let started = rows!("state", 0, 1);
+        let started = builder.rows("state", 0..1, &axis);
         let has_started = builder.op("Greater", &[&started, &zero]);
-        let latest = rows!("state", 1, 2);
+        let latest = builder.rows("state", 1..2, &axis);
         let elapsed = builder.op("Sub", &["time_s", &latest]);
         let steps_back = builder.op("Less", &[&elapsed, &zero]);
         let mut restarts = builder.op("Not", &[&has_started]);
@@ -50,18 +42,18 @@ impl Printer<'_> {
         next_rows.push(next_time);
         let mut past = Vec::new();
         if kept > 0 {
-            let of_state = rows!("state", 2, 2 + kept);
+            let of_state = builder.rows("state", 2..2 + kept, &axis);
             let of_state = builder.op("Where", &[&restarts, now, &of_state]);
             let lags: Vec<i64> = constants.lags.iter().map(|lag| *lag as i64 - 1).collect();
             let lags = builder.whole(&[lags.len()], &lags);
             past.push(builder.with("Gather", &[&of_state, &lags], &[("axis", 0)]));
             next_rows.push(now.to_owned());
             if kept > 1 {
-                next_rows.push(rows!(&of_state, 0, kept - 1));
+                next_rows.push(builder.rows(&of_state, 0..kept - 1, &axis));
             }
         }
         if averages > 0 {
-            let of_state = rows!("state", 2 + kept, 2 + kept + averages);
+            let of_state = builder.rows("state", 2 + kept..2 + kept + averages, &axis);
             let of_state = builder.op("Where", &[&restarts, now, &of_state]);
             let (per_second, per_reading) = history.rates();
             let per_second = builder.numbers("per_second", DOUBLE, &[averages, 1], per_second.into_iter());

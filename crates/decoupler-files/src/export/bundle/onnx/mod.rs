@@ -49,7 +49,7 @@ pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<St
     let state = contents.state_in_words().map(|about| format!(" {about}"));
     let about = format!(
         "{}. Answers are NaN where a reading or the row is invalid.{}{}",
-        contents.meaning.purpose_without_stop(),
+        contents.meaning.purpose(),
         state.unwrap_or_default(),
         notes.collect::<String>()
     );
