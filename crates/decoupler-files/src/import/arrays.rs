@@ -2,9 +2,14 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use decoupler_core::text::{clean_name, original_name};
+use decoupler_core::text::clean_name;
 
-use super::{Column, Format, Missing, Table, TableError, Variable, csv_table::Reading, format::Array, table::Labels};
+use super::{
+    Column, Encoding, Format, Table, TableError, Variable,
+    csv_table::Reading,
+    format::{Array, Cell},
+    table::Labels,
+};
 
 /// Maximum number of rows of an array that are one sample, such as two readings per press.
 const MAX_ROWS_PER_SAMPLE: usize = 16;
@@ -22,15 +27,8 @@ pub(super) fn table(
     left_out: Vec<String>,
     reading: &Reading<'_>,
 ) -> Result<Table, TableError> {
-    let mut notes: Vec<String> = left_out
-        .into_iter()
-        .map(|what| format!("left out: {}", clean_name(&what)))
-        .collect();
-    let originals = Vec::from_iter(arrays.iter().map(|array| original_name(&array.name)));
-    let arrays = Vec::from_iter(arrays.into_iter().map(|array| Array {
-        name: clean_name(&array.name),
-        ..array
-    }));
+    let left_out = left_out.iter().map(|what| format!("left out: {}", clean_name(what)));
+    let mut notes = Vec::from_iter(left_out);
     let Some(rows) = rows_of_samples(&arrays, &reading.used) else {
         let found = if notes.is_empty() {
             "it is empty".to_owned()
@@ -40,51 +38,47 @@ pub(super) fn table(
         return Err(TableError::array("there is no array of numbers", found));
     };
     let (mut columns, mut variables) = (Vec::new(), Vec::new());
-    for (array, original) in arrays.into_iter().zip(originals) {
-        let (name, shape, first) = (array.name.clone(), array.shape.clone(), columns.len());
-        let variable = |end| Variable {
-            name,
-            shape,
-            columns: first..end,
-        };
-        if array.rows % rows != 0 || array.rows / rows > MAX_ROWS_PER_SAMPLE {
+    for array in arrays {
+        let (name, shape, first, each) = (array.name, array.shape, columns.len(), array.rows / rows);
+        if array.rows % rows != 0 || each > MAX_ROWS_PER_SAMPLE {
             notes.push(format!(
-                "left out: {} is {}, and a sample is one of {rows} rows; name its columns to use it instead",
-                array.name, array.shape
+                "left out: {name} is {shape}, and a sample is one of {rows} rows; name its columns to use it instead"
             ));
-            variables.push(variable(first));
-            continue;
-        }
-        let each = array.rows / rows;
-        if each > 1 {
-            notes.push(format!(
-                "{} is {}: {each} rows per sample, side by side",
-                array.name, array.shape
-            ));
-        } else if array.is_reshaped {
-            let width = array.columns.len();
-            notes.push(format!("{} is {}, read as {rows} × {width}", array.name, array.shape));
-        }
-        let numbers = side_by_side(array.columns, each);
-        let width = numbers.len();
-        for (index, numbers) in numbers.into_iter().enumerate() {
-            let name = match (array.name.as_str(), width) {
-                ("", _) => format!("c{}", index + 1),
-                (name, 1) => name.to_owned(),
-                (name, _) => format!("{name}.c{}", index + 1),
-            };
-            columns.push(Column {
-                original: original.clone(),
-                name,
+        } else {
+            if each > 1 {
+                notes.push(format!("{name} is {shape}: {each} rows per sample, side by side"));
+            } else if array.is_reshaped {
+                let width = array.columns.len();
+                notes.push(format!("{name} is {shape}, read as {rows} × {width}"));
+            }
+            let numbers = side_by_side(array.columns, each);
+            let width = numbers.len();
+            columns.extend(numbers.into_iter().enumerate().map(|(index, numbers)| Column {
+                original: array.original.clone(),
+                name: match (name.as_str(), width) {
+                    ("", _) => format!("c{}", index + 1),
+                    (name, 1) => name.to_owned(),
+                    (name, _) => format!("{name}.c{}", index + 1),
+                },
                 numbers,
                 ..Column::default()
-            });
+            }));
         }
-        variables.push(variable(columns.len()));
+        let columns = first..columns.len();
+        variables.push(Variable { name, shape, columns });
     }
     let roles = reading.roles(&columns);
     for (column, (missing, has_labels)) in columns.iter_mut().zip(roles) {
-        give_role(column, &missing, has_labels);
+        column.labels = has_labels.then(Labels::default);
+        for (line, number) in (1..).zip(std::mem::take(&mut column.numbers)) {
+            let is_missing = number.is_nan() || missing.iter().any(|rule| rule.is_number(number));
+            let (text, found) = match number.is_finite() {
+                true if !has_labels => (String::new(), Cell::Number(number)),
+                true => (number.to_string(), Cell::Number(number)),
+                false => (number.to_string(), Cell::Text),
+            };
+            column.push(line, text.as_bytes(), found, is_missing, Encoding::Utf8);
+        }
     }
     variables.retain(|variable| !variable.name.is_empty());
     Ok(Table {
@@ -130,22 +124,4 @@ fn side_by_side(columns: Vec<Vec<f64>>, each: usize) -> Vec<Vec<f64>> {
         columns.iter().map(of_row)
     };
     (0..each).flat_map(part).collect()
-}
-
-/// Marks the cells that are missing or infinite, and labels the cells of a group.
-fn give_role(column: &mut Column, missing: &[&Missing], has_labels: bool) {
-    let mut labels = has_labels.then(Labels::default);
-    for (row, number) in column.numbers.iter_mut().enumerate() {
-        if number.is_nan() || missing.iter().any(|rule| rule.is_number(*number)) {
-            column.missing += 1;
-            *number = f64::NAN;
-        } else if number.is_infinite() {
-            column.faults.add(row as u64 + 1, || number.to_string());
-            *number = f64::NAN;
-        }
-        if let Some(labels) = &mut labels {
-            labels.push((!number.is_nan()).then(|| number.to_string()).as_deref());
-        }
-    }
-    column.labels = labels;
 }

@@ -165,6 +165,16 @@ impl Named for Encoding {
     const ALL: &'static [Self] = &[Self::Utf8, Self::Latin1, Self::Utf16Le, Self::Utf16Be];
 }
 
+impl Encoding {
+    /// Returns the text of a cell. Invalid UTF-8 is read as Latin-1, which maps to the first 256 characters of Unicode.
+    pub(super) fn text(self, cell: &[u8]) -> String {
+        match std::str::from_utf8(cell) {
+            Ok(text) if self != Self::Latin1 => text.to_owned(),
+            _ => cell.iter().copied().map(char::from).collect(),
+        }
+    }
+}
+
 impl fmt::Display for Dialect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let header = if self.header { "a header" } else { "no header" };

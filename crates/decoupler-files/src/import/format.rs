@@ -1,16 +1,28 @@
-//! File formats of recordings. To add one, add a variant of [`Format`] and of [`Contents`] here, and a module that reads its
+//! File formats of recordings. To add one, add a variant of [`Format`] and a case of [`read`] here, and a module that reads its
 //! arrays.
 
 use std::{
     fmt,
     fs::File,
-    io::{self, BufReader, Read as _, Seek as _},
+    io::{self, BufReader, Read, Seek as _},
     path::{Path, PathBuf},
 };
 
+use decoupler_core::text::{clean_name, original_name};
 use zip::ZipArchive;
 
-use super::{Decimal, Dialect, TableError, rows::MAX_CELLS};
+use super::{
+    Decimal, Dialect, Table, TableError, Watch, arrays,
+    csv_table::{self, Reading},
+    matlab, numpy,
+    progress::Watched,
+    rows::MAX_CELLS,
+    sheet,
+};
+use crate::machine::ReadingBudget;
+
+/// Number of numbers that are read at once.
+const BLOCK: u64 = 1 << 17;
 
 /// File format.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,22 +42,6 @@ pub enum Format {
         /// `true` if its first row has the names of the columns.
         header: bool,
     },
-}
-
-/// Contents of a file, recognised by its beginning.
-pub(super) enum Contents {
-    /// Text.
-    Text,
-    /// A NumPy array.
-    Npy,
-    /// An archive of NumPy arrays.
-    Npz,
-    /// Arrays of MATLAB.
-    Matlab,
-    /// Sheets of Excel since 2007.
-    Xlsx,
-    /// Sheets of OpenDocument.
-    Ods,
 }
 
 /// Beginnings of files that are not read, with what they are and what to do.
@@ -106,40 +102,59 @@ impl Format {
     }
 }
 
-impl Contents {
-    /// Recognises the contents of the file at `path` by its beginning, and those of an archive by the names in it.
-    ///
-    /// # Errors
-    /// If it cannot be read, or is a known kind of file that is not read.
-    pub(super) fn of(path: &Path, mut file: &File) -> Result<Self, TableError> {
-        let mut beginning = Vec::new();
-        file.take(16).read_to_end(&mut beginning)?;
-        file.rewind()?;
-        let refused = |what: &str, cure: &str| TableError::Contents(format!("it is {what}, which is not read; {cure}"));
-        if let Some((_, what, cure)) = REFUSED.iter().find(|(start, ..)| beginning.starts_with(start)) {
-            return Err(refused(what, cure));
-        }
-        let is_named = path.extension().is_some_and(|found| found.eq_ignore_ascii_case("mat"));
-        match beginning[..] {
-            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => return Ok(Self::Npy),
-            [b'P', b'K', 3 | 5, ..] => {}
-            _ if is_named || beginning.starts_with(b"MATLAB") => return Ok(Self::Matlab),
-            _ => return Ok(Self::Text),
-        }
-        let archive = ZipArchive::new(BufReader::new(file));
-        file.rewind()?;
-        let Ok(archive) = archive else { return Ok(Self::Npz) };
-        let has = |is_it: &dyn Fn(&str) -> bool| archive.file_names().any(|name| name.is_ok_and(|name| is_it(&name)));
-        if has(&|name| name.starts_with("xl/")) {
-            Ok(Self::Xlsx)
-        } else if has(&|name| name == "mimetype") && has(&|name| name == "content.xml") {
-            Ok(Self::Ods)
-        } else if archive.is_empty() || has(&|name| name.ends_with(".npy")) {
-            Ok(Self::Npz)
-        } else {
-            Err(refused("a zip archive without .npy arrays", "unpack it"))
-        }
+/// Reads the table in the file at `path`, whose format is recognised by its beginning, and that of an archive by the names in
+/// it.
+///
+/// # Errors
+/// If the file cannot be read, does not contain a table or is a known kind of file that is not read, or `watch` breaks.
+pub(super) fn read(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Result<Table, TableError> {
+    let file = File::open(path)?;
+    let metadata = file.metadata()?;
+    if metadata.is_dir() {
+        return Err(io::Error::from(io::ErrorKind::IsADirectory).into());
     }
+    let size = metadata.is_file().then_some(metadata.len());
+    let budget = &mut ReadingBudget::now();
+    let mut beginning = Vec::new();
+    // A pipe can be read only once.
+    if size.is_some() {
+        (&file).take(16).read_to_end(&mut beginning)?;
+        (&file).rewind()?;
+    }
+    let refused = |what: &str, cure: &str| TableError::Contents(format!("it is {what}, which is not read; {cure}"));
+    if let Some((_, what, cure)) = REFUSED.iter().find(|(start, ..)| beginning.starts_with(start)) {
+        return Err(refused(what, cure));
+    }
+    let is_named = path.extension().is_some_and(|found| found.eq_ignore_ascii_case("mat")) && size.is_some();
+    let ((arrays, left_out), format) = match beginning[..] {
+        [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => {
+            let array = numpy::read("", &mut BufReader::new(Watched::new(file, size, watch)), budget)?;
+            ((vec![array], Vec::new()), Format::Npy)
+        }
+        [b'P', b'K', 3 | 5, ..] => {
+            let archive = ZipArchive::new(BufReader::new(&file));
+            (&file).rewind()?;
+            let names = archive.iter().flat_map(ZipArchive::file_names);
+            let names = Vec::from_iter(names.filter_map(|name| Some(name.ok()?.into_owned())));
+            let has = |wanted: &str| names.iter().any(|name| name == wanted);
+            if names.iter().any(|name| name.starts_with("xl/")) {
+                return sheet::read(path, file, false, reading, budget, watch);
+            } else if has("mimetype") && has("content.xml") {
+                return sheet::read(path, file, true, reading, budget, watch);
+            } else if archive.is_ok_and(|archive| !archive.is_empty())
+                && !names.iter().any(|name| name.ends_with(".npy"))
+            {
+                return Err(refused("a zip archive without .npy arrays", "unpack it"));
+            }
+            (numpy::read_archive(BufReader::new(file), budget, watch)?, Format::Npz)
+        }
+        _ if is_named || beginning.starts_with(b"MATLAB") => {
+            let source = BufReader::new(Watched::new(file, size, watch));
+            (matlab::read(source, budget)?, Format::Matlab)
+        }
+        _ => return csv_table::read(path, Watched::new(file, size, watch), reading, budget),
+    };
+    arrays::table(path, arrays, format, left_out, reading)
 }
 
 impl fmt::Display for Format {
@@ -158,24 +173,18 @@ impl fmt::Display for Format {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Element {
     /// As in NumPy: `f` for floating point, `i` and `u` for integers with and without a sign.
-    kind: char,
+    pub(super) kind: char,
     /// Number of bytes.
     pub(super) size: usize,
-}
-
-/// Byte order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Endian {
-    Little,
-    Big,
+    /// `true` if the most significant byte comes first.
+    pub(super) is_big: bool,
 }
 
 impl Element {
-    pub(super) const I32: Self = Self { kind: 'i', size: 4 };
-    pub(super) const U32: Self = Self { kind: 'u', size: 4 };
-
-    /// Returns the type with this code of NumPy, such as `f8`.
+    /// Returns the type with this code of NumPy, such as `<f8`.
     pub(super) fn of_code(code: &str) -> Option<Self> {
+        let is_big = code.starts_with('>');
+        let code = code.trim_start_matches(['>', '<', '|', '=']);
         let code = if ["b1", "?"].contains(&code) { "u1" } else { code };
         let kind = code.chars().next()?;
         let size = code[kind.len_utf8()..].parse().ok()?;
@@ -184,33 +193,48 @@ impl Element {
             'i' | 'u' => [1, 2, 4, 8].contains(&size),
             _ => false,
         };
-        is_known.then_some(Self { kind, size })
+        is_known.then_some(Self { kind, size, is_big })
     }
 
-    /// Reads the numbers in `bytes`; a part of a number at the end is ignored.
-    pub(super) fn read(self, bytes: &[u8], endian: Endian) -> Vec<f64> {
-        let number = |chunk: &[u8]| {
-            let mut bytes = [0; 8];
-            bytes[..self.size].copy_from_slice(chunk);
-            if endian == Endian::Big {
-                bytes[..self.size].reverse();
+    /// Reads `count` numbers, or those up to the end of the source, block by block, so that a corrupt count allocates little
+    /// memory.
+    pub(super) fn read(self, source: &mut dyn Read, count: u64) -> io::Result<Vec<f64>> {
+        let (mut numbers, mut block) = (Vec::new(), Vec::new());
+        while (numbers.len() as u64) < count {
+            block.clear();
+            let wanted = (count - numbers.len() as u64).min(BLOCK) * self.size as u64;
+            source.take(wanted).read_to_end(&mut block)?;
+            numbers.extend(block.chunks_exact(self.size).map(|chunk| self.number(chunk)));
+            if (block.len() as u64) < wanted {
+                break;
             }
-            let bits = u64::from_le_bytes(bytes);
-            match (self.kind, self.size) {
-                ('f', 4) => f64::from(f32::from_bits(bits as u32)),
-                ('f', _) => f64::from_bits(bits),
-                ('i', size) => ((bits << (64 - 8 * size)) as i64 >> (64 - 8 * size)) as f64,
-                _ => bits as f64,
-            }
-        };
-        bytes.chunks_exact(self.size).map(number).collect()
+        }
+        Ok(numbers)
+    }
+
+    fn number(self, chunk: &[u8]) -> f64 {
+        let mut bytes = [0; 8];
+        bytes[..self.size].copy_from_slice(chunk);
+        if self.is_big {
+            bytes[..self.size].reverse();
+        }
+        let bits = u64::from_le_bytes(bytes);
+        match (self.kind, self.size) {
+            ('f', 4) => f64::from(f32::from_bits(bits as u32)),
+            ('f', _) => f64::from_bits(bits),
+            ('i', size) => ((bits << (64 - 8 * size)) as i64 >> (64 - 8 * size)) as f64,
+            _ => bits as f64,
+        }
     }
 }
 
 /// A named array of numbers: samples × columns, column by column.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Array {
+    /// Name without unprintable characters.
     pub(super) name: String,
+    /// Name in the file, escaped, if it has such characters.
+    pub(super) original: Option<String>,
     pub(super) rows: usize,
     pub(super) columns: Vec<Vec<f64>>,
     /// Shape in the file, as text.
@@ -243,7 +267,8 @@ impl Array {
             (0..width).map(column).collect()
         };
         Ok(Self {
-            name,
+            original: original_name(&name),
+            name: clean_name(&name),
             rows,
             columns,
             shape: written(shape),

@@ -2,19 +2,23 @@
 //! <https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf>. Numeric and logical arrays, and those in
 //! structures, are read; other variables are reported. No existing crate reports the variables it skips and limits the allocation for a corrupt length.
 
-use std::io::Read;
+use std::io::{self, Read};
 
 use flate2::read::ZlibDecoder;
 
 use super::{
     TableError,
-    format::{Array, Element, Endian, written},
+    format::{Array, Element, written},
     progress::table_error,
 };
 use crate::machine::ReadingBudget;
 
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
+/// Types of numbers by their codes in NumPy.
+const CODES: [&str; 14] = [
+    "", "i1", "u1", "i2", "u2", "i4", "u4", "f4", "", "f8", "", "", "i8", "u8",
+];
 /// Maximum depth of structures in structures.
 const DEEPEST: usize = 8;
 /// Maximum number of fields times elements of a structure.
@@ -22,53 +26,45 @@ const MAX_FIELDS: usize = 1 << 20;
 /// Memory of a field of a structure in bytes, without its numbers.
 const FIELD: u64 = 128;
 /// Maximum length of names, shapes and flags in bytes.
-const LONGEST: usize = 1 << 16;
+const LONGEST: u64 = 1 << 16;
 
 /// Reads the numeric arrays of a file; returns them and the variables left out. `budget` limits their memory.
 pub(super) fn read(mut source: impl Read, budget: &mut ReadingBudget) -> Result<(Vec<Array>, Vec<String>), TableError> {
-    let mut header = [0; 128];
-    if !fill(&mut source, &mut header)? {
-        return Err(cut_off());
-    }
+    let header = up_to(&mut source, 128)?;
     if header.starts_with(b"MATLAB 7.3") {
         let reason = "it has version 7.3 of the format, which is HDF5; save it with the option -v7";
         return Err(wrong(reason));
     }
-    let endian = match &header[126..] {
-        b"IM" => Endian::Little,
-        b"MI" => Endian::Big,
+    let is_big = match header.get(126..).ok_or_else(cut_off)? {
+        b"IM" => false,
+        b"MI" => true,
         _ => {
             let reason = "it is not a MAT-file of version 5 to 7; save it with the option -v7";
             return Err(wrong(reason));
         }
     };
     let mut found = Variables::default();
-    let mut tag = [0; 8];
-    while fill(&mut source, &mut tag)? {
-        let (kind, size, is_small) = parsed(tag, endian)?;
-        let mut limited = (&mut source).take(size as u64);
-        match (kind, is_small) {
-            (COMPRESSED, false) => {
-                let mut inflated = ZlibDecoder::new(&mut limited);
-                if fill(&mut inflated, &mut tag)?
-                    && let (MATRIX, size, false) = parsed(tag, endian)?
-                {
-                    found.read(&mut inflated, size, endian, budget)?;
+    let mut file = Elements::new(&mut source, is_big, budget);
+    while let Some(tag) = file.tag()? {
+        match tag.kind {
+            COMPRESSED if tag.size == tag.rest => {
+                // Compressed variables are not padded.
+                file.padding = 0;
+                let mut inflated = ZlibDecoder::new((&mut *file.source).take(tag.rest));
+                let mut elements = Elements::new(&mut inflated, is_big, file.budget);
+                if let Some(Tag { kind: MATRIX, rest, .. }) = elements.tag()? {
+                    found.read(&mut elements, rest)?;
                 }
                 // The checksum is verified at the end of the data.
-                if fill(&mut inflated, &mut [0])? {
+                if !up_to(&mut inflated, 1)?.is_empty() {
                     let reason = "it has more data than it states; copy it again";
                     return Err(TableError::damaged("a variable", reason));
                 }
-                if inflated.total_in() != size as u64 {
+                if inflated.total_in() != tag.rest {
                     return Err(TableError::damaged("a variable", "its length is wrong; copy it again"));
                 }
             }
-            (MATRIX, false) => {
-                found.read(&mut limited, size, endian, budget)?;
-                let padding = size.next_multiple_of(8) - size;
-                drain(&mut source, padding as u64)?;
-            }
+            MATRIX if tag.size == tag.rest => found.read(&mut file, tag.rest)?,
             _ => return Err(TableError::damaged("a variable", "its kind is unknown; copy it again")),
         }
     }
@@ -83,44 +79,18 @@ struct Variables {
 }
 
 impl Variables {
-    /// Reads a variable of `size` bytes; of one that is left out, only its name.
-    fn read(
-        &mut self,
-        source: &mut dyn Read,
-        size: usize,
-        endian: Endian,
-        budget: &mut ReadingBudget,
-    ) -> Result<(), TableError> {
-        // Flags, shape and name come first.
-        let mut bytes = Vec::new();
-        let mut read = |bytes: &mut Vec<u8>, end: usize| {
-            let missing = (end - bytes.len()) as u64;
-            let read = source.take(missing).read_to_end(bytes).map_err(damage)?;
-            if (read as u64) < missing {
-                Err(cut_off())
-            } else {
-                Ok(())
-            }
-        };
-        read(&mut bytes, size.min(4 * LONGEST))?;
-        let head = Elements { bytes: &bytes, endian }.matrix_head()?;
-        let (name, other) = match head {
-            (name, _, Class::Other(what)) => (name, Some(what)),
-            (name, ..) => (name, None),
-        };
+    /// Reads a variable, the next `size` bytes of `elements`.
+    fn read(&mut self, elements: &mut Elements<'_>, size: u64) -> Result<(), TableError> {
+        let mut source = (&mut *elements.source).take(size);
+        let (name, value) = Elements::new(&mut source, elements.is_big, elements.budget).matrix(0)?;
+        drain(&mut source)?;
+        if source.limit() > 0 {
+            return Err(cut_off());
+        }
         // MATLAB stores internal data, such as `__function_workspace__`, in variables without a name.
-        if let Some(what) = other.filter(|_| !name.is_empty()) {
-            self.left_out.push(format!("{name} is {what}"));
+        if !name.is_empty() {
+            self.add(name, value);
         }
-        if other.is_some() || name.is_empty() {
-            return drain(source, (size - bytes.len()) as u64);
-        }
-        budget.claim(size as u64)?;
-        read(&mut bytes, size)?;
-        let value = Elements { bytes: &bytes, endian }.matrix(budget, 0)?.1;
-        drop(bytes);
-        budget.release(size as u64);
-        self.add(name, value);
         Ok(())
     }
 
@@ -161,133 +131,176 @@ enum Value {
     Other(&'static str),
 }
 
-/// Class of a matrix.
-enum Class {
-    Numbers,
-    Structures,
-    /// Anything else: what it is.
-    Other(&'static str),
+/// Beginning of an element.
+struct Tag {
+    kind: u32,
+    /// Number of bytes of the data.
+    size: u64,
+    /// The data of a small element.
+    small: Vec<u8>,
+    /// Number of bytes of the data that follow.
+    rest: u64,
 }
 
-/// Elements of a variable, which follow each other.
+/// Elements that follow each other.
 struct Elements<'a> {
-    bytes: &'a [u8],
-    endian: Endian,
+    source: &'a mut dyn Read,
+    is_big: bool,
+    budget: &'a mut ReadingBudget,
+    /// Number of bytes before the next element.
+    padding: u64,
 }
 
 impl<'a> Elements<'a> {
-    /// Type and data of the next element.
-    fn next(&mut self) -> Result<(u32, &'a [u8]), TableError> {
-        let (tag, rest) = self.bytes.split_first_chunk().ok_or_else(cut_off)?;
-        let (kind, size, is_small) = parsed(*tag, self.endian)?;
-        let (data, padded) = if is_small {
-            (&tag[4..], 0)
-        } else {
-            (rest, size.next_multiple_of(8))
-        };
-        self.bytes = rest.get(padded..).unwrap_or_default();
-        Ok((kind, data.get(..size).ok_or_else(cut_off)?))
+    fn new(source: &'a mut dyn Read, is_big: bool, budget: &'a mut ReadingBudget) -> Self {
+        Self {
+            source,
+            is_big,
+            budget,
+            padding: 0,
+        }
     }
 
-    /// Data of a name, a shape or flags.
-    fn next_short(&mut self) -> Result<&'a [u8], TableError> {
-        let (_, data) = self.next()?;
-        if data.len() > LONGEST {
-            return Err(wrong("an element has an invalid length; copy it again"));
+    /// Tag of the next element; `None` at the end. Its data must be read before the next.
+    fn tag(&mut self) -> Result<Option<Tag>, TableError> {
+        drain(&mut (&mut *self.source).take(self.padding))?;
+        let tag = up_to(self.source, 8)?;
+        let [kind, size] = self.integers(&tag)[..] else {
+            return if tag.is_empty() { Ok(None) } else { Err(cut_off()) };
+        };
+        let (kind, size) = (kind as u32, u64::from(size as u32));
+        let (size, small) = match kind >> 16 {
+            0 => (size, Vec::new()),
+            small @ 1..=4 => (u64::from(small), tag[4..][..small as usize].to_vec()),
+            _ => return Err(wrong("an element has an invalid length; copy it again")),
+        };
+        let rest = size - small.len() as u64;
+        self.padding = rest.next_multiple_of(8) - rest;
+        let kind = kind & 0xffff;
+        Ok(Some(Tag {
+            kind,
+            size,
+            small,
+            rest,
+        }))
+    }
+
+    fn next(&mut self) -> Result<Tag, TableError> {
+        self.tag()?.ok_or_else(cut_off)
+    }
+
+    /// Data of an element.
+    fn data(&mut self, tag: Tag) -> Result<Vec<u8>, TableError> {
+        let mut data = tag.small;
+        data.extend(up_to(self.source, tag.rest)?);
+        if (data.len() as u64) < tag.size {
+            return Err(cut_off());
         }
         Ok(data)
     }
 
-    fn next_integers(&mut self) -> Result<Vec<f64>, TableError> {
-        Ok(Element::I32.read(self.next_short()?, self.endian))
+    /// Data of a name, a shape or flags.
+    fn next_short(&mut self) -> Result<Vec<u8>, TableError> {
+        let tag = self.next()?;
+        if tag.size > LONGEST {
+            return Err(wrong("an element has an invalid length; copy it again"));
+        }
+        self.data(tag)
     }
 
-    /// Name, shape and class of a matrix.
-    fn matrix_head(&mut self) -> Result<(String, Vec<f64>, Class), TableError> {
-        let flags = self.next_integers()?.first().copied().unwrap_or(0.0) as i64;
-        let (shape, name) = (self.next_integers()?, text(self.next_short()?));
-        let class = match flags & 0xff {
-            1 => Class::Other("a cell array"),
-            2 => Class::Structures,
-            4 => Class::Other("text"),
-            5 => Class::Other("sparse; save it as full"),
-            6..=15 if flags & 0x0800 != 0 => Class::Other("complex"),
-            6..=15 => Class::Numbers,
-            _ => Class::Other("an object"),
+    fn next_integers(&mut self) -> Result<Vec<i32>, TableError> {
+        let bytes = self.next_short()?;
+        Ok(self.integers(&bytes))
+    }
+
+    fn integers(&self, bytes: &[u8]) -> Vec<i32> {
+        let integer = if self.is_big {
+            i32::from_be_bytes
+        } else {
+            i32::from_le_bytes
         };
-        Ok((name, shape, class))
+        bytes.as_chunks().0.iter().map(|bytes| integer(*bytes)).collect()
     }
 
-    /// Name and value of a matrix.
-    fn matrix(mut self, budget: &mut ReadingBudget, depth: usize) -> Result<(String, Value), TableError> {
-        let (name, shape, class) = self.matrix_head()?;
-        let value = match class {
-            Class::Other(what) => Value::Other(what),
-            Class::Numbers => self.numbers(&name, &shape, budget)?,
-            Class::Structures if depth == DEEPEST => Value::Other("a structure within too many others"),
-            Class::Structures => self.structures(&shape, budget, depth)?,
+    /// Name and value of a matrix. The data of one that is left out, and of a variable without a name, is not read.
+    fn matrix(&mut self, depth: usize) -> Result<(String, Value), TableError> {
+        let flags = self.next_integers()?.first().copied().unwrap_or(0);
+        let (shape, name) = (self.next_integers()?, text(&self.next_short()?));
+        let value = match flags & 0xff {
+            _ if depth == 0 && name.is_empty() => Value::Other("internal"),
+            1 => Value::Other("a cell array"),
+            2 if depth == DEEPEST => Value::Other("a structure within too many others"),
+            2 => self.structures(&shape, depth)?,
+            4 => Value::Other("text"),
+            5 => Value::Other("sparse; save it as full"),
+            6..=15 if flags & 0x0800 != 0 => Value::Other("complex"),
+            6..=15 => self.numbers(&name, &shape)?,
+            _ => Value::Other("an object"),
         };
         Ok((name, value))
     }
 
-    fn numbers(&mut self, name: &str, shape: &[f64], budget: &mut ReadingBudget) -> Result<Value, TableError> {
-        if shape.is_empty() || shape.iter().any(|size| *size < 1.0) {
+    fn numbers(&mut self, name: &str, shape: &[i32]) -> Result<Value, TableError> {
+        if shape.is_empty() || shape.iter().any(|size| *size < 1) {
             return Ok(Value::Other("empty"));
         }
         let shape = Vec::from_iter(shape.iter().map(|size| *size as usize));
-        let (kind, bytes) = self.next()?;
-        let code = match kind {
-            1 => "i1",
-            2 => "u1",
-            3 => "i2",
-            4 => "u2",
-            5 => "i4",
-            6 => "u4",
-            7 => "f4",
-            9 => "f8",
-            12 => "i8",
-            13 => "u8",
-            _ => "",
-        };
-        let element = Element::of_code(code).ok_or_else(|| {
+        let tag = self.next()?;
+        let element = CODES.get(tag.kind as usize).and_then(|code| Element::of_code(code));
+        let element = element.ok_or_else(|| {
             let reason = "its numbers have an unknown type; save it with the option -v7";
             TableError::array(name, reason)
         })?;
-        let found = bytes.len() / element.size;
-        let expected = shape.iter().copied().try_fold(1, usize::checked_mul);
+        let is_big = self.is_big;
+        let found = tag.size / element.size as u64;
+        let expected = shape
+            .iter()
+            .try_fold(1_u64, |count, size| count.checked_mul(*size as u64));
         if expected != Some(found) {
             let shape = written(&shape);
             let reason = format!("it should have {shape} numbers and has {found}; save or copy it again");
             return Err(TableError::array(name, reason));
         }
         // The numbers in the order of the file are freed once they are copied to their columns.
-        budget.claim((found as u64).saturating_mul(2 * size_of::<f64>() as u64))?;
-        let numbers = element.read(bytes, self.endian);
+        self.budget.claim(found.saturating_mul(2 * size_of::<f64>() as u64))?;
+        let mut data = tag.small.chain((&mut *self.source).take(tag.rest));
+        let numbers = Element { is_big, ..element }.read(&mut data, found).map_err(damage)?;
+        drain(&mut data)?;
+        if (numbers.len() as u64) < found {
+            return Err(cut_off());
+        }
         Ok(Value::Numbers { shape, numbers })
     }
 
     /// Reads the fields of `shape` structures.
-    fn structures(&mut self, shape: &[f64], budget: &mut ReadingBudget, depth: usize) -> Result<Value, TableError> {
-        let length = self.next_integers()?.first().map_or(0, |length| *length as usize);
-        let (_, names) = self.next()?;
-        let count: f64 = shape.iter().product();
+    fn structures(&mut self, shape: &[i32], depth: usize) -> Result<Value, TableError> {
+        let length = self
+            .next_integers()?
+            .first()
+            .map_or(0, |length| (*length).max(0) as usize);
+        let tag = self.next()?;
+        self.budget.claim(tag.size)?;
+        let names = self.data(tag)?;
+        let count: f64 = shape.iter().map(|size| f64::from(*size)).product();
         let width = names.len().checked_div(length).unwrap_or(0);
         let values = count.max(1.0) * width as f64;
         if values > MAX_FIELDS as f64 {
             return Ok(Value::Other("a structure with too many fields"));
         }
-        budget.claim(values as u64 * FIELD)?;
+        self.budget.claim(values as u64 * FIELD)?;
         let names = names.chunks_exact(length.max(1)).take(width);
         let mut fields = Vec::from_iter(names.map(|name| (text(name), Vec::new())));
         // Without fields, a shape of any size has no data.
         let elements = if fields.is_empty() { 0 } else { count as usize };
         for _ in 0..elements {
             for (_, values) in &mut fields {
-                let endian = self.endian;
-                values.push(match self.next()? {
-                    (MATRIX, bytes @ [_, ..]) => Elements { bytes, endian }.matrix(budget, depth + 1)?.1,
+                let tag = self.next()?;
+                let mut data = (&mut *self.source).take(tag.rest);
+                values.push(match tag.kind {
+                    MATRIX if tag.size > 0 => Elements::new(&mut data, self.is_big, self.budget).matrix(depth + 1)?.1,
                     _ => Value::Other("empty"),
                 });
+                drain(&mut data)?;
             }
         }
         Ok(Value::Structures(fields))
@@ -322,17 +335,6 @@ fn text(bytes: &[u8]) -> String {
     letters.filter(|letter| !letter.is_control()).collect()
 }
 
-/// Returns the type and size of an element from its tag, and `true` if it is small: its data is in the tag.
-fn parsed(tag: [u8; 8], endian: Endian) -> Result<(u32, usize, bool), TableError> {
-    let number = |bytes: &[u8]| Element::U32.read(bytes, endian)[0] as u32;
-    let (kind, size) = (number(&tag[..4]), number(&tag[4..]) as usize);
-    match (kind >> 16) as usize {
-        0 => Ok((kind, size, false)),
-        small @ 1..=4 => Ok((kind & 0xffff, small, true)),
-        _ => Err(wrong("an element has an invalid length; copy it again")),
-    }
-}
-
 fn wrong(reason: &str) -> TableError {
     TableError::array("MAT-file", reason)
 }
@@ -341,32 +343,26 @@ fn cut_off() -> TableError {
     wrong("it is cut off; copy it again")
 }
 
-/// Fills `buffer`; returns `false` at the end of the source.
-fn fill(source: &mut dyn Read, buffer: &mut [u8]) -> Result<bool, TableError> {
-    let mut filled = 0;
-    while filled < buffer.len() {
-        match source.read(&mut buffer[filled..]).map_err(damage)? {
-            0 if filled == 0 => return Ok(false),
-            0 => return Err(cut_off()),
-            read => filled += read,
-        }
-    }
-    Ok(true)
+/// Reads `count` bytes, or those up to the end.
+fn up_to(source: &mut dyn Read, count: u64) -> Result<Vec<u8>, TableError> {
+    let mut bytes = Vec::new();
+    source.take(count).read_to_end(&mut bytes).map_err(damage)?;
+    Ok(bytes)
 }
 
-/// Reads `count` bytes, or up to the end.
-fn drain(source: &mut dyn Read, count: u64) -> Result<(), TableError> {
-    std::io::copy(&mut source.take(count), &mut std::io::sink()).map_err(damage)?;
+/// Reads up to the end.
+fn drain(source: &mut dyn Read) -> Result<(), TableError> {
+    io::copy(source, &mut io::sink()).map_err(damage)?;
     Ok(())
 }
 
 /// Converts a decompression error; other I/O errors are passed on.
-fn damage(error: std::io::Error) -> TableError {
+fn damage(error: io::Error) -> TableError {
     match error.kind() {
-        std::io::ErrorKind::InvalidInput | std::io::ErrorKind::InvalidData => {
+        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData => {
             TableError::damaged("a variable", "its compressed data is corrupt; copy it again")
         }
-        std::io::ErrorKind::UnexpectedEof => cut_off(),
+        io::ErrorKind::UnexpectedEof => cut_off(),
         _ => table_error(error),
     }
 }

@@ -8,6 +8,7 @@
 //!
 //! [`Format`] lists the file formats. To add one, add a variant there and a module that reads its arrays.
 
+mod archive;
 mod arrays;
 mod choosing;
 mod columns;
@@ -58,4 +59,4 @@ pub use sentinel::Sentinel;
 pub(crate) use setup::watch;
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
 pub use suggestion::{Meaning, suggested_plan, suggested_plan_in_order};
-pub use table::{Column, Excess, Fault, Faults, Table, Variable};
+pub use table::{Column, Fault, Faults, Table, Variable};
