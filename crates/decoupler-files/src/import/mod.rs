@@ -50,7 +50,7 @@ pub use format::Format;
 pub use importing::{Dropped, FileReport, JoinReport, Recording, read_table};
 pub use inputs::{InputTable, KeptColumn};
 pub use inspection::{ColumnKind, ColumnSummary, InspectedFile, Inspection, TimeSummary};
-pub use lines::{KeptCell, LONGEST_LINE, LineError, LineParser, ParsedLine, ReadError, Readings, ReadingsFile};
+pub use lines::{KeptCell, LONGEST_LINE, LineError, LineParser, ParsedLine, Readings, ReadingsFile};
 pub use plan::{Plan, PlannedSets, TestFiles};
 pub use positions::holds_positions;
 pub use progress::{Progress, Watch};

@@ -7,7 +7,7 @@ mod line_error;
 mod line_parser;
 mod readings_file;
 
-pub use line_error::{LineError, ReadError};
+pub use line_error::LineError;
 pub use line_parser::{KeptCell, LineParser, ParsedLine};
 pub use readings_file::{Readings, ReadingsFile};
 

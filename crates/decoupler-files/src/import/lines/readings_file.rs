@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use super::{
     super::{Separator, TableError, rows::Rows},
-    LONGEST_LINE, LineParser, ParsedLine, ReadError,
+    LONGEST_LINE, LineParser, ParsedLine,
 };
 
 /// File with the readings of an array, read block by block, so that a large file needs little memory.
@@ -52,7 +52,7 @@ impl<R: Read> ReadingsFile<R> {
     ///
     /// # Errors
     /// If the file cannot be read, has no readings, or a line is malformed.
-    pub fn read(&mut self, most: usize) -> Result<Option<Readings>, ReadError> {
+    pub fn read(&mut self, most: usize) -> Result<Option<Readings>, TableError> {
         let (mut values_ohm, mut lines, mut row_indices) = (Vec::new(), Vec::new(), Vec::new());
         let channels = self.parser.channels();
         let mut taken = 0;
@@ -68,7 +68,7 @@ impl<R: Read> ReadingsFile<R> {
                     self.torn_line = Some(line);
                     break;
                 }
-                Err(error) => return Err(error.into()),
+                Err(error) => return Err(TableError::Contents(error.to_string())),
             };
             let rows = readings.len() / channels;
             values_ohm.extend_from_slice(readings);
@@ -78,7 +78,7 @@ impl<R: Read> ReadingsFile<R> {
             taken += 1;
         }
         if !self.has_readings {
-            return Err(TableError::Empty.into());
+            return Err(TableError::Empty);
         }
         if lines.is_empty() {
             return Ok(None);
@@ -107,7 +107,7 @@ mod tests {
         )
     }
 
-    fn read(text: &str) -> Result<Readings, ReadError> {
+    fn read(text: &str) -> Result<Readings, TableError> {
         Ok(reader(text, scene::Rows::All).read(100)?.unwrap())
     }
 
