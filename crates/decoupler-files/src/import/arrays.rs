@@ -7,25 +7,26 @@ use decoupler_core::text::clean_name;
 use super::{
     Column, Encoding, Format, Table, TableError, Variable,
     csv_table::Reading,
-    format::{Array, Cell},
+    format::{Array, Cell, written},
     table::Labels,
 };
+use crate::machine::ReadingBudget;
 
 /// Maximum number of rows of an array that are one sample, such as two readings per press.
 const MAX_ROWS_PER_SAMPLE: usize = 16;
 /// Minimum number of samples for which rows are taken together unless the user names the arrays.
 const MIN_SAMPLES: usize = 10;
 
-/// Combines arrays with the same number of rows into a table. An array with a multiple of these rows has several rows per
+/// Combines arrays with the same number of rows into a table, and notes those left out. An array with a multiple of these rows has several rows per
 /// sample, which are put side by side. If columns are used, the arrays that they name determine the number of rows; else,
 /// those with most numbers. A single array without a name has the columns c1, c2, …; the columns of an array X are X.c1,
 /// X.c2, …, or X if there is only one.
 pub(super) fn table(
     path: &Path,
-    arrays: Vec<Array>,
+    (arrays, left_out): (Vec<Array>, Vec<String>),
     format: Format,
-    left_out: Vec<String>,
     reading: &Reading<'_>,
+    budget: &mut ReadingBudget,
 ) -> Result<Table, TableError> {
     let left_out = left_out.iter().map(|what| format!("left out: {}", clean_name(what)));
     let mut notes = Vec::from_iter(left_out);
@@ -39,7 +40,8 @@ pub(super) fn table(
     };
     let (mut columns, mut variables) = (Vec::new(), Vec::new());
     for array in arrays {
-        let (name, shape, first, each) = (array.name, array.shape, columns.len(), array.rows / rows);
+        let (name, original) = (array.name.clone(), array.original.clone());
+        let (first, shape, each) = (columns.len(), written(&array.shape), array.rows / rows);
         if array.rows % rows != 0 || each > MAX_ROWS_PER_SAMPLE {
             notes.push(format!(
                 "left out: {name} is {shape}, and a sample is one of {rows} rows; name its columns to use it instead"
@@ -47,14 +49,13 @@ pub(super) fn table(
         } else {
             if each > 1 {
                 notes.push(format!("{name} is {shape}: {each} rows per sample, side by side"));
-            } else if array.is_reshaped {
-                let width = array.columns.len();
-                notes.push(format!("{name} is {shape}, read as {rows} × {width}"));
+            } else if array.shape.len() > 2 {
+                notes.push(format!("{name} is {shape}, read as {rows} × {}", array.width));
             }
-            let numbers = side_by_side(array.columns, each);
+            let numbers = array.columns(each, budget)?;
             let width = numbers.len();
             columns.extend(numbers.into_iter().enumerate().map(|(index, numbers)| Column {
-                original: array.original.clone(),
+                original: original.clone(),
                 name: match (name.as_str(), width) {
                     ("", _) => format!("c{}", index + 1),
                     (name, 1) => name.to_owned(),
@@ -105,23 +106,11 @@ fn rows_of_samples(arrays: &[Array], used: &[String]) -> Option<usize> {
     }
     let mut numbers: BTreeMap<usize, usize> = BTreeMap::new();
     for array in arrays {
-        *numbers.entry(array.rows).or_default() += array.rows * array.columns.len();
+        *numbers.entry(array.rows).or_default() += array.rows * array.width;
     }
     let (&most, _) = numbers.iter().max_by_key(|(_, count)| **count)?;
     let is_per_sample = |rows: &&usize| {
         **rows >= MIN_SAMPLES && **rows < most && most % **rows == 0 && most / **rows <= MAX_ROWS_PER_SAMPLE
     };
     Some(numbers.keys().rev().find(is_per_sample).copied().unwrap_or(most))
-}
-
-/// Puts every `each` rows side by side.
-fn side_by_side(columns: Vec<Vec<f64>>, each: usize) -> Vec<Vec<f64>> {
-    if each == 1 {
-        return columns;
-    }
-    let part = |first: usize| {
-        let of_row = move |column: &Vec<f64>| column.iter().skip(first).step_by(each).copied().collect();
-        columns.iter().map(of_row)
-    };
-    (0..each).flat_map(part).collect()
 }

@@ -227,13 +227,11 @@ fn name_apart(columns: &mut [Column]) {
     for column in columns {
         let count = counts.entry(column.name.clone()).or_default();
         *count += 1;
-        while *count > 1 {
-            let numbered = format!("{}#{count}", column.name);
-            if names.insert(numbered.clone()) {
-                column.name = numbered;
-                break;
-            }
+        while *count > 1 && !names.insert(format!("{}#{count}", column.name)) {
             *count += 1;
+        }
+        if *count > 1 {
+            column.name = format!("{}#{count}", column.name);
         }
     }
 }

@@ -6,9 +6,7 @@ use encoding_rs_io::DecodeReaderBytesBuilder;
 use serde::{Deserialize, Serialize};
 
 /// Character between the cells of a row.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, strum::Display, strum::IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum Separator {
@@ -26,9 +24,7 @@ pub enum Separator {
 }
 
 /// Character before the decimal places.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, strum::Display, strum::IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum Decimal {
@@ -40,9 +36,7 @@ pub enum Decimal {
 }
 
 /// Encoding of a text file.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, strum::Display, strum::IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "kebab-case")]
 pub enum Encoding {
@@ -177,23 +171,24 @@ impl Encoding {
 
 impl fmt::Display for Dialect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            separator,
+            decimal,
+            encoding,
+            ..
+        } = self;
         let header = if self.header { "a header" } else { "no header" };
-        write!(
-            f,
-            "separator {}, decimal {}, {header}, {}",
-            self.separator, self.decimal, self.encoding
-        )?;
-        if self.sep_line {
-            write!(f, ", a sep= line")?;
-        }
-        if self.trailing_separator {
-            write!(f, ", a separator at the end of each row")?;
-        }
-        if self.skipped_lines > 0 {
-            write!(f, ", {} before the table", counted(self.skipped_lines, "line"))?;
-        }
-        if self.carriage_returns {
-            write!(f, ", lines end with CR")?;
+        write!(f, "separator {separator}, decimal {decimal}, {header}, {encoding}")?;
+        let skipped = format!("{} before the table", counted(self.skipped_lines, "line"));
+        for (is_so, what) in [
+            (self.sep_line, "a sep= line"),
+            (self.trailing_separator, "a separator at the end of each row"),
+            (self.skipped_lines > 0, &skipped),
+            (self.carriage_returns, "lines end with CR"),
+        ] {
+            if is_so {
+                write!(f, ", {what}")?;
+            }
         }
         Ok(())
     }

@@ -19,7 +19,7 @@ use super::{
     rows::MAX_CELLS,
     sheet,
 };
-use crate::machine::ReadingBudget;
+use crate::machine::{OverBudget, ReadingBudget};
 
 /// Number of numbers that are read at once.
 const BLOCK: u64 = 1 << 17;
@@ -126,7 +126,7 @@ pub(super) fn read(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Resu
         return Err(refused(what, cure));
     }
     let is_named = path.extension().is_some_and(|found| found.eq_ignore_ascii_case("mat")) && size.is_some();
-    let ((arrays, left_out), format) = match beginning[..] {
+    let (arrays, format) = match beginning[..] {
         [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => {
             let array = numpy::read("", &mut BufReader::new(Watched::new(file, size, watch)), budget)?;
             ((vec![array], Vec::new()), Format::Npy)
@@ -154,7 +154,7 @@ pub(super) fn read(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Resu
         }
         _ => return csv_table::read(path, Watched::new(file, size, watch), reading, budget),
     };
-    arrays::table(path, arrays, format, left_out, reading)
+    arrays::table(path, arrays, format, reading, budget)
 }
 
 impl fmt::Display for Format {
@@ -196,10 +196,9 @@ impl Element {
         is_known.then_some(Self { kind, size, is_big })
     }
 
-    /// Reads `count` numbers, or those up to the end of the source, block by block, so that a corrupt count allocates little
-    /// memory.
+    /// Reads `count` numbers, whose memory is claimed, or those up to the end of the source.
     pub(super) fn read(self, source: &mut dyn Read, count: u64) -> io::Result<Vec<f64>> {
-        let (mut numbers, mut block) = (Vec::new(), Vec::new());
+        let (mut numbers, mut block) = (Vec::with_capacity(count as usize), Vec::new());
         while (numbers.len() as u64) < count {
             block.clear();
             let wanted = (count - numbers.len() as u64).min(BLOCK) * self.size as u64;
@@ -228,52 +227,64 @@ impl Element {
     }
 }
 
-/// A named array of numbers: samples × columns, column by column.
+/// A named array of numbers: samples × columns.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Array {
     /// Name without unprintable characters.
     pub(super) name: String,
     /// Name in the file, escaped, if it has such characters.
     pub(super) original: Option<String>,
+    /// Shape in the file: the first dimension counts samples, and the others are joined in the order of the numbers.
+    pub(super) shape: Vec<usize>,
     pub(super) rows: usize,
-    pub(super) columns: Vec<Vec<f64>>,
-    /// Shape in the file, as text.
-    pub(super) shape: String,
-    /// `true` if it has more than two dimensions in the file.
-    pub(super) is_reshaped: bool,
+    pub(super) width: usize,
+    numbers: Vec<f64>,
+    is_by_column: bool,
 }
 
 impl Array {
-    /// Splits `numbers` into columns: the first dimension of `shape` counts samples, and the others are joined in the order of
-    /// the numbers.
     pub(super) fn new(
-        name: String,
-        shape: &[usize],
+        name: &str,
+        shape: Vec<usize>,
         numbers: Vec<f64>,
         is_by_column: bool,
     ) -> Result<Self, TableError> {
-        let rows = shape.first().copied().unwrap_or(1);
-        let width = shape.iter().skip(1).product();
+        let (rows, width) = (shape.first().copied().unwrap_or(1), shape.iter().skip(1).product());
         if width > MAX_CELLS {
-            let reason = format!("{} is more than {MAX_CELLS} columns; transpose it", written(shape));
-            return Err(TableError::array(&name, reason));
+            let reason = format!("{} is more than {MAX_CELLS} columns; transpose it", written(&shape));
+            return Err(TableError::array(name, reason));
         }
-        let columns = if width == 1 {
-            vec![numbers]
-        } else if is_by_column {
-            numbers.chunks_exact(rows.max(1)).map(<[f64]>::to_vec).collect()
-        } else {
-            let column = |index| numbers.iter().skip(index).step_by(width).copied().collect();
-            (0..width).map(column).collect()
-        };
         Ok(Self {
-            original: original_name(&name),
-            name: clean_name(&name),
+            name: clean_name(name),
+            original: original_name(name),
+            shape,
             rows,
-            columns,
-            shape: written(shape),
-            is_reshaped: shape.len() > 2,
+            width,
+            numbers,
+            is_by_column,
         })
+    }
+
+    /// Returns the columns of samples of `each` rows, which are side by side.
+    pub(super) fn columns(self, each: usize, budget: &mut ReadingBudget) -> Result<Vec<Vec<f64>>, OverBudget> {
+        if self.width * each == 1 {
+            return Ok(vec![self.numbers]);
+        }
+        let bytes = (self.numbers.len() * size_of::<f64>()) as u64;
+        budget.claim(bytes)?;
+        let column = |index: usize| {
+            let (row, column) = (index / self.width, index % self.width);
+            let (first, step) = match self.is_by_column {
+                true => (column * self.rows + row, each),
+                false => (row * self.width + column, each * self.width),
+            };
+            let numbers = self.numbers[first..].iter().step_by(step);
+            numbers.take(self.rows / each).copied().collect()
+        };
+        let columns = (0..self.width * each).map(column).collect();
+        // The numbers in the order of the file are freed.
+        budget.release(bytes);
+        Ok(columns)
     }
 }
 

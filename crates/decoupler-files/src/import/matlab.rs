@@ -101,7 +101,7 @@ impl Variables {
             Value::Numbers { shape, numbers } => {
                 // A row vector becomes a column of the table.
                 let first = shape.iter().position(|&size| size > 1).unwrap_or(shape.len() - 1);
-                match Array::new(name, &shape[first..], numbers, true) {
+                match Array::new(&name, shape[first..].to_vec(), numbers, true) {
                     Ok(array) => self.arrays.push(array),
                     Err(error) => self.left_out.push(error.to_string()),
                 }
@@ -261,8 +261,7 @@ impl<'a> Elements<'a> {
             let reason = format!("it should have {shape} numbers and has {found}; save or copy it again");
             return Err(TableError::array(name, reason));
         }
-        // The numbers in the order of the file are freed once they are copied to their columns.
-        self.budget.claim(found.saturating_mul(2 * size_of::<f64>() as u64))?;
+        self.budget.claim(found.saturating_mul(size_of::<f64>() as u64))?;
         let mut data = tag.small.chain((&mut *self.source).take(tag.rest));
         let numbers = Element { is_big, ..element }.read(&mut data, found).map_err(damage)?;
         drain(&mut data)?;

@@ -16,8 +16,6 @@ use crate::machine::ReadingBudget;
 
 /// Maximum length of a header in bytes.
 const LONGEST_HEADER: usize = 1 << 16;
-/// Memory of a number in bytes.
-const NUMBER: u64 = size_of::<f64>() as u64;
 
 /// Reads an array: samples × any further dimensions. `budget` limits its memory.
 pub(super) fn read(name: &str, source: &mut dyn Read, budget: &mut ReadingBudget) -> Result<Array, TableError> {
@@ -49,16 +47,17 @@ pub(super) fn read(name: &str, source: &mut dyn Read, budget: &mut ReadingBudget
         return Err(wrong(format!("its header has {length} bytes; save it with numpy.save")));
     }
     let (header, element) = Header::parse(&String::from_utf8_lossy(&bytes(length)?)).map_err(wrong)?;
-    let (shape, size) = (header.shape.as_slice(), element.size);
-    let written = written(shape);
-    let expected = shape.iter().copied().try_fold(size, usize::checked_mul);
-    let count = expected.ok_or_else(|| wrong(format!("{written} numbers do not fit into memory")))? / size;
-    let count = count as u64;
+    let written = written(&header.shape);
+    let bytes = header
+        .shape
+        .iter()
+        .try_fold(element.size, |count, size| count.checked_mul(*size));
+    let bytes = bytes.ok_or_else(|| wrong(format!("{written} numbers do not fit into memory")))?;
+    let count = (bytes / element.size) as u64;
     if count == 0 {
         return Err(wrong(format!("it is empty ({written})")));
     }
-    // The numbers in the order of the file are freed once they are copied to their columns.
-    budget.claim(count.saturating_mul(2 * NUMBER))?;
+    budget.claim(count.saturating_mul(size_of::<f64>() as u64))?;
     let numbers = element.read(source, count).map_err(table_error)?;
     let found = numbers.len();
     if (found as u64) < count {
@@ -66,9 +65,7 @@ pub(super) fn read(name: &str, source: &mut dyn Read, budget: &mut ReadingBudget
             "it is cut off: its header states {written} numbers, but it has {found}; copy it again"
         )));
     }
-    let array = Array::new(name.to_owned(), shape, numbers, header.fortran_order)?;
-    budget.release(count * NUMBER);
-    Ok(array)
+    Array::new(name, header.shape, numbers, header.fortran_order)
 }
 
 /// Shape and type of an array, with the names of their keys.

@@ -74,17 +74,25 @@ struct Extremes {
 impl Extremes {
     /// Returns `None` unless there are two different numbers.
     fn of(numbers: &[f64]) -> Option<Self> {
-        let present = || numbers.iter().copied().filter(|number| !number.is_nan());
-        let (min, max) = (
-            present().fold(f64::INFINITY, f64::min),
-            present().fold(f64::NEG_INFINITY, f64::max),
-        );
-        (min < max).then(|| Self {
+        let (mut min, mut above_min, mut below_max, mut max) =
+            (f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY);
+        // NaN is neither below nor above.
+        for &number in numbers {
+            if number < min {
+                (min, above_min) = (number, min);
+            } else if number > min && number < above_min {
+                above_min = number;
+            }
+            if number > max {
+                (max, below_max) = (number, max);
+            } else if number < max && number > below_max {
+                below_max = number;
+            }
+        }
+        (min < max).then_some(Self {
             min,
-            above_min: present().filter(|number| *number > min).fold(f64::INFINITY, f64::min),
-            below_max: present()
-                .filter(|number| *number < max)
-                .fold(f64::NEG_INFINITY, f64::max),
+            above_min,
+            below_max,
             max,
         })
     }

@@ -1,4 +1,7 @@
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::{
+    collections::BTreeSet,
+    hash::{DefaultHasher, Hash, Hasher},
+};
 
 use decoupler_core::{
     dataset::{DatasetError, MemoryStream, Place, Series},
@@ -181,12 +184,8 @@ impl LineParser {
         let is_derived = |name: &String| recipe.derive.iter().any(|derived| derived.name == *name);
         let names = inputs.iter().map(|input| &input.name);
         let names = names.chain(recipe.derive.iter().flat_map(Derived::columns));
-        let mut read: Vec<Channel> = Vec::new();
-        for name in names.filter(|name| !is_derived(name)) {
-            if read.iter().all(|channel| channel.name != *name) {
-                read.push(Channel::new(name, None));
-            }
-        }
+        let read = BTreeSet::from_iter(names.filter(|name| !is_derived(name)));
+        let read = read.into_iter().map(|name| Channel::new(name, None)).collect();
         let memory = problem.memory.as_ref();
         let rows = row_wires.map(|read| RowWires {
             read,
