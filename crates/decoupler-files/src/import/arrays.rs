@@ -8,7 +8,6 @@ use super::{
     Column, Encoding, Format, Table, TableError, Variable,
     csv_table::Reading,
     format::{Array, Cell, written},
-    table::Labels,
 };
 use crate::machine::ReadingBudget;
 
@@ -68,13 +67,12 @@ pub(super) fn table(
         let columns = first..columns.len();
         variables.push(Variable { name, shape, columns });
     }
-    let roles = reading.roles(&columns);
-    for (column, (missing, has_labels)) in columns.iter_mut().zip(roles) {
-        column.labels = has_labels.then(Labels::default);
+    let markers = reading.give_roles(&mut columns);
+    for (column, markers) in columns.iter_mut().zip(markers) {
         for (line, number) in (1..).zip(std::mem::take(&mut column.numbers)) {
-            let is_missing = number.is_nan() || missing.iter().any(|rule| rule.is_number(number));
+            let is_missing = number.is_nan() || markers.iter().any(|missing| missing.is_number(number));
             let (text, found) = match number.is_finite() {
-                true if !has_labels => (String::new(), Cell::Number(number)),
+                true if column.labels.is_none() => (String::new(), Cell::Number(number)),
                 true => (number.to_string(), Cell::Number(number)),
                 false => (number.to_string(), Cell::Text),
             };

@@ -38,18 +38,21 @@ pub(super) struct Reading<'a> {
 }
 
 impl<'a> Reading<'a> {
-    /// Returns the markers of missing values of each column, and `true` if it holds labels.
-    pub(super) fn roles(&self, columns: &[Column]) -> Vec<(Vec<&'a Missing>, bool)> {
-        let find = |name: &String| position(columns, name);
-        let label = self.label.as_ref().and_then(find);
-        let markers = self.missing.iter();
-        let markers = Vec::from_iter(markers.map(|(name, missing)| (name.as_ref().map(find), *missing)));
-        let of = |column| {
-            let is_marker = |of: &Option<Option<usize>>| of.is_none_or(|of| of == Some(column));
-            let markers = markers.iter().filter(|(of, _)| is_marker(of));
-            (markers.map(|(_, missing)| *missing).collect(), label == Some(column))
-        };
-        (0..columns.len()).map(of).collect()
+    /// Gives labels to the column that has them, and returns the markers of missing values of each column.
+    pub(super) fn give_roles(&self, columns: &mut [Column]) -> Vec<Vec<&'a Missing>> {
+        if let Some(label) = self.label.as_ref().and_then(|name| position(columns, name)) {
+            columns[label].labels = Some(Labels::default());
+        }
+        let mut markers = vec![Vec::new(); columns.len()];
+        for (name, missing) in &self.missing {
+            match name {
+                None => markers.iter_mut().for_each(|of_column| of_column.push(*missing)),
+                Some(name) => position(columns, name)
+                    .into_iter()
+                    .for_each(|column| markers[column].push(*missing)),
+            }
+        }
+        markers
     }
 }
 
@@ -86,15 +89,10 @@ pub(super) fn read(
     };
     let empty_end = dialect.trailing_separator && headers.last().is_none_or(String::is_empty);
     let mut columns = named(&headers, width - usize::from(empty_end && width > 1));
-    let roles = reading.roles(&columns).into_iter().zip(&mut columns);
-    let missing = roles.map(|((missing, has_labels), column)| {
-        column.labels = has_labels.then(Labels::default);
-        missing
-    });
     let mut body = Body {
         dialect,
         budget,
-        missing: missing.collect(),
+        missing: reading.give_roles(&mut columns),
         too_short: Faults::default(),
         table: Table::new(path, Format::Text(dialect)),
     };

@@ -15,6 +15,8 @@ use crate::machine::ReadingBudget;
 
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
+/// Class of structures.
+const STRUCTURES: i32 = 2;
 /// Types of numbers by their codes in NumPy.
 const CODES: [&str; 14] = [
     "", "i1", "u1", "i2", "u2", "i4", "u4", "f4", "", "f8", "", "", "i8", "u8",
@@ -25,8 +27,8 @@ const DEEPEST: usize = 8;
 const MAX_FIELDS: usize = 1 << 20;
 /// Memory of a field of a structure in bytes, without its numbers.
 const FIELD: u64 = 128;
-/// Maximum length of names, shapes and flags in bytes.
-const LONGEST: u64 = 1 << 16;
+/// Number of bytes that contain the flags, the shape and the name of a variable.
+const HEAD: usize = 1 << 18;
 
 /// Reads the numeric arrays of a file; returns them and the variables left out. `budget` limits their memory.
 pub(super) fn read(mut source: impl Read, budget: &mut ReadingBudget) -> Result<(Vec<Array>, Vec<String>), TableError> {
@@ -44,27 +46,27 @@ pub(super) fn read(mut source: impl Read, budget: &mut ReadingBudget) -> Result<
         }
     };
     let mut found = Variables::default();
-    let mut file = Elements::new(&mut source, is_big, budget);
-    while let Some(tag) = file.tag()? {
-        match tag.kind {
-            COMPRESSED if tag.size == tag.rest => {
-                // Compressed variables are not padded.
-                file.padding = 0;
-                let mut inflated = ZlibDecoder::new((&mut *file.source).take(tag.rest));
-                let mut elements = Elements::new(&mut inflated, is_big, file.budget);
-                if let Some(Tag { kind: MATRIX, rest, .. }) = elements.tag()? {
-                    found.read(&mut elements, rest)?;
+    while let Some(tag) = parsed(&up_to(&mut source, 8)?, is_big)? {
+        match tag {
+            (COMPRESSED, size, false) => {
+                let mut inflated = ZlibDecoder::new((&mut source).take(size as u64));
+                let tag = up_to(&mut inflated, 8)?;
+                if let Some((MATRIX, size, false)) = parsed(&tag, is_big)? {
+                    found.read(&mut inflated, size, is_big, budget)?;
                 }
                 // The checksum is verified at the end of the data.
                 if !up_to(&mut inflated, 1)?.is_empty() {
                     let reason = "it has more data than it states; copy it again";
                     return Err(TableError::damaged("a variable", reason));
                 }
-                if inflated.total_in() != tag.rest {
+                if inflated.total_in() != size as u64 {
                     return Err(TableError::damaged("a variable", "its length is wrong; copy it again"));
                 }
             }
-            MATRIX if tag.size == tag.rest => found.read(&mut file, tag.rest)?,
+            (MATRIX, size, false) => {
+                found.read(&mut source, size, is_big, budget)?;
+                up_to(&mut source, size.next_multiple_of(8) - size)?;
+            }
             _ => return Err(TableError::damaged("a variable", "its kind is unknown; copy it again")),
         }
     }
@@ -79,18 +81,30 @@ struct Variables {
 }
 
 impl Variables {
-    /// Reads a variable, the next `size` bytes of `elements`.
-    fn read(&mut self, elements: &mut Elements<'_>, size: u64) -> Result<(), TableError> {
-        let mut source = (&mut *elements.source).take(size);
-        let (name, value) = Elements::new(&mut source, elements.is_big, elements.budget).matrix(0)?;
-        drain(&mut source)?;
-        if source.limit() > 0 {
-            return Err(cut_off());
-        }
+    /// Reads a variable of `size` bytes; of one that is left out, only its name.
+    fn read(
+        &mut self,
+        source: &mut dyn Read,
+        size: usize,
+        is_big: bool,
+        budget: &mut ReadingBudget,
+    ) -> Result<(), TableError> {
+        let mut bytes = up_to(source, size.min(HEAD))?;
+        let (flags, _, name) = Elements { bytes: &bytes, is_big }.head()?;
+        let left = size - bytes.len();
         // MATLAB stores internal data, such as `__function_workspace__`, in variables without a name.
-        if !name.is_empty() {
-            self.add(name, value);
+        if name.is_empty() || left_out(flags).is_some() {
+            let note = left_out(flags).map(|what| format!("{name} is {what}"));
+            self.left_out.extend(note.filter(|_| !name.is_empty()));
+            io::copy(&mut source.take(left as u64), &mut io::sink()).map_err(damage)?;
+            return Ok(());
         }
+        budget.claim(size as u64)?;
+        bytes.append(&mut up_to(source, left)?);
+        let value = Elements { bytes: &bytes, is_big }.matrix(budget, 0)?;
+        drop(bytes);
+        budget.release(size as u64);
+        self.add(name, value);
         Ok(())
     }
 
@@ -131,178 +145,108 @@ enum Value {
     Other(&'static str),
 }
 
-/// Beginning of an element.
-struct Tag {
-    kind: u32,
-    /// Number of bytes of the data.
-    size: u64,
-    /// The data of a small element.
-    small: Vec<u8>,
-    /// Number of bytes of the data that follow.
-    rest: u64,
-}
-
-/// Elements that follow each other.
+/// Elements of a variable, which follow each other.
 struct Elements<'a> {
-    source: &'a mut dyn Read,
+    bytes: &'a [u8],
     is_big: bool,
-    budget: &'a mut ReadingBudget,
-    /// Number of bytes before the next element.
-    padding: u64,
 }
 
 impl<'a> Elements<'a> {
-    fn new(source: &'a mut dyn Read, is_big: bool, budget: &'a mut ReadingBudget) -> Self {
-        Self {
-            source,
-            is_big,
-            budget,
-            padding: 0,
-        }
-    }
-
-    /// Tag of the next element; `None` at the end. Its data must be read before the next.
-    fn tag(&mut self) -> Result<Option<Tag>, TableError> {
-        drain(&mut (&mut *self.source).take(self.padding))?;
-        let tag = up_to(self.source, 8)?;
-        let [kind, size] = self.integers(&tag)[..] else {
-            return if tag.is_empty() { Ok(None) } else { Err(cut_off()) };
+    /// Type and data of the next element.
+    fn next(&mut self) -> Result<(u32, &'a [u8]), TableError> {
+        let tag = &self.bytes[..self.bytes.len().min(8)];
+        let (kind, size, is_small) = parsed(tag, self.is_big)?.ok_or_else(cut_off)?;
+        let (start, end) = match is_small {
+            true => (4, 8),
+            false => (8, 8 + size.next_multiple_of(8)),
         };
-        let (kind, size) = (kind as u32, u64::from(size as u32));
-        let (size, small) = match kind >> 16 {
-            0 => (size, Vec::new()),
-            small @ 1..=4 => (u64::from(small), tag[4..][..small as usize].to_vec()),
-            _ => return Err(wrong("an element has an invalid length; copy it again")),
-        };
-        let rest = size - small.len() as u64;
-        self.padding = rest.next_multiple_of(8) - rest;
-        let kind = kind & 0xffff;
-        Ok(Some(Tag {
-            kind,
-            size,
-            small,
-            rest,
-        }))
-    }
-
-    fn next(&mut self) -> Result<Tag, TableError> {
-        self.tag()?.ok_or_else(cut_off)
-    }
-
-    /// Data of an element.
-    fn data(&mut self, tag: Tag) -> Result<Vec<u8>, TableError> {
-        let mut data = tag.small;
-        data.extend(up_to(self.source, tag.rest)?);
-        if (data.len() as u64) < tag.size {
-            return Err(cut_off());
-        }
-        Ok(data)
-    }
-
-    /// Data of a name, a shape or flags.
-    fn next_short(&mut self) -> Result<Vec<u8>, TableError> {
-        let tag = self.next()?;
-        if tag.size > LONGEST {
-            return Err(wrong("an element has an invalid length; copy it again"));
-        }
-        self.data(tag)
+        let data = self.bytes.get(start..start + size).ok_or_else(cut_off)?;
+        self.bytes = self.bytes.get(end..).unwrap_or_default();
+        Ok((kind, data))
     }
 
     fn next_integers(&mut self) -> Result<Vec<i32>, TableError> {
-        let bytes = self.next_short()?;
-        Ok(self.integers(&bytes))
+        Ok(integers(self.next()?.1, self.is_big))
     }
 
-    fn integers(&self, bytes: &[u8]) -> Vec<i32> {
-        let integer = if self.is_big {
-            i32::from_be_bytes
-        } else {
-            i32::from_le_bytes
-        };
-        bytes.as_chunks().0.iter().map(|bytes| integer(*bytes)).collect()
-    }
-
-    /// Name and value of a matrix. The data of one that is left out, and of a variable without a name, is not read.
-    fn matrix(&mut self, depth: usize) -> Result<(String, Value), TableError> {
+    /// Flags, shape and name of a matrix.
+    fn head(&mut self) -> Result<(i32, Vec<i32>, String), TableError> {
         let flags = self.next_integers()?.first().copied().unwrap_or(0);
-        let (shape, name) = (self.next_integers()?, text(&self.next_short()?));
-        let value = match flags & 0xff {
-            _ if depth == 0 && name.is_empty() => Value::Other("internal"),
-            1 => Value::Other("a cell array"),
-            2 if depth == DEEPEST => Value::Other("a structure within too many others"),
-            2 => self.structures(&shape, depth)?,
-            4 => Value::Other("text"),
-            5 => Value::Other("sparse; save it as full"),
-            6..=15 if flags & 0x0800 != 0 => Value::Other("complex"),
-            6..=15 => self.numbers(&name, &shape)?,
-            _ => Value::Other("an object"),
-        };
-        Ok((name, value))
+        Ok((flags, self.next_integers()?, text(self.next()?.1)))
     }
 
-    fn numbers(&mut self, name: &str, shape: &[i32]) -> Result<Value, TableError> {
+    /// Value of a matrix.
+    fn matrix(mut self, budget: &mut ReadingBudget, depth: usize) -> Result<Value, TableError> {
+        let (flags, shape, name) = self.head()?;
+        match left_out(flags) {
+            Some(what) => Ok(Value::Other(what)),
+            None if flags & 0xff != STRUCTURES => self.numbers(&name, &shape, budget),
+            None if depth == DEEPEST => Ok(Value::Other("a structure within too many others")),
+            None => self.structures(&shape, budget, depth),
+        }
+    }
+
+    fn numbers(&mut self, name: &str, shape: &[i32], budget: &mut ReadingBudget) -> Result<Value, TableError> {
         if shape.is_empty() || shape.iter().any(|size| *size < 1) {
             return Ok(Value::Other("empty"));
         }
         let shape = Vec::from_iter(shape.iter().map(|size| *size as usize));
-        let tag = self.next()?;
-        let element = CODES.get(tag.kind as usize).and_then(|code| Element::of_code(code));
+        let (kind, mut bytes) = self.next()?;
+        let element = CODES.get(kind as usize).and_then(|code| Element::of_code(code));
         let element = element.ok_or_else(|| {
             let reason = "its numbers have an unknown type; save it with the option -v7";
             TableError::array(name, reason)
         })?;
-        let is_big = self.is_big;
-        let found = tag.size / element.size as u64;
-        let expected = shape
-            .iter()
-            .try_fold(1_u64, |count, size| count.checked_mul(*size as u64));
+        let found = bytes.len() / element.size;
+        let expected = shape.iter().copied().try_fold(1, usize::checked_mul);
         if expected != Some(found) {
             let shape = written(&shape);
             let reason = format!("it should have {shape} numbers and has {found}; save or copy it again");
             return Err(TableError::array(name, reason));
         }
-        self.budget.claim(found.saturating_mul(size_of::<f64>() as u64))?;
-        let mut data = tag.small.chain((&mut *self.source).take(tag.rest));
-        let numbers = Element { is_big, ..element }.read(&mut data, found).map_err(damage)?;
-        drain(&mut data)?;
-        if (numbers.len() as u64) < found {
-            return Err(cut_off());
-        }
+        let is_big = self.is_big;
+        budget.claim((found as u64).saturating_mul(size_of::<f64>() as u64))?;
+        let numbers = Element { is_big, ..element }.read(&mut bytes, found as u64)?;
         Ok(Value::Numbers { shape, numbers })
     }
 
     /// Reads the fields of `shape` structures.
-    fn structures(&mut self, shape: &[i32], depth: usize) -> Result<Value, TableError> {
-        let length = self
-            .next_integers()?
-            .first()
-            .map_or(0, |length| (*length).max(0) as usize);
-        let tag = self.next()?;
-        self.budget.claim(tag.size)?;
-        let names = self.data(tag)?;
+    fn structures(&mut self, shape: &[i32], budget: &mut ReadingBudget, depth: usize) -> Result<Value, TableError> {
+        let length = self.next_integers()?.first().map_or(0, |length| *length as usize);
+        let (_, names) = self.next()?;
         let count: f64 = shape.iter().map(|size| f64::from(*size)).product();
         let width = names.len().checked_div(length).unwrap_or(0);
         let values = count.max(1.0) * width as f64;
         if values > MAX_FIELDS as f64 {
             return Ok(Value::Other("a structure with too many fields"));
         }
-        self.budget.claim(values as u64 * FIELD)?;
+        budget.claim(values as u64 * FIELD)?;
         let names = names.chunks_exact(length.max(1)).take(width);
         let mut fields = Vec::from_iter(names.map(|name| (text(name), Vec::new())));
         // Without fields, a shape of any size has no data.
         let elements = if fields.is_empty() { 0 } else { count as usize };
+        let is_big = self.is_big;
         for _ in 0..elements {
             for (_, values) in &mut fields {
-                let tag = self.next()?;
-                let mut data = (&mut *self.source).take(tag.rest);
-                values.push(match tag.kind {
-                    MATRIX if tag.size > 0 => Elements::new(&mut data, self.is_big, self.budget).matrix(depth + 1)?.1,
+                values.push(match self.next()? {
+                    (MATRIX, bytes @ [_, ..]) => Elements { bytes, is_big }.matrix(budget, depth + 1)?,
                     _ => Value::Other("empty"),
                 });
-                drain(&mut data)?;
             }
         }
         Ok(Value::Structures(fields))
+    }
+}
+
+/// Returns what a matrix with these flags is, unless it is numbers or structures.
+fn left_out(flags: i32) -> Option<&'static str> {
+    match flags & 0xff {
+        1 => Some("a cell array"),
+        STRUCTURES => None,
+        4 => Some("text"),
+        5 => Some("sparse; save it as full"),
+        6..=15 => (flags & 0x0800 != 0).then_some("complex"),
+        _ => Some("an object"),
     }
 }
 
@@ -334,6 +278,27 @@ fn text(bytes: &[u8]) -> String {
     letters.filter(|letter| !letter.is_control()).collect()
 }
 
+/// Returns the type and size of an element from its tag, and `true` if it is small: its data is in the tag. `None` at the end.
+fn parsed(tag: &[u8], is_big: bool) -> Result<Option<(u32, usize, bool)>, TableError> {
+    let [kind, size] = integers(tag, is_big)[..] else {
+        return if tag.is_empty() { Ok(None) } else { Err(cut_off()) };
+    };
+    let (kind, size) = (kind as u32, size as u32);
+    match kind >> 16 {
+        0 => Ok(Some((kind, size as usize, false))),
+        small @ 1..=4 => Ok(Some((kind & 0xffff, small as usize, true))),
+        _ => Err(wrong("an element has an invalid length; copy it again")),
+    }
+}
+
+fn integers(bytes: &[u8], is_big: bool) -> Vec<i32> {
+    let integer = match is_big {
+        true => i32::from_be_bytes,
+        false => i32::from_le_bytes,
+    };
+    bytes.as_chunks().0.iter().map(|bytes| integer(*bytes)).collect()
+}
+
 fn wrong(reason: &str) -> TableError {
     TableError::array("MAT-file", reason)
 }
@@ -343,16 +308,10 @@ fn cut_off() -> TableError {
 }
 
 /// Reads `count` bytes, or those up to the end.
-fn up_to(source: &mut dyn Read, count: u64) -> Result<Vec<u8>, TableError> {
+fn up_to(source: &mut dyn Read, count: usize) -> Result<Vec<u8>, TableError> {
     let mut bytes = Vec::new();
-    source.take(count).read_to_end(&mut bytes).map_err(damage)?;
+    source.take(count as u64).read_to_end(&mut bytes).map_err(damage)?;
     Ok(bytes)
-}
-
-/// Reads up to the end.
-fn drain(source: &mut dyn Read) -> Result<(), TableError> {
-    io::copy(source, &mut io::sink()).map_err(damage)?;
-    Ok(())
 }
 
 /// Converts a decompression error; other I/O errors are passed on.

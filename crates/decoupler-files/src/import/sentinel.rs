@@ -74,21 +74,17 @@ struct Extremes {
 impl Extremes {
     /// Returns `None` unless there are two different numbers.
     fn of(numbers: &[f64]) -> Option<Self> {
-        let (mut min, mut above_min, mut below_max, mut max) =
-            (f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY);
-        // NaN is neither below nor above.
-        for &number in numbers {
-            if number < min {
-                (min, above_min) = (number, min);
-            } else if number > min && number < above_min {
-                above_min = number;
-            }
-            if number > max {
-                (max, below_max) = (number, max);
-            } else if number < max && number > below_max {
-                below_max = number;
-            }
-        }
+        // The smallest two of different numbers or, negated, the largest; NaN is never smaller.
+        let two = |sign: f64| {
+            let numbers = numbers.iter().map(|number| sign * number);
+            let smallest = numbers.fold([f64::INFINITY; 2], |[first, second], number| match number {
+                _ if number < first => [number, first],
+                _ if number > first && number < second => [first, number],
+                _ => [first, second],
+            });
+            smallest.map(|number| sign * number)
+        };
+        let ([min, above_min], [max, below_max]) = (two(1.0), two(-1.0));
         (min < max).then_some(Self {
             min,
             above_min,
