@@ -2,12 +2,13 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use decoupler_core::text::clean_name;
+use decoupler_core::text::{clean_name, original_name};
 
 use super::{
     Column, Encoding, Format, Table, TableError, Variable,
     csv_table::Reading,
     format::{Array, Cell, written},
+    rows::MAX_CELLS,
 };
 use crate::machine::ReadingBudget;
 
@@ -16,10 +17,10 @@ const MAX_ROWS_PER_SAMPLE: usize = 16;
 /// Minimum number of samples for which rows are taken together unless the user names the arrays.
 const MIN_SAMPLES: usize = 10;
 
-/// Combines arrays with the same number of rows into a table, and notes those left out. An array with a multiple of these rows has several rows per
-/// sample, which are put side by side. If columns are used, the arrays that they name determine the number of rows; else,
-/// those with most numbers. A single array without a name has the columns c1, c2, …; the columns of an array X are X.c1,
-/// X.c2, …, or X if there is only one.
+/// Combines arrays with the same number of rows into a table, and notes those left out. An array with a multiple of these rows
+/// has several rows per sample, which are put side by side. If columns are used, the arrays that they name determine the number
+/// of rows; else, those with most numbers. A single array without a name has the columns c1, c2, …; the columns of an array X
+/// are X.c1, X.c2, …, or X if there is only one.
 pub(super) fn table(
     path: &Path,
     (arrays, left_out): (Vec<Array>, Vec<String>),
@@ -27,8 +28,13 @@ pub(super) fn table(
     reading: &Reading<'_>,
     budget: &mut ReadingBudget,
 ) -> Result<Table, TableError> {
-    let left_out = left_out.iter().map(|what| format!("left out: {}", clean_name(what)));
-    let mut notes = Vec::from_iter(left_out);
+    let (arrays, wide): (Vec<_>, Vec<_>) = arrays.into_iter().partition(|array| array.width() <= MAX_CELLS);
+    let wide = wide.iter().map(|Array { name, shape, .. }| {
+        let (name, shape) = (if name.is_empty() { "the array" } else { name }, written(shape));
+        format!("{name} is {shape}, more than {MAX_CELLS} columns; transpose it")
+    });
+    let left_out = left_out.into_iter().chain(wide);
+    let mut notes = Vec::from_iter(left_out.map(|what| format!("left out: {}", clean_name(&what))));
     let Some(rows) = rows_of_samples(&arrays, &reading.used) else {
         let found = if notes.is_empty() {
             "it is empty".to_owned()
@@ -39,9 +45,9 @@ pub(super) fn table(
     };
     let (mut columns, mut variables) = (Vec::new(), Vec::new());
     for array in arrays {
-        let (name, original) = (array.name.clone(), array.original.clone());
-        let (first, shape, each) = (columns.len(), written(&array.shape), array.rows / rows);
-        if array.rows % rows != 0 || each > MAX_ROWS_PER_SAMPLE {
+        let (name, original) = (clean_name(&array.name), original_name(&array.name));
+        let (first, shape, each) = (columns.len(), written(&array.shape), array.rows() / rows);
+        if array.rows() % rows != 0 || each > MAX_ROWS_PER_SAMPLE {
             notes.push(format!(
                 "left out: {name} is {shape}, and a sample is one of {rows} rows; name its columns to use it instead"
             ));
@@ -49,7 +55,7 @@ pub(super) fn table(
             if each > 1 {
                 notes.push(format!("{name} is {shape}: {each} rows per sample, side by side"));
             } else if array.shape.len() > 2 {
-                notes.push(format!("{name} is {shape}, read as {rows} × {}", array.width));
+                notes.push(format!("{name} is {shape}, read as {rows} × {}", array.width()));
             }
             let numbers = array.columns(each, budget)?;
             let width = numbers.len();
@@ -94,17 +100,17 @@ pub(super) fn table(
 fn rows_of_samples(arrays: &[Array], used: &[String]) -> Option<usize> {
     let is_used = |array: &&Array| {
         let is_of = |name: &String| {
-            let of_array = name.strip_prefix(array.name.as_str());
+            let of_array = name.strip_prefix(&clean_name(&array.name));
             of_array.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
         };
         !array.name.is_empty() && used.iter().any(is_of)
     };
-    if let Some(rows) = arrays.iter().filter(is_used).map(|array| array.rows).min() {
+    if let Some(rows) = arrays.iter().filter(is_used).map(Array::rows).min() {
         return Some(rows);
     }
     let mut numbers: BTreeMap<usize, usize> = BTreeMap::new();
     for array in arrays {
-        *numbers.entry(array.rows).or_default() += array.rows * array.width;
+        *numbers.entry(array.rows()).or_default() += array.numbers.len();
     }
     let (&most, _) = numbers.iter().max_by_key(|(_, count)| **count)?;
     let is_per_sample = |rows: &&usize| {

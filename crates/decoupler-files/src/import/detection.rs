@@ -180,15 +180,9 @@ pub(super) fn encoding_of(beginning: &[u8]) -> Encoding {
 fn sep_line(text: &[u8], line_break: u8) -> Option<Separator> {
     let line = text.split(|&byte| byte == line_break).next()?;
     let line = line.strip_suffix(b"\r").unwrap_or(line);
-    let line = line
-        .strip_prefix(b"\"")
-        .and_then(|line| line.strip_suffix(b"\""))
-        .unwrap_or(line);
-    let (name, character) = line.split_at_checked(4)?;
-    if !name.eq_ignore_ascii_case(b"sep=") {
-        return None;
-    }
-    Separator::of_character(character)
+    let quoted = line.strip_prefix(b"\"").and_then(|line| line.strip_suffix(b"\""));
+    let (name, character) = quoted.unwrap_or(line).split_at_checked(4)?;
+    Separator::of_character(character).filter(|_| name.eq_ignore_ascii_case(b"sep="))
 }
 
 #[cfg(test)]

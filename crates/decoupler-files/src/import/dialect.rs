@@ -9,18 +9,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, strum::Display, strum::IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
+#[repr(u8)]
 pub enum Separator {
     /// `,`
     #[default]
-    Comma,
+    Comma = b',',
     /// `;`
-    Semicolon,
+    Semicolon = b';',
     /// Tab.
-    Tab,
+    Tab = b'\t',
     /// `|`
-    Bar,
+    Bar = b'|',
     /// Any number of spaces or tabs.
-    Space,
+    Space = b' ',
 }
 
 /// Character before the decimal places.
@@ -119,13 +120,7 @@ impl Separator {
 
     /// The character.
     pub(super) fn byte(self) -> u8 {
-        match self {
-            Self::Comma => b',',
-            Self::Semicolon => b';',
-            Self::Tab => b'\t',
-            Self::Bar => b'|',
-            Self::Space => b' ',
-        }
+        self as u8
     }
 
     /// Returns the separator with this character.
@@ -171,12 +166,7 @@ impl Encoding {
 
 impl fmt::Display for Dialect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            separator,
-            decimal,
-            encoding,
-            ..
-        } = self;
+        let (separator, decimal, encoding) = (self.separator, self.decimal, self.encoding);
         let header = if self.header { "a header" } else { "no header" };
         write!(f, "separator {separator}, decimal {decimal}, {header}, {encoding}")?;
         let skipped = format!("{} before the table", counted(self.skipped_lines, "line"));

@@ -8,7 +8,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler_core::text::{clean_name, original_name};
 use zip::ZipArchive;
 
 use super::{
@@ -16,7 +15,6 @@ use super::{
     csv_table::{self, Reading},
     matlab, numpy,
     progress::Watched,
-    rows::MAX_CELLS,
     sheet,
 };
 use crate::machine::{OverBudget, ReadingBudget};
@@ -136,14 +134,13 @@ pub(super) fn read(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Resu
             (&file).rewind()?;
             let names = archive.iter().flat_map(ZipArchive::file_names);
             let names = Vec::from_iter(names.filter_map(|name| Some(name.ok()?.into_owned())));
-            let has = |wanted: &str| names.iter().any(|name| name == wanted);
-            if names.iter().any(|name| name.starts_with("xl/")) {
-                return sheet::read(path, file, false, reading, budget, watch);
-            } else if has("mimetype") && has("content.xml") {
-                return sheet::read(path, file, true, reading, budget, watch);
-            } else if archive.is_ok_and(|archive| !archive.is_empty())
-                && !names.iter().any(|name| name.ends_with(".npy"))
-            {
+            let has = |is_it: fn(&str) -> bool| names.iter().any(|name| is_it(name));
+            let is_excel = has(|name| name.starts_with("xl/"));
+            let is_ods = !is_excel && has(|name| name == "mimetype") && has(|name| name == "content.xml");
+            if is_excel || is_ods {
+                return sheet::read(path, file, is_ods, reading, budget, watch);
+            }
+            if archive.is_ok_and(|archive| !archive.is_empty()) && !has(|name| name.ends_with(".npy")) {
                 return Err(refused("a zip archive without .npy arrays", "unpack it"));
             }
             (numpy::read_archive(BufReader::new(file), budget, watch)?, Format::Npz)
@@ -228,60 +225,42 @@ impl Element {
 }
 
 /// A named array of numbers: samples × columns.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug)]
 pub(super) struct Array {
-    /// Name without unprintable characters.
     pub(super) name: String,
-    /// Name in the file, escaped, if it has such characters.
-    pub(super) original: Option<String>,
     /// Shape in the file: the first dimension counts samples, and the others are joined in the order of the numbers.
     pub(super) shape: Vec<usize>,
-    pub(super) rows: usize,
-    pub(super) width: usize,
-    numbers: Vec<f64>,
-    is_by_column: bool,
+    pub(super) numbers: Vec<f64>,
+    pub(super) is_by_column: bool,
 }
 
 impl Array {
-    pub(super) fn new(
-        name: &str,
-        shape: Vec<usize>,
-        numbers: Vec<f64>,
-        is_by_column: bool,
-    ) -> Result<Self, TableError> {
-        let (rows, width) = (shape.first().copied().unwrap_or(1), shape.iter().skip(1).product());
-        if width > MAX_CELLS {
-            let reason = format!("{} is more than {MAX_CELLS} columns; transpose it", written(&shape));
-            return Err(TableError::array(name, reason));
-        }
-        Ok(Self {
-            name: clean_name(name),
-            original: original_name(name),
-            shape,
-            rows,
-            width,
-            numbers,
-            is_by_column,
-        })
+    pub(super) fn rows(&self) -> usize {
+        self.shape.first().copied().unwrap_or(1)
+    }
+
+    pub(super) fn width(&self) -> usize {
+        self.shape.iter().skip(1).product()
     }
 
     /// Returns the columns of samples of `each` rows, which are side by side.
     pub(super) fn columns(self, each: usize, budget: &mut ReadingBudget) -> Result<Vec<Vec<f64>>, OverBudget> {
-        if self.width * each == 1 {
+        let (rows, width) = (self.rows(), self.width());
+        if width * each == 1 {
             return Ok(vec![self.numbers]);
         }
         let bytes = (self.numbers.len() * size_of::<f64>()) as u64;
         budget.claim(bytes)?;
         let column = |index: usize| {
-            let (row, column) = (index / self.width, index % self.width);
+            let (row, column) = (index / width, index % width);
             let (first, step) = match self.is_by_column {
-                true => (column * self.rows + row, each),
-                false => (row * self.width + column, each * self.width),
+                true => (column * rows + row, each),
+                false => (row * width + column, each * width),
             };
             let numbers = self.numbers[first..].iter().step_by(step);
-            numbers.take(self.rows / each).copied().collect()
+            numbers.take(rows / each).copied().collect()
         };
-        let columns = (0..self.width * each).map(column).collect();
+        let columns = (0..width * each).map(column).collect();
         // The numbers in the order of the file are freed.
         budget.release(bytes);
         Ok(columns)
@@ -322,9 +301,6 @@ const LONGEST: usize = 64;
 
 /// Parses a cell without surrounding spaces; the number is correctly rounded.
 pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Cell {
-    if cell.is_empty() {
-        return Cell::Missing;
-    }
     let number = match decimal {
         Decimal::Point => parse_point(cell),
         // A point would be a thousands separator, or a decimal point after all.
@@ -342,6 +318,7 @@ pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Cell {
     match number {
         Some(number) if number.is_finite() => Cell::Number(number),
         Some(number) if number.is_nan() => Cell::Missing,
+        None if cell.is_empty() => Cell::Missing,
         _ => Cell::Text,
     }
 }

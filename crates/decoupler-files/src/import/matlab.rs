@@ -115,10 +115,13 @@ impl Variables {
             Value::Numbers { shape, numbers } => {
                 // A row vector becomes a column of the table.
                 let first = shape.iter().position(|&size| size > 1).unwrap_or(shape.len() - 1);
-                match Array::new(&name, shape[first..].to_vec(), numbers, true) {
-                    Ok(array) => self.arrays.push(array),
-                    Err(error) => self.left_out.push(error.to_string()),
-                }
+                let (shape, is_by_column) = (shape[first..].to_vec(), true);
+                self.arrays.push(Array {
+                    name,
+                    shape,
+                    numbers,
+                    is_by_column,
+                });
             }
             Value::Structures(fields) => {
                 for (field, values) in fields {

@@ -65,7 +65,12 @@ pub(super) fn read(name: &str, source: &mut dyn Read, budget: &mut ReadingBudget
             "it is cut off: its header states {written} numbers, but it has {found}; copy it again"
         )));
     }
-    Array::new(name, header.shape, numbers, header.fortran_order)
+    Ok(Array {
+        name: name.to_owned(),
+        shape: header.shape,
+        numbers,
+        is_by_column: header.fortran_order,
+    })
 }
 
 /// Shape and type of an array, with the names of their keys.
