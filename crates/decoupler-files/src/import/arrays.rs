@@ -76,13 +76,14 @@ pub(super) fn table(
     let markers = reading.give_roles(&mut columns);
     for (column, markers) in columns.iter_mut().zip(markers) {
         for (line, number) in (1..).zip(std::mem::take(&mut column.numbers)) {
-            let is_missing = number.is_nan() || markers.iter().any(|missing| missing.is_number(number));
-            let (text, found) = match number.is_finite() {
-                true if column.labels.is_none() => (String::new(), Cell::Number(number)),
-                true => (number.to_string(), Cell::Number(number)),
-                false => (number.to_string(), Cell::Text),
+            let found = match number {
+                _ if number.is_nan() || markers.iter().any(|missing| missing.is_number(number)) => Cell::Missing,
+                _ if number.is_infinite() => Cell::Text,
+                number => Cell::Number(number),
             };
-            column.push(line, text.as_bytes(), found, is_missing, Encoding::Utf8);
+            let is_plain = column.labels.is_none() && found != Cell::Text;
+            let text = if is_plain { String::new() } else { number.to_string() };
+            column.push(line, text.as_bytes(), found, Encoding::Utf8);
         }
     }
     variables.retain(|variable| !variable.name.is_empty());

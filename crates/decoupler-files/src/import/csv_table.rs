@@ -45,12 +45,10 @@ impl<'a> Reading<'a> {
         }
         let mut markers = vec![Vec::new(); columns.len()];
         for (name, missing) in &self.missing {
-            match name {
-                None => markers.iter_mut().for_each(|of_column| of_column.push(*missing)),
-                Some(name) => position(columns, name)
-                    .into_iter()
-                    .for_each(|column| markers[column].push(*missing)),
-            }
+            let of = name.as_ref().map(|name| position(columns, name));
+            let is_marked = |column: &usize| of.is_none_or(|of| of == Some(*column));
+            let marked = (0..columns.len()).filter(is_marked);
+            marked.for_each(|column| markers[column].push(*missing));
         }
         markers
     }
@@ -160,9 +158,11 @@ impl Body<'_> {
         let Dialect { decimal, encoding, .. } = self.dialect;
         for (column, missing) in table.columns.iter_mut().zip(&self.missing) {
             let cell = cells.next().unwrap_or_default();
-            let found = parse(cell, decimal);
-            let is_missing = found == Cell::Missing || missing.iter().any(|missing| missing.is(cell, found));
-            if let Some(length) = column.push(line, cell, found, is_missing, encoding) {
+            let found = match parse(cell, decimal) {
+                found if missing.iter().any(|missing| missing.is(cell, found)) => Cell::Missing,
+                found => found,
+            };
+            if let Some(length) = column.push(line, cell, found, encoding) {
                 self.budget.claim(2 * (length as u64 + TEXT))?;
             }
         }
@@ -184,14 +184,11 @@ impl Body<'_> {
             (&self.too_short, "fewer cells than there are columns, which are missing"),
             (&table.too_long, "more cells than there are columns, left out"),
         ] {
-            let note = |first: &Fault| {
-                format!(
-                    "{} with {what}, the first on line {}",
-                    counted(rows.count, "row"),
-                    first.line
-                )
-            };
-            table.notes.extend(rows.first.as_ref().map(note));
+            if let Some(Fault { line, .. }) = &rows.first {
+                let rows = counted(rows.count, "row");
+                let note = format!("{rows} with {what}, the first on line {line}");
+                table.notes.push(note);
+            }
         }
         Ok(table)
     }

@@ -34,11 +34,7 @@ pub(super) fn detect(
     let table = &text[start..];
     // The last row may be truncated.
     let end = table.iter().rposition(|&byte| byte == line_break).map(|end| end + 1);
-    let table = if is_whole {
-        table
-    } else {
-        &table[..end.unwrap_or(table.len())]
-    };
+    let table = &table[..end.filter(|_| !is_whole).unwrap_or(table.len())];
     let given = choice.separator.or(declared);
     let separators = Separator::ALL
         .iter()
@@ -89,11 +85,16 @@ struct Sample {
 
 impl Sample {
     fn of(text: &[u8], separators: (Separator, Decimal), carriage_returns: bool) -> Result<Self, TableError> {
+        // A time stamp counts as a number.
+        let parsed = |cell: &[u8]| match parse(cell, separators.1) {
+            Cell::Text if TimeStamp::parse(cell).is_some() => Cell::Number(0.0),
+            found => found,
+        };
         let mut source = Rows::new(text, separators.0, carriage_returns);
         let mut rows: Vec<Vec<Cell>> = Vec::new();
         while rows.len() < MAX_ROWS {
             match source.advance() {
-                Ok(true) => rows.push(source.cells().map(|cell| parse_or_stamp(cell, separators.1)).collect()),
+                Ok(true) => rows.push(source.cells().map(parsed).collect()),
                 Ok(false) => break,
                 // The closing quote may lie beyond the beginning.
                 Err(TableError::Quote(_)) if !rows.is_empty() => break,
@@ -148,14 +149,6 @@ impl Sample {
     }
 }
 
-/// Parses a cell; a time stamp counts as a number.
-fn parse_or_stamp(cell: &[u8], decimal: Decimal) -> Cell {
-    match parse(cell, decimal) {
-        Cell::Text if TimeStamp::parse(cell).is_some() => Cell::Number(0.0),
-        found => found,
-    }
-}
-
 /// Guesses the encoding of a file from its beginning.
 pub(super) fn encoding_of(beginning: &[u8]) -> Encoding {
     let has_zeros = |offset: usize| {
@@ -168,11 +161,9 @@ pub(super) fn encoding_of(beginning: &[u8]) -> Encoding {
         [0xfe, 0xff, ..] => Encoding::Utf16Be,
         _ if has_zeros(1) && !has_zeros(0) => Encoding::Utf16Le,
         _ if has_zeros(0) && !has_zeros(1) => Encoding::Utf16Be,
-        _ => match std::str::from_utf8(beginning) {
-            // The last character of the beginning may be truncated.
-            Err(error) if error.error_len().is_some() => Encoding::Latin1,
-            _ => Encoding::Utf8,
-        },
+        // The last character of the beginning may be truncated.
+        _ if std::str::from_utf8(beginning).is_err_and(|error| error.error_len().is_some()) => Encoding::Latin1,
+        _ => Encoding::Utf8,
     }
 }
 

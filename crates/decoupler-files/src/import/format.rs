@@ -14,7 +14,7 @@ use super::{
     Decimal, Dialect, Table, TableError, Watch, arrays,
     csv_table::{self, Reading},
     matlab, numpy,
-    progress::Watched,
+    progress::{Watched, table_error},
     sheet,
 };
 use crate::machine::{OverBudget, ReadingBudget};
@@ -193,18 +193,28 @@ impl Element {
         is_known.then_some(Self { kind, size, is_big })
     }
 
-    /// Reads `count` numbers, whose memory is claimed, or those up to the end of the source.
-    pub(super) fn read(self, source: &mut dyn Read, count: u64) -> io::Result<Vec<f64>> {
-        let (mut numbers, mut block) = (Vec::with_capacity(count as usize), Vec::new());
+    /// Reads `count` numbers, or those up to the end of the source, block by block, so that a corrupt count allocates little
+    /// memory.
+    pub(super) fn read(
+        self,
+        source: &mut dyn Read,
+        count: u64,
+        budget: &mut ReadingBudget,
+    ) -> Result<Vec<f64>, TableError> {
+        let bytes = count.saturating_mul(size_of::<f64>() as u64);
+        // A vector that grows has room for up to twice its numbers.
+        budget.claim(bytes.saturating_mul(2))?;
+        let (mut numbers, mut block) = (Vec::new(), Vec::new());
         while (numbers.len() as u64) < count {
             block.clear();
             let wanted = (count - numbers.len() as u64).min(BLOCK) * self.size as u64;
-            source.take(wanted).read_to_end(&mut block)?;
+            source.take(wanted).read_to_end(&mut block).map_err(table_error)?;
             numbers.extend(block.chunks_exact(self.size).map(|chunk| self.number(chunk)));
             if (block.len() as u64) < wanted {
                 break;
             }
         }
+        budget.release(bytes);
         Ok(numbers)
     }
 

@@ -208,8 +208,7 @@ impl<'a> Elements<'a> {
             return Err(TableError::array(name, reason));
         }
         let is_big = self.is_big;
-        budget.claim((found as u64).saturating_mul(size_of::<f64>() as u64))?;
-        let numbers = Element { is_big, ..element }.read(&mut bytes, found as u64)?;
+        let numbers = Element { is_big, ..element }.read(&mut bytes, found as u64, budget)?;
         Ok(Value::Numbers { shape, numbers })
     }
 

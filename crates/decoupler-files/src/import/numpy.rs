@@ -57,8 +57,7 @@ pub(super) fn read(name: &str, source: &mut dyn Read, budget: &mut ReadingBudget
     if count == 0 {
         return Err(wrong(format!("it is empty ({written})")));
     }
-    budget.claim(count.saturating_mul(size_of::<f64>() as u64))?;
-    let numbers = element.read(source, count).map_err(table_error)?;
+    let numbers = element.read(source, count, budget)?;
     let found = numbers.len();
     if (found as u64) < count {
         return Err(wrong(format!(

@@ -42,21 +42,21 @@ pub(super) fn read(
         if is_ods {
             let mut workbook: Ods<_> = open_workbook_from_rs(source).map_err(damaged)?;
             let names = workbook.sheet_names();
-            Sheets::read(names, watch, |name| workbook.worksheet_range(name).map_err(damaged))
+            chosen(names, watch, |name| workbook.worksheet_range(name).map_err(damaged))
         } else {
             let mut workbook: Xlsx<_> = open_workbook_from_rs(source).map_err(damaged)?;
-            Sheets::read(workbook.sheet_names(), watch, |name| cells(&mut workbook, name, budget))
+            chosen(workbook.sheet_names(), watch, |name| cells(&mut workbook, name, budget))
         }
     }));
-    let sheets = read.unwrap_or_else(|_| {
+    let (name, range, left_out) = read.unwrap_or_else(|_| {
         let reason = "its parts contradict each other; save it again, or as CSV";
         Err(TableError::damaged("the spreadsheet", reason))
     })?;
-    if sheets.range.is_empty() {
+    if range.is_empty() {
         return Err(TableError::Empty);
     }
-    let text = text_of(&sheets.range);
-    drop(sheets.range);
+    let text = text_of(&range);
+    drop(range);
     let size = text.len() as u64;
     let reading = Reading {
         choice: DialectChoice {
@@ -69,57 +69,41 @@ pub(super) fn read(
     };
     let text = Watched::new(Cursor::new(text), Some(size), watch);
     let mut table = csv_table::read(path, text, &reading, budget)?;
-    table.notes.extend(sheets.left_out);
+    table.notes.extend(left_out);
     table.format = Format::Sheet {
-        name: sheets.name,
+        name,
         header: table.has_header(),
     };
     Ok(table)
 }
 
-/// Sheets of a file, of which one is used: the first of those with most numbers.
-#[derive(Default)]
-struct Sheets {
-    name: String,
-    range: Range<Data>,
-    /// Notes on the others that have cells.
-    left_out: Vec<String>,
-}
-
-impl Sheets {
-    /// Reads all sheets, each by its name with `range_of`; no more than two are in memory at once.
-    fn read(
-        names: Vec<String>,
-        watch: Watch<'_>,
-        mut range_of: impl FnMut(&str) -> Result<Range<Data>, TableError>,
-    ) -> Result<Self, TableError> {
-        let (mut sheets, mut most) = (Self::default(), None);
-        for name in names {
-            if watch(Progress { bytes: 0, of: None }).is_break() {
-                return Err(TableError::Cancelled);
-            }
-            let mut range = range_of(&name)?;
-            let mut name = clean_name(&name);
-            let cells = range.used_cells();
-            let count = Some(
-                cells
-                    .filter(|cell| matches!(cell.2, Data::Int(_) | Data::Float(_)))
-                    .count(),
-            );
-            if count > most {
-                most = count;
-                std::mem::swap(&mut sheets.name, &mut name);
-                std::mem::swap(&mut sheets.range, &mut range);
-            }
-            if !range.is_empty() {
-                let (rows, width) = range.get_size();
-                sheets.left_out.push(format!(
-                    "left out: sheet '{name}' is {rows} × {width}; save it as its own file to use it"
-                ));
-            }
+/// Reads all sheets, each by its name with `range_of`; no more than two are in memory at once. Returns the name and the cells of
+/// the first of those with most numbers, and notes on the others that have cells.
+fn chosen(
+    names: Vec<String>,
+    watch: Watch<'_>,
+    mut range_of: impl FnMut(&str) -> Result<Range<Data>, TableError>,
+) -> Result<(String, Range<Data>, Vec<String>), TableError> {
+    let (mut chosen, mut most, mut left_out) = ((String::new(), Range::default()), None, Vec::new());
+    for name in names {
+        if watch(Progress { bytes: 0, of: None }).is_break() {
+            return Err(TableError::Cancelled);
         }
-        Ok(sheets)
+        let mut sheet = (clean_name(&name), range_of(&name)?);
+        let is_number = |cell: &(_, _, &Data)| matches!(cell.2, Data::Int(_) | Data::Float(_));
+        let count = Some(sheet.1.used_cells().filter(is_number).count());
+        if count > most {
+            most = count;
+            std::mem::swap(&mut chosen, &mut sheet);
+        }
+        let (name, range) = sheet;
+        if !range.is_empty() {
+            let (rows, width) = range.get_size();
+            let cure = "save it as its own file to use it";
+            left_out.push(format!("left out: sheet '{name}' is {rows} × {width}; {cure}"));
+        }
     }
+    Ok((chosen.0, chosen.1, left_out))
 }
 
 fn damaged(error: impl std::fmt::Display) -> TableError {

@@ -39,6 +39,7 @@ pub(super) fn claim(
     let config = reader.config_mut();
     config.check_end_names = is_strict;
     config.check_comments = false;
+    config.expand_empty_elements = true;
     let (mut sheet, mut buffer, mut open) = (Sheet::default(), Vec::new(), 0);
     loop {
         buffer.clear();
@@ -47,7 +48,6 @@ pub(super) fn claim(
                 open += 1;
                 sheet.take(&element, budget)?;
             }
-            Ok(Event::Empty(element)) => sheet.take(&element, budget)?,
             Ok(Event::End(_)) => open -= 1,
             Ok(Event::Eof) if !is_strict || open == 0 => break,
             Err(_) if !is_strict => break,
@@ -58,7 +58,7 @@ pub(super) fn claim(
             Ok(_) => {}
         }
     }
-    sheet.finish(budget)
+    Ok(budget.claim(rectangle(sheet.extent))?)
 }
 
 /// A sheet, or one table of an OpenDocument file.
@@ -121,7 +121,7 @@ impl Sheet {
             }
             "row" | "c" => check_attributes(element)?,
             "table" => {
-                self.finish(budget)?;
+                budget.claim(rectangle(self.extent))?;
                 *self = Self::default();
             }
             "table-row" => {
@@ -145,11 +145,6 @@ impl Sheet {
             _ => {}
         }
         Ok(())
-    }
-
-    /// Claims the rectangle.
-    fn finish(&self, budget: &mut ReadingBudget) -> Result<(), TableError> {
-        Ok(budget.claim(rectangle(self.extent))?)
     }
 }
 

@@ -174,25 +174,17 @@ pub struct Fault {
 impl Column {
     /// Adds a cell with this text, parsed as `found`. The first value decides whether the column has numbers or time stamps,
     /// which become the seconds since the first. Returns the length of the text if it is a new label.
-    pub(super) fn push(
-        &mut self,
-        line: u64,
-        cell: &[u8],
-        found: Cell,
-        is_missing: bool,
-        encoding: Encoding,
-    ) -> Option<usize> {
+    pub(super) fn push(&mut self, line: u64, cell: &[u8], found: Cell, encoding: Encoding) -> Option<usize> {
+        let (mut added, is_missing) = (None, found == Cell::Missing);
         self.missing += usize::from(is_missing);
-        let number = found.number().filter(|_| !is_missing);
-        let mut added = None;
-        let number = match (number, &mut self.labels) {
-            (number, Some(labels)) => {
+        let number = match (found, &mut self.labels) {
+            (found, Some(labels)) => {
                 let text = encoding.text(cell);
                 added = labels.push((!is_missing).then_some(&text)).then_some(text.len());
-                number.unwrap_or(f64::NAN)
+                found.number().unwrap_or(f64::NAN)
             }
-            (Some(number), None) if self.start.is_none() => number,
-            _ if is_missing => f64::NAN,
+            (Cell::Number(number), None) if self.start.is_none() => number,
+            (Cell::Missing, None) => f64::NAN,
             _ => self.seconds(cell).unwrap_or_else(|| {
                 self.faults.add(line, || encoding.text(cell));
                 f64::NAN

@@ -32,7 +32,7 @@ use super::{
 /// may be repeated, for example when a device restarts, and a comma may end a line.
 #[derive(Debug, Default)]
 pub struct LineParser {
-    inputs: Vec<Channel>,
+    pub(super) inputs: Vec<Channel>,
     others: OtherColumns,
     /// Columns computed from others.
     derive: Vec<Derived>,
@@ -48,9 +48,9 @@ pub struct LineParser {
     has_names: bool,
     is_snapshot: bool,
     /// `true` once a line had readings.
-    has_readings: bool,
+    pub(super) has_readings: bool,
     /// Number of lines so far whose row-wire follows from their order, valid or not.
-    lines_in_turn: usize,
+    pub(super) lines_in_turn: usize,
     /// The derived columns, once the columns of the lines are known.
     derived: DerivedStream,
     /// Group of each line of the start, which is waited for.
@@ -205,16 +205,6 @@ impl LineParser {
         })
     }
 
-    /// Number of readings of a row-wire.
-    pub(super) fn channels(&self) -> usize {
-        self.inputs.len()
-    }
-
-    /// Number of lines so far whose row-wire follows from their order, valid or not.
-    pub fn lines_in_turn(&self) -> usize {
-        self.lines_in_turn
-    }
-
     /// Counts a malformed line, which still advances the row counter.
     pub fn count_bad(&mut self) {
         let is_in_turn = |rows: &RowWires| rows.unnumbered == Unnumbered::InTurn;
@@ -309,14 +299,12 @@ impl LineParser {
         };
         let is_bad = |column: &usize| !self.cells[*column].is_finite();
         let mut read = columns.inputs.iter().copied().filter(|column| *column < width);
-        let is_no_resistance = |column: &usize| is_bad(column) || self.cells[*column] <= 0.0;
-        if self.is_array
-            && let Some(column) = read.clone().find(is_no_resistance)
-        {
-            return refused(column, "a resistance; give a finite number of ohm above 0");
-        }
-        if let Some(column) = read.find(is_bad) {
-            return refused(column, "a finite number");
+        let (needed, limit) = match self.is_array {
+            true => ("a resistance; give a finite number of ohm above 0", 0.0),
+            false => ("a finite number", f64::NEG_INFINITY),
+        };
+        if let Some(column) = read.find(|column| is_bad(column) || self.cells[*column] <= limit) {
+            return refused(column, needed);
         }
         // A memory places the line in its series.
         let last = self.rows.as_ref().map_or(LAST_ROW_WIRE, |rows| rows.last);
@@ -616,6 +604,23 @@ mod tests {
             readings(&mut lines, 5, "2026-11-24T12:00:00.3Z,1,7"),
             Some((0, vec![7.0, 5.0]))
         );
+    }
+
+    #[test]
+    fn a_time_may_be_a_derived_column() {
+        let recipe = Recipe {
+            time: Some("d".to_owned()),
+            derive: vec!["d=a-b".parse().unwrap()],
+            memory: Some(Memory {
+                lags: vec![Span::Samples(1.0)],
+                ..Memory::default()
+            }),
+            ..Recipe::default()
+        };
+        let mut lines = lines(&["u"], &recipe, None);
+        assert_eq!(readings(&mut lines, 1, "a (s),b (s),u"), None);
+        assert_eq!(readings(&mut lines, 2, "5,4,7"), Some((0, vec![7.0, 7.0])));
+        assert_eq!(readings(&mut lines, 3, "6,4.5,8"), Some((0, vec![8.0, 7.0])));
     }
 
     #[test]
