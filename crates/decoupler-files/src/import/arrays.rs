@@ -75,7 +75,9 @@ pub(super) fn table(
     }
     let markers = reading.give_roles(&mut columns);
     for (column, markers) in columns.iter_mut().zip(markers) {
-        for (line, number) in (1..).zip(std::mem::take(&mut column.numbers)) {
+        let numbers = std::mem::take(&mut column.numbers);
+        column.numbers.reserve_exact(numbers.len());
+        for (line, number) in (1..).zip(numbers) {
             let found = match number {
                 _ if number.is_nan() || markers.iter().any(|missing| missing.is_number(number)) => Cell::Missing,
                 _ if number.is_infinite() => Cell::Text,
