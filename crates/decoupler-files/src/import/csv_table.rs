@@ -7,15 +7,14 @@ use std::{
 use decoupler_core::text::{clean_name, counted, original_name};
 
 use super::{
-    Column, Dialect, DialectChoice, Encoding, Format, Missing, Table, TableError,
+    Column, Dialect, DialectChoice, Encoding, Fault, Faults, Format, Missing, Table, TableError,
     columns::position,
     detection::{BEGINNING, detect, encoding_of},
     dialect::utf8_of_utf16,
     format::{Cell, parse},
     progress::table_error,
     rows::Rows,
-    table::{Excess, Labels, name_and_unit},
-    time_stamp::TimeStamp,
+    table::{Labels, name_and_unit},
 };
 use crate::machine::ReadingBudget;
 
@@ -39,21 +38,19 @@ pub(super) struct Reading<'a> {
 }
 
 impl<'a> Reading<'a> {
-    /// Returns the markers of missing values of each column, and `true` if it holds labels.
-    pub(super) fn roles(&self, columns: &[Column]) -> Vec<(Vec<&'a Missing>, bool)> {
-        let find = |name: &String| position(columns, name);
-        let label = self.label.as_ref().and_then(find);
-        let markers = self
-            .missing
-            .iter()
-            .map(|(name, missing)| (name.as_ref().map(find), *missing));
-        let markers = Vec::from_iter(markers);
-        let of = |column| {
-            let is_marker = |of: &Option<Option<usize>>| of.is_none_or(|of| of == Some(column));
-            let markers = markers.iter().filter(|(of, _)| is_marker(of));
-            (markers.map(|(_, missing)| *missing).collect(), label == Some(column))
-        };
-        (0..columns.len()).map(of).collect()
+    /// Gives labels to the column that has them, and returns the markers of missing values of each column.
+    pub(super) fn give_roles(&self, columns: &mut [Column]) -> Vec<Vec<&'a Missing>> {
+        if let Some(label) = self.label.as_ref().and_then(|name| position(columns, name)) {
+            columns[label].labels = Some(Labels::default());
+        }
+        let mut markers = vec![Vec::new(); columns.len()];
+        for (name, missing) in &self.missing {
+            let of = name.as_ref().map(|name| position(columns, name));
+            let is_marked = |column: &usize| of.is_none_or(|of| of == Some(*column));
+            let marked = (0..columns.len()).filter(is_marked);
+            marked.for_each(|column| markers[column].push(*missing));
+        }
+        markers
     }
 }
 
@@ -75,12 +72,11 @@ pub(super) fn read(
     let is_whole = beginning.len() < BEGINNING;
     let table = beginning.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&beginning);
     let (dialect, width) = detect(table, is_whole, encoding, &reading.choice)?;
-    let text = table.chain(text);
-    let mut rows = Rows::new(text, dialect.separator, dialect.carriage_returns);
+    let mut rows = Rows::new(table.chain(text), dialect.separator, dialect.carriage_returns);
     rows.skip(dialect.skipped_lines + usize::from(dialect.sep_line))?;
     let mut headers = Vec::new();
     if dialect.header && rows.advance()? {
-        headers = rows.cells().map(|cell| text_of(cell, encoding)).collect();
+        headers = rows.cells().map(|cell| encoding.text(cell)).collect();
     }
     let mut has_row = rows.advance()?;
     let width = match headers.len() {
@@ -90,27 +86,16 @@ pub(super) fn read(
         of_headers => of_headers,
     };
     let empty_end = dialect.trailing_separator && headers.last().is_none_or(String::is_empty);
-    let columns = named(&headers, width - usize::from(empty_end && width > 1));
-    let roles = reading.roles(&columns);
-    let builders = columns
-        .into_iter()
-        .zip(roles)
-        .map(|(column, (missing, has_labels))| Builder {
-            column: Column {
-                labels: has_labels.then(Labels::default),
-                ..column
-            },
-            has_numbers: false,
-            missing,
-        });
+    let mut columns = named(&headers, width - usize::from(empty_end && width > 1));
     let mut body = Body {
         dialect,
         budget,
-        builders: builders.collect(),
+        missing: reading.give_roles(&mut columns),
+        too_short: Faults::default(),
         table: Table::new(path, Format::Text(dialect)),
-        too_short: Excess::default(),
     };
-    let width = if headers.is_empty() { width } else { body.builders.len() };
+    let width = if headers.is_empty() { width } else { columns.len() };
+    body.table.columns = columns;
     while has_row {
         if body.is_torn(&rows, width) {
             body.table.torn_line = Some(rows.line());
@@ -134,17 +119,10 @@ fn beginning_of(source: &mut impl Read) -> Result<Vec<u8>, TableError> {
 struct Body<'a> {
     dialect: Dialect,
     budget: &'a mut ReadingBudget,
-    builders: Vec<Builder<'a>>,
-    /// The table without its columns.
+    /// Markers of missing values of each column.
+    missing: Vec<Vec<&'a Missing>>,
+    too_short: Faults,
     table: Table,
-    too_short: Excess,
-}
-
-struct Builder<'a> {
-    column: Column,
-    /// `true` once a cell was a number.
-    has_numbers: bool,
-    missing: Vec<&'a Missing>,
 }
 
 impl Body<'_> {
@@ -154,36 +132,42 @@ impl Body<'_> {
         if rows.is_ended() || self.table.rows == 0 {
             return false;
         }
+        let columns = &self.table.columns;
         let is_text = |cell: &[u8]| parse(cell, self.dialect.decimal) == Cell::Text;
-        let has_numbers = |builder: &Builder<'_>| builder.has_numbers && builder.column.faults.count == 0;
-        let ends_in_text = || rows.len() == self.builders.len() && rows.cells().last().is_some_and(is_text);
-        rows.len() < width || (self.builders.last().is_some_and(has_numbers) && ends_in_text())
+        let has_numbers = |column: &Column| column.has_numbers() && column.faults.count == 0;
+        let ends_in_text = || rows.len() == columns.len() && rows.cells().last().is_some_and(is_text);
+        rows.len() < width || (columns.last().is_some_and(has_numbers) && ends_in_text())
     }
 
     fn add<R: Read>(&mut self, rows: &Rows<R>) -> Result<(), TableError> {
-        let (line, width, count) = (rows.line(), self.builders.len(), rows.len());
-        let mut cells = rows.cells();
+        let (table, line, count) = (&mut self.table, rows.line(), rows.len());
+        let (mut cells, width) = (rows.cells(), table.columns.len());
         // A separator at the end of a row does not start another cell.
         if count > width && (count > width + 1 || cells.clone().last().is_some_and(|cell| !cell.is_empty())) {
-            self.table.too_long.add(line);
+            table.too_long.add(line, String::new);
             return Ok(());
         }
         if count < width {
-            self.too_short.add(line);
+            self.too_short.add(line, String::new);
         }
-        if self.table.rows == LARGEST_ROWS {
+        if table.rows == LARGEST_ROWS {
             let reason = format!("it has more than {LARGEST_ROWS} rows; use every second row, or a part of the file");
             return Err(TableError::Contents(reason));
         }
         self.budget.claim(NUMBER * width as u64)?;
-        for builder in &mut self.builders {
-            let added = builder.push(line, cells.next().unwrap_or_default(), &self.dialect);
-            if let Some(length) = added {
+        let Dialect { decimal, encoding, .. } = self.dialect;
+        for (column, missing) in table.columns.iter_mut().zip(&self.missing) {
+            let cell = cells.next().unwrap_or_default();
+            let found = match parse(cell, decimal) {
+                found if missing.iter().any(|missing| missing.is(cell, found)) => Cell::Missing,
+                found => found,
+            };
+            if let Some(length) = column.push(line, cell, found, encoding) {
                 self.budget.claim(2 * (length as u64 + TEXT))?;
             }
         }
-        self.table.lines.push(self.table.rows, line);
-        self.table.rows += 1;
+        table.lines.push(table.rows, line);
+        table.rows += 1;
         Ok(())
     }
 
@@ -196,88 +180,37 @@ impl Body<'_> {
             .torn_line
             .map(|line| format!("line {line}, the last, is cut off and left out"));
         table.notes.extend(torn);
-        for (excess, what) in [
-            (self.too_short, "fewer cells than there are columns, which are missing"),
-            (table.too_long, "more cells than there are columns, left out"),
+        for (rows, what) in [
+            (&self.too_short, "fewer cells than there are columns, which are missing"),
+            (&table.too_long, "more cells than there are columns, left out"),
         ] {
-            if let Some(line) = excess.first_line {
-                let rows = counted(excess.rows, "row");
-                table
-                    .notes
-                    .push(format!("{rows} with {what}, the first on line {line}"));
+            if let Some(Fault { line, .. }) = &rows.first {
+                let rows = counted(rows.count, "row");
+                let note = format!("{rows} with {what}, the first on line {line}");
+                table.notes.push(note);
             }
         }
-        table.columns = self.builders.into_iter().map(Builder::finish).collect();
         Ok(table)
-    }
-}
-
-impl Builder<'_> {
-    /// Adds a cell; returns the length of its text if that is a new label.
-    fn push(&mut self, line: u64, cell: &[u8], dialect: &Dialect) -> Option<usize> {
-        let found = parse(cell, dialect.decimal);
-        let is_missing = found == Cell::Missing || self.missing.iter().any(|missing| missing.is(cell, found));
-        self.column.missing += usize::from(is_missing);
-        let mut added = None;
-        let number = match (found.number(), &mut self.column.labels) {
-            (number, Some(labels)) => {
-                let text = text_of(cell, dialect.encoding);
-                added = labels.push((!is_missing).then_some(&text)).then_some(text.len());
-                number.filter(|_| !is_missing).unwrap_or(f64::NAN)
-            }
-            _ if is_missing => f64::NAN,
-            (Some(number), None) if self.column.start.is_none() => {
-                self.has_numbers = true;
-                number
-            }
-            _ => self.seconds(cell).unwrap_or_else(|| {
-                self.column.faults.add(line, || text_of(cell, dialect.encoding));
-                f64::NAN
-            }),
-        };
-        self.column.numbers.push(number);
-        added
-    }
-
-    /// Returns the seconds since the first time stamp of a column; `None` unless all of its cells are time stamps, all with or
-    /// all without a zone.
-    fn seconds(&mut self, cell: &[u8]) -> Option<f64> {
-        let stamp = TimeStamp::parse(cell)?;
-        if self.has_numbers || self.column.faults.count > 0 {
-            return None;
-        }
-        let start = *self.column.start.get_or_insert(stamp);
-        (start.has_zone == stamp.has_zone).then(|| stamp.seconds_since(start))
-    }
-
-    fn finish(mut self) -> Column {
-        if self.column.start.is_some() {
-            // Whatever the header says, such as a time zone.
-            self.column.unit = Some("s".to_owned());
-        }
-        self.column
     }
 }
 
 /// Returns `width` columns without cells, with names and units from the cells of the header, if there is one.
 pub(super) fn named(headers: &[String], width: usize) -> Vec<Column> {
-    let mut columns: Vec<Column> = Vec::new();
-    for index in 0..width {
+    let column = |index: usize| {
         let given = headers.get(index).map_or("", String::as_str);
         let header = clean_name(given);
-        let (name, unit) = name_and_unit(&header);
-        let wanted = if name.is_empty() {
-            format!("c{}", index + 1)
-        } else {
-            name.to_owned()
+        let (name, unit) = match name_and_unit(&header) {
+            ("", unit) => (format!("c{}", index + 1), unit),
+            (name, unit) => (name.to_owned(), unit),
         };
-        columns.push(Column {
-            name: wanted,
+        Column {
+            name,
             unit: unit.map(str::to_owned),
             original: original_name(given),
             ..Column::default()
-        });
-    }
+        }
+    };
+    let mut columns = Vec::from_iter((0..width).map(column));
     name_apart(&mut columns);
     columns
 }
@@ -289,21 +222,11 @@ fn name_apart(columns: &mut [Column]) {
     for column in columns {
         let count = counts.entry(column.name.clone()).or_default();
         *count += 1;
-        while *count > 1 {
-            let numbered = format!("{}#{count}", column.name);
-            if names.insert(numbered.clone()) {
-                column.name = numbered;
-                break;
-            }
+        while *count > 1 && !names.insert(format!("{}#{count}", column.name)) {
             *count += 1;
         }
-    }
-}
-
-/// Returns the text of a cell. Invalid UTF-8 is read as Latin-1, which maps to the first 256 characters of Unicode.
-fn text_of(cell: &[u8], encoding: Encoding) -> String {
-    match std::str::from_utf8(cell) {
-        Ok(text) if encoding != Encoding::Latin1 => text.to_owned(),
-        _ => cell.iter().copied().map(char::from).collect(),
+        if *count > 1 {
+            column.name = format!("{}#{count}", column.name);
+        }
     }
 }

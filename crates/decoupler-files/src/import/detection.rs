@@ -34,133 +34,119 @@ pub(super) fn detect(
     let table = &text[start..];
     // The last row may be truncated.
     let end = table.iter().rposition(|&byte| byte == line_break).map(|end| end + 1);
-    let table = if is_whole {
-        table
-    } else {
-        &table[..end.unwrap_or(table.len())]
-    };
-    let separators = match choice.separator.or(declared) {
-        Some(separator) => vec![separator],
-        None => Separator::ALL.to_vec(),
-    };
-    let mut best: Option<(Score, Separator, Decimal, Vec<Vec<Cell>>)> = None;
-    let mut defect = None;
-    for separator in separators {
-        let decimals = match choice.decimal {
-            Some(decimal) => vec![decimal],
-            None if separator == Separator::Comma => vec![Decimal::Point],
-            None => vec![Decimal::Point, Decimal::Comma],
-        };
-        for decimal in decimals {
-            match sample(table, separator, decimal, carriage_returns) {
-                Ok(rows) => {
-                    let score = Score::of(&rows);
-                    if best.as_ref().is_none_or(|(best, ..)| score.is_better_than(best)) {
-                        best = Some((score, separator, decimal, rows));
-                    }
-                }
-                Err(error) => defect = Some(error),
+    let table = &table[..end.filter(|_| !is_whole).unwrap_or(table.len())];
+    let given = choice.separator.or(declared);
+    let separators = Separator::ALL
+        .iter()
+        .flat_map(|one| Decimal::ALL.iter().map(move |decimal| (*one, *decimal)));
+    let is_tried = |(separator, decimal): &(Separator, Decimal)| {
+        given.is_none_or(|given| given == *separator)
+            && match choice.decimal {
+                Some(given) => given == *decimal,
+                None => *separator != Separator::Comma || *decimal == Decimal::Point,
             }
+    };
+    let (mut best, mut defect) = (None::<Sample>, TableError::Empty);
+    for separators in separators.filter(is_tried) {
+        match Sample::of(table, separators, carriage_returns) {
+            Ok(sample) if best.as_ref().is_none_or(|best| sample.is_better_than(best)) => best = Some(sample),
+            Ok(_) => {}
+            Err(error) => defect = error,
         }
     }
-    let Some((score, separator, decimal, rows)) = best.filter(|(.., rows)| !rows.is_empty()) else {
-        return Err(defect.unwrap_or(TableError::Empty));
+    let Some(best) = best.filter(|best| !best.rows.is_empty()) else {
+        return Err(defect);
     };
+    let (separator, decimal) = best.separators;
     let dialect = Dialect {
         encoding,
         separator,
         decimal,
-        header: choice.header.unwrap_or_else(|| has_names(&rows)),
-        trailing_separator: separator != Separator::Space && score.width > 1 && ends_empty(&rows, score.width),
+        header: choice.header.unwrap_or_else(|| best.has_names()),
+        trailing_separator: separator != Separator::Space && best.width > 1 && best.ends_empty(),
         sep_line: declared.is_some(),
         skipped_lines,
         carriage_returns,
     };
     let is_known = is_whole || end.is_some();
-    Ok((dialect, if is_known { score.width } else { 0 }))
+    Ok((dialect, if is_known { best.width } else { 0 }))
 }
 
-/// Score of a pair of separators.
-struct Score {
+/// Cells of the first rows with a pair of separators.
+struct Sample {
+    separators: (Separator, Decimal),
+    rows: Vec<Vec<Cell>>,
     /// Most common number of cells in a row.
     width: usize,
-    /// Fraction of the rows with that number of cells.
-    regular: f64,
-    /// Fraction of the cells of these rows, except the first row, that are numbers or missing.
-    numeric: f64,
+    /// Fraction of the rows with that number of cells, times the fraction of their cells, except in the first row, that are
+    /// numbers or missing; higher if there are several columns.
+    merit: f64,
 }
 
-impl Score {
-    fn of(rows: &[Vec<Cell>]) -> Self {
-        let (width, count) = commonest(rows.iter().map(Vec::len));
-        let body = rows
-            .iter()
-            .skip(usize::from(rows.len() > 1))
-            .filter(|row| row.len() == width);
-        let cells: Vec<Cell> = body.flatten().copied().collect();
-        let numbers = cells.iter().filter(|cell| matches!(cell, Cell::Number(_))).count();
-        let missing = cells.iter().filter(|cell| **cell == Cell::Missing).count();
-        Self {
-            width,
-            regular: count as f64 / rows.len().max(1) as f64,
-            // A table of empty cells is not a table of numbers.
-            numeric: (numbers as f64 + 0.9 * missing as f64) / cells.len().max(1) as f64,
+impl Sample {
+    fn of(text: &[u8], separators: (Separator, Decimal), carriage_returns: bool) -> Result<Self, TableError> {
+        // A time stamp counts as a number.
+        let parsed = |cell: &[u8]| match parse(cell, separators.1) {
+            Cell::Text if TimeStamp::parse(cell).is_some() => Cell::Number(0.0),
+            found => found,
+        };
+        let mut source = Rows::new(text, separators.0, carriage_returns);
+        let mut rows: Vec<Vec<Cell>> = Vec::new();
+        while rows.len() < MAX_ROWS {
+            match source.advance() {
+                Ok(true) => rows.push(source.cells().map(parsed).collect()),
+                Ok(false) => break,
+                // The closing quote may lie beyond the beginning.
+                Err(TableError::Quote(_)) if !rows.is_empty() => break,
+                Err(error) => return Err(error),
+            }
         }
+        let (width, count) = commonest(rows.iter().map(Vec::len));
+        let body = rows.iter().skip(usize::from(rows.len() > 1));
+        let (mut cells, mut numeric) = (0, 0.0);
+        for cell in body.filter(|row| row.len() == width).flatten() {
+            cells += 1;
+            numeric += match cell {
+                Cell::Number(_) => 1.0,
+                // A table of empty cells is not a table of numbers.
+                Cell::Missing => 0.9,
+                Cell::Text => 0.0,
+            };
+        }
+        let regular = count as f64 / rows.len().max(1) as f64;
+        let several = if width > 1 { 0.3 } else { 0.0 };
+        Ok(Self {
+            separators,
+            rows,
+            width,
+            merit: regular * numeric / f64::from(cells.max(1)) + several,
+        })
     }
 
     fn is_better_than(&self, other: &Self) -> bool {
-        let merit = |score: &Self| score.numeric * score.regular + if score.width > 1 { 0.3 } else { 0.0 };
-        let (ours, theirs) = (merit(self), merit(other));
-        ours > theirs + 1e-9 || (ours > theirs - 1e-9 && self.width > other.width)
+        self.merit > other.merit + 1e-9 || (self.merit > other.merit - 1e-9 && self.width > other.width)
     }
-}
 
-/// Cells of the first rows.
-fn sample(text: &[u8], separator: Separator, decimal: Decimal, crs: bool) -> Result<Vec<Vec<Cell>>, TableError> {
-    let mut rows = Rows::new(text, separator, crs);
-    let mut sample = Vec::new();
-    while sample.len() < MAX_ROWS {
-        match rows.advance() {
-            Ok(true) => sample.push(rows.cells().map(|cell| parse_or_stamp(cell, decimal)).collect()),
-            Ok(false) => break,
-            // The closing quote may lie beyond the beginning.
-            Err(TableError::Quote(_)) if !sample.is_empty() => break,
-            Err(error) => return Err(error),
-        }
+    fn has_names(&self) -> bool {
+        let Some((first, body)) = self.rows.split_first() else {
+            return false;
+        };
+        let texts = first.iter().filter(|cell| **cell == Cell::Text).count();
+        let filled = first.iter().filter(|cell| **cell != Cell::Missing).count();
+        let is_number = |column: usize| {
+            let cells = || body.iter().filter_map(|row| row.get(column));
+            let numbers = cells().filter(|cell| matches!(cell, Cell::Number(_))).count();
+            numbers > 0 && 2 * numbers >= cells().count()
+        };
+        let is_above_numbers = |column: usize| first[column] == Cell::Text && is_number(column);
+        texts > 0 && 2 * texts >= filled && (body.is_empty() || (0..first.len()).any(is_above_numbers))
     }
-    Ok(sample)
-}
 
-/// Parses a cell; a time stamp counts as a number.
-fn parse_or_stamp(cell: &[u8], decimal: Decimal) -> Cell {
-    match parse(cell, decimal) {
-        Cell::Text if TimeStamp::parse(cell).is_some() => Cell::Number(0.0),
-        found => found,
+    /// Returns `true` if the last cell of every row of the most common length is empty.
+    fn ends_empty(&self) -> bool {
+        let mut rows = self.rows.iter().filter(|row| row.len() == self.width);
+        rows.all(|row| row[self.width - 1] == Cell::Missing)
     }
-}
-
-fn has_names(rows: &[Vec<Cell>]) -> bool {
-    let Some((first, body)) = rows.split_first() else {
-        return false;
-    };
-    let is_text = |cell: &&Cell| **cell == Cell::Text;
-    let texts = first.iter().filter(is_text).count();
-    let filled = first.iter().filter(|cell| **cell != Cell::Missing).count();
-    if texts == 0 || 2 * texts < filled {
-        return false;
-    }
-    let is_number = |column: usize| {
-        let cells = || body.iter().filter_map(|row| row.get(column));
-        let numbers = cells().filter(|cell| matches!(cell, Cell::Number(_))).count();
-        numbers > 0 && 2 * numbers >= cells().count()
-    };
-    body.is_empty() || (0..first.len()).any(|column| first[column] == Cell::Text && is_number(column))
-}
-
-fn ends_empty(rows: &[Vec<Cell>], width: usize) -> bool {
-    rows.iter()
-        .filter(|row| row.len() == width)
-        .all(|row| row[width - 1] == Cell::Missing)
 }
 
 /// Guesses the encoding of a file from its beginning.
@@ -175,11 +161,9 @@ pub(super) fn encoding_of(beginning: &[u8]) -> Encoding {
         [0xfe, 0xff, ..] => Encoding::Utf16Be,
         _ if has_zeros(1) && !has_zeros(0) => Encoding::Utf16Le,
         _ if has_zeros(0) && !has_zeros(1) => Encoding::Utf16Be,
-        _ => match std::str::from_utf8(beginning) {
-            // The last character of the beginning may be truncated.
-            Err(error) if error.error_len().is_some() => Encoding::Latin1,
-            _ => Encoding::Utf8,
-        },
+        // The last character of the beginning may be truncated.
+        _ if std::str::from_utf8(beginning).is_err_and(|error| error.error_len().is_some()) => Encoding::Latin1,
+        _ => Encoding::Utf8,
     }
 }
 
@@ -187,15 +171,9 @@ pub(super) fn encoding_of(beginning: &[u8]) -> Encoding {
 fn sep_line(text: &[u8], line_break: u8) -> Option<Separator> {
     let line = text.split(|&byte| byte == line_break).next()?;
     let line = line.strip_suffix(b"\r").unwrap_or(line);
-    let line = line
-        .strip_prefix(b"\"")
-        .and_then(|line| line.strip_suffix(b"\""))
-        .unwrap_or(line);
-    let (name, character) = line.split_at_checked(4)?;
-    if !name.eq_ignore_ascii_case(b"sep=") {
-        return None;
-    }
-    Separator::of_character(character)
+    let quoted = line.strip_prefix(b"\"").and_then(|line| line.strip_suffix(b"\""));
+    let (name, character) = quoted.unwrap_or(line).split_at_checked(4)?;
+    Separator::of_character(character).filter(|_| name.eq_ignore_ascii_case(b"sep="))
 }
 
 #[cfg(test)]

@@ -6,29 +6,26 @@ use encoding_rs_io::DecodeReaderBytesBuilder;
 use serde::{Deserialize, Serialize};
 
 /// Character between the cells of a row.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, strum::Display, strum::IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
+#[repr(u8)]
 pub enum Separator {
     /// `,`
     #[default]
-    Comma,
+    Comma = b',',
     /// `;`
-    Semicolon,
+    Semicolon = b';',
     /// Tab.
-    Tab,
+    Tab = b'\t',
     /// `|`
-    Bar,
+    Bar = b'|',
     /// Any number of spaces or tabs.
-    Space,
+    Space = b' ',
 }
 
 /// Character before the decimal places.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, strum::Display, strum::IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "snake_case")]
 pub enum Decimal {
@@ -40,9 +37,7 @@ pub enum Decimal {
 }
 
 /// Encoding of a text file.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display, strum::IntoStaticStr,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, strum::Display, strum::IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 #[serde(rename_all = "kebab-case")]
 pub enum Encoding {
@@ -125,13 +120,7 @@ impl Separator {
 
     /// The character.
     pub(super) fn byte(self) -> u8 {
-        match self {
-            Self::Comma => b',',
-            Self::Semicolon => b';',
-            Self::Tab => b'\t',
-            Self::Bar => b'|',
-            Self::Space => b' ',
-        }
+        self as u8
     }
 
     /// Returns the separator with this character.
@@ -165,25 +154,31 @@ impl Named for Encoding {
     const ALL: &'static [Self] = &[Self::Utf8, Self::Latin1, Self::Utf16Le, Self::Utf16Be];
 }
 
+impl Encoding {
+    /// Returns the text of a cell. Invalid UTF-8 is read as Latin-1, which maps to the first 256 characters of Unicode.
+    pub(super) fn text(self, cell: &[u8]) -> String {
+        match std::str::from_utf8(cell) {
+            Ok(text) if self != Self::Latin1 => text.to_owned(),
+            _ => cell.iter().copied().map(char::from).collect(),
+        }
+    }
+}
+
 impl fmt::Display for Dialect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (separator, decimal, encoding) = (self.separator, self.decimal, self.encoding);
         let header = if self.header { "a header" } else { "no header" };
-        write!(
-            f,
-            "separator {}, decimal {}, {header}, {}",
-            self.separator, self.decimal, self.encoding
-        )?;
-        if self.sep_line {
-            write!(f, ", a sep= line")?;
-        }
-        if self.trailing_separator {
-            write!(f, ", a separator at the end of each row")?;
-        }
-        if self.skipped_lines > 0 {
-            write!(f, ", {} before the table", counted(self.skipped_lines, "line"))?;
-        }
-        if self.carriage_returns {
-            write!(f, ", lines end with CR")?;
+        write!(f, "separator {separator}, decimal {decimal}, {header}, {encoding}")?;
+        let skipped = format!("{} before the table", counted(self.skipped_lines, "line"));
+        for (is_so, what) in [
+            (self.sep_line, "a sep= line"),
+            (self.trailing_separator, "a separator at the end of each row"),
+            (self.skipped_lines > 0, &skipped),
+            (self.carriage_returns, "lines end with CR"),
+        ] {
+            if is_so {
+                write!(f, ", {what}")?;
+            }
         }
         Ok(())
     }

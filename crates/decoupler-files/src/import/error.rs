@@ -12,23 +12,15 @@ use crate::machine::{OverBudget, system_cause};
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ImportError {
-    /// A file cannot be read.
-    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: io::Error,
-    },
     /// A stored plan names a pipe or device.
     #[error("'{}' is a pipe or device, which is read only when it is given as an argument; write its data to a file", .0.display())]
     Irregular(PathBuf),
-    /// The contents of a file are not a table.
-    #[error("'{}': {source}", .path.display())]
+    /// A file cannot be read, or its contents are not a table.
+    #[error("{}'{}': {source}", if let TableError::Io(_) = source { "cannot read " } else { "" }, .path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// Error in its contents.
+        /// Error in its contents, or of the operating system.
         source: TableError,
     },
     /// A name, range, meaning or condition of a recipe is wrong, or does not fit the files.
@@ -116,11 +108,12 @@ pub enum TableError {
 impl TableError {
     /// Returns the error with the file in which it is.
     pub(super) fn in_file(self, path: &Path) -> ImportError {
-        let path = path.to_owned();
         match self {
-            Self::Io(source) => ImportError::Read { path, source },
             Self::Cancelled => ImportError::Cancelled,
-            source => ImportError::File { path, source },
+            source => ImportError::File {
+                path: path.to_owned(),
+                source,
+            },
         }
     }
 

@@ -1,16 +1,26 @@
-//! File formats of recordings. To add one, add a variant of [`Format`] and of [`Contents`] here, and a module that reads its
+//! File formats of recordings. To add one, add a variant of [`Format`] and a case of [`read`] here, and a module that reads its
 //! arrays.
 
 use std::{
     fmt,
     fs::File,
-    io::{self, BufReader, Read as _, Seek as _},
+    io::{self, BufReader, Read, Seek as _},
     path::{Path, PathBuf},
 };
 
 use zip::ZipArchive;
 
-use super::{Decimal, Dialect, TableError, rows::MAX_CELLS};
+use super::{
+    Decimal, Dialect, Table, TableError, Watch, arrays,
+    csv_table::{self, Reading},
+    matlab, numpy,
+    progress::{Watched, table_error},
+    sheet,
+};
+use crate::machine::{OverBudget, ReadingBudget};
+
+/// Number of numbers that are read at once.
+const BLOCK: u64 = 1 << 17;
 
 /// File format.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,22 +40,6 @@ pub enum Format {
         /// `true` if its first row has the names of the columns.
         header: bool,
     },
-}
-
-/// Contents of a file, recognised by its beginning.
-pub(super) enum Contents {
-    /// Text.
-    Text,
-    /// A NumPy array.
-    Npy,
-    /// An archive of NumPy arrays.
-    Npz,
-    /// Arrays of MATLAB.
-    Matlab,
-    /// Sheets of Excel since 2007.
-    Xlsx,
-    /// Sheets of OpenDocument.
-    Ods,
 }
 
 /// Beginnings of files that are not read, with what they are and what to do.
@@ -106,40 +100,58 @@ impl Format {
     }
 }
 
-impl Contents {
-    /// Recognises the contents of the file at `path` by its beginning, and those of an archive by the names in it.
-    ///
-    /// # Errors
-    /// If it cannot be read, or is a known kind of file that is not read.
-    pub(super) fn of(path: &Path, mut file: &File) -> Result<Self, TableError> {
-        let mut beginning = Vec::new();
-        file.take(16).read_to_end(&mut beginning)?;
-        file.rewind()?;
-        let refused = |what: &str, cure: &str| TableError::Contents(format!("it is {what}, which is not read; {cure}"));
-        if let Some((_, what, cure)) = REFUSED.iter().find(|(start, ..)| beginning.starts_with(start)) {
-            return Err(refused(what, cure));
-        }
-        let is_named = path.extension().is_some_and(|found| found.eq_ignore_ascii_case("mat"));
-        match beginning[..] {
-            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => return Ok(Self::Npy),
-            [b'P', b'K', 3 | 5, ..] => {}
-            _ if is_named || beginning.starts_with(b"MATLAB") => return Ok(Self::Matlab),
-            _ => return Ok(Self::Text),
-        }
-        let archive = ZipArchive::new(BufReader::new(file));
-        file.rewind()?;
-        let Ok(archive) = archive else { return Ok(Self::Npz) };
-        let has = |is_it: &dyn Fn(&str) -> bool| archive.file_names().any(|name| name.is_ok_and(|name| is_it(&name)));
-        if has(&|name| name.starts_with("xl/")) {
-            Ok(Self::Xlsx)
-        } else if has(&|name| name == "mimetype") && has(&|name| name == "content.xml") {
-            Ok(Self::Ods)
-        } else if archive.is_empty() || has(&|name| name.ends_with(".npy")) {
-            Ok(Self::Npz)
-        } else {
-            Err(refused("a zip archive without .npy arrays", "unpack it"))
-        }
+/// Reads the table in the file at `path`, whose format is recognised by its beginning, and that of an archive by the names in
+/// it.
+///
+/// # Errors
+/// If the file cannot be read, does not contain a table or is a known kind of file that is not read, or `watch` breaks.
+pub(super) fn read(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Result<Table, TableError> {
+    let file = File::open(path)?;
+    let metadata = file.metadata()?;
+    if metadata.is_dir() {
+        return Err(io::Error::from(io::ErrorKind::IsADirectory).into());
     }
+    let size = metadata.is_file().then_some(metadata.len());
+    let budget = &mut ReadingBudget::now();
+    let mut beginning = Vec::new();
+    // A pipe can be read only once.
+    if size.is_some() {
+        (&file).take(16).read_to_end(&mut beginning)?;
+        (&file).rewind()?;
+    }
+    let refused = |what: &str, cure: &str| TableError::Contents(format!("it is {what}, which is not read; {cure}"));
+    if let Some((_, what, cure)) = REFUSED.iter().find(|(start, ..)| beginning.starts_with(start)) {
+        return Err(refused(what, cure));
+    }
+    let is_named = path.extension().is_some_and(|found| found.eq_ignore_ascii_case("mat")) && size.is_some();
+    let (arrays, format) = match beginning[..] {
+        [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => {
+            let array = numpy::read("", &mut BufReader::new(Watched::new(file, size, watch)), budget)?;
+            ((vec![array], Vec::new()), Format::Npy)
+        }
+        [b'P', b'K', 3 | 5, ..] => {
+            let archive = ZipArchive::new(BufReader::new(&file));
+            (&file).rewind()?;
+            let names = archive.iter().flat_map(ZipArchive::file_names);
+            let names = Vec::from_iter(names.filter_map(|name| Some(name.ok()?.into_owned())));
+            let has = |is_it: fn(&str) -> bool| names.iter().any(|name| is_it(name));
+            let is_excel = has(|name| name.starts_with("xl/"));
+            let is_ods = !is_excel && has(|name| name == "mimetype") && has(|name| name == "content.xml");
+            if is_excel || is_ods {
+                return sheet::read(path, file, is_ods, reading, budget, watch);
+            }
+            if archive.is_ok_and(|archive| !archive.is_empty()) && !has(|name| name.ends_with(".npy")) {
+                return Err(refused("a zip archive without .npy arrays", "unpack it"));
+            }
+            (numpy::read_archive(BufReader::new(file), budget, watch)?, Format::Npz)
+        }
+        _ if is_named || beginning.starts_with(b"MATLAB") => {
+            let source = BufReader::new(Watched::new(file, size, watch));
+            (matlab::read(source, budget)?, Format::Matlab)
+        }
+        _ => return csv_table::read(path, Watched::new(file, size, watch), reading, budget),
+    };
+    arrays::table(path, arrays, format, reading, budget)
 }
 
 impl fmt::Display for Format {
@@ -158,24 +170,18 @@ impl fmt::Display for Format {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Element {
     /// As in NumPy: `f` for floating point, `i` and `u` for integers with and without a sign.
-    kind: char,
+    pub(super) kind: char,
     /// Number of bytes.
     pub(super) size: usize,
-}
-
-/// Byte order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Endian {
-    Little,
-    Big,
+    /// `true` if the most significant byte comes first.
+    pub(super) is_big: bool,
 }
 
 impl Element {
-    pub(super) const I32: Self = Self { kind: 'i', size: 4 };
-    pub(super) const U32: Self = Self { kind: 'u', size: 4 };
-
-    /// Returns the type with this code of NumPy, such as `f8`.
+    /// Returns the type with this code of NumPy, such as `<f8`.
     pub(super) fn of_code(code: &str) -> Option<Self> {
+        let is_big = code.starts_with('>');
+        let code = code.trim_start_matches(['>', '<', '|', '=']);
         let code = if ["b1", "?"].contains(&code) { "u1" } else { code };
         let kind = code.chars().next()?;
         let size = code[kind.len_utf8()..].parse().ok()?;
@@ -184,71 +190,90 @@ impl Element {
             'i' | 'u' => [1, 2, 4, 8].contains(&size),
             _ => false,
         };
-        is_known.then_some(Self { kind, size })
+        is_known.then_some(Self { kind, size, is_big })
     }
 
-    /// Reads the numbers in `bytes`; a part of a number at the end is ignored.
-    pub(super) fn read(self, bytes: &[u8], endian: Endian) -> Vec<f64> {
-        let number = |chunk: &[u8]| {
-            let mut bytes = [0; 8];
-            bytes[..self.size].copy_from_slice(chunk);
-            if endian == Endian::Big {
-                bytes[..self.size].reverse();
+    /// Reads `count` numbers, or those up to the end of the source, block by block, so that a corrupt count allocates little
+    /// memory.
+    pub(super) fn read(
+        self,
+        source: &mut dyn Read,
+        count: u64,
+        budget: &mut ReadingBudget,
+    ) -> Result<Vec<f64>, TableError> {
+        let bytes = count.saturating_mul(size_of::<f64>() as u64);
+        // A vector that grows has room for up to twice its numbers.
+        budget.claim(bytes.saturating_mul(2))?;
+        let (mut numbers, mut block) = (Vec::new(), Vec::new());
+        while (numbers.len() as u64) < count {
+            block.clear();
+            let wanted = (count - numbers.len() as u64).min(BLOCK) * self.size as u64;
+            source.take(wanted).read_to_end(&mut block).map_err(table_error)?;
+            numbers.extend(block.chunks_exact(self.size).map(|chunk| self.number(chunk)));
+            if (block.len() as u64) < wanted {
+                break;
             }
-            let bits = u64::from_le_bytes(bytes);
-            match (self.kind, self.size) {
-                ('f', 4) => f64::from(f32::from_bits(bits as u32)),
-                ('f', _) => f64::from_bits(bits),
-                ('i', size) => ((bits << (64 - 8 * size)) as i64 >> (64 - 8 * size)) as f64,
-                _ => bits as f64,
-            }
-        };
-        bytes.chunks_exact(self.size).map(number).collect()
+        }
+        budget.release(bytes);
+        Ok(numbers)
+    }
+
+    fn number(self, chunk: &[u8]) -> f64 {
+        let mut bytes = [0; 8];
+        bytes[..self.size].copy_from_slice(chunk);
+        if self.is_big {
+            bytes[..self.size].reverse();
+        }
+        let bits = u64::from_le_bytes(bytes);
+        match (self.kind, self.size) {
+            ('f', 4) => f64::from(f32::from_bits(bits as u32)),
+            ('f', _) => f64::from_bits(bits),
+            ('i', size) => ((bits << (64 - 8 * size)) as i64 >> (64 - 8 * size)) as f64,
+            _ => bits as f64,
+        }
     }
 }
 
-/// A named array of numbers: samples × columns, column by column.
-#[derive(Clone, Debug, PartialEq)]
+/// A named array of numbers: samples × columns.
+#[derive(Debug)]
 pub(super) struct Array {
     pub(super) name: String,
-    pub(super) rows: usize,
-    pub(super) columns: Vec<Vec<f64>>,
-    /// Shape in the file, as text.
-    pub(super) shape: String,
-    /// `true` if it has more than two dimensions in the file.
-    pub(super) is_reshaped: bool,
+    /// Shape in the file: the first dimension counts samples, and the others are joined in the order of the numbers.
+    pub(super) shape: Vec<usize>,
+    pub(super) numbers: Vec<f64>,
+    pub(super) is_by_column: bool,
 }
 
 impl Array {
-    /// Splits `numbers` into columns: the first dimension of `shape` counts samples, and the others are joined in the order of
-    /// the numbers.
-    pub(super) fn new(
-        name: String,
-        shape: &[usize],
-        numbers: Vec<f64>,
-        is_by_column: bool,
-    ) -> Result<Self, TableError> {
-        let rows = shape.first().copied().unwrap_or(1);
-        let width = shape.iter().skip(1).product();
-        if width > MAX_CELLS {
-            let reason = format!("{} is more than {MAX_CELLS} columns; transpose it", written(shape));
-            return Err(TableError::array(&name, reason));
+    pub(super) fn rows(&self) -> usize {
+        self.shape.first().copied().unwrap_or(1)
+    }
+
+    pub(super) fn width(&self) -> usize {
+        self.shape.iter().skip(1).product()
+    }
+
+    /// Returns the columns of samples of `each` rows, which are side by side.
+    pub(super) fn columns(self, each: usize, budget: &mut ReadingBudget) -> Result<Vec<Vec<f64>>, OverBudget> {
+        let (rows, width) = (self.rows(), self.width());
+        if width * each == 1 {
+            return Ok(vec![self.numbers]);
         }
-        let columns = if width == 1 {
-            vec![numbers]
-        } else if is_by_column {
-            numbers.chunks_exact(rows.max(1)).map(<[f64]>::to_vec).collect()
-        } else {
-            let column = |index| numbers.iter().skip(index).step_by(width).copied().collect();
-            (0..width).map(column).collect()
+        let bytes = (self.numbers.len() * size_of::<f64>()) as u64;
+        budget.claim(bytes)?;
+        let column = |index: usize| {
+            let (row, column) = (index / width, index % width);
+            let (first, step) = match self.is_by_column {
+                true => (column * rows + row, each),
+                false => (row * width + column, each * width),
+            };
+            let numbers = self.numbers[first..].iter().step_by(step);
+            numbers.take(rows / each).copied().collect()
         };
-        Ok(Self {
-            name,
-            rows,
-            columns,
-            shape: written(shape),
-            is_reshaped: shape.len() > 2,
-        })
+        let columns = (0..width * each).map(column).collect();
+        // The numbers in the order of the file are freed.
+        budget.release(bytes);
+        Ok(columns)
     }
 }
 
@@ -286,9 +311,6 @@ const LONGEST: usize = 64;
 
 /// Parses a cell without surrounding spaces; the number is correctly rounded.
 pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Cell {
-    if cell.is_empty() {
-        return Cell::Missing;
-    }
     let number = match decimal {
         Decimal::Point => parse_point(cell),
         // A point would be a thousands separator, or a decimal point after all.
@@ -306,6 +328,7 @@ pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Cell {
     match number {
         Some(number) if number.is_finite() => Cell::Number(number),
         Some(number) if number.is_nan() => Cell::Missing,
+        None if cell.is_empty() => Cell::Missing,
         _ => Cell::Text,
     }
 }

@@ -1,8 +1,4 @@
-use std::{
-    fs::File,
-    io::{self, BufReader},
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use decoupler_core::{
     dataset::{Dataset, DatasetError, History, Memory},
@@ -13,23 +9,18 @@ use ndarray::ArcArray2;
 use serde::Serialize;
 
 use super::{
-    Column, Cure, Derived, DialectChoice, FileSet, Format, ImportError, Joined, Recipe, Table, TableError, Watch,
-    arrays,
+    Column, Cure, Derived, DialectChoice, FileSet, Format, ImportError, Joined, Recipe, Table, Watch,
     columns::{Files, Meanings},
-    csv_table::{self, Reading},
+    csv_table::Reading,
     derived::TimeColumn,
-    format::Contents,
+    format,
     join::{Partners, gather, median_interval, nearest},
-    matlab, numpy,
     positions::read_positions,
-    progress::Watched,
     selection::Rows,
     sentinel::{Sentinel, is_rounding, rounding_warning},
-    sheet,
     suggestion::is_group_name,
     table::stem,
 };
-use crate::machine::ReadingBudget;
 
 impl Recipe {
     /// Imports the samples of the files, whose paths are relative to `folder`.
@@ -137,7 +128,7 @@ impl Recipe {
         let (times, reports, total) = (
             meanings.time.map(of_samples),
             rows.reports(),
-            main.rows + main.too_long.rows,
+            main.rows + main.too_long.count,
         );
         let targets_of_rows = gather(&mut files.columns, &meanings.targets, &kept, &meanings.inputs);
         let history = past(gather(&mut files.columns, &meanings.inputs, &read, &[]));
@@ -324,38 +315,7 @@ pub fn read_table(path: &Path, choice: DialectChoice, watch: Watch<'_>) -> Resul
 }
 
 pub(super) fn read(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Result<Table, ImportError> {
-    read_file(path, reading, watch).map_err(|error| error.in_file(path))
-}
-
-fn read_file(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Result<Table, TableError> {
-    let file = File::open(path)?;
-    let metadata = file.metadata()?;
-    if metadata.is_dir() {
-        return Err(io::Error::from(io::ErrorKind::IsADirectory).into());
-    }
-    let size = metadata.is_file().then_some(metadata.len());
-    let budget = &mut ReadingBudget::now();
-    // A pipe can be read only once.
-    let contents = if size.is_some() {
-        Contents::of(path, &file)?
-    } else {
-        Contents::Text
-    };
-    let ((found, left_out), format) = match contents {
-        Contents::Text => return csv_table::read(path, Watched::new(file, size, watch), reading, budget),
-        Contents::Xlsx => return sheet::read(path, file, false, reading, budget, watch),
-        Contents::Ods => return sheet::read(path, file, true, reading, budget, watch),
-        Contents::Npz => (numpy::read_archive(BufReader::new(file), budget, watch)?, Format::Npz),
-        Contents::Npy => {
-            let array = numpy::read("", BufReader::new(Watched::new(file, size, watch)), budget)?;
-            ((vec![array], Vec::new()), Format::Npy)
-        }
-        Contents::Matlab => {
-            let source = BufReader::new(Watched::new(file, size, watch));
-            (matlab::read(source, budget)?, Format::Matlab)
-        }
-    };
-    arrays::table(path, found, format, left_out, reading)
+    format::read(path, reading, watch).map_err(|error| error.in_file(path))
 }
 
 /// Measured samples with a description of their channels.

@@ -2,61 +2,60 @@
 //! <https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf>. Numeric and logical arrays, and those in
 //! structures, are read; other variables are reported. No existing crate reports the variables it skips and limits the allocation for a corrupt length.
 
-use std::io::Read;
+use std::io::{self, Read};
 
 use flate2::read::ZlibDecoder;
 
 use super::{
     TableError,
-    format::{Array, Element, Endian, written},
+    format::{Array, Element, written},
     progress::table_error,
 };
 use crate::machine::ReadingBudget;
 
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
+/// Class of structures.
+const STRUCTURES: i32 = 2;
+/// Types of numbers by their codes in NumPy.
+const CODES: [&str; 14] = [
+    "", "i1", "u1", "i2", "u2", "i4", "u4", "f4", "", "f8", "", "", "i8", "u8",
+];
 /// Maximum depth of structures in structures.
 const DEEPEST: usize = 8;
 /// Maximum number of fields times elements of a structure.
 const MAX_FIELDS: usize = 1 << 20;
 /// Memory of a field of a structure in bytes, without its numbers.
 const FIELD: u64 = 128;
-/// Maximum length of names, shapes and flags in bytes.
-const LONGEST: usize = 1 << 16;
+/// Number of bytes that contain the flags, the shape and the name of a variable.
+const HEAD: usize = 1 << 18;
 
 /// Reads the numeric arrays of a file; returns them and the variables left out. `budget` limits their memory.
 pub(super) fn read(mut source: impl Read, budget: &mut ReadingBudget) -> Result<(Vec<Array>, Vec<String>), TableError> {
-    let mut header = [0; 128];
-    if !fill(&mut source, &mut header)? {
-        return Err(cut_off());
-    }
+    let header = up_to(&mut source, 128)?;
     if header.starts_with(b"MATLAB 7.3") {
         let reason = "it has version 7.3 of the format, which is HDF5; save it with the option -v7";
         return Err(wrong(reason));
     }
-    let endian = match &header[126..] {
-        b"IM" => Endian::Little,
-        b"MI" => Endian::Big,
+    let is_big = match header.get(126..).ok_or_else(cut_off)? {
+        b"IM" => false,
+        b"MI" => true,
         _ => {
             let reason = "it is not a MAT-file of version 5 to 7; save it with the option -v7";
             return Err(wrong(reason));
         }
     };
     let mut found = Variables::default();
-    let mut tag = [0; 8];
-    while fill(&mut source, &mut tag)? {
-        let (kind, size, is_small) = parsed(tag, endian)?;
-        let mut limited = (&mut source).take(size as u64);
-        match (kind, is_small) {
-            (COMPRESSED, false) => {
-                let mut inflated = ZlibDecoder::new(&mut limited);
-                if fill(&mut inflated, &mut tag)?
-                    && let (MATRIX, size, false) = parsed(tag, endian)?
-                {
-                    found.read(&mut inflated, size, endian, budget)?;
+    while let Some(tag) = parsed(&up_to(&mut source, 8)?, is_big)? {
+        match tag {
+            (COMPRESSED, size, false) => {
+                let mut inflated = ZlibDecoder::new((&mut source).take(size as u64));
+                let tag = up_to(&mut inflated, 8)?;
+                if let Some((MATRIX, size, false)) = parsed(&tag, is_big)? {
+                    found.read(&mut inflated, size, is_big, budget)?;
                 }
                 // The checksum is verified at the end of the data.
-                if fill(&mut inflated, &mut [0])? {
+                if !up_to(&mut inflated, 1)?.is_empty() {
                     let reason = "it has more data than it states; copy it again";
                     return Err(TableError::damaged("a variable", reason));
                 }
@@ -64,10 +63,9 @@ pub(super) fn read(mut source: impl Read, budget: &mut ReadingBudget) -> Result<
                     return Err(TableError::damaged("a variable", "its length is wrong; copy it again"));
                 }
             }
-            (MATRIX, false) => {
-                found.read(&mut limited, size, endian, budget)?;
-                let padding = size.next_multiple_of(8) - size;
-                drain(&mut source, padding as u64)?;
+            (MATRIX, size, false) => {
+                found.read(&mut source, size, is_big, budget)?;
+                up_to(&mut source, size.next_multiple_of(8) - size)?;
             }
             _ => return Err(TableError::damaged("a variable", "its kind is unknown; copy it again")),
         }
@@ -88,36 +86,22 @@ impl Variables {
         &mut self,
         source: &mut dyn Read,
         size: usize,
-        endian: Endian,
+        is_big: bool,
         budget: &mut ReadingBudget,
     ) -> Result<(), TableError> {
-        // Flags, shape and name come first.
-        let mut bytes = Vec::new();
-        let mut read = |bytes: &mut Vec<u8>, end: usize| {
-            let missing = (end - bytes.len()) as u64;
-            let read = source.take(missing).read_to_end(bytes).map_err(damage)?;
-            if (read as u64) < missing {
-                Err(cut_off())
-            } else {
-                Ok(())
-            }
-        };
-        read(&mut bytes, size.min(4 * LONGEST))?;
-        let head = Elements { bytes: &bytes, endian }.matrix_head()?;
-        let (name, other) = match head {
-            (name, _, Class::Other(what)) => (name, Some(what)),
-            (name, ..) => (name, None),
-        };
+        let mut bytes = up_to(source, size.min(HEAD))?;
+        let (flags, _, name) = Elements { bytes: &bytes, is_big }.head()?;
+        let left = size - bytes.len();
         // MATLAB stores internal data, such as `__function_workspace__`, in variables without a name.
-        if let Some(what) = other.filter(|_| !name.is_empty()) {
-            self.left_out.push(format!("{name} is {what}"));
-        }
-        if other.is_some() || name.is_empty() {
-            return drain(source, (size - bytes.len()) as u64);
+        if name.is_empty() || left_out(flags).is_some() {
+            let note = left_out(flags).map(|what| format!("{name} is {what}"));
+            self.left_out.extend(note.filter(|_| !name.is_empty()));
+            io::copy(&mut source.take(left as u64), &mut io::sink()).map_err(damage)?;
+            return Ok(());
         }
         budget.claim(size as u64)?;
-        read(&mut bytes, size)?;
-        let value = Elements { bytes: &bytes, endian }.matrix(budget, 0)?.1;
+        bytes.append(&mut up_to(source, left)?);
+        let value = Elements { bytes: &bytes, is_big }.matrix(budget, 0)?;
         drop(bytes);
         budget.release(size as u64);
         self.add(name, value);
@@ -131,10 +115,13 @@ impl Variables {
             Value::Numbers { shape, numbers } => {
                 // A row vector becomes a column of the table.
                 let first = shape.iter().position(|&size| size > 1).unwrap_or(shape.len() - 1);
-                match Array::new(name, &shape[first..], numbers, true) {
-                    Ok(array) => self.arrays.push(array),
-                    Err(error) => self.left_out.push(error.to_string()),
-                }
+                let (shape, is_by_column) = (shape[first..].to_vec(), true);
+                self.arrays.push(Array {
+                    name,
+                    shape,
+                    numbers,
+                    is_by_column,
+                });
             }
             Value::Structures(fields) => {
                 for (field, values) in fields {
@@ -161,95 +148,55 @@ enum Value {
     Other(&'static str),
 }
 
-/// Class of a matrix.
-enum Class {
-    Numbers,
-    Structures,
-    /// Anything else: what it is.
-    Other(&'static str),
-}
-
 /// Elements of a variable, which follow each other.
 struct Elements<'a> {
     bytes: &'a [u8],
-    endian: Endian,
+    is_big: bool,
 }
 
 impl<'a> Elements<'a> {
     /// Type and data of the next element.
     fn next(&mut self) -> Result<(u32, &'a [u8]), TableError> {
-        let (tag, rest) = self.bytes.split_first_chunk().ok_or_else(cut_off)?;
-        let (kind, size, is_small) = parsed(*tag, self.endian)?;
-        let (data, padded) = if is_small {
-            (&tag[4..], 0)
-        } else {
-            (rest, size.next_multiple_of(8))
+        let tag = &self.bytes[..self.bytes.len().min(8)];
+        let (kind, size, is_small) = parsed(tag, self.is_big)?.ok_or_else(cut_off)?;
+        let (start, end) = match is_small {
+            true => (4, 8),
+            false => (8, 8 + size.next_multiple_of(8)),
         };
-        self.bytes = rest.get(padded..).unwrap_or_default();
-        Ok((kind, data.get(..size).ok_or_else(cut_off)?))
+        let data = self.bytes.get(start..start + size).ok_or_else(cut_off)?;
+        self.bytes = self.bytes.get(end..).unwrap_or_default();
+        Ok((kind, data))
     }
 
-    /// Data of a name, a shape or flags.
-    fn next_short(&mut self) -> Result<&'a [u8], TableError> {
-        let (_, data) = self.next()?;
-        if data.len() > LONGEST {
-            return Err(wrong("an element has an invalid length; copy it again"));
+    fn next_integers(&mut self) -> Result<Vec<i32>, TableError> {
+        Ok(integers(self.next()?.1, self.is_big))
+    }
+
+    /// Flags, shape and name of a matrix.
+    fn head(&mut self) -> Result<(i32, Vec<i32>, String), TableError> {
+        let flags = self.next_integers()?.first().copied().unwrap_or(0);
+        Ok((flags, self.next_integers()?, text(self.next()?.1)))
+    }
+
+    /// Value of a matrix.
+    fn matrix(mut self, budget: &mut ReadingBudget, depth: usize) -> Result<Value, TableError> {
+        let (flags, shape, name) = self.head()?;
+        match left_out(flags) {
+            Some(what) => Ok(Value::Other(what)),
+            None if flags & 0xff != STRUCTURES => self.numbers(&name, &shape, budget),
+            None if depth == DEEPEST => Ok(Value::Other("a structure within too many others")),
+            None => self.structures(&shape, budget, depth),
         }
-        Ok(data)
     }
 
-    fn next_integers(&mut self) -> Result<Vec<f64>, TableError> {
-        Ok(Element::I32.read(self.next_short()?, self.endian))
-    }
-
-    /// Name, shape and class of a matrix.
-    fn matrix_head(&mut self) -> Result<(String, Vec<f64>, Class), TableError> {
-        let flags = self.next_integers()?.first().copied().unwrap_or(0.0) as i64;
-        let (shape, name) = (self.next_integers()?, text(self.next_short()?));
-        let class = match flags & 0xff {
-            1 => Class::Other("a cell array"),
-            2 => Class::Structures,
-            4 => Class::Other("text"),
-            5 => Class::Other("sparse; save it as full"),
-            6..=15 if flags & 0x0800 != 0 => Class::Other("complex"),
-            6..=15 => Class::Numbers,
-            _ => Class::Other("an object"),
-        };
-        Ok((name, shape, class))
-    }
-
-    /// Name and value of a matrix.
-    fn matrix(mut self, budget: &mut ReadingBudget, depth: usize) -> Result<(String, Value), TableError> {
-        let (name, shape, class) = self.matrix_head()?;
-        let value = match class {
-            Class::Other(what) => Value::Other(what),
-            Class::Numbers => self.numbers(&name, &shape, budget)?,
-            Class::Structures if depth == DEEPEST => Value::Other("a structure within too many others"),
-            Class::Structures => self.structures(&shape, budget, depth)?,
-        };
-        Ok((name, value))
-    }
-
-    fn numbers(&mut self, name: &str, shape: &[f64], budget: &mut ReadingBudget) -> Result<Value, TableError> {
-        if shape.is_empty() || shape.iter().any(|size| *size < 1.0) {
+    fn numbers(&mut self, name: &str, shape: &[i32], budget: &mut ReadingBudget) -> Result<Value, TableError> {
+        if shape.is_empty() || shape.iter().any(|size| *size < 1) {
             return Ok(Value::Other("empty"));
         }
         let shape = Vec::from_iter(shape.iter().map(|size| *size as usize));
-        let (kind, bytes) = self.next()?;
-        let code = match kind {
-            1 => "i1",
-            2 => "u1",
-            3 => "i2",
-            4 => "u2",
-            5 => "i4",
-            6 => "u4",
-            7 => "f4",
-            9 => "f8",
-            12 => "i8",
-            13 => "u8",
-            _ => "",
-        };
-        let element = Element::of_code(code).ok_or_else(|| {
+        let (kind, mut bytes) = self.next()?;
+        let element = CODES.get(kind as usize).and_then(|code| Element::of_code(code));
+        let element = element.ok_or_else(|| {
             let reason = "its numbers have an unknown type; save it with the option -v7";
             TableError::array(name, reason)
         })?;
@@ -260,17 +207,16 @@ impl<'a> Elements<'a> {
             let reason = format!("it should have {shape} numbers and has {found}; save or copy it again");
             return Err(TableError::array(name, reason));
         }
-        // The numbers in the order of the file are freed once they are copied to their columns.
-        budget.claim((found as u64).saturating_mul(2 * size_of::<f64>() as u64))?;
-        let numbers = element.read(bytes, self.endian);
+        let is_big = self.is_big;
+        let numbers = Element { is_big, ..element }.read(&mut bytes, found as u64, budget)?;
         Ok(Value::Numbers { shape, numbers })
     }
 
     /// Reads the fields of `shape` structures.
-    fn structures(&mut self, shape: &[f64], budget: &mut ReadingBudget, depth: usize) -> Result<Value, TableError> {
+    fn structures(&mut self, shape: &[i32], budget: &mut ReadingBudget, depth: usize) -> Result<Value, TableError> {
         let length = self.next_integers()?.first().map_or(0, |length| *length as usize);
         let (_, names) = self.next()?;
-        let count: f64 = shape.iter().product();
+        let count: f64 = shape.iter().map(|size| f64::from(*size)).product();
         let width = names.len().checked_div(length).unwrap_or(0);
         let values = count.max(1.0) * width as f64;
         if values > MAX_FIELDS as f64 {
@@ -281,16 +227,28 @@ impl<'a> Elements<'a> {
         let mut fields = Vec::from_iter(names.map(|name| (text(name), Vec::new())));
         // Without fields, a shape of any size has no data.
         let elements = if fields.is_empty() { 0 } else { count as usize };
+        let is_big = self.is_big;
         for _ in 0..elements {
             for (_, values) in &mut fields {
-                let endian = self.endian;
                 values.push(match self.next()? {
-                    (MATRIX, bytes @ [_, ..]) => Elements { bytes, endian }.matrix(budget, depth + 1)?.1,
+                    (MATRIX, bytes @ [_, ..]) => Elements { bytes, is_big }.matrix(budget, depth + 1)?,
                     _ => Value::Other("empty"),
                 });
             }
         }
         Ok(Value::Structures(fields))
+    }
+}
+
+/// Returns what a matrix with these flags is, unless it is numbers or structures.
+fn left_out(flags: i32) -> Option<&'static str> {
+    match flags & 0xff {
+        1 => Some("a cell array"),
+        STRUCTURES => None,
+        4 => Some("text"),
+        5 => Some("sparse; save it as full"),
+        6..=15 => (flags & 0x0800 != 0).then_some("complex"),
+        _ => Some("an object"),
     }
 }
 
@@ -322,15 +280,25 @@ fn text(bytes: &[u8]) -> String {
     letters.filter(|letter| !letter.is_control()).collect()
 }
 
-/// Returns the type and size of an element from its tag, and `true` if it is small: its data is in the tag.
-fn parsed(tag: [u8; 8], endian: Endian) -> Result<(u32, usize, bool), TableError> {
-    let number = |bytes: &[u8]| Element::U32.read(bytes, endian)[0] as u32;
-    let (kind, size) = (number(&tag[..4]), number(&tag[4..]) as usize);
-    match (kind >> 16) as usize {
-        0 => Ok((kind, size, false)),
-        small @ 1..=4 => Ok((kind & 0xffff, small, true)),
+/// Returns the type and size of an element from its tag, and `true` if it is small: its data is in the tag. `None` at the end.
+fn parsed(tag: &[u8], is_big: bool) -> Result<Option<(u32, usize, bool)>, TableError> {
+    let [kind, size] = integers(tag, is_big)[..] else {
+        return if tag.is_empty() { Ok(None) } else { Err(cut_off()) };
+    };
+    let (kind, size) = (kind as u32, size as u32);
+    match kind >> 16 {
+        0 => Ok(Some((kind, size as usize, false))),
+        small @ 1..=4 => Ok(Some((kind & 0xffff, small as usize, true))),
         _ => Err(wrong("an element has an invalid length; copy it again")),
     }
+}
+
+fn integers(bytes: &[u8], is_big: bool) -> Vec<i32> {
+    let integer = match is_big {
+        true => i32::from_be_bytes,
+        false => i32::from_le_bytes,
+    };
+    bytes.as_chunks().0.iter().map(|bytes| integer(*bytes)).collect()
 }
 
 fn wrong(reason: &str) -> TableError {
@@ -341,32 +309,20 @@ fn cut_off() -> TableError {
     wrong("it is cut off; copy it again")
 }
 
-/// Fills `buffer`; returns `false` at the end of the source.
-fn fill(source: &mut dyn Read, buffer: &mut [u8]) -> Result<bool, TableError> {
-    let mut filled = 0;
-    while filled < buffer.len() {
-        match source.read(&mut buffer[filled..]).map_err(damage)? {
-            0 if filled == 0 => return Ok(false),
-            0 => return Err(cut_off()),
-            read => filled += read,
-        }
-    }
-    Ok(true)
-}
-
-/// Reads `count` bytes, or up to the end.
-fn drain(source: &mut dyn Read, count: u64) -> Result<(), TableError> {
-    std::io::copy(&mut source.take(count), &mut std::io::sink()).map_err(damage)?;
-    Ok(())
+/// Reads `count` bytes, or those up to the end.
+fn up_to(source: &mut dyn Read, count: usize) -> Result<Vec<u8>, TableError> {
+    let mut bytes = Vec::new();
+    source.take(count as u64).read_to_end(&mut bytes).map_err(damage)?;
+    Ok(bytes)
 }
 
 /// Converts a decompression error; other I/O errors are passed on.
-fn damage(error: std::io::Error) -> TableError {
+fn damage(error: io::Error) -> TableError {
     match error.kind() {
-        std::io::ErrorKind::InvalidInput | std::io::ErrorKind::InvalidData => {
+        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData => {
             TableError::damaged("a variable", "its compressed data is corrupt; copy it again")
         }
-        std::io::ErrorKind::UnexpectedEof => cut_off(),
+        io::ErrorKind::UnexpectedEof => cut_off(),
         _ => table_error(error),
     }
 }

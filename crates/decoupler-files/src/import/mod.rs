@@ -8,6 +8,7 @@
 //!
 //! [`Format`] lists the file formats. To add one, add a variant there and a module that reads its arrays.
 
+mod archive;
 mod arrays;
 mod choosing;
 mod columns;
@@ -49,7 +50,7 @@ pub use format::Format;
 pub use importing::{Dropped, FileReport, JoinReport, Recording, read_table};
 pub use inputs::{InputTable, KeptColumn};
 pub use inspection::{ColumnKind, ColumnSummary, InspectedFile, Inspection, TimeSummary};
-pub use lines::{KeptCell, LONGEST_LINE, LineError, LineParser, ParsedLine, ReadError, Readings, ReadingsFile};
+pub use lines::{KeptCell, LONGEST_LINE, LineError, LineParser, ParsedLine, Readings, ReadingsFile};
 pub use plan::{Plan, PlannedSets, TestFiles};
 pub use positions::holds_positions;
 pub use progress::{Progress, Watch};
@@ -58,4 +59,4 @@ pub use sentinel::Sentinel;
 pub(crate) use setup::watch;
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
 pub use suggestion::{Meaning, suggested_plan, suggested_plan_in_order};
-pub use table::{Column, Excess, Fault, Faults, Table, Variable};
+pub use table::{Column, Fault, Faults, Table, Variable};

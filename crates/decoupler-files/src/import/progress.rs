@@ -21,19 +21,15 @@ pub struct Progress {
 pub type Watch<'a> = &'a mut dyn FnMut(Progress) -> ControlFlow<()>;
 
 /// Source that reports the number of bytes read.
-pub(super) struct Watched<'a, 'w, R> {
+pub(super) struct Watched<'a, R> {
     source: R,
     progress: Progress,
     next: u64,
-    watch: &'a mut (dyn FnMut(Progress) -> ControlFlow<()> + 'w),
+    watch: Watch<'a>,
 }
 
-impl<'a, 'w, R: Read> Watched<'a, 'w, R> {
-    pub(super) fn new(
-        source: R,
-        of: Option<u64>,
-        watch: &'a mut (dyn FnMut(Progress) -> ControlFlow<()> + 'w),
-    ) -> Self {
+impl<'a, R: Read> Watched<'a, R> {
+    pub(super) fn new(source: R, of: Option<u64>, watch: Watch<'a>) -> Self {
         Self {
             source,
             progress: Progress { bytes: 0, of },
@@ -43,7 +39,7 @@ impl<'a, 'w, R: Read> Watched<'a, 'w, R> {
     }
 }
 
-impl<R: Read> Read for Watched<'_, '_, R> {
+impl<R: Read> Read for Watched<'_, R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if self.progress.bytes >= self.next {
             if (self.watch)(self.progress).is_break() {

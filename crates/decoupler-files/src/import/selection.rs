@@ -87,10 +87,10 @@ impl Rows<'_> {
                 },
             }
         }
-        let too_long = main.too_long.first_line.map(|first_line| Dropped {
+        let too_long = main.too_long.first.as_ref().map(|first| Dropped {
             reason: format!("more cells than the {}", counted(self.files.width(0), "column")),
-            rows: main.too_long.rows,
-            first_line,
+            rows: main.too_long.count,
+            first_line: first.line,
         });
         let counted = counts.into_iter().map(|(reason, rows, first_line)| Dropped {
             reason: self.words(reason),
@@ -102,7 +102,7 @@ impl Rows<'_> {
             let reasons = dropped
                 .iter()
                 .map(|Dropped { rows, reason, .. }| format!("{rows}: {reason}"));
-            let (rows, reasons) = (main.rows + main.too_long.rows, Vec::from_iter(reasons).join("; "));
+            let (rows, reasons) = (main.rows + main.too_long.count, Vec::from_iter(reasons).join("; "));
             return Err(ImportError::Samples(format!("no row of {rows} is left: {reasons}")));
         }
         Ok((kept, dropped))

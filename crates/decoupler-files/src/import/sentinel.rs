@@ -29,15 +29,14 @@ const MAX_LEVELS: usize = 20;
 impl Sentinel {
     /// Finds the number among those of a column, in which NaN is missing.
     pub(super) fn find(numbers: &[f64]) -> Option<Self> {
-        let extremes = Extremes::of(numbers)?;
-        if distinct(numbers, MAX_LEVELS) <= MAX_LEVELS && extremes.levels_are_codes() {
+        let [[min, above_min], [max, below_max]] = extremes(numbers)?;
+        // A few values at regular distances are codes, like the classes -1, 0 and 1.
+        let (low, high) = (above_min - min, max - below_max);
+        if low.max(high) <= 3.0 * low.min(high) && distinct(numbers, MAX_LEVELS) <= MAX_LEVELS {
             return None;
         }
         let present = numbers.iter().filter(|number| !number.is_nan()).count();
-        let ends = [
-            (extremes.min, extremes.above_min, extremes.max),
-            (extremes.max, extremes.below_max, extremes.min),
-        ];
+        let ends = [(min, above_min, max), (max, below_max, min)];
         ends.into_iter().find_map(|(value, nearest, opposite)| {
             let cells = numbers.iter().filter(|number| **number == value).count();
             let (gap, range) = ((nearest - value).abs(), (opposite - nearest).abs());
@@ -63,37 +62,21 @@ impl Sentinel {
     }
 }
 
-/// The two smallest and the two largest different numbers.
-struct Extremes {
-    min: f64,
-    above_min: f64,
-    below_max: f64,
-    max: f64,
-}
-
-impl Extremes {
-    /// Returns `None` unless there are two different numbers.
-    fn of(numbers: &[f64]) -> Option<Self> {
-        let present = || numbers.iter().copied().filter(|number| !number.is_nan());
-        let (min, max) = (
-            present().fold(f64::INFINITY, f64::min),
-            present().fold(f64::NEG_INFINITY, f64::max),
-        );
-        (min < max).then(|| Self {
-            min,
-            above_min: present().filter(|number| *number > min).fold(f64::INFINITY, f64::min),
-            below_max: present()
-                .filter(|number| *number < max)
-                .fold(f64::NEG_INFINITY, f64::max),
-            max,
-        })
-    }
-
-    /// Returns `true` if few values are at regular distances, like the classes -1, 0 and 1.
-    fn levels_are_codes(&self) -> bool {
-        let (low, high) = (self.above_min - self.min, self.max - self.below_max);
-        low.max(high) <= 3.0 * low.min(high)
-    }
+/// Returns the smallest and the second smallest, and the largest and the second largest of different numbers; `None` unless there
+/// are two.
+fn extremes(numbers: &[f64]) -> Option<[[f64; 2]; 2]> {
+    // Negated, the largest are the smallest; NaN never is.
+    let two = |sign: f64| {
+        let numbers = numbers.iter().map(|number| sign * number);
+        let smallest = numbers.fold([f64::INFINITY; 2], |[first, second], number| match number {
+            _ if number < first => [number, first],
+            _ if number > first && number < second => [first, number],
+            _ => [first, second],
+        });
+        smallest.map(|number| sign * number)
+    };
+    let found = [two(1.0), two(-1.0)];
+    (found[0][0] < found[1][0]).then_some(found)
 }
 
 /// Counts different numbers, up to one more than `limit`.
@@ -115,7 +98,7 @@ pub(super) fn is_rounding(numbers: &[f64]) -> bool {
     const FRACTION: f64 = 1e-5;
     const FRACTION_OF_FEW: f64 = 1e-3;
     const FEW: usize = 3;
-    let Some(Extremes { min, max, .. }) = Extremes::of(numbers) else {
+    let Some([[min, _], [max, _]]) = extremes(numbers) else {
         return false;
     };
     let (range, value) = (max - min, min.abs().max(max.abs()));

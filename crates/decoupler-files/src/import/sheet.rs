@@ -8,15 +8,15 @@ use std::{
     path::Path,
 };
 
-use calamine::{Cell, Data, DataRef, Ods, Range, Reader, Xlsx, XlsxError, open_workbook_from_rs};
+use calamine::{Cell, Data, DataRef, Ods, Range, Reader as _, Xlsx, XlsxError, open_workbook_from_rs};
 use decoupler_core::text::clean_name;
 
 use super::{
     Decimal, DialectChoice, Encoding, Format, Progress, Separator, Table, TableError, Watch,
+    archive::for_each_entry,
     csv_table::{self, Reading},
-    numpy::check_names,
     progress::Watched,
-    sheet_claims::{self, LARGEST, OF_CELL, Rectangle, outside},
+    sheet_claims::{LARGEST, OF_CELL, claim, extend, outside, rectangle},
 };
 use crate::{csv_row::csv_cell, machine::ReadingBudget};
 
@@ -32,26 +32,29 @@ pub(super) fn read(
     budget: &mut ReadingBudget,
     watch: Watch<'_>,
 ) -> Result<Table, TableError> {
-    check_names(&mut BufReader::new(&file))?;
-    sheet_claims::claim(BufReader::new(&file), is_ods, budget, watch)?;
+    for_each_entry(BufReader::new(&file), watch, |name, size, part| {
+        claim(BufReader::new(part), size, is_ods && name == "content.xml", budget)
+    })?;
     (&file).rewind()?;
     let source = BufReader::new(file);
     // The reader of spreadsheets may panic on a file whose parts contradict each other.
     let read = catch_unwind(AssertUnwindSafe(|| {
         if is_ods {
-            let range_of = |workbook: &mut Ods<_>, name: &str| workbook.worksheet_range(name).map_err(damaged);
-            Sheets::read(source, watch, range_of)
+            let mut workbook: Ods<_> = open_workbook_from_rs(source).map_err(damaged)?;
+            let names = workbook.sheet_names();
+            chosen(names, watch, |name| workbook.worksheet_range(name).map_err(damaged))
         } else {
-            Sheets::read(source, watch, |workbook, name| cells(workbook, name, budget))
+            let mut workbook: Xlsx<_> = open_workbook_from_rs(source).map_err(damaged)?;
+            chosen(workbook.sheet_names(), watch, |name| cells(&mut workbook, name, budget))
         }
     }));
-    let sheets = read.unwrap_or_else(|_| {
+    let (name, range, left_out) = read.unwrap_or_else(|_| {
         let reason = "its parts contradict each other; save it again, or as CSV";
         Err(TableError::damaged("the spreadsheet", reason))
     })?;
-    let Some((name, range)) = sheets.chosen.filter(|(_, range)| !range.is_empty()) else {
+    if range.is_empty() {
         return Err(TableError::Empty);
-    };
+    }
     let text = text_of(&range);
     drop(range);
     let size = text.len() as u64;
@@ -64,15 +67,9 @@ pub(super) fn read(
         },
         ..reading.clone()
     };
-    let mut table = csv_table::read(
-        path,
-        Watched::new(Cursor::new(text), Some(size), watch),
-        &reading,
-        budget,
-    )?;
-    table.notes.extend(sheets.others.iter().map(|(other, (rows, width))| {
-        format!("left out: sheet '{other}' is {rows} × {width}; save it as its own file to use it")
-    }));
+    let text = Watched::new(Cursor::new(text), Some(size), watch);
+    let mut table = csv_table::read(path, text, &reading, budget)?;
+    table.notes.extend(left_out);
     table.format = Format::Sheet {
         name,
         header: table.has_header(),
@@ -80,54 +77,33 @@ pub(super) fn read(
     Ok(table)
 }
 
-/// Sheets of a file, of which one is used.
-#[derive(Default)]
-struct Sheets {
-    /// The first of those with most numbers: name and cells.
-    chosen: Option<(String, Range<Data>)>,
-    /// Names of the others that have cells, with their numbers of rows and columns.
-    others: Vec<(String, (usize, usize))>,
-}
-
-impl Sheets {
-    /// Reads all sheets, each by its name with `range_of`; no more than two are in memory at once.
-    fn read<R, S>(
-        source: S,
-        watch: Watch<'_>,
-        mut range_of: impl FnMut(&mut R, &str) -> Result<Range<Data>, TableError>,
-    ) -> Result<Self, TableError>
-    where
-        R: Reader<S>,
-        S: Read + Seek,
-        R::Error: std::fmt::Display,
-    {
-        let mut workbook: R = open_workbook_from_rs(source).map_err(damaged)?;
-        let numbers = |range: &Range<Data>| {
-            let is_number = |(_, _, cell): &(usize, usize, &Data)| matches!(cell, Data::Int(_) | Data::Float(_));
-            range.used_cells().filter(is_number).count()
-        };
-        let mut sheets = Self::default();
-        let mut most = 0;
-        for name in workbook.sheet_names() {
-            if watch(Progress { bytes: 0, of: None }).is_break() {
-                return Err(TableError::Cancelled);
-            }
-            let range = range_of(&mut workbook, &name)?;
-            let count = numbers(&range);
-            let name = clean_name(&name);
-            let other = if sheets.chosen.is_none() || count > most {
-                most = count;
-                sheets.chosen.replace((name, range))
-            } else {
-                Some((name, range))
-            };
-            let other = other.filter(|(_, range)| !range.is_empty());
-            sheets
-                .others
-                .extend(other.map(|(name, range)| (name, range.get_size())));
+/// Reads all sheets, each by its name with `range_of`; no more than two are in memory at once. Returns the name and the cells of
+/// the first of those with most numbers, and notes on the others that have cells.
+fn chosen(
+    names: Vec<String>,
+    watch: Watch<'_>,
+    mut range_of: impl FnMut(&str) -> Result<Range<Data>, TableError>,
+) -> Result<(String, Range<Data>, Vec<String>), TableError> {
+    let (mut chosen, mut most, mut left_out) = ((String::new(), Range::default()), None, Vec::new());
+    for name in names {
+        if watch(Progress { bytes: 0, of: None }).is_break() {
+            return Err(TableError::Cancelled);
         }
-        Ok(sheets)
+        let mut sheet = (clean_name(&name), range_of(&name)?);
+        let is_number = |cell: &(_, _, &Data)| matches!(cell.2, Data::Int(_) | Data::Float(_));
+        let count = Some(sheet.1.used_cells().filter(is_number).count());
+        if count > most {
+            most = count;
+            std::mem::swap(&mut chosen, &mut sheet);
+        }
+        let (name, range) = sheet;
+        if !range.is_empty() {
+            let (rows, width) = range.get_size();
+            let cure = "save it as its own file to use it";
+            left_out.push(format!("left out: sheet '{name}' is {rows} × {width}; {cure}"));
+        }
     }
+    Ok((chosen.0, chosen.1, left_out))
 }
 
 fn damaged(error: impl std::fmt::Display) -> TableError {
@@ -145,21 +121,21 @@ fn cells<S: Read + Seek>(
         Err(XlsxError::NotAWorksheet(_)) => return Ok(Range::default()),
         reader => reader.map_err(damaged)?,
     };
-    let (mut cells, mut rectangle) = (Vec::new(), Rectangle::default());
+    let (mut cells, mut extent) = (Vec::new(), [0, 0]);
     while let Some(cell) = reader.next_cell().map_err(damaged)? {
         if matches!(cell.get_value(), DataRef::Empty) {
             continue;
         }
         let (row, column) = cell.get_position();
-        let place = [row, column].map(u64::from);
-        if place[0] >= LARGEST[0] || place[1] >= LARGEST[1] {
-            return Err(outside(&format!("{} of row {}", place[1] + 1, place[0] + 1)));
+        let end = [row, column].map(|place| u64::from(place) + 1);
+        if end[0] > LARGEST[0] || end[1] > LARGEST[1] {
+            return Err(outside(&format!("{} of row {}", end[1], end[0])));
         }
         budget.claim(OF_CELL)?;
-        rectangle.include(place, [1, 1]);
+        extend(&mut extent, end);
         cells.push(Cell::new((row, column), Data::from(cell.get_value().clone())));
     }
-    budget.claim(rectangle.memory())?;
+    budget.claim(rectangle(extent))?;
     Ok(Range::from_sparse(cells))
 }
 

@@ -1,72 +1,45 @@
-//! Checksums and memory of the parts of a zip archive with sheets, before they are read: the reader of spreadsheets does not
-//! read parts to their end, where their checksum is, and allocates the whole rectangle between the first and the last cell of
-//! an OpenDocument file, which a few hundred bytes can make larger than any memory.
+//! Memory of the parts of a zip archive with sheets, before they are read: the reader of spreadsheets allocates the whole
+//! rectangle up to the last cell of an OpenDocument file, which a few hundred bytes can make larger than any memory.
 
-use std::io::{self, BufRead, BufReader, Read, Seek};
+use std::io::BufRead;
 
 use quick_xml::{
     Reader,
     events::{BytesStart, Event},
 };
-use zip::ZipArchive;
 
-use super::{TableError, Watch, numpy::damage, progress::Watched};
+use super::TableError;
 use crate::machine::ReadingBudget;
 
 /// Memory of a byte of XML: strings of one letter, in a vector that has just doubled.
 const OF_BYTE: u64 = 4;
 /// Memory of a cell that has a value, with its text.
 pub(super) const OF_CELL: u64 = 128;
-/// Memory of a cell of the rectangle, empty or not, as it is copied.
+/// Memory of a cell of the rectangle up to the last cell, empty or not, as it is copied.
 const OF_PLACE: u64 = 72;
 /// Memory of a text without its letters.
 const OF_TEXT: u64 = size_of::<String>() as u64;
 /// Maximum number of rows and columns of a sheet.
 pub(super) const LARGEST: [u64; 2] = [1 << 20, 1 << 14];
 
-/// Claims the memory of all parts of the archive, except the cells of Excel files, and verifies their checksums. With
-/// `is_strict`, elements of its sheets must end: the reader of OpenDocument files waits for their ends for ever.
+/// Claims the memory of a part of the archive with `size` bytes, up to its end or its first error, except the cells of Excel
+/// files. With `is_strict`, its elements must end: the reader of OpenDocument files waits for their ends for ever.
 ///
 /// # Errors
-/// If it exceeds the budget, a part is damaged, or an element does not end.
+/// If it exceeds the budget, or an element does not end.
 pub(super) fn claim(
-    source: impl Read + Seek,
+    xml: impl BufRead,
+    size: u64,
     is_strict: bool,
     budget: &mut ReadingBudget,
-    watch: Watch<'_>,
 ) -> Result<(), TableError> {
-    let Ok(mut archive) = ZipArchive::new(source) else {
-        // Reported by the reader of the sheets.
-        return Ok(());
-    };
-    for index in 0..archive.len() {
-        let entry = archive
-            .by_index(index)
-            .map_err(|error| TableError::damaged("the archive", format_args!("{error}; copy it again")))?;
-        let size = entry.size();
-        let name = String::from_utf8_lossy(entry.name_raw()).into_owned();
-        let is_strict = is_strict && name == "content.xml";
-        budget.claim(size.saturating_mul(OF_BYTE))?;
-        let mut xml = BufReader::new(Watched::new(entry, Some(size), watch));
-        let claimed = claim_part(&mut xml, is_strict, budget);
-        // Without its end, a part may be larger than memory or endless.
-        let ended = match claimed {
-            Err(TableError::OverBudget(_)) => Ok(0),
-            _ => io::copy(&mut xml, &mut io::sink()),
-        };
-        ended.map_err(|error| damage(&name, error))?;
-        claimed?;
-    }
-    Ok(())
-}
-
-/// Claims the memory of one part of the archive, up to its end or its first error.
-fn claim_part(xml: impl BufRead, is_strict: bool, budget: &mut ReadingBudget) -> Result<(), TableError> {
+    budget.claim(size.saturating_mul(OF_BYTE))?;
     let mut reader = Reader::from_reader(xml);
     // As the reader of the sheets.
     let config = reader.config_mut();
     config.check_end_names = is_strict;
     config.check_comments = false;
+    config.expand_empty_elements = true;
     let (mut sheet, mut buffer, mut open) = (Sheet::default(), Vec::new(), 0);
     loop {
         buffer.clear();
@@ -75,7 +48,6 @@ fn claim_part(xml: impl BufRead, is_strict: bool, budget: &mut ReadingBudget) ->
                 open += 1;
                 sheet.take(&element, budget)?;
             }
-            Ok(Event::Empty(element)) => sheet.take(&element, budget)?,
             Ok(Event::End(_)) => open -= 1,
             Ok(Event::Eof) if !is_strict || open == 0 => break,
             Err(_) if !is_strict => break,
@@ -86,19 +58,16 @@ fn claim_part(xml: impl BufRead, is_strict: bool, budget: &mut ReadingBudget) ->
             Ok(_) => {}
         }
     }
-    sheet.end(budget)
+    Ok(budget.claim(rectangle(sheet.extent))?)
 }
 
-/// Rectangle of a sheet, or of one table of an OpenDocument file.
+/// A sheet, or one table of an OpenDocument file.
 #[derive(Default)]
 struct Sheet {
-    rectangle: Rectangle,
-    /// Row and column after the last cell.
-    next: [u64; 2],
-    /// Number of rows that the current row repeats.
-    row_repeats: u64,
-    /// Number of cells that the current cell repeats.
-    repeats: u64,
+    /// Number of rows and columns up to the last cell with a value.
+    extent: [u64; 2],
+    /// Number of rows up to the current one, and of columns up to the current cell.
+    end: [u64; 2],
     /// Number of cells of the current row whose memory is claimed.
     claimed: u64,
 }
@@ -152,28 +121,23 @@ impl Sheet {
             }
             "row" | "c" => check_attributes(element)?,
             "table" => {
-                self.end(budget)?;
+                budget.claim(rectangle(self.extent))?;
                 *self = Self::default();
             }
             "table-row" => {
                 check_attributes(element)?;
-                self.next = [self.next[0] + self.row_repeats, 0];
-                let repeats = number(element, "table:number-rows-repeated");
-                self.row_repeats = repeats.unwrap_or(1).min(LARGEST[0]);
-                (self.repeats, self.claimed) = (0, 0);
+                let repeats = number(element, "table:number-rows-repeated").unwrap_or(1);
+                self.end = [self.end[0] + repeats.min(LARGEST[0]), 0];
+                self.claimed = 0;
             }
             "table-cell" | "covered-table-cell" => {
                 check_attributes(element)?;
-                self.next[1] += self.repeats;
-                let repeats = number(element, "table:number-columns-repeated");
-                self.repeats = repeats.unwrap_or(1).min(LARGEST[1]);
-                let values = ["office:value-type", "office:value", "table:formula"];
-                if values
-                    .iter()
-                    .any(|name| matches!(element.try_get_attribute(name), Ok(Some(_))))
-                {
-                    self.rectangle.include(self.next, [self.row_repeats, self.repeats]);
-                    let width = (self.next[1] + self.repeats).min(LARGEST[1]);
+                let repeats = number(element, "table:number-columns-repeated").unwrap_or(1);
+                self.end[1] += repeats.min(LARGEST[1]);
+                let mut names = element.attributes().flatten().map(|attribute| attribute.key);
+                if names.any(|name| name.as_ref().starts_with("office:") || name.as_ref() == "table:formula") {
+                    extend(&mut self.extent, self.end);
+                    let width = self.end[1].min(LARGEST[1]);
                     budget.claim(OF_CELL.saturating_mul(width.saturating_sub(self.claimed)))?;
                     self.claimed = self.claimed.max(width);
                 }
@@ -182,37 +146,16 @@ impl Sheet {
         }
         Ok(())
     }
-
-    /// Claims the rectangle.
-    fn end(&self, budget: &mut ReadingBudget) -> Result<(), TableError> {
-        Ok(budget.claim(self.rectangle.memory())?)
-    }
 }
 
-/// Rectangle between the first and the last cell with a value.
-#[derive(Default)]
-pub(super) struct Rectangle {
-    /// First and last row and column.
-    bounds: Option<[[u64; 2]; 2]>,
+/// Extends a rectangle to one with these numbers of rows and columns.
+pub(super) fn extend(extent: &mut [u64; 2], end: [u64; 2]) {
+    *extent = [extent[0].max(end[0]), extent[1].max(end[1])];
 }
 
-impl Rectangle {
-    /// Includes a number of rows and columns from `first`.
-    pub(super) fn include(&mut self, first: [u64; 2], counts: [u64; 2]) {
-        let last = [0, 1].map(|axis| first[axis].saturating_add(counts[axis].saturating_sub(1)));
-        let [before, after] = self.bounds.unwrap_or([first, last]);
-        self.bounds = Some([
-            [0, 1].map(|axis| before[axis].min(first[axis])),
-            [0, 1].map(|axis| after[axis].max(last[axis])),
-        ]);
-    }
-
-    /// Returns its memory in bytes.
-    pub(super) fn memory(&self) -> u64 {
-        let Some([first, last]) = self.bounds else { return 0 };
-        let [rows, columns] = [0, 1].map(|axis| last[axis] - first[axis] + 1);
-        rows.saturating_mul(columns).saturating_mul(OF_PLACE)
-    }
+/// Returns the memory of a rectangle of cells in bytes.
+pub(super) fn rectangle([rows, columns]: [u64; 2]) -> u64 {
+    rows.saturating_mul(columns).saturating_mul(OF_PLACE)
 }
 
 #[cfg(test)]
@@ -220,7 +163,7 @@ mod tests {
     use super::*;
 
     fn claimed(xml: &str) -> u64 {
-        let claims = |limit| claim_part(xml.as_bytes(), false, &mut ReadingBudget::of(limit, true)).is_ok();
+        let claims = |limit| claim(xml.as_bytes(), 0, false, &mut ReadingBudget::of(limit, true)).is_ok();
         // Bisection: the smallest budget that suffices.
         let (mut low, mut high) = (0, u64::MAX);
         while high - low > 1 {

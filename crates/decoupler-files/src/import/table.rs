@@ -9,7 +9,7 @@ use decoupler_core::text::clean_name;
 
 use serde::Serialize;
 
-use super::{Dialect, Format, TableError, time_stamp::TimeStamp};
+use super::{Dialect, Encoding, Format, TableError, format::Cell, time_stamp::TimeStamp};
 
 /// Table read from a file: columns of equal length.
 #[derive(Clone, Debug)]
@@ -29,7 +29,7 @@ pub struct Table {
     /// Last line of a text file, if it is cut off and therefore left out.
     pub torn_line: Option<u64>,
     /// Rows that were left out because they have more cells than there are columns.
-    pub too_long: Excess,
+    pub too_long: Faults,
     pub(super) lines: Lines,
 }
 
@@ -42,22 +42,6 @@ pub struct Variable {
     pub shape: String,
     /// Indices of its columns; empty if it is left out, because its rows are not those of the samples.
     pub columns: Range<usize>,
-}
-
-/// Rows of unusual length.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Excess {
-    /// Number of such rows.
-    pub rows: usize,
-    /// Line of the first of them, from 1.
-    pub first_line: Option<u64>,
-}
-
-impl Excess {
-    pub(super) fn add(&mut self, line: u64) {
-        self.rows += 1;
-        self.first_line.get_or_insert(line);
-    }
 }
 
 /// Line of each row; compact, since rows are mostly on consecutive lines.
@@ -97,7 +81,7 @@ impl Table {
             format,
             notes: Vec::new(),
             torn_line: None,
-            too_long: Excess::default(),
+            too_long: Faults::default(),
             lines: Lines::default(),
         }
     }
@@ -110,8 +94,8 @@ impl Table {
     /// Refuses a table with rows that were left out because they are too long.
     pub(super) fn check_widths(&self) -> Result<(), TableError> {
         let reason = "the row has more cells than there are columns; correct it";
-        let line = self.too_long.first_line;
-        line.map_or(Ok(()), |line| Err(TableError::in_row(line, reason)))
+        let first = self.too_long.first.as_ref();
+        first.map_or(Ok(()), |first| Err(TableError::in_row(first.line, reason)))
     }
 
     /// Returns `true` if the columns have names in the file.
@@ -159,10 +143,10 @@ pub struct Column {
     pub(super) start: Option<TimeStamp>,
 }
 
-/// Cells that are neither numbers nor missing.
+/// Cells that are neither numbers nor missing, or rows of unusual length.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Faults {
-    /// Number of such cells.
+    /// Number of such cells or rows.
     pub count: usize,
     /// The first of them.
     pub first: Option<Fault>,
@@ -178,16 +162,54 @@ impl Faults {
     }
 }
 
-/// Cell that is neither a number nor missing.
+/// Cell that is neither a number nor missing, or row of unusual length.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// Line of the cell, from 1.
+    /// Line, from 1.
     pub line: u64,
-    /// Text of the cell, shortened.
+    /// Text of the cell, shortened; empty for a row.
     pub text: String,
 }
 
 impl Column {
+    /// Adds a cell with this text, parsed as `found`. The first value decides whether the column has numbers or time stamps,
+    /// which become the seconds since the first. Returns the length of the text if it is a new label.
+    pub(super) fn push(&mut self, line: u64, cell: &[u8], found: Cell, encoding: Encoding) -> Option<usize> {
+        let (mut added, is_missing) = (None, found == Cell::Missing);
+        self.missing += usize::from(is_missing);
+        let number = match (found, &mut self.labels) {
+            (found, Some(labels)) => {
+                let text = encoding.text(cell);
+                added = labels.push((!is_missing).then_some(&text)).then_some(text.len());
+                found.number().unwrap_or(f64::NAN)
+            }
+            (Cell::Number(number), None) if self.start.is_none() => number,
+            (Cell::Missing, None) => f64::NAN,
+            _ => self.seconds(cell).unwrap_or_else(|| {
+                self.faults.add(line, || encoding.text(cell));
+                f64::NAN
+            }),
+        };
+        self.numbers.push(number);
+        added
+    }
+
+    /// Returns the seconds since the first time stamp; `None` unless all values are time stamps, all with or all without a zone.
+    fn seconds(&mut self, cell: &[u8]) -> Option<f64> {
+        let stamp = TimeStamp::parse(cell)?;
+        if self.start.is_none() && self.numbers.len() == self.missing {
+            // Whatever the header says, such as a time zone.
+            (self.start, self.unit) = (Some(stamp), Some("s".to_owned()));
+        }
+        let start = self.start.filter(|_| self.faults.count == 0)?;
+        (start.has_zone == stamp.has_zone).then(|| stamp.seconds_since(start))
+    }
+
+    /// Returns `true` if the values are numbers, and there is one.
+    pub(super) fn has_numbers(&self) -> bool {
+        self.labels.is_none() && self.start.is_none() && self.numbers.len() > self.missing + self.faults.count
+    }
+
     /// Returns `true` if the cell is missing, or not a number in a column without labels.
     pub(super) fn is_missing(&self, row: usize) -> bool {
         match &self.labels {

@@ -1,6 +1,6 @@
 //! Time stamps in ISO 8601, such as `2026-11-24T12:00:00.5+01:00` or `2026-11-24 12:00:00`.
 
-use jiff::{civil::DateTime, fmt::temporal::Pieces};
+use jiff::Timestamp;
 
 /// Moment of a time stamp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,7 +12,7 @@ pub(super) struct TimeStamp {
 }
 
 const SECOND: i128 = 1_000_000_000;
-const DAY_S: i32 = 86_400;
+const DAY_S: i128 = 86_400;
 
 impl TimeStamp {
     /// Parses a date and a time with T or a space between them, and optionally seconds, a fraction and a zone; `None` for
@@ -28,33 +28,24 @@ impl TimeStamp {
                 .find(['+', '-', 'Z', 'z'])
                 .map_or(text.len(), |at| 16 + at),
         );
-        // Zones are numbers of hours and minutes.
-        if zone.len() > "+01:00".len() {
+        // Zones are numbers of hours and minutes, less than a day.
+        if zone.len() > "+01:00".len() || zone.get(1..3).is_some_and(|hours| hours > "23") {
             return None;
         }
-        // 24:00 is the end of a day.
-        let is_end_of_day = moment.get(11..16)? == "24:00";
+        // 24:00 is the end of a day, and second 60 a leap second, which the calendar takes for second 59.
+        let (is_end_of_day, is_leap) = (moment.get(11..16)? == "24:00", moment.get(16..19) == Some(":60"));
         let start_of_day = if is_end_of_day {
             moment.replacen("24:00", "00:00", 1)
         } else {
             moment.to_owned()
         };
-        let whole = format!("{}{zone}", start_of_day.trim_end());
-        let pieces = Pieces::parse(&whole).ok()?;
-        let offset_s = pieces.to_numeric_offset().map(|offset| offset.seconds());
-        if offset_s.is_some_and(|seconds| seconds.abs() >= DAY_S) || pieces.time_zone_annotation().is_some() {
-            return None;
-        }
-        // Second 60 is a leap second, which the calendar takes for second 59.
-        let is_leap = moment.get(16..19) == Some(":60");
-        let later_s = i32::from(is_end_of_day) * DAY_S + i32::from(is_leap) - offset_s.unwrap_or(0);
-        let since_1970 = pieces
-            .date()
-            .to_datetime(pieces.time()?)
-            .duration_since(DateTime::constant(1970, 1, 1, 0, 0, 0, 0));
+        let has_zone = !zone.is_empty();
+        let whole = format!("{}{}", start_of_day.trim_end(), if has_zone { zone } else { "Z" });
+        let stamp: Timestamp = whole.parse().ok()?;
+        let later_s = i128::from(is_end_of_day) * DAY_S + i128::from(is_leap);
         Some(Self {
-            nanoseconds: since_1970.as_nanos() + SECOND * i128::from(later_s),
-            has_zone: offset_s.is_some(),
+            nanoseconds: stamp.as_nanosecond() + SECOND * later_s,
+            has_zone,
         })
     }
 

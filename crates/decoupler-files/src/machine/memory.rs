@@ -29,18 +29,19 @@ pub fn memory_budget() -> MemoryBudget {
 fn from_texts(given: Option<&str>, meminfo: Option<&str>, limit: Option<&str>) -> MemoryBudget {
     let gigabytes = given.and_then(|text| text.trim().parse().ok());
     if let Some(gigabytes) = gigabytes.filter(|gigabytes: &f64| *gigabytes > 0.0) {
-        return // Saturates, also at infinity.
-MemoryBudget::User((gigabytes * 1e9) as u64);
+        // Saturates, also at infinity.
+        return MemoryBudget::User((gigabytes * 1e9) as u64);
     }
     let limit = limit.and_then(|text| text.trim().parse().ok());
-    let least = [meminfo.and_then(total_bytes), limit].into_iter().flatten().min();
-    let of_system = least.map(MemoryBudget::System);
+    let total = meminfo.and_then(|text| bytes_of(text, "MemTotal:"));
+    let of_system = [total, limit].into_iter().flatten().min().map(MemoryBudget::System);
     of_system.unwrap_or(MemoryBudget::Assumed(MemoryBudget::ASSUMED_BYTES))
 }
 
-fn total_bytes(meminfo: &str) -> Option<u64> {
-    let total = meminfo.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
-    let kibibytes: u64 = total.trim().strip_suffix("kB")?.trim().parse().ok()?;
+/// Returns the number of bytes on the line of a file in `/proc` that begins with `key`.
+pub(super) fn bytes_of(text: &str, key: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(key))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kibibytes * 1024)
 }
 

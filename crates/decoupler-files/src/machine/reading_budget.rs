@@ -3,7 +3,7 @@ use std::fs;
 use decoupler_core::machine::MemoryBudget;
 use thiserror::Error;
 
-use super::memory_budget;
+use super::memory::{bytes_of, memory_budget};
 
 /// Memory that reading one file may take: half of the free memory or, if the user has set a limit, all of that.
 ///
@@ -16,24 +16,17 @@ pub struct ReadingBudget {
     is_given: bool,
 }
 
-/// A file needs more memory than reading may take.
+/// A file needs this number of bytes, which is more than the budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[error(
     "it needs {} of memory, and reading may use {}{}; use a part of it, or raise the limit with the option --memory-limit or \
      the environment variable {} (in GB)",
-    size(*.needed),
-    size(*.limit),
-    if *.is_given { "" } else { ", half of the free memory" },
+    size(*.0),
+    size(.1.limit),
+    if .1.is_given { "" } else { ", half of the free memory" },
     MemoryBudget::VARIABLE
 )]
-pub struct OverBudget {
-    /// Bytes needed.
-    pub needed: u64,
-    /// Bytes that reading may use.
-    pub limit: u64,
-    /// `true` if the user has set the limit.
-    pub is_given: bool,
-}
+pub struct OverBudget(u64, ReadingBudget);
 
 /// Returns a number of bytes in GB, or in MB if it is small.
 fn size(bytes: u64) -> String {
@@ -50,14 +43,7 @@ impl ReadingBudget {
         if let MemoryBudget::User(bytes) = machine {
             return Self::of(bytes, true);
         }
-        let text = |path: &str| fs::read_to_string(path).ok();
-        let free = free_bytes(&Texts {
-            meminfo: text("/proc/meminfo"),
-            status: text("/proc/self/status"),
-            limits: text("/proc/self/limits"),
-            container_limit: text("/sys/fs/cgroup/memory.max"),
-            container_use: text("/sys/fs/cgroup/memory.current"),
-        });
+        let free = free_bytes(|path| fs::read_to_string(path).ok());
         Self::of(free.unwrap_or(machine.bytes()) / 2, false)
     }
 
@@ -77,12 +63,7 @@ impl ReadingBudget {
     pub fn claim(&mut self, bytes: u64) -> Result<(), OverBudget> {
         let needed = self.used.saturating_add(bytes);
         if needed > self.limit {
-            let Self { limit, is_given, .. } = *self;
-            return Err(OverBudget {
-                needed,
-                limit,
-                is_given,
-            });
+            return Err(OverBudget(needed, *self));
         }
         self.used = needed;
         Ok(())
@@ -94,34 +75,19 @@ impl ReadingBudget {
     }
 }
 
-/// Files of Linux that state memory, as far as they can be read.
-#[derive(Default)]
-struct Texts {
-    meminfo: Option<String>,
-    status: Option<String>,
-    limits: Option<String>,
-    container_limit: Option<String>,
-    container_use: Option<String>,
-}
-
 /// Returns the free memory: the smallest of that of the machine, that left in the container, and that left below the limit of
-/// the process (`ulimit -v`).
-fn free_bytes(texts: &Texts) -> Option<u64> {
-    let number = |text: &Option<String>| text.as_ref()?.trim().parse::<u64>().ok();
-    let kibibytes = |text: &Option<String>, key: &str| {
-        let line = text.as_ref()?.lines().find_map(|line| line.strip_prefix(key))?;
-        let count: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-        Some(count * 1024)
-    };
-    let machine = kibibytes(&texts.meminfo, "MemAvailable:");
-    let used_in_container = number(&texts.container_use).unwrap_or(0);
-    let container = number(&texts.container_limit).map(|limit| limit.saturating_sub(used_in_container));
-    let limit = texts.limits.as_ref().and_then(|limits| {
-        let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
-        line.split_whitespace().next()?.parse::<u64>().ok()
-    });
-    let used = kibibytes(&texts.status, "VmSize:").unwrap_or(0);
+/// the process (`ulimit -v`). `text` returns a file of Linux, if it can be read.
+fn free_bytes(text: impl Fn(&str) -> Option<String>) -> Option<u64> {
+    let bytes = |path, key| bytes_of(&text(path)?, key);
+    let number = |path| text(path)?.trim().parse::<u64>().ok();
+    let used_in_container = number("/sys/fs/cgroup/memory.current").unwrap_or(0);
+    let container = number("/sys/fs/cgroup/memory.max").map(|limit| limit.saturating_sub(used_in_container));
+    let limits = text("/proc/self/limits").unwrap_or_default();
+    let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"));
+    let limit = line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok());
+    let used = bytes("/proc/self/status", "VmSize:").unwrap_or(0);
     let process = limit.map(|limit| limit.saturating_sub(used));
+    let machine = bytes("/proc/meminfo", "MemAvailable:");
     [machine, container, process].into_iter().flatten().min()
 }
 
@@ -156,20 +122,25 @@ mod tests {
 
     #[test]
     fn free_memory_is_the_smallest_of_machine_container_and_process() {
-        let texts = |container: Option<&str>, limits: &str| Texts {
-            meminfo: Some("MemTotal: 100 kB\nMemAvailable:   50000000 kB\n".to_owned()),
-            status: Some("VmPeak: 9 kB\nVmSize:\t   20000 kB\n".to_owned()),
-            limits: Some(format!(
-                "Max address space         {limits}            unlimited            bytes\n"
-            )),
-            container_limit: container.map(str::to_owned),
-            container_use: container.map(|_| "1000000\n".to_owned()),
+        let free = |container: Option<&str>, limits: &str| {
+            free_bytes(|path| {
+                Some(match path {
+                    "/proc/meminfo" => "MemTotal: 100 kB\nMemAvailable:   50000000 kB\n".to_owned(),
+                    "/proc/self/status" => "VmPeak: 9 kB\nVmSize:\t   20000 kB\n".to_owned(),
+                    "/proc/self/limits" => {
+                        format!("Max address space         {limits}            unlimited            bytes\n")
+                    }
+                    "/sys/fs/cgroup/memory.max" => container?.to_owned(),
+                    "/sys/fs/cgroup/memory.current" => container.map(|_| "1000000\n")?.to_owned(),
+                    _ => panic!("{path}"),
+                })
+            })
         };
-        assert_eq!(free_bytes(&texts(None, "unlimited")), Some(50_000_000 * 1024));
-        assert_eq!(free_bytes(&texts(Some("max\n"), "unlimited")), Some(50_000_000 * 1024));
-        assert_eq!(free_bytes(&texts(Some("3000000\n"), "unlimited")), Some(2_000_000));
-        assert_eq!(free_bytes(&texts(None, "1000000000")), Some(1_000_000_000 - 20_480_000));
-        assert_eq!(free_bytes(&texts(None, "1000")), Some(0));
-        assert_eq!(free_bytes(&Texts::default()), None);
+        assert_eq!(free(None, "unlimited"), Some(50_000_000 * 1024));
+        assert_eq!(free(Some("max\n"), "unlimited"), Some(50_000_000 * 1024));
+        assert_eq!(free(Some("3000000\n"), "unlimited"), Some(2_000_000));
+        assert_eq!(free(None, "1000000000"), Some(1_000_000_000 - 20_480_000));
+        assert_eq!(free(None, "1000"), Some(0));
+        assert_eq!(free_bytes(|_| None), None);
     }
 }

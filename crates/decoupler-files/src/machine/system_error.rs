@@ -25,7 +25,11 @@ pub fn system_cause(error: &io::Error) -> String {
         ErrorKind::BrokenPipe => "the program that reads it has ended; start both again",
         ErrorKind::OutOfMemory => "memory is full; close other programs, or use less data",
         ErrorKind::InvalidData => "it is not text that can be read; check that it is the right file",
-        _ => return with_remedy(error),
+        _ if error.raw_os_error().is_none() => return system_words(error),
+        _ => {
+            let words = system_words(error);
+            return format!("the system reports: {words}; check the disk or device, or give another place");
+        }
     };
     words.to_owned()
 }
@@ -34,16 +38,6 @@ pub fn system_cause(error: &io::Error) -> String {
 pub(crate) fn system_words(error: &io::Error) -> String {
     let text = error.to_string();
     text.split(" (os error").next().unwrap_or(&text).to_owned()
-}
-
-/// Returns the system's own message, for rare errors.
-fn with_remedy(error: &io::Error) -> String {
-    let words = system_words(error);
-    if error.raw_os_error().is_some() {
-        format!("the system reports: {words}; check the disk or device, or give another place")
-    } else {
-        words
-    }
 }
 
 #[cfg(test)]

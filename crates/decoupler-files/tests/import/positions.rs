@@ -112,7 +112,7 @@ fn invalid_files_are_refused_with_line_and_cause() {
         .import
         .import(folder.path(), &mut |_| ControlFlow::Continue(()))
         .unwrap_err();
-    assert!(matches!(gone, ImportError::Read { .. }), "{gone}");
+    assert!(gone.to_string().starts_with("cannot read '"), "{gone}");
 }
 
 #[test]

@@ -135,7 +135,7 @@ fn judge_table(text: &str, expected: Option<&[[f64; 3]]>) -> Verdict {
         while let Some(readings) = reader.read(2)? {
             values.extend(readings.values_ohm);
         }
-        Ok::<_, decoupler_files::import::ReadError>(values)
+        Ok::<_, decoupler_files::import::TableError>(values)
     };
     match (read(), expected) {
         (Err(error), None) => refused(&error),

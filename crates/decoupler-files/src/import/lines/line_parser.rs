@@ -1,4 +1,7 @@
-use std::hash::{DefaultHasher, Hash, Hasher};
+use std::{
+    collections::BTreeSet,
+    hash::{DefaultHasher, Hash, Hasher},
+};
 
 use decoupler_core::{
     dataset::{DatasetError, MemoryStream, Place, Series},
@@ -10,9 +13,10 @@ use decoupler_core::{
 
 use super::{
     super::{
-        Derived, Recipe,
+        Decimal, Derived, Recipe,
         derived::DerivedStream,
         fields::Fields,
+        format,
         inputs::{InputColumns, OtherColumns},
         selection::{LAST_ROW_WIRE, row_wire},
         table::excerpt,
@@ -28,7 +32,7 @@ use super::{
 /// may be repeated, for example when a device restarts, and a comma may end a line.
 #[derive(Debug, Default)]
 pub struct LineParser {
-    inputs: Vec<Channel>,
+    pub(super) inputs: Vec<Channel>,
     others: OtherColumns,
     /// Columns computed from others.
     derive: Vec<Derived>,
@@ -39,14 +43,14 @@ pub struct LineParser {
     /// `true` for the resistances of an array.
     is_array: bool,
     fields: Fields,
-    /// Columns of the lines, from the header or the first line of readings.
-    columns: Option<InputColumns>,
+    /// Columns of the lines, from the header or the first line of readings; of width 0 until then.
+    columns: InputColumns,
     has_names: bool,
     is_snapshot: bool,
     /// `true` once a line had readings.
-    has_readings: bool,
+    pub(super) has_readings: bool,
     /// Number of lines so far whose row-wire follows from their order, valid or not.
-    lines_in_turn: usize,
+    pub(super) lines_in_turn: usize,
     /// The derived columns, once the columns of the lines are known.
     derived: DerivedStream,
     /// Group of each line of the start, which is waited for.
@@ -78,9 +82,7 @@ struct RowWires {
 enum Unnumbered {
     /// Nothing, and the network needs no row.
     Any,
-    /// There is only one.
-    Single,
-    /// It follows from the number of lines so far.
+    /// It follows from the number of lines so far; a single one is always in turn.
     InTurn,
     /// Nothing.
     Refused,
@@ -140,32 +142,27 @@ impl LineParser {
         let read = rows.read(scale.rows())?;
         let unnumbered = match rows.model() {
             RowModel::Shared => Unnumbered::Any,
-            RowModel::Each if read.len() == 1 => Unnumbered::Single,
-            RowModel::Each if is_complete => Unnumbered::InTurn,
+            RowModel::Each if is_complete || read.len() == 1 => Unnumbered::InTurn,
             RowModel::Each => Unnumbered::Refused,
         };
-        let last = scale.rows();
-        Ok(Self::of_resistances(
-            scale.columns(),
-            RowWires { read, last, unnumbered },
-        ))
-    }
-
-    fn of_resistances(channels: usize, rows: RowWires) -> Self {
-        let inputs = Vec::from_iter((1..=channels).map(|channel| Channel::new(format!("r_{channel}"), None)));
-        let others = OtherColumns {
-            row_wire: Some("row".to_owned()),
-            time: Some("time_s".to_owned()),
-            ..OtherColumns::default()
-        };
-        Self {
+        let channels = 1..=scale.columns();
+        let inputs = Vec::from_iter(channels.map(|channel| Channel::new(format!("r_{channel}"), None)));
+        Ok(Self {
             read: inputs.clone(),
             inputs,
-            others,
-            rows: Some(rows),
+            others: OtherColumns {
+                row_wire: Some("row".to_owned()),
+                time: Some("time_s".to_owned()),
+                ..OtherColumns::default()
+            },
+            rows: Some(RowWires {
+                read,
+                last: scale.rows(),
+                unnumbered,
+            }),
             is_array: true,
             ..Self::default()
-        }
+        })
     }
 
     /// Returns a parser of the inputs of a network of `problem`, with the other columns of `recipe`; `row_wires` are those of the
@@ -187,12 +184,8 @@ impl LineParser {
         let is_derived = |name: &String| recipe.derive.iter().any(|derived| derived.name == *name);
         let names = inputs.iter().map(|input| &input.name);
         let names = names.chain(recipe.derive.iter().flat_map(Derived::columns));
-        let mut read: Vec<Channel> = Vec::new();
-        for name in names.filter(|name| !is_derived(name)) {
-            if read.iter().all(|channel| channel.name != *name) {
-                read.push(Channel::new(name, None));
-            }
-        }
+        let read = BTreeSet::from_iter(names.filter(|name| !is_derived(name)));
+        let read = read.into_iter().map(|name| Channel::new(name, None)).collect();
         let memory = problem.memory.as_ref();
         let rows = row_wires.map(|read| RowWires {
             read,
@@ -212,24 +205,11 @@ impl LineParser {
         })
     }
 
-    /// Number of readings of a row-wire.
-    pub(super) fn channels(&self) -> usize {
-        self.inputs.len()
-    }
-
-    /// Number of lines so far whose row-wire follows from their order, valid or not.
-    pub fn lines_in_turn(&self) -> usize {
-        self.lines_in_turn
-    }
-
     /// Counts a malformed line, which still advances the row counter.
     pub fn count_bad(&mut self) {
-        let is_in_turn = self
-            .rows
-            .as_ref()
-            .is_some_and(|rows| rows.unnumbered == Unnumbered::InTurn);
-        let has_no_row = |columns: &InputColumns| columns.row_wire.is_none();
-        self.lines_in_turn += usize::from(is_in_turn && self.columns.as_ref().is_some_and(has_no_row));
+        let is_in_turn = |rows: &RowWires| rows.unnumbered == Unnumbered::InTurn;
+        let has_no_row = self.columns.width > 0 && self.columns.row_wire.is_none();
+        self.lines_in_turn += usize::from(has_no_row && self.rows.as_ref().is_some_and(is_in_turn));
     }
 
     /// Parses a line without its line break; `line` is its number, from 1.
@@ -242,7 +222,7 @@ impl LineParser {
             self.count_bad();
             // Garbage before the first readings does not determine the layout.
             if !self.has_names && !self.has_readings {
-                (self.columns, self.derived) = (None, DerivedStream::default());
+                (self.columns, self.derived) = (InputColumns::default(), DerivedStream::default());
             }
         }
         Ok(match found? {
@@ -252,7 +232,7 @@ impl LineParser {
             Found::Readings(row_index, place) => ParsedLine::Row {
                 row_index,
                 readings: &self.readings,
-                time_s: self.columns.as_ref().and_then(|columns| columns.time_s(&self.cells)),
+                time_s: self.columns.time_s(&self.cells),
                 place,
                 kept: &self.kept,
             },
@@ -270,18 +250,14 @@ impl LineParser {
             return Err(LineError::Malformed(line, reason.to_owned()));
         }
         self.fields.split(text);
+        let number = |cell| format::parse(cell, Decimal::Point).number().unwrap_or(f64::NAN);
         self.cells.clear();
-        self.cells
-            .extend(self.fields.iter(text).map(|cell| number(cell).unwrap_or(f64::NAN)));
+        self.cells.extend(self.fields.iter(text).map(number));
         self.read_stamp(text);
-        let is_readings = |columns: &InputColumns| self.check(columns, line, text).is_ok();
         // Only the first line, or a line that cannot be used, may be a header: other lines need no strings.
-        if !self.columns.as_ref().is_some_and(is_readings) {
-            let cells = self
-                .fields
-                .iter(text)
-                .map(|cell| String::from_utf8_lossy(cell).into_owned());
-            let cells: Vec<String> = cells.collect();
+        if self.check(line, text).is_err() {
+            let cells = self.fields.iter(text).map(String::from_utf8_lossy);
+            let cells = Vec::from_iter(cells.map(|cell| cell.into_owned()));
             // After a line with readings, a device that starts again repeats its header whole; other texts are garbage, or an
             // overflow of the device.
             let is_header = if self.has_readings {
@@ -294,17 +270,14 @@ impl LineParser {
                 found.map_err(|reason| LineError::Final(line, reason))?;
                 return Ok(Found::NoReadings);
             }
-            if self.columns.is_none() {
+            if self.columns.width == 0 {
                 // A comma may end the line.
-                let last = self.fields.iter(text).next_back();
-                let has_comma = self.cells.len() > 1 && last.is_some_and(<[u8]>::is_empty);
-                let found = self.find_columns(&[], self.cells.len() - usize::from(has_comma));
+                let has_comma = cells.len() > 1 && cells.last().is_some_and(String::is_empty);
+                let found = self.find_columns(&[], cells.len() - usize::from(has_comma));
                 found.map_err(|reason| LineError::Malformed(line, reason))?;
                 self.read_stamp(text);
             }
-            if let Some(columns) = &self.columns {
-                self.check(columns, line, text)?;
-            }
+            self.check(line, text)?;
         }
         let row_index = self.row_index(line)?;
         self.has_readings = true;
@@ -312,9 +285,8 @@ impl LineParser {
     }
 
     /// Checks that the cells can be used.
-    fn check(&self, columns: &InputColumns, line: u64, text: &[u8]) -> Result<(), LineError> {
-        let width = columns.width;
-        let found = self.fields.len();
+    fn check(&self, line: u64, text: &[u8]) -> Result<(), LineError> {
+        let (columns, width, found) = (&self.columns, self.columns.width, self.fields.len());
         let has_trailing_comma = found == width + 1 && found > 1 && self.fields.get(text, width).is_empty();
         if found != width && !has_trailing_comma {
             let found = counted(found, "cell");
@@ -323,43 +295,41 @@ impl LineParser {
         }
         let refused = |column: usize, needed: &str| {
             let cell = excerpt(&String::from_utf8_lossy(self.fields.get(text, column)));
-            LineError::Cell(line, column + 1, format!("'{cell}' is not {needed}"))
+            Err(LineError::Cell(line, column + 1, format!("'{cell}' is not {needed}")))
         };
-        let is_number = |column: &usize| self.cells[*column].is_finite();
-        let is_resistance = |column: &usize| is_number(column) && self.cells[*column] > 0.0;
+        let is_bad = |column: &usize| !self.cells[*column].is_finite();
         let mut read = columns.inputs.iter().copied().filter(|column| *column < width);
-        if self.is_array
-            && let Some(column) = read.clone().find(|column| !is_resistance(column))
-        {
-            return Err(refused(column, "a resistance; give a finite number of ohm above 0"));
-        }
-        if let Some(column) = read.find(|column| !is_number(column)) {
-            return Err(refused(column, "a finite number"));
+        let (needed, limit) = match self.is_array {
+            true => ("a resistance; give a finite number of ohm above 0", 0.0),
+            false => ("a finite number", f64::NEG_INFINITY),
+        };
+        if let Some(column) = read.find(|column| is_bad(column) || self.cells[*column] <= limit) {
+            return refused(column, needed);
         }
         // A memory places the line in its series.
         let last = self.rows.as_ref().map_or(LAST_ROW_WIRE, |rows| rows.last);
         let needs_row_wire = self.memory.is_some() || self.rows.is_some();
-        let is_row_wire = |column: &usize| row_wire(self.cells[*column]).is_some_and(|row| row < last);
+        let is_row_wire = |column: &usize| {
+            let number = self.cells.get(*column).copied();
+            number.and_then(row_wire).is_some_and(|row| row < last)
+        };
         if let Some(column) = columns.row_wire.filter(|column| needs_row_wire && !is_row_wire(column)) {
-            return Err(refused(column, &format!("a row-wire; give a number from 1 to {last}")));
+            return refused(column, &format!("a row-wire; give a number from 1 to {last}"));
         }
-        if let Some(column) = self.derived.needed(width).find(|column| !is_number(column)) {
-            return Err(refused(column, "a finite number"));
+        if let Some(column) = self.derived.needed(width).find(is_bad) {
+            return refused(column, "a finite number");
         }
-        let time = columns
-            .time
-            .filter(|(column, _)| self.memory.is_some() && !is_number(column));
-        time.map_or(Ok(()), |(column, _)| {
-            Err(refused(column, "a time, which the history of readings needs"))
-        })
+        match columns.time {
+            Some((column, _)) if self.memory.is_some() && column < width && is_bad(&column) => {
+                refused(column, "a time, which the history of readings needs")
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Gathers the readings of a line whose cells can be used.
     fn readings_of(&mut self, line: u64, text: &[u8], row_index: Option<usize>) -> Result<Found, LineError> {
-        let Some(columns) = &self.columns else {
-            return Ok(Found::NoReadings);
-        };
-        let width = columns.width;
+        let (columns, width) = (&self.columns, self.columns.width);
         self.cells.truncate(width);
         let group = columns.group.filter(|&column| column < width);
         let group = group.map_or(0, |column| key(self.fields.get(text, column)));
@@ -369,10 +339,15 @@ impl LineParser {
             let is_first = self.groups_of_start.len() == 1;
             return Ok(Found::Start { is_first });
         };
-        self.remember(&start);
-        let Some(columns) = &self.columns else {
-            return Ok(Found::NoReadings);
-        };
+        for (cells, group) in start.iter().zip(self.groups_of_start.drain(..)) {
+            columns.gather(cells, &mut self.readings);
+            // Lines without all inputs are no samples.
+            if let Some(memory) = &mut self.memory
+                && self.readings.iter().all(|reading| reading.is_finite())
+            {
+                memory.step(columns.series(group, cells), &self.readings, columns.time_s(cells));
+            }
+        }
         if let Some(column) = columns.inputs.iter().find(|&&column| !self.cells[column].is_finite()) {
             let name = self.derived.name(column - width);
             let reason = format!("the derived column '{name}' has no value");
@@ -388,24 +363,21 @@ impl LineParser {
                 kept.text.push_str(&self.cells[column].to_string());
             }
         }
-        let mut place = None;
-        if let Some(memory) = &mut self.memory {
+        let place = self.memory.as_mut().map(|memory| {
             let series = columns.series(group, &self.cells);
-            let (features, found) = memory.step(series, &self.readings, columns.time_s(&self.cells));
-            place = Some(found);
+            let (features, place) = memory.step(series, &self.readings, columns.time_s(&self.cells));
             self.readings.clear();
             self.readings.extend_from_slice(features);
-        }
+            place
+        });
         Ok(Found::Readings(row_index, place))
     }
 
     /// Replaces a time stamp by the time since the first.
     fn read_stamp(&mut self, text: &[u8]) {
-        let time = self.columns.as_ref().and_then(|columns| columns.time);
-        let Some((column, unit_s)) = time.filter(|(column, _)| *column < self.cells.len()) else {
-            return;
-        };
-        if let Some(stamp) = TimeStamp::parse(self.fields.get(text, column)) {
+        if let Some((column, unit_s)) = self.columns.time
+            && let Some(stamp) = TimeStamp::parse(self.fields.get(text, column))
+        {
             let start = *self.start.get_or_insert(stamp);
             if start.has_zone == stamp.has_zone {
                 // Stamps are in seconds, whatever unit the header has.
@@ -414,31 +386,16 @@ impl LineParser {
         }
     }
 
-    /// Takes the lines of the start into the memory; those without all inputs are no samples.
-    fn remember(&mut self, start: &[Vec<f64>]) {
-        let (Some(columns), Some(memory)) = (&self.columns, &mut self.memory) else {
-            return;
-        };
-        for (cells, group) in start.iter().zip(self.groups_of_start.drain(..)) {
-            columns.gather(cells, &mut self.readings);
-            if self.readings.iter().all(|reading| reading.is_finite()) {
-                memory.step(columns.series(group, cells), &self.readings, columns.time_s(cells));
-            }
-        }
-    }
-
     /// Index of the row-wire of a line whose cells can be used.
     fn row_index(&mut self, line: u64) -> Result<Option<usize>, LineError> {
-        let (Some(rows), Some(columns)) = (&self.rows, &self.columns) else {
+        let Some(rows) = self.rows.as_ref().filter(|_| !self.is_snapshot) else {
             return Ok(Some(0));
         };
-        let Some(column) = columns.row_wire.filter(|_| !self.is_snapshot) else {
+        let Some(column) = self.columns.row_wire else {
+            let turn = self.lines_in_turn % rows.read.len();
             return match rows.unnumbered {
-                _ if self.is_snapshot => Ok(Some(0)),
                 Unnumbered::Any => Ok(None),
-                Unnumbered::Single => Ok(Some(0)),
                 Unnumbered::InTurn => {
-                    let turn = self.lines_in_turn % rows.read.len();
                     self.lines_in_turn += 1;
                     Ok(Some(turn))
                 }
@@ -447,22 +404,21 @@ impl LineParser {
         };
         let row = self.cells[column] as usize;
         let index = rows.read.iter().position(|read| read + 1 == row);
-        let index = index.ok_or_else(|| {
+        index.map(Some).ok_or_else(|| {
             let read = Vec::from_iter(rows.read.iter().map(|row| (row + 1).to_string())).join(", ");
             let noun = if rows.read.len() == 1 { "row" } else { "rows" };
-            LineError::OtherRow(
+            LineError::Malformed(
                 line,
                 format!("there is no network for row {row}, only for {noun} {read}"),
             )
-        })?;
-        Ok(Some(index))
+        })
     }
 
     /// Finds the inputs in the cells of a header, or in lines of `width` cells without one.
     fn find_columns(&mut self, header: &[String], width: usize) -> Result<(), String> {
-        let has_rows = self.rows.is_some();
         let channels = self.inputs.len();
         let all = self.rows.as_ref().map_or(0, |rows| rows.read.len()) * channels;
+        let needs_row_wire = self.rows.is_some() && !self.is_array;
         let is_unnamed_array = self.is_array && header.is_empty();
         let is_snapshot = is_unnamed_array && width == all && width > channels;
         let (columns, derived) = if is_unnamed_array {
@@ -470,21 +426,15 @@ impl LineParser {
             let columns = InputColumns::in_order(count, !is_snapshot && width == count + 1);
             (columns, DerivedStream::default())
         } else {
-            InputColumns::of(
-                header,
-                width,
-                &self.inputs,
-                &self.others,
-                &self.derive,
-                has_rows && !self.is_array,
-            )?
+            let (inputs, others, derive) = (&self.inputs, &self.others, &self.derive);
+            InputColumns::of(header, width, inputs, others, derive, needs_row_wire)?
         };
         if self.is_array
             && let Some(name) = InputColumns::named_twice(header, &self.inputs)
         {
             return Err(format!("there are two columns '{name}'; keep one"));
         }
-        if has_rows && !self.is_array && columns.row_wire.is_none() {
+        if needs_row_wire && columns.row_wire.is_none() {
             let name = self.others.row_wire.as_deref().unwrap_or("row");
             return Err(format!(
                 "there is no column '{name}', which is an input of the network; each row-wire has its own network, which is \
@@ -492,22 +442,17 @@ impl LineParser {
             ));
         }
         // The header of a device that starts again does not begin another start.
-        if self.columns.as_ref() != Some(&columns) {
+        if self.columns != columns {
             let cells = columns.kept.iter().map(|(_, title)| KeptCell {
                 title: title.clone(),
-                ..KeptCell::default()
+                text: String::new(),
             });
             self.kept = cells.collect();
-            (self.columns, self.derived) = (Some(columns), derived);
+            (self.columns, self.derived) = (columns, derived);
         }
         (self.has_names, self.is_snapshot) = (!header.is_empty(), is_snapshot);
         Ok(())
     }
-}
-
-/// Parses a number; `None` if the cell is not a number.
-fn number(cell: &[u8]) -> Option<f64> {
-    std::str::from_utf8(cell).ok()?.parse().ok()
 }
 
 /// Number of a group, from its text.
@@ -659,6 +604,23 @@ mod tests {
             readings(&mut lines, 5, "2026-11-24T12:00:00.3Z,1,7"),
             Some((0, vec![7.0, 5.0]))
         );
+    }
+
+    #[test]
+    fn a_time_may_be_a_derived_column() {
+        let recipe = Recipe {
+            time: Some("d".to_owned()),
+            derive: vec!["d=a-b".parse().unwrap()],
+            memory: Some(Memory {
+                lags: vec![Span::Samples(1.0)],
+                ..Memory::default()
+            }),
+            ..Recipe::default()
+        };
+        let mut lines = lines(&["u"], &recipe, None);
+        assert_eq!(readings(&mut lines, 1, "a (s),b (s),u"), None);
+        assert_eq!(readings(&mut lines, 2, "5,4,7"), Some((0, vec![7.0, 7.0])));
+        assert_eq!(readings(&mut lines, 3, "6,4.5,8"), Some((0, vec![8.0, 7.0])));
     }
 
     #[test]

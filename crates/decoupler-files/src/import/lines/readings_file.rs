@@ -4,14 +4,13 @@ use ndarray::Array2;
 
 use super::{
     super::{Separator, TableError, rows::Rows},
-    LONGEST_LINE, LineParser, ParsedLine, ReadError,
+    LONGEST_LINE, LineParser, ParsedLine,
 };
 
 /// File with the readings of an array, read block by block, so that a large file needs little memory.
 pub struct ReadingsFile<R> {
     rows: Rows<R>,
     parser: LineParser,
-    has_readings: bool,
     torn_line: Option<u64>,
 }
 
@@ -32,7 +31,6 @@ impl<R: Read> ReadingsFile<R> {
         Self {
             rows: Rows::new(source, Separator::Comma, false).limited(LONGEST_LINE),
             parser,
-            has_readings: false,
             torn_line: None,
         }
     }
@@ -45,40 +43,39 @@ impl<R: Read> ReadingsFile<R> {
 
     /// Number of lines so far whose row-wire follows from their order.
     pub fn lines_in_turn(&self) -> usize {
-        self.parser.lines_in_turn()
+        self.parser.lines_in_turn
     }
 
     /// Reads at most `most` further lines; returns `None` at the end.
     ///
     /// # Errors
     /// If the file cannot be read, has no readings, or a line is malformed.
-    pub fn read(&mut self, most: usize) -> Result<Option<Readings>, ReadError> {
+    pub fn read(&mut self, most: usize) -> Result<Option<Readings>, TableError> {
         let (mut values_ohm, mut lines, mut row_indices) = (Vec::new(), Vec::new(), Vec::new());
-        let channels = self.parser.channels();
+        let channels = self.parser.inputs.len();
         let mut taken = 0;
         while taken < most && self.torn_line.is_none() && self.rows.next_text()? {
-            let line = self.rows.line();
+            let (line, has_readings) = (self.rows.line(), self.parser.has_readings);
             let (first_row, readings) = match self.parser.parse(line, self.rows.text()) {
                 Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => continue,
                 Ok(ParsedLine::Row {
                     row_index, readings, ..
                 }) => (row_index.unwrap_or(0), readings),
                 Ok(ParsedLine::Snapshot(readings)) => (0, readings),
-                Err(_) if self.has_readings && !self.rows.is_ended() => {
+                Err(_) if has_readings && !self.rows.is_ended() => {
                     self.torn_line = Some(line);
                     break;
                 }
-                Err(error) => return Err(error.into()),
+                Err(error) => return Err(TableError::Contents(error.to_string())),
             };
             let rows = readings.len() / channels;
             values_ohm.extend_from_slice(readings);
             lines.extend(std::iter::repeat_n(line, rows));
             row_indices.extend(first_row..first_row + rows);
-            self.has_readings = true;
             taken += 1;
         }
-        if !self.has_readings {
-            return Err(TableError::Empty.into());
+        if !self.parser.has_readings {
+            return Err(TableError::Empty);
         }
         if lines.is_empty() {
             return Ok(None);
@@ -107,7 +104,7 @@ mod tests {
         )
     }
 
-    fn read(text: &str) -> Result<Readings, ReadError> {
+    fn read(text: &str) -> Result<Readings, TableError> {
         Ok(reader(text, scene::Rows::All).read(100)?.unwrap())
     }
 
