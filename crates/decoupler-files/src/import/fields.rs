@@ -45,18 +45,28 @@ impl Fields {
             self.split_quoted(text);
             return;
         }
-        let is_spaced = self.separator == Separator::Space;
         let separator = self.separator.byte();
-        let is_separator = |byte: &u8| *byte == separator || (is_spaced && byte.is_ascii_whitespace());
+        match self.separator {
+            Separator::Space => {
+                self.split_at(text, |byte| byte == separator || byte.is_ascii_whitespace());
+                self.ranges.retain(|range| !range.is_empty());
+            }
+            _ => self.split_at(text, |byte| byte == separator),
+        }
+    }
+
+    fn split_at(&mut self, text: &[u8], is_separator: impl Fn(u8) -> bool) {
         let mut start = 0;
-        let cells = text.split(is_separator).map(|cell| {
-            let range = start..start + cell.len();
-            start = range.end + 1;
-            range
-        });
-        let cells = cells.filter(|range| !is_spaced || !range.is_empty());
-        self.ranges
-            .extend(cells.take(self.limit.map_or(usize::MAX, |limit| limit + 1)));
+        for (place, &byte) in text.iter().enumerate() {
+            if is_separator(byte) {
+                self.ranges.push(start..place);
+                start = place + 1;
+                if self.limit.is_some_and(|limit| self.ranges.len() > limit) {
+                    return;
+                }
+            }
+        }
+        self.ranges.push(start..text.len());
     }
 
     fn split_quoted(&mut self, text: &[u8]) {
