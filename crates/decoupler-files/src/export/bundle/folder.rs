@@ -72,7 +72,7 @@ impl AtomicFolder {
         if is_empty_folder(&target) {
             fs::remove_dir(&target).map_err(|error| WriteError::io(&target, error))?;
         }
-        let persisted = folder.persist(&target);
+        let persisted = folder.persist(&target, true);
         persisted.map_err(|error| WriteError::io(&target, error))?;
         files.sort();
         Ok(files)
