@@ -92,7 +92,9 @@ impl UnfinishedFile {
 impl UnfinishedFolder {
     /// Creates a temporary folder in `parent`.
     pub(super) fn begin(parent: &Path) -> io::Result<Self> {
-        Self::create(parent, |path| fs::create_dir(path).map(|()| File::open(path).ok().map(locked)))
+        Self::create(parent, |path| {
+            fs::create_dir(path).map(|()| File::open(path).ok().map(locked))
+        })
     }
 }
 
@@ -175,7 +177,12 @@ mod tests {
             })
         };
         assert!(vanishing(3).is_ok() && attempts.get() == 4);
-        assert!(vanishing(usize::MAX).unwrap_err().to_string().contains("give another place"));
+        assert!(
+            vanishing(usize::MAX)
+                .unwrap_err()
+                .to_string()
+                .contains("give another place")
+        );
     }
 
     #[test]
