@@ -293,7 +293,7 @@ impl NetworkFile {
         path: &Path,
         commit: fn(AtomicFile) -> Result<T, WriteError>,
     ) -> Result<T, DocumentError> {
-        self.check().map_err(|defect| unsound(path, defect))?;
+        self.check().map_err(|defect| DocumentError::unsound(path, defect))?;
         let located = |recorded: &Recorded| recorded.relative_to(folder_of(path));
         let file = Self {
             recorded: self.recorded.as_ref().map(located),
@@ -312,7 +312,7 @@ impl NetworkFile {
     pub fn to_text(&self) -> Result<String, DocumentError> {
         let checked = self.check();
         let text = checked.and_then(|()| KIND.seal(&self.program, self).map_err(|error| error.to_string()));
-        text.map_err(|defect| unsound(Path::new(Self::TEXT), defect))
+        text.map_err(|defect| DocumentError::unsound(Path::new(Self::TEXT), defect))
     }
 
     /// Reads the text of [`Self::to_text`].
@@ -445,11 +445,6 @@ impl NetworkFile {
             ))
         })
     }
-}
-
-fn unsound(path: &Path, defect: String) -> DocumentError {
-    let path = path.to_owned();
-    DocumentError::Unsound { path, defect }
 }
 
 fn require(holds: bool, defect: impl FnOnce() -> String) -> Result<(), String> {

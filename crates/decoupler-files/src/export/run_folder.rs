@@ -374,7 +374,7 @@ fn write(path: &Path, value: &impl Serialize) -> Result<(), WriteError> {
 /// The file cannot be read, is of another kind or version, or is damaged.
 fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, DocumentError> {
     match fs::metadata(path) {
-        Ok(found) if !found.is_file() => Err(KIND.damaged(path, "it is not a file".to_owned())),
+        Ok(found) if !found.is_file() => Err(KIND.damaged(path, "it is not a file")),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         _ => KIND.load(path).map(|(_, value)| Some(value)),
     }
