@@ -12,7 +12,7 @@ use decoupler_core::{
     text::counted,
 };
 
-use super::{Cell, Table, TableColumn, TableForm, table::cell};
+use super::{Cell, Table, TableColumn, TableForm, table::cell, tables::percent_of};
 
 /// Table of the results of an experiment for readers, with the same columns in the terminal, in files and in the
 /// window.
@@ -187,14 +187,6 @@ pub fn trials_table(results: &ExperimentResults) -> Table {
         ]);
         fields
     }))
-}
-
-/// Measure by which the errors of an array, or of a recording, are compared.
-fn percent_of(is_array: bool) -> ErrorMeasure {
-    match is_array {
-        true => ErrorMeasure::ZPercent,
-        false => ErrorMeasure::RangePercent,
-    }
 }
 
 /// Settings of a cell.
