@@ -21,7 +21,7 @@ static ALL: Mutex<(BTreeSet<PathBuf>, BTreeSet<PathBuf>)> = Mutex::new((BTreeSet
 pub(super) struct Unfinished<L> {
     path: PathBuf,
     /// Open and locked while it is in use.
-    lock: L,
+    pub(super) lock: L,
 }
 
 pub(super) type UnfinishedFile = Unfinished<File>;
@@ -83,10 +83,6 @@ impl UnfinishedFile {
     pub(super) fn begin(folder: &Path) -> io::Result<Self> {
         Self::create(folder, |path| File::create_new(path).map(locked))
     }
-
-    pub(super) fn as_file(&self) -> &File {
-        &self.lock
-    }
 }
 
 impl UnfinishedFolder {
@@ -108,10 +104,8 @@ fn locked(file: File) -> File {
 pub(super) fn folder_of(path: &Path) -> &Path {
     // Standard input and output are where the program runs.
     let is_standard = [Path::new("/dev/stdin"), Path::new("/dev/stdout")].contains(&path);
-    let parent = path
-        .parent()
-        .filter(|parent| !parent.as_os_str().is_empty() && !is_standard);
-    parent.unwrap_or(Path::new("."))
+    let parent = path.parent().filter(|parent| *parent != Path::new(""));
+    parent.filter(|_| !is_standard).unwrap_or(Path::new("."))
 }
 
 /// Removes the unfinished files and folders in `folder` that are not in use. Those that cannot be removed stay.
@@ -157,7 +151,7 @@ pub fn exit_leaving_nothing(status: i32) -> ! {
     std::process::exit(status)
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests {
     use super::*;
 
@@ -200,6 +194,8 @@ mod tests {
         }
     }
 
+    /// Windows cannot lock folders.
+    #[cfg(unix)]
     #[test]
     fn a_folder_in_use_stays_and_one_that_was_left_is_removed() {
         let home = tempfile::tempdir().unwrap();

@@ -28,8 +28,7 @@ impl AtomicFolder {
         let parent = target.parent().filter(|parent| !parent.as_os_str().is_empty());
         let parent = parent.unwrap_or(Path::new("."));
         if !parent.is_dir() {
-            let (path, folder) = (target.to_owned(), parent.to_owned());
-            return Err(WriteError::NoFolder { path, folder }.into());
+            return Err(WriteError::no_folder(target, parent).into());
         }
         if fs::symlink_metadata(target).is_ok() && !is_empty_folder(target) {
             return Err(BundleError::Exists(target.to_owned()));
