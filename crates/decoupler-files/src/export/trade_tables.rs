@@ -100,14 +100,17 @@ pub fn describe_workload(workload: &Workload) -> String {
         MemoryBudget::Assumed(_) => String::new(),
     };
     format!(
-        "about {}{machine} of memory; on one thread about {} to draw the samples and {} per epoch, {} for {}; the \
-         figures of the decoders take additional time",
+        "about {}{machine} of memory; on one thread about {} to draw the samples and {}; the figures of the decoders take \
+         additional time",
         gigabytes(workload.bytes),
         format_duration(workload.drawing_time()),
-        format_duration(workload.epoch_time()),
-        format_duration(workload.training_time()),
-        counted(workload.epochs, "epoch")
+        describe_epochs(workload)
     )
+}
+
+fn describe_epochs(workload: &Workload) -> String {
+    let [epoch, all] = [workload.epoch_time(), workload.training_time()].map(format_duration);
+    format!("{epoch} per epoch, {all} for {}", counted(workload.epochs, "epoch"))
 }
 
 /// Describes the time that a training on a recording will take on this machine, and if it is more than a minute, what
@@ -121,20 +124,12 @@ pub fn describe_recorded_workload(settings: &RunSettings, size: TrainingSize) ->
     if all_epochs < SHORT {
         return None;
     }
-    let mut text = format!(
-        "on one thread about {} per epoch, {} for {}",
-        format_duration(workload.epoch_time()),
-        format_duration(all_epochs),
-        counted(workload.epochs, "epoch")
-    );
+    let mut text = format!("on one thread about {}", describe_epochs(&workload));
     if all_epochs > LONG {
         let faster = workload.faster_methods(settings, size).into_iter();
         let faster = faster.map(|(method, time)| {
-            format!(
-                "{method} ({}) takes about {}",
-                method.short_name(),
-                format_duration(time)
-            )
+            let (name, time) = (method.short_name(), format_duration(time));
+            format!("{method} ({name}) takes about {time}")
         });
         let faster = Vec::from_iter(faster.chain(["fewer hidden nodes or epochs take less".to_owned()]));
         text += &format!("; {}", faster.join(", "));
