@@ -126,14 +126,14 @@ impl TrainingRecord {
         let trainer = run.trainers().get(past.start).unwrap_or_else(|| run.leader());
         let history = { trainer.history().iter() }.filter(|record| record.epoch <= past.epoch);
         let stages = { trainer.stages().iter() }.filter(|stage| stage.first_epoch <= past.epoch);
-        let history = Vec::from_iter(history.cloned());
+        let history = Vec::from_iter(history.copied());
         Self {
             stop_reason: Some(StopReason::Stopped),
             best_epoch: past.best_epoch,
             epochs: history.last().map_or(0, |record| record.epoch),
             seconds: past.elapsed.as_secs_f64(),
             history,
-            stages: stages.cloned().collect(),
+            stages: stages.copied().collect(),
             // The states of the other starts at that epoch are not kept.
             starts: Vec::new(),
         }

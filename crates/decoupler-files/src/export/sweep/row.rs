@@ -82,7 +82,7 @@ impl SweepRow {
         let fields = self.result.as_object().into_iter().flatten();
         for (name, value) in fields.filter(|(name, _)| !self.is_told_by_options(name)) {
             flatten(value, name, &mut |place, value| {
-                add(3, format!("result.{place}"), text(value))
+                add(3, format!("result.{place}"), text(value));
             });
         }
         for (place, value) in &self.time {
