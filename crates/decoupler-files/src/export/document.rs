@@ -10,7 +10,7 @@ use serde_json::{
     Value,
     value::{RawValue, to_raw_value},
 };
-use strum::VariantArray as _;
+use strum::{EnumMessage as _, VariantArray as _};
 use thiserror::Error;
 
 use super::{AtomicFile, WriteError};
@@ -21,56 +21,53 @@ use crate::{
 
 pub(super) const PROGRAM: &str = concat!("decoupler ", env!("CARGO_PKG_VERSION"));
 
-/// Kinds of JSON files that the program writes and reads back.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::VariantArray)]
+/// Kinds of JSON files that the program writes and reads back, each with its name in sentences, its format, and what helps if
+/// a file is damaged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::Display, strum::EnumMessage, strum::VariantArray)]
 #[non_exhaustive]
 pub enum DocumentKind {
     /// A trained network with its record: [`super::NetworkFile`].
+    #[strum(to_string = "network file", message = "decoupler network")]
+    #[strum(detailed_message = "copy or save it again")]
     Network,
     /// A training to be resumed: [`super::CheckpointFile`].
+    #[strum(to_string = "checkpoint", message = "decoupler checkpoint")]
+    #[strum(detailed_message = "copy it again, or start a new training")]
     Checkpoint,
     /// The source of the samples of a run: [`super::RecipeFile`].
+    #[strum(to_string = "recipe", message = "decoupler recipe")]
+    #[strum(detailed_message = "correct it, or write it again with inspect --recipe-out")]
     Recipe,
     /// A sensor model: [`super::SensorFile`].
+    #[strum(to_string = "sensor file", message = "decoupler sensor")]
+    #[strum(detailed_message = "correct it, or calibrate again")]
     Sensor,
     /// A name or choice of the run list: [`super::RunFolder`].
+    #[strum(to_string = "part of a run list", message = "decoupler run list")]
+    #[strum(detailed_message = "name the run or choose A and B again")]
     RunList,
     /// A finished trial of `decoupler sweep`.
+    #[strum(to_string = "trial", message = "decoupler trial")]
+    #[strum(detailed_message = "delete it and run the sweep again")]
     Trial,
 }
 
 impl DocumentKind {
-    /// Returns the name of the format, the only version that can be read, and the name in sentences.
-    fn description(self) -> (&'static str, u64, &'static str) {
-        match self {
-            Self::Network => ("decoupler network", 4, "network file"),
-            Self::Checkpoint => ("decoupler checkpoint", 4, "checkpoint"),
-            Self::Recipe => ("decoupler recipe", 1, "recipe"),
-            Self::Sensor => ("decoupler sensor", 1, "sensor file"),
-            Self::RunList => ("decoupler run list", 1, "part of a run list"),
-            Self::Trial => ("decoupler trial", 1, "trial"),
-        }
-    }
-
-    fn cure(self) -> &'static str {
-        match self {
-            Self::Network => "copy or save it again",
-            Self::Recipe => "correct it, or write it again with inspect --recipe-out",
-            Self::Sensor => "correct it, or calibrate again",
-            Self::Checkpoint => "copy it again, or start a new training",
-            Self::RunList => "name the run or choose A and B again",
-            Self::Trial => "delete it and run the sweep again",
-        }
-    }
-
     /// Value of the field `format`.
     pub(super) fn format(self) -> &'static str {
-        self.description().0
+        self.get_message().unwrap_or_default()
     }
 
     /// Version of the format, the only one that can be read.
     pub(super) fn version(self) -> u64 {
-        self.description().1
+        match self {
+            Self::Network | Self::Checkpoint => 4,
+            Self::Recipe | Self::Sensor | Self::RunList | Self::Trial => 1,
+        }
+    }
+
+    fn cure(self) -> &'static str {
+        self.get_detailed_message().unwrap_or_default()
     }
 
     /// Returns the kind of the file at `path`, determined by its beginning; `None` if it is of no kind or cannot be
@@ -209,12 +206,6 @@ impl DocumentKind {
             run: Some(&contents),
             sensor: None,
         })
-    }
-}
-
-impl fmt::Display for DocumentKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.description().2)
     }
 }
 
