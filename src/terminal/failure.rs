@@ -137,7 +137,7 @@ impl Failure {
     /// Returns `true` if the reader of the output has closed it, which is not a failure.
     pub(super) fn is_broken_pipe(&self) -> bool {
         match self {
-            Self::Output(error) | Self::Write(WriteError::Io { source: error, .. }) => {
+            Self::Output(error) | Self::Write(WriteError { source: error, .. }) => {
                 error.kind() == ErrorKind::BrokenPipe
             }
             _ => false,

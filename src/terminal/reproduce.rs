@@ -21,8 +21,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        ExperimentTable, Table, atomic_write, cells_table, describe_conditions, describe_failures,
-        describe_worse_than_mean, figures::PictureError, format_duration, trials_table, write_experiment_markdown,
+        ExperimentTable, atomic_write, cells_table, describe_conditions, describe_failures, describe_worse_than_mean,
+        figures::PictureError, format_duration, trials_table, write_experiment_markdown,
     },
     figure::experiment_figure,
     machine::memory_budget,
@@ -299,8 +299,7 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut dyn Write) ->
             describe_conditions(&results.experiment)
         )?;
         let table = ExperimentTable::new(results);
-        let headings = table.columns.iter().map(|column| column.heading);
-        writeln!(out, "{}", Table::of_headings(headings, table.rows.clone()).aligned())?;
+        writeln!(out, "{}", table.table.aligned())?;
         notes.insert(table.note);
         for failure in describe_failures(results) {
             writeln!(out, "{failure}")?;

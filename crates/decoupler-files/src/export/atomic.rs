@@ -11,41 +11,27 @@ use thiserror::Error;
 use super::unfinished::{UnfinishedFile, folder_of};
 use crate::machine::system_cause;
 
-/// Errors of writing a file.
+/// Error of writing a file.
 #[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum WriteError {
-    /// Its folder is missing.
-    #[error("cannot write '{}': the folder '{}' does not exist; make it first", .path.display(), .folder.display())]
-    NoFolder {
-        /// The file.
-        path: PathBuf,
-        /// Its folder.
-        folder: PathBuf,
-    },
-    /// The path is a folder.
-    #[error("cannot write '{}': it is a folder; give the name of a file", .0.display())]
-    Folder(PathBuf),
-    /// The file there is write-protected.
-    #[error("cannot write '{}': it is read-only; give another name", .0.display())]
-    ReadOnly(PathBuf),
-    /// The operating system refuses.
-    #[error("cannot write '{}': {}", .path.display(), system_cause(.source))]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The error of the operating system.
-        source: io::Error,
-    },
+#[error("cannot write '{}': {}", .path.display(), system_cause(.source))]
+pub struct WriteError {
+    /// The file.
+    pub path: PathBuf,
+    /// The error of the operating system, or a cause in words.
+    pub source: io::Error,
 }
 
 impl WriteError {
     /// Wraps the operating system's error about `path`.
     pub fn io(path: &Path, source: io::Error) -> Self {
-        Self::Io {
-            path: path.to_owned(),
-            source,
-        }
+        let path = path.to_owned();
+        Self { path, source }
+    }
+
+    /// The folder of `path` is missing.
+    pub(super) fn no_folder(path: &Path, folder: &Path) -> Self {
+        let cause = format!("the folder '{}' does not exist; make it first", folder.display());
+        Self::io(path, io::Error::other(cause))
     }
 }
 
@@ -69,7 +55,7 @@ fn target_of(path: &Path) -> Result<Option<(PathBuf, Option<Permissions>)>, Writ
     }
     let is_folder = path.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator);
     if is_folder || path.is_dir() {
-        return Err(WriteError::Folder(path.to_owned()));
+        return Err(WriteError::io(path, ErrorKind::IsADirectory.into()));
     }
     // The target of a link is replaced, not the link itself.
     let mut target = path.to_owned();
@@ -79,16 +65,16 @@ fn target_of(path: &Path) -> Result<Option<(PathBuf, Option<Permissions>)>, Writ
     }
     let folder = folder_of(&target);
     if !folder.is_dir() {
-        let (path, folder) = (path.to_owned(), folder.to_owned());
-        return Err(WriteError::NoFolder { path, folder });
+        return Err(WriteError::no_folder(path, folder));
     }
-    match fs::metadata(&target) {
-        Ok(old) if !old.is_file() => Ok(None),
-        Ok(old) if old.permissions().readonly() => Err(WriteError::ReadOnly(path.to_owned())),
-        Ok(old) => Ok(Some((target, Some(old.permissions())))),
-        Err(missing) if missing.kind() == ErrorKind::NotFound => Ok(Some((target, None))),
-        Err(source) => Err(WriteError::io(path, source)),
-    }
+    let refused = match fs::metadata(&target) {
+        Ok(old) if !old.is_file() => return Ok(None),
+        Ok(old) if old.permissions().readonly() => io::Error::other("it is read-only; give another name"),
+        Ok(old) => return Ok(Some((target, Some(old.permissions())))),
+        Err(missing) if missing.kind() == ErrorKind::NotFound => return Ok(Some((target, None))),
+        Err(error) => error,
+    };
+    Err(WriteError::io(path, refused))
 }
 
 impl AtomicFile {
@@ -104,9 +90,9 @@ impl AtomicFile {
             };
             let unfinished = UnfinishedFile::begin(folder_of(&target))?;
             if let Some(permissions) = permissions {
-                unfinished.as_file().set_permissions(permissions)?;
+                unfinished.lock.set_permissions(permissions)?;
             }
-            Ok((unfinished.as_file().try_clone()?, Some((unfinished, target))))
+            Ok((unfinished.lock.try_clone()?, Some((unfinished, target))))
         };
         let (file, unfinished) = created().map_err(|source| WriteError::io(path, source))?;
         Ok(Self {
@@ -121,7 +107,7 @@ impl AtomicFile {
     /// # Errors
     /// Any error of the operating system; a file that was there before is then unchanged.
     pub fn commit(self) -> Result<(), WriteError> {
-        self.finish(true)
+        self.finish(true).map(drop)
     }
 
     /// As [`Self::commit`], but never replaces a file, not even one that another program has just written: returns `false` if
@@ -130,21 +116,20 @@ impl AtomicFile {
     /// # Errors
     /// Any error of the operating system.
     pub(super) fn commit_new(self) -> Result<bool, WriteError> {
-        match self.finish(false) {
-            Err(WriteError::Io { source, .. }) if source.kind() == ErrorKind::AlreadyExists => Ok(false),
-            finished => finished.map(|()| true),
-        }
+        self.finish(false)
     }
 
-    fn finish(self, may_replace: bool) -> Result<(), WriteError> {
+    fn finish(self, may_replace: bool) -> Result<bool, WriteError> {
         let finished = || {
             let file = self.writer.into_inner().map_err(io::IntoInnerError::into_error)?;
             let Some((unfinished, target)) = self.unfinished else {
-                return Ok(());
+                return Ok(true);
             };
             file.sync_all()?;
-            drop(file);
-            unfinished.persist(&target, may_replace)
+            match unfinished.persist(&target, may_replace) {
+                Err(error) if !may_replace && error.kind() == ErrorKind::AlreadyExists => Ok(false),
+                persisted => persisted.map(|()| true),
+            }
         };
         finished().map_err(|source| WriteError::io(&self.path, source))
     }

@@ -89,10 +89,7 @@ impl CheckpointFile {
     /// # Errors
     /// The run has numbers that JSON cannot hold, or the path cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), DocumentError> {
-        let unsound = |error: serde_json::Error| DocumentError::Unsound {
-            path: path.to_owned(),
-            defect: error.to_string(),
-        };
+        let unsound = |error: serde_json::Error| DocumentError::unsound(path, error);
         let located = |recorded: &Recorded| recorded.relative_to(folder_of(path));
         let file = Self {
             recorded: self.recorded.as_ref().map(located),

@@ -10,6 +10,7 @@ use serde_json::{
     Value,
     value::{RawValue, to_raw_value},
 };
+use strum::{EnumMessage as _, VariantArray as _};
 use thiserror::Error;
 
 use super::{AtomicFile, WriteError};
@@ -20,65 +21,53 @@ use crate::{
 
 pub(super) const PROGRAM: &str = concat!("decoupler ", env!("CARGO_PKG_VERSION"));
 
-/// Kinds of JSON files that the program writes and reads back.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Kinds of JSON files that the program writes and reads back, each with its name in sentences, its format, and what helps if
+/// a file is damaged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::Display, strum::EnumMessage, strum::VariantArray)]
 #[non_exhaustive]
 pub enum DocumentKind {
     /// A trained network with its record: [`super::NetworkFile`].
+    #[strum(to_string = "network file", message = "decoupler network")]
+    #[strum(detailed_message = "copy or save it again")]
     Network,
     /// A training to be resumed: [`super::CheckpointFile`].
+    #[strum(to_string = "checkpoint", message = "decoupler checkpoint")]
+    #[strum(detailed_message = "copy it again, or start a new training")]
     Checkpoint,
     /// The source of the samples of a run: [`super::RecipeFile`].
+    #[strum(to_string = "recipe", message = "decoupler recipe")]
+    #[strum(detailed_message = "correct it, or write it again with inspect --recipe-out")]
     Recipe,
     /// A sensor model: [`super::SensorFile`].
+    #[strum(to_string = "sensor file", message = "decoupler sensor")]
+    #[strum(detailed_message = "correct it, or calibrate again")]
     Sensor,
     /// A name or choice of the run list: [`super::RunFolder`].
+    #[strum(to_string = "part of a run list", message = "decoupler run list")]
+    #[strum(detailed_message = "name the run or choose A and B again")]
     RunList,
     /// A finished trial of `decoupler sweep`.
+    #[strum(to_string = "trial", message = "decoupler trial")]
+    #[strum(detailed_message = "delete it and run the sweep again")]
     Trial,
 }
 
 impl DocumentKind {
-    const ALL: [Self; 6] = [
-        Self::Network,
-        Self::Checkpoint,
-        Self::Recipe,
-        Self::Sensor,
-        Self::RunList,
-        Self::Trial,
-    ];
-
-    /// Returns the name of the format, the only version that can be read, and the name in sentences.
-    fn description(self) -> (&'static str, u64, &'static str) {
-        match self {
-            Self::Network => ("decoupler network", 4, "network file"),
-            Self::Checkpoint => ("decoupler checkpoint", 4, "checkpoint"),
-            Self::Recipe => ("decoupler recipe", 1, "recipe"),
-            Self::Sensor => ("decoupler sensor", 1, "sensor file"),
-            Self::RunList => ("decoupler run list", 1, "part of a run list"),
-            Self::Trial => ("decoupler trial", 1, "trial"),
-        }
-    }
-
-    fn cure(self) -> &'static str {
-        match self {
-            Self::Network => "copy or save it again",
-            Self::Recipe => "correct it, or write it again with inspect --recipe-out",
-            Self::Sensor => "correct it, or calibrate again",
-            Self::Checkpoint => "copy it again, or start a new training",
-            Self::RunList => "name the run or choose A and B again",
-            Self::Trial => "delete it and run the sweep again",
-        }
-    }
-
     /// Value of the field `format`.
     pub(super) fn format(self) -> &'static str {
-        self.description().0
+        self.get_message().unwrap_or_default()
     }
 
     /// Version of the format, the only one that can be read.
     pub(super) fn version(self) -> u64 {
-        self.description().1
+        match self {
+            Self::Network | Self::Checkpoint => 4,
+            Self::Recipe | Self::Sensor | Self::RunList | Self::Trial => 1,
+        }
+    }
+
+    fn cure(self) -> &'static str {
+        self.get_detailed_message().unwrap_or_default()
     }
 
     /// Returns the kind of the file at `path`, determined by its beginning; `None` if it is of no kind or cannot be
@@ -92,9 +81,8 @@ impl DocumentKind {
         let text = String::from_utf8_lossy(&beginning);
         let (_, rest) = text.trim_start().strip_prefix('{')?.split_once("\"format\"")?;
         let rest = rest.trim_start_matches(|c: char| c == ':' || c.is_whitespace());
-        Self::ALL
-            .into_iter()
-            .find(|kind| rest.starts_with(&format!("\"{}\"", kind.format())))
+        let is_named = |kind: &&Self| rest.starts_with(&format!("\"{}\"", kind.format()));
+        Self::VARIANTS.iter().find(is_named).copied()
     }
 
     /// Returns the origin of the samples of `run` for its file: `recorded`, or `None` if they are simulated.
@@ -117,36 +105,45 @@ impl DocumentKind {
             path: path.to_owned(),
             source,
         })?;
-        let other = |reason: &str| DocumentError::Other {
-            path: path.to_owned(),
-            kind: self,
-            reason: in_one_line(reason),
-        };
-        let beginning = format!("{{\"format\":\"{}\",", self.format());
-        let heading: Heading = serde_json::from_slice(&bytes).map_err(|error| match error {
+        let checked = self.check_heading(&bytes);
+        checked.map_err(|defect| DocumentError::unusable(path, &defect))?;
+        Ok(bytes)
+    }
+
+    fn check_heading(self, bytes: &[u8]) -> Result<(), String> {
+        let (format, version) = (self.format(), self.version());
+        let other = |reason: &str| format!("is not a {self}: {reason}; choose one that Decoupler saved");
+        let beginning = format!("{{\"format\":\"{format}\",");
+        let heading: Heading = serde_json::from_slice(bytes).map_err(|error| match error {
             _ if bytes.trim_ascii().is_empty() => other("it is empty"),
-            error if is_cut_off(&bytes, &error) => DocumentError::CutOff {
-                path: path.to_owned(),
-                kind: self,
-                line: error.line(),
-                column: error.column(),
-            },
-            error if error.is_data() => other(&format!("it has no field \"format\": \"{}\"", self.format())),
-            error if bytes.starts_with(beginning.as_bytes()) => self.damaged(path, error.to_string()),
+            error if is_cut_off(bytes, &error) => {
+                let (line, column) = (error.line(), error.column());
+                format!("is cut off at line {line}, column {column}; {}", self.cure())
+            }
+            error if error.is_data() => other(&format!("it has no field \"format\": \"{format}\"")),
+            error if bytes.starts_with(beginning.as_bytes()) => self.damage(error),
             error => other(&error.to_string()),
         })?;
-        if heading.format != self.format() {
+        if heading.format != format {
             return Err(other(&format!("its format is {}", heading.format)));
         }
-        if heading.version.as_u64() != Some(self.version()) {
-            return Err(DocumentError::Version {
-                path: path.to_owned(),
-                kind: self,
-                version: heading.version.to_string(),
-                program: in_one_line(heading.program.as_str().unwrap_or("another program")),
-            });
+        if heading.version.as_u64() != Some(version) {
+            let program = heading.program.as_str().unwrap_or("another program");
+            return Err(format!(
+                "has version {} of the format, written by {program}; this is {PROGRAM}, which reads version {version}: open it \
+                 with the program that wrote it",
+                heading.version
+            ));
         }
-        Ok(bytes)
+        Ok(())
+    }
+
+    fn damage(self, defect: impl fmt::Display) -> String {
+        format!("is damaged: {defect}; {}", self.cure())
+    }
+
+    pub(super) fn damaged(self, path: &Path, defect: impl fmt::Display) -> DocumentError {
+        DocumentError::unusable(path, &self.damage(defect))
     }
 
     /// Reads the contents of the file of this kind at `path`, and the program that wrote it.
@@ -185,16 +182,13 @@ impl DocumentKind {
         path: &Path,
         commit: fn(AtomicFile) -> Result<T, WriteError>,
     ) -> Result<T, WriteError> {
-        /// Upper bound on the length of the heading.
-        const HEADING: u64 = 1 << 10;
         let error = |source| WriteError::io(path, source);
-        let contents = to_raw_value(contents).map_err(|source| error(source.into()))?;
-        if contents.get().len() as u64 + HEADING > LARGEST_BYTES {
+        let text = self.seal(program, contents).map_err(|source| error(source.into()))?;
+        if text.len() as u64 >= LARGEST_BYTES {
             return Err(error(too_large()));
         }
         let mut file = AtomicFile::create(path)?;
-        serde_json::to_writer(&mut file, &self.sealed(program, &contents)).map_err(|source| error(source.into()))?;
-        writeln!(file).map_err(error)?;
+        writeln!(file, "{text}").map_err(error)?;
         commit(file)
     }
 
@@ -203,33 +197,15 @@ impl DocumentKind {
     /// # Errors
     /// The contents cannot be written as JSON.
     pub(super) fn seal(self, program: &str, contents: &impl Serialize) -> serde_json::Result<String> {
-        serde_json::to_string(&self.sealed(program, &to_raw_value(contents)?))
-    }
-
-    fn sealed<'a>(self, program: &str, contents: &'a RawValue) -> Sealed<'a> {
-        Sealed {
+        let contents = to_raw_value(contents)?;
+        serde_json::to_string(&Sealed {
             format: self.format().to_owned(),
             version: self.version(),
             program: program.to_owned(),
-            crc32: Some(checksum(contents)),
-            run: Some(contents),
+            crc32: Some(checksum(&contents)),
+            run: Some(&contents),
             sensor: None,
-        }
-    }
-
-    pub(super) fn damaged(self, path: &Path, defect: String) -> DocumentError {
-        let path = path.to_owned();
-        DocumentError::Damaged {
-            path,
-            kind: self,
-            defect: in_one_line(&defect),
-        }
-    }
-}
-
-impl fmt::Display for DocumentKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.description().2)
+        })
     }
 }
 
@@ -334,48 +310,12 @@ pub enum DocumentError {
         /// The error of the operating system.
         source: io::Error,
     },
-    /// Not JSON, or JSON of another kind.
-    #[error("'{}' is not a {kind}: {reason}; choose one that Decoupler saved", .path.display())]
-    Other {
+    /// The file is of another kind or version, cut off or damaged, or is not saved because it could not be read back.
+    #[error("'{}' {defect}", .path.display())]
+    Unusable {
         /// The file.
         path: PathBuf,
-        /// Kind that it should have.
-        kind: DocumentKind,
-        /// Description of the file as found.
-        reason: String,
-    },
-    /// JSON that ends too early.
-    #[error("'{}' is cut off at line {line}, column {column}; {}", .path.display(), .kind.cure())]
-    CutOff {
-        /// The file.
-        path: PathBuf,
-        /// Kind of the file.
-        kind: DocumentKind,
-        /// Line of the end, counted from 1.
-        line: usize,
-        /// Column of the end, counted from 1.
-        column: usize,
-    },
-    /// Written in a format unknown to this version.
-    #[error("'{}' has version {version} of the format, written by {program}; this is {PROGRAM}, which reads version {}: open it with the program that wrote it", .path.display(), .kind.version())]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// Kind of the file.
-        kind: DocumentKind,
-        /// Version of the file.
-        version: String,
-        /// Program that wrote the file.
-        program: String,
-    },
-    /// The checksum does not match, or a field is missing, of the wrong kind, or does not fit the others.
-    #[error("'{}' is damaged: {defect}; {}", .path.display(), .kind.cure())]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// Kind of the file.
-        kind: DocumentKind,
-        /// Description of the defect, with the field or with line and column.
+        /// The defect, with the field or with line and column, and what to do, as the rest of a sentence about the file.
         defect: String,
     },
     /// The samples are recorded, and no plan is given.
@@ -383,20 +323,24 @@ pub enum DocumentError {
         "a {0} of recorded samples names the recording: give the plan that reads it, or save the networks with serde"
     )]
     NoPlan(DocumentKind),
-    /// A recording is needed.
-    #[error("'{}' is the recipe of a simulated array: give the recipe of a recording", .0.display())]
-    SimulatedRecipe(PathBuf),
-    /// The run has values that could not be read back.
-    #[error("'{}' is not saved: {defect}; train again with other settings", .path.display())]
-    Unsound {
-        /// The file.
-        path: PathBuf,
-        /// Description of the defect, with the field.
-        defect: String,
-    },
     /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+}
+
+impl DocumentError {
+    pub(super) fn unusable(path: &Path, defect: &str) -> Self {
+        let (path, defect) = (path.to_owned(), in_one_line(defect));
+        Self::Unusable { path, defect }
+    }
+
+    /// The contents for `path` could not be read back.
+    pub(super) fn unsound(path: &Path, defect: impl fmt::Display) -> Self {
+        Self::unusable(
+            path,
+            &format!("is not saved: {defect}; train again with other settings"),
+        )
+    }
 }
 
 #[cfg(test)]

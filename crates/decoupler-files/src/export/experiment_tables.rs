@@ -12,27 +12,18 @@ use decoupler_core::{
     text::counted,
 };
 
-use super::{Cell, Table, TableColumn, TableForm, table::cell};
+use super::{Cell, Table, TableColumn, TableForm, table::cell, tables::percent_of};
 
 /// Table of the results of an experiment for readers, with the same columns in the terminal, in files and in the
 /// window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExperimentTable {
-    /// Columns of the table.
-    pub columns: Vec<ExperimentColumn>,
-    /// Cells of the experiment, row by row.
-    pub rows: Vec<Vec<Cell>>,
+    /// Headings, and the cells of the experiment row by row.
+    pub table: Table,
+    /// Kind of the figures in each column.
+    pub kinds: Vec<ExperimentColumnKind>,
     /// Explanation of the last columns, to be shown below the table.
     pub note: &'static str,
-}
-
-/// A column of the results of an experiment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ExperimentColumn {
-    /// Name of the column.
-    pub heading: &'static str,
-    /// Kind of its figures.
-    pub kind: ExperimentColumnKind,
 }
 
 /// Kind of the figures in a column.
@@ -54,32 +45,36 @@ impl ExperimentTable {
     /// The results so far.
     pub fn new(results: &ExperimentResults) -> Self {
         let has_published = results.cells.iter().any(|cell| cell.published.is_some());
-        let row = |cell: &experiments::Cell| {
-            let labels = results.experiment.axes().zip(results.cell_labels(cell));
+        let row = |of: &experiments::Cell| {
+            let labels = results.experiment.axes().zip(results.cell_labels(of));
             let labels = labels.map(|(axis, label)| {
                 let cell = label.parse().map_or_else(|_| Cell::Text(label.clone()), Cell::Count);
                 (axis.kind.name(), ExperimentColumnKind::Axis, cell)
             });
-            Vec::from_iter(labels.chain(figures(cell, has_published)))
+            let figures = figures(of).into_iter();
+            let figures = figures.filter_map(|(_, shown, cell)| shown.map(|(heading, kind)| (heading, kind, cell)));
+            let figures = figures.filter(|(_, kind, _)| has_published || *kind != ExperimentColumnKind::Published);
+            Vec::from_iter(labels.chain(figures))
         };
         let rows = Vec::from_iter(results.cells.iter().map(row));
-        let columns = rows.first().into_iter().flatten();
-        let columns = columns.map(|&(heading, kind, _)| ExperimentColumn { heading, kind });
         Self {
-            columns: columns.collect(),
+            kinds: { rows.first().into_iter().flatten() }
+                .map(|&(_, kind, _)| kind)
+                .collect(),
+            table: Table::of_rows({ rows.into_iter() }.map(|row| {
+                let cells = row.into_iter();
+                cells.map(|(heading, _, value)| cell(heading, value)).collect()
+            })),
             note: match results.experiment.recording {
                 None => NODES_NOTE,
                 Some(_) => TARGETS_NOTE,
             },
-            rows: { rows.into_iter() }
-                .map(|row| row.into_iter().map(|(.., cell)| cell).collect())
-                .collect(),
         }
     }
 
     /// Returns the table for export, with the training time in seconds.
     pub fn table(&self) -> Table {
-        let mut table = Table::of_headings(self.columns.iter().map(|column| column.heading), self.rows.clone());
+        let mut table = self.table.clone();
         for (place, column) in table.columns.iter_mut().enumerate() {
             for row in &mut table.rows {
                 if let Cell::Seconds(seconds) = row[place] {
@@ -98,42 +93,49 @@ const TARGETS_NOTE: &str = "Median, minimum and maximum over seeds. error: mean 
      the target, averaged over the targets that vary, and R² likewise; mean: always answering the training mean; ridge: \
      ridge regression; epochs: mean of the starts; training: one network, all its starts.";
 
-/// A figure of a cell: heading and kind of its column, and its value.
-type CellFigure = (&'static str, ExperimentColumnKind, Cell);
+/// A figure of a cell: its name in tables for programs; where readers see it, the heading and kind of its column; its value.
+type CellFigure = (String, Option<(&'static str, ExperimentColumnKind)>, Cell);
 
-/// Columns with the figures of a cell.
-fn figures(cell: &experiments::Cell, has_published: bool) -> Vec<CellFigure> {
+/// All figures of a cell.
+fn figures(of: &experiments::Cell) -> Vec<CellFigure> {
     use ExperimentColumnKind::{Linear, Other, Published, Ranking};
-    let is_array = cell.settings.simulation().is_some();
-    let [publ, median, mean, linear] = if is_array {
-        ["Z % publ.", "Z % median", "mean Z %", "linear Z %"]
-    } else {
-        ["error % publ.", "error % median", "mean %", "ridge %"]
-    };
-    let percent = cell.percent();
-    let mut figures: Vec<CellFigure> = vec![
-        (publ, Published, percent.published.into()),
-        (median, Ranking, percent.median.into()),
-        ("min", Other, percent.min.into()),
-        ("max", Other, percent.max.into()),
-    ];
-    for (measure, figure) in cell.errors() {
-        let (publ, median) = match measure {
-            ErrorMeasure::XPercent => (Some("X % publ."), "X % median"),
-            ErrorMeasure::YPercent => (Some("Y % publ."), "Y % median"),
-            ErrorMeasure::R2 => (None, "R² median"),
-            _ => continue,
+    let is_array = of.settings.simulation().is_some();
+    let mut figures: Vec<CellFigure> = Vec::new();
+    for (measure, figure) in of.errors().filter(|(measure, _)| *measure != ErrorMeasure::ZMm) {
+        let (published, median, kind) = match measure {
+            ErrorMeasure::ZPercent => ("Z % publ.", "Z % median", Ranking),
+            ErrorMeasure::XPercent => ("X % publ.", "X % median", Other),
+            ErrorMeasure::YPercent => ("Y % publ.", "Y % median", Other),
+            ErrorMeasure::R2 => ("", "R² median", Other),
+            _ => ("", "error % median", Ranking),
         };
-        figures.extend(publ.map(|publ| (publ, Published, figure.published.into())));
-        figures.push((median, Other, figure.median.into()));
+        let of_ranking = |heading| (kind == Ranking).then_some((heading, Other));
+        let name = |statistic: &str| format!("{}_{statistic}", measure.field());
+        // Nothing is published for a recording.
+        figures.extend(is_array.then(|| (name("published"), Some((published, Published)), figure.published.into())));
+        figures.extend([
+            (name("median"), Some((median, kind)), figure.median.into()),
+            (name("min"), of_ranking("min"), figure.min.into()),
+            (name("max"), of_ranking("max"), figure.max.into()),
+        ]);
     }
+    let [mean, linear] = if is_array {
+        ["mean Z %", "linear Z %"]
+    } else {
+        ["mean %", "ridge %"]
+    };
+    let (name, seconds) = (percent_of(is_array).field(), Cell::Seconds(of.training_seconds()));
     figures.extend([
-        (mean, Other, cell.mean_percent().into()),
-        (linear, Linear, cell.linear_percent().into()),
-        ("epochs", Other, cell.epochs_run().into()),
-        ("training", Other, Cell::Seconds(cell.training_seconds())),
+        (format!("mean_{name}"), Some((mean, Other)), of.mean_percent().into()),
+        (
+            format!("linear_{name}"),
+            Some((linear, Linear)),
+            of.linear_percent().into(),
+        ),
+        ("epochs_run".to_owned(), Some(("epochs", Other)), of.epochs_run().into()),
+        ("training_seconds".to_owned(), Some(("training", Other)), seconds),
+        ("epoch_ms".to_owned(), None, of.epoch_ms().into()),
     ]);
-    figures.retain(|(_, kind, _)| has_published || *kind != Published);
     figures
 }
 
@@ -143,24 +145,7 @@ pub fn cells_table(results: &ExperimentResults) -> Table {
         let mut fields = settings_fields(of);
         fields.push(cell("starts", of.settings.starts));
         fields.push(cell("trials", of.trials.len()));
-        let is_array = of.settings.simulation().is_some();
-        for (measure, figure) in of.errors().filter(|(measure, _)| *measure != ErrorMeasure::ZMm) {
-            let name = measure.field();
-            fields.extend(is_array.then(|| cell(&*format!("{name}_published"), figure.published)));
-            fields.extend([
-                cell(&*format!("{name}_median"), figure.median),
-                cell(&*format!("{name}_min"), figure.min),
-                cell(&*format!("{name}_max"), figure.max),
-            ]);
-        }
-        let name = percent_of(is_array).field();
-        fields.extend([
-            cell(&*format!("mean_{name}"), of.mean_percent()),
-            cell(&*format!("linear_{name}"), of.linear_percent()),
-            cell("epochs_run", of.epochs_run()),
-            cell("training_seconds", of.training_seconds()),
-            cell("epoch_ms", of.epoch_ms()),
-        ]);
+        fields.extend({ figures(of).into_iter() }.map(|(name, _, figure)| cell(&*name, figure)));
         fields
     }))
 }
@@ -202,14 +187,6 @@ pub fn trials_table(results: &ExperimentResults) -> Table {
         ]);
         fields
     }))
-}
-
-/// Measure by which the errors of an array, or of a recording, are compared.
-fn percent_of(is_array: bool) -> ErrorMeasure {
-    match is_array {
-        true => ErrorMeasure::ZPercent,
-        false => ErrorMeasure::RangePercent,
-    }
 }
 
 /// Settings of a cell.

@@ -3,10 +3,10 @@ use std::{path::Path, sync::Arc, time::Duration};
 use decoupler_core::{
     dataset::{Dataset, DatasetError, Memory, Simulation},
     decoupling::{Combined, ProgramDecoder},
-    evaluation::{ErrorTable, Intervals, Run, RunSettings, Scores, StartRecord, TestErrors},
+    evaluation::{ErrorTable, Intervals, Run, RunSettings, Scores, TestErrors},
     job::Job,
     live::{DriftReference, LiveError},
-    network::{DecouplingNetwork, Networks},
+    network::Networks,
     problem::{Channel, Problem, TargetPosition},
     scene::Rows,
 };
@@ -70,34 +70,26 @@ fn is_not_described(drift: &Result<DriftReference, LiveError>) -> bool {
     *drift == not_described()
 }
 
-/// Description of the training readings as it is saved.
-#[derive(Serialize, Deserialize)]
-#[serde(untagged)]
-enum SavedDrift<T> {
-    Monitored(T),
-    NotMonitored {
-        not_monitored: LiveError,
-    },
-    /// Description for the monitor of an older version.
-    #[serde(skip_serializing)]
-    Older(serde::de::IgnoredAny),
-}
-
 fn write_drift<S: Serializer>(drift: &Result<DriftReference, LiveError>, serializer: S) -> Result<S::Ok, S::Error> {
-    let saved = match drift {
-        Ok(reference) => SavedDrift::Monitored(reference),
-        Err(error) => SavedDrift::NotMonitored {
-            not_monitored: error.clone(),
-        },
-    };
-    saved.serialize(serializer)
+    match drift {
+        Ok(reference) => reference.serialize(serializer),
+        Err(error) => serializer.collect_map([("not_monitored", error)]),
+    }
 }
 
 fn read_drift<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Result<DriftReference, LiveError>, D::Error> {
-    Ok(match SavedDrift::deserialize(deserializer)? {
-        SavedDrift::Monitored(reference) => Ok(reference),
-        SavedDrift::NotMonitored { not_monitored } => Err(not_monitored),
-        SavedDrift::Older(_) => not_described(),
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Saved {
+        Monitored(DriftReference),
+        NotMonitored { not_monitored: LiveError },
+        Older(serde::de::IgnoredAny),
+    }
+    Ok(match Saved::deserialize(deserializer)? {
+        Saved::Monitored(reference) => Ok(reference),
+        Saved::NotMonitored { not_monitored } => Err(not_monitored),
+        // A description for the monitor of an older version.
+        Saved::Older(_) => not_described(),
     })
 }
 
@@ -293,7 +285,7 @@ impl NetworkFile {
         path: &Path,
         commit: fn(AtomicFile) -> Result<T, WriteError>,
     ) -> Result<T, DocumentError> {
-        self.check().map_err(|defect| unsound(path, defect))?;
+        self.check().map_err(|defect| DocumentError::unsound(path, defect))?;
         let located = |recorded: &Recorded| recorded.relative_to(folder_of(path));
         let file = Self {
             recorded: self.recorded.as_ref().map(located),
@@ -312,7 +304,7 @@ impl NetworkFile {
     pub fn to_text(&self) -> Result<String, DocumentError> {
         let checked = self.check();
         let text = checked.and_then(|()| KIND.seal(&self.program, self).map_err(|error| error.to_string()));
-        text.map_err(|defect| unsound(Path::new(Self::TEXT), defect))
+        text.map_err(|defect| DocumentError::unsound(Path::new(Self::TEXT), defect))
     }
 
     /// Reads the text of [`Self::to_text`].
@@ -359,48 +351,50 @@ impl NetworkFile {
             ..
         } = self;
         check_settings(settings, self.recorded.as_ref())?;
-        let simulation = settings.simulation();
-        let is_placed = |position: &TargetPosition| position.target < problem.targets.len();
-        let has_memory = |memory: &Memory| memory.check(problem.inputs.len()).is_ok();
+        let (simulation, targets) = (settings.simulation(), problem.targets.len());
+        let is_impossible = |memory: &Memory| memory.check(problem.inputs.len()).is_err();
+        let is_unplaced = |position: &TargetPosition| position.target >= targets;
         match simulation {
-            Some(simulation) => require(*problem == simulation.problem(), || {
-                "problem: it does not match the array".to_owned()
-            })?,
-            None => {
-                require(!problem.has_nodes(), || NODES_OF_RECORDING.to_owned())?;
-                require(problem.memory.as_ref().is_none_or(has_memory), || {
-                    "problem.memory: it is not possible for these inputs".to_owned()
-                })?;
-                require(problem.positions.iter().all(is_placed), || {
-                    "problem.positions: a target does not exist".to_owned()
-                })?;
+            Some(array) if *problem != array.problem() => Err("problem: it does not match the array"),
+            None if problem.has_nodes() => Err(NODES_OF_RECORDING),
+            None if problem.memory.as_ref().is_some_and(is_impossible) => {
+                Err("problem.memory: it is not possible for these inputs")
             }
-        }
-        for network in network.values() {
-            let infinite = network.mlp().weights().iter().position(|weight| !weight.is_finite());
-            let defect = infinite.map(|index| format!("network: weight {index} is not a finite number"));
-            defect.map_or(Ok(()), Err)?;
-        }
+            None if problem.positions.iter().any(is_unplaced) => Err("problem.positions: a target does not exist"),
+            _ => Ok(()),
+        }?;
+        let weights = network.values().iter().map(|network| network.mlp().weights());
+        let infinite = weights.filter_map(|weights| weights.iter().position(|weight| !weight.is_finite()));
+        refuse(infinite.map(|index| format!("network: weight {index} is not a finite number")))?;
         check_number(network, settings, self.row_wires.as_deref())?;
-        for network in network.values() {
-            check_sizes(network, problem, settings.network_hidden())?;
-        }
+        let sizes = network.values().iter().flat_map(|network| {
+            let (inputs, outputs) = (network.inputs().channels(), network.outputs().channels());
+            let hidden = network.mlp().shape().hidden;
+            [
+                ("reads", inputs, problem.feature_count(), "readings"),
+                ("gives", outputs, targets, "targets"),
+                ("has", hidden, settings.network_hidden(), "hidden nodes"),
+            ]
+        });
+        let wrong = sizes.filter(|(_, found, expected, _)| found != expected);
+        refuse(wrong.map(|(verb, found, expected, what)| {
+            format!("network: it {verb} {found} {what}, but the settings need {expected}")
+        }))?;
         if let Some(simulation) = simulation {
             check_places(network, simulation)?;
         }
         self.check_training()?;
         if let Some(intervals) = &self.intervals {
-            let checked = intervals.check(problem.targets.len());
+            let checked = intervals.check(targets);
             checked.map_err(|defect| format!("intervals: {defect}"))?;
         }
-        let drift = self.drift.as_ref().ok();
-        require(
-            drift.is_none_or(|drift| drift.is_valid() && drift.channels() == problem.inputs.len()),
-            || "drift: it does not match the inputs".to_owned(),
-        )?;
+        let is_other = |drift: &DriftReference| !drift.is_valid() || drift.channels() != problem.inputs.len();
+        if self.drift.as_ref().is_ok_and(is_other) {
+            return Err("drift: it does not match the inputs".to_owned());
+        }
         let combined = self.combined();
-        let defect = combined.and_then(|combined| combined.defect(problem.feature_count(), problem.targets.len()));
-        defect.map_or(Ok(()), |defect| Err(format!("recorded.combined: {defect}")))?;
+        let defect = combined.and_then(|combined| combined.defect(problem.feature_count(), targets));
+        refuse(defect.map(|defect| format!("recorded.combined: {defect}")))?;
         let errors = [
             ("network", Some(&scores.network)),
             ("network_alone", scores.network_alone.as_ref()),
@@ -408,8 +402,11 @@ impl NetworkFile {
             ("baselines.linear", Some(&scores.baselines.linear)),
             ("baselines.model_based", scores.baselines.model_based.as_ref()),
         ];
-        let mut errors = errors.into_iter().filter_map(|(place, errors)| Some((place, errors?)));
-        errors.try_for_each(|(place, errors)| check_errors(&format!("scores.{place}"), errors, problem))
+        let defects = errors.into_iter().filter_map(|(place, errors)| {
+            let defect = defect_of_errors(errors?, problem)?;
+            Some(format!("scores.{place}{defect}"))
+        });
+        refuse(defects)
     }
 
     fn check_training(&self) -> Result<(), String> {
@@ -422,38 +419,26 @@ impl NetworkFile {
             ..
         } = &self.training;
         let last = history.last().ok_or("training.history: it is empty")?.epoch;
-        require(*epochs == last, || {
-            format!("training.epochs: it is {epochs}, but the history ends with epoch {last}")
-        })?;
-        require(*best_epoch <= last, || {
-            format!("training.best_epoch: {best_epoch} is after the last, {last}")
-        })?;
-        require(*seconds >= 0.0 && seconds.is_finite(), || {
-            format!("training.seconds: {seconds} is not a time")
-        })?;
         let (found, expected) = (starts.len(), self.settings.starts);
-        require(found == 0 || found == expected, || {
-            format!("training.starts: {found} of them, but the settings ask for {expected}")
-        })?;
-        let infinite = |start: &StartRecord| {
+        let infinite = starts.iter().position(|start| {
             let figures = [Some(start.train_mse), start.validation_mse, start.percent()];
             figures.into_iter().flatten().any(|figure| !figure.is_finite())
-        };
-        starts.iter().position(infinite).map_or(Ok(()), |place| {
-            Err(format!(
-                "training.starts: an error of number {place} is not a finite number"
-            ))
-        })
+        });
+        let defects = [
+            (*epochs != last).then(|| format!("epochs: it is {epochs}, but the history ends with epoch {last}")),
+            (*best_epoch > last).then(|| format!("best_epoch: {best_epoch} is after the last, {last}")),
+            (!(0.0..f64::INFINITY).contains(seconds)).then(|| format!("seconds: {seconds} is not a time")),
+            (found != 0 && found != expected)
+                .then(|| format!("starts: {found} of them, but the settings ask for {expected}")),
+            infinite.map(|place| format!("starts: an error of number {place} is not a finite number")),
+        ];
+        refuse({ defects.into_iter().flatten() }.map(|defect| format!("training.{defect}")))
     }
 }
 
-fn unsound(path: &Path, defect: String) -> DocumentError {
-    let path = path.to_owned();
-    DocumentError::Unsound { path, defect }
-}
-
-fn require(holds: bool, defect: impl FnOnce() -> String) -> Result<(), String> {
-    if holds { Ok(()) } else { Err(defect()) }
+/// Returns the first defect as an error.
+fn refuse(defects: impl IntoIterator<Item = String>) -> Result<(), String> {
+    defects.into_iter().next().map_or(Ok(()), Err)
 }
 
 /// Checks the settings in a file, and that a recording has its plan.
@@ -478,33 +463,15 @@ fn check_number(network: &Networks, settings: &RunSettings, row_wires: Option<&[
     let found = network.values().len();
     let Some(source) = settings.simulation() else {
         let rows = row_wires.map_or(1, <[usize]>::len);
-        return require(found == 1 || found == rows, || {
-            format!("network: {found} of them for {rows} row-wires")
-        });
+        let defect = || format!("network: {found} of them for {rows} row-wires");
+        return refuse((found != 1 && found != rows).then(defect));
     };
-    let rows = source
-        .rows()
-        .map_err(|defect| format!("settings.source.scene.rows: {defect}"))?;
+    let rows = source.rows();
+    let rows = rows.map_err(|defect| format!("settings.source.scene.rows: {defect}"))?;
     let needed = source.scene.rows.model().decoders(rows);
-    require(needed == found, || {
-        let (rows, scale) = (source.scene.rows, source.sensor.scale);
-        format!("network: {found} of them, but rows {rows} of {scale} need {needed}")
-    })
-}
-
-fn check_sizes(network: &DecouplingNetwork, problem: &Problem, hidden: usize) -> Result<(), String> {
-    let (inputs, outputs) = (network.inputs().channels(), network.outputs().channels());
-    let sizes = [
-        ("reads", inputs, problem.feature_count(), "readings"),
-        ("gives", outputs, problem.targets.len(), "targets"),
-        ("has", network.mlp().shape().hidden, hidden, "hidden nodes"),
-    ];
-    let mut sizes = sizes.into_iter();
-    sizes.try_for_each(|(verb, found, expected, what)| {
-        require(found == expected, || {
-            format!("network: it {verb} {found} {what}, but the settings need {expected}")
-        })
-    })
+    let (rows, scale) = (source.scene.rows, source.sensor.scale);
+    let defect = || format!("network: {found} of them, but rows {rows} of {scale} need {needed}");
+    refuse((found != needed).then(defect))
 }
 
 /// Describes the first coordinate whose training range is out of reach of the nodes of the scene, even with a margin of
@@ -532,29 +499,30 @@ fn check_places(networks: &Networks, simulation: &Simulation) -> Result<(), Stri
             let rounding_mm = 1e-9 * (low.abs().max(high.abs()) + spare_mm);
             let possible = low - spare_mm - rounding_mm..=high + spare_mm + rounding_mm;
             let (min, max) = outputs.extremes(channel);
-            require(possible.contains(&min) && possible.contains(&max), || {
-                format!(
-                    "network: node {} was trained from {min:e} to {max:e} mm, but lies from {low} to {high} mm",
-                    node + 1
-                )
-            })?;
+            if !possible.contains(&min) || !possible.contains(&max) {
+                let node = node + 1;
+                return Err(format!(
+                    "network: node {node} was trained from {min:e} to {max:e} mm, but lies from {low} to {high} mm"
+                ));
+            }
         }
     }
     Ok(())
 }
 
-fn check_errors(place: &str, errors: &TestErrors, problem: &Problem) -> Result<(), String> {
+/// Describes what is wrong with errors of these targets, if anything is.
+fn defect_of_errors(errors: &TestErrors, problem: &Problem) -> Option<String> {
     let expected = problem.targets.len();
     match errors {
-        TestErrors::Nodes(_) if !problem.has_nodes() => return Err(format!("{place}: the targets are not nodes")),
-        TestErrors::Targets(_) if problem.has_nodes() => return Err(format!("{place}: the targets are nodes")),
+        TestErrors::Nodes(_) if !problem.has_nodes() => Some(": the targets are not nodes".to_owned()),
+        TestErrors::Targets(_) if problem.has_nodes() => Some(": the targets are nodes".to_owned()),
         TestErrors::Targets(found) if found.len() != expected => {
-            return Err(format!("{place}: {} of them for {expected} targets", found.len()));
+            Some(format!(": {} of them for {expected} targets", found.len()))
         }
-        _ => {}
+        _ => errors
+            .infinite_figure()
+            .map(|name| format!(".{name}: it is not a finite number")),
     }
-    let infinite = errors.infinite_figure();
-    infinite.map_or(Ok(()), |name| Err(format!("{place}.{name}: it is not a finite number")))
 }
 
 #[cfg(test)]

@@ -93,8 +93,7 @@ impl RecipeFile {
     /// scene.
     pub fn load(path: &Path) -> Result<RecipeSource, DocumentError> {
         let bytes = KIND.read(path)?;
-        let document: Document =
-            serde_json::from_slice(&bytes).map_err(|error| KIND.damaged(path, error.to_string()))?;
+        let document: Document = serde_json::from_slice(&bytes).map_err(|error| KIND.damaged(path, error))?;
         match document.source {
             RecipeSource::Recording(plan) => {
                 let plan = plan.restored(folder_of(path));
@@ -120,7 +119,10 @@ impl RecipeFile {
     pub fn load_recording(path: &Path) -> Result<Plan, DocumentError> {
         match Self::load(path)? {
             RecipeSource::Recording(plan) => Ok(plan),
-            RecipeSource::Simulated(_) => Err(DocumentError::SimulatedRecipe(path.to_owned())),
+            RecipeSource::Simulated(_) => {
+                let defect = "is the recipe of a simulated array: give the recipe of a recording";
+                Err(DocumentError::unusable(path, defect))
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use std::{
     collections::BTreeSet,
+    ffi::OsStr,
     fs, io,
     path::{Path, PathBuf},
     sync::Arc,
@@ -155,33 +156,29 @@ impl RunFolder {
             }
         }
         let mut problems = Vec::new();
-        match ids(path) {
-            Ok(ids) => {
-                runs.retain(|run| ids.contains(&run.id) || unwritten.contains(&run.id));
-                for id in ids {
-                    let Err(place) = runs.binary_search_by_key(&id, |run| run.id) else {
-                        continue;
-                    };
-                    match NetworkFile::load(&run_path(path, id)) {
-                        Ok(file) => runs.insert(place, KeptRun::new(id, &file, runs)),
-                        // Another program has removed it just now.
-                        Err(_) if !run_path(path, id).exists() => {}
-                        Err(error) => problems.push(left_out(&error)),
-                    }
-                }
-            }
+        let ids = match ids(path) {
+            Ok(ids) => ids,
             Err(error) => {
                 let (path, cause) = (path.display(), system_cause(&error));
                 return self.untold(vec![format!("cannot read the run list '{path}': {cause}")]);
             }
+        };
+        runs.retain(|run| ids.contains(&run.id) || unwritten.contains(&run.id));
+        for id in ids {
+            let Err(place) = runs.binary_search_by_key(&id, |run| run.id) else {
+                continue;
+            };
+            match NetworkFile::load(&run_path(path, id)) {
+                Ok(file) => runs.insert(place, KeptRun::new(id, &file, runs)),
+                // Another program has removed it just now.
+                Err(_) if !run_path(path, id).exists() => {}
+                Err(error) => problems.push(left_out(&error)),
+            }
         }
-        for run in &mut *runs {
-            match read::<String>(&name_path(path, run.id)) {
-                Ok(name) => run.name = name.map_or_else(|| run.name.clone(), |name| clean_name(&name)),
-                Err(defect) => {
-                    let name = &run.name;
-                    problems.push(format!("the name of a run cannot be read: {defect}; rename '{name}'"));
-                }
+        for KeptRun { id, name, .. } in &mut *runs {
+            match read::<String>(&name_path(path, *id)) {
+                Ok(found) => *name = found.map_or_else(|| name.clone(), |found| clean_name(&found)),
+                Err(defect) => problems.push(format!("the name of a run cannot be read: {defect}; rename '{name}'")),
             }
         }
         match read(&pinned_path(path)) {
@@ -246,14 +243,11 @@ impl RunFolder {
             }
             run.id = run.id.wrapping_add(1);
         };
-        let is_there = self
-            .path
-            .as_ref()
-            .is_some_and(|folder| run_path(folder, run.id).exists());
-        if !is_there {
-            self.unwritten.insert(run.id);
+        let id = run.id;
+        runs.insert(runs.partition_point(|other| other.id < id), run);
+        if self.folder_of(id).is_none() {
+            self.unwritten.insert(id);
         }
-        runs.insert(runs.partition_point(|other| other.id < run.id), run);
         written
     }
 
@@ -346,18 +340,11 @@ fn pinned_path(folder: &Path) -> PathBuf {
 fn ids(folder: &Path) -> io::Result<Vec<u64>> {
     let mut ids = Vec::new();
     for entry in fs::read_dir(folder)? {
-        let entry = entry?;
-        let name = entry.file_name();
-        // Opening a pipe would wait for a program that writes to it.
-        if !fs::metadata(entry.path()).is_ok_and(|found| found.is_file()) {
-            continue;
-        }
-        let id = name.to_str().and_then(|name| {
-            let id = name.strip_prefix("run-")?.strip_suffix(".json")?.parse().ok()?;
-            // Excludes "run-007.json", which no program writes.
-            (run_path(Path::new(""), id) == Path::new(name)).then_some(id)
-        });
-        ids.extend(id);
+        let path = entry?.path();
+        let name = path.file_name().and_then(OsStr::to_str);
+        let id = name.and_then(|name| name.strip_prefix("run-")?.strip_suffix(".json")?.parse().ok());
+        // No program writes "run-007.json", and opening a pipe would wait for a program that writes to it.
+        ids.extend(id.filter(|id| path == run_path(folder, *id) && path.is_file()));
     }
     ids.sort_unstable();
     Ok(ids)
@@ -374,7 +361,7 @@ fn write(path: &Path, value: &impl Serialize) -> Result<(), WriteError> {
 /// The file cannot be read, is of another kind or version, or is damaged.
 fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, DocumentError> {
     match fs::metadata(path) {
-        Ok(found) if !found.is_file() => Err(KIND.damaged(path, "it is not a file".to_owned())),
+        Ok(found) if !found.is_file() => Err(KIND.damaged(path, "it is not a file")),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         _ => KIND.load(path).map(|(_, value)| Some(value)),
     }

@@ -124,17 +124,16 @@ impl TrainingRecord {
     /// Captures the record, until a past epoch, of the start that was best at that epoch.
     pub(super) fn until(run: &Run, past: &PastNetwork) -> Self {
         let trainer = run.trainers().get(past.start).unwrap_or_else(|| run.leader());
-        let mut history = trainer.history().to_vec();
-        history.retain(|record| record.epoch <= past.epoch);
-        let mut stages = trainer.stages().to_vec();
-        stages.retain(|stage| stage.first_epoch <= past.epoch);
+        let history = { trainer.history().iter() }.filter(|record| record.epoch <= past.epoch);
+        let stages = { trainer.stages().iter() }.filter(|stage| stage.first_epoch <= past.epoch);
+        let history = Vec::from_iter(history.copied());
         Self {
             stop_reason: Some(StopReason::Stopped),
             best_epoch: past.best_epoch,
             epochs: history.last().map_or(0, |record| record.epoch),
             seconds: past.elapsed.as_secs_f64(),
             history,
-            stages,
+            stages: stages.copied().collect(),
             // The states of the other starts at that epoch are not kept.
             starts: Vec::new(),
         }

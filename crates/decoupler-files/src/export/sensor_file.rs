@@ -25,7 +25,7 @@ impl SensorFile {
     /// The file cannot be read, is of another kind or version, or its sensor is impossible.
     pub fn load(path: &Path) -> Result<SensorModel, DocumentError> {
         let (_, sensor): (_, SensorModel) = KIND.load(path)?;
-        let checked = sensor.check().map_err(|error| KIND.damaged(path, error.to_string()));
+        let checked = sensor.check().map_err(|error| KIND.damaged(path, error));
         checked.map(|()| sensor)
     }
 }

@@ -36,70 +36,61 @@ pub fn error_table(tables: &[ErrorTable]) -> Table {
 /// Returns the table of measured decoders: for an array a row for each, and the `model_based` errors if they exceed
 /// rounding errors; for a recording a row for each decoder and target.
 pub fn decoder_table(problem: &Problem, reports: &[DecoderReport], model_based: Option<&TestErrors>) -> Table {
-    if problem.has_nodes() {
-        array_decoder_table(reports, model_based.and_then(TestErrors::nodes))
-    } else {
-        recording_decoder_table(problem, reports)
-    }
-}
-
-fn array_decoder_table(reports: &[DecoderReport], model_based: Option<&Errors>) -> Table {
-    let model_based = model_based.filter(|errors| !errors.is_rounding());
-    // Without a report, the errors are those of the model-based decoder.
-    let row = |report: Option<&DecoderReport>, errors: Option<&Errors>| {
-        let name = report.map_or("model-based", |report| report.kind.name(report.precision));
-        let percent = match report {
-            Some(report) => report.errors.percent(),
-            None => errors.and_then(|errors| errors.z_percent),
+    let name = |report: &DecoderReport| cell(DECODER, report.kind.name(report.precision));
+    if !problem.has_nodes() {
+        let row = |report: &DecoderReport, target: &Channel, errors: &TargetErrors| {
+            let measures = [ErrorMeasure::Rmse, ErrorMeasure::R2, ErrorMeasure::RangePercent];
+            let mut cells = vec![name(report), cell(("target", "Target", ""), target.title())];
+            cells.extend(measures.map(|measure| error_cell(measure, measure.of_target(errors))));
+            cells.push(cell(FRAME, report.frame_us));
+            cells.push(cell(("fit_seconds", "fit", "s"), report.fit_seconds));
+            cells
         };
-        let times = model_based.map(|model_based| match report {
-            Some(_) => errors.and_then(|errors| errors.times(model_based)),
-            None => Some(1.0),
-        });
+        return Table::of_rows(reports.iter().flat_map(|report| {
+            let targets = problem.targets.iter().zip(report.errors.targets());
+            targets.map(move |(target, errors)| row(report, target, errors))
+        }));
+    }
+    let model_based = model_based.and_then(TestErrors::nodes);
+    let model_based = model_based.filter(|errors| !errors.is_rounding());
+    let row = |name: (TableColumn, Cell), errors: Option<&Errors>, report: Option<&DecoderReport>| {
         let mut cells = vec![
-            cell(("decoder", "Decoder", ""), name),
-            cell(("z_percent", "Z", "%"), percent),
-            cell(("z_mm", "Z", "mm"), errors.map(|errors| errors.z_mm)),
+            name,
+            error_cell(ErrorMeasure::ZPercent, errors.and_then(|errors| errors.z_percent)),
+            error_cell(ErrorMeasure::ZMm, errors.map(|errors| errors.z_mm)),
         ];
-        cells.extend(times.map(|times| cell(("times_model_based", "times model-based", ""), times)));
+        cells.extend(model_based.map(|exact| cell(TIMES, errors.and_then(|errors| errors.times(exact)))));
         cells.push(cell("residual", report.and_then(|report| report.residual)));
-        cells.push(cell(
-            ("frame_us", "a frame", "µs"),
-            report.map(|report| report.frame_us),
-        ));
+        cells.push(cell(FRAME, report.map(|report| report.frame_us)));
         cells
     };
-    let rows = reports.iter().map(|report| row(Some(report), report.errors.nodes()));
-    Table::of_rows(rows.chain(model_based.map(|errors| row(None, Some(errors)))))
+    let rows = { reports.iter() }.map(|report| row(name(report), report.errors.nodes(), Some(report)));
+    Table::of_rows(rows.chain(model_based.map(|errors| row(cell(DECODER, "model-based"), Some(errors), None))))
 }
 
-fn recording_decoder_table(problem: &Problem, reports: &[DecoderReport]) -> Table {
-    let row = |report: &DecoderReport, target: &Channel, errors: &TargetErrors| {
-        let [rmse, r2, percent] = [ErrorMeasure::Rmse, ErrorMeasure::R2, ErrorMeasure::RangePercent]
-            .map(|measure| error_cell(measure, measure.of_target(errors)));
-        vec![
-            cell(("decoder", "Decoder", ""), report.kind.name(report.precision)),
-            cell(("target", "Target", ""), target.title()),
-            rmse,
-            r2,
-            percent,
-            cell(("frame_us", "a frame", "µs"), report.frame_us),
-            cell(("fit_seconds", "fit", "s"), report.fit_seconds),
-        ]
-    };
-    Table::of_rows(reports.iter().flat_map(|report| {
-        let targets = problem.targets.iter().zip(report.errors.targets());
-        targets.map(move |(target, errors)| row(report, target, errors))
-    }))
-}
+/// A column of a table for readers: name in files, heading and unit.
+type Column = (&'static str, &'static str, &'static str);
 
-fn error_cell(measure: ErrorMeasure, error: Option<f64>) -> (TableColumn, Cell) {
-    let (heading, unit) = measure.heading();
-    let column = TableColumn::new(measure.field(), heading, unit);
-    match measure {
-        ErrorMeasure::R2 => cell(column, Cell::R2(error)),
-        _ => cell(column, error),
+pub(super) const DECODER: Column = ("decoder", "Decoder", "");
+pub(super) const TIMES: Column = ("times_model_based", "times model-based", "");
+pub(super) const FRAME: Column = ("frame_us", "a frame", "µs");
+
+/// Measure by which the errors of an array, or of a recording, are compared.
+pub(super) fn percent_of(is_array: bool) -> ErrorMeasure {
+    match is_array {
+        true => ErrorMeasure::ZPercent,
+        false => ErrorMeasure::RangePercent,
     }
+}
+
+/// Returns an error with its column.
+pub(super) fn error_cell(measure: ErrorMeasure, error: Option<f64>) -> (TableColumn, Cell) {
+    let (heading, unit) = measure.heading();
+    let value = match measure {
+        ErrorMeasure::R2 => Cell::R2(error),
+        _ => error.into(),
+    };
+    cell((measure.field(), heading, unit), value)
 }
 
 /// Definitions of the columns of [`search_table`].
@@ -119,17 +110,18 @@ const SEARCH_MEANINGS: [&str; 8] = [
 /// Returns the candidates of a search as a table; the choice is marked.
 pub fn search_table(record: &AutoRecord) -> Table {
     let row = |(place, tried): (usize, &Tried)| {
-        let share = (tried.share > 0.0).then(|| Cell::from(100.0 * tried.share));
+        let share = match tried.share > 0.0 {
+            true => Cell::from(100.0 * tried.share),
+            false => "".into(),
+        };
         let mark = if place == record.chosen { "*" } else { "" };
+        let cut_off = if tried.is_cut_off { "+" } else { "" };
         let (begin, epochs) = match tried.model {
-            TriedModel::Network { begin, epochs, .. } => (
-                begin.to_string(),
-                format!("{epochs}{}", if tried.is_cut_off { "+" } else { "" }),
-            ),
-            _ => (String::new(), String::new()),
+            TriedModel::Network { begin, epochs, .. } => (begin.to_string(), format!("{epochs}{cut_off}")),
+            _ => Default::default(),
         };
         vec![
-            cell(("share_percent", "share", "%"), share.unwrap_or_else(|| "".into())),
+            cell(("share_percent", "share", "%"), share),
             cell(("features", "inputs", ""), tried.features()),
             cell("model", format!("{}{mark}", tried.model)),
             cell(("begin", "begins at", ""), begin),
@@ -197,16 +189,14 @@ pub fn describe_determinacy(
     measured: &[Result<Determination, Undetermined>],
     is_combined: bool,
 ) -> Vec<String> {
-    let explains = if is_combined {
-        "the chosen combination explains"
-    } else {
-        "the network explains"
+    let explains = match is_combined {
+        true => "the chosen combination explains",
+        false => "the network explains",
     };
     let of = |(target, measured): (&Channel, &Result<Determination, Undetermined>)| match measured {
         Err(cause) => Some(format!("{}: {cause}", target.name)),
-        Ok(measured) => {
-            (measured.determinacy() != Determinacy::Determined).then(|| measured.sentence(&target.name, explains))
-        }
+        Ok(found) if found.determinacy() == Determinacy::Determined => None,
+        Ok(found) => Some(found.sentence(&target.name, explains)),
     };
     targets.iter().zip(measured).filter_map(of).collect()
 }

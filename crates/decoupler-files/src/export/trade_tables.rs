@@ -2,12 +2,16 @@ use std::time::Duration;
 
 use decoupler_core::{
     decoupling::Precision,
-    evaluation::{RunSettings, TradeOffPoint, TrainingSize, Workload},
+    evaluation::{ErrorMeasure, RunSettings, TradeOffPoint, TrainingSize, Workload},
     machine::MemoryBudget,
     text::counted,
 };
 
-use super::{Cell, Table, format_duration, table::cell};
+use super::{
+    Table, format_duration,
+    table::cell,
+    tables::{DECODER, FRAME, TIMES, error_cell, percent_of},
+};
 use crate::{
     figure::{TradeOffCost, TradeOffLevel, point_name},
     machine::memory_budget,
@@ -15,48 +19,47 @@ use crate::{
 
 /// Returns the table of all points of all levels with all their figures, for programs.
 pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
+    /// Columns that a recording does not have.
+    const OF_ARRAYS: [&str; 7] = [
+        "noise",
+        "preset",
+        "samples",
+        "z_mm",
+        "residual",
+        "model_based_z_percent",
+        "model_based_z_mm",
+    ];
     let is_array = levels.iter().any(|level| level.noise.is_some());
-    let percent = if is_array { "z_percent" } else { "percent_of_range" };
-    let of_array = |field: &'static str, value: Option<Cell>| is_array.then(|| cell(field, value));
     let row = |noise: Option<f64>, point: &TradeOffPoint, on_decoding: bool, on_training: bool| {
         let report = &point.report;
         let (model_based, nodes) = (point.model_based.as_ref(), report.errors.nodes());
-        let simulation = point.settings.simulation();
-        let mut cells = Vec::new();
-        cells.extend(of_array("noise", noise.map(Cell::from)));
-        cells.extend(of_array("preset", point.preset.map(|preset| preset.to_string().into())));
-        cells.push(cell("decoder", report.kind.to_string()));
-        cells.push(cell(
-            "precision",
-            match report.precision {
-                Precision::Double => "f64",
-                Precision::Single => "f32",
-            },
-        ));
-        cells.push(cell("hidden", point.hidden()));
-        cells.push(cell("method", point.method().map(|method| method.short_name())));
-        cells.extend(of_array(
-            "samples",
-            simulation.map(|simulation| simulation.samples.into()),
-        ));
-        let epochs = point.settings.training.stopping.epochs;
-        cells.push(cell("epochs", point.hidden().map(|_| epochs)));
-        cells.push(cell(percent, report.errors.percent()));
-        cells.extend(of_array("z_mm", nodes.map(|errors| errors.z_mm.into())));
-        cells.push(cell("frame_us", report.frame_us));
-        cells.push(cell("training_s", point.training_seconds));
-        cells.extend(of_array("residual", report.residual.map(Cell::from)));
-        cells.extend(of_array(
-            "model_based_z_percent",
-            model_based.map(|errors| errors.z_percent.into()),
-        ));
-        cells.extend(of_array(
-            "model_based_z_mm",
-            model_based.map(|errors| errors.z_mm.into()),
-        ));
-        cells.push(cell("on_decoding_front", on_decoding.to_string()));
-        cells.push(cell("on_training_front", on_training.to_string()));
-        cells
+        let settings = &point.settings;
+        let precision = match report.precision {
+            Precision::Double => "f64",
+            Precision::Single => "f32",
+        };
+        let hidden = point.hidden();
+        let cells = [
+            cell("noise", noise),
+            cell("preset", point.preset.map(|preset| preset.to_string())),
+            cell("decoder", report.kind.to_string()),
+            cell("precision", precision),
+            cell("hidden", hidden),
+            cell("method", point.method().map(|method| method.short_name())),
+            cell("samples", settings.simulation().map(|array| array.samples)),
+            cell("epochs", hidden.map(|_| settings.training.stopping.epochs)),
+            cell(percent_of(is_array).field(), report.errors.percent()),
+            cell("z_mm", nodes.map(|errors| errors.z_mm)),
+            cell("frame_us", report.frame_us),
+            cell("training_s", point.training_seconds),
+            cell("residual", report.residual),
+            cell("model_based_z_percent", model_based.map(|errors| errors.z_percent)),
+            cell("model_based_z_mm", model_based.map(|errors| errors.z_mm)),
+            cell("on_decoding_front", on_decoding.to_string()),
+            cell("on_training_front", on_training.to_string()),
+        ];
+        let cells = cells.into_iter();
+        Vec::from_iter(cells.filter(|(column, _)| is_array || !OF_ARRAYS.contains(&&*column.field)))
     };
     Table::of_rows(levels.iter().flat_map(|level| {
         let [decoding, training] = TradeOffCost::ALL.map(|cost| level.front(cost));
@@ -69,23 +72,19 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
 pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
     let mut points: Vec<&TradeOffPoint> = level.points.iter().collect();
     points.sort_by(|a, b| a.report.frame_us.total_cmp(&b.report.frame_us));
+    let is_array = level.noise.is_some();
+    // Ratios to rounding are meaningless.
     let has_ratio = points.iter().any(|point| point.to_model_based().is_some());
     let row = |point: &TradeOffPoint| {
-        let report = &point.report;
-        let percent = match level.noise {
-            Some(_) => ("z_percent", "Z", "%"),
-            None => ("percent_of_range", "MAE", "% of range"),
-        };
-        let z_mm = report.errors.nodes().map(|errors| errors.z_mm);
+        let errors = &point.report.errors;
         let mut cells = vec![
-            cell(("decoder", "Decoder", ""), point_name(point)),
-            cell(percent, report.errors.percent()),
+            cell(DECODER, point_name(point)),
+            error_cell(percent_of(is_array), errors.percent()),
         ];
-        cells.extend(level.noise.map(|_| cell(("z_mm", "Z", "mm"), z_mm)));
-        // Ratios to rounding are meaningless.
-        let times = ("times_model_based", "times model-based", "");
-        cells.extend(has_ratio.then(|| cell(times, point.to_model_based())));
-        cells.push(cell(("frame_us", "a frame", "µs"), report.frame_us));
+        let z_mm = || error_cell(ErrorMeasure::ZMm, errors.nodes().map(|errors| errors.z_mm));
+        cells.extend(is_array.then(z_mm));
+        cells.extend(has_ratio.then(|| cell(TIMES, point.to_model_based())));
+        cells.push(cell(FRAME, point.report.frame_us));
         cells.push(cell(("training_s", "training", "s"), point.training_seconds));
         cells
     };
@@ -101,14 +100,17 @@ pub fn describe_workload(workload: &Workload) -> String {
         MemoryBudget::Assumed(_) => String::new(),
     };
     format!(
-        "about {}{machine} of memory; on one thread about {} to draw the samples and {} per epoch, {} for {}; the \
-         figures of the decoders take additional time",
+        "about {}{machine} of memory; on one thread about {} to draw the samples and {}; the figures of the decoders take \
+         additional time",
         gigabytes(workload.bytes),
         format_duration(workload.drawing_time()),
-        format_duration(workload.epoch_time()),
-        format_duration(workload.training_time()),
-        counted(workload.epochs, "epoch")
+        describe_epochs(workload)
     )
+}
+
+fn describe_epochs(workload: &Workload) -> String {
+    let [epoch, all] = [workload.epoch_time(), workload.training_time()].map(format_duration);
+    format!("{epoch} per epoch, {all} for {}", counted(workload.epochs, "epoch"))
 }
 
 /// Describes the time that a training on a recording will take on this machine, and if it is more than a minute, what
@@ -122,20 +124,12 @@ pub fn describe_recorded_workload(settings: &RunSettings, size: TrainingSize) ->
     if all_epochs < SHORT {
         return None;
     }
-    let mut text = format!(
-        "on one thread about {} per epoch, {} for {}",
-        format_duration(workload.epoch_time()),
-        format_duration(all_epochs),
-        counted(workload.epochs, "epoch")
-    );
+    let mut text = format!("on one thread about {}", describe_epochs(&workload));
     if all_epochs > LONG {
         let faster = workload.faster_methods(settings, size).into_iter();
         let faster = faster.map(|(method, time)| {
-            format!(
-                "{method} ({}) takes about {}",
-                method.short_name(),
-                format_duration(time)
-            )
+            let (name, time) = (method.short_name(), format_duration(time));
+            format!("{method} ({name}) takes about {time}")
         });
         let faster = Vec::from_iter(faster.chain(["fewer hidden nodes or epochs take less".to_owned()]));
         text += &format!("; {}", faster.join(", "));

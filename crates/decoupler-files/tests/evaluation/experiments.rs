@@ -501,8 +501,8 @@ fn tables_of_a_recording_have_its_error_measures_and_target_names() {
         panic!("the samples are recorded");
     };
     results.problem = Some(Arc::clone(problem));
-    let table = ExperimentTable::new(&results);
-    let headings: Vec<_> = table.columns.iter().map(|column| column.heading).collect();
+    let ExperimentTable { table, .. } = ExperimentTable::new(&results);
+    let headings: Vec<_> = table.columns.iter().map(|column| column.heading.as_str()).collect();
     assert_eq!(
         headings,
         [

@@ -5,8 +5,7 @@ use std::time::Instant;
 use decoupler_core::text::counted;
 use decoupler_files::{
     export::{
-        Cell, ExperimentColumn, ExperimentColumnKind, ExperimentTable, describe_conditions, describe_failures,
-        describe_worse_than_mean,
+        Cell, ExperimentColumnKind, ExperimentTable, describe_conditions, describe_failures, describe_worse_than_mean,
     },
     figure::{Figure, HeatMap},
 };
@@ -252,7 +251,7 @@ pub fn results_card_height(ui: &Ui, outcome: &Outcome, width: f32) -> f32 {
     let conditions = describe_conditions(&outcome.results.experiment);
     let texts = text_size(ui, conditions, type_size().note, width).y + note_size(ui, &outcome.table, width).y;
     let title = space(7);
-    let rows = space(6) * (outcome.table.rows.len() as f32 + 1.0);
+    let rows = space(6) * (outcome.table.table.rows.len() as f32 + 1.0);
     // Gaps between the four.
     (MARGINS + title + texts + rows + space(5)).ceil()
 }
@@ -289,58 +288,55 @@ fn open_ui(ui: &mut Ui, outcome: &Outcome, marked: Option<usize>, shared: &Share
 pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, shared: &Shared, effects: &mut Vec<Effect>) {
     let palette = &Theme::of(ui).palette;
     let axes = outcome.results.experiment.axes().count();
-    let headings = &outcome.table.columns;
+    let (headings, kinds) = (&outcome.table.table.columns, &outcome.table.kinds);
     let rounded = |row: &Vec<Cell>| Vec::from_iter(row.iter().map(Cell::rounded));
-    let texts = Vec::from_iter(outcome.table.rows.iter().map(rounded));
-    let column = |(place, of_table): (usize, &ExperimentColumn)| {
+    let texts = Vec::from_iter(outcome.table.table.rows.iter().map(rounded));
+    let column = |place: usize| {
+        let heading = &headings[place].heading;
         let texts = texts.iter().map(|row| row[place].as_str());
         let column = if place < axes {
-            TableColumn::text(of_table.heading)
+            TableColumn::text(heading)
         } else {
-            TableColumn::figure(of_table.heading)
+            TableColumn::figure(heading)
         };
         column.width(ColumnWidth::of_longest(texts))
     };
-    let columns: Vec<TableColumn<'_>> = headings.iter().enumerate().map(column).collect();
+    let columns: Vec<TableColumn<'_>> = (0..headings.len()).map(column).collect();
     // An axis is sorted by the places in its list.
     let figure = |cell: usize, column: usize| {
         let of_results = &outcome.results.cells[cell];
         let value = match column {
             0 => Some(of_results.column as f64),
             1 if axes > 1 => Some(of_results.row as f64),
-            _ => outcome.table.rows[cell].get(column).and_then(Cell::number),
+            _ => outcome.table.table.rows[cell].get(column).and_then(Cell::number),
         };
         (value, "")
     };
-    let order = look.sort.order(outcome.table.rows.len(), figure);
+    let order = look.sort.order(outcome.table.table.rows.len(), figure);
     let row = |place: usize| {
         let number = order[place];
         let texts = &texts[number];
         let name = texts[..axes].join(", ");
         let loses = loses_to_linear_map(outcome, number);
-        let cells = headings
-            .iter()
-            .zip(texts)
-            .enumerate()
-            .map(|(column, (of_table, text))| {
-                let is_median = of_table.kind == ExperimentColumnKind::Ranking;
-                let is_beaten = loses && of_table.kind == ExperimentColumnKind::Linear;
-                let colour = match of_table.kind {
-                    ExperimentColumnKind::Ranking => palette.accent,
-                    ExperimentColumnKind::Published => palette.dim,
-                    _ if is_beaten => palette.warning,
-                    _ => palette.text,
-                };
-                let meaning = if is_beaten {
-                    "The linear baseline is more accurate here than the network."
-                } else {
-                    ""
-                };
-                TableCell::new(text)
-                    .colour(colour)
-                    .strong(is_median || column < axes)
-                    .meaning(meaning)
-            });
+        let cells = kinds.iter().zip(texts).enumerate().map(|(column, (&kind, text))| {
+            let is_median = kind == ExperimentColumnKind::Ranking;
+            let is_beaten = loses && kind == ExperimentColumnKind::Linear;
+            let colour = match kind {
+                ExperimentColumnKind::Ranking => palette.accent,
+                ExperimentColumnKind::Published => palette.dim,
+                _ if is_beaten => palette.warning,
+                _ => palette.text,
+            };
+            let meaning = if is_beaten {
+                "The linear baseline is more accurate here than the network."
+            } else {
+                ""
+            };
+            TableCell::new(text)
+                .colour(colour)
+                .strong(is_median || column < axes)
+                .meaning(meaning)
+        });
         TableRow::new(cells)
             .labelled(format!("Cell {name}"))
             .named(name)

@@ -29,8 +29,7 @@ impl AtomicFolder {
         let name = target.file_name().ok_or_else(exists)?;
         let parent = folder_of(target);
         if !parent.is_dir() {
-            let (path, folder) = (target.to_owned(), parent.to_owned());
-            return Err(WriteError::NoFolder { path, folder }.into());
+            return Err(WriteError::no_folder(target, parent).into());
         }
         if fs::symlink_metadata(target).is_ok() && !is_empty_folder(target) {
             return Err(exists());
@@ -69,7 +68,7 @@ impl AtomicFolder {
         if is_empty_folder(&self.target) {
             fs::remove_dir(&self.target).map_err(refused)?;
         }
-        self.folder.persist(&self.target).map_err(refused)?;
+        self.folder.persist(&self.target, true).map_err(refused)?;
         self.files.sort();
         Ok(self.files)
     }

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::import::{DialectChoice, Plan, Recipe, Setup};
+use crate::import::{DialectChoice, FileSet, Plan, Recipe, Setup};
 use decoupler_core::{
     dataset::{Division, Memory, Simulation, Span},
     evaluation::{RUN_OPTIONS, RunOption, RunSettings},
@@ -196,9 +196,7 @@ pub(super) fn file_options(plan: &Plan, recipe: Option<&Path>) -> Vec<GivenOptio
     };
     if let Some(test) = &plan.test {
         let names = ["test-data", "test-join"];
-        options.extend(set_options(&test.data, &test.join, names));
-        let more = test.append.iter();
-        options.extend(more.flat_map(|set| set_options(&set.data, &set.join, names)));
+        options.extend(set_options(&test.data, &test.join, &test.append, names));
     }
     options
 }
@@ -222,10 +220,16 @@ pub(super) fn division_options(plan: &Plan, usual: Option<f64>) -> Vec<GivenOpti
     options
 }
 
-fn set_options(data: &Path, join: &[PathBuf], [data_name, join_name]: [&'static str; 2]) -> Vec<GivenOption> {
-    let join = join.iter().map(|file| (join_name.into(), file.display().to_string()));
-    let data = (data_name.into(), data.display().to_string());
-    std::iter::once(data).chain(join).collect()
+/// Options with the files of the first set and of those appended to it.
+fn set_options(data: &Path, join: &[PathBuf], append: &[FileSet], names: [&'static str; 2]) -> Vec<GivenOption> {
+    let [of_data, of_join] = names.map(|name| move |file: &Path| (name.into(), file.display().to_string()));
+    let mut options = Vec::new();
+    let more = append.iter().map(|set| (&*set.data, &*set.join));
+    for (data, join) in std::iter::once((data, join)).chain(more) {
+        options.push(of_data(data));
+        options.extend(join.iter().map(|file| of_join(file)));
+    }
+    options
 }
 
 fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
@@ -254,12 +258,7 @@ fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
         positions,
     } = recipe;
     let joined = Vec::from_iter(join.iter().map(|joined| joined.file.clone()));
-    let mut options = set_options(data, &joined, ["data", "join"]);
-    options.extend(
-        append
-            .iter()
-            .flat_map(|set| set_options(&set.data, &set.join, ["data", "join"])),
-    );
+    let mut options = set_options(data, &joined, append, ["data", "join"]);
     let mut times = Vec::from_iter(join.iter().filter_map(|joined| joined.time.clone()));
     // One for all, or one for each.
     if times.windows(2).all(|pair| pair[0] == pair[1]) {

@@ -1,7 +1,5 @@
 //! Blocks of which a report consists, and their rendering as HTML.
 
-use std::fmt::Write as _;
-
 use crate::{
     export::{Table, figures::dark_style, table::escaped_html},
     figure::Figure,
@@ -59,10 +57,7 @@ pub(super) fn text(blocks: &[Block]) -> String {
 pub(super) fn document(title: &str, blocks: &[Block]) -> String {
     let title = escaped_html(title);
     let mut body = format!("<section class=\"head\">\n<h1>{title}</h1>\n");
-    for (place, block) in blocks.iter().enumerate() {
-        // Writing to a string cannot fail.
-        let _ = write!(body, "{}", block.html(place));
-    }
+    body.extend(blocks.iter().enumerate().map(|(place, block)| block.html(place)));
     let (style, dark) = (include_str!("style.css"), dark_style());
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\

@@ -207,9 +207,8 @@ impl RunReport<'_> {
     fn summary(&self) -> String {
         let Self { file, .. } = *self;
         let training = &file.training;
-        let reason = training
-            .stop_reason
-            .map_or("not ended".to_owned(), |reason| reason.to_string());
+        let reason = training.stop_reason;
+        let reason = reason.map_or("not ended".to_owned(), |reason| reason.to_string());
         let time = Duration::try_from_secs_f64(training.seconds).unwrap_or_default();
         let error = format_percent(file.scores.network.percent());
         let error = match file.scores.network {
@@ -312,10 +311,8 @@ impl RunReport<'_> {
                 RowModel::Each => "a network for each",
                 RowModel::Shared => "one network for all",
             };
-            let rows = file
-                .row_wires
-                .as_ref()
-                .map(|rows| format!("{}, {networks}", rows.len()));
+            let rows = file.row_wires.as_ref();
+            let rows = rows.map(|rows| format!("{}, {networks}", rows.len()));
             add("row-wires", &rows.as_deref().unwrap_or("not known"));
         }
         for RunOption { setting, .. } in &RUN_OPTIONS {

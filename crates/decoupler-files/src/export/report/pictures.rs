@@ -44,33 +44,30 @@ pub(super) fn pictures(
         "Gradient and the method's own quantities.".to_owned(),
         training_state_figure(&training.history, &training.stages),
     );
-    let mut add_errors = |index: Option<usize>, of: Decoded<'_>, captions: [String; 2]| {
+    let targets = || file.problem.targets.iter().take(MAX_TARGETS);
+    let decoded = match of_array {
+        Some(_) => vec![(
+            (None, Decoded::Nodes),
+            "Decoupled against actual z of the nodes of the test set.".to_owned(),
+            "Distribution of the z errors of the test set.".to_owned(),
+        )],
+        None => Vec::from_iter({ targets().enumerate() }.map(|(index, target)| {
+            let name = &target.name;
+            (
+                (Some(index), Decoded::Target(target)),
+                format!("Decoded against actual values of {name} in the test set."),
+                format!("Distribution of the errors of {name} in the test set."),
+            )
+        })),
+    };
+    for ((index, of), regression, histogram) in decoded {
         let pairs = value_pairs(test, answers, index);
         let line = RegressionLine::of(pairs.iter().copied());
-        let [regression, histogram] = captions;
-        add(
-            regression,
-            regression_figure((pairs.len(), &|pair| pairs[pair]), &line, of),
-        );
+        let point = |pair: usize| pairs[pair];
+        add(regression, regression_figure((pairs.len(), &point), &line, of));
         add(histogram, histogram_figure(&pairs, None, of));
-    };
-    if of_array.is_some() {
-        let captions = [
-            "Decoupled against actual z of the nodes of the test set.",
-            "Distribution of the z errors of the test set.",
-        ];
-        add_errors(None, Decoded::Nodes, captions.map(str::to_owned));
-        return pictures;
     }
-    let targets = || file.problem.targets.iter().take(MAX_TARGETS);
-    for (index, target) in targets().enumerate() {
-        let name = &target.name;
-        let captions = [
-            format!("Decoded against actual values of {name} in the test set."),
-            format!("Distribution of the errors of {name} in the test set."),
-        ];
-        add_errors(Some(index), Decoded::Target(target), captions);
-    }
+    // An array has no loops.
     for (target, found) in targets().zip(loops) {
         if let Some(found) = found {
             let name = &target.name;

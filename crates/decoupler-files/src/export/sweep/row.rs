@@ -1,7 +1,6 @@
 use std::{
     cmp::Ordering,
     collections::{BTreeMap, BTreeSet},
-    ffi::OsStr,
     io::{self, Write},
     path::{Path, PathBuf},
 };
@@ -32,17 +31,15 @@ pub struct SweepRow {
 
 impl From<Trial> for SweepRow {
     fn from(trial: Trial) -> Self {
-        let mut time = BTreeMap::from([("seconds".to_owned(), Value::from(trial.seconds))]);
-        let trial_id = trial.id();
-        let mut result = trial.report;
-        take_times(&mut result, "", &mut time);
-        Self {
-            trial: trial_id,
+        let mut row = Self {
+            trial: trial.id(),
             program: trial.program,
             options: trial.options,
-            result,
-            time,
-        }
+            result: trial.report,
+            time: BTreeMap::from([("seconds".to_owned(), trial.seconds.into())]),
+        };
+        take_times(&mut row.result, "", &mut row.time);
+        row
     }
 }
 
@@ -73,25 +70,23 @@ impl SweepRow {
 
     /// Cells of the row. Results that repeat an option, and lists of objects, are left out.
     fn cells(&self) -> Cells {
-        let mut cells = Cells::from([
-            ((0, "trial".to_owned()), self.trial.to_string()),
-            ((1, "program".to_owned()), self.program.clone()),
-        ]);
-        let options = self.options.iter().map(|(option, value)| ((2, option.clone()), value));
-        let times = self
-            .time
-            .iter()
-            .map(|(place, value)| ((4, format!("time.{place}")), value));
-        cells.extend(
-            options
-                .chain(times)
-                .map(|(column, value)| (column, text(value).unwrap_or_default())),
-        );
+        let mut cells = Cells::new();
+        let mut add = |kind: u8, heading: String, value: Option<String>| {
+            cells.extend(value.map(|value| ((kind, heading), value)));
+        };
+        add(0, "trial".to_owned(), Some(self.trial.to_string()));
+        add(1, "program".to_owned(), Some(self.program.clone()));
+        for (option, value) in &self.options {
+            add(2, option.clone(), Some(text(value).unwrap_or_default()));
+        }
         let fields = self.result.as_object().into_iter().flatten();
         for (name, value) in fields.filter(|(name, _)| !self.is_told_by_options(name)) {
             flatten(value, name, &mut |place, value| {
-                cells.extend(text(value).map(|text| ((3, format!("result.{place}")), text)));
+                add(3, format!("result.{place}"), text(value));
             });
+        }
+        for (place, value) in &self.time {
+            add(4, format!("time.{place}"), Some(text(value).unwrap_or_default()));
         }
         cells
     }
@@ -108,10 +103,8 @@ impl SweepRow {
 fn take_times(value: &mut Value, place: &str, times: &mut BTreeMap<String, Value>) {
     match value {
         Value::Object(fields) => {
-            let found = TIMES
-                .iter()
-                .filter_map(|name| Some((joined(place, name), fields.remove(*name)?)));
-            times.extend(found);
+            let found = |name: &str| Some((joined(place, name), fields.remove(name)?));
+            times.extend(TIMES.into_iter().filter_map(found));
             for (name, value) in fields {
                 take_times(value, &joined(place, name), times);
             }
@@ -161,15 +154,10 @@ fn text(value: &Value) -> Option<String> {
         Value::Null => Some(String::new()),
         Value::String(text) => Some(text.clone()),
         Value::Array(values) => {
-            let texts: Option<Vec<_>> = values.iter().map(|value| value.as_str()).collect();
+            let texts = values.iter().map(Value::as_str).collect::<Option<Vec<_>>>()?;
             // Remarks are sentences; values of an option are words.
-            texts.map(|texts| {
-                texts.join(if texts.iter().any(|text| text.contains(' ')) {
-                    "; "
-                } else {
-                    " "
-                })
-            })
+            let has_sentences = texts.iter().any(|text| text.contains(' '));
+            Some(texts.join(if has_sentences { "; " } else { " " }))
         }
         Value::Object(_) => None,
         value => Some(value.to_string()),
@@ -188,11 +176,10 @@ pub enum SweepTableFormat {
 impl SweepTableFormat {
     /// Returns the format given by the extension of `path`.
     pub fn of(path: &Path) -> Option<Self> {
-        let ending = path.extension().and_then(OsStr::to_str)?;
-        match ending.to_ascii_lowercase().as_str() {
-            "csv" => Some(Self::Csv),
-            "json" => Some(Self::Json),
-            _ => None,
+        let ends_with = |ending| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending));
+        match ends_with("csv") {
+            true => Some(Self::Csv),
+            false => ends_with("json").then_some(Self::Json),
         }
     }
 
@@ -284,10 +271,9 @@ impl MergedSweep {
                 }
             }
         }
-        let unfinished = unfinished.difference(&merged.finished);
-        merged.missing = unfinished
-            .map(|id| format!("trial {id} (begun, not finished)"))
-            .collect();
+        let unfinished =
+            { unfinished.difference(&merged.finished) }.map(|id| format!("trial {id} (begun, not finished)"));
+        merged.missing = unfinished.collect();
         for results in found.into_values() {
             if results.len() == 1 {
                 merged.trials.extend(results.into_values().map(|(_, row)| row));

@@ -1,35 +1,25 @@
-use std::fmt;
-
 use super::{Cell, Table};
 use decoupler_core::text::{begins_formula, inert};
 
 /// Form in which a table is copied into other documents.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::Display)]
 pub enum TableForm {
     /// GitHub-flavoured Markdown, numbers rounded for readers.
     Markdown,
     /// LaTeX for the packages `booktabs` and `siunitx`, numbers rounded for readers and aligned at the decimal point.
+    #[strum(to_string = "LaTeX")]
     Latex,
     /// Columns separated by tabs, numbers with every digit: for spreadsheets.
+    #[strum(to_string = "tab-separated")]
     TabSeparated,
     /// An array of objects by the names of the fields, numbers with every digit: for programs.
+    #[strum(to_string = "JSON")]
     Json,
 }
 
 impl TableForm {
     /// All forms, in the order offered to the user.
     pub const ALL: [Self; 4] = [Self::Markdown, Self::Latex, Self::TabSeparated, Self::Json];
-}
-
-impl fmt::Display for TableForm {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Markdown => "Markdown",
-            Self::Latex => "LaTeX",
-            Self::TabSeparated => "tab-separated",
-            Self::Json => "JSON",
-        })
-    }
 }
 
 impl Table {
