@@ -243,7 +243,7 @@ impl Columns {
 pub fn division(by: SplitBy, validation_fraction: f64) -> Division {
     Division {
         by,
-        validation_fraction,
+        validation_fraction: Some(validation_fraction),
         ..Division::default()
     }
 }

@@ -144,8 +144,8 @@ pub(super) struct RecipeArguments {
     /// Share of the samples held out for testing [default: 0.2]
     #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "test_data")]
     test_fraction: Option<f64>,
-    /// Share of the other samples that selects the best weights and ends the training; 0 for none, which suits the
-    /// default method, and 0.2 the others than br [default: 0]
+    /// Share of the other samples that selects the best weights and ends the training; 0 for none [default: as the method
+    /// of the training needs: 0 for br, 0.2 for the others]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     validation_fraction: Option<f64>,
     /// File joined to --test-data, corresponding to --join; may be repeated
@@ -264,11 +264,6 @@ impl ImportArguments {
             return Err(Failure::Arguments(message.to_owned()));
         }
         expanded("--data", &self.data)
-    }
-
-    /// Returns `true` if the validation share is given in an argument or a recipe.
-    pub(super) fn holds_out(&self) -> bool {
-        self.rest.validation_fraction.is_some() || self.recipe.is_some()
     }
 
     /// Refuses arguments that need a recording.
@@ -428,7 +423,7 @@ impl ImportArguments {
         plan.division = Division {
             by: self.split.unwrap_or(by),
             test_fraction: self.rest.test_fraction.unwrap_or(test_fraction),
-            validation_fraction: self.rest.validation_fraction.unwrap_or(validation_fraction),
+            validation_fraction: self.rest.validation_fraction.or(validation_fraction),
         };
         if !self.test_data.is_empty() {
             let (data, join) = (

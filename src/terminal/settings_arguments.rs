@@ -463,18 +463,14 @@ impl TrainingArguments {
         Ok(settings)
     }
 
-    /// Setup of a new run on samples of `source`, or of the array described by the arguments. `holds_out` is true if the
-    /// validation share of a recording is given; otherwise the method determines it.
-    pub(super) fn setup(&self, source: Option<RecipeSource>, holds_out: bool) -> Result<Setup, Failure> {
-        let mut plan = match source {
+    /// Setup of a new run on samples of `source`, or of the array described by the arguments.
+    pub(super) fn setup(&self, source: Option<RecipeSource>) -> Result<Setup, Failure> {
+        let plan = match source {
             None => return Ok(self.settings(None)?.into()),
             Some(RecipeSource::Simulated(simulation)) => return Ok(self.settings(Some(simulation))?.into()),
             Some(RecipeSource::Recording(plan)) => plan,
         };
         let settings = self.recorded(plan.import.row_wire.is_some())?;
-        if !holds_out {
-            plan.division.validation_fraction = settings.validation_fraction();
-        }
         Ok(Setup::recording(settings, plan))
     }
 

@@ -148,7 +148,7 @@ impl Train {
     /// Setup of a new run.
     fn setup(&self) -> Result<Setup, Failure> {
         let source = self.import.source(&self.training.scene.columns())?;
-        let setup = self.training.setup(source, self.import.holds_out())?;
+        let setup = self.training.setup(source)?;
         let mut settings = *setup.settings();
         if let (Some(path), Some(simulation)) = (&self.sensor, settings.simulation_mut()) {
             simulation.sensor = SensorFile::load(path)?;

@@ -58,7 +58,14 @@ impl From<&Plan> for RecipeSource {
 impl From<&Setup> for RecipeSource {
     fn from(setup: &Setup) -> Self {
         match (setup.plan(), setup.settings().simulation()) {
-            (Some(plan), _) => plan.into(),
+            (Some(plan), _) => {
+                let mut plan = plan.clone();
+                // So that another method holds out what it needs.
+                let division = &mut plan.division;
+                let usual = setup.settings().validation_fraction();
+                division.validation_fraction = division.validation_fraction.filter(|share| *share != usual);
+                Self::Recording(plan)
+            }
             (None, Some(simulation)) => (*simulation).into(),
             (None, None) => unreachable!("the setup of a recording has a plan"),
         }

@@ -95,16 +95,17 @@ impl Setup {
     /// # Panics
     /// If the source of `settings` is simulated.
     pub fn recording(settings: RunSettings, plan: Plan) -> Self {
-        assert!(settings.simulation().is_none(), "the source is a recording");
-        Self {
-            plan: Some(plan),
-            ..settings.into()
-        }
+        Self::of(settings, Some(plan)).expect("the source is a recording")
     }
 
     /// Returns the setup with these settings; `None` unless a plan is given for a measured source and only for that.
-    pub fn of(settings: RunSettings, plan: Option<Plan>) -> Option<Self> {
+    /// The plan holds out for validation what the method needs, unless it gives a share.
+    pub fn of(settings: RunSettings, mut plan: Option<Plan>) -> Option<Self> {
         let is_recording = settings.simulation().is_none();
+        if let Some(plan) = &mut plan {
+            let share = &mut plan.division.validation_fraction;
+            share.get_or_insert(settings.validation_fraction());
+        }
         (is_recording == plan.is_some()).then_some(Self {
             plan,
             ..settings.into()

@@ -365,7 +365,7 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
             let mut plan = setup.plan().unwrap().clone();
             plan.division.by = SplitBy::ALL[place / 2];
             // Levenberg-Marquardt needs samples for validation, Bayesian regularisation none.
-            plan.division.validation_fraction = [0.0, 0.2][place % 2];
+            plan.division.validation_fraction = Some([0.0, 0.2][place % 2]);
             let sets = plan
                 .sets(Path::new(""), seed, &mut |_| ControlFlow::Continue(()))
                 .unwrap();

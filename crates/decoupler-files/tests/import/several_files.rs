@@ -72,7 +72,7 @@ fn rows_of_all_files_follow_one_another_and_each_file_is_a_group() {
         ..Plan::default()
     };
     plan.division.by = SplitBy::Group;
-    plan.division.validation_fraction = 0.0;
+    plan.division.validation_fraction = Some(0.0);
     let sets = plan
         .sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(()))
         .unwrap();

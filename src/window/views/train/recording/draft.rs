@@ -105,6 +105,15 @@ impl Draft {
         draft
     }
 
+    /// Returns this import with this share held out for validation, unless a recipe gives another.
+    pub(super) fn holding_out(mut self, usual: f64) -> Self {
+        let of_recipe = self.of_recipe.iter_mut().flat_map(|plans| plans.iter_mut());
+        for plan in std::iter::once(&mut self.plan).chain(of_recipe) {
+            plan.division.validation_fraction.get_or_insert(usual);
+        }
+        self
+    }
+
     /// Returns this import with the choices of the user in an older one, as far as they fit the files.
     pub(super) fn keeping(mut self, older: &Self) -> Self {
         let stems = self
