@@ -17,10 +17,10 @@ use decoupler_core::{
     text::Named,
 };
 use decoupler_files::{
-    export::{RecipeFile, RecipeSource},
+    export::RecipeFile,
     import::{
         Condition, Decimal, Derived, DialectChoice, Encoding, FileSet, Joined, Missing, Plan, Recipe, Recorded,
-        Separator, TestFiles,
+        Separator,
     },
 };
 
@@ -356,7 +356,12 @@ impl ImportArguments {
                 };
                 let given = std::path::absolute(given).unwrap_or_else(|_| given.clone());
                 let is_named = |path: &PathBuf| path.file_name() == given.file_name();
-                let named = saved.plan.files().find(is_named).filter(|_| !is_named(place));
+                let named = saved
+                    .plan
+                    .files()
+                    .into_iter()
+                    .find(is_named)
+                    .filter(|_| !is_named(place));
                 found = found.relocated(named.as_ref().unwrap_or(place), &given);
                 for path in Vec::from_iter(found.missing().into_iter().map(Path::to_owned)) {
                     let near = path.file_name().map(|name| given.with_file_name(name));
@@ -370,15 +375,15 @@ impl ImportArguments {
     }
 
     /// Source of the samples: a recording, or the simulated array of a recipe; `None` for the array of the arguments.
-    pub(super) fn source(&self, inputs: &[String]) -> Result<Option<RecipeSource>, Failure> {
+    pub(super) fn source(&self, inputs: &[String]) -> Result<Option<RecipeFile>, Failure> {
         if let Some(path) = &self.recipe
-            && let simulated @ RecipeSource::Simulated(_) = RecipeFile::load(path)?
+            && let simulated @ RecipeFile::Simulated(_) = RecipeFile::load(path)?
         {
             self.check_unused()?;
             return Ok(Some(simulated));
         }
         if self.is_given() {
-            return Ok(Some(RecipeSource::Recording(self.plan(inputs)?)));
+            return Ok(Some(RecipeFile::Recording(self.plan(inputs)?)));
         }
         self.check_unused()?;
         Ok(None)
@@ -430,7 +435,7 @@ impl ImportArguments {
                 expanded("--test-data", &self.test_data)?,
                 expanded("--test-join", &self.rest.test_join)?,
             );
-            plan.test = TestFiles::of(file_sets("test-", data, join)?);
+            plan.test = file_sets("test-", data, join)?;
         }
         if plan.division.by == SplitBy::Group && !plan.import.has_groups() {
             let message = "--split group: give the group column with --group, or several files with --data";
@@ -448,8 +453,7 @@ impl ImportArguments {
         }
         let rest = &self.rest;
         let files = file_sets("", expanded("--data", &self.data)?, expanded("--join", &self.join)?)?;
-        let mut files = files.into_iter();
-        let FileSet { data, join } = files.next().unwrap_or_default();
+        let FileSet { data, join, append } = files.unwrap_or_default();
         if rest.join_time.len() > 1 && rest.join_time.len() != join.len() {
             let message = "--join-time: give it once, or once for each joined file of the first --data";
             return Err(Failure::Arguments(message.to_owned()));
@@ -463,7 +467,7 @@ impl ImportArguments {
         Ok(Recipe {
             data,
             join: join.into_iter().enumerate().map(joined).collect(),
-            append: files.collect(),
+            append,
             dialect: rest.dialect(),
             inputs: inputs.to_vec(),
             targets: targets.to_vec(),

@@ -13,7 +13,7 @@ use decoupler_core::{
     text::Named,
     training::TrainingSettings,
 };
-use decoupler_files::{export::RecipeSource, import::Setup};
+use decoupler_files::{export::RecipeFile, import::Setup};
 
 use super::{count, failure::Failure, interruption::check_same};
 
@@ -464,11 +464,11 @@ impl TrainingArguments {
     }
 
     /// Setup of a new run on samples of `source`, or of the array described by the arguments.
-    pub(super) fn setup(&self, source: Option<RecipeSource>) -> Result<Setup, Failure> {
+    pub(super) fn setup(&self, source: Option<RecipeFile>) -> Result<Setup, Failure> {
         let plan = match source {
             None => return Ok(self.settings(None)?.into()),
-            Some(RecipeSource::Simulated(simulation)) => return Ok(self.settings(Some(simulation))?.into()),
-            Some(RecipeSource::Recording(plan)) => plan,
+            Some(RecipeFile::Simulated(simulation)) => return Ok(self.settings(Some(simulation))?.into()),
+            Some(RecipeFile::Recording(plan)) => plan,
         };
         let settings = self.recorded(plan.import.row_wire.is_some())?;
         Ok(Setup::recording(settings, plan))

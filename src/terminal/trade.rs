@@ -237,7 +237,7 @@ impl Trade {
 /// Divides recordings that have already been read by another plan.
 fn divided(recordings: &Recordings, plan: &Plan, seed: Seed) -> Result<RunSets, Failure> {
     let (split, test) = plan.divide(&recordings.training, recordings.test.as_ref(), seed)?;
-    Ok(RunSets::new(split, test).described(recordings.training.problem()))
+    Ok(RunSets::new(split, test).described(recordings.training.problem.clone()))
 }
 
 /// Measures all cases, up to the first failure. Returns the levels with points, and whether all cases were measured

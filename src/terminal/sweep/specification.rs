@@ -8,7 +8,7 @@ use std::{
 use clap::{Arg, ArgAction, Args, Command, FromArgMatches};
 use decoupler_core::{decoupling::DecoderKind, evaluation::RUN_OPTIONS, text::in_one_line};
 use decoupler_files::{
-    export::RecipeSource,
+    export::RecipeFile,
     import::{Plan, Setup},
 };
 use serde::{
@@ -308,12 +308,12 @@ impl TrialArguments {
                 let message = "the specification has a recording; leave --data, --recipe and --inputs out";
                 return Err(Failure::Arguments(message.to_owned()));
             }
-            Some(recording) => Some(RecipeSource::Recording(self.import.divided(recording.clone())?)),
+            Some(recording) => Some(RecipeFile::Recording(self.import.divided(recording.clone())?)),
             None => self.import.source(&columns)?,
         };
         let source = source.map(|source| match source {
-            RecipeSource::Recording(plan) => RecipeSource::Recording(plan.absolute()),
-            simulated @ RecipeSource::Simulated(_) => simulated,
+            RecipeFile::Recording(plan) => RecipeFile::Recording(plan.absolute()),
+            simulated @ RecipeFile::Simulated(_) => simulated,
         });
         self.training
             .refuse_auto("a sweep has the same settings in every trial")?;

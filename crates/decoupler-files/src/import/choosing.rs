@@ -71,13 +71,11 @@ impl Setup {
             // Rows in which only these channels have no value are samples now.
             (recording, test_recording) = read(&plan)?;
         }
-        let raw = recording.with_memory(None).map_err(ImportError::from)?;
+        let raw = recording.with_memory(None)?;
         let seed = self.settings().seed;
-        let training = plan.division.training(&raw.set, test_recording.is_some(), seed);
-        let training = training.map_err(ImportError::from)?;
-        let choice = if training.len() < MIN_SAMPLES {
-            None
-        } else {
+        let training = plan.division.training(&raw.set, test_recording.is_some(), seed)?;
+        let mut choice = None;
+        if training.len() >= MIN_SAMPLES {
             let set = raw.set.select(&training);
             let samples = AutoSamples {
                 set: &set,
@@ -85,37 +83,23 @@ impl Setup {
                 by: plan.division.by,
             };
             let fixed = AutoFixed {
-                memory: plan.import.memory.clone().or_else(|| fixed.memory.clone()),
+                memory: plan.import.memory.take().or_else(|| fixed.memory.clone()),
                 ..fixed.clone()
             };
             let mut on_trying = |progress| on_progress(ChoosingProgress::Trying(progress));
-            let chosen = choose_settings(
-                self.settings(),
-                &fixed,
-                &samples,
-                (budget_s, memory_budget()),
-                job,
-                &mut on_trying,
-            );
-            Some(chosen.map(|mut choice| {
-                choice.record.left_out = left_out;
-                choice
-            })?)
-        };
-        let mut settings = *self.settings();
-        if let Some(choice) = &choice {
-            settings = choice.settings;
-            plan.import.memory = Some(choice.memory.clone()).filter(|memory| !memory.is_empty());
+            let limits = (budget_s, memory_budget());
+            let mut chosen = choose_settings(self.settings(), &fixed, &samples, limits, job, &mut on_trying)?;
+            chosen.record.left_out = left_out;
+            plan.import.memory = Some(chosen.memory.clone()).filter(|memory| !memory.is_empty());
+            choice = Some(chosen);
         }
-        let recording = raw
-            .with_memory(plan.import.memory.as_ref())
-            .map_err(ImportError::from)?;
+        let settings = choice.as_ref().map_or(*self.settings(), |choice| choice.settings);
+        let recording = raw.with_memory(plan.import.memory.as_ref())?;
         // Lags in seconds have as many samples as in training.
-        let memory = recording.memory();
-        let test_recording = test_recording.map(|test| test.with_memory(memory)).transpose();
-        let test_recording = test_recording.map_err(ImportError::from)?;
-        let planned = plan.planned(recording, test_recording, settings.seed)?;
-        let mut sets = SetupSets::of_plan(&plan, folder, planned, &mut watch(job, &mut |_| {}))?;
+        let memory = recording.problem.memory.as_ref();
+        let test_recording = test_recording.map(|test| test.with_memory(memory)).transpose()?;
+        let recordings = (recording, test_recording);
+        let mut sets = SetupSets::of_plan(&plan, folder, recordings, settings.seed, &mut watch(job, &mut |_| {}))?;
         if let (Some(recordings), Some(choice)) = (&mut sets.recordings, &choice) {
             recordings.recorded.search = Some(choice.record.clone());
             recordings.recorded.combined = Some(choice.combined.clone());
@@ -138,7 +122,7 @@ impl Recording {
     /// # Errors
     /// If the samples cannot be divided, or the job is cancelled.
     pub fn findings(&self, settings: &RunSettings, by: SplitBy, job: &Job<'_>) -> Result<Findings, SetupError> {
-        let raw = self.with_memory(None).map_err(ImportError::from)?;
+        let raw = self.with_memory(None)?;
         let all = Vec::from_iter(0..raw.set.samples());
         let samples = AutoSamples {
             set: &raw.set,
@@ -146,7 +130,7 @@ impl Recording {
             by,
         };
         let fixed = AutoFixed {
-            memory: self.memory().cloned(),
+            memory: self.problem.memory.clone(),
             ..AutoFixed::default()
         };
         Ok(Findings::measure(settings, &samples, &fixed, job)?)
@@ -162,11 +146,13 @@ fn leave_out_dead(plan: &mut Plan, recording: &Recording, seed: Seed) -> Result<
         return Ok(Vec::new());
     }
     let dead = dead_channels(&raw.set.select(&training));
-    let channels = raw.inputs.iter().map(|input| input.name.clone()).enumerate();
-    let (left_out, kept): (Vec<_>, Vec<_>) = channels.partition(|(channel, _)| dead.contains(channel));
-    let names = |channels: Vec<(usize, String)>| Vec::from_iter(channels.into_iter().map(|(_, name)| name));
-    if !left_out.is_empty() {
-        plan.import.inputs = names(kept);
+    let named = |is_dead: bool| {
+        let channels = raw.problem.inputs.iter().enumerate();
+        let found = channels.filter(|(channel, _)| dead.contains(channel) == is_dead);
+        Vec::from_iter(found.map(|(_, input)| input.name.clone()))
+    };
+    if !dead.is_empty() {
+        plan.import.inputs = named(false);
     }
-    Ok(names(left_out))
+    Ok(named(true))
 }

@@ -1,6 +1,6 @@
 //! Columns of the files of a recipe, found by their names.
 
-use std::collections::{HashMap, HashSet, hash_map::Entry};
+use std::collections::{HashMap, HashSet};
 
 use decoupler_core::{
     problem::Channel,
@@ -9,7 +9,7 @@ use decoupler_core::{
 
 use super::{
     Column, Condition, Cure, ImportError, Meaning, Recipe, Table, expression::Expression, join::Partners,
-    table::name_and_unit, time_stamp::TimeStamp,
+    suggestion::is_group_name, table::name_and_unit, time_stamp::TimeStamp,
 };
 
 /// Number of names above which a message lists only names similar to the one given.
@@ -73,6 +73,9 @@ pub(super) struct Files {
     firsts: Vec<usize>,
     /// Prefix of the columns of each joined file.
     stems: Vec<String>,
+    pub(super) meanings: Meanings,
+    /// Matching rows of each joined file; `None` if it is joined row by row.
+    pub(super) joins: Vec<Option<Partners>>,
 }
 
 impl Files {
@@ -93,6 +96,8 @@ impl Files {
             columns,
             firsts,
             stems,
+            meanings: Meanings::default(),
+            joins: Vec::new(),
         }
     }
 
@@ -174,8 +179,20 @@ impl Files {
         Ok(meant)
     }
 
+    /// Warns of an unused column that looks like the group.
+    pub(super) fn group_hint(&self) -> Option<String> {
+        let is_used = |id: &usize| self.meanings.inputs.contains(id) || self.meanings.targets.contains(id);
+        let mut own = (0..self.width(0)).filter(|id| !is_used(id));
+        let name = &self.columns[own.find(|&id| is_group_name(&self.columns[id].name))?].name;
+        Some(format!(
+            "the column {name} looks like a group of samples that belong together: choose it as the group (--group {name}), so \
+             that training and test samples never share one"
+        ))
+    }
+
     /// Refuses columns with cells that are neither numbers nor missing, and labels where numbers are needed.
-    pub(super) fn check_numbers(&self, meanings: &Meanings) -> Result<(), ImportError> {
+    pub(super) fn check_numbers(&self) -> Result<(), ImportError> {
+        let meanings = &self.meanings;
         meanings.used().try_for_each(|id| self.check_cells(id))?;
         let compared = meanings.comparisons.iter().map(|(id, _)| *id);
         for id in compared.chain(meanings.time).chain(meanings.row_wire) {
@@ -207,13 +224,13 @@ impl Files {
     }
 
     /// Puts the cells of joined files into the rows of the first, and frees columns that are not used.
-    pub(super) fn join(&mut self, meanings: &Meanings, joins: &[Option<Partners>]) {
-        let used: HashSet<usize> = meanings.used().collect();
+    pub(super) fn join(&mut self) {
+        let used: HashSet<usize> = self.meanings.used().collect();
         for id in 0..self.columns.len() {
             let (file, _) = self.place(id);
             if !used.contains(&id) {
                 self.columns[id].clear();
-            } else if let Some(Some(partners)) = file.checked_sub(1).map(|joined| &joins[joined]) {
+            } else if let Some(Some(partners)) = file.checked_sub(1).map(|joined| &self.joins[joined]) {
                 self.columns[id].take_rows(&partners.rows);
             }
         }
@@ -272,19 +289,17 @@ impl Meanings {
         let find = |name: &str| find(&files.columns, name);
         let meant = files.meant(recipe)?;
         let of = |meaning| {
-            meant
-                .iter()
-                .filter(move |(_, other)| *other == meaning)
-                .map(|(id, _)| *id)
+            let found = meant.iter().filter(|(_, other)| *other == meaning);
+            Vec::from_iter(found.map(|(id, _)| *id))
         };
         let comparisons = recipe.conditions.iter().flat_map(|condition| &condition.comparisons);
         let comparisons = comparisons.map(|comparison| Ok((find(&comparison.column)?, comparison.clone())));
         let meanings = Self {
-            inputs: of(Meaning::Input).collect(),
-            targets: of(Meaning::Target).collect(),
-            time: of(Meaning::Time).next(),
-            group: of(Meaning::Group).next(),
-            row_wire: of(Meaning::RowWire).next(),
+            inputs: of(Meaning::Input),
+            targets: of(Meaning::Target),
+            time: of(Meaning::Time).pop(),
+            group: of(Meaning::Group).pop(),
+            row_wire: of(Meaning::RowWire).pop(),
             comparisons: comparisons.collect::<Result<_, ImportError>>()?,
         };
         for missing in recipe.missing.iter().filter_map(|missing| missing.column.as_deref()) {
@@ -298,16 +313,11 @@ impl Meanings {
         }
         let mut seen = HashMap::new();
         for (id, meaning) in meant.into_iter().filter(|(_, meaning)| *meaning != Meaning::Time) {
-            match seen.entry(id) {
-                Entry::Vacant(entry) => {
-                    entry.insert(meaning);
-                }
-                Entry::Occupied(first) => {
-                    let (one, other) = (first.get().with_article(), meaning.with_article());
-                    let name = &files.columns[id].name;
-                    let reason = format!("column '{name}' is both {one} and {other}; give it one meaning");
-                    return Err(ImportError::Columns(reason));
-                }
+            if let Some(first) = seen.insert(id, meaning) {
+                let (one, other) = (Meaning::with_article(first), meaning.with_article());
+                let name = &files.columns[id].name;
+                let reason = format!("column '{name}' is both {one} and {other}; give it one meaning");
+                return Err(ImportError::Columns(reason));
             }
         }
         Ok(meanings)

@@ -20,10 +20,22 @@ const GAP: f64 = 5.0;
 
 /// Summary of the columns of a file.
 #[derive(Clone, Debug, Serialize)]
-pub struct Inspection {
+pub struct InspectedFile {
+    /// The file, as it was named.
+    #[serde(skip)]
+    pub path: PathBuf,
+    /// Prefix of the names of its columns; `None` for the first file.
+    #[serde(skip)]
+    pub stem: Option<String>,
+    /// Format and layout of the file.
+    #[serde(skip)]
+    pub format: Format,
+    /// Meaning of each column according to a recipe.
+    #[serde(skip)]
+    pub meanings: Vec<Meaning>,
     /// Number of rows.
     pub rows: usize,
-    /// Columns.
+    /// Columns. Markers of missing values in the recipe count as missing.
     pub columns: Vec<ColumnSummary>,
     /// Named arrays of numbers in the file, such as the variables of a workspace.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -102,31 +114,24 @@ pub struct TimeSummary {
     pub backwards: usize,
 }
 
-impl Inspection {
+impl InspectedFile {
     /// Reads the file at `path` and summarises each column. `time` is the time column; if absent, a first column that always
     /// increases is assumed to be the time.
     ///
     /// # Errors
     /// As [`read_table`], or if there is no column `time`.
-    pub fn read(
-        path: &Path,
-        choice: DialectChoice,
-        time: Option<&str>,
-        watch: Watch<'_>,
-    ) -> Result<(Self, Table), ImportError> {
-        let table = read_table(path, choice, watch)?;
-        Ok((Self::of(&table, time)?, table))
+    pub fn read(path: &Path, choice: DialectChoice, time: Option<&str>, watch: Watch<'_>) -> Result<Self, ImportError> {
+        Self::of(&read_table(path, choice, watch)?, path, time)
     }
 
-    /// Summarises each column of `table`; see [`Self::read`].
-    pub(super) fn of(table: &Table, time: Option<&str>) -> Result<Self, ImportError> {
+    /// Summarises each column of `table`, from the file at `path`; see [`Self::read`].
+    fn of(table: &Table, path: &Path, time: Option<&str>) -> Result<Self, ImportError> {
         let mut columns: Vec<ColumnSummary> = table.columns.iter().map(ColumnSummary::of).collect();
         name_duplicates(table, &mut columns);
         let chosen = match time {
             Some(name) => Some((find(&table.columns, name)?, false)),
             None => guess_time(table, &columns).map(|column| (column, true)),
         };
-        let time = chosen.map(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));
         let mut warnings = table.notes.clone();
         let sentinels = columns
             .iter()
@@ -135,12 +140,25 @@ impl Inspection {
         let rounded = columns.iter().filter(|column| column.is_rounding);
         warnings.extend(rounded.map(|column| rounding_warning(&column.name)));
         Ok(Self {
+            path: path.to_owned(),
+            stem: None,
+            format: table.format.clone(),
+            meanings: vec![Meaning::Unused; columns.len()],
             rows: table.rows,
             columns,
             variables: table.variables.clone(),
-            time,
+            time: chosen.map(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed)),
             warnings,
         })
+    }
+
+    /// Returns the full name of a column; a column of a joined file is prefixed with the stem.
+    pub fn full_name(&self, column: usize) -> String {
+        let name = &self.columns[column].name;
+        match &self.stem {
+            None => name.clone(),
+            Some(stem) => format!("{stem}.{name}"),
+        }
     }
 }
 
@@ -241,32 +259,6 @@ impl TimeSummary {
     }
 }
 
-/// File of a recipe with a summary of its columns.
-#[derive(Clone, Debug)]
-pub struct InspectedFile {
-    /// The file, as the recipe names it.
-    pub path: PathBuf,
-    /// Prefix of the names of its columns; `None` for the first file.
-    pub stem: Option<String>,
-    /// Format and layout of the file.
-    pub format: Format,
-    /// Summary of its columns. Markers of missing values in the recipe count as missing.
-    pub inspection: Inspection,
-    /// Meaning of each column according to the recipe.
-    pub meanings: Vec<Meaning>,
-}
-
-impl InspectedFile {
-    /// Returns the full name of a column; a column of a joined file is prefixed with the stem.
-    pub fn full_name(&self, column: usize) -> String {
-        let name = &self.inspection.columns[column].name;
-        match &self.stem {
-            None => name.clone(),
-            Some(stem) => format!("{stem}.{name}"),
-        }
-    }
-}
-
 impl Recipe {
     /// Reads the files, whose paths are relative to `folder`, and summarises each column; the recipe need not be complete. The
     /// rows of `variables`, with their full names, are samples, as are those of the variables whose columns the recipe uses.
@@ -284,18 +276,14 @@ impl Recipe {
             group: None,
             ..self.clone()
         };
-        let set = self.sets().swap_remove(0);
+        let set = self.files();
         let stems = self.stems();
         let mut tables = plain.read_set(&set, variables, folder, watch)?;
         let mut inspected = Vec::new();
-        for (table, path) in tables.iter_mut().zip(set.files()) {
-            inspected.push(InspectedFile {
-                path: path.clone(),
-                stem: inspected.len().checked_sub(1).map(|joined| stems[joined].clone()),
-                format: table.format.clone(),
-                inspection: Inspection::of(table, None)?,
-                meanings: vec![Meaning::Unused; table.columns.len()],
-            });
+        let of_tables = std::iter::once(None).chain(stems.iter().cloned().map(Some));
+        for ((table, path), stem) in tables.iter_mut().zip(set.files()).zip(of_tables) {
+            let file = InspectedFile::of(table, path, None)?;
+            inspected.push(InspectedFile { stem, ..file });
             // Only their names are needed from here on.
             table.columns.iter_mut().for_each(Column::clear);
         }

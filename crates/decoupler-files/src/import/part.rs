@@ -83,8 +83,9 @@ fn check_same(first: &Recording, other: &Recording) -> Result<(), ImportError> {
             "'{path}': {found}, and '{first}': {expected}; files of one experiment need the same columns"
         ))
     };
-    let channels = first.inputs.iter().chain(&first.targets);
-    for (one, another) in channels.zip(other.inputs.iter().chain(&other.targets)) {
+    let [channels, others] =
+        [first, other].map(|Recording { problem, .. }| problem.inputs.iter().chain(&problem.targets));
+    for (one, another) in channels.zip(others) {
         if one != another {
             return Err(refuse(another.title(), one.title()));
         }

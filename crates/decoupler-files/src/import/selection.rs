@@ -1,29 +1,17 @@
-use std::{borrow::Cow, collections::HashMap};
-
-use super::{
-    Dropped, FileReport, FileSet, Format, ImportError, JoinReport, Recipe, Table,
-    columns::{Files, Meanings},
-    join::Partners,
+use std::{
+    borrow::Cow,
+    collections::{HashMap, HashSet},
 };
+
+use super::{Dropped, FileReport, Format, ImportError, JoinReport, Table, columns::Files, join::Partners};
 use decoupler_core::{
-    dataset::{History, Memory, RowOrder, Series},
+    dataset::{History, RowOrder, Series},
     text::counted,
 };
 use ndarray::Array2;
 
 /// Largest number of a row-wire.
 pub(super) const LAST_ROW_WIRE: usize = 10_000;
-
-/// Rows of the first file, with the cells of the joined files.
-pub(super) struct Rows<'a> {
-    pub(super) recipe: &'a Recipe,
-    /// The files, as the recipe names them.
-    pub(super) set: &'a FileSet,
-    pub(super) files: &'a Files,
-    pub(super) meanings: &'a Meanings,
-    /// Matching rows of each joined file; `None` if it is joined row by row.
-    pub(super) joins: &'a [Option<Partners>],
-}
 
 /// Why a row is no sample.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -36,33 +24,22 @@ enum Reason {
     Missing(usize),
 }
 
-impl Rows<'_> {
+/// Rows of the first file, with the cells of the joined files.
+impl Files {
     fn main(&self) -> &Table {
-        &self.files.tables[0]
-    }
-
-    fn name(&self, id: usize) -> &str {
-        &self.files.columns[id].name
+        &self.tables[0]
     }
 
     /// Returns the cell of a row; NaN if it is missing or the row has no match.
     pub(super) fn number(&self, id: usize, row: usize) -> f64 {
-        self.files.columns[id].numbers[row]
-    }
-
-    fn is_missing(&self, id: usize, row: usize) -> bool {
-        self.files.columns[id].is_missing(row)
+        self.columns[id].numbers[row]
     }
 
     /// Returns the rows that are samples, and the dropped rows by reason, in order of first occurrence.
     pub(super) fn select(&self) -> Result<(Vec<usize>, Vec<Dropped>), ImportError> {
         let main = self.main();
-        let mut used: Vec<usize> = Vec::new();
-        self.meanings.used().for_each(|id| {
-            if !used.contains(&id) {
-                used.push(id);
-            }
-        });
+        let mut seen = HashSet::new();
+        let used = Vec::from_iter(self.meanings.used().filter(|id| seen.insert(*id)));
         let is_lonely =
             |join: &Option<Partners>, row: usize| join.as_ref().is_some_and(|join| join.rows[row].is_none());
         let reason_of = |row: usize| {
@@ -73,7 +50,7 @@ impl Rows<'_> {
                     !number.is_nan() && !comparison.is_met(number)
                 })
             };
-            let missing = || used.iter().copied().find(|&id| self.is_missing(id, row));
+            let missing = || used.iter().copied().find(|&id| self.columns[id].is_missing(row));
             let unmet_or_missing = || unmet().map(Reason::Unmet).or_else(|| missing().map(Reason::Missing));
             lonely.map(Reason::Lonely).or_else(unmet_or_missing)
         };
@@ -88,7 +65,7 @@ impl Rows<'_> {
             }
         }
         let too_long = main.too_long.first_line.map(|first_line| Dropped {
-            reason: format!("more cells than the {}", counted(self.files.width(0), "column")),
+            reason: format!("more cells than the {}", counted(self.width(0), "column")),
             rows: main.too_long.rows,
             first_line,
         });
@@ -112,11 +89,11 @@ impl Rows<'_> {
         match reason {
             Reason::Lonely(join) => {
                 let limit = self.joins[join].as_ref().map_or(f64::NAN, |join| join.limit);
-                let file = self.set.join[join].display();
+                let file = self.tables[join + 1].path.display();
                 format!("no row of '{file}' within {limit} of its time")
             }
             Reason::Unmet(comparison) => format!("{} is not met", self.meanings.comparisons[comparison].1),
-            Reason::Missing(id) => format!("{} is missing", self.name(id)),
+            Reason::Missing(id) => format!("{} is missing", self.columns[id].name),
         }
     }
 
@@ -124,24 +101,25 @@ impl Rows<'_> {
     pub(super) fn with_readings(&self) -> Vec<usize> {
         let used = Vec::from_iter(self.meanings.placing().chain(self.meanings.inputs.iter().copied()));
         let has_row_wire = |row: usize| self.meanings.row_wire.is_none_or(|id| self.row_wire(id, row).is_ok());
-        let is_complete = |&row: &usize| !used.iter().any(|id| self.is_missing(*id, row)) && has_row_wire(row);
+        let is_complete = |&row: &usize| !used.iter().any(|id| self.columns[*id].is_missing(row)) && has_row_wire(row);
         (0..self.main().rows).filter(is_complete).collect()
     }
 
     /// Describes the rows `read` in order of time, of which those in `kept` are samples: returns the history of their readings,
-    /// once these are moved.
+    /// once these are moved. With `needs_clock`, a memory needs the times in seconds.
     pub(super) fn past(
         &self,
         read: &[usize],
         kept: &[usize],
+        needs_clock: bool,
     ) -> Result<impl FnOnce(Array2<f64>) -> History + use<>, ImportError> {
         let mut places = vec![0; self.main().rows];
         read.iter().enumerate().for_each(|(place, &row)| places[row] = place);
         let mut times_s = None;
         if let Some(id) = self.meanings.time {
-            let channel = self.files.channel(id);
+            let channel = self.channel(id);
             let factor = seconds(channel.unit.as_deref());
-            if factor.is_none() && self.recipe.memory.as_ref().is_some_and(Memory::needs_clock) {
+            if factor.is_none() && needs_clock {
                 let (name, unit) = (channel.name, channel.unit.unwrap_or_default());
                 return Err(ImportError::Samples(format!(
                     "the times in '{name}' are in {unit}, and a memory needs times in s, ms, us, ns, min or h: give the unit \
@@ -198,7 +176,7 @@ impl Rows<'_> {
         };
         let (mut known, mut names) = (HashMap::<Cow<'_, str>, usize>::new(), Vec::new());
         let numbers = kept.iter().map(|&row| {
-            let name = self.files.columns[id].text(row);
+            let name = self.columns[id].text(row);
             *known.entry(name).or_insert_with_key(|name| {
                 names.push(name.clone().into_owned());
                 names.len() - 1
@@ -221,7 +199,7 @@ impl Rows<'_> {
     fn row_wire(&self, id: usize, row: usize) -> Result<usize, ImportError> {
         let value = self.number(id, row);
         row_wire(value).ok_or_else(|| {
-            let name = self.name(id);
+            let name = &self.columns[id].name;
             ImportError::Samples(format!(
                 "'{name}': {value} is not the number of a row-wire; give whole numbers from 1 to {LAST_ROW_WIRE}"
             ))
@@ -235,7 +213,7 @@ impl Rows<'_> {
                 path: table.path.clone(),
                 format: table.format.clone(),
                 rows: table.rows,
-                columns: self.files.width(file),
+                columns: self.width(file),
                 has_names: table.has_header() && table.format != Format::Npy,
                 join: join.map(|partners| JoinReport {
                     limit: partners.limit,
@@ -245,7 +223,7 @@ impl Rows<'_> {
                 }),
             }
         };
-        self.files.tables.iter().enumerate().map(report).collect()
+        self.tables.iter().enumerate().map(report).collect()
     }
 }
 

@@ -1,6 +1,7 @@
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use decoupler_core::{
+    dataset::{DatasetError, Seed},
     evaluation::{
         Intervals, Run, RunError, RunSets, RunSettings,
         experiments::{ExperimentRecording, TrialSamples},
@@ -13,7 +14,7 @@ use decoupler_core::{
 use ndarray::{Axis, Slice};
 use thiserror::Error;
 
-use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording, Watch};
+use super::{ImportError, Plan, Progress, Recorded, Recording, Watch};
 use crate::machine::memory_budget;
 
 /// Everything needed to repeat a run: its settings and, for a recording, the plan that reads it.
@@ -75,6 +76,12 @@ impl From<ImportError> for SetupError {
             ImportError::Cancelled => Self::Cancelled(Cancelled),
             error => Self::Import(error),
         }
+    }
+}
+
+impl From<DatasetError> for SetupError {
+    fn from(error: DatasetError) -> Self {
+        Self::Import(error.into())
     }
 }
 
@@ -171,8 +178,8 @@ impl Setup {
         };
         self.check_files()?;
         let watch = &mut watch(job, on_progress);
-        let planned = plan.sets(folder, self.settings.seed, watch)?;
-        Ok(SetupSets::of_plan(plan, folder, planned, watch)?)
+        let recordings = plan.recordings(folder, watch)?;
+        Ok(SetupSets::of_plan(plan, folder, recordings, self.settings.seed, watch)?)
     }
 
     /// Returns the recording for an experiment; `None` for a simulated array.
@@ -203,7 +210,7 @@ impl Setup {
         self.check_files()?;
         let (recording, test) = plan.recordings(folder, &mut watch(job, on_progress))?;
         Ok(TrialSamples::Recorded {
-            problem: Arc::new(recording.problem()),
+            problem: Arc::new(recording.problem),
             set: Arc::new(recording.set),
             test: test.map(|test| Arc::new(test.set)),
             memory: memory_budget(),
@@ -220,27 +227,26 @@ pub(crate) fn watch(job: &Job<'_>, on_progress: &mut dyn FnMut(Progress)) -> imp
 }
 
 impl SetupSets {
-    /// Returns the datasets of a plan whose paths are relative to `folder`.
+    /// Splits the samples of a plan, whose paths are relative to `folder`; `seed` is the seed of the run.
     pub(super) fn of_plan(
         plan: &Plan,
         folder: &Path,
-        planned: PlannedSets,
+        (training, test): (Recording, Option<Recording>),
+        seed: Seed,
         watch: Watch<'_>,
     ) -> Result<Self, ImportError> {
-        let recorded = Recorded::of(plan.within(folder).absolute(), &planned, watch)?;
+        let (split, test_set) = plan.divide(&training, test.as_ref(), seed)?;
+        let recorded = Recorded::of(plan.within(folder).absolute(), [&training.set, &test_set], watch)?;
         let sets = RunSets {
             memory: memory_budget(),
-            ..RunSets::new(planned.split, planned.test).described(planned.recording.problem())
+            ..RunSets::new(split, test_set).described(training.problem.clone())
         };
-        let recordings = Recordings {
+        let recordings = Some(Recordings {
             recorded,
-            training: planned.recording,
-            test: planned.test_recording,
-        };
-        Ok(Self {
-            sets,
-            recordings: Some(recordings),
-        })
+            training,
+            test,
+        });
+        Ok(Self { sets, recordings })
     }
 
     /// Prepares a run of `setup` on these datasets, with its baselines.

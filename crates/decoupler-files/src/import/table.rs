@@ -9,7 +9,7 @@ use decoupler_core::text::clean_name;
 
 use serde::Serialize;
 
-use super::{Dialect, Format, TableError, time_stamp::TimeStamp};
+use super::{Format, TableError, time_stamp::TimeStamp};
 
 /// Table read from a file: columns of equal length.
 #[derive(Clone, Debug)]
@@ -120,14 +120,6 @@ impl Table {
             Format::Text(dialect) => dialect.header,
             Format::Sheet { header, .. } => *header,
             Format::Npy | Format::Npz | Format::Matlab => true,
-        }
-    }
-
-    /// Returns the layout of a text file; `None` for other formats.
-    pub fn dialect(&self) -> Option<&Dialect> {
-        match &self.format {
-            Format::Text(dialect) => Some(dialect),
-            _ => None,
         }
     }
 }

@@ -210,7 +210,9 @@ pub(super) fn division_options(plan: &Plan, usual: Option<f64>) -> Vec<GivenOpti
     if plan.test.is_none() && is_given(division.test_fraction == default.test_fraction) {
         options.push(("test-fraction".into(), division.test_fraction.to_string()));
     }
-    let validation = division.validation_fraction.filter(|share| is_given(usual == Some(*share)));
+    let validation = division
+        .validation_fraction
+        .filter(|share| is_given(usual == Some(*share)));
     options.extend(validation.map(|share| ("validation-fraction".into(), share.to_string())));
     options
 }

@@ -45,7 +45,7 @@ pub(super) fn joined_ui(ui: &mut Ui, draft: &mut Draft) {
     }
     let intervals: Vec<Option<f64>> = draft.files[1..]
         .iter()
-        .map(|file| file.inspection.time.as_ref().and_then(|time| time.median_interval))
+        .map(|file| file.time.as_ref().and_then(|time| time.median_interval))
         .collect();
     let names: Vec<String> = draft.files[1..].iter().map(|file| file_name(&file.path)).collect();
     for ((joined, interval), name) in draft.joined().iter_mut().zip(intervals).zip(names) {
