@@ -23,7 +23,10 @@ use decoupler_files::{
         Cell, RecipeFile, Table, TableColumn, describe_positions, describe_target, describe_warnings, format_below_one,
         format_number,
     },
-    import::{ColumnKind, ColumnSummary, FileReport, Format, InspectedFile, Plan, Recording, Recordings, TimeSummary},
+    import::{
+        ColumnKind, ColumnSummary, FileReport, Format, InspectedFile, Plan, Recording, Recordings, TimeSummary,
+        read_table,
+    },
 };
 use serde_json::{Value, json};
 
@@ -67,9 +70,8 @@ impl Inspect {
         let (mut objects, mut texts) = (Vec::new(), Vec::new());
         let files = self.import.only_files()?;
         for file in &files {
-            let inspected = with_bar(|watch| {
-                InspectedFile::read(file, self.import.rest.dialect(), self.import.time.as_deref(), watch)
-            })?;
+            let table = with_bar(|watch| read_table(file, self.import.rest.dialect(), watch))?;
+            let inspected = InspectedFile::of(&table, file, self.import.time.as_deref())?;
             let format = inspected.format.to_string();
             let dialect = match &inspected.format {
                 Format::Text(dialect) => Some(dialect),

@@ -43,7 +43,7 @@ pub(crate) fn check(bytes: &[u8], path: &Path) {
     if !matches!(table.format, Format::Text(_)) {
         same_as_text(&table, path);
     }
-    let inspection = InspectedFile::read(path, DialectChoice::default(), None, &mut watch).unwrap();
+    let inspection = InspectedFile::of(&table, path, None).unwrap();
     for column in &inspection.columns {
         let bars = column.histogram.iter().sum::<usize>();
         assert!(bars == 0 || bars == table.rows - column.missing - column.texts);

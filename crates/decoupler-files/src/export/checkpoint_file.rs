@@ -11,7 +11,7 @@ use serde_json::value::to_raw_value;
 use super::{
     AtomicFile, DocumentError, DocumentKind, document::PROGRAM, network_file::check_settings, unfinished::folder_of,
 };
-use crate::import::{Progress, Recorded, Setup, SetupError, SetupSets};
+use crate::import::{Progress, Recorded, Setup, SetupError, SetupSets, stored};
 use decoupler_core::{
     evaluation::{Run, RunSettings},
     job::Job,
@@ -93,7 +93,7 @@ impl CheckpointFile {
             path: path.to_owned(),
             defect: error.to_string(),
         };
-        let located = |recorded: &Recorded| recorded.relative_to(folder_of(path));
+        let located = |recorded: &Recorded| recorded.with_paths(|file| stored(file, folder_of(path)));
         let file = Self {
             recorded: self.recorded.as_ref().map(located),
             ..self.clone()

@@ -1,4 +1,5 @@
 use std::{
+    collections::HashSet,
     fs::File,
     io::{self, BufReader},
     path::{Path, PathBuf},
@@ -49,12 +50,9 @@ impl Recipe {
         let mut parts = Vec::new();
         for set in sets {
             let imported = self.import_set(set, sets.len() == 1, memory.as_ref(), folder, watch);
-            let part = imported.map_err(|error| {
-                if sets.len() == 1 {
-                    error
-                } else {
-                    error.of_file(&set.data)
-                }
+            let part = imported.map_err(|error| match sets {
+                [_] => error,
+                _ => error.of_file(&set.data),
             })?;
             // Lags in seconds have as many samples in all files.
             memory.clone_from(&part.problem.memory);
@@ -194,37 +192,27 @@ impl Recipe {
         more: &[String],
         watch: Watch<'_>,
     ) -> Result<Table, ImportError> {
-        let own_name = |full: &str| match joined {
-            None => Some(full.trim().to_owned()),
-            Some((_, stem)) => full.trim().strip_prefix(stem)?.strip_prefix('.').map(str::to_owned),
-        };
+        let prefix = joined.map_or_else(String::new, |(_, stem)| format!("{stem}."));
+        let own_name = |full: &str| full.trim().strip_prefix(&*prefix).map(str::to_owned);
         let missing = self.missing.iter().filter_map(|missing| match &missing.column {
             None => Some((None, missing)),
             Some(column) => Some((Some(own_name(column)?), missing)),
         });
-        let columns = self.inputs.iter().chain(&self.targets);
-        let columns = columns.chain(self.derive.iter().flat_map(Derived::columns));
+        let channels = self.inputs.iter().chain(&self.targets);
         let single = self.time.iter().chain(&self.group).chain(&self.row_wire);
+        let derived = self.derive.iter().flat_map(Derived::columns);
+        let used = channels.chain(single).chain(derived).chain(more);
         let reading = Reading {
             choice: self.dialect,
             missing: missing.collect(),
             label: self.group.as_deref().and_then(own_name),
-            used: columns
-                .chain(single)
-                .chain(more)
-                .filter_map(|name| own_name(name))
-                .collect(),
+            used: used.filter_map(|name| own_name(name)).collect(),
         };
         let mut table = read(path, &reading, watch)?;
-        let time = joined
-            .and_then(|(joined, _)| joined.time.as_deref())
-            .or(self.time.as_deref());
-        let time = time.map(|name| TimeColumn {
+        let time = joined.and_then(|(joined, _)| joined.time.as_deref());
+        let time = time.or(self.time.as_deref()).map(|name| TimeColumn {
             name,
-            given_unit: match joined {
-                None => self.unit_of(name),
-                Some((_, stem)) => self.unit_of(&format!("{stem}.{name}")),
-            },
+            given_unit: self.unit_of(&format!("{prefix}{name}")),
         });
         for derived in &self.derive {
             derived.add_to(&mut table, own_name, time)?;
@@ -269,7 +257,7 @@ impl Recipe {
             return Err(refuse("its times are all the same", Cure::GiveLimit));
         };
         let partners = nearest(&of_main.numbers, &joined_times, limit);
-        let several = partners.uses(table.rows).iter().filter(|uses| **uses > 1).count();
+        let several = partners.shared;
         if 10 * several > table.rows {
             let (rows, file) = (table.rows, table.path.display());
             warnings.push(format!(
@@ -416,13 +404,8 @@ impl Recording {
     /// Returns the warnings of several recordings, such as for training and for testing, which often share them.
     pub fn warnings_of<'a>(recordings: impl IntoIterator<Item = &'a Self>) -> Vec<String> {
         let all = recordings.into_iter().flat_map(|recording| &recording.warnings);
-        let mut warnings = Vec::new();
-        for warning in all {
-            if !warnings.contains(warning) {
-                warnings.push(warning.clone());
-            }
-        }
-        warnings
+        let mut seen = HashSet::new();
+        all.filter(|warning| seen.insert(*warning)).cloned().collect()
     }
 
     /// Readings in order of time, from which the features of any memory are computed.

@@ -6,10 +6,9 @@ use std::{
 use serde::Serialize;
 
 use super::{
-    Column, DialectChoice, Format, ImportError, Meaning, Recipe, Table, Variable, Watch,
+    Column, Format, ImportError, Meaning, Recipe, Table, Variable, Watch,
     columns::{Files, find},
     join::median_interval,
-    read_table,
     sentinel::{Sentinel, is_rounding, rounding_warning},
 };
 
@@ -115,17 +114,12 @@ pub struct TimeSummary {
 }
 
 impl InspectedFile {
-    /// Reads the file at `path` and summarises each column. `time` is the time column; if absent, a first column that always
-    /// increases is assumed to be the time.
+    /// Summarises each column of `table`, from the file at `path`. `time` is the time column; if absent, a first column that
+    /// always increases is assumed to be the time.
     ///
     /// # Errors
-    /// As [`read_table`], or if there is no column `time`.
-    pub fn read(path: &Path, choice: DialectChoice, time: Option<&str>, watch: Watch<'_>) -> Result<Self, ImportError> {
-        Self::of(&read_table(path, choice, watch)?, path, time)
-    }
-
-    /// Summarises each column of `table`, from the file at `path`; see [`Self::read`].
-    fn of(table: &Table, path: &Path, time: Option<&str>) -> Result<Self, ImportError> {
+    /// If there is no column `time`.
+    pub fn of(table: &Table, path: &Path, time: Option<&str>) -> Result<Self, ImportError> {
         let mut columns: Vec<ColumnSummary> = table.columns.iter().map(ColumnSummary::of).collect();
         name_duplicates(table, &mut columns);
         let chosen = match time {

@@ -20,15 +20,11 @@ impl Recording {
         let mut known: HashMap<&str, usize> = HashMap::new();
         let (mut groups, mut row_wires) = (Vec::new(), Vec::new());
         for (number, Self { set, group_names, .. }) in parts.iter().enumerate() {
-            let numbers = Vec::from_iter(group_names.iter().map(|name| {
+            groups.extend(set.groups().iter().map(|&group| {
                 let next = known.len();
-                *known.entry(name).or_insert(next)
+                let name = group_names.get(group);
+                name.map_or(number, |name| *known.entry(name).or_insert(next))
             }));
-            groups.extend(
-                set.groups()
-                    .iter()
-                    .map(|&group| numbers.get(group).copied().unwrap_or(number)),
-            );
             row_wires.extend((0..set.samples()).filter_map(|sample| set.row_wire(sample)));
         }
         let rows = |of: for<'a> fn(&'a Dataset) -> ArrayView2<'a, f64>| -> Array2<f64> {

@@ -5,7 +5,10 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
-use super::{FileSet, ImportError, Recipe, Recording, Watch, recipe::is_irregular};
+use super::{
+    FileSet, ImportError, Recipe, Recording, Watch,
+    recipe::{absolute, is_irregular},
+};
 use decoupler_core::dataset::{Dataset, Division, Seed, Split, SplitBy};
 
 /// Files, the meanings of their columns, and the split of their samples: everything needed to repeat a run on measured
@@ -121,7 +124,7 @@ impl Plan {
     /// Returns this plan with absolute paths.
     #[must_use]
     pub fn absolute(&self) -> Self {
-        self.with_paths(|path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()))
+        self.with_paths(absolute)
     }
 
     /// Returns this plan with its paths joined to `folder`.

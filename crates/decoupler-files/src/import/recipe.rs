@@ -4,7 +4,7 @@ use std::{
     collections::BTreeMap,
     fs::{self, File},
     io::Read as _,
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
 };
 
 use decoupler_core::{
@@ -12,6 +12,8 @@ use decoupler_core::{
     decoupling::Combined,
     evaluation::{Intervals, auto::AutoRecord},
 };
+use path_clean::clean;
+use pathdiff::diff_paths;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -164,57 +166,30 @@ impl FileSet {
     }
 }
 
+pub(super) fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
+
 /// Returns the path of a recording as stored in a file in `folder`: relative to the folder. A recording in the user's home
 /// is stored by name only if the folder is not in the home, so that no file reveals the home folder of its author.
 pub(crate) fn stored(path: &Path, folder: &Path) -> PathBuf {
-    let absolute = |path: &Path| std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| normal(&path));
-    relative(&absolute(path), &absolute(folder), std::env::home_dir().as_deref())
+    let [path, folder] = [path, folder].map(|path| clean(absolute(path)));
+    relative(&path, &folder, std::env::home_dir().as_deref())
 }
 
 /// Returns the path of a recording that is `stored` in a file in `folder`. A recording that has been moved is also looked up
 /// next to the file.
 pub(crate) fn restored(stored: &Path, folder: &Path) -> PathBuf {
-    let path = normal(&folder.join(stored));
+    let path = clean(folder.join(stored));
     let neighbour = path.file_name().map(|name| folder.join(name));
-    match neighbour {
-        Some(neighbour) if !path.exists() && neighbour.exists() => neighbour,
-        _ => path,
-    }
+    neighbour.filter(|near| !path.exists() && near.exists()).unwrap_or(path)
 }
 
-/// Returns the path of a file relative to `folder`, both absolute; only the name if the relative path leaves `home`, or if
-/// the paths have no common prefix.
+/// Returns the path of a file relative to `folder`, both absolute; only the name if the relative path leaves `home`.
 fn relative(path: &Path, folder: &Path, home: Option<&Path>) -> PathBuf {
-    let name = || path.file_name().map_or_else(|| path.to_owned(), PathBuf::from);
-    if home.is_some_and(|home| path.starts_with(home) && !folder.starts_with(home)) {
-        return name();
-    }
-    let (of_path, of_folder) = (Vec::from_iter(path.components()), Vec::from_iter(folder.components()));
-    let shared = of_path
-        .iter()
-        .zip(&of_folder)
-        .take_while(|(one, other)| one == other)
-        .count();
-    if shared == 0 {
-        return name();
-    }
-    let up = of_folder[shared..].iter().map(|_| Component::ParentDir);
-    up.chain(of_path[shared..].iter().copied()).collect()
-}
-
-/// Resolves `..` components.
-fn normal(path: &Path) -> PathBuf {
-    let mut normal = PathBuf::new();
-    for component in path.components() {
-        match component {
-            Component::CurDir => {}
-            Component::ParentDir if matches!(normal.components().next_back(), Some(Component::Normal(_))) => {
-                normal.pop();
-            }
-            component => normal.push(component),
-        }
-    }
-    normal
+    let leaves = home.is_some_and(|home| path.starts_with(home) && !folder.starts_with(home));
+    let relative = diff_paths(path, folder).filter(|_| !leaves);
+    relative.unwrap_or_else(|| path.file_name().unwrap_or(path.as_os_str()).into())
 }
 
 /// Origin of recorded samples: the plan that reads them, and checksums that identify its files and samples.
@@ -268,18 +243,11 @@ impl Recorded {
         })
     }
 
-    /// Returns it with paths relative to `folder`, for a file stored there. A recording in the user's home is stored by name
-    /// only if the folder is not in the home, so that no file reveals the home folder of its author.
-    #[must_use]
-    pub fn relative_to(&self, folder: &Path) -> Self {
-        self.with_paths(|path| stored(path, folder))
-    }
-
     /// Returns it with its paths resolved for a file in `folder`. A recording that has been moved is also looked up next to the
     /// file.
     #[must_use]
     pub fn within(&self, folder: &Path) -> Self {
-        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        let folder = absolute(folder);
         self.with_paths(|path| restored(path, &folder))
     }
 
@@ -300,7 +268,8 @@ impl Recorded {
         files.filter(|path| !path.exists()).collect()
     }
 
-    fn with_paths(&self, of: impl Fn(&Path) -> PathBuf) -> Self {
+    /// Returns it with other paths.
+    pub(crate) fn with_paths(&self, of: impl Fn(&Path) -> PathBuf) -> Self {
         let mut recorded = self.clone();
         recorded.files.iter_mut().for_each(|file| file.path = of(&file.path));
         recorded.plan = self.plan.with_paths(of);
@@ -364,6 +333,6 @@ mod tests {
             let found = relative(Path::new(path), Path::new(folder), home);
             assert_eq!(found, Path::new(expected), "{path} from {folder}");
         }
-        assert_eq!(normal(Path::new("/a/b/../c/./d")), Path::new("/a/c/d"));
+        assert_eq!(restored(Path::new("../c/./d"), Path::new("/a/b")), Path::new("/a/c/d"));
     }
 }

@@ -3,7 +3,7 @@ use std::{
     collections::{HashMap, HashSet},
 };
 
-use super::{Dropped, FileReport, Format, ImportError, JoinReport, Table, columns::Files, join::Partners};
+use super::{Dropped, FileReport, Format, ImportError, Table, columns::Files, join::Partners};
 use decoupler_core::{
     dataset::{History, RowOrder, Series},
     text::counted,
@@ -12,17 +12,6 @@ use ndarray::Array2;
 
 /// Largest number of a row-wire.
 pub(super) const LAST_ROW_WIRE: usize = 10_000;
-
-/// Why a row is no sample.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Reason {
-    /// It has no match in this joined file.
-    Lonely(usize),
-    /// It does not meet this comparison.
-    Unmet(usize),
-    /// This column is missing.
-    Missing(usize),
-}
 
 /// Rows of the first file, with the cells of the joined files.
 impl Files {
@@ -38,43 +27,48 @@ impl Files {
     /// Returns the rows that are samples, and the dropped rows by reason, in order of first occurrence.
     pub(super) fn select(&self) -> Result<(Vec<usize>, Vec<Dropped>), ImportError> {
         let main = self.main();
-        let mut seen = HashSet::new();
-        let used = Vec::from_iter(self.meanings.used().filter(|id| seen.insert(*id)));
-        let is_lonely =
-            |join: &Option<Partners>, row: usize| join.as_ref().is_some_and(|join| join.rows[row].is_none());
-        let reason_of = |row: usize| {
-            let lonely = self.joins.iter().position(|join| is_lonely(join, row));
-            let unmet = || {
-                self.meanings.comparisons.iter().position(|(id, comparison)| {
-                    let number = self.number(*id, row);
-                    !number.is_nan() && !comparison.is_met(number)
-                })
-            };
-            let missing = || used.iter().copied().find(|&id| self.columns[id].is_missing(row));
-            let unmet_or_missing = || unmet().map(Reason::Unmet).or_else(|| missing().map(Reason::Missing));
-            lonely.map(Reason::Lonely).or_else(unmet_or_missing)
-        };
-        let (mut kept, mut counts) = (Vec::new(), Vec::<(Reason, usize, u64)>::new());
-        for row in 0..main.rows {
-            match reason_of(row) {
-                None => kept.push(row),
-                Some(reason) => match counts.iter_mut().find(|(other, ..)| *other == reason) {
-                    Some((_, rows, _)) => *rows += 1,
-                    None => counts.push((reason, 1, main.line(row))),
-                },
+        // Why a row is dropped, and whether it is kept.
+        let mut needs: Vec<(String, Box<dyn Fn(usize) -> bool + '_>)> = Vec::new();
+        for (join, table) in self.joins.iter().zip(&self.tables[1..]) {
+            if let Some(Partners { rows, report, .. }) = join {
+                let (file, limit) = (table.path.display(), report.limit);
+                let reason = format!("no row of '{file}' within {limit} of its time");
+                needs.push((reason, Box::new(|row| rows[row].is_some())));
             }
         }
-        let too_long = main.too_long.first_line.map(|first_line| Dropped {
+        for (id, comparison) in &self.meanings.comparisons {
+            let numbers = &self.columns[*id].numbers;
+            let is_met = |row: usize| numbers[row].is_nan() || comparison.is_met(numbers[row]);
+            needs.push((format!("{comparison} is not met"), Box::new(is_met)));
+        }
+        let mut seen = HashSet::new();
+        for id in self.meanings.used().filter(|id| seen.insert(*id)) {
+            let column = &self.columns[id];
+            let reason = format!("{} is missing", column.name);
+            needs.push((reason, Box::new(|row| !column.is_missing(row))));
+        }
+        let mut dropped = Vec::from_iter(main.too_long.first_line.map(|first_line| Dropped {
             reason: format!("more cells than the {}", counted(self.width(0), "column")),
             rows: main.too_long.rows,
             first_line,
-        });
-        let counted = counts.into_iter().map(|(reason, rows, first_line)| Dropped {
-            reason: self.words(reason),
-            rows,
-            first_line,
-        });
-        let dropped = Vec::from_iter(too_long.into_iter().chain(counted));
+        }));
+        let (mut kept, mut places) = (Vec::new(), vec![None; needs.len()]);
+        for row in 0..main.rows {
+            let Some(need) = needs.iter().position(|(_, is_met)| !is_met(row)) else {
+                kept.push(row);
+                continue;
+            };
+            let place = *places[need].get_or_insert(dropped.len());
+            if place == dropped.len() {
+                let (reason, first_line) = (needs[need].0.clone(), main.line(row));
+                dropped.push(Dropped {
+                    reason,
+                    rows: 0,
+                    first_line,
+                });
+            }
+            dropped[place].rows += 1;
+        }
         if kept.is_empty() {
             let reasons = dropped
                 .iter()
@@ -83,18 +77,6 @@ impl Files {
             return Err(ImportError::Samples(format!("no row of {rows} is left: {reasons}")));
         }
         Ok((kept, dropped))
-    }
-
-    fn words(&self, reason: Reason) -> String {
-        match reason {
-            Reason::Lonely(join) => {
-                let limit = self.joins[join].as_ref().map_or(f64::NAN, |join| join.limit);
-                let file = self.tables[join + 1].path.display();
-                format!("no row of '{file}' within {limit} of its time")
-            }
-            Reason::Unmet(comparison) => format!("{} is not met", self.meanings.comparisons[comparison].1),
-            Reason::Missing(id) => format!("{} is missing", self.columns[id].name),
-        }
     }
 
     /// Returns the rows with all readings and a time, including rows that are not samples.
@@ -215,12 +197,7 @@ impl Files {
                 rows: table.rows,
                 columns: self.width(file),
                 has_names: table.has_header() && table.format != Format::Npy,
-                join: join.map(|partners| JoinReport {
-                    limit: partners.limit,
-                    without_partner: partners.rows.iter().filter(|partner| partner.is_none()).count(),
-                    unused: partners.uses(table.rows).iter().filter(|uses| **uses == 0).count(),
-                    median_offset: partners.median_offset,
-                }),
+                join: join.map(|partners| partners.report),
             }
         };
         self.tables.iter().enumerate().map(report).collect()

@@ -58,24 +58,18 @@ pub struct Recordings {
 pub enum SetupError {
     /// The recording cannot be read.
     #[error(transparent)]
-    Import(ImportError),
+    Import(#[from] ImportError),
     /// The samples cannot be drawn or trained on.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The caller cancelled the work.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
     /// The recording has changed.
     #[error("'{0}' has other samples than when the run was saved; use the original files, or train again")]
     OtherSamples(String),
 }
 
-impl From<ImportError> for SetupError {
-    fn from(error: ImportError) -> Self {
-        match error {
-            ImportError::Cancelled => Self::Cancelled(Cancelled),
-            error => Self::Import(error),
-        }
+impl From<Cancelled> for SetupError {
+    fn from(_: Cancelled) -> Self {
+        Self::Import(ImportError::Cancelled)
     }
 }
 
@@ -109,9 +103,9 @@ impl Setup {
     /// The plan holds out for validation what the method needs, unless it gives a share.
     pub fn of(settings: RunSettings, mut plan: Option<Plan>) -> Option<Self> {
         let is_recording = settings.simulation().is_none();
-        if let Some(plan) = &mut plan {
-            let share = &mut plan.division.validation_fraction;
-            share.get_or_insert(settings.validation_fraction());
+        if let Some(Plan { division, .. }) = &mut plan {
+            let usual = settings.validation_fraction();
+            division.validation_fraction.get_or_insert(usual);
         }
         (is_recording == plan.is_some()).then_some(Self {
             plan,
@@ -121,11 +115,9 @@ impl Setup {
 
     /// Returns the setup of a run that is read from a file, which may name regular files only.
     #[must_use]
-    pub(crate) fn stored(self) -> Self {
-        Self {
-            is_stored: true,
-            ..self
-        }
+    pub(crate) fn stored(mut self) -> Self {
+        self.is_stored = true;
+        self
     }
 
     fn check_files(&self) -> Result<(), ImportError> {
@@ -176,8 +168,8 @@ impl Setup {
             let sets = RunSets::draw(&self.settings, memory_budget(), job)?;
             return Ok(SetupSets { sets, recordings: None });
         };
-        self.check_files()?;
         let watch = &mut watch(job, on_progress);
+        self.check_files()?;
         let recordings = plan.recordings(folder, watch)?;
         Ok(SetupSets::of_plan(plan, folder, recordings, self.settings.seed, watch)?)
     }

@@ -382,8 +382,9 @@ fn two_recordings_are_joined_by_the_nearest_time() {
         .map(|dropped| dropped.reason.as_str())
         .collect();
     assert_eq!(reasons[0], "states.c3>5 is not met");
+    let states = folder.path().join("states.csv");
     assert!(
-        reasons[1].starts_with("no row of 'states.csv' within 0.5"),
+        reasons[1].starts_with(&format!("no row of '{}' within 0.5", states.display())),
         "{reasons:?}"
     );
     // Without times, rows are joined in order if their numbers are equal.
@@ -481,7 +482,7 @@ fn an_inspection_describes_each_column() {
         "time (s),a,b,c,d,e\n0,1.5,1,7,1,x\n1,,2,7,2,y\n2,2.5,3,7,3,z\n3,3,4,7,4,\n30,4,5,7,5,w\n",
     )]);
     let path = folder.path().join("data.csv");
-    let found = InspectedFile::read(&path, DialectChoice::default(), None, &mut go_on).unwrap();
+    let found = InspectedFile::of(&read(&path).unwrap(), &path, None).unwrap();
     let kinds: Vec<ColumnKind> = found.columns.iter().map(|column| column.kind).collect();
     use ColumnKind::{Integer, Number, Text};
     assert_eq!(kinds, [Integer, Number, Integer, Integer, Integer, Text]);

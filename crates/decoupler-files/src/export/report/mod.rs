@@ -21,7 +21,7 @@ use super::{
     describe_worse_than_ridge, document::PROGRAM, error_table, format_duration, format_percent, search_table,
     sweep::flatten, table::cell, unfinished::folder_of,
 };
-use crate::import::Setup;
+use crate::import::{Setup, stored};
 use decoupler_core::{
     dataset::{Dataset, Simulation},
     evaluation::{
@@ -88,7 +88,11 @@ impl RunReport<'_> {
     }
 
     fn setup(&self, folder: &Path) -> Setup {
-        let recorded = self.file.recorded.as_ref().map(|recorded| recorded.relative_to(folder));
+        let recorded = self
+            .file
+            .recorded
+            .as_ref()
+            .map(|recorded| recorded.with_paths(|file| stored(file, folder)));
         let setup = Setup::of(self.file.settings, recorded.map(|recorded| recorded.plan));
         setup.expect("a file of a recording has its plan")
     }
