@@ -79,7 +79,7 @@ impl Setup {
             let set = raw.set.select(&training);
             let samples = AutoSamples {
                 set: &set,
-                past: Some((raw.history(), &training)),
+                past: Some((&raw.history, &training)),
                 by: plan.division.by,
             };
             let fixed = AutoFixed {
@@ -126,7 +126,7 @@ impl Recording {
         let all = Vec::from_iter(0..raw.set.samples());
         let samples = AutoSamples {
             set: &raw.set,
-            past: Some((raw.history(), &all)),
+            past: Some((&raw.history, &all)),
             by,
         };
         let fixed = AutoFixed {

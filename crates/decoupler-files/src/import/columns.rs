@@ -1,6 +1,9 @@
 //! Columns of the files of a recipe, found by their names.
 
-use std::collections::{HashMap, HashSet};
+use std::{
+    collections::{HashMap, HashSet},
+    ops::Range,
+};
 
 use decoupler_core::{
     problem::Channel,
@@ -69,8 +72,8 @@ pub(super) struct Files {
     /// The files, without their columns.
     pub(super) tables: Vec<Table>,
     pub(super) columns: Vec<Column>,
-    /// Index of the first column of each file.
-    firsts: Vec<usize>,
+    /// Columns of each file.
+    pub(super) ranges: Vec<Range<usize>>,
     /// Prefix of the columns of each joined file.
     stems: Vec<String>,
     pub(super) meanings: Meanings,
@@ -81,20 +84,21 @@ pub(super) struct Files {
 impl Files {
     /// `stems` are the prefixes of the columns of the joined files.
     pub(super) fn of(mut tables: Vec<Table>, stems: Vec<String>) -> Self {
-        let (mut columns, mut firsts) = (Vec::new(), Vec::new());
+        let (mut columns, mut ranges) = (Vec::new(), Vec::new());
         for (file, table) in tables.iter_mut().enumerate() {
-            firsts.push(columns.len());
+            let first = columns.len();
             columns.extend(std::mem::take(&mut table.columns).into_iter().map(|mut column| {
                 if let Some(joined) = file.checked_sub(1) {
                     column.name = format!("{}.{}", stems[joined], column.name);
                 }
                 column
             }));
+            ranges.push(first..columns.len());
         }
         Self {
             tables,
             columns,
-            firsts,
+            ranges,
             stems,
             meanings: Meanings::default(),
             joins: Vec::new(),
@@ -103,25 +107,19 @@ impl Files {
 
     /// Returns the file of a column, and the index of the column in the file.
     pub(super) fn place(&self, id: usize) -> (usize, usize) {
-        let file = self.firsts.partition_point(|first| *first <= id) - 1;
-        (file, id - self.firsts[file])
-    }
-
-    /// Number of columns of a file.
-    pub(super) fn width(&self, file: usize) -> usize {
-        let end = self.firsts.get(file + 1).copied().unwrap_or(self.columns.len());
-        end - self.firsts[file]
+        let file = self.ranges.partition_point(|range| range.start <= id) - 1;
+        (file, id - self.ranges[file].start)
     }
 
     fn of_file(&self, file: usize) -> &[Column] {
-        &self.columns[self.firsts[file]..][..self.width(file)]
+        &self.columns[self.ranges[file].clone()]
     }
 
     /// Finds a column of a joined file by its name in the file.
     pub(super) fn find_joined(&self, file: usize, name: &str) -> Option<usize> {
         let full_name = format!("{}.{}", self.stems[file - 1], name.trim());
         let found = position(self.of_file(file), &full_name)?;
-        Some(self.firsts[file] + found)
+        Some(self.ranges[file].start + found)
     }
 
     /// Names of the columns of a joined file in the file.
@@ -182,7 +180,7 @@ impl Files {
     /// Warns of an unused column that looks like the group.
     pub(super) fn group_hint(&self) -> Option<String> {
         let is_used = |id: &usize| self.meanings.inputs.contains(id) || self.meanings.targets.contains(id);
-        let mut own = (0..self.width(0)).filter(|id| !is_used(id));
+        let mut own = self.ranges[0].clone().filter(|id| !is_used(id));
         let name = &self.columns[own.find(|&id| is_group_name(&self.columns[id].name))?].name;
         Some(format!(
             "the column {name} looks like a group of samples that belong together: choose it as the group (--group {name}), so \

@@ -82,11 +82,10 @@ impl Recipe {
         let mut files = Files::of(self.read_set(set, &[], folder, watch)?, self.stems());
         files.meanings = Meanings::of(self, &files)?;
         files.give_units(self)?;
-        let noted = |table: &Table| {
-            let file = table.path.display();
-            Vec::from_iter(table.notes.iter().map(|note| format!("'{file}': {note}")))
-        };
-        let mut warnings = Vec::from_iter(files.tables.iter().flat_map(noted));
+        let mut warnings = Vec::new();
+        for Table { path, notes, .. } in &files.tables {
+            warnings.extend(notes.iter().map(|note| format!("'{}': {note}", path.display())));
+        }
         if is_alone && self.group.is_none() {
             warnings.extend(files.group_hint());
         }
@@ -123,11 +122,8 @@ impl Recipe {
         }
         let main = &files.tables[0];
         let lines = kept.iter().map(|&row| main.line(row)).collect();
-        let (times, reports, total) = (
-            files.meanings.time.map(of_samples),
-            files.reports(),
-            main.rows + main.too_long.rows,
-        );
+        let total = main.rows + main.too_long.rows;
+        let (times, reports) = (files.meanings.time.map(of_samples), files.reports());
         let (columns, meanings) = (&mut files.columns, &files.meanings);
         let targets = gather(columns, &meanings.targets, &kept, &meanings.inputs);
         let history = past(gather(columns, &meanings.inputs, &read, &[]));
@@ -141,7 +137,6 @@ impl Recipe {
             group_names,
             lines,
             times,
-            has_groups: self.group.is_some(),
             rows: total,
             dropped,
             files: reports,
@@ -338,7 +333,7 @@ pub struct Recording {
     /// Description of the readings, the targets and the memory.
     pub problem: Problem,
     /// Readings in order of time, for [other memories](Self::with_memory).
-    pub(super) history: History,
+    pub history: History,
     /// Index of the first sample of each data file, and the file.
     pub(super) parts: Vec<(usize, PathBuf)>,
     /// Name of each group of a group column.
@@ -347,8 +342,6 @@ pub struct Recording {
     pub lines: Vec<u64>,
     /// Time of each sample, if there is a time column.
     pub times: Option<Vec<f64>>,
-    /// `true` if there is a group column, or several files.
-    pub has_groups: bool,
     /// Number of rows in the file, including dropped rows.
     pub rows: usize,
     /// Dropped rows, by reason.
@@ -406,11 +399,6 @@ impl Recording {
         let all = recordings.into_iter().flat_map(|recording| &recording.warnings);
         let mut seen = HashSet::new();
         all.filter(|warning| seen.insert(*warning)).cloned().collect()
-    }
-
-    /// Readings in order of time, from which the features of any memory are computed.
-    pub fn history(&self) -> &History {
-        &self.history
     }
 
     /// Returns the recording with another memory, or without one.

@@ -1,5 +1,6 @@
 use std::{
     collections::HashMap,
+    hash::{BuildHasher as _, RandomState},
     path::{Path, PathBuf},
 };
 
@@ -206,15 +207,12 @@ fn histogram(numbers: impl Iterator<Item = f64>, min: f64, max: f64) -> Vec<usiz
 /// Marks the columns that have the same cells as an earlier one.
 fn name_duplicates(table: &Table, columns: &mut [ColumnSummary]) {
     let bits = |column: usize| table.columns[column].numbers.iter().map(|number| number.to_bits());
-    let mut known: HashMap<u64, Vec<usize>> = HashMap::new();
+    let (state, mut known) = (RandomState::new(), HashMap::<u64, Vec<usize>>::new());
     for index in (0..columns.len())
         .filter(|&index| columns[index].min.is_some())
         .collect::<Vec<_>>()
     {
-        // FNV-1a.
-        let hash = bits(index).fold(0xcbf2_9ce4_8422_2325_u64, |hash, bits| {
-            (hash ^ bits).wrapping_mul(0x0100_0000_01b3)
-        });
+        let hash = state.hash_one(Vec::from_iter(bits(index)));
         let earlier = known.entry(hash).or_default();
         match earlier.iter().find(|other| bits(**other).eq(bits(index))) {
             Some(&other) => columns[index].duplicate_of = Some(columns[other].name.clone()),

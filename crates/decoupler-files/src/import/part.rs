@@ -48,8 +48,7 @@ impl Recording {
             whole.files.extend(part.files);
             whole.warnings.extend(part.warnings);
         }
-        (whole.set, whole.has_groups) = (set, true);
-        Ok(whole)
+        Ok(Self { set, ..whole })
     }
 
     /// Returns the file of a sample, whose line is in [`Self::lines`].

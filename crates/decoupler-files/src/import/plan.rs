@@ -95,12 +95,6 @@ impl Plan {
         }
     }
 
-    /// Returns `true` if the test samples are a random part of the recording: errors on them are optimistic if neighbouring
-    /// rows are similar.
-    pub fn is_optimistic(&self) -> bool {
-        self.division.by == SplitBy::Random && self.test.is_none()
-    }
-
     /// Returns all files of the plan.
     pub fn files(&self) -> Vec<PathBuf> {
         self.clone().paths_mut().into_iter().map(std::mem::take).collect()

@@ -48,7 +48,7 @@ impl Files {
             needs.push((reason, Box::new(|row| !column.is_missing(row))));
         }
         let mut dropped = Vec::from_iter(main.too_long.first_line.map(|first_line| Dropped {
-            reason: format!("more cells than the {}", counted(self.width(0), "column")),
+            reason: format!("more cells than the {}", counted(self.ranges[0].len(), "column")),
             rows: main.too_long.rows,
             first_line,
         }));
@@ -195,7 +195,7 @@ impl Files {
                 path: table.path.clone(),
                 format: table.format.clone(),
                 rows: table.rows,
-                columns: self.width(file),
+                columns: self.ranges[file].len(),
                 has_names: table.has_header() && table.format != Format::Npy,
                 join: join.map(|partners| partners.report),
             }

@@ -8,13 +8,12 @@ use decoupler_core::{
     },
     job::{Cancelled, Job},
     live::{DriftReference, LiveError},
-    text::clean_name,
     training::TrainerState,
 };
 use ndarray::{Axis, Slice};
 use thiserror::Error;
 
-use super::{ImportError, Plan, Progress, Recorded, Recording, Watch};
+use super::{ImportError, Plan, Progress, Recorded, Recording, Watch, table::stem};
 use crate::machine::memory_budget;
 
 /// Everything needed to repeat a run: its settings and, for a recording, the plan that reads it.
@@ -147,7 +146,7 @@ impl Setup {
     /// Returns the name of the source: the array scale, or the stem of the first file.
     pub fn source_name(&self) -> String {
         match (&self.plan, self.settings.simulation()) {
-            (Some(plan), _) => clean_name(&plan.import.data.file_stem().unwrap_or_default().to_string_lossy()),
+            (Some(plan), _) => stem(&plan.import.data),
             (None, Some(simulation)) => simulation.sensor.scale.to_string(),
             (None, None) => String::new(),
         }

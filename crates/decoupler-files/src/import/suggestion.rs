@@ -90,15 +90,13 @@ fn series<'a>(files: &[&'a InspectedFile]) -> Vec<Vec<&'a InspectedFile>> {
 /// Returns `true` if two files have the same columns and are of the same kind: their names differ in numbers only, or they
 /// have a header and different numbers of rows, so that they cannot be joined row by row.
 fn are_alike(one: &InspectedFile, other: &InspectedFile) -> bool {
-    fn names(file: &InspectedFile) -> impl Iterator<Item = &String> {
-        file.columns.iter().map(|column| &column.name)
-    }
+    let [names, others] = [one, other].map(|file| file.columns.iter().map(|column| &column.name));
     let letters = |file: &InspectedFile| {
         let name = stem(&file.path).to_lowercase();
         name.chars().filter(|letter| letter.is_alphabetic()).collect::<String>()
     };
     let has_header = matches!(&one.format, Format::Text(dialect) if dialect.header);
-    names(one).eq(names(other))
+    names.eq(others)
         && score_of_file(&one.path) == score_of_file(&other.path)
         && (letters(one) == letters(other) || (has_header && one.rows != other.rows))
 }
@@ -266,7 +264,7 @@ fn add(recipe: &mut Recipe, file: &InspectedFile, stem: Option<&str>, is_target:
 }
 
 /// Meaning of a column in a recording.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, strum::Display)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, strum::Display, strum::VariantArray)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Meaning {
     /// Reading of the sensor.
@@ -286,14 +284,7 @@ pub enum Meaning {
 
 impl Meaning {
     /// All meanings, in the order offered to the user.
-    pub const ALL: [Self; 6] = [
-        Self::Input,
-        Self::Target,
-        Self::Time,
-        Self::Group,
-        Self::RowWire,
-        Self::Unused,
-    ];
+    pub const ALL: &[Self] = <Self as strum::VariantArray>::VARIANTS;
 
     /// Returns the meaning in a sentence.
     pub(super) fn with_article(self) -> String {

@@ -618,7 +618,7 @@ fn a_time_zone_in_the_header_is_no_unit() {
         });
         let recording = import(&wanted, &folder).unwrap();
         assert_eq!(
-            recording.history().times_s().map(|times| times[1] - times[0]),
+            recording.history.times_s().map(|times| times[1] - times[0]),
             Some(0.5),
             "{text}"
         );

@@ -61,7 +61,7 @@ fn rows_of_all_files_follow_one_another_and_each_file_is_a_group() {
         Vec::from_iter(forces.iter().map(|force| 2.0 * force))
     );
     let groups = Vec::from_iter((0..3).flat_map(|session| [session; 5]));
-    assert_eq!((recording.set.groups(), recording.has_groups), (&groups[..], true));
+    assert_eq!(recording.set.groups(), groups);
     assert_eq!((recording.rows, recording.files.len()), (15, 6));
     assert_eq!((recording.lines[0], recording.lines[7]), (2, 4));
     assert_eq!(recording.file_of(4), folder.path().join("0/sensor.csv"));

@@ -23,7 +23,7 @@ use super::{
 };
 use crate::import::{Setup, stored};
 use decoupler_core::{
-    dataset::{Dataset, Simulation},
+    dataset::{Dataset, Simulation, SplitBy},
     evaluation::{
         Combination, DecoderReport, ErrorTable, Errors, Outlook, RUN_OPTIONS, RunOption, StartRecord, TestErrors,
         best_start, error_remarks,
@@ -269,7 +269,7 @@ impl RunReport<'_> {
                 file.combined().is_some(),
             ));
             remarks.extend(describe_worse_than_ridge(problem, scores));
-            let is_optimistic = plan.is_optimistic().then_some(
+            let is_optimistic = (plan.test_order() == SplitBy::Random).then_some(
                 "test samples are drawn at random, which is optimistic where neighbouring rows are similar; split by time \
                  or by group for an honest test",
             );

@@ -299,7 +299,7 @@ pub(super) fn meaning_ui(ui: &mut Ui, name: &str, meaning: Meaning, width: f32) 
     });
     let combo = ComboBox::from_id_salt(name).selected_text(text).width(width);
     let shown = combo.show_ui(ui, |ui| {
-        for option in Meaning::ALL {
+        for &option in Meaning::ALL {
             let choice = ui.selectable_label(option == meaning, option.to_string());
             if choice.on_hover_text(explanation(option)).clicked() && option != meaning {
                 picked = Some(option);

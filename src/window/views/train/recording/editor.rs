@@ -269,7 +269,7 @@ impl RecordingEditor {
             }
             Opened::Import(draft, reopened) => {
                 self.close_all();
-                self.draft = Some(*draft);
+                self.draft = Some(draft.holding_out(shared.recording.settings.validation_fraction()));
                 self.changed = reopened.changed;
                 if let Some(checkpoint) = reopened.checkpoint {
                     let setup = Setup::recording(checkpoint.settings, reopened.recorded.plan);
