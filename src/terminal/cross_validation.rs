@@ -129,7 +129,7 @@ fn print_folds(
                 "mean": targets(channels, &scores.baselines.mean, &[], &[]),
                 "ridge": targets(channels, &scores.baselines.linear, &[], &[]),
             },
-            "better": better(&problem, &scores),
+            "better": better(problem, &scores),
         })
     };
     print(object, |out| {
@@ -140,7 +140,7 @@ fn print_folds(
             set.samples(),
             validated.folds.count()
         )?;
-        let tables = ErrorTable::of_scores(&problem, &scores, None);
+        let tables = ErrorTable::of_scores(problem, &scores, None);
         write!(out, "{}", error_table(&tables).aligned())
     })
 }

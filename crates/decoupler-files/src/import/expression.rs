@@ -110,12 +110,12 @@ impl Expression {
             return Err("a name is missing".to_owned());
         }
         let span = operand.strip_prefix("start(").and_then(|rest| rest.strip_suffix(')'));
-        let operand = match span.map(|span| span.parse().ok()) {
+        let operand = match span {
             None => Operand::Column(operand.to_owned()),
-            Some(Some(span)) if !matches!(span, Span::Samples(rows) if rows.fract() != 0.0) => Operand::Start(span),
-            Some(_) => {
+            Some(span) => {
+                let is_whole = |span: &Span| !matches!(span, Span::Samples(rows) if rows.fract() != 0.0);
                 let reason = "start(…) needs a number of rows, or a number of seconds above 0 such as 2s";
-                return Err(reason.to_owned());
+                Operand::Start(span.parse().ok().filter(is_whole).ok_or(reason)?)
             }
         };
         Ok(Self {

@@ -126,10 +126,8 @@ impl InputColumns {
     pub(super) fn is_header(cells: &[String], inputs: &[Channel], is_first_line: bool) -> bool {
         let is_name = |cell: &String| inputs.iter().any(|input| input.name == name_and_unit(cell).0);
         let is_text = |cell: &&String| !cell.trim().is_empty() && cell.trim().parse::<f64>().is_err();
-        let (names, texts) = (
-            cells.iter().filter(|cell| is_name(cell)).count(),
-            cells.iter().filter(is_text).count(),
-        );
+        let names = cells.iter().filter(|cell| is_name(cell)).count();
+        let texts = cells.iter().filter(is_text).count();
         (names >= inputs.len() && Self::has_all(cells, inputs))
             || (names > 0 && texts > 0)
             || (texts == cells.len() && texts >= inputs.len() && (texts > 1 || is_first_line))

@@ -41,7 +41,7 @@ mod suggestion;
 mod table;
 mod time_stamp;
 
-pub use choosing::{ChoosingProgress, ChosenSetup};
+pub use choosing::ChoosingProgress;
 pub use dialect::{Decimal, Dialect, DialectChoice, Encoding, Separator};
 pub use error::{Cure, ImportError, TableError};
 pub use expression::{Condition, Derived, Missing};

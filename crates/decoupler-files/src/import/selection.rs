@@ -13,6 +13,9 @@ use ndarray::Array2;
 /// Largest number of a row-wire.
 pub(super) const LAST_ROW_WIRE: usize = 10_000;
 
+/// Why a row is dropped, and whether it is kept.
+type Need<'a> = (String, Box<dyn Fn(usize) -> bool + 'a>);
+
 /// Rows of the first file, with the cells of the joined files.
 impl Files {
     fn main(&self) -> &Table {
@@ -27,8 +30,7 @@ impl Files {
     /// Returns the rows that are samples, and the dropped rows by reason, in order of first occurrence.
     pub(super) fn select(&self) -> Result<(Vec<usize>, Vec<Dropped>), ImportError> {
         let main = self.main();
-        // Why a row is dropped, and whether it is kept.
-        let mut needs: Vec<(String, Box<dyn Fn(usize) -> bool + '_>)> = Vec::new();
+        let mut needs = Vec::<Need<'_>>::new();
         for (join, table) in self.joins.iter().zip(&self.tables[1..]) {
             if let Some(Partners { rows, report, .. }) = join {
                 let (file, limit) = (table.path.display(), report.limit);
@@ -136,13 +138,10 @@ impl Files {
             return Ok(order_note(order, self.main().line(read[first_row])));
         }
         let falls = |pair: &&[usize]| self.number(time, pair[1]) < self.number(time, pair[0]);
-        let count = kept.windows(2).filter(falls).count();
-        let note = kept.windows(2).find(falls).map(|pair| {
-            format!(
-                "the times go backwards {}, first on line {}; the samples are sorted by time",
-                counted(count, "time"),
-                self.main().line(pair[1])
-            )
+        let falls = Vec::from_iter(kept.windows(2).filter(falls).map(|pair| pair[1]));
+        let note = falls.first().map(|&row| {
+            let (times, line) = (counted(falls.len(), "time"), self.main().line(row));
+            format!("the times go backwards {times}, first on line {line}; the samples are sorted by time")
         });
         for rows in [kept, read] {
             rows.sort_by(|&one, &other| self.number(time, one).total_cmp(&self.number(time, other)));
