@@ -150,7 +150,7 @@ impl Samples<'_> {
     pub fn split(&self, division: Division, seed: Seed) -> PyResult<Split> {
         self.check()?;
         division.check().map_err(value_error)?;
-        if division.validation_fraction == 0.0 || self.readings.dim().0 == 0 {
+        if division.validation_fraction == Some(0.0) || self.readings.dim().0 == 0 {
             return Ok(Split {
                 training: self.dataset()?,
                 validation: None,

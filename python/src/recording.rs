@@ -33,28 +33,26 @@ pub fn read_recording<'py>(py: Python<'py>, plan: &str, seed: u64) -> PyResult<B
 }
 
 fn divided<'py>(py: Python<'py>, plan: &Plan, seed: u64) -> PyResult<Bound<'py, PyDict>> {
-    let sets = detached(py, || {
+    let recordings = detached(py, || {
         let mut interrupted = None;
-        let sets = plan.sets(
-            Path::new(""),
-            Seed(seed),
-            &mut |_| match Python::attach(|py| py.check_signals()) {
-                Ok(()) => ControlFlow::Continue(()),
-                Err(signal) => {
-                    interrupted = Some(signal);
-                    ControlFlow::Break(())
-                }
-            },
-        );
+        let recordings = plan.recordings(Path::new(""), &mut |_| match Python::attach(|py| py.check_signals()) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(signal) => {
+                interrupted = Some(signal);
+                ControlFlow::Break(())
+            }
+        });
         // A signal is an exception of its own, not an error of the import.
-        Ok::<_, ImportError>(interrupted.map_or(Ok(sets), Err))
+        Ok::<_, ImportError>(interrupted.map_or(Ok(recordings), Err))
     })??;
-    let sets = sets.map_err(value_error)?;
-    let all = of_recording(py, &sets.recording)?;
-    all.set_item("training", arrays(py, &sets.split.training)?)?;
-    let validation = sets.split.validation.as_ref();
+    let (recording, test) = recordings.map_err(value_error)?;
+    let divided = plan.divide(&recording, test.as_ref(), Seed(seed));
+    let (split, test) = divided.map_err(value_error)?;
+    let all = of_recording(py, &recording)?;
+    all.set_item("training", arrays(py, &split.training)?)?;
+    let validation = split.validation.as_ref();
     all.set_item("validation", validation.map(|set| arrays(py, set)).transpose()?)?;
-    all.set_item("test", arrays(py, &sets.test)?)?;
+    all.set_item("test", arrays(py, &test)?)?;
     Ok(all)
 }
 
@@ -62,10 +60,10 @@ fn of_recording<'py>(py: Python<'py>, recording: &Recording) -> PyResult<Bound<'
     let all = arrays(py, &recording.set)?;
     let names = |channels: &[Channel]| Vec::from_iter(channels.iter().map(|channel| channel.name.clone()));
     let units = |channels: &[Channel]| Vec::from_iter(channels.iter().map(|channel| channel.unit.clone()));
-    all.set_item("inputs", names(&recording.inputs))?;
-    all.set_item("input_units", units(&recording.inputs))?;
-    all.set_item("targets", names(&recording.targets))?;
-    all.set_item("target_units", units(&recording.targets))?;
+    all.set_item("inputs", names(&recording.problem.features()))?;
+    all.set_item("input_units", units(&recording.problem.features()))?;
+    all.set_item("targets", names(&recording.problem.targets))?;
+    all.set_item("target_units", units(&recording.problem.targets))?;
     all.set_item("times", recording.times.as_ref().map(|times| times.to_pyarray(py)))?;
     all.set_item("warnings", recording.warnings.clone())?;
     let dropped = recording

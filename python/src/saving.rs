@@ -17,7 +17,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{AtomicFile, NetworkFile, TrainingRecord, WriteError},
-    import::{Decimal, DialectChoice, Plan, Recipe, Separator, Setup, TestFiles},
+    import::{Decimal, DialectChoice, FileSet, Plan, Recipe, Separator, Setup},
 };
 use serde::{Deserialize, Serialize};
 
@@ -229,10 +229,9 @@ impl Columns {
                 group: self.has_groups.then(|| GROUP.to_owned()),
                 ..Recipe::default()
             },
-            test: Some(TestFiles {
+            test: Some(FileSet {
                 data: test,
-                join: Vec::new(),
-                append: Vec::new(),
+                ..FileSet::default()
             }),
             division,
         }
@@ -243,7 +242,7 @@ impl Columns {
 pub fn division(by: SplitBy, validation_fraction: f64) -> Division {
     Division {
         by,
-        validation_fraction,
+        validation_fraction: Some(validation_fraction),
         ..Division::default()
     }
 }

@@ -65,7 +65,7 @@ pub(super) fn optimism(recording: &Recording, settings: &RunSettings, by: SplitB
     let is_cancelled = || graceful.is_end_requested();
     match recording.findings(settings, by, &Job::new(&is_cancelled)) {
         Ok(Findings { comparison, .. }) => {
-            let targets = recording.targets.iter().enumerate();
+            let targets = recording.problem.targets.iter().enumerate();
             targets
                 .map(|(index, target)| comparison.sentence(index, &target.name))
                 .collect()
@@ -100,12 +100,12 @@ fn print_folds(
     settings: &RunSettings,
     validated: &CrossValidated,
 ) -> Result<(), Failure> {
-    let (set, problem, by) = (&recording.set, recording.problem(), plan.division.by);
+    let (set, problem, by) = (&recording.set, &recording.problem, plan.division.by);
     let channels = &problem.targets;
     let scores = validated.scores(set);
     let determined = Determination::measure(set, validated.network.view(), by);
     recording.warnings.iter().for_each(warn);
-    let remarks = channel_remarks(set, by, &recording.inputs, channels).into_iter();
+    let remarks = channel_remarks(set, by, &recording.problem.features(), channels).into_iter();
     let remarks = remarks.chain(optimism(recording, settings, by));
     let remarks = remarks.chain(describe_determinacy(channels, &determined, false));
     remarks
@@ -114,7 +114,7 @@ fn print_folds(
     let object = || {
         json!({
             "files": files([recording]),
-            "inputs": recording.inputs,
+            "inputs": recording.problem.features(),
             "split": by.to_string(),
             "folds": validated.folds.count(),
             "rows": recording.rows,
@@ -129,7 +129,7 @@ fn print_folds(
                 "mean": targets(channels, &scores.baselines.mean, &[], &[]),
                 "ridge": targets(channels, &scores.baselines.linear, &[], &[]),
             },
-            "better": better(&problem, &scores),
+            "better": better(problem, &scores),
         })
     };
     print(object, |out| {
@@ -140,7 +140,7 @@ fn print_folds(
             set.samples(),
             validated.folds.count()
         )?;
-        let tables = ErrorTable::of_scores(&problem, &scores, None);
+        let tables = ErrorTable::of_scores(problem, &scores, None);
         write!(out, "{}", error_table(&tables).aligned())
     })
 }

@@ -412,7 +412,7 @@ impl FineTune {
         let division = Division {
             by: SplitBy::Group,
             test_fraction: 0.2,
-            validation_fraction: 0.2,
+            validation_fraction: Some(0.2),
         };
         let divided = division.sets(&frames, None, settings.seed);
         let (split, test) = divided.map_err(decoupler_core::evaluation::RunError::from)?;

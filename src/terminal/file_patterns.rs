@@ -69,11 +69,11 @@ fn matching(pattern: &str) -> Result<Vec<PathBuf>, PatternError> {
     Ok(found)
 }
 
-/// Divides the joined files among the data files, in order; `kind` is "test-" for those of the test.
+/// Divides the joined files among the data files, in order, and returns the first of these with the others appended; `kind` is "test-" for those of the test.
 ///
 /// # Errors
 /// If the data files do not get the same number of joined files.
-pub(super) fn file_sets(kind: &str, data: Vec<PathBuf>, join: Vec<PathBuf>) -> Result<Vec<FileSet>, Failure> {
+pub(super) fn file_sets(kind: &str, data: Vec<PathBuf>, join: Vec<PathBuf>) -> Result<Option<FileSet>, Failure> {
     if !join.len().is_multiple_of(data.len().max(1)) {
         return Err(Failure::Arguments(format!(
             "--{kind}join: {} joined files cannot be divided among the {} files of --{kind}data; give as many for each, in their order",
@@ -86,8 +86,13 @@ pub(super) fn file_sets(kind: &str, data: Vec<PathBuf>, join: Vec<PathBuf>) -> R
     let set = |data| FileSet {
         data,
         join: join.by_ref().take(each).collect(),
+        append: Vec::new(),
     };
-    Ok(data.into_iter().map(set).collect())
+    let mut sets = Vec::from_iter(data.into_iter().map(set)).into_iter();
+    Ok(sets.next().map(|first| FileSet {
+        append: sets.collect(),
+        ..first
+    }))
 }
 
 #[cfg(test)]
@@ -138,7 +143,12 @@ mod tests {
     fn joined_files_go_with_the_data_files_in_order() {
         let paths = |names: &[&str]| Vec::from_iter(names.iter().map(PathBuf::from));
         let sets = file_sets("", paths(&["a", "b"]), paths(&["a1", "a2", "b1", "b2"])).unwrap();
-        assert_eq!((&sets[1].data, &sets[1].join), (&"b".into(), &paths(&["b1", "b2"])));
+        let sets = sets.unwrap();
+        assert_eq!(sets.join, paths(&["a1", "a2"]));
+        assert_eq!(
+            (&sets.append[0].data, &sets.append[0].join),
+            (&"b".into(), &paths(&["b1", "b2"]))
+        );
         let error = file_sets("test-", paths(&["a", "b"]), paths(&["a1"]))
             .unwrap_err()
             .to_string();

@@ -17,10 +17,10 @@ use decoupler_core::{
     text::Named,
 };
 use decoupler_files::{
-    export::{RecipeFile, RecipeSource},
+    export::RecipeFile,
     import::{
         Condition, Decimal, Derived, DialectChoice, Encoding, FileSet, Joined, Missing, Plan, Recipe, Recorded,
-        Separator, TestFiles,
+        Separator,
     },
 };
 
@@ -144,8 +144,8 @@ pub(super) struct RecipeArguments {
     /// Share of the samples held out for testing [default: 0.2]
     #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "test_data")]
     test_fraction: Option<f64>,
-    /// Share of the other samples that selects the best weights and ends the training; 0 for none, which suits the
-    /// default method, and 0.2 the others than br [default: 0]
+    /// Share of the other samples that selects the best weights and ends the training; 0 for none [default: as the method
+    /// of the training needs: 0 for br, 0.2 for the others]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     validation_fraction: Option<f64>,
     /// File joined to --test-data, corresponding to --join; may be repeated
@@ -266,11 +266,6 @@ impl ImportArguments {
         expanded("--data", &self.data)
     }
 
-    /// Returns `true` if the validation share is given in an argument or a recipe.
-    pub(super) fn holds_out(&self) -> bool {
-        self.rest.validation_fraction.is_some() || self.recipe.is_some()
-    }
-
     /// Refuses arguments that need a recording.
     pub(super) fn check_unused(&self) -> Result<(), Failure> {
         self.refuse_division(|argument| format!("{argument} needs --data or --recipe"))
@@ -361,7 +356,12 @@ impl ImportArguments {
                 };
                 let given = std::path::absolute(given).unwrap_or_else(|_| given.clone());
                 let is_named = |path: &PathBuf| path.file_name() == given.file_name();
-                let named = saved.plan.files().find(is_named).filter(|_| !is_named(place));
+                let named = saved
+                    .plan
+                    .files()
+                    .into_iter()
+                    .find(is_named)
+                    .filter(|_| !is_named(place));
                 found = found.relocated(named.as_ref().unwrap_or(place), &given);
                 for path in Vec::from_iter(found.missing().into_iter().map(Path::to_owned)) {
                     let near = path.file_name().map(|name| given.with_file_name(name));
@@ -375,15 +375,15 @@ impl ImportArguments {
     }
 
     /// Source of the samples: a recording, or the simulated array of a recipe; `None` for the array of the arguments.
-    pub(super) fn source(&self, inputs: &[String]) -> Result<Option<RecipeSource>, Failure> {
+    pub(super) fn source(&self, inputs: &[String]) -> Result<Option<RecipeFile>, Failure> {
         if let Some(path) = &self.recipe
-            && let simulated @ RecipeSource::Simulated(_) = RecipeFile::load(path)?
+            && let simulated @ RecipeFile::Simulated(_) = RecipeFile::load(path)?
         {
             self.check_unused()?;
             return Ok(Some(simulated));
         }
         if self.is_given() {
-            return Ok(Some(RecipeSource::Recording(self.plan(inputs)?)));
+            return Ok(Some(RecipeFile::Recording(self.plan(inputs)?)));
         }
         self.check_unused()?;
         Ok(None)
@@ -428,14 +428,14 @@ impl ImportArguments {
         plan.division = Division {
             by: self.split.unwrap_or(by),
             test_fraction: self.rest.test_fraction.unwrap_or(test_fraction),
-            validation_fraction: self.rest.validation_fraction.unwrap_or(validation_fraction),
+            validation_fraction: self.rest.validation_fraction.or(validation_fraction),
         };
         if !self.test_data.is_empty() {
             let (data, join) = (
                 expanded("--test-data", &self.test_data)?,
                 expanded("--test-join", &self.rest.test_join)?,
             );
-            plan.test = TestFiles::of(file_sets("test-", data, join)?);
+            plan.test = file_sets("test-", data, join)?;
         }
         if plan.division.by == SplitBy::Group && !plan.import.has_groups() {
             let message = "--split group: give the group column with --group, or several files with --data";
@@ -453,8 +453,7 @@ impl ImportArguments {
         }
         let rest = &self.rest;
         let files = file_sets("", expanded("--data", &self.data)?, expanded("--join", &self.join)?)?;
-        let mut files = files.into_iter();
-        let FileSet { data, join } = files.next().unwrap_or_default();
+        let FileSet { data, join, append } = files.unwrap_or_default();
         if rest.join_time.len() > 1 && rest.join_time.len() != join.len() {
             let message = "--join-time: give it once, or once for each joined file of the first --data";
             return Err(Failure::Arguments(message.to_owned()));
@@ -468,7 +467,7 @@ impl ImportArguments {
         Ok(Recipe {
             data,
             join: join.into_iter().enumerate().map(joined).collect(),
-            append: files.collect(),
+            append,
             dialect: rest.dialect(),
             inputs: inputs.to_vec(),
             targets: targets.to_vec(),

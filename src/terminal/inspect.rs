@@ -20,10 +20,13 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        Cell, RecipeFile, RecipeSource, Table, TableColumn, describe_positions, describe_target, describe_warnings,
-        format_below_one, format_number,
+        Cell, RecipeFile, Table, TableColumn, describe_positions, describe_target, describe_warnings, format_below_one,
+        format_number,
     },
-    import::{ColumnKind, ColumnSummary, FileReport, Inspection, Plan, Recording, Recordings, TimeSummary},
+    import::{
+        ColumnKind, ColumnSummary, FileReport, Format, InspectedFile, Plan, Recording, Recordings, TimeSummary,
+        read_table,
+    },
 };
 use serde_json::{Value, json};
 
@@ -67,29 +70,32 @@ impl Inspect {
         let (mut objects, mut texts) = (Vec::new(), Vec::new());
         let files = self.import.only_files()?;
         for file in &files {
-            let (inspection, table) = with_bar(|watch| {
-                Inspection::read(file, self.import.rest.dialect(), self.import.time.as_deref(), watch)
-            })?;
-            let format = table.format.to_string();
-            inspection.warnings.iter().for_each(warn);
-            let of_file = json!({"file": file.to_string_lossy(), "format": format, "dialect": table.dialect()});
-            objects.push(joined([of_file, value(&inspection)]));
-            texts.push((file, format, inspection));
+            let table = with_bar(|watch| read_table(file, self.import.rest.dialect(), watch))?;
+            let inspected = InspectedFile::of(&table, file, self.import.time.as_deref())?;
+            let format = inspected.format.to_string();
+            let dialect = match &inspected.format {
+                Format::Text(dialect) => Some(dialect),
+                _ => None,
+            };
+            inspected.warnings.iter().for_each(warn);
+            let of_file = json!({"file": file.to_string_lossy(), "format": format, "dialect": dialect});
+            objects.push(joined([of_file, value(&inspected)]));
+            texts.push((format, inspected));
         }
         let object = || match &mut objects[..] {
             [object] => object.take(),
             objects => json!({"files": objects}),
         };
         print(object, |out| {
-            for (number, (file, format, inspection)) in texts.iter().enumerate() {
+            for (number, (format, inspected)) in texts.iter().enumerate() {
                 if number > 0 {
                     writeln!(out)?;
                 }
-                let (rows, columns) = (inspection.rows, inspection.columns.len());
+                let (rows, columns) = (inspected.rows, inspected.columns.len());
                 let size = format!("{} × {}", counted(rows, "row"), counted(columns, "column"));
-                writeln!(out, "{}: {size}\n{format}\n", file.display())?;
-                write!(out, "{}", columns_table(&inspection.columns).aligned())?;
-                if let Some(time) = &inspection.time {
+                writeln!(out, "{}: {size}\n{format}\n", inspected.path.display())?;
+                write!(out, "{}", columns_table(&inspected.columns).aligned())?;
+                if let Some(time) = &inspected.time {
                     write_time(time, out)?;
                 }
             }
@@ -102,7 +108,7 @@ impl Inspect {
 fn write_recipe(plan: &Plan, path: &Path) -> Result<(), Failure> {
     check_output("--recipe-out", path)?;
     let recording = with_bar(|watch| plan.recording(working_folder(), watch))?;
-    RecipeFile::save(RecipeSource::Recording(plan.clone()), path)?;
+    RecipeFile::Recording(plan.clone()).save(path)?;
     recording.warnings.iter().for_each(warn);
     let object = || {
         let samples = json!({"rows": recording.rows, "samples": recording.set.samples()});
@@ -235,7 +241,7 @@ impl RecordingReport {
         };
         let mut object = json!({
             "files": files(all()),
-            "inputs": recording.inputs,
+            "inputs": recording.problem.features(),
             "split": split,
             "test_fraction": test as f64 / (training + validation + test) as f64,
             "rows": all().map(|recording| recording.rows).sum::<usize>(),
@@ -244,9 +250,9 @@ impl RecordingReport {
             "test_samples": test,
             "dropped": Vec::from_iter(all().flat_map(|recording| &recording.dropped)),
         });
-        let position = |&TargetPosition { target, x_mm, y_mm }: &TargetPosition| json!({"target": recording.targets[target].name, "x_mm": x_mm, "y_mm": y_mm});
-        if !recording.positions.is_empty() {
-            object["positions"] = recording.positions.iter().map(position).collect();
+        let position = |&TargetPosition { target, x_mm, y_mm }: &TargetPosition| json!({"target": recording.problem.targets[target].name, "x_mm": x_mm, "y_mm": y_mm});
+        if !recording.problem.positions.is_empty() {
+            object["positions"] = recording.problem.positions.iter().map(position).collect();
         }
         let mut text = Vec::new();
         write_files(all(), &mut text)?;
@@ -255,7 +261,7 @@ impl RecordingReport {
             text,
             "{samples} for training, {validation} for validation, {test} for testing (split by {split})"
         )?;
-        if let Some(positions) = describe_positions(&recording.positions) {
+        if let Some(positions) = describe_positions(&recording.problem.positions) {
             writeln!(text, "{positions}")?;
         }
         Ok(Self { object, text })
@@ -342,7 +348,7 @@ impl StudyArguments {
         describe_warnings(&recording, by, &findings).iter().for_each(warn);
         let (samples, folds) = (recording.set.samples(), findings.record.folds);
         let object = || {
-            let targets = recording.targets.iter().enumerate();
+            let targets = recording.problem.targets.iter().enumerate();
             json!({
                 "files": files([&recording]),
                 "rows": recording.rows,
@@ -360,7 +366,7 @@ impl StudyArguments {
                 out,
                 "{samples} samples, {folds} folds by {by}; 95 % confidence intervals from blocks or groups of samples\n"
             )?;
-            for (channel, of) in recording.targets.iter().zip(&findings.targets) {
+            for (channel, of) in recording.problem.targets.iter().zip(&findings.targets) {
                 write!(out, "{}", capitalised(&describe_target(&channel.name, of)))?;
                 if let (Ok(ridge), Some(kernel)) = (of.ridge, of.kernel) {
                     let [ridge, kernel] = [ridge, kernel].map(|of| format_below_one(of.r2.value, 2));
@@ -369,7 +375,7 @@ impl StudyArguments {
                 writeln!(out)?;
             }
             writeln!(out)?;
-            for (index, channel) in recording.targets.iter().enumerate() {
+            for (index, channel) in recording.problem.targets.iter().enumerate() {
                 writeln!(
                     out,
                     "{}",

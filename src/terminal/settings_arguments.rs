@@ -13,7 +13,7 @@ use decoupler_core::{
     text::Named,
     training::TrainingSettings,
 };
-use decoupler_files::{export::RecipeSource, import::Setup};
+use decoupler_files::{export::RecipeFile, import::Setup};
 
 use super::{count, failure::Failure, interruption::check_same};
 
@@ -463,18 +463,14 @@ impl TrainingArguments {
         Ok(settings)
     }
 
-    /// Setup of a new run on samples of `source`, or of the array described by the arguments. `holds_out` is true if the
-    /// validation share of a recording is given; otherwise the method determines it.
-    pub(super) fn setup(&self, source: Option<RecipeSource>, holds_out: bool) -> Result<Setup, Failure> {
-        let mut plan = match source {
+    /// Setup of a new run on samples of `source`, or of the array described by the arguments.
+    pub(super) fn setup(&self, source: Option<RecipeFile>) -> Result<Setup, Failure> {
+        let plan = match source {
             None => return Ok(self.settings(None)?.into()),
-            Some(RecipeSource::Simulated(simulation)) => return Ok(self.settings(Some(simulation))?.into()),
-            Some(RecipeSource::Recording(plan)) => plan,
+            Some(RecipeFile::Simulated(simulation)) => return Ok(self.settings(Some(simulation))?.into()),
+            Some(RecipeFile::Recording(plan)) => plan,
         };
         let settings = self.recorded(plan.import.row_wire.is_some())?;
-        if !holds_out {
-            plan.division.validation_fraction = settings.validation_fraction();
-        }
         Ok(Setup::recording(settings, plan))
     }
 

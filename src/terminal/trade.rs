@@ -220,17 +220,13 @@ impl Trade {
             if self.scene.value("epochs").is_some() {
                 settings.training.stopping.epochs = stopping.epochs;
             }
-            let mut plan = plan.clone();
-            if !self.import.holds_out() {
-                plan.division.validation_fraction = settings.validation_fraction();
-            }
             let mut decoders = decoders.clone();
             // The others do not depend on the method.
             decoders.retain(|kind| number == 0 || kind.needs_network());
             Case {
                 noise: None,
                 preset: None,
-                setup: Setup::recording(settings, plan),
+                setup: Setup::recording(settings, plan.clone()),
                 decoders,
             }
         };
@@ -241,7 +237,7 @@ impl Trade {
 /// Divides recordings that have already been read by another plan.
 fn divided(recordings: &Recordings, plan: &Plan, seed: Seed) -> Result<RunSets, Failure> {
     let (split, test) = plan.divide(&recordings.training, recordings.test.as_ref(), seed)?;
-    Ok(RunSets::new(split, test).described(recordings.training.problem()))
+    Ok(RunSets::new(split, test).described(recordings.training.problem.clone()))
 }
 
 /// Measures all cases, up to the first failure. Returns the levels with points, and whether all cases were measured

@@ -30,7 +30,7 @@ use decoupler_files::{
         CheckpointFile, Checkpointing, NetworkFile, SensorFile, check_writable, format_number, is_same,
         report::{RunReport, quoted},
     },
-    import::{ChoosingProgress, ChosenSetup, ImportError, Setup, SetupError, SetupSets},
+    import::{ChoosingProgress, ImportError, Setup, SetupError, SetupSets},
 };
 
 /// Train a network and print its errors
@@ -91,10 +91,7 @@ impl Train {
                     return self.cross_validate(&setup, folds);
                 }
                 let (setup, sets) = match self.chooses(&setup)? {
-                    true => {
-                        let chosen = self.choose(&setup)?;
-                        (chosen.setup, chosen.sets)
-                    }
+                    true => self.choose(&setup)?,
                     false => {
                         let sets = sets(&setup)?;
                         (setup, sets)
@@ -148,7 +145,7 @@ impl Train {
     /// Setup of a new run.
     fn setup(&self) -> Result<Setup, Failure> {
         let source = self.import.source(&self.training.scene.columns())?;
-        let setup = self.training.setup(source, self.import.holds_out())?;
+        let setup = self.training.setup(source)?;
         let mut settings = *setup.settings();
         if let (Some(path), Some(simulation)) = (&self.sensor, settings.simulation_mut()) {
             simulation.sensor = SensorFile::load(path)?;
@@ -182,7 +179,7 @@ impl Train {
     }
 
     /// Chooses the settings of `setup`, with a progress bar of the budget.
-    fn choose(&self, setup: &Setup) -> Result<ChosenSetup, Failure> {
+    fn choose(&self, setup: &Setup) -> Result<(Setup, SetupSets), Failure> {
         let bar = progress_bar(100, "{bar:20} {msg}");
         let (memory, tries_memory) = self.import.fixed_history()?;
         let fixed = AutoFixed {

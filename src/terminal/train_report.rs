@@ -160,7 +160,8 @@ impl Trained<'_> {
 
     /// Share of the test samples of a recording outside the range of its training samples, with a warning.
     fn extrapolation(&self) -> Option<(f64, Option<String>)> {
-        let Recording { inputs, targets, .. } = &self.sets.recordings.as_ref()?.training;
+        let Recording { problem, .. } = &self.sets.recordings.as_ref()?.training;
+        let (inputs, targets) = (&problem.features(), &problem.targets);
         let training = &self.sets.sets.split.training;
         Some(extrapolation(training, self.run.test(), inputs, targets))
     }

@@ -104,6 +104,44 @@ fn a_recipe_trains_the_same_network_and_folds_test_every_sample() {
 }
 
 #[test]
+fn a_recipe_without_a_validation_share_holds_out_what_the_method_needs() {
+    let folder = recordings();
+    let columns = "--data sensor.csv --join states.csv --time c1 --inputs c2..c4 --targets states.c2,states.c3";
+    let settings = "--hidden 3 --starts 1 --epochs 5 --json";
+    json(
+        &format!("inspect {columns} --recipe-out usual.json --json"),
+        folder.path(),
+    );
+    json(
+        &format!("inspect {columns} --validation-fraction 0 --recipe-out none.json --json"),
+        folder.path(),
+    );
+    let held_out = |source: &str, method: &str| {
+        let report = json(&format!("train {source} --method {method} {settings}"), folder.path());
+        report["validation_samples"].as_u64().unwrap()
+    };
+    for (method, expected) in [("lm", 48), ("br", 0)] {
+        for (source, expected) in [
+            (columns, expected),
+            ("--recipe usual.json", expected),
+            ("--recipe none.json", 0),
+        ] {
+            assert_eq!(held_out(source, method), expected, "{source} {method}");
+        }
+    }
+    // Recipes of earlier versions give every share.
+    let recipe = fs::read_to_string(folder.path().join("none.json")).unwrap();
+    let fraction = |share: &str| recipe.replace("\"validation_fraction\": 0.0", share);
+    assert_ne!(fraction(""), recipe);
+    fs::write(
+        folder.path().join("null.json"),
+        fraction("\"validation_fraction\": null"),
+    )
+    .unwrap();
+    assert_eq!(held_out("--recipe null.json", "lm"), 48);
+}
+
+#[test]
 fn a_checkpoint_resumes_unless_its_samples_have_changed() {
     let folder = recordings();
     let whole = json(&format!("{TRAIN} --json"), folder.path());
@@ -483,7 +521,9 @@ fn a_recipe_of_a_simulated_array_trains_the_same_network() {
     let train = "train --hidden 3 --epochs 5 --decoder mean --json";
     let first = json(&format!("{train} {array} --out n.json"), folder.path());
     let settings = NetworkFile::load(&folder.path().join("n.json")).unwrap().settings;
-    RecipeFile::save(*settings.simulation().unwrap(), &folder.path().join("array.json")).unwrap();
+    RecipeFile::Simulated(*settings.simulation().unwrap())
+        .save(&folder.path().join("array.json"))
+        .unwrap();
     let again = json(&format!("{train} --recipe array.json"), folder.path());
     assert_eq!((&first["errors"], &first["scene"]), (&again["errors"], &again["scene"]));
     // Arguments change what the recipe describes.

@@ -2,7 +2,9 @@ use std::{collections::BTreeSet, fmt::Write, fs, ops::ControlFlow, path::Path};
 
 use decoupler_core::problem::TargetPosition;
 use decoupler_files::{
-    import::{DialectChoice, Inspection, Recipe, Separator, Table, holds_positions, read_table, suggested_plan},
+    import::{
+        DialectChoice, Format, InspectedFile, Recipe, Separator, Table, holds_positions, read_table, suggested_plan,
+    },
     machine::limit_memory,
 };
 
@@ -38,10 +40,10 @@ pub(crate) fn check(bytes: &[u8], path: &Path) {
     }
     let names = BTreeSet::from_iter(table.columns.iter().map(|column| &column.name));
     assert_eq!(names.len(), table.columns.len(), "each column has its own name");
-    if table.dialect().is_none() {
+    if !matches!(table.format, Format::Text(_)) {
         same_as_text(&table, path);
     }
-    let (inspection, _) = Inspection::read(path, DialectChoice::default(), None, &mut watch).unwrap();
+    let inspection = InspectedFile::of(&table, path, None).unwrap();
     for column in &inspection.columns {
         let bars = column.histogram.iter().sum::<usize>();
         assert!(bars == 0 || bars == table.rows - column.missing - column.texts);
@@ -136,7 +138,7 @@ fn check_positions(path: &Path, recording: &Path) {
     };
     if let Ok(read) = recipe.import(Path::new(""), &mut |_| ControlFlow::Continue(())) {
         let at = |place: &TargetPosition| (place.target, place.x_mm.is_finite() && place.y_mm.is_finite());
-        let places = Vec::from_iter(read.positions.iter().map(at));
+        let places = Vec::from_iter(read.problem.positions.iter().map(at));
         assert!(
             [
                 &[(0, true)][..],
@@ -146,7 +148,7 @@ fn check_positions(path: &Path, recording: &Path) {
             ]
             .contains(&&places[..])
         );
-        TargetPosition::lattice(&read.positions);
+        TargetPosition::lattice(&read.problem.positions);
     }
 }
 

@@ -1,10 +1,7 @@
 use std::{fs, ops::ControlFlow, path::Path};
 
 use decoupler_core::dataset::Seed;
-use decoupler_files::{
-    export::{RecipeFile, RecipeSource},
-    machine::limit_memory,
-};
+use decoupler_files::{export::RecipeFile, machine::limit_memory};
 
 use crate::{
     corpus::replay,
@@ -48,14 +45,14 @@ fn check(path: &Path, bytes: &[u8]) -> bool {
         }
     };
     let text = || String::from_utf8_lossy(bytes);
-    RecipeFile::save(source.clone(), path).unwrap();
+    source.save(path).unwrap();
     let again = RecipeFile::load(path).unwrap();
-    let RecipeSource::Recording(plan) = source else {
+    let RecipeFile::Recording(plan) = source else {
         assert_eq!(again, source, "{}", text());
         return true;
     };
     // The files of the recipe are named from another folder, but are the same.
-    let RecipeSource::Recording(again) = again else {
+    let RecipeFile::Recording(again) = again else {
         panic!("{}", text())
     };
     assert_eq!(again.absolute(), plan.absolute(), "{}", text());
@@ -64,13 +61,17 @@ fn check(path: &Path, bytes: &[u8]) -> bool {
     let is_ours = |file: std::path::PathBuf| {
         file.parent() == Some(folder) && RECORDINGS.iter().any(|(name, _)| file.ends_with(name))
     };
-    if !plan.files().all(is_ours) {
+    if !plan.files().into_iter().all(is_ours) {
         return false;
     }
-    match plan.sets(Path::new(""), Seed(1), &mut |_| ControlFlow::Continue(())) {
-        Ok(sets) => {
-            let recording = &sets.recording;
-            for set in [&recording.set, &sets.test, &sets.split.training] {
+    let recordings = plan.recordings(Path::new(""), &mut |_| ControlFlow::Continue(()));
+    let divided = recordings.and_then(|(recording, test)| {
+        let (split, test) = plan.divide(&recording, test.as_ref(), Seed(1))?;
+        Ok((recording, split, test))
+    });
+    match divided {
+        Ok((recording, split, test)) => {
+            for set in [&recording.set, &test, &split.training] {
                 let is_finite = |number: &f64| number.is_finite();
                 assert!(set.readings().iter().all(is_finite), "{}", text());
                 assert!(set.targets().iter().all(is_finite), "{}", text());

@@ -141,7 +141,7 @@ fn a_split_and_its_shares_are_kept_if_a_column_is_a_group() {
     assert!(driver.says("time, 30 % test"), "{:#?}", driver.texts());
     let division = saved_plan(&mut driver, &folder).division;
     assert_eq!((division.by, division.test_fraction), (SplitBy::Time, 0.3));
-    assert_eq!(division.validation_fraction, 0.25);
+    assert_eq!(division.validation_fraction, Some(0.25));
 }
 
 #[test]

@@ -348,16 +348,16 @@ fn the_method_decides_what_is_held_out_until_the_user_does() {
             .division
             .validation_fraction
     };
-    assert_eq!(held_out(&driver), 0.0);
+    assert_eq!(held_out(&driver), Some(0.0));
     driver.choose_by_hand();
     crate::configuring::choose_method(&mut driver, "Levenberg-Marquardt");
     driver.settle();
-    assert_eq!(held_out(&driver), 0.2);
+    assert_eq!(held_out(&driver), Some(0.2));
     driver.unfold_to("Samples", "Validation share");
     driver.enter("Validation share", "30");
     driver.enter("Hidden nodes", "3");
     driver.settle();
-    assert_eq!(held_out(&driver), 0.3);
+    assert_eq!(held_out(&driver), Some(0.3));
 }
 
 #[test]

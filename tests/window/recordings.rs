@@ -155,14 +155,9 @@ pub(crate) fn settings() -> RunSettings {
 /// Returns the run of the library on the plan with these settings.
 pub(crate) fn trained(plan: &Plan) -> Run {
     let watch = &mut |_| std::ops::ControlFlow::Continue(());
-    let sets = plan.sets(Path::new(""), Seed::default(), watch).unwrap();
-    let mut run = Run::with_baselines(
-        settings(),
-        RunSets::new(sets.split, sets.test),
-        None,
-        &Job::UNINTERRUPTED,
-    )
-    .unwrap();
+    let (recording, test) = plan.recordings(Path::new(""), watch).unwrap();
+    let (split, test) = plan.divide(&recording, test.as_ref(), Seed::default()).unwrap();
+    let mut run = Run::with_baselines(settings(), RunSets::new(split, test), None, &Job::UNINTERRUPTED).unwrap();
     while run.step().is_none() {}
     run
 }

@@ -57,7 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let calibrated = train(settings)?;
     let moved = |set: &Dataset| rebased(set, &nominal, &calibration.model);
     let division = Division {
-        validation_fraction: 0.2,
+        validation_fraction: Some(0.2),
         ..Division::default()
     };
     let (split, _) = division.sets(&moved(&frames)?, Some(&test), Seed(0))?;

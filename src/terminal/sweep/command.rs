@@ -459,7 +459,7 @@ impl SweepArguments {
         let mut axes = self.axes.0.clone();
         axes.push(("seed".to_owned(), seeds.collect()));
         let mut train = TrainOptions::new();
-        let specification = Specification::of_arguments(recording, self.import.holds_out(), axes, &mut train)?;
+        let specification = Specification::of_arguments(recording, axes, &mut train)?;
         Trials::of(specification, &mut train)
     }
 }

@@ -8,7 +8,7 @@ use std::{
 use clap::{Arg, ArgAction, Args, Command, FromArgMatches};
 use decoupler_core::{decoupling::DecoderKind, evaluation::RUN_OPTIONS, text::in_one_line};
 use decoupler_files::{
-    export::RecipeSource,
+    export::RecipeFile,
     import::{Plan, Setup},
 };
 use serde::{
@@ -39,8 +39,6 @@ pub(super) struct Specification {
     pub(super) axes: Vec<Axis>,
     /// Recording shared by all trials; its paths are absolute.
     pub(super) recording: Option<Plan>,
-    /// `true` if its share for validation is given, which otherwise follows from the method.
-    pub(super) holds_out: bool,
 }
 
 /// A varied option and its values.
@@ -70,7 +68,7 @@ impl Specification {
     /// Reads the file at `path` and checks each option and value separately.
     pub(super) fn read(path: &Path, train: &mut TrainOptions) -> Result<Self, Failure> {
         let text = read_text(path).map_err(|error| Failure::Path("read", path.to_owned(), error))?;
-        let layout: Layout = serde_json::from_str(&text).map_err(|error| {
+        let mut layout: Layout = serde_json::from_str(&text).map_err(|error| {
             Failure::Arguments(format!(
                 "'{}' is not a specification: {}; write {{\"train\": {{OPTION: VALUE, ...}}, \"axes\": {{OPTION: [VALUE, ...], \
                  ...}}}} with the options of decoupler train",
@@ -78,16 +76,18 @@ impl Specification {
                 in_one_line(&error.to_string())
             ))
         })?;
-        let holds_out = (layout.recording.as_ref()).is_some_and(|plan| plan.division.validation_fraction > 0.0);
-        Self::of(path, layout, holds_out, train)
+        if let Some(plan) = &mut layout.recording {
+            // Earlier versions wrote 0 where the method determines the share.
+            plan.division.validation_fraction = plan.division.validation_fraction.filter(|share| *share > 0.0);
+        }
+        Self::of(path, layout, train)
     }
 
-    fn of(path: &Path, layout: Layout, holds_out: bool, train: &mut TrainOptions) -> Result<Self, Failure> {
+    fn of(path: &Path, layout: Layout, train: &mut TrainOptions) -> Result<Self, Failure> {
         let mut specification = Self {
             path: path.to_owned(),
             shared: Vec::new(),
             axes: Vec::new(),
-            holds_out,
             recording: layout.recording.map(|plan| plan.within(folder(path)).absolute()),
         };
         if let Some(file) = specification.recording.as_ref().and_then(Plan::irregular) {
@@ -113,7 +113,6 @@ impl Specification {
     /// Specification from command-line arguments: each axis has values separated by commas.
     pub(super) fn of_arguments(
         recording: Option<Plan>,
-        holds_out: bool,
         axes: Vec<(String, Vec<String>)>,
         train: &mut TrainOptions,
     ) -> Result<Self, Failure> {
@@ -126,7 +125,7 @@ impl Specification {
             axes: UniqueKeys(axes.collect()),
             recording,
         };
-        Self::of(Path::new("the arguments"), layout, holds_out, train)
+        Self::of(Path::new("the arguments"), layout, train)
     }
 
     fn axis(&self, option: &str, values: &Value, train: &mut TrainOptions) -> Result<Axis, Failure> {
@@ -309,17 +308,16 @@ impl TrialArguments {
                 let message = "the specification has a recording; leave --data, --recipe and --inputs out";
                 return Err(Failure::Arguments(message.to_owned()));
             }
-            Some(recording) => Some(RecipeSource::Recording(self.import.divided(recording.clone())?)),
+            Some(recording) => Some(RecipeFile::Recording(self.import.divided(recording.clone())?)),
             None => self.import.source(&columns)?,
         };
-        let holds_out = self.import.holds_out() || specification.holds_out;
         let source = source.map(|source| match source {
-            RecipeSource::Recording(plan) => RecipeSource::Recording(plan.absolute()),
-            simulated @ RecipeSource::Simulated(_) => simulated,
+            RecipeFile::Recording(plan) => RecipeFile::Recording(plan.absolute()),
+            simulated @ RecipeFile::Simulated(_) => simulated,
         });
         self.training
             .refuse_auto("a sweep has the same settings in every trial")?;
-        self.training.setup(source, holds_out)
+        self.training.setup(source)
     }
 
     /// Decoders to measure: those given, by default all for a simulated array and none for a recording.

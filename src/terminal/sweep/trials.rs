@@ -115,7 +115,7 @@ impl Trials {
                 Ok(crc32)
             }
         };
-        plan.files().map(of_file).collect()
+        plan.files().into_iter().map(of_file).collect()
     }
 
     /// The trial at `position`.

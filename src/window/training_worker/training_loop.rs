@@ -253,9 +253,9 @@ impl<'a> TrainingLoop<'a> {
                 }
             };
             let (fixed, folder) = (AutoFixed::default(), Path::new(""));
-            let chosen = setup.choose(&fixed, DEFAULT_BUDGET_S, folder, job, &mut on_choosing)?;
-            let run = chosen.sets.run(&chosen.setup, None, job)?;
-            Ok(TrainedRun::new(run, &chosen.sets))
+            let (setup, sets) = setup.choose(&fixed, DEFAULT_BUDGET_S, folder, job, &mut on_choosing)?;
+            let run = sets.run(&setup, None, job)?;
+            Ok(TrainedRun::new(run, &sets))
         })
     }
 

@@ -14,9 +14,12 @@ pub struct Division {
     pub by: SplitBy,
     /// Share of the samples held out for the test, above 0 and below 1.
     pub test_fraction: f64,
-    /// Share of the other samples held out for validation, from 0 to below 1. With 0, nothing is held out; see
-    /// [`RunSettings::validation_fraction`](crate::evaluation::RunSettings::validation_fraction).
-    pub validation_fraction: f64,
+    /// Share of the other samples held out for validation, from 0 to below 1. With 0, nothing is held out; if absent, a run
+    /// holds out what its method needs, see
+    /// [`RunSettings::validation_fraction`](crate::evaluation::RunSettings::validation_fraction), and nothing is held out
+    /// without a run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub validation_fraction: Option<f64>,
 }
 
 /// Samples of each part of a divided set, as ascending indices.
@@ -31,13 +34,13 @@ pub(crate) struct DividedSamples {
 }
 
 impl Default for Division {
-    /// Returns the division in time: the last fifth is the test set, and nothing is held out for validation, since
-    /// the default method of measured runs needs none.
+    /// Returns the division in time: the last fifth is the test set, and the method determines what is held out for
+    /// validation.
     fn default() -> Self {
         Self {
             by: SplitBy::Time,
             test_fraction: 0.2,
-            validation_fraction: 0.0,
+            validation_fraction: None,
         }
     }
 }
@@ -83,7 +86,7 @@ impl Division {
         }
         let hold_out_last = |mut units: Vec<Vec<usize>>| DividedSamples {
             test: take_last(&mut units, test_fraction),
-            validation: take_last(&mut units, self.validation_fraction),
+            validation: take_last(&mut units, self.validation_fraction.unwrap_or(0.0)),
             training: ascending(units.concat()),
         };
         let targets = set.targets();
@@ -109,7 +112,7 @@ impl Division {
             valid.ok_or(DatasetError::Fraction { part, value, least })
         };
         check("test", self.test_fraction, f64::MIN_POSITIVE, "above 0")?;
-        check("validation", self.validation_fraction, 0.0, "0")
+        check("validation", self.validation_fraction.unwrap_or(0.0), 0.0, "0")
     }
 }
 
@@ -278,7 +281,7 @@ mod tests {
         let division = Division {
             by,
             test_fraction: 0.2,
-            validation_fraction: 0.2,
+            validation_fraction: Some(0.2),
         };
         division.divide(set, false, Seed(seed))
     }
@@ -369,7 +372,7 @@ mod tests {
     fn a_separate_test_set_leaves_all_samples_for_training_and_validation() {
         let set = set((0..50).collect());
         let a_fifth_held_out = Division {
-            validation_fraction: 0.2,
+            validation_fraction: Some(0.2),
             ..Division::default()
         };
         let parts = a_fifth_held_out.divide(&set, true, Seed(0)).unwrap();
@@ -389,7 +392,7 @@ mod tests {
             let division = Division {
                 by: SplitBy::Time,
                 test_fraction,
-                validation_fraction,
+                validation_fraction: Some(validation_fraction),
             };
             let error = division.divide(&set(vec![0, 1]), false, Seed(0));
             assert!(matches!(error, Err(DatasetError::Fraction { .. })), "{division:?}");

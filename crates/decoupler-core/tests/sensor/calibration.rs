@@ -92,7 +92,7 @@ fn calibration_and_fine_tuning_adapt_a_network_to_the_real_sensor() {
     assert!(calibrated < 1.2 * limit, "{calibrated} {limit}");
     let frames = rebased(&frames, &nominal, &calibration.model);
     let division = Division {
-        validation_fraction: 0.2,
+        validation_fraction: Some(0.2),
         ..Division::default()
     };
     let (split, _) = division.sets(&frames, Some(&test), Seed(0)).unwrap();

@@ -11,7 +11,7 @@ use serde_json::value::to_raw_value;
 use super::{
     AtomicFile, DocumentError, DocumentKind, document::PROGRAM, network_file::check_settings, unfinished::folder_of,
 };
-use crate::import::{Progress, Recorded, Setup, SetupError, SetupSets};
+use crate::import::{Progress, Recorded, Setup, SetupError, SetupSets, stored};
 use decoupler_core::{
     evaluation::{Run, RunSettings},
     job::Job,
@@ -90,7 +90,7 @@ impl CheckpointFile {
     /// The run has numbers that JSON cannot hold, or the path cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), DocumentError> {
         let unsound = |error: serde_json::Error| DocumentError::unsound(path, error);
-        let located = |recorded: &Recorded| recorded.relative_to(folder_of(path));
+        let located = |recorded: &Recorded| recorded.with_paths(|file| stored(file, folder_of(path)));
         let file = Self {
             recorded: self.recorded.as_ref().map(located),
             ..self.clone()

@@ -302,8 +302,8 @@ fn describe_division(recording: &ExperimentRecording, varies: bool) -> String {
         (false, false, SplitBy::Random) => format!("a random {share} % of the samples for test"),
     };
     match division.validation_fraction {
-        0.0 => test,
-        fraction => format!("{test}, {} % of the others for validation", percent(fraction)),
+        None | Some(0.0) => test,
+        Some(fraction) => format!("{test}, {} % of the others for validation", percent(fraction)),
     }
 }
 

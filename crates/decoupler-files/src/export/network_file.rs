@@ -16,7 +16,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::{
     AtomicFile, DocumentError, DocumentKind, TrainingRecord, WriteError, document::PROGRAM, unfinished::folder_of,
 };
-use crate::import::{InputTable, LineParser, Recipe, Recorded, Setup, SetupError};
+use crate::import::{InputTable, LineParser, Recipe, Recorded, Setup, SetupError, stored};
 
 const KIND: DocumentKind = DocumentKind::Network;
 
@@ -286,7 +286,7 @@ impl NetworkFile {
         commit: fn(AtomicFile) -> Result<T, WriteError>,
     ) -> Result<T, DocumentError> {
         self.check().map_err(|defect| DocumentError::unsound(path, defect))?;
-        let located = |recorded: &Recorded| recorded.relative_to(folder_of(path));
+        let located = |recorded: &Recorded| recorded.with_paths(|file| stored(file, folder_of(path)));
         let file = Self {
             recorded: self.recorded.as_ref().map(located),
             ..self.clone()

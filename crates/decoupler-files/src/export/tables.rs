@@ -286,9 +286,8 @@ pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
         return Vec::new();
     };
     let (training, test) = (&sets.sets.split.training, &sets.sets.test);
-    let Recording {
-        inputs, targets, set, ..
-    } = &recordings.training;
+    let Recording { problem, set, .. } = &recordings.training;
+    let (inputs, targets) = (&problem.features(), &problem.targets);
     let division = recordings.recorded.plan.division;
     let mut warnings = target_remarks(training, division.by, inputs, targets);
     // In time, the first samples are those for testing unless they are for training.
@@ -317,8 +316,13 @@ pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
 
 /// Returns remarks on the channels and targets of a recording that is divided by `by`, and on possible leaks.
 pub fn describe_warnings(recording: &Recording, by: SplitBy, findings: &Findings) -> Vec<String> {
-    let mut warnings = channel_remarks(&recording.set, by, &recording.inputs, &recording.targets);
-    warnings.extend(findings.record.leaks(&recording.targets));
+    let mut warnings = channel_remarks(
+        &recording.set,
+        by,
+        &recording.problem.features(),
+        &recording.problem.targets,
+    );
+    warnings.extend(findings.record.leaks(&recording.problem.targets));
     warnings
 }
 

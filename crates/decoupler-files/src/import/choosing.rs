@@ -1,30 +1,18 @@
 use std::path::Path;
 
 use decoupler_core::{
-    dataset::{Seed, SplitBy},
+    dataset::SplitBy,
     evaluation::{
         Intervals, RunSettings,
-        auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, choose_settings, dead_channels},
+        auto::{AutoFixed, AutoProgress, AutoRecord, AutoSamples, choose_settings, dead_channels},
         recorded::Findings,
     },
     job::Job,
     scene::RowModel,
 };
 
-use super::{ImportError, Plan, Progress, Recording, Setup, SetupError, SetupSets, setup::watch};
+use super::{Plan, Progress, Recording, Recordings, Setup, SetupError, SetupSets, setup::watch};
 use crate::machine::memory_budget;
-
-/// Setup whose settings were chosen from its training samples.
-#[derive(Clone, Debug)]
-pub struct ChosenSetup {
-    /// Setup with the chosen settings and memory.
-    pub setup: Setup,
-    /// Its datasets, with the chosen features.
-    pub sets: SetupSets,
-    /// The choice and its held-out answers; `None` if there were too few samples to choose, so that the settings are as
-    /// given.
-    pub choice: Option<AutoChoice>,
-}
 
 /// Progress of a choice of settings.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +33,8 @@ impl Setup {
     }
 
     /// Reads the recording, whose paths are relative to `folder`, and chooses settings by cross-validation on its training
-    /// samples, within `budget_s` seconds of one core; see [`choose_settings`]. A memory of the recipe is kept.
+    /// samples, within `budget_s` seconds of one core; see [`choose_settings`]. Returns the setup with the chosen settings and
+    /// memory, and its datasets; the settings are as given if there are too few samples. A memory of the recipe is kept.
     ///
     /// # Errors
     /// If the files cannot be read, their samples cannot be split or scaled, or the job is cancelled.
@@ -59,76 +48,67 @@ impl Setup {
         folder: &Path,
         job: &Job<'_>,
         on_progress: &mut dyn FnMut(ChoosingProgress),
-    ) -> Result<ChosenSetup, SetupError> {
+    ) -> Result<(Self, SetupSets), SetupError> {
         let mut plan = self.plan().expect("settings are chosen for a recording").clone();
-        let mut read = |plan: &Plan| {
+        let mut settings = *self.settings();
+        let mut read = |plan: &Plan| -> Result<_, SetupError> {
             let mut on_reading = |progress| on_progress(ChoosingProgress::Reading(progress));
-            plan.recordings(folder, &mut watch(job, &mut on_reading))
+            let (recording, test) = plan.recordings(folder, &mut watch(job, &mut on_reading))?;
+            let raw = recording.with_memory(None)?;
+            let training = plan.division.training(&raw.set, test.is_some(), settings.seed)?;
+            Ok((raw, test, training))
         };
-        let (mut recording, mut test_recording) = read(&plan)?;
-        let left_out = leave_out_dead(&mut plan, &recording, self.settings().seed)?;
-        if !left_out.is_empty() {
-            // Rows in which only these channels have no value are samples now.
-            (recording, test_recording) = read(&plan)?;
+        let (mut raw, mut test, mut training) = read(&plan)?;
+        let mut left_out = Vec::new();
+        // A pipe cannot be read again, so that all of its channels stay.
+        if training.len() >= MIN_SAMPLES && plan.irregular().is_none() {
+            let dead = dead_channels(&raw.set.select(&training));
+            let mut names = Vec::from_iter(raw.problem.inputs.iter().map(|input| input.name.clone()));
+            left_out.extend(dead.iter().map(|&channel| names[channel].clone()));
+            if !dead.is_empty() {
+                names.retain(|name| !left_out.contains(name));
+                plan.import.inputs = names;
+                // Rows in which only these channels have no value are samples now.
+                (raw, test, training) = read(&plan)?;
+            }
         }
-        let raw = recording.with_memory(None).map_err(ImportError::from)?;
-        let seed = self.settings().seed;
-        let training = plan.division.training(&raw.set, test_recording.is_some(), seed);
-        let training = training.map_err(ImportError::from)?;
-        let choice = if training.len() < MIN_SAMPLES {
-            None
-        } else {
+        let mut choice = None;
+        if training.len() >= MIN_SAMPLES {
             let set = raw.set.select(&training);
             let samples = AutoSamples {
                 set: &set,
-                past: Some((raw.history(), &training)),
+                past: Some((&raw.history, &training)),
                 by: plan.division.by,
             };
             let fixed = AutoFixed {
-                memory: plan.import.memory.clone().or_else(|| fixed.memory.clone()),
+                memory: plan.import.memory.take().or_else(|| fixed.memory.clone()),
                 ..fixed.clone()
             };
             let mut on_trying = |progress| on_progress(ChoosingProgress::Trying(progress));
-            let chosen = choose_settings(
-                self.settings(),
-                &fixed,
-                &samples,
-                (budget_s, memory_budget()),
-                job,
-                &mut on_trying,
-            );
-            Some(chosen.map(|mut choice| {
-                choice.record.left_out = left_out;
-                choice
-            })?)
-        };
-        let mut settings = *self.settings();
-        if let Some(choice) = &choice {
-            settings = choice.settings;
-            plan.import.memory = Some(choice.memory.clone()).filter(|memory| !memory.is_empty());
+            let limits = (budget_s, memory_budget());
+            let chosen = choose_settings(&settings, &fixed, &samples, limits, job, &mut on_trying)?;
+            settings = chosen.settings;
+            plan.import.memory = Some(chosen.memory.clone()).filter(|memory| !memory.is_empty());
+            choice = Some(chosen);
         }
-        let recording = raw
-            .with_memory(plan.import.memory.as_ref())
-            .map_err(ImportError::from)?;
+        let recording = raw.with_memory(plan.import.memory.as_ref())?;
         // Lags in seconds have as many samples as in training.
-        let memory = recording.memory();
-        let test_recording = test_recording.map(|test| test.with_memory(memory)).transpose();
-        let test_recording = test_recording.map_err(ImportError::from)?;
-        let planned = plan.planned(recording, test_recording, settings.seed)?;
-        let mut sets = SetupSets::of_plan(&plan, folder, planned, &mut watch(job, &mut |_| {}))?;
-        if let (Some(recordings), Some(choice)) = (&mut sets.recordings, &choice) {
-            recordings.recorded.search = Some(choice.record.clone());
-            recordings.recorded.combined = Some(choice.combined.clone());
+        let memory = recording.problem.memory.as_ref();
+        let test = test.map(|test| test.with_memory(memory)).transpose()?;
+        let (recordings, seed) = ((recording, test), settings.seed);
+        let mut sets = SetupSets::of_plan(&plan, folder, recordings, seed, &mut watch(job, &mut |_| {}))?;
+        if let (Some(Recordings { recorded, .. }), Some(choice)) = (&mut sets.recordings, choice) {
             // The held-out answers of the combination. Its weights, and the epochs, were chosen for these same answers, which
             // makes their errors slightly too small; that they come from fewer training samples makes them too large.
             let (training, by) = (&sets.sets.split.training, plan.division.by);
-            recordings.recorded.chosen_intervals = Some(Intervals::calibrate(training, choice.answers.view(), by));
+            recorded.chosen_intervals = Some(Intervals::calibrate(training, choice.answers.view(), by));
+            recorded.search = Some(AutoRecord {
+                left_out,
+                ..choice.record
+            });
+            recorded.combined = Some(choice.combined);
         }
-        Ok(ChosenSetup {
-            setup: Self::recording(settings, plan),
-            sets,
-            choice,
-        })
+        Ok((Self::recording(settings, plan), sets))
     }
 }
 
@@ -138,35 +118,17 @@ impl Recording {
     /// # Errors
     /// If the samples cannot be divided, or the job is cancelled.
     pub fn findings(&self, settings: &RunSettings, by: SplitBy, job: &Job<'_>) -> Result<Findings, SetupError> {
-        let raw = self.with_memory(None).map_err(ImportError::from)?;
+        let raw = self.with_memory(None)?;
         let all = Vec::from_iter(0..raw.set.samples());
         let samples = AutoSamples {
             set: &raw.set,
-            past: Some((raw.history(), &all)),
+            past: Some((&raw.history, &all)),
             by,
         };
         let fixed = AutoFixed {
-            memory: self.memory().cloned(),
+            memory: self.problem.memory.clone(),
             ..AutoFixed::default()
         };
         Ok(Findings::measure(settings, &samples, &fixed, job)?)
     }
-}
-
-/// Removes channels that are nearly dead in the training samples from the plan, and returns their names. A pipe cannot be read
-/// again without them, so that all of its channels stay.
-fn leave_out_dead(plan: &mut Plan, recording: &Recording, seed: Seed) -> Result<Vec<String>, ImportError> {
-    let raw = recording.with_memory(None)?;
-    let training = plan.division.training(&raw.set, plan.test.is_some(), seed)?;
-    if plan.irregular().is_some() || training.len() < MIN_SAMPLES {
-        return Ok(Vec::new());
-    }
-    let dead = dead_channels(&raw.set.select(&training));
-    let channels = raw.inputs.iter().map(|input| input.name.clone()).enumerate();
-    let (left_out, kept): (Vec<_>, Vec<_>) = channels.partition(|(channel, _)| dead.contains(channel));
-    let names = |channels: Vec<(usize, String)>| Vec::from_iter(channels.into_iter().map(|(_, name)| name));
-    if !left_out.is_empty() {
-        plan.import.inputs = names(kept);
-    }
-    Ok(names(left_out))
 }

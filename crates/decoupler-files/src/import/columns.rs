@@ -1,6 +1,9 @@
 //! Columns of the files of a recipe, found by their names.
 
-use std::collections::{HashMap, HashSet, hash_map::Entry};
+use std::{
+    collections::{HashMap, HashSet},
+    ops::Range,
+};
 
 use decoupler_core::{
     problem::Channel,
@@ -9,7 +12,7 @@ use decoupler_core::{
 
 use super::{
     Column, Condition, Cure, ImportError, Meaning, Recipe, Table, expression::Expression, join::Partners,
-    table::name_and_unit, time_stamp::TimeStamp,
+    suggestion::is_group_name, table::name_and_unit, time_stamp::TimeStamp,
 };
 
 /// Number of names above which a message lists only names similar to the one given.
@@ -69,54 +72,54 @@ pub(super) struct Files {
     /// The files, without their columns.
     pub(super) tables: Vec<Table>,
     pub(super) columns: Vec<Column>,
-    /// Index of the first column of each file.
-    firsts: Vec<usize>,
+    /// Columns of each file.
+    pub(super) ranges: Vec<Range<usize>>,
     /// Prefix of the columns of each joined file.
     stems: Vec<String>,
+    pub(super) meanings: Meanings,
+    /// Matching rows of each joined file; `None` if it is joined row by row.
+    pub(super) joins: Vec<Option<Partners>>,
 }
 
 impl Files {
     /// `stems` are the prefixes of the columns of the joined files.
     pub(super) fn of(mut tables: Vec<Table>, stems: Vec<String>) -> Self {
-        let (mut columns, mut firsts) = (Vec::new(), Vec::new());
+        let (mut columns, mut ranges) = (Vec::new(), Vec::new());
         for (file, table) in tables.iter_mut().enumerate() {
-            firsts.push(columns.len());
+            let first = columns.len();
             columns.extend(std::mem::take(&mut table.columns).into_iter().map(|mut column| {
                 if let Some(joined) = file.checked_sub(1) {
                     column.name = format!("{}.{}", stems[joined], column.name);
                 }
                 column
             }));
+            ranges.push(first..columns.len());
         }
         Self {
             tables,
             columns,
-            firsts,
+            ranges,
             stems,
+            meanings: Meanings::default(),
+            joins: Vec::new(),
         }
     }
 
     /// Returns the file of a column, and the index of the column in the file.
     pub(super) fn place(&self, id: usize) -> (usize, usize) {
-        let file = self.firsts.partition_point(|first| *first <= id) - 1;
-        (file, id - self.firsts[file])
-    }
-
-    /// Number of columns of a file.
-    pub(super) fn width(&self, file: usize) -> usize {
-        let end = self.firsts.get(file + 1).copied().unwrap_or(self.columns.len());
-        end - self.firsts[file]
+        let file = self.ranges.partition_point(|range| range.start <= id) - 1;
+        (file, id - self.ranges[file].start)
     }
 
     fn of_file(&self, file: usize) -> &[Column] {
-        &self.columns[self.firsts[file]..][..self.width(file)]
+        &self.columns[self.ranges[file].clone()]
     }
 
     /// Finds a column of a joined file by its name in the file.
     pub(super) fn find_joined(&self, file: usize, name: &str) -> Option<usize> {
         let full_name = format!("{}.{}", self.stems[file - 1], name.trim());
         let found = position(self.of_file(file), &full_name)?;
-        Some(self.firsts[file] + found)
+        Some(self.ranges[file].start + found)
     }
 
     /// Names of the columns of a joined file in the file.
@@ -174,8 +177,20 @@ impl Files {
         Ok(meant)
     }
 
+    /// Warns of an unused column that looks like the group.
+    pub(super) fn group_hint(&self) -> Option<String> {
+        let is_used = |id: &usize| self.meanings.inputs.contains(id) || self.meanings.targets.contains(id);
+        let mut own = self.ranges[0].clone().filter(|id| !is_used(id));
+        let name = &self.columns[own.find(|&id| is_group_name(&self.columns[id].name))?].name;
+        Some(format!(
+            "the column {name} looks like a group of samples that belong together: choose it as the group (--group {name}), so \
+             that training and test samples never share one"
+        ))
+    }
+
     /// Refuses columns with cells that are neither numbers nor missing, and labels where numbers are needed.
-    pub(super) fn check_numbers(&self, meanings: &Meanings) -> Result<(), ImportError> {
+    pub(super) fn check_numbers(&self) -> Result<(), ImportError> {
+        let meanings = &self.meanings;
         meanings.used().try_for_each(|id| self.check_cells(id))?;
         let compared = meanings.comparisons.iter().map(|(id, _)| *id);
         for id in compared.chain(meanings.time).chain(meanings.row_wire) {
@@ -207,13 +222,13 @@ impl Files {
     }
 
     /// Puts the cells of joined files into the rows of the first, and frees columns that are not used.
-    pub(super) fn join(&mut self, meanings: &Meanings, joins: &[Option<Partners>]) {
-        let used: HashSet<usize> = meanings.used().collect();
+    pub(super) fn join(&mut self) {
+        let used: HashSet<usize> = self.meanings.used().collect();
         for id in 0..self.columns.len() {
             let (file, _) = self.place(id);
             if !used.contains(&id) {
                 self.columns[id].clear();
-            } else if let Some(Some(partners)) = file.checked_sub(1).map(|joined| &joins[joined]) {
+            } else if let Some(Some(partners)) = file.checked_sub(1).map(|joined| &self.joins[joined]) {
                 self.columns[id].take_rows(&partners.rows);
             }
         }
@@ -272,19 +287,17 @@ impl Meanings {
         let find = |name: &str| find(&files.columns, name);
         let meant = files.meant(recipe)?;
         let of = |meaning| {
-            meant
-                .iter()
-                .filter(move |(_, other)| *other == meaning)
-                .map(|(id, _)| *id)
+            let found = meant.iter().filter(|(_, other)| *other == meaning);
+            Vec::from_iter(found.map(|(id, _)| *id))
         };
         let comparisons = recipe.conditions.iter().flat_map(|condition| &condition.comparisons);
         let comparisons = comparisons.map(|comparison| Ok((find(&comparison.column)?, comparison.clone())));
         let meanings = Self {
-            inputs: of(Meaning::Input).collect(),
-            targets: of(Meaning::Target).collect(),
-            time: of(Meaning::Time).next(),
-            group: of(Meaning::Group).next(),
-            row_wire: of(Meaning::RowWire).next(),
+            inputs: of(Meaning::Input),
+            targets: of(Meaning::Target),
+            time: of(Meaning::Time).pop(),
+            group: of(Meaning::Group).pop(),
+            row_wire: of(Meaning::RowWire).pop(),
             comparisons: comparisons.collect::<Result<_, ImportError>>()?,
         };
         for missing in recipe.missing.iter().filter_map(|missing| missing.column.as_deref()) {
@@ -298,16 +311,11 @@ impl Meanings {
         }
         let mut seen = HashMap::new();
         for (id, meaning) in meant.into_iter().filter(|(_, meaning)| *meaning != Meaning::Time) {
-            match seen.entry(id) {
-                Entry::Vacant(entry) => {
-                    entry.insert(meaning);
-                }
-                Entry::Occupied(first) => {
-                    let (one, other) = (first.get().with_article(), meaning.with_article());
-                    let name = &files.columns[id].name;
-                    let reason = format!("column '{name}' is both {one} and {other}; give it one meaning");
-                    return Err(ImportError::Columns(reason));
-                }
+            if let Some(first) = seen.insert(id, meaning) {
+                let (one, other) = (Meaning::with_article(first), meaning.with_article());
+                let name = &files.columns[id].name;
+                let reason = format!("column '{name}' is both {one} and {other}; give it one meaning");
+                return Err(ImportError::Columns(reason));
             }
         }
         Ok(meanings)

@@ -1,15 +1,13 @@
 //! Derived columns of tables and of streams of lines: those of a stream equal those of a file with the same lines.
 
+use decoupler_core::dataset::Span;
+
 use super::{
     Column, Derived, ImportError, Table,
     columns::position,
-    expression::{Operand, Operator},
+    expression::{Expression, Operand, Operator},
     selection::seconds,
 };
-
-/// Reasons why there is no mean at the start.
-const NOTHING_AT_START: &str = "no cell at the start is a number";
-const TOO_LONG: &str = "its start is too long for a stream; give fewer rows or seconds";
 
 /// Maximum number of cells of a stream that are kept until the start is over: 128 MB.
 const MAX_CELLS: usize = 1 << 24;
@@ -26,20 +24,10 @@ pub(super) struct TimeColumn<'a> {
 /// Derived column with the places of its columns in a table or in the lines of a stream.
 #[derive(Clone, Debug, PartialEq)]
 struct Located {
-    column: usize,
-    operator: Operator,
-    operand: Source,
-}
-
-/// What a column is combined with.
-#[derive(Clone, Debug, PartialEq)]
-enum Source {
-    Column(usize),
-    Number(f64),
-    /// Its own mean over the first rows.
-    Rows(usize),
-    /// Its own mean over the first seconds, by the time column and the seconds in its unit.
-    Seconds(f64, (usize, f64)),
+    derived: Derived,
+    expression: Expression<usize>,
+    /// Time column and the seconds in its unit, for a mean over the first seconds.
+    time: Option<(usize, f64)>,
 }
 
 impl Derived {
@@ -59,45 +47,54 @@ impl Derived {
         let (Some(column), Some(name)) = (find(&self.expression.column), name) else {
             return Ok(None);
         };
-        let mut other = column;
+        let operator = self.expression.operator;
+        let (mut other, mut clock) = (column, None);
         let operand = match &self.expression.operand {
             Operand::Column(name) => {
                 let missing = || self.refused(&format!("there is no column '{name}' in the same file"));
                 other = find(name).ok_or_else(missing)?;
-                Source::Column(other)
+                Operand::Column(other)
             }
-            Operand::Rows(rows) => Source::Rows(*rows),
-            Operand::Number(number) => Source::Number(*number),
-            Operand::Seconds(limit_s) => {
-                let found = time.and_then(|time| Some((position(columns, time.name)?, time.given_unit)));
-                let Some((time, given_unit)) = found else {
-                    return Err(self.refused("seconds need the time column; give a number of rows"));
-                };
-                let Column { name, unit, start, .. } = &columns[time];
-                let Some(unit_s) = seconds(start.map(|_| "s").or(given_unit).or(unit.as_deref())) else {
-                    return Err(self.refused(&format!("'{name}' has no unit of time")));
-                };
-                Source::Seconds(*limit_s, (time, unit_s))
+            Operand::Number(number) => Operand::Number(*number),
+            Operand::Start(span) => {
+                if self.needs_time() {
+                    clock = Some(self.clock(columns, time)?);
+                }
+                Operand::Start(*span)
             }
         };
-        let operator = self.expression.operator;
-        let units = [column, other].map(|place| columns[place].unit.as_deref());
-        let unit = match (operator, units) {
-            (Operator::Over, [one, other]) if one == other => None,
-            (Operator::Over, [one, other]) => one.zip(other).map(|(one, other)| format!("{one}/{other}")),
-            (_, [one, other]) => one.filter(|_| one == other).map(str::to_owned),
+        let [one, two] = [column, other].map(|place| columns[place].unit.as_deref());
+        let unit = match operator {
+            Operator::Over if one == two => None,
+            Operator::Over => one.zip(two).map(|(one, two)| format!("{one}/{two}")),
+            _ => one.filter(|_| one == two).map(str::to_owned),
+        };
+        let located = Located {
+            derived: self.clone(),
+            expression: Expression {
+                column,
+                operator,
+                operand,
+            },
+            time: clock,
         };
         let new = Column {
             name,
             unit,
             ..Column::default()
         };
-        let located = Located {
-            column,
-            operator,
-            operand,
-        };
         Ok(Some((located, new)))
+    }
+
+    /// Returns the place of the time column and the seconds in its unit.
+    fn clock(&self, columns: &[Column], time: Option<TimeColumn<'_>>) -> Result<(usize, f64), ImportError> {
+        let found = time.and_then(|time| Some((position(columns, time.name)?, time.given_unit)));
+        let (place, given_unit) =
+            found.ok_or_else(|| self.refused("seconds need the time column; give a number of rows"))?;
+        let Column { name, unit, start, .. } = &columns[place];
+        let unit_s = seconds(start.map(|_| "s").or(given_unit).or(unit.as_deref()));
+        let unit_s = unit_s.ok_or_else(|| self.refused(&format!("'{name}' has no unit of time")))?;
+        Ok((place, unit_s))
     }
 
     /// Adds the column to a table, unless the table has its name already or does not have its first column; `own` and `time`
@@ -119,9 +116,7 @@ impl Derived {
             return Err(self.refused(&format!("'{}' has text", column.name)));
         }
         let cell = |row: usize, column: usize| table.columns[column].numbers[row];
-        if !located.take_start(table.rows, cell) {
-            return Err(self.refused(NOTHING_AT_START));
-        }
+        located.take_start(table.rows, cell)?;
         let of_row = |row| located.value(|column| cell(row, column));
         let derived = Vec::from_iter((0..table.rows).map(of_row));
         table.columns.push(Column {
@@ -136,51 +131,58 @@ impl Derived {
 impl Located {
     /// Places of the columns from which it is computed.
     fn columns(&self) -> impl Iterator<Item = usize> + use<> {
-        let other = match self.operand {
-            Source::Column(other) | Source::Seconds(_, (other, _)) => Some(other),
-            Source::Rows(_) | Source::Number(_) => None,
+        let other = match self.expression.operand {
+            Operand::Column(other) => Some(other),
+            _ => self.time.map(|(time, _)| time),
         };
-        std::iter::once(self.column).chain(other)
+        std::iter::once(self.expression.column).chain(other)
     }
 
     /// Returns `true` if `rows` rows are the whole start, or all of it and more; `cell` returns a cell by row and column.
     fn has_start(&self, rows: usize, cell: impl Fn(usize, usize) -> f64) -> bool {
-        match self.operand {
-            Source::Rows(needed) => rows >= needed,
-            Source::Seconds(limit_s, (time, unit_s)) => {
-                rows > 0 && unit_s * (cell(rows - 1, time) - cell(0, time)) > limit_s
+        match (&self.expression.operand, self.time) {
+            (Operand::Start(Span::Samples(needed)), _) => rows as f64 >= *needed,
+            (Operand::Start(Span::Seconds(limit_s)), Some((time, unit_s))) => {
+                rows > 0 && unit_s * (cell(rows - 1, time) - cell(0, time)) > *limit_s
             }
-            Source::Column(_) | Source::Number(_) => true,
+            _ => true,
         }
     }
 
-    /// Replaces a mean at the start of `rows` rows by its value; returns `false` if no cell there is a number. `cell` returns a
-    /// cell by row and column.
-    fn take_start(&mut self, rows: usize, cell: impl Fn(usize, usize) -> f64) -> bool {
+    /// Replaces a mean at the start of `rows` rows by its value. `cell` returns a cell by row and column.
+    ///
+    /// # Errors
+    /// If no cell at the start is a number.
+    fn take_start(&mut self, rows: usize, cell: impl Fn(usize, usize) -> f64) -> Result<(), ImportError> {
+        let Operand::Start(span) = self.expression.operand else {
+            return Ok(());
+        };
         let mut start = Vec::from_iter(0..rows);
-        match self.operand {
-            Source::Column(_) | Source::Number(_) => return true,
-            Source::Rows(limit) => start.truncate(limit),
-            Source::Seconds(limit_s, (time, unit_s)) => {
+        match (span, self.time) {
+            (Span::Seconds(limit_s), Some((time, unit_s))) => {
                 let first = start.iter().map(|&row| cell(row, time)).fold(f64::INFINITY, f64::min);
                 start.retain(|&row| unit_s * (cell(row, time) - first) <= limit_s);
             }
+            (Span::Samples(rows) | Span::Seconds(rows), _) => start.truncate(rows as usize),
         }
-        let present = start.into_iter().map(|row| cell(row, self.column));
+        let present = start.into_iter().map(|row| cell(row, self.expression.column));
         let present = present.filter(|value| !value.is_nan());
         let (sum, count) = present.fold((0.0, 0_u32), |(sum, count), value| (sum + value, count + 1));
-        self.operand = Source::Number(sum / f64::from(count));
-        count > 0
+        if count == 0 {
+            return Err(self.derived.refused("no cell at the start is a number"));
+        }
+        self.expression.operand = Operand::Number(sum / f64::from(count));
+        Ok(())
     }
 
     /// Value in a row; NaN if there is none, such as for a quotient by zero. `cell` returns a cell of the row by column.
     fn value(&self, cell: impl Fn(usize) -> f64) -> f64 {
-        let operand = match self.operand {
-            Source::Column(other) => cell(other),
-            Source::Number(number) => number,
-            Source::Rows(_) | Source::Seconds(..) => f64::NAN,
+        let operand = match self.expression.operand {
+            Operand::Column(other) => cell(other),
+            Operand::Number(number) => number,
+            Operand::Start(_) => f64::NAN,
         };
-        let value = self.operator.value(cell(self.column), operand);
+        let value = self.expression.operator.value(cell(self.expression.column), operand);
         if value.is_finite() { value } else { f64::NAN }
     }
 }
@@ -189,7 +191,7 @@ impl Located {
 #[derive(Clone, Debug, Default)]
 pub(super) struct DerivedStream {
     /// The columns in the order in which they are computed: a later one may be computed from an earlier one.
-    columns: Vec<(Derived, Located)>,
+    columns: Vec<Located>,
     /// Cells of the lines of the start; `None` after it.
     start: Option<Vec<Vec<f64>>>,
 }
@@ -209,7 +211,7 @@ impl DerivedStream {
             let found = derived.located(columns, |name| Some(name.trim().to_owned()), time)?;
             if let Some((found, new)) = found {
                 columns.push(new);
-                located.push((derived.clone(), found));
+                located.push(found);
             }
         }
         Ok(Self {
@@ -220,13 +222,13 @@ impl DerivedStream {
 
     /// Columns of the stream from which the new ones are computed; `width` is the number of its columns.
     pub(super) fn needed(&self, width: usize) -> impl Iterator<Item = usize> {
-        let columns = self.columns.iter().flat_map(|(_, column)| column.columns());
+        let columns = self.columns.iter().flat_map(Located::columns);
         columns.filter(move |&column| column < width)
     }
 
     /// Name of a new column, by its place behind those of the stream.
     pub(super) fn name(&self, place: usize) -> &str {
-        self.columns.get(place).map_or("", |(derived, _)| &derived.name)
+        self.columns.get(place).map_or("", |column| &column.derived.name)
     }
 
     /// Adds the derived columns to the cells of the next line, and returns the lines of the start, with their derived columns,
@@ -236,7 +238,7 @@ impl DerivedStream {
     /// If no cell at the start is a number, or the start is too long.
     pub(super) fn take(&mut self, cells: &mut Vec<f64>) -> Result<Option<Vec<Vec<f64>>>, ImportError> {
         let Some(mut lines) = self.start.take() else {
-            for (_, column) in &self.columns {
+            for column in &self.columns {
                 cells.push(column.value(|place| cells[place]));
             }
             return Ok(Some(Vec::new()));
@@ -245,17 +247,16 @@ impl DerivedStream {
         // Times of derived columns do not exist: a span is over by the cells of the stream.
         let cell = |row: usize, place: usize| lines[row].get(place).copied().unwrap_or(f64::NAN);
         let mut columns = self.columns.iter();
-        if let Some((derived, _)) = columns.find(|(_, column)| !column.has_start(lines.len(), cell)) {
+        if let Some(column) = columns.find(|column| !column.has_start(lines.len(), cell)) {
             if lines.len().saturating_mul(cells.len()) > MAX_CELLS {
-                return Err(derived.refused(TOO_LONG));
+                let reason = "its start is too long for a stream; give fewer rows or seconds";
+                return Err(column.derived.refused(reason));
             }
             self.start = Some(lines);
             return Ok(None);
         }
-        for (derived, column) in &mut self.columns {
-            if !column.take_start(lines.len(), |row, place| lines[row][place]) {
-                return Err(derived.refused(NOTHING_AT_START));
-            }
+        for column in &mut self.columns {
+            column.take_start(lines.len(), |row, place| lines[row][place])?;
             for line in &mut lines {
                 let value = column.value(|place| line[place]);
                 line.push(value);

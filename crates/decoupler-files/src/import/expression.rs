@@ -2,17 +2,21 @@
 
 use std::{convert::Infallible, fmt, str::FromStr};
 
-use decoupler_core::text::{in_one_line, is_unprintable};
+use decoupler_core::{
+    dataset::Span,
+    text::{in_one_line, is_unprintable},
+};
 use serde::{Deserialize, Deserializer, Serializer, de};
 
 use super::{ImportError, format::Cell};
 
-/// A column with an operator and what it is compared or combined with.
+/// A column with an operator and what it is compared or combined with; columns are given by their names or, in a table, by their
+/// places.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Expression {
-    pub(super) column: String,
+pub(super) struct Expression<C = String> {
+    pub(super) column: C,
     pub(super) operator: Operator,
-    pub(super) operand: Operand,
+    pub(super) operand: Operand<C>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,14 +33,12 @@ pub(super) enum Operator {
 
 /// What a column is compared or combined with.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Operand {
+pub(super) enum Operand<C> {
     /// Another column, row by row.
-    Column(String),
+    Column(C),
     Number(f64),
-    /// Its own mean over the first rows.
-    Rows(usize),
-    /// Its own mean over the first seconds.
-    Seconds(f64),
+    /// Its own mean over the first rows or seconds.
+    Start(Span),
 }
 
 /// Operators as written; one that begins with another comes before it.
@@ -108,17 +110,13 @@ impl Expression {
             return Err("a name is missing".to_owned());
         }
         let span = operand.strip_prefix("start(").and_then(|rest| rest.strip_suffix(')'));
-        let seconds = span.and_then(|span| span.trim().strip_suffix('s'));
-        let operand = match (span, seconds) {
-            (_, Some(seconds)) => {
-                let seconds = finite(seconds.trim()).filter(|seconds| *seconds > 0.0);
-                Operand::Seconds(seconds.ok_or("start(…s) needs a number of seconds above 0")?)
+        let operand = match span {
+            None => Operand::Column(operand.to_owned()),
+            Some(span) => {
+                let is_whole = |span: &Span| !matches!(span, Span::Samples(rows) if rows.fract() != 0.0);
+                let reason = "start(…) needs a number of rows, or a number of seconds above 0 such as 2s";
+                Operand::Start(span.parse().ok().filter(is_whole).ok_or(reason)?)
             }
-            (Some(rows), None) => {
-                let rows = rows.trim().parse().ok().filter(|rows| *rows > 0);
-                Operand::Rows(rows.ok_or("start(…) needs a number of rows, or seconds such as 2s")?)
-            }
-            (None, None) => Operand::Column(operand.to_owned()),
         };
         Ok(Self {
             column: column.to_owned(),
@@ -141,8 +139,7 @@ impl fmt::Display for Expression {
         match &self.operand {
             Operand::Number(number) => write!(f, "{column}{sign}{number}"),
             Operand::Column(other) => write!(f, "{column} {sign} {other}"),
-            Operand::Rows(rows) => write!(f, "{column} {sign} start({rows})"),
-            Operand::Seconds(seconds) => write!(f, "{column} {sign} start({seconds}s)"),
+            Operand::Start(span) => write!(f, "{column} {sign} start({span})"),
         }
     }
 }
@@ -182,7 +179,7 @@ impl Derived {
 
     /// Returns `true` if it needs a time column.
     pub(super) fn needs_time(&self) -> bool {
-        matches!(self.expression.operand, Operand::Seconds(_))
+        matches!(self.expression.operand, Operand::Start(Span::Seconds(_)))
     }
 }
 

@@ -1,24 +1,25 @@
-use std::path::{Path, PathBuf};
+use std::{
+    collections::HashSet,
+    path::{Path, PathBuf},
+};
 
 use decoupler_core::{
     dataset::{Dataset, DatasetError, History, Memory},
-    problem::{Channel, Problem, TargetPosition},
+    problem::Problem,
     text::{counted, in_one_line},
 };
 use ndarray::ArcArray2;
 use serde::Serialize;
 
 use super::{
-    Column, Cure, Derived, DialectChoice, FileSet, Format, ImportError, Joined, Recipe, Table, Watch,
+    Cure, Derived, DialectChoice, FileSet, Format, ImportError, Joined, Recipe, Table, Watch,
     columns::{Files, Meanings},
     csv_table::Reading,
     derived::TimeColumn,
     format,
     join::{Partners, gather, median_interval, nearest},
     positions::read_positions,
-    selection::Rows,
     sentinel::{Sentinel, is_rounding, rounding_warning},
-    suggestion::is_group_name,
     table::stem,
 };
 
@@ -28,7 +29,7 @@ impl Recipe {
     /// # Errors
     /// If a file cannot be read, a column is missing, a used cell is not a number, no row is left, or `watch` breaks.
     pub fn import(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
-        self.import_sets(&self.sets(), self.memory.as_ref(), folder, watch)
+        self.import_sets(&self.files().flat(), self.memory.as_ref(), folder, watch)
     }
 
     /// Imports the samples of these files, one set after another, with the features of `memory`.
@@ -43,15 +44,12 @@ impl Recipe {
         let mut parts = Vec::new();
         for set in sets {
             let imported = self.import_set(set, sets.len() == 1, memory.as_ref(), folder, watch);
-            let part = imported.map_err(|error| {
-                if sets.len() == 1 {
-                    error
-                } else {
-                    error.of_file(&set.data)
-                }
+            let part = imported.map_err(|error| match sets {
+                [_] => error,
+                _ => error.of_file(&set.data),
             })?;
             // Lags in seconds have as many samples in all files.
-            memory = part.memory().cloned();
+            memory.clone_from(&part.problem.memory);
             parts.push(part);
         }
         let mut recording = match sets.len() {
@@ -59,7 +57,7 @@ impl Recipe {
             _ => Recording::joined(parts)?,
         };
         let values = recording.set.targets();
-        let targets = recording.targets.iter().zip(values.columns());
+        let targets = recording.problem.targets.iter().zip(values.columns());
         let rounded = targets.filter(|(_, values)| is_rounding(&values.to_vec()));
         let warnings = Vec::from_iter(rounded.map(|(target, _)| rounding_warning(&target.name)));
         recording.warnings.extend(warnings);
@@ -76,82 +74,63 @@ impl Recipe {
         watch: Watch<'_>,
     ) -> Result<Recording, ImportError> {
         let mut files = Files::of(self.read_set(set, &[], folder, watch)?, self.stems());
-        let meanings = Meanings::of(self, &files)?;
+        files.meanings = Meanings::of(self, &files)?;
         files.give_units(self)?;
-        let noted = |table: &Table| {
-            let file = table.path.display();
-            Vec::from_iter(table.notes.iter().map(|note| format!("'{file}': {note}")))
-        };
-        let mut warnings = Vec::from_iter(files.tables.iter().flat_map(noted));
-        let is_used = |id: &usize| meanings.inputs.contains(id) || meanings.targets.contains(id);
-        let own = files.columns[..files.width(0)].iter().enumerate();
-        let group = { own }.find(|(id, column)| is_group_name(&column.name) && !is_used(id));
-        if let Some((_, Column { name, .. })) = group.filter(|_| meanings.group.is_none() && is_alone) {
-            warnings.push(format!(
-                "the column {name} looks like a group of samples that belong together: choose it as the group (--group \
-                 {name}), so that training and test samples never share one"
-            ));
+        let mut warnings = Vec::new();
+        for Table { path, notes, .. } in &files.tables {
+            warnings.extend(notes.iter().map(|note| format!("'{}': {note}", path.display())));
         }
-        let joins = (1..files.tables.len()).map(|file| self.partners(file, &files, &meanings, &mut warnings));
-        let joins = joins.collect::<Result<Vec<_>, _>>()?;
-        files.check_numbers(&meanings)?;
-        files.join(&meanings, &joins);
-        let rows = Rows {
-            recipe: self,
-            set,
-            files: &files,
-            meanings: &meanings,
-            joins: &joins,
-        };
-        let (mut kept, dropped) = rows.select()?;
+        if is_alone && self.group.is_none() {
+            warnings.extend(files.group_hint());
+        }
+        for file in 1..files.tables.len() {
+            let partners = self.partners(file, &files, &mut warnings)?;
+            files.joins.push(partners);
+        }
+        files.check_numbers()?;
+        files.join();
+        let (mut kept, dropped) = files.select()?;
         // The past includes rows that are no samples.
-        let mut read = rows.with_readings();
-        if let Some(id) = meanings.time {
-            warnings.extend(rows.put_in_order(id, &mut kept, &mut read)?);
+        let mut read = files.with_readings();
+        if let Some(id) = files.meanings.time {
+            warnings.extend(files.put_in_order(id, &mut kept, &mut read)?);
         }
-        let of_samples = |id: usize| Vec::from_iter(kept.iter().map(|&row| rows.number(id, row)));
-        let (groups, group_names) = rows.groups(&kept);
-        let row_wires = rows.row_wires(&kept)?;
-        let past = rows.past(&read, &kept)?;
+        let of_samples = |id: usize| Vec::from_iter(kept.iter().map(|&row| files.number(id, row)));
+        let (groups, group_names) = files.groups(&kept);
+        let row_wires = files.row_wires(&kept)?;
+        let past = files.past(&read, &kept, self.memory.as_ref().is_some_and(Memory::needs_clock))?;
         let channels = |ids: &[usize]| Vec::from_iter(ids.iter().map(|id| files.channel(*id)));
-        let (inputs, targets) = (channels(&meanings.inputs), channels(&meanings.targets));
-        let positions = match &self.positions {
-            Some(file) => read_positions(&folder.join(file), &targets, watch)?,
-            None => Vec::new(),
+        let mut problem = Problem {
+            inputs: channels(&files.meanings.inputs),
+            targets: channels(&files.meanings.targets),
+            memory: None,
+            positions: Vec::new(),
+            sensor: None,
         };
-        for &id in meanings.inputs.iter().chain(&meanings.targets) {
+        if let Some(file) = &self.positions {
+            problem.positions = read_positions(&folder.join(file), &problem.targets, watch)?;
+        }
+        for &id in files.meanings.inputs.iter().chain(&files.meanings.targets) {
             let found = Sentinel::find(&of_samples(id));
             warnings.extend(found.map(|found| found.warning(&files.columns[id].name)));
         }
         let main = &files.tables[0];
         let lines = kept.iter().map(|&row| main.line(row)).collect();
-        let (times, reports, total) = (
-            meanings.time.map(of_samples),
-            rows.reports(),
-            main.rows + main.too_long.count,
-        );
-        let targets_of_rows = gather(&mut files.columns, &meanings.targets, &kept, &meanings.inputs);
-        let history = past(gather(&mut files.columns, &meanings.inputs, &read, &[]));
-        let (memory, readings) = remembered(&history, memory)?;
-        let problem = Problem {
-            inputs,
-            targets,
-            memory,
-            positions,
-            sensor: None,
-        };
+        let total = main.rows + main.too_long.count;
+        let (times, reports) = (files.meanings.time.map(of_samples), files.reports());
+        let (columns, meanings) = (&mut files.columns, &files.meanings);
+        let targets = gather(columns, &meanings.targets, &kept, &meanings.inputs);
+        let history = past(gather(columns, &meanings.inputs, &read, &[]));
+        let readings;
+        (problem.memory, readings) = remembered(&history, memory)?;
         Ok(Recording {
-            set: Dataset::new(readings, targets_of_rows, row_wires.as_deref(), groups)?,
-            inputs: problem.features(),
-            targets: problem.targets.clone(),
-            positions: problem.positions.clone(),
+            set: Dataset::new(readings, targets, row_wires.as_deref(), groups)?,
             problem,
             history,
             parts: vec![(0, reports[0].path.clone())],
             group_names,
             lines,
             times,
-            has_groups: self.group.is_some(),
             rows: total,
             dropped,
             files: reports,
@@ -202,37 +181,27 @@ impl Recipe {
         more: &[String],
         watch: Watch<'_>,
     ) -> Result<Table, ImportError> {
-        let own_name = |full: &str| match joined {
-            None => Some(full.trim().to_owned()),
-            Some((_, stem)) => full.trim().strip_prefix(stem)?.strip_prefix('.').map(str::to_owned),
-        };
+        let prefix = joined.map_or_else(String::new, |(_, stem)| format!("{stem}."));
+        let own_name = |full: &str| full.trim().strip_prefix(&*prefix).map(str::to_owned);
         let missing = self.missing.iter().filter_map(|missing| match &missing.column {
             None => Some((None, missing)),
             Some(column) => Some((Some(own_name(column)?), missing)),
         });
-        let columns = self.inputs.iter().chain(&self.targets);
-        let columns = columns.chain(self.derive.iter().flat_map(Derived::columns));
+        let channels = self.inputs.iter().chain(&self.targets);
         let single = self.time.iter().chain(&self.group).chain(&self.row_wire);
+        let derived = self.derive.iter().flat_map(Derived::columns);
+        let used = channels.chain(single).chain(derived).chain(more);
         let reading = Reading {
             choice: self.dialect,
             missing: missing.collect(),
             label: self.group.as_deref().and_then(own_name),
-            used: columns
-                .chain(single)
-                .chain(more)
-                .filter_map(|name| own_name(name))
-                .collect(),
+            used: used.filter_map(|name| own_name(name)).collect(),
         };
         let mut table = read(path, &reading, watch)?;
-        let time = joined
-            .and_then(|(joined, _)| joined.time.as_deref())
-            .or(self.time.as_deref());
-        let time = time.map(|name| TimeColumn {
+        let time = joined.and_then(|(joined, _)| joined.time.as_deref());
+        let time = time.or(self.time.as_deref()).map(|name| TimeColumn {
             name,
-            given_unit: match joined {
-                None => self.unit_of(name),
-                Some((_, stem)) => self.unit_of(&format!("{stem}.{name}")),
-            },
+            given_unit: self.unit_of(&format!("{prefix}{name}")),
         });
         for derived in &self.derive {
             derived.add_to(&mut table, own_name, time)?;
@@ -245,12 +214,11 @@ impl Recipe {
         &self,
         file: usize,
         files: &Files,
-        meanings: &Meanings,
         warnings: &mut Vec<String>,
     ) -> Result<Option<Partners>, ImportError> {
         let (main, table, joined) = (&files.tables[0], &files.tables[file], &self.join[file - 1]);
         let refuse = |reason: &str, cure| not_joined(&table.path, reason, cure);
-        let Some(time) = meanings.time else {
+        let Some(time) = files.meanings.time else {
             if table.rows != main.rows {
                 let reason = format!("it has {} and the other file {}", counted(table.rows, "row"), main.rows);
                 return Err(refuse(&reason, Cure::NameTimes));
@@ -278,7 +246,7 @@ impl Recipe {
             return Err(refuse("its times are all the same", Cure::GiveLimit));
         };
         let partners = nearest(&of_main.numbers, &joined_times, limit);
-        let several = partners.uses(table.rows).iter().filter(|uses| **uses > 1).count();
+        let several = partners.shared;
         if 10 * several > table.rows {
             let (rows, file) = (table.rows, table.path.display());
             warnings.push(format!(
@@ -322,19 +290,13 @@ pub(super) fn read(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Resu
 #[derive(Clone, Debug)]
 pub struct Recording {
     /// Samples of one file after another, within a file in order of time, or of the file where its clock restarts; readings and targets in the order of
-    /// [`Self::inputs`] and [`Self::targets`]. Without a group column, each of several files is a group, or each sample of a
+    /// the features and targets of [`Self::problem`]. Without a group column, each of several files is a group, or each sample of a
     /// single file.
     pub set: Dataset,
-    /// Names and units of the channels of [`Self::set`]: the readings and, with a memory, the values from their past.
-    pub inputs: Vec<Channel>,
-    /// Names and units of the targets.
-    pub targets: Vec<Channel>,
-    /// Positions of targets on the skin, for those that have one.
-    pub positions: Vec<TargetPosition>,
     /// Description of the readings, the targets and the memory.
-    problem: Problem,
+    pub problem: Problem,
     /// Readings in order of time, for [other memories](Self::with_memory).
-    pub(super) history: History,
+    pub history: History,
     /// Index of the first sample of each data file, and the file.
     pub(super) parts: Vec<(usize, PathBuf)>,
     /// Name of each group of a group column.
@@ -343,8 +305,6 @@ pub struct Recording {
     pub lines: Vec<u64>,
     /// Time of each sample, if there is a time column.
     pub times: Option<Vec<f64>>,
-    /// `true` if there is a group column, or several files.
-    pub has_groups: bool,
     /// Number of rows in the file, including dropped rows.
     pub rows: usize,
     /// Dropped rows, by reason.
@@ -397,31 +357,11 @@ pub struct JoinReport {
 }
 
 impl Recording {
-    /// Returns the description of the channels.
-    pub fn problem(&self) -> Problem {
-        self.problem.clone()
-    }
-
     /// Returns the warnings of several recordings, such as for training and for testing, which often share them.
     pub fn warnings_of<'a>(recordings: impl IntoIterator<Item = &'a Self>) -> Vec<String> {
         let all = recordings.into_iter().flat_map(|recording| &recording.warnings);
-        let mut warnings = Vec::new();
-        for warning in all {
-            if !warnings.contains(warning) {
-                warnings.push(warning.clone());
-            }
-        }
-        warnings
-    }
-
-    /// Memory whose features are the channels of the samples, with its usual interval.
-    pub fn memory(&self) -> Option<&Memory> {
-        self.problem.memory.as_ref()
-    }
-
-    /// Readings in order of time, from which the features of any memory are computed.
-    pub fn history(&self) -> &History {
-        &self.history
+        let mut seen = HashSet::new();
+        all.filter(|warning| seen.insert(*warning)).cloned().collect()
     }
 
     /// Returns the recording with another memory, or without one.
@@ -436,7 +376,6 @@ impl Recording {
         };
         Ok(Self {
             set: self.set.with_readings(features),
-            inputs: problem.features(),
             problem,
             ..self.clone()
         })

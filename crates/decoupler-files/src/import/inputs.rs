@@ -1,18 +1,18 @@
 use std::path::Path;
 
 use decoupler_core::{
-    dataset::RowOrder,
+    dataset::{Memory, RowOrder},
     problem::{Channel, Problem},
     text::counted,
 };
 use ndarray::Array2;
 
 use super::{
-    Column, Derived, FileSet, ImportError, Recipe, TableError, Watch,
+    Column, Derived, ImportError, Recipe, TableError, Watch,
     columns::{Files, Meanings, called, near, position},
     csv_table::named,
     derived::{DerivedStream, TimeColumn},
-    selection::{Rows, order_note, seconds},
+    selection::{order_note, seconds},
     table::name_and_unit,
 };
 
@@ -126,10 +126,8 @@ impl InputColumns {
     pub(super) fn is_header(cells: &[String], inputs: &[Channel], is_first_line: bool) -> bool {
         let is_name = |cell: &String| inputs.iter().any(|input| input.name == name_and_unit(cell).0);
         let is_text = |cell: &&String| !cell.trim().is_empty() && cell.trim().parse::<f64>().is_err();
-        let (names, texts) = (
-            cells.iter().filter(|cell| is_name(cell)).count(),
-            cells.iter().filter(is_text).count(),
-        );
+        let names = cells.iter().filter(|cell| is_name(cell)).count();
+        let texts = cells.iter().filter(is_text).count();
         (names >= inputs.len() && Self::has_all(cells, inputs))
             || (names > 0 && texts > 0)
             || (texts == cells.len() && texts >= inputs.len() && (texts > 1 || is_first_line))
@@ -241,22 +239,15 @@ impl Recipe {
             let unit = files.columns[id].unit.take();
             files.columns[id].unit = unit.or(others.time_unit.clone());
         }
-        let meanings = Meanings {
+        files.meanings = Meanings {
             inputs: found.inputs,
             time,
             group: found.group,
             row_wire: found.row_wire,
             ..Meanings::default()
         };
-        let (table, columns) = (&files.tables[0], &files.columns);
-        files.check_numbers(&meanings)?;
-        let rows = Rows {
-            recipe: self,
-            set: &FileSet::default(),
-            files: &files,
-            meanings: &meanings,
-            joins: &[],
-        };
+        files.check_numbers()?;
+        let (table, columns, meanings) = (&files.tables[0], &files.columns, &files.meanings);
         let is_missing = |id: usize, row: usize| columns[id].is_missing(row);
         for &id in meanings.inputs.iter().chain(&meanings.row_wire) {
             if let Some(row) = (0..table.rows).find(|&row| is_missing(id, row)) {
@@ -277,15 +268,16 @@ impl Recipe {
             ));
         }
         let mut readings = Array2::from_shape_fn((placed.len(), meanings.inputs.len()), |(row, input)| {
-            rows.number(meanings.inputs[input], placed[row])
+            files.number(meanings.inputs[input], placed[row])
         });
         let times_s = self.time.as_ref().and_then(|name| {
             let id = position(columns, name)?;
             let unit_s = seconds(columns[id].unit.as_deref().or_else(|| self.unit_of(name)))?;
-            Some(placed.iter().map(|&row| unit_s * rows.number(id, row)).collect())
+            Some(placed.iter().map(|&row| unit_s * files.number(id, row)).collect())
         });
         if let Some(memory) = &problem.memory {
-            let history = rows.past(&placed, &placed)?(readings);
+            let needs_clock = self.memory.as_ref().is_some_and(Memory::needs_clock);
+            let history = files.past(&placed, &placed, needs_clock)?(readings);
             if let order @ (RowOrder::Restarts { first_row, .. } | RowOrder::Shuffled { first_row, .. }) =
                 history.order()
             {
@@ -305,7 +297,7 @@ impl Recipe {
         });
         Ok(InputTable {
             readings,
-            row_wires: rows.row_wires(&placed)?,
+            row_wires: files.row_wires(&placed)?,
             times_s,
             lines: placed.iter().map(|&row| table.line(row)).collect(),
             torn_line: table.torn_line,

@@ -1,15 +1,15 @@
 use std::{
     collections::HashMap,
+    hash::{BuildHasher as _, RandomState},
     path::{Path, PathBuf},
 };
 
 use serde::Serialize;
 
 use super::{
-    Column, DialectChoice, Format, ImportError, Meaning, Recipe, Table, Variable, Watch,
+    Column, Format, ImportError, Meaning, Recipe, Table, Variable, Watch,
     columns::{Files, find},
     join::median_interval,
-    read_table,
     sentinel::{Sentinel, is_rounding, rounding_warning},
 };
 
@@ -20,10 +20,22 @@ const GAP: f64 = 5.0;
 
 /// Summary of the columns of a file.
 #[derive(Clone, Debug, Serialize)]
-pub struct Inspection {
+pub struct InspectedFile {
+    /// The file, as it was named.
+    #[serde(skip)]
+    pub path: PathBuf,
+    /// Prefix of the names of its columns; `None` for the first file.
+    #[serde(skip)]
+    pub stem: Option<String>,
+    /// Format and layout of the file.
+    #[serde(skip)]
+    pub format: Format,
+    /// Meaning of each column according to a recipe.
+    #[serde(skip)]
+    pub meanings: Vec<Meaning>,
     /// Number of rows.
     pub rows: usize,
-    /// Columns.
+    /// Columns. Markers of missing values in the recipe count as missing.
     pub columns: Vec<ColumnSummary>,
     /// Named arrays of numbers in the file, such as the variables of a workspace.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -102,31 +114,19 @@ pub struct TimeSummary {
     pub backwards: usize,
 }
 
-impl Inspection {
-    /// Reads the file at `path` and summarises each column. `time` is the time column; if absent, a first column that always
-    /// increases is assumed to be the time.
+impl InspectedFile {
+    /// Summarises each column of `table`, from the file at `path`. `time` is the time column; if absent, a first column that
+    /// always increases is assumed to be the time.
     ///
     /// # Errors
-    /// As [`read_table`], or if there is no column `time`.
-    pub fn read(
-        path: &Path,
-        choice: DialectChoice,
-        time: Option<&str>,
-        watch: Watch<'_>,
-    ) -> Result<(Self, Table), ImportError> {
-        let table = read_table(path, choice, watch)?;
-        Ok((Self::of(&table, time)?, table))
-    }
-
-    /// Summarises each column of `table`; see [`Self::read`].
-    pub(super) fn of(table: &Table, time: Option<&str>) -> Result<Self, ImportError> {
+    /// If there is no column `time`.
+    pub fn of(table: &Table, path: &Path, time: Option<&str>) -> Result<Self, ImportError> {
         let mut columns: Vec<ColumnSummary> = table.columns.iter().map(ColumnSummary::of).collect();
         name_duplicates(table, &mut columns);
         let chosen = match time {
             Some(name) => Some((find(&table.columns, name)?, false)),
             None => guess_time(table, &columns).map(|column| (column, true)),
         };
-        let time = chosen.map(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));
         let mut warnings = table.notes.clone();
         let sentinels = columns
             .iter()
@@ -135,12 +135,25 @@ impl Inspection {
         let rounded = columns.iter().filter(|column| column.is_rounding);
         warnings.extend(rounded.map(|column| rounding_warning(&column.name)));
         Ok(Self {
+            path: path.to_owned(),
+            stem: None,
+            format: table.format.clone(),
+            meanings: vec![Meaning::Unused; columns.len()],
             rows: table.rows,
             columns,
             variables: table.variables.clone(),
-            time,
+            time: chosen.map(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed)),
             warnings,
         })
+    }
+
+    /// Returns the full name of a column; a column of a joined file is prefixed with the stem.
+    pub fn full_name(&self, column: usize) -> String {
+        let name = &self.columns[column].name;
+        match &self.stem {
+            None => name.clone(),
+            Some(stem) => format!("{stem}.{name}"),
+        }
     }
 }
 
@@ -194,15 +207,12 @@ fn histogram(numbers: impl Iterator<Item = f64>, min: f64, max: f64) -> Vec<usiz
 /// Marks the columns that have the same cells as an earlier one.
 fn name_duplicates(table: &Table, columns: &mut [ColumnSummary]) {
     let bits = |column: usize| table.columns[column].numbers.iter().map(|number| number.to_bits());
-    let mut known: HashMap<u64, Vec<usize>> = HashMap::new();
+    let (state, mut known) = (RandomState::new(), HashMap::<u64, Vec<usize>>::new());
     for index in (0..columns.len())
         .filter(|&index| columns[index].min.is_some())
         .collect::<Vec<_>>()
     {
-        // FNV-1a.
-        let hash = bits(index).fold(0xcbf2_9ce4_8422_2325_u64, |hash, bits| {
-            (hash ^ bits).wrapping_mul(0x0100_0000_01b3)
-        });
+        let hash = state.hash_one(Vec::from_iter(bits(index)));
         let earlier = known.entry(hash).or_default();
         match earlier.iter().find(|other| bits(**other).eq(bits(index))) {
             Some(&other) => columns[index].duplicate_of = Some(columns[other].name.clone()),
@@ -241,32 +251,6 @@ impl TimeSummary {
     }
 }
 
-/// File of a recipe with a summary of its columns.
-#[derive(Clone, Debug)]
-pub struct InspectedFile {
-    /// The file, as the recipe names it.
-    pub path: PathBuf,
-    /// Prefix of the names of its columns; `None` for the first file.
-    pub stem: Option<String>,
-    /// Format and layout of the file.
-    pub format: Format,
-    /// Summary of its columns. Markers of missing values in the recipe count as missing.
-    pub inspection: Inspection,
-    /// Meaning of each column according to the recipe.
-    pub meanings: Vec<Meaning>,
-}
-
-impl InspectedFile {
-    /// Returns the full name of a column; a column of a joined file is prefixed with the stem.
-    pub fn full_name(&self, column: usize) -> String {
-        let name = &self.inspection.columns[column].name;
-        match &self.stem {
-            None => name.clone(),
-            Some(stem) => format!("{stem}.{name}"),
-        }
-    }
-}
-
 impl Recipe {
     /// Reads the files, whose paths are relative to `folder`, and summarises each column; the recipe need not be complete. The
     /// rows of `variables`, with their full names, are samples, as are those of the variables whose columns the recipe uses.
@@ -284,18 +268,14 @@ impl Recipe {
             group: None,
             ..self.clone()
         };
-        let set = self.sets().swap_remove(0);
+        let set = self.files();
         let stems = self.stems();
         let mut tables = plain.read_set(&set, variables, folder, watch)?;
         let mut inspected = Vec::new();
-        for (table, path) in tables.iter_mut().zip(set.files()) {
-            inspected.push(InspectedFile {
-                path: path.clone(),
-                stem: inspected.len().checked_sub(1).map(|joined| stems[joined].clone()),
-                format: table.format.clone(),
-                inspection: Inspection::of(table, None)?,
-                meanings: vec![Meaning::Unused; table.columns.len()],
-            });
+        let of_tables = std::iter::once(None).chain(stems.iter().cloned().map(Some));
+        for ((table, path), stem) in tables.iter_mut().zip(set.files()).zip(of_tables) {
+            let file = InspectedFile::of(table, path, None)?;
+            inspected.push(InspectedFile { stem, ..file });
             // Only their names are needed from here on.
             table.columns.iter_mut().for_each(Column::clear);
         }

@@ -1,24 +1,14 @@
 use ndarray::Array2;
 
-use super::Column;
+use super::{Column, JoinReport};
 
 /// Rows of a joined recording that match the rows of the first.
 pub(super) struct Partners {
     /// Row of the joined file for each row; `None` if none is within the limit.
     pub(super) rows: Vec<Option<u32>>,
-    /// Maximum time difference between joined rows.
-    pub(super) limit: f64,
-    /// Median of the time of a row minus the time of its match.
-    pub(super) median_offset: Option<f64>,
-}
-
-impl Partners {
-    /// Number of rows that match each of the `count` rows of the joined file.
-    pub(super) fn uses(&self, count: usize) -> Vec<usize> {
-        let mut uses = vec![0; count];
-        self.rows.iter().flatten().for_each(|&row| uses[row as usize] += 1);
-        uses
-    }
+    pub(super) report: JoinReport,
+    /// Number of rows of the joined file that match several rows.
+    pub(super) shared: usize,
 }
 
 /// Finds the nearest of `joined` within `limit` for each of `times`; of two equally near ones, the earlier. Times may be in
@@ -30,32 +20,32 @@ pub(super) fn nearest(times: &[f64], joined: &[f64], limit: f64) -> Partners {
     order.sort_by(|&one, &other| joined[one as usize].total_cmp(&joined[other as usize]));
     let of = |place: usize| joined[order[place] as usize];
     let mut offsets = Vec::new();
-    let rows = times
-        .iter()
-        .map(|&time| {
-            // Of equal times, the first row is the match.
-            let after = order.partition_point(|&row| joined[row as usize] < time);
-            let before = after
-                .checked_sub(1)
-                .map(|place| order.partition_point(|&row| joined[row as usize] < of(place)));
-            let candidates = [before, (after < order.len()).then_some(after)];
-            let gap = |place: &usize| (of(*place) - time).abs();
-            let nearest = candidates
-                .into_iter()
-                .flatten()
-                .min_by(|one, other| gap(one).total_cmp(&gap(other)))?;
-            // A missing time has no match.
-            (gap(&nearest) <= limit).then(|| {
-                offsets.push(time - of(nearest));
-                order[nearest]
-            })
+    let mut uses = vec![0_usize; joined.len()];
+    let partner = |&time: &f64| {
+        // Of equal times, the first row is the match.
+        let after = order.partition_point(|&row| joined[row as usize] < time);
+        let before = after.checked_sub(1);
+        let before = before.map(|place| order.partition_point(|&row| joined[row as usize] < of(place)));
+        let candidates = [before, (after < order.len()).then_some(after)];
+        let gap = |place: &usize| (of(*place) - time).abs();
+        let nearest = candidates.into_iter().flatten();
+        let nearest = nearest.min_by(|one, other| gap(one).total_cmp(&gap(other)))?;
+        // A missing time has no match.
+        (gap(&nearest) <= limit).then(|| {
+            offsets.push(time - of(nearest));
+            uses[order[nearest] as usize] += 1;
+            order[nearest]
         })
-        .collect();
-    Partners {
-        rows,
+    };
+    let rows = Vec::from_iter(times.iter().map(partner));
+    let report = JoinReport {
         limit,
+        without_partner: rows.iter().filter(|partner| partner.is_none()).count(),
+        unused: uses.iter().filter(|uses| **uses == 0).count(),
         median_offset: median(&mut offsets),
-    }
+    };
+    let shared = uses.iter().filter(|uses| **uses > 1).count();
+    Partners { rows, report, shared }
 }
 
 /// Returns the median of the intervals between the sorted times, ignoring intervals of zero.

@@ -1,6 +1,6 @@
 //! Import of measured data: text, Excel, NumPy and MATLAB tables, joined by time, with a meaning for each column.
 //!
-//! [`read_table`] reads one file and [`Inspection`] summarises its columns. A [`Recipe`] defines which files are joined and
+//! [`read_table`] reads one file and [`InspectedFile`] summarises its columns. A [`Recipe`] defines which files are joined and
 //! what their columns mean; importing it returns a [`Recording`]: samples with names, units and times, and the dropped rows
 //! with reasons. A [`Plan`] adds the split into training and test samples; [`suggested_plan`] guesses one from the files. A
 //! [`Setup`] is a plan or a simulated array with the settings of a run: everything needed to reproduce its samples; its settings
@@ -42,19 +42,20 @@ mod suggestion;
 mod table;
 mod time_stamp;
 
-pub use choosing::{ChoosingProgress, ChosenSetup};
+pub use choosing::ChoosingProgress;
 pub use dialect::{Decimal, Dialect, DialectChoice, Encoding, Separator};
 pub use error::{Cure, ImportError, TableError};
 pub use expression::{Condition, Derived, Missing};
 pub use format::Format;
 pub use importing::{Dropped, FileReport, JoinReport, Recording, read_table};
 pub use inputs::{InputTable, KeptColumn};
-pub use inspection::{ColumnKind, ColumnSummary, InspectedFile, Inspection, TimeSummary};
+pub use inspection::{ColumnKind, ColumnSummary, InspectedFile, TimeSummary};
 pub use lines::{KeptCell, LONGEST_LINE, LineError, LineParser, ParsedLine, Readings, ReadingsFile};
-pub use plan::{Plan, PlannedSets, TestFiles};
+pub use plan::Plan;
 pub use positions::holds_positions;
 pub use progress::{Progress, Watch};
 pub use recipe::{FileChecksum, FileSet, Joined, Recipe, Recorded, file_crc32};
+pub(crate) use recipe::{restored, stored};
 pub use sentinel::Sentinel;
 pub(crate) use setup::watch;
 pub use setup::{Recordings, Setup, SetupError, SetupSets};

@@ -20,15 +20,11 @@ impl Recording {
         let mut known: HashMap<&str, usize> = HashMap::new();
         let (mut groups, mut row_wires) = (Vec::new(), Vec::new());
         for (number, Self { set, group_names, .. }) in parts.iter().enumerate() {
-            let numbers = Vec::from_iter(group_names.iter().map(|name| {
+            groups.extend(set.groups().iter().map(|&group| {
                 let next = known.len();
-                *known.entry(name).or_insert(next)
+                let name = group_names.get(group);
+                name.map_or(number, |name| *known.entry(name).or_insert(next))
             }));
-            groups.extend(
-                set.groups()
-                    .iter()
-                    .map(|&group| numbers.get(group).copied().unwrap_or(number)),
-            );
             row_wires.extend((0..set.samples()).filter_map(|sample| set.row_wire(sample)));
         }
         let rows = |of: for<'a> fn(&'a Dataset) -> ArrayView2<'a, f64>| -> Array2<f64> {
@@ -52,8 +48,7 @@ impl Recording {
             whole.files.extend(part.files);
             whole.warnings.extend(part.warnings);
         }
-        (whole.set, whole.has_groups) = (set, true);
-        Ok(whole)
+        Ok(Self { set, ..whole })
     }
 
     /// Returns the file of a sample, whose line is in [`Self::lines`].
@@ -83,8 +78,9 @@ fn check_same(first: &Recording, other: &Recording) -> Result<(), ImportError> {
             "'{path}': {found}, and '{first}': {expected}; files of one experiment need the same columns"
         ))
     };
-    let channels = first.inputs.iter().chain(&first.targets);
-    for (one, another) in channels.zip(other.inputs.iter().chain(&other.targets)) {
+    let [channels, others] =
+        [first, other].map(|Recording { problem, .. }| problem.inputs.iter().chain(&problem.targets));
+    for (one, another) in channels.zip(others) {
         if one != another {
             return Err(refuse(another.title(), one.title()));
         }

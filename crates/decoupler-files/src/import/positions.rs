@@ -51,22 +51,12 @@ fn table(path: &Path, watch: Watch<'_>) -> Result<Table, ImportError> {
 
 fn positions(table: &Table, targets: &[Channel]) -> Result<Vec<TargetPosition>, TableError> {
     table.check_widths()?;
-    let column = |name: &str| {
-        let found = position(&table.columns, name).filter(|_| matches!(table.format, Format::Text(_)));
-        let missing = || format!("it has no column '{name}'; positions of targets are text with the header target,x,y");
-        found
-            .map(|id| &table.columns[id])
-            .ok_or_else(|| TableError::Contents(missing()))
-    };
-    let [names, x, y] = [column(COLUMNS[0])?, column(COLUMNS[1])?, column(COLUMNS[2])?];
-    for column in [names, x, y] {
-        check(table, column)?;
-    }
-    let places: HashMap<&str, usize> = targets
-        .iter()
-        .enumerate()
-        .map(|(index, target)| (target.name.as_str(), index))
-        .collect();
+    let [names, x, y] = [
+        column(table, COLUMNS[0])?,
+        column(table, COLUMNS[1])?,
+        column(table, COLUMNS[2])?,
+    ];
+    let places = HashMap::<&str, usize>::from_iter(targets.iter().map(|target| target.name.as_str()).zip(0..));
     let mut found: Vec<TargetPosition> = Vec::new();
     let (mut line_of_target, mut line_of_place) = (HashMap::new(), BTreeMap::new());
     for row in 0..table.rows {
@@ -103,23 +93,24 @@ fn positions(table: &Table, targets: &[Channel]) -> Result<Vec<TargetPosition>, 
     Ok(found)
 }
 
-/// Checks that the column is complete, and has numbers in millimetres except for the names.
-fn check(table: &Table, column: &Column) -> Result<(), TableError> {
-    let name = &column.name;
+/// Returns a column that is complete, and has numbers in millimetres except for the names.
+fn column<'a>(table: &'a Table, name: &str) -> Result<&'a Column, TableError> {
+    let found = position(&table.columns, name).filter(|_| matches!(table.format, Format::Text(_)));
+    let Some(column) = found.map(|id| &table.columns[id]) else {
+        let reason = format!("it has no column '{name}'; positions of targets are text with the header target,x,y");
+        return Err(TableError::Contents(reason));
+    };
     if let Some(unit) = column.unit.as_ref().filter(|unit| *unit != "mm" && name != COLUMNS[0]) {
-        return Err(TableError::Contents(format!(
-            "column '{name}' is in {unit}; give millimetres"
-        )));
+        let reason = format!("column '{name}' is in {unit}; give millimetres");
+        return Err(TableError::Contents(reason));
     }
     let fault = column.faults.first.as_ref();
     let fault = fault.map(|fault| (fault.line, format!("'{}', which is not a finite number", fault.text)));
     let missing = (0..table.rows).find(|&row| column.is_missing(row));
     let missing = missing.map(|row| (table.line(row), "missing".to_owned()));
-    match fault.or(missing) {
-        None => Ok(()),
-        Some((line, cell)) => Err(TableError::in_row(
-            line,
-            format!("{name} is {cell}; each line needs the name of a target, and its x and y in millimetres"),
-        )),
-    }
+    let Some((line, cell)) = fault.or(missing) else {
+        return Ok(column);
+    };
+    let reason = "each line needs the name of a target, and its x and y in millimetres";
+    Err(TableError::in_row(line, format!("{name} is {cell}; {reason}")))
 }

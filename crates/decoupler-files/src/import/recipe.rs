@@ -4,7 +4,7 @@ use std::{
     collections::BTreeMap,
     fs::{self, File},
     io::Read as _,
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
 };
 
 use decoupler_core::{
@@ -12,10 +12,12 @@ use decoupler_core::{
     decoupling::Combined,
     evaluation::{Intervals, auto::AutoRecord},
 };
+use path_clean::clean;
+use pathdiff::diff_paths;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets, Watch,
+    Condition, Derived, DialectChoice, ImportError, Missing, Plan, Watch,
     expression::texts,
     progress::{Watched, table_error},
     table::name_and_unit,
@@ -97,22 +99,29 @@ impl Recipe {
         std::iter::once(&self.data).chain(self.append.iter().map(|set| &set.data))
     }
 
-    /// Returns the sets of files whose rows become samples.
-    pub(super) fn sets(&self) -> Vec<FileSet> {
-        let first = FileSet {
+    /// Returns the files whose rows become samples, with those joined to them.
+    pub(super) fn files(&self) -> FileSet {
+        FileSet {
             data: self.data.clone(),
             join: self.join.iter().map(|joined| joined.file.clone()).collect(),
-        };
-        std::iter::once(first).chain(self.append.iter().cloned()).collect()
+            append: self.append.clone(),
+        }
     }
 
     /// Returns `true` if samples belong to groups: the values of the group column, or else the files.
     pub fn has_groups(&self) -> bool {
         self.group.is_some() || !self.append.is_empty()
     }
+
+    /// Returns the unit given for a column, which either may name with its unit.
+    pub(super) fn unit_of(&self, column: &str) -> Option<&str> {
+        let bare = |name| name_and_unit(name).0;
+        let found = self.units.iter().find(|(name, _)| bare(name) == bare(column));
+        found.map(|(_, unit)| unit.as_str())
+    }
 }
 
-/// Files that replace the files of a recipe, with the same columns.
+/// Files that replace or follow the files of a recipe, with the same columns.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FileSet {
@@ -121,79 +130,66 @@ pub struct FileSet {
     /// Take the places of the joined files, in the same order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub join: Vec<PathBuf>,
+    /// Further files, whose rows follow.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub append: Vec<FileSet>,
 }
 
 impl FileSet {
-    /// Returns all files of the set.
+    /// Returns the first file with those joined to it, then those whose rows follow.
+    pub(super) fn flat(&self) -> Vec<Self> {
+        let first = Self {
+            append: Vec::new(),
+            ..self.clone()
+        };
+        let following = self.append.iter().flat_map(Self::flat);
+        std::iter::once(first).chain(following).collect()
+    }
+
+    /// Returns these files replaced by others; `None` if one of them has no replacement.
+    pub(super) fn replaced(&self, of: &impl Fn(&Path) -> Option<PathBuf>) -> Option<Self> {
+        Some(Self {
+            data: of(&self.data)?,
+            join: self.join.iter().map(|path| of(path)).collect::<Option<_>>()?,
+            append: self.append.iter().map(|set| set.replaced(of)).collect::<Option<_>>()?,
+        })
+    }
+
+    /// Returns the first file and those joined to it.
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
         std::iter::once(&self.data).chain(&self.join)
     }
 
-    pub(super) fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
-        std::iter::once(&mut self.data).chain(&mut self.join)
+    pub(super) fn files_mut(&mut self) -> Vec<&mut PathBuf> {
+        let first = std::iter::once(&mut self.data).chain(&mut self.join);
+        first.chain(self.append.iter_mut().flat_map(Self::files_mut)).collect()
     }
+}
+
+pub(super) fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
 /// Returns the path of a recording as stored in a file in `folder`: relative to the folder. A recording in the user's home
 /// is stored by name only if the folder is not in the home, so that no file reveals the home folder of its author.
-pub(super) fn stored(path: &Path, folder: &Path) -> PathBuf {
-    let absolute = |path: &Path| std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| normal(&path));
-    relative(&absolute(path), &absolute(folder), std::env::home_dir().as_deref())
+pub(crate) fn stored(path: &Path, folder: &Path) -> PathBuf {
+    let [path, folder] = [path, folder].map(|path| clean(absolute(path)));
+    relative(&path, &folder, std::env::home_dir().as_deref())
 }
 
 /// Returns the path of a recording that is `stored` in a file in `folder`. A recording that has been moved is also looked up
 /// next to the file.
-pub(super) fn restored(stored: &Path, folder: &Path) -> PathBuf {
-    let path = normal(&folder.join(stored));
+pub(crate) fn restored(stored: &Path, folder: &Path) -> PathBuf {
+    let path = clean(folder.join(stored));
     let neighbour = path.file_name().map(|name| folder.join(name));
-    match neighbour {
-        Some(neighbour) if !path.exists() && neighbour.exists() => neighbour,
-        _ => path,
-    }
+    neighbour.filter(|near| !path.exists() && near.exists()).unwrap_or(path)
 }
 
-/// Returns the path of a file relative to `folder`, both absolute; only the name if the relative path leaves `home`, or if
-/// the paths have no common prefix.
+/// Returns the path of a file relative to `folder`, both absolute; only the name if the relative path leaves `home`.
 fn relative(path: &Path, folder: &Path, home: Option<&Path>) -> PathBuf {
-    let name = || path.file_name().map_or_else(|| path.to_owned(), PathBuf::from);
-    if home.is_some_and(|home| path.starts_with(home) && !folder.starts_with(home)) {
-        return name();
-    }
-    let (of_path, of_folder) = (Vec::from_iter(path.components()), Vec::from_iter(folder.components()));
-    let shared = of_path
-        .iter()
-        .zip(&of_folder)
-        .take_while(|(one, other)| one == other)
-        .count();
-    if shared == 0 {
-        return name();
-    }
-    let up = of_folder[shared..].iter().map(|_| Component::ParentDir);
-    up.chain(of_path[shared..].iter().copied()).collect()
-}
-
-/// Resolves `..` components.
-fn normal(path: &Path) -> PathBuf {
-    let mut normal = PathBuf::new();
-    for component in path.components() {
-        match component {
-            Component::CurDir => {}
-            Component::ParentDir if matches!(normal.components().next_back(), Some(Component::Normal(_))) => {
-                normal.pop();
-            }
-            component => normal.push(component),
-        }
-    }
-    normal
-}
-
-impl Recipe {
-    /// Returns the unit given for a column, which either may name with its unit.
-    pub(super) fn unit_of(&self, column: &str) -> Option<&str> {
-        let bare = |name| name_and_unit(name).0;
-        let found = self.units.iter().find(|(name, _)| bare(name) == bare(column));
-        found.map(|(_, unit)| unit.as_str())
-    }
+    let leaves = home.is_some_and(|home| path.starts_with(home) && !folder.starts_with(home));
+    let relative = diff_paths(path, folder).filter(|_| !leaves);
+    relative.unwrap_or_else(|| path.file_name().unwrap_or(path.as_os_str()).into())
 }
 
 /// Origin of recorded samples: the plan that reads them, and checksums that identify its files and samples.
@@ -228,18 +224,18 @@ pub struct FileChecksum {
 }
 
 impl Recorded {
-    /// Describes the samples read by `plan`, whose paths must not depend on the working folder.
-    pub(super) fn of(plan: Plan, sets: &PlannedSets, watch: Watch<'_>) -> Result<Self, ImportError> {
+    /// Describes the `samples` read by `plan`, whose paths must not depend on the working folder.
+    pub(super) fn of(plan: Plan, samples: [&Dataset; 2], watch: Watch<'_>) -> Result<Self, ImportError> {
         let checksum = |path: PathBuf| {
             // A pipe can be read only once, and is empty now.
             let crc32 = path.is_file().then(|| file_crc32(&path, watch)).transpose()?;
             let crc32 = crc32.unwrap_or_default();
             Ok(FileChecksum { path, crc32 })
         };
-        let files = plan.files().map(checksum).collect::<Result<_, ImportError>>()?;
+        let files = plan.files().into_iter().map(checksum);
         Ok(Self {
-            files,
-            samples_crc32: samples_crc32([&sets.recording.set, &sets.test]),
+            files: files.collect::<Result<_, ImportError>>()?,
+            samples_crc32: samples_crc32(samples),
             search: None,
             combined: None,
             chosen_intervals: None,
@@ -247,18 +243,11 @@ impl Recorded {
         })
     }
 
-    /// Returns it with paths relative to `folder`, for a file stored there. A recording in the user's home is stored by name
-    /// only if the folder is not in the home, so that no file reveals the home folder of its author.
-    #[must_use]
-    pub fn relative_to(&self, folder: &Path) -> Self {
-        self.with_paths(|path| stored(path, folder))
-    }
-
     /// Returns it with its paths resolved for a file in `folder`. A recording that has been moved is also looked up next to the
     /// file.
     #[must_use]
     pub fn within(&self, folder: &Path) -> Self {
-        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        let folder = absolute(folder);
         self.with_paths(|path| restored(path, &folder))
     }
 
@@ -279,10 +268,11 @@ impl Recorded {
         files.filter(|path| !path.exists()).collect()
     }
 
-    fn with_paths(&self, of: impl Fn(&Path) -> PathBuf) -> Self {
+    /// Returns it with other paths.
+    pub(crate) fn with_paths(&self, of: impl Fn(&Path) -> PathBuf) -> Self {
         let mut recorded = self.clone();
         recorded.files.iter_mut().for_each(|file| file.path = of(&file.path));
-        recorded.plan = self.plan.with_paths(|path| of(path));
+        recorded.plan = self.plan.with_paths(of);
         recorded
     }
 }
@@ -343,6 +333,6 @@ mod tests {
             let found = relative(Path::new(path), Path::new(folder), home);
             assert_eq!(found, Path::new(expected), "{path} from {folder}");
         }
-        assert_eq!(normal(Path::new("/a/b/../c/./d")), Path::new("/a/c/d"));
+        assert_eq!(restored(Path::new("../c/./d"), Path::new("/a/b")), Path::new("/a/c/d"));
     }
 }

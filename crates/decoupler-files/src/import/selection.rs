@@ -1,12 +1,11 @@
-use std::{borrow::Cow, collections::HashMap};
-
-use super::{
-    Dropped, FileReport, FileSet, Format, ImportError, JoinReport, Recipe, Table,
-    columns::{Files, Meanings},
-    join::Partners,
+use std::{
+    borrow::Cow,
+    collections::{HashMap, HashSet},
 };
+
+use super::{Dropped, FileReport, Format, ImportError, Table, columns::Files, join::Partners};
 use decoupler_core::{
-    dataset::{History, Memory, RowOrder, Series},
+    dataset::{History, RowOrder, Series},
     text::counted,
 };
 use ndarray::Array2;
@@ -14,90 +13,64 @@ use ndarray::Array2;
 /// Largest number of a row-wire.
 pub(super) const LAST_ROW_WIRE: usize = 10_000;
 
+/// Why a row is dropped, and whether it is kept.
+type Need<'a> = (String, Box<dyn Fn(usize) -> bool + 'a>);
+
 /// Rows of the first file, with the cells of the joined files.
-pub(super) struct Rows<'a> {
-    pub(super) recipe: &'a Recipe,
-    /// The files, as the recipe names them.
-    pub(super) set: &'a FileSet,
-    pub(super) files: &'a Files,
-    pub(super) meanings: &'a Meanings,
-    /// Matching rows of each joined file; `None` if it is joined row by row.
-    pub(super) joins: &'a [Option<Partners>],
-}
-
-/// Why a row is no sample.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Reason {
-    /// It has no match in this joined file.
-    Lonely(usize),
-    /// It does not meet this comparison.
-    Unmet(usize),
-    /// This column is missing.
-    Missing(usize),
-}
-
-impl Rows<'_> {
+impl Files {
     fn main(&self) -> &Table {
-        &self.files.tables[0]
-    }
-
-    fn name(&self, id: usize) -> &str {
-        &self.files.columns[id].name
+        &self.tables[0]
     }
 
     /// Returns the cell of a row; NaN if it is missing or the row has no match.
     pub(super) fn number(&self, id: usize, row: usize) -> f64 {
-        self.files.columns[id].numbers[row]
-    }
-
-    fn is_missing(&self, id: usize, row: usize) -> bool {
-        self.files.columns[id].is_missing(row)
+        self.columns[id].numbers[row]
     }
 
     /// Returns the rows that are samples, and the dropped rows by reason, in order of first occurrence.
     pub(super) fn select(&self) -> Result<(Vec<usize>, Vec<Dropped>), ImportError> {
         let main = self.main();
-        let mut used: Vec<usize> = Vec::new();
-        self.meanings.used().for_each(|id| {
-            if !used.contains(&id) {
-                used.push(id);
-            }
-        });
-        let is_lonely =
-            |join: &Option<Partners>, row: usize| join.as_ref().is_some_and(|join| join.rows[row].is_none());
-        let reason_of = |row: usize| {
-            let lonely = self.joins.iter().position(|join| is_lonely(join, row));
-            let unmet = || {
-                self.meanings.comparisons.iter().position(|(id, comparison)| {
-                    let number = self.number(*id, row);
-                    !number.is_nan() && !comparison.is_met(number)
-                })
-            };
-            let missing = || used.iter().copied().find(|&id| self.is_missing(id, row));
-            let unmet_or_missing = || unmet().map(Reason::Unmet).or_else(|| missing().map(Reason::Missing));
-            lonely.map(Reason::Lonely).or_else(unmet_or_missing)
-        };
-        let (mut kept, mut counts) = (Vec::new(), Vec::<(Reason, usize, u64)>::new());
-        for row in 0..main.rows {
-            match reason_of(row) {
-                None => kept.push(row),
-                Some(reason) => match counts.iter_mut().find(|(other, ..)| *other == reason) {
-                    Some((_, rows, _)) => *rows += 1,
-                    None => counts.push((reason, 1, main.line(row))),
-                },
+        let mut needs = Vec::<Need<'_>>::new();
+        for (join, table) in self.joins.iter().zip(&self.tables[1..]) {
+            if let Some(Partners { rows, report, .. }) = join {
+                let (file, limit) = (table.path.display(), report.limit);
+                let reason = format!("no row of '{file}' within {limit} of its time");
+                needs.push((reason, Box::new(|row| rows[row].is_some())));
             }
         }
-        let too_long = main.too_long.first.as_ref().map(|first| Dropped {
-            reason: format!("more cells than the {}", counted(self.files.width(0), "column")),
+        for (id, comparison) in &self.meanings.comparisons {
+            let numbers = &self.columns[*id].numbers;
+            let is_met = |row: usize| numbers[row].is_nan() || comparison.is_met(numbers[row]);
+            needs.push((format!("{comparison} is not met"), Box::new(is_met)));
+        }
+        let mut seen = HashSet::new();
+        for id in self.meanings.used().filter(|id| seen.insert(*id)) {
+            let column = &self.columns[id];
+            let reason = format!("{} is missing", column.name);
+            needs.push((reason, Box::new(|row| !column.is_missing(row))));
+        }
+        let mut dropped = Vec::from_iter(main.too_long.first.as_ref().map(|first| Dropped {
+            reason: format!("more cells than the {}", counted(self.ranges[0].len(), "column")),
             rows: main.too_long.count,
             first_line: first.line,
-        });
-        let counted = counts.into_iter().map(|(reason, rows, first_line)| Dropped {
-            reason: self.words(reason),
-            rows,
-            first_line,
-        });
-        let dropped = Vec::from_iter(too_long.into_iter().chain(counted));
+        }));
+        let (mut kept, mut places) = (Vec::new(), vec![None; needs.len()]);
+        for row in 0..main.rows {
+            let Some(need) = needs.iter().position(|(_, is_met)| !is_met(row)) else {
+                kept.push(row);
+                continue;
+            };
+            let place = *places[need].get_or_insert(dropped.len());
+            if place == dropped.len() {
+                let (reason, first_line) = (needs[need].0.clone(), main.line(row));
+                dropped.push(Dropped {
+                    reason,
+                    rows: 0,
+                    first_line,
+                });
+            }
+            dropped[place].rows += 1;
+        }
         if kept.is_empty() {
             let reasons = dropped
                 .iter()
@@ -108,40 +81,29 @@ impl Rows<'_> {
         Ok((kept, dropped))
     }
 
-    fn words(&self, reason: Reason) -> String {
-        match reason {
-            Reason::Lonely(join) => {
-                let limit = self.joins[join].as_ref().map_or(f64::NAN, |join| join.limit);
-                let file = self.set.join[join].display();
-                format!("no row of '{file}' within {limit} of its time")
-            }
-            Reason::Unmet(comparison) => format!("{} is not met", self.meanings.comparisons[comparison].1),
-            Reason::Missing(id) => format!("{} is missing", self.name(id)),
-        }
-    }
-
     /// Returns the rows with all readings and a time, including rows that are not samples.
     pub(super) fn with_readings(&self) -> Vec<usize> {
         let used = Vec::from_iter(self.meanings.placing().chain(self.meanings.inputs.iter().copied()));
         let has_row_wire = |row: usize| self.meanings.row_wire.is_none_or(|id| self.row_wire(id, row).is_ok());
-        let is_complete = |&row: &usize| !used.iter().any(|id| self.is_missing(*id, row)) && has_row_wire(row);
+        let is_complete = |&row: &usize| !used.iter().any(|id| self.columns[*id].is_missing(row)) && has_row_wire(row);
         (0..self.main().rows).filter(is_complete).collect()
     }
 
     /// Describes the rows `read` in order of time, of which those in `kept` are samples: returns the history of their readings,
-    /// once these are moved.
+    /// once these are moved. With `needs_clock`, a memory needs the times in seconds.
     pub(super) fn past(
         &self,
         read: &[usize],
         kept: &[usize],
+        needs_clock: bool,
     ) -> Result<impl FnOnce(Array2<f64>) -> History + use<>, ImportError> {
         let mut places = vec![0; self.main().rows];
         read.iter().enumerate().for_each(|(place, &row)| places[row] = place);
         let mut times_s = None;
         if let Some(id) = self.meanings.time {
-            let channel = self.files.channel(id);
+            let channel = self.channel(id);
             let factor = seconds(channel.unit.as_deref());
-            if factor.is_none() && self.recipe.memory.as_ref().is_some_and(Memory::needs_clock) {
+            if factor.is_none() && needs_clock {
                 let (name, unit) = (channel.name, channel.unit.unwrap_or_default());
                 return Err(ImportError::Samples(format!(
                     "the times in '{name}' are in {unit}, and a memory needs times in s, ms, us, ns, min or h: give the unit \
@@ -176,13 +138,10 @@ impl Rows<'_> {
             return Ok(order_note(order, self.main().line(read[first_row])));
         }
         let falls = |pair: &&[usize]| self.number(time, pair[1]) < self.number(time, pair[0]);
-        let count = kept.windows(2).filter(falls).count();
-        let note = kept.windows(2).find(falls).map(|pair| {
-            format!(
-                "the times go backwards {}, first on line {}; the samples are sorted by time",
-                counted(count, "time"),
-                self.main().line(pair[1])
-            )
+        let falls = Vec::from_iter(kept.windows(2).filter(falls).map(|pair| pair[1]));
+        let note = falls.first().map(|&row| {
+            let (times, line) = (counted(falls.len(), "time"), self.main().line(row));
+            format!("the times go backwards {times}, first on line {line}; the samples are sorted by time")
         });
         for rows in [kept, read] {
             rows.sort_by(|&one, &other| self.number(time, one).total_cmp(&self.number(time, other)));
@@ -198,7 +157,7 @@ impl Rows<'_> {
         };
         let (mut known, mut names) = (HashMap::<Cow<'_, str>, usize>::new(), Vec::new());
         let numbers = kept.iter().map(|&row| {
-            let name = self.files.columns[id].text(row);
+            let name = self.columns[id].text(row);
             *known.entry(name).or_insert_with_key(|name| {
                 names.push(name.clone().into_owned());
                 names.len() - 1
@@ -221,7 +180,7 @@ impl Rows<'_> {
     fn row_wire(&self, id: usize, row: usize) -> Result<usize, ImportError> {
         let value = self.number(id, row);
         row_wire(value).ok_or_else(|| {
-            let name = self.name(id);
+            let name = &self.columns[id].name;
             ImportError::Samples(format!(
                 "'{name}': {value} is not the number of a row-wire; give whole numbers from 1 to {LAST_ROW_WIRE}"
             ))
@@ -235,17 +194,12 @@ impl Rows<'_> {
                 path: table.path.clone(),
                 format: table.format.clone(),
                 rows: table.rows,
-                columns: self.files.width(file),
+                columns: self.ranges[file].len(),
                 has_names: table.has_header() && table.format != Format::Npy,
-                join: join.map(|partners| JoinReport {
-                    limit: partners.limit,
-                    without_partner: partners.rows.iter().filter(|partner| partner.is_none()).count(),
-                    unused: partners.uses(table.rows).iter().filter(|uses| **uses == 0).count(),
-                    median_offset: partners.median_offset,
-                }),
+                join: join.map(|partners| partners.report),
             }
         };
-        self.files.tables.iter().enumerate().map(report).collect()
+        self.tables.iter().enumerate().map(report).collect()
     }
 }
 

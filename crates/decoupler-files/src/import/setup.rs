@@ -1,19 +1,19 @@
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use decoupler_core::{
+    dataset::{DatasetError, Seed},
     evaluation::{
         Intervals, Run, RunError, RunSets, RunSettings,
         experiments::{ExperimentRecording, TrialSamples},
     },
     job::{Cancelled, Job},
     live::{DriftReference, LiveError},
-    text::clean_name,
     training::TrainerState,
 };
 use ndarray::{Axis, Slice};
 use thiserror::Error;
 
-use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording, Watch};
+use super::{ImportError, Plan, Progress, Recorded, Recording, Watch, table::stem};
 use crate::machine::memory_budget;
 
 /// Everything needed to repeat a run: its settings and, for a recording, the plan that reads it.
@@ -57,24 +57,24 @@ pub struct Recordings {
 pub enum SetupError {
     /// The recording cannot be read.
     #[error(transparent)]
-    Import(ImportError),
+    Import(#[from] ImportError),
     /// The samples cannot be drawn or trained on.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The caller cancelled the work.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
     /// The recording has changed.
     #[error("'{0}' has other samples than when the run was saved; use the original files, or train again")]
     OtherSamples(String),
 }
 
-impl From<ImportError> for SetupError {
-    fn from(error: ImportError) -> Self {
-        match error {
-            ImportError::Cancelled => Self::Cancelled(Cancelled),
-            error => Self::Import(error),
-        }
+impl From<Cancelled> for SetupError {
+    fn from(_: Cancelled) -> Self {
+        Self::Import(ImportError::Cancelled)
+    }
+}
+
+impl From<DatasetError> for SetupError {
+    fn from(error: DatasetError) -> Self {
+        Self::Import(error.into())
     }
 }
 
@@ -95,16 +95,17 @@ impl Setup {
     /// # Panics
     /// If the source of `settings` is simulated.
     pub fn recording(settings: RunSettings, plan: Plan) -> Self {
-        assert!(settings.simulation().is_none(), "the source is a recording");
-        Self {
-            plan: Some(plan),
-            ..settings.into()
-        }
+        Self::of(settings, Some(plan)).expect("the source is a recording")
     }
 
     /// Returns the setup with these settings; `None` unless a plan is given for a measured source and only for that.
-    pub fn of(settings: RunSettings, plan: Option<Plan>) -> Option<Self> {
+    /// The plan holds out for validation what the method needs, unless it gives a share.
+    pub fn of(settings: RunSettings, mut plan: Option<Plan>) -> Option<Self> {
         let is_recording = settings.simulation().is_none();
+        if let Some(Plan { division, .. }) = &mut plan {
+            let usual = settings.validation_fraction();
+            division.validation_fraction.get_or_insert(usual);
+        }
         (is_recording == plan.is_some()).then_some(Self {
             plan,
             ..settings.into()
@@ -113,11 +114,9 @@ impl Setup {
 
     /// Returns the setup of a run that is read from a file, which may name regular files only.
     #[must_use]
-    pub(crate) fn stored(self) -> Self {
-        Self {
-            is_stored: true,
-            ..self
-        }
+    pub(crate) fn stored(mut self) -> Self {
+        self.is_stored = true;
+        self
     }
 
     fn check_files(&self) -> Result<(), ImportError> {
@@ -147,7 +146,7 @@ impl Setup {
     /// Returns the name of the source: the array scale, or the stem of the first file.
     pub fn source_name(&self) -> String {
         match (&self.plan, self.settings.simulation()) {
-            (Some(plan), _) => clean_name(&plan.import.data.file_stem().unwrap_or_default().to_string_lossy()),
+            (Some(plan), _) => stem(&plan.import.data),
             (None, Some(simulation)) => simulation.sensor.scale.to_string(),
             (None, None) => String::new(),
         }
@@ -168,10 +167,10 @@ impl Setup {
             let sets = RunSets::draw(&self.settings, memory_budget(), job)?;
             return Ok(SetupSets { sets, recordings: None });
         };
-        self.check_files()?;
         let watch = &mut watch(job, on_progress);
-        let planned = plan.sets(folder, self.settings.seed, watch)?;
-        Ok(SetupSets::of_plan(plan, folder, planned, watch)?)
+        self.check_files()?;
+        let recordings = plan.recordings(folder, watch)?;
+        Ok(SetupSets::of_plan(plan, folder, recordings, self.settings.seed, watch)?)
     }
 
     /// Returns the recording for an experiment; `None` for a simulated array.
@@ -202,7 +201,7 @@ impl Setup {
         self.check_files()?;
         let (recording, test) = plan.recordings(folder, &mut watch(job, on_progress))?;
         Ok(TrialSamples::Recorded {
-            problem: Arc::new(recording.problem()),
+            problem: Arc::new(recording.problem),
             set: Arc::new(recording.set),
             test: test.map(|test| Arc::new(test.set)),
             memory: memory_budget(),
@@ -219,27 +218,26 @@ pub(crate) fn watch(job: &Job<'_>, on_progress: &mut dyn FnMut(Progress)) -> imp
 }
 
 impl SetupSets {
-    /// Returns the datasets of a plan whose paths are relative to `folder`.
+    /// Splits the samples of a plan, whose paths are relative to `folder`; `seed` is the seed of the run.
     pub(super) fn of_plan(
         plan: &Plan,
         folder: &Path,
-        planned: PlannedSets,
+        (training, test): (Recording, Option<Recording>),
+        seed: Seed,
         watch: Watch<'_>,
     ) -> Result<Self, ImportError> {
-        let recorded = Recorded::of(plan.within(folder).absolute(), &planned, watch)?;
+        let (split, test_set) = plan.divide(&training, test.as_ref(), seed)?;
+        let recorded = Recorded::of(plan.within(folder).absolute(), [&training.set, &test_set], watch)?;
         let sets = RunSets {
             memory: memory_budget(),
-            ..RunSets::new(planned.split, planned.test).described(planned.recording.problem())
+            ..RunSets::new(split, test_set).described(training.problem.clone())
         };
-        let recordings = Recordings {
+        let recordings = Some(Recordings {
             recorded,
-            training: planned.recording,
-            test: planned.test_recording,
-        };
-        Ok(Self {
-            sets,
-            recordings: Some(recordings),
-        })
+            training,
+            test,
+        });
+        Ok(Self { sets, recordings })
     }
 
     /// Prepares a run of `setup` on these datasets, with its baselines.

@@ -1,10 +1,8 @@
-use std::{fmt, path::Path};
+use std::path::Path;
 
 use decoupler_core::dataset::SplitBy;
 
-use super::{
-    ColumnKind, ColumnSummary, FileSet, Format, InspectedFile, Inspection, Joined, Plan, Recipe, TestFiles, table::stem,
-};
+use super::{ColumnKind, ColumnSummary, FileSet, Format, InspectedFile, Joined, Plan, Recipe, table::stem};
 
 /// Words in names of columns and files that suggest a target, by their weights.
 const TARGET_WORDS: [(i32, &str); 2] = [
@@ -40,8 +38,24 @@ fn is_one_of(word: &str, words: &str) -> bool {
 ///
 /// Constant columns, text and copies of other columns are not used.
 pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
-    let (training, test) = apart(files);
-    let mut series = series(&training);
+    let is_test = |file: &&InspectedFile| stem(&file.path).to_lowercase().contains("test");
+    let (tests, training): (Vec<_>, Vec<_>) = files.iter().partition(is_test);
+    if !tests.is_empty() && tests.len() == training.len() {
+        let plan = plan_of_series(&training);
+        // Each training file has one for the test, such as `trainPose` and `testPose`.
+        let test = plan.import.files().replaced(&|path| {
+            let mut tests = tests.iter().map(|test| &test.path);
+            tests.find(|test| without_part(test) == without_part(path)).cloned()
+        });
+        if test.is_some() {
+            return Plan { test, ..plan };
+        }
+    }
+    plan_of_series(&Vec::from_iter(files))
+}
+
+fn plan_of_series(files: &[&InspectedFile]) -> Plan {
+    let mut series = series(files);
     // The file with the readings first: the one that looks least like targets; of equal ones, the widest.
     series.sort_by_key(|files| (score_of_file(&files[0].path), usize::MAX - numeric(files[0]).count()));
     let mut plan = plan_of(&Vec::from_iter(series.iter().map(|files| files[0])));
@@ -49,11 +63,12 @@ pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
     plan.import.append = Vec::from_iter((1..series.first().map_or(1, Vec::len)).map(|number| FileSet {
         data: path(&series[0], number),
         join: series[1..].iter().map(|files| path(files, number)).collect(),
+        append: Vec::new(),
     }));
     if plan.import.has_groups() {
         plan.division.by = SplitBy::Group;
     }
-    Plan { test, ..plan }
+    plan
 }
 
 /// Divides files into those of the same kind, such as one per session; all of them single unless there are as many of each
@@ -75,17 +90,15 @@ fn series<'a>(files: &[&'a InspectedFile]) -> Vec<Vec<&'a InspectedFile>> {
 /// Returns `true` if two files have the same columns and are of the same kind: their names differ in numbers only, or they
 /// have a header and different numbers of rows, so that they cannot be joined row by row.
 fn are_alike(one: &InspectedFile, other: &InspectedFile) -> bool {
-    fn names(file: &InspectedFile) -> impl Iterator<Item = &String> {
-        file.inspection.columns.iter().map(|column| &column.name)
-    }
+    let [names, others] = [one, other].map(|file| file.columns.iter().map(|column| &column.name));
     let letters = |file: &InspectedFile| {
         let name = stem(&file.path).to_lowercase();
         name.chars().filter(|letter| letter.is_alphabetic()).collect::<String>()
     };
     let has_header = matches!(&one.format, Format::Text(dialect) if dialect.header);
-    names(one).eq(names(other))
+    names.eq(others)
         && score_of_file(&one.path) == score_of_file(&other.path)
-        && (letters(one) == letters(other) || (has_header && one.inspection.rows != other.inspection.rows))
+        && (letters(one) == letters(other) || (has_header && one.rows != other.rows))
 }
 
 /// As [`suggested_plan`], if the first file is known to have the readings and the others are joined to it.
@@ -111,18 +124,13 @@ fn plan_of(order: &[&InspectedFile]) -> Plan {
     };
     recipe.join = joined.iter().map(with_time).collect();
     recipe.time = time_of(first);
-    add(recipe, first, guesses(first, joined.is_empty()), None);
+    // A single file contains both inputs and targets.
+    let is_alone = joined.is_empty();
+    let is_target = |name: &str, unit: Option<&str>| is_alone && looks_like_target(name, unit);
+    add(recipe, first, None, is_target);
     for (file, stem) in joined.iter().zip(recipe.stems()) {
-        let mut meanings = guesses(file, false);
-        for (meaning, column) in meanings.iter_mut().zip(&file.inspection.columns) {
-            // Columns of joined files are targets, whatever their names.
-            match meaning {
-                Meaning::Input if column.is_rounding => *meaning = Meaning::Unused,
-                Meaning::Input => *meaning = Meaning::Target,
-                _ => {}
-            }
-        }
-        add(recipe, file, meanings, Some(&stem));
+        // Columns of joined files are targets, whatever their names.
+        add(recipe, file, Some(&stem), |_, _| true);
     }
     let Recipe { inputs, targets, .. } = recipe;
     // If the names do not distinguish them, the last column is the target, as in most tables of samples.
@@ -145,26 +153,6 @@ fn own_stem(file: &InspectedFile) -> Option<String> {
     file.stem.as_ref().filter(is_own).cloned()
 }
 
-/// Returns the training files, and the test files if each training file has one, such as `trainPose` and `testPose`.
-fn apart(files: &[InspectedFile]) -> (Vec<&InspectedFile>, Option<TestFiles>) {
-    let is_test = |file: &&InspectedFile| stem(&file.path).to_lowercase().contains("test");
-    let (tests, training): (Vec<_>, Vec<_>) = files.iter().partition(is_test);
-    let mut sorted = training.clone();
-    sorted.sort_by_key(|file| (score_of_file(&file.path), usize::MAX - numeric(file).count()));
-    let partner = |file: &&InspectedFile| {
-        let is_partner = |test: &&&InspectedFile| without_part(&test.path) == without_part(&file.path);
-        Some(tests.iter().find(is_partner)?.path.clone())
-    };
-    match sorted.iter().map(partner).collect::<Option<Vec<_>>>() {
-        Some(mut partners) if !tests.is_empty() && tests.len() == training.len() => {
-            let (data, join) = (partners.remove(0), partners);
-            let append = Vec::new();
-            (training, Some(TestFiles { data, join, append }))
-        }
-        _ => (files.iter().collect(), None),
-    }
-}
-
 /// Returns the name of a file without "training", "train" or "test".
 fn without_part(path: &Path) -> String {
     let mut name = stem(path).to_lowercase();
@@ -175,7 +163,7 @@ fn without_part(path: &Path) -> String {
 }
 
 fn numeric(file: &InspectedFile) -> impl Iterator<Item = &ColumnSummary> {
-    file.inspection.columns.iter().filter(|column| is_numeric(column))
+    file.columns.iter().filter(|column| is_numeric(column))
 }
 
 fn is_numeric(column: &ColumnSummary) -> bool {
@@ -184,9 +172,8 @@ fn is_numeric(column: &ColumnSummary) -> bool {
 
 /// Returns the time column, if its name or unit suggests a time or it has no name: an input may increase steadily, too.
 fn time(file: &InspectedFile) -> Option<&ColumnSummary> {
-    let Inspection { time, columns, .. } = &file.inspection;
-    let name = &time.as_ref()?.column;
-    let column = columns.iter().find(|column| column.name == *name)?;
+    let name = &file.time.as_ref()?.column;
+    let column = file.columns.iter().find(|column| column.name == *name)?;
     let name = column.name.to_lowercase();
     let is_named = ["time", "stamp", "clock", "date", "index", "frame", "sample", "second"];
     let has_unit = |unit: &String| ["s", "ms", "µs", "us", "min", "h"].contains(&unit.trim());
@@ -222,37 +209,6 @@ pub(super) fn is_group_name(name: &str) -> bool {
             .all(|word| ["", "id", "no", "nr", "number"].contains(word))
 }
 
-/// Guesses the meaning of each column.
-fn guesses(file: &InspectedFile, is_alone: bool) -> Vec<Meaning> {
-    let inspection = &file.inspection;
-    let time = time(file).map(|time| time.name.as_str());
-    let mut has_group = false;
-    let guess = |column: &ColumnSummary| {
-        if time == Some(column.name.as_str()) {
-            return Meaning::Time;
-        }
-        let name = column.name.trim().to_lowercase();
-        if !has_group && is_group_name(&name) {
-            has_group = true;
-            return Meaning::Group;
-        }
-        if column.is_constant || column.duplicate_of.is_some() || !is_numeric(column) {
-            return Meaning::Unused;
-        }
-        let is_row_wire = ["row_wire", "row-wire", "row wire", "rowwire", "row"].contains(&name.as_str());
-        if is_row_wire && column.kind == ColumnKind::Integer && column.min >= Some(1.0) {
-            return Meaning::RowWire;
-        }
-        // A single file contains both inputs and targets.
-        match is_alone && looks_like_target(&name, column.unit.as_deref()) {
-            true if column.is_rounding => Meaning::Unused,
-            true => Meaning::Target,
-            false => Meaning::Input,
-        }
-    };
-    inspection.columns.iter().map(guess).collect()
-}
-
 fn looks_like_target(name: &str, unit: Option<&str>) -> bool {
     if let Some(unit) = unit.map(|unit| unit.trim().to_lowercase()) {
         let is_in = |units: &str| units.split(',').any(|other| other == unit);
@@ -273,27 +229,43 @@ fn looks_like_target(name: &str, unit: Option<&str>) -> bool {
     ["x", "y", "z"].contains(&name) || words().any(|word| target_words().any(|(_, target)| target == word))
 }
 
-/// Adds the columns of a file to a recipe by their full names.
-fn add(recipe: &mut Recipe, file: &InspectedFile, meanings: Vec<Meaning>, stem: Option<&String>) {
-    for (column, meaning) in file.inspection.columns.iter().zip(meanings) {
-        let name = match stem {
+/// Adds the columns of a file to a recipe by their full names, with guesses of their meanings; `is_target` distinguishes targets
+/// from inputs by the name and the unit.
+fn add(recipe: &mut Recipe, file: &InspectedFile, stem: Option<&str>, is_target: impl Fn(&str, Option<&str>) -> bool) {
+    let time = time(file).map(|time| time.name.as_str());
+    let mut has_group = false;
+    for column in &file.columns {
+        let full_name = || match stem {
             None => column.name.clone(),
             Some(stem) => format!("{stem}.{}", column.name),
         };
-        match meaning {
-            Meaning::Input => recipe.inputs.push(name),
-            Meaning::Target => recipe.targets.push(name),
-            Meaning::Group if recipe.group.is_none() => recipe.group = Some(name),
-            Meaning::RowWire if recipe.row_wire.is_none() => recipe.row_wire = Some(name),
+        let name = column.name.trim().to_lowercase();
+        let is_row_wire = ["row_wire", "row-wire", "row wire", "rowwire", "row"].contains(&name.as_str())
+            && column.kind == ColumnKind::Integer
+            && column.min >= Some(1.0);
+        if time == Some(column.name.as_str()) {
             // Only the first file has a time here, if the files are joined by time.
-            Meaning::Time if stem.is_none() && recipe.join.is_empty() => recipe.time = Some(name),
-            _ => {}
+            if stem.is_none() && recipe.join.is_empty() {
+                recipe.time = Some(full_name());
+            }
+        } else if !has_group && is_group_name(&name) {
+            has_group = true;
+            recipe.group.get_or_insert_with(full_name);
+        } else if column.is_constant || column.duplicate_of.is_some() || !is_numeric(column) {
+            // Such columns are not used.
+        } else if is_row_wire {
+            recipe.row_wire.get_or_insert_with(full_name);
+        } else if !is_target(&name, column.unit.as_deref()) {
+            recipe.inputs.push(full_name());
+        } else if !column.is_rounding {
+            recipe.targets.push(full_name());
         }
     }
 }
 
 /// Meaning of a column in a recording.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, strum::Display, strum::VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Meaning {
     /// Reading of the sensor.
     Input,
@@ -312,39 +284,14 @@ pub enum Meaning {
 
 impl Meaning {
     /// All meanings, in the order offered to the user.
-    pub const ALL: [Self; 6] = [
-        Self::Input,
-        Self::Target,
-        Self::Time,
-        Self::Group,
-        Self::RowWire,
-        Self::Unused,
-    ];
-}
+    pub const ALL: &[Self] = <Self as strum::VariantArray>::VARIANTS;
 
-impl Meaning {
     /// Returns the meaning in a sentence.
-    pub(super) fn with_article(self) -> &'static str {
+    pub(super) fn with_article(self) -> String {
         match self {
-            Self::Input => "an input",
-            Self::Target => "a target",
-            Self::Time => "the time",
-            Self::Group => "the group",
-            Self::RowWire => "the row-wire",
-            Self::Unused => "unused",
+            Self::Input => "an input".to_owned(),
+            Self::Target => "a target".to_owned(),
+            one_column => format!("the {one_column}"),
         }
-    }
-}
-
-impl fmt::Display for Meaning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Input => "input",
-            Self::Target => "target",
-            Self::Time => "time",
-            Self::Group => "group",
-            Self::RowWire => "row-wire",
-            Self::Unused => "unused",
-        })
     }
 }

@@ -9,7 +9,7 @@ use decoupler_core::text::clean_name;
 
 use serde::Serialize;
 
-use super::{Dialect, Encoding, Format, TableError, format::Cell, time_stamp::TimeStamp};
+use super::{Encoding, Format, TableError, format::Cell, time_stamp::TimeStamp};
 
 /// Table read from a file: columns of equal length.
 #[derive(Clone, Debug)]
@@ -104,14 +104,6 @@ impl Table {
             Format::Text(dialect) => dialect.header,
             Format::Sheet { header, .. } => *header,
             Format::Npy | Format::Npz | Format::Matlab => true,
-        }
-    }
-
-    /// Returns the layout of a text file; `None` for other formats.
-    pub fn dialect(&self) -> Option<&Dialect> {
-        match &self.format {
-            Format::Text(dialect) => Some(dialect),
-            _ => None,
         }
     }
 }

@@ -589,7 +589,7 @@ mod tests {
             .unwrap();
         let other = network(folder.path());
         let file = Arc::new(NetworkFile {
-            problem: trained.problem(),
+            problem: trained.problem.clone(),
             recorded: Some(RecordedFiles {
                 plan: Plan {
                     import,

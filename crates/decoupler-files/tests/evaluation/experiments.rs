@@ -365,16 +365,19 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
             let mut plan = setup.plan().unwrap().clone();
             plan.division.by = SplitBy::ALL[place / 2];
             // Levenberg-Marquardt needs samples for validation, Bayesian regularisation none.
-            plan.division.validation_fraction = [0.0, 0.2][place % 2];
-            let sets = plan
-                .sets(Path::new(""), seed, &mut |_| ControlFlow::Continue(()))
-                .unwrap();
-            assert_eq!(sets.split.validation.is_some(), place % 2 == 1);
+            plan.division.validation_fraction = Some([0.0, 0.2][place % 2]);
+            let divided = || {
+                let watch = &mut |_| ControlFlow::Continue(());
+                let recording = plan.recording(Path::new(""), watch).unwrap();
+                plan.divide(&recording, None, seed).unwrap()
+            };
+            let (split, test) = divided();
+            assert_eq!(split.validation.is_some(), place % 2 == 1);
             let mut settings = *setup.settings();
             settings.seed = seed;
             settings.training.method = [Method::recorded_regularization(), Method::default()][place % 2];
             let mut alone =
-                Run::with_baselines(settings, RunSets::new(sets.split, sets.test), None, &Job::UNINTERRUPTED).unwrap();
+                Run::with_baselines(settings, RunSets::new(split, test), None, &Job::UNINTERRUPTED).unwrap();
             while alone.step().is_none() {}
             assert_eq!(trial.seed, seed);
             assert_eq!(trial.scores.network, alone.errors(), "cell {place}");
@@ -383,12 +386,10 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
                 [&trial.scores.baselines.mean, &trial.scores.baselines.linear],
                 [&baselines.mean, &baselines.linear]
             );
-            let sets = plan
-                .sets(Path::new(""), seed, &mut |_| ControlFlow::Continue(()))
-                .unwrap();
+            let (split, test) = divided();
             let taken_up = Run::with_baselines(
                 settings,
-                RunSets::new(sets.split, sets.test),
+                RunSets::new(split, test),
                 Some(trial.states.clone()),
                 &Job::UNINTERRUPTED,
             )

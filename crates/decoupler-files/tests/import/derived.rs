@@ -43,7 +43,7 @@ fn channel(name: &str) -> Channel {
 
 fn imported(recipe: &Recipe, folder: &Path) -> Problem {
     let imported = recipe.import(folder, &mut |_| ControlFlow::Continue(()));
-    imported.unwrap().problem()
+    imported.unwrap().problem
 }
 
 #[test]

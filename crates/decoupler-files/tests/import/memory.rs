@@ -3,7 +3,7 @@
 use std::{fs, ops::ControlFlow, path::Path};
 
 use decoupler_core::dataset::{Memory, Seed, Span};
-use decoupler_files::import::{Plan, Recipe, Recording, TestFiles};
+use decoupler_files::import::{FileSet, Plan, Recipe, Recording};
 use tempfile::TempDir;
 
 /// A folder with data.csv: a reading that counts the rows, and a target of which every fifth is missing. Times are in
@@ -49,11 +49,11 @@ fn features_come_from_all_readings_and_start_again_after_a_gap() {
         ..Memory::default()
     };
     let recording = import(&recipe(Some(memory.clone())), folder.path()).unwrap();
-    let titles = Vec::from_iter(recording.inputs.iter().map(|channel| channel.title()));
+    let titles = Vec::from_iter(recording.problem.features().iter().map(|channel| channel.title()));
     assert_eq!(titles, ["u (V)", "u[-1] (V)", "u[-0.04s] (V)", "u~0.1s (V)"]);
-    let problem = recording.problem();
+    let problem = &recording.problem;
     assert_eq!((problem.inputs.len(), problem.feature_count()), (1, 4));
-    assert!((problem.memory.unwrap().interval_s.unwrap() - 0.02).abs() < 1e-12);
+    assert!((problem.memory.as_ref().unwrap().interval_s.unwrap() - 0.02).abs() < 1e-12);
     // The rows without a target are no samples, but they are in the past of those after them.
     assert_eq!(recording.set.samples(), 32);
     let weight = 1.0 - f64::exp(-0.2);
@@ -113,25 +113,25 @@ fn the_state_continues_into_the_test_samples_and_test_files_have_the_intervals_o
         import: recipe(Some(memory)),
         ..Plan::default()
     };
-    let sets = plan
-        .sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(()))
-        .unwrap();
-    let first = sets.test.sample_readings(0);
+    let tested = |plan: &Plan| {
+        let (recording, test) = plan
+            .recordings(folder.path(), &mut |_| ControlFlow::Continue(()))
+            .unwrap();
+        plan.divide(&recording, test.as_ref(), Seed(0)).unwrap().1
+    };
+    let test = tested(&plan);
+    let first = test.sample_readings(0);
     assert_eq!(first[1], first[0] - 2.0);
     // Twice as slow: a lag of 0.04 s would be one sample of this file.
     let slow = (0..10)
         .map(|row| format!("{},{row},0,1\n", 40 * row))
         .collect::<String>();
     fs::write(folder.path().join("slow.csv"), format!("t (ms),u (V),group,y\n{slow}")).unwrap();
-    plan.test = Some(TestFiles {
+    plan.test = Some(FileSet {
         data: "slow.csv".into(),
-        join: Vec::new(),
-        append: Vec::new(),
+        ..FileSet::default()
     });
-    let sets = plan
-        .sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(()))
-        .unwrap();
-    assert_eq!(sets.test.sample_readings(5), [5.0, 3.0]);
+    assert_eq!(tested(&plan).sample_readings(5), [5.0, 3.0]);
 }
 
 #[test]

@@ -7,13 +7,13 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::{Division, Seed, Simulation, SplitBy},
+    dataset::{Division, Simulation, SplitBy},
     evaluation::{Run, RunSettings, TargetErrors, TestErrors},
     job::Job,
     scene::RowModel,
 };
 use decoupler_files::{
-    export::{CheckpointFile, NetworkFile, RecipeFile, RecipeSource, RunFolder, describe_worse_than_ridge},
+    export::{CheckpointFile, NetworkFile, RecipeFile, RunFolder, describe_worse_than_ridge},
     import::{Plan, Recipe, Setup, SetupError, SetupSets, file_crc32},
 };
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -249,7 +249,9 @@ fn no_saved_file_has_an_absolute_path() {
     whole.save(&networks.join("network.json")).unwrap();
     let plan = &whole.recorded.as_ref().unwrap().plan;
     assert!(plan.import.data.is_absolute());
-    RecipeFile::save(plan, &networks.join("recipe.json")).unwrap();
+    RecipeFile::Recording(plan.clone())
+        .save(&networks.join("recipe.json"))
+        .unwrap();
     let (mut kept, _) = RunFolder::open(&networks.join("runs")).unwrap();
     kept.keep(Arc::new(whole.clone())).unwrap();
     let entries = [networks.clone(), networks.join("runs")].map(|folder| fs::read_dir(folder).unwrap());
@@ -370,7 +372,7 @@ fn a_recipe_repeats_the_import_from_another_folder() {
     plan.import.conditions = vec!["t>0".parse().unwrap()];
     plan.import.missing = vec!["x=-1".parse().unwrap()];
     let path = folder.path().join("import.json");
-    RecipeFile::save(&plan.within(folder.path()), &path).unwrap();
+    RecipeFile::Recording(plan.within(folder.path())).save(&path).unwrap();
     let text = fs::read_to_string(&path).unwrap();
     assert!(
         text.contains("\"data\": \"data.csv\"") && text.contains("\"t>0\""),
@@ -378,11 +380,11 @@ fn a_recipe_repeats_the_import_from_another_folder() {
     );
     let read = RecipeFile::load_recording(&path).unwrap();
     assert_eq!(read, plan.within(folder.path()));
-    assert_eq!(RecipeFile::load(&path).unwrap(), RecipeSource::Recording(read.clone()));
-    let sets = read
-        .sets(Path::new(""), Seed(0), &mut |_| std::ops::ControlFlow::Continue(()))
+    assert_eq!(RecipeFile::load(&path).unwrap(), RecipeFile::Recording(read.clone()));
+    let recording = read
+        .recording(Path::new(""), &mut |_| std::ops::ControlFlow::Continue(()))
         .unwrap();
-    assert_eq!(sets.recording.set.readings().column(0).to_vec(), [3.0, 5.0, 7.0]);
+    assert_eq!(recording.set.readings().column(0).to_vec(), [3.0, 5.0, 7.0]);
     for (from, to, cause) in [
         ("\"inputs\"", "\"imputs\"", "unknown field `imputs`"),
         (
@@ -415,7 +417,7 @@ fn a_recipe_of_an_array_has_only_differences_from_the_papers_array() {
     };
     assert_eq!(
         written(r#"{"simulated": {}}"#).unwrap(),
-        RecipeSource::Simulated(Simulation::default())
+        RecipeFile::Simulated(Simulation::default())
     );
     let mut expected = Simulation::default();
     expected.sensor.scale = "10x6_3x18".parse().unwrap();
@@ -424,7 +426,7 @@ fn a_recipe_of_an_array_has_only_differences_from_the_papers_array() {
     expected.samples = 500;
     let text = r#"{"simulated": {"sensor": {"scale": "10x6_3x18", "geometry": {"height_mm": 6}},
         "scene": {"noise": {"relative": 1e-3}}, "samples": 500}}"#;
-    assert_eq!(written(text).unwrap(), RecipeSource::Simulated(expected));
+    assert_eq!(written(text).unwrap(), RecipeFile::Simulated(expected));
     for (text, cause) in [
         (r#"{"simulated": {"sample": 500}}"#, "unknown field `sample`"),
         (
@@ -443,8 +445,8 @@ fn a_recipe_of_an_array_has_only_differences_from_the_papers_array() {
         let error = written(text).unwrap_err().to_string();
         assert!(error.contains(cause) && error.contains("array.json"), "{error}");
     }
-    RecipeFile::save(expected, &path).unwrap();
-    assert_eq!(RecipeFile::load(&path).unwrap(), RecipeSource::Simulated(expected));
+    RecipeFile::Simulated(expected).save(&path).unwrap();
+    assert_eq!(RecipeFile::load(&path).unwrap(), RecipeFile::Simulated(expected));
     let error = RecipeFile::load_recording(&path).unwrap_err();
     assert!(
         error.to_string().contains("is the recipe of a simulated array"),
@@ -470,7 +472,7 @@ fn a_pipe_named_by_a_file_is_refused_before_it_is_opened() {
     let folder = tempfile::tempdir().unwrap();
     let plan = curved(folder.path()).within(folder.path());
     let recipe = folder.path().join("recipe.json");
-    RecipeFile::save(&plan, &recipe).unwrap();
+    RecipeFile::Recording(plan.clone()).save(&recipe).unwrap();
     let file = trained(folder.path());
     let data = plan.import.data;
     fs::remove_file(&data).unwrap();

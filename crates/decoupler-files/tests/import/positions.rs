@@ -49,14 +49,14 @@ fn positions_are_matched_to_their_targets_in_any_order_and_layout() {
         "\u{feff}target;x (mm);y [mm]\r\nd4;2,5;0\r\nd1;0;0\r\nd3;2,5;-1\r\nd2;0;-1\r\n",
         "y\ttarget\tx\n0\t d4 \t2.5\n0\td1\t0\n-1\td3\t2.5\n-1\td2\t0\n",
     ] {
-        let found = imported(&folder, text).unwrap().positions;
+        let found = imported(&folder, text).unwrap().problem.positions;
         assert_eq!(found, expected, "{text}");
         let (lines_mm, order) = TargetPosition::lattice(&found).unwrap();
         assert_eq!(lines_mm, [[0.0, 2.5], [-1.0, 0.0]]);
         assert_eq!(order, [3, 1, 2, 0]);
     }
     // A force alone also has one unit.
-    let alone = imported(&folder, "target,x,y\nforce,1,2\n").unwrap().positions;
+    let alone = imported(&folder, "target,x,y\nforce,1,2\n").unwrap().problem.positions;
     assert_eq!(alone, [at(4, 1.0, 2.0)]);
 }
 
@@ -120,7 +120,9 @@ fn a_recipe_keeps_the_file_relative_to_its_folder() {
     let folder = recording();
     imported(&folder, "target,x,y\nd1,0,0\nd2,1,0\n").unwrap();
     let recipe = folder.path().join("recipe.json");
-    RecipeFile::save(&plan().within(folder.path()), &recipe).unwrap();
+    RecipeFile::Recording(plan().within(folder.path()))
+        .save(&recipe)
+        .unwrap();
     assert!(
         fs::read_to_string(&recipe)
             .unwrap()
@@ -134,7 +136,7 @@ fn a_recipe_keeps_the_file_relative_to_its_folder() {
     let again = loaded
         .recording(Path::new(""), &mut |_| ControlFlow::Continue(()))
         .unwrap();
-    assert_eq!(again.positions.len(), 2);
+    assert_eq!(again.problem.positions.len(), 2);
 }
 
 #[test]

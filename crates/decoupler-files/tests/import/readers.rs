@@ -126,8 +126,8 @@ fn a_table_has_the_same_numbers_in_every_format() {
             .all(|error| error.abs() < 1e-14)
     );
     assert_eq!(
-        (&one.inputs, &one.lines, &one.times),
-        (&other.inputs, &other.lines, &other.times)
+        (&one.problem.inputs, &one.lines, &one.times),
+        (&other.problem.inputs, &other.lines, &other.times)
     );
 }
 

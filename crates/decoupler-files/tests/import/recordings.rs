@@ -4,7 +4,7 @@ use std::{fs, ops::ControlFlow, path::Path};
 
 use decoupler_core::dataset::{Memory, Span};
 use decoupler_files::import::{
-    ColumnKind, Decimal, DialectChoice, Encoding, Inspection, Joined, Progress, Recipe, Recording, Separator, Table,
+    ColumnKind, Decimal, DialectChoice, Encoding, InspectedFile, Joined, Progress, Recipe, Recording, Separator, Table,
     read_table,
 };
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -382,8 +382,9 @@ fn two_recordings_are_joined_by_the_nearest_time() {
         .map(|dropped| dropped.reason.as_str())
         .collect();
     assert_eq!(reasons[0], "states.c3>5 is not met");
+    let states = folder.path().join("states.csv");
     assert!(
-        reasons[1].starts_with("no row of 'states.csv' within 0.5"),
+        reasons[1].starts_with(&format!("no row of '{}' within 0.5", states.display())),
         "{reasons:?}"
     );
     // Without times, rows are joined in order if their numbers are equal.
@@ -420,8 +421,8 @@ fn columns_have_names_ranges_units_and_one_meaning() {
     let titles = |channels: &[decoupler_core::problem::Channel]| {
         channels.iter().map(|channel| channel.title()).collect::<Vec<_>>()
     };
-    assert_eq!(titles(&recording.inputs), ["x (mm)", "y (V)"]);
-    assert_eq!(titles(&recording.targets), ["z (N)"]);
+    assert_eq!(titles(&recording.problem.inputs), ["x (mm)", "y (V)"]);
+    assert_eq!(titles(&recording.problem.targets), ["z (N)"]);
     assert_eq!(recording.set.groups(), [0, 0, 1]);
     assert_eq!(
         (recording.set.row_wire(1), recording.set.row_wire(2)),
@@ -481,7 +482,7 @@ fn an_inspection_describes_each_column() {
         "time (s),a,b,c,d,e\n0,1.5,1,7,1,x\n1,,2,7,2,y\n2,2.5,3,7,3,z\n3,3,4,7,4,\n30,4,5,7,5,w\n",
     )]);
     let path = folder.path().join("data.csv");
-    let (found, _) = Inspection::read(&path, DialectChoice::default(), None, &mut go_on).unwrap();
+    let found = InspectedFile::of(&read(&path).unwrap(), &path, None).unwrap();
     let kinds: Vec<ColumnKind> = found.columns.iter().map(|column| column.kind).collect();
     use ColumnKind::{Integer, Number, Text};
     assert_eq!(kinds, [Integer, Number, Integer, Integer, Integer, Text]);
@@ -518,9 +519,9 @@ fn derived_columns_are_differences_and_ratios_also_with_the_start_of_the_file() 
     assert_eq!(readings.column(1).to_vec(), [2.0, 3.0, 3.0]);
     assert_eq!(readings.column(2).to_vec(), [2.0 / 3.0, 3.0, 2.0]);
     assert_eq!(readings.column(3).to_vec(), [-3.0, 4.0, 1.0]);
-    assert_eq!(recording.inputs[0].unit.as_deref(), Some("V"));
-    assert_eq!(recording.inputs[1].unit, None);
-    let problem = recording.problem();
+    assert_eq!(recording.problem.inputs[0].unit.as_deref(), Some("V"));
+    assert_eq!(recording.problem.inputs[1].unit, None);
+    let problem = &recording.problem;
     let path = folder.path().join("data.csv");
     let inputs = Recipe {
         derive: recipe.derive[..1].to_vec(),
@@ -528,7 +529,7 @@ fn derived_columns_are_differences_and_ratios_also_with_the_start_of_the_file() 
     };
     let one = decoupler_core::problem::Problem {
         inputs: problem.inputs[..1].to_vec(),
-        ..problem
+        ..problem.clone()
     };
     let found = inputs
         .read_inputs(&path, &one, false, &mut |_| ControlFlow::Continue(()))
@@ -617,7 +618,7 @@ fn a_time_zone_in_the_header_is_no_unit() {
         });
         let recording = import(&wanted, &folder).unwrap();
         assert_eq!(
-            recording.history().times_s().map(|times| times[1] - times[0]),
+            recording.history.times_s().map(|times| times[1] - times[0]),
             Some(0.5),
             "{text}"
         );

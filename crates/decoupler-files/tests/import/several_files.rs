@@ -27,6 +27,7 @@ fn set(session: usize) -> FileSet {
     FileSet {
         data: format!("{session}/sensor.csv").into(),
         join: vec![format!("{session}/states.csv").into()],
+        append: Vec::new(),
     }
 }
 
@@ -60,7 +61,7 @@ fn rows_of_all_files_follow_one_another_and_each_file_is_a_group() {
         Vec::from_iter(forces.iter().map(|force| 2.0 * force))
     );
     let groups = Vec::from_iter((0..3).flat_map(|session| [session; 5]));
-    assert_eq!((recording.set.groups(), recording.has_groups), (&groups[..], true));
+    assert_eq!(recording.set.groups(), groups);
     assert_eq!((recording.rows, recording.files.len()), (15, 6));
     assert_eq!((recording.lines[0], recording.lines[7]), (2, 4));
     assert_eq!(recording.file_of(4), folder.path().join("0/sensor.csv"));
@@ -72,11 +73,12 @@ fn rows_of_all_files_follow_one_another_and_each_file_is_a_group() {
         ..Plan::default()
     };
     plan.division.by = SplitBy::Group;
-    plan.division.validation_fraction = 0.0;
-    let sets = plan
-        .sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(()))
+    plan.division.validation_fraction = Some(0.0);
+    let (recording, _) = plan
+        .recordings(folder.path(), &mut |_| ControlFlow::Continue(()))
         .unwrap();
-    assert_eq!((sets.test.samples(), sets.split.training.samples()), (5, 10));
+    let (split, test) = plan.divide(&recording, None, Seed(0)).unwrap();
+    assert_eq!((test.samples(), split.training.samples()), (5, 10));
 }
 
 #[test]
@@ -126,7 +128,7 @@ fn a_file_with_other_columns_is_refused_by_name() {
     let without_joined = Recipe {
         append: vec![FileSet {
             data: "1/sensor.csv".into(),
-            join: Vec::new(),
+            ..FileSet::default()
         }],
         ..recipe(1)
     };
@@ -142,10 +144,10 @@ fn plans_keep_their_files_and_old_plans_are_read() {
     };
     let text = serde_json::to_string(&plan).unwrap();
     assert_eq!(serde_json::from_str::<Plan>(&text).unwrap(), plan);
-    let names = Vec::from_iter(plan.named().files().map(|path| path.display().to_string()));
+    let names = Vec::from_iter(plan.named().files().iter().map(|path| path.display().to_string()));
     assert_eq!(names, ["sensor.csv", "states.csv", "sensor.csv", "states.csv"]);
     let moved = plan.within(Path::new("/data"));
-    assert!(moved.files().all(|path| path.starts_with("/data")));
+    assert!(moved.files().iter().all(|path| path.starts_with("/data")));
     let old: Recipe = serde_json::from_str(r#"{"data": "a.csv", "inputs": ["r"], "targets": ["f"]}"#).unwrap();
     assert!(old.append.is_empty() && !old.has_groups());
     assert!(!serde_json::to_string(&old).unwrap().contains("append"));

@@ -196,7 +196,7 @@ fn a_recipe_is_inspected_with_its_own_meanings_and_missing_cells() {
         [Meaning::Time, Meaning::Input, Meaning::Input, Meaning::Group]
     );
     assert_eq!(files[1].meanings, [Meaning::Time, Meaning::Target]);
-    let missing = |file: usize, column: usize| files[file].inspection.columns[column].missing;
+    let missing = |file: usize, column: usize| files[file].columns[column].missing;
     assert_eq!((missing(0, 2), missing(1, 1)), (1, 0));
     assert_eq!(
         (files[1].full_name(1).as_str(), files[0].full_name(1).as_str()),

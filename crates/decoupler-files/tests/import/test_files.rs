@@ -3,7 +3,7 @@
 use std::{fs, ops::ControlFlow};
 
 use decoupler_core::dataset::Seed;
-use decoupler_files::import::{Plan, Recipe, TestFiles};
+use decoupler_files::import::{FileSet, Plan, Recipe};
 
 #[test]
 fn training_rows_are_refused_as_test_rows() {
@@ -21,15 +21,16 @@ fn training_rows_are_refused_as_test_rows() {
                 targets: vec!["x".to_owned()],
                 ..Recipe::default()
             },
-            test: Some(TestFiles {
+            test: Some(FileSet {
                 data: data.into(),
-                join: Vec::new(),
-                append: Vec::new(),
+                ..FileSet::default()
             }),
             ..Plan::default()
         };
-        let sets = plan.sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(()));
-        sets.map(|sets| sets.test.samples()).map_err(|error| error.to_string())
+        let recordings = plan.recordings(folder.path(), &mut |_| ControlFlow::Continue(()));
+        let (recording, test) = recordings.map_err(|error| error.to_string())?;
+        let (_, test) = plan.divide(&recording, test.as_ref(), Seed(0)).unwrap();
+        Ok::<_, String>(test.samples())
     };
     assert_eq!(tested("test.csv"), Ok(40));
     for same in ["train.csv", "sub/../train.csv"] {

@@ -21,7 +21,7 @@ use decoupler_core::{
 use decoupler_files::{
     export::{ExperimentTable, sweep_specification},
     figure::{Figure, experiment_figure},
-    import::{Plan, Setup, SetupError},
+    import::{ImportError, Plan, Setup, SetupError},
 };
 use serde_json::Value;
 
@@ -395,7 +395,7 @@ pub fn run(job: &mut Background<ExperimentEvent>, experiment: Experiment, setup:
             // The paths of the window's plans are absolute.
             let samples = setup.trial_samples(Path::new(""), &Job::new(&|| report.is_cancelled()), &mut |_| {});
             let samples = match samples {
-                Err(SetupError::Cancelled(_)) => return Ok(()),
+                Err(SetupError::Import(ImportError::Cancelled)) => return Ok(()),
                 samples => samples.map_err(|error| error.to_string())?,
             };
             if let TrialSamples::Recorded { problem, .. } = &samples {

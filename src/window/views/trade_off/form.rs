@@ -257,8 +257,8 @@ impl TradeOffForm {
             }
             let mut plan = plan.clone();
             // A share set by the user is kept.
-            if plan.division.validation_fraction == base.validation_fraction() {
-                plan.division.validation_fraction = settings.validation_fraction();
+            if plan.division.validation_fraction == Some(base.validation_fraction()) {
+                plan.division.validation_fraction = Some(settings.validation_fraction());
             }
             let of_run = decoders.iter().filter(|kind| place == 0 || kind.needs_network());
             PlannedRun {
@@ -505,7 +505,7 @@ mod tests {
                 assert_eq!(settings.training.stopping.epochs, 60);
                 (
                     settings.training.method.short_name(),
-                    run.setup.plan().unwrap().division.validation_fraction,
+                    run.setup.plan().unwrap().division.validation_fraction.unwrap(),
                 )
             };
             let mut held_out = Vec::from_iter(runs.map(held_out));
@@ -515,7 +515,7 @@ mod tests {
         assert_eq!(held_out(&plan), [("br", 0.0), ("lm", 0.2)]);
         // A share set by the user applies to every method.
         let mut chosen = Plan::default();
-        chosen.division.validation_fraction = 0.3;
+        chosen.division.validation_fraction = Some(0.3);
         let plan = TradeOffForm::default().plan(&recording(&chosen)).unwrap();
         assert_eq!(held_out(&plan), [("br", 0.3), ("lm", 0.3)]);
         let mut form = TradeOffForm::default();

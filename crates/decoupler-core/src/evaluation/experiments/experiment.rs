@@ -167,7 +167,7 @@ impl Axis {
     /// # Panics
     /// If `index` is out of range.
     fn apply(&self, index: usize, cell: &mut Cell) -> Result<(), SettingError> {
-        let usual = cell.settings.validation_fraction();
+        let usual = Some(cell.settings.validation_fraction());
         self.kind.setting().set(cell, &self.values[index])?;
         if let Some(division) = cell.division.as_mut().filter(|_| self.kind == AxisKind::Method) {
             let method = &mut cell.settings.training.method;
@@ -175,7 +175,7 @@ impl Axis {
                 *method = Method::recorded_regularization();
             }
             if division.validation_fraction == usual {
-                division.validation_fraction = cell.settings.validation_fraction();
+                division.validation_fraction = Some(cell.settings.validation_fraction());
             }
         }
         Ok(())

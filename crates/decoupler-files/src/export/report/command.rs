@@ -48,12 +48,6 @@ pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, Com
                 Some(_) => of_plan.push(("split".into(), plan.division.by.to_string())),
                 None => of_plan.extend(division_options(plan, Some(settings.validation_fraction()))),
             }
-            let is_named = |wanted: &str| of_plan.iter().any(|(name, _)| name == wanted);
-            // A recipe fixes the fraction, which otherwise follows from the method.
-            if IN_RECIPE.iter().any(|name| is_named(name)) && recipe.is_none() && !is_named("validation-fraction") {
-                let fraction = plan.division.validation_fraction.to_string();
-                of_plan.push(("validation-fraction".into(), fraction));
-            }
             // Without it, settings are chosen.
             options.push(("hidden".into(), settings.hidden.to_string()));
             usual.hidden = settings.hidden;
@@ -214,9 +208,10 @@ pub(super) fn division_options(plan: &Plan, usual: Option<f64>) -> Vec<GivenOpti
     if plan.test.is_none() && is_given(division.test_fraction == default.test_fraction) {
         options.push(("test-fraction".into(), division.test_fraction.to_string()));
     }
-    if is_given(usual == Some(division.validation_fraction)) {
-        options.push(("validation-fraction".into(), division.validation_fraction.to_string()));
-    }
+    let validation = division
+        .validation_fraction
+        .filter(|share| is_given(usual == Some(*share)));
+    options.extend(validation.map(|share| ("validation-fraction".into(), share.to_string())));
     options
 }
 

@@ -21,9 +21,9 @@ use super::{
     describe_worse_than_ridge, document::PROGRAM, error_table, format_duration, format_percent, search_table,
     sweep::flatten, table::cell, unfinished::folder_of,
 };
-use crate::import::Setup;
+use crate::import::{Setup, stored};
 use decoupler_core::{
-    dataset::{Dataset, Simulation},
+    dataset::{Dataset, Simulation, SplitBy},
     evaluation::{
         Combination, DecoderReport, ErrorTable, Errors, Outlook, RUN_OPTIONS, RunOption, StartRecord, TestErrors,
         best_start, error_remarks,
@@ -88,7 +88,11 @@ impl RunReport<'_> {
     }
 
     fn setup(&self, folder: &Path) -> Setup {
-        let recorded = self.file.recorded.as_ref().map(|recorded| recorded.relative_to(folder));
+        let recorded = self
+            .file
+            .recorded
+            .as_ref()
+            .map(|recorded| recorded.with_paths(|file| stored(file, folder)));
         let setup = Setup::of(self.file.settings, recorded.map(|recorded| recorded.plan));
         setup.expect("a file of a recording has its plan")
     }
@@ -264,7 +268,7 @@ impl RunReport<'_> {
                 file.combined().is_some(),
             ));
             remarks.extend(describe_worse_than_ridge(problem, scores));
-            let is_optimistic = plan.is_optimistic().then_some(
+            let is_optimistic = (plan.test_order() == SplitBy::Random).then_some(
                 "test samples are drawn at random, which is optimistic where neighbouring rows are similar; split by time \
                  or by group for an honest test",
             );

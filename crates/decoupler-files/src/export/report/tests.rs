@@ -286,7 +286,7 @@ fn the_command_of_a_recording_names_files_columns_and_division() {
     let mut other = settings;
     other.training.method = Method::default();
     plan.division.by = SplitBy::Random;
-    plan.division.validation_fraction = 0.0;
+    plan.division.validation_fraction = Some(0.0);
     let text = command(&plan, other, None).unwrap();
     assert!(
         text.ends_with("--validation-fraction 0 --recipe-out recipe.json && decoupler train --recipe recipe.json --hidden 12 --method lm"),

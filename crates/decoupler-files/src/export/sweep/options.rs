@@ -137,7 +137,7 @@ fn division_options(division: &Division) -> TrialOptions {
     let options = [
         ("split", by.to_string().into()),
         ("test-fraction", (test_fraction + 0.0).into()),
-        ("validation-fraction", (validation_fraction + 0.0).into()),
+        ("validation-fraction", (validation_fraction.unwrap_or(0.0) + 0.0).into()),
     ];
     options.map(|(option, value)| (option.to_owned(), value)).into()
 }

@@ -210,7 +210,7 @@ fn find(setup: Setup, plan: &Plan, recording: Recording, report: &Report<StudyEv
         findings,
         setup,
         samples: recording.set.samples(),
-        targets: recording.targets,
+        targets: recording.problem.targets,
         time: begun.elapsed(),
     })));
     Ok(())
@@ -235,19 +235,19 @@ fn validate(
     let validated = CrossValidated::on_folds(settings, set, assigned, job).map_err(|error| error.to_string())?;
     let determined = Determination::measure(set, validated.network.view(), by);
     let scores = validated.scores(set);
-    let mut remarks = channel_remarks(set, by, &recording.inputs, &recording.targets);
-    for (target, channel) in recording.targets.iter().enumerate() {
+    let mut remarks = channel_remarks(set, by, &recording.problem.features(), &recording.problem.targets);
+    for (target, channel) in recording.problem.targets.iter().enumerate() {
         let name = &channel.name;
         remarks.push(match &determined[target] {
             Ok(determined) => determined.sentence(name, "the network explains"),
             Err(cause) => format!("{name}: {cause}"),
         });
     }
-    remarks.extend(ridge_remarks(set, &validated, by, &recording.targets));
+    remarks.extend(ridge_remarks(set, &validated, by, &recording.problem.targets));
     report.send(StudyEvent::Validated(Box::new(FoldsResult {
         folds: describe_folds(folds, by),
         samples: set.samples(),
-        table: ErrorTable::of_scores(&recording.problem(), &scores, None),
+        table: ErrorTable::of_scores(&recording.problem, &scores, None),
         remarks,
         setup,
     })));

@@ -169,7 +169,7 @@ impl Renaming {
             if file.stem.as_deref() == stem {
                 continue;
             }
-            for (column, summary) in file.inspection.columns.iter().enumerate() {
+            for (column, summary) in file.columns.iter().enumerate() {
                 let name = match stem {
                     None => summary.name.clone(),
                     Some(stem) => format!("{stem}.{}", summary.name),

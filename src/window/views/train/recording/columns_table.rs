@@ -97,7 +97,7 @@ fn table_ui(ui: &mut Ui, draft: &Draft) -> Option<Change> {
 
 /// Lines of the columns of a file; those of a variable follow its heading, which a variable with one column does not need.
 fn lines_of(file: usize, inspected: &InspectedFile) -> Vec<Line> {
-    let variables = &inspected.inspection.variables;
+    let variables = &inspected.variables;
     let mut lines = Vec::new();
     for column in 0..inspected.meanings.len() {
         let starts =
@@ -128,7 +128,7 @@ fn variable_row<'a>(
     request: &'a dyn Fn(Option<Change>),
 ) -> TableRow<'a> {
     let inspected = &draft.files[file];
-    let Variable { name, shape, columns } = &inspected.inspection.variables[variable];
+    let Variable { name, shape, columns } = &inspected.variables[variable];
     let is_left_out = columns.is_empty();
     let of_all = move |ui: &mut Ui| {
         let label = format!("Meaning of variable {name}");
@@ -146,7 +146,7 @@ fn variable_row<'a>(
         let response = shown.response;
         response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, &label));
         if is_left_out {
-            let rows = inspected.inspection.rows;
+            let rows = inspected.rows;
             response.on_hover_text(format!(
                 "Left out, because a sample is one of {rows} rows. Choose its meaning to make its rows the samples."
             ));
@@ -179,7 +179,7 @@ fn file_row<'a>(draft: &'a Draft, file: usize, palette: &Palette, request: &'a d
             .response
             .widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, &label));
     };
-    let rows = counted(inspected.inspection.rows, "row");
+    let rows = counted(inspected.rows, "row");
     let mut cells = vec![TableCell::new(name).strong(true), TableCell::controls(of_all)];
     cells.extend((0..4).map(|_| TableCell::default()));
     cells.push(TableCell::new(rows).colour(palette.dim));
@@ -194,7 +194,7 @@ fn column_row<'a>(
 ) -> TableRow<'a> {
     let palette = *palette;
     let inspected = &draft.files[file];
-    let summary = &inspected.inspection.columns[column];
+    let summary = &inspected.columns[column];
     let name = Rc::new(inspected.full_name(column));
     let meaning = inspected.meanings[column];
     let colour = if meaning == Meaning::Unused {
@@ -257,14 +257,14 @@ fn column_row<'a>(
     let missing_cell = {
         let name = of();
         move |ui: &mut Ui| {
-            let texts = missing_texts(summary.missing, inspected.inspection.rows);
+            let texts = missing_texts(summary.missing, inspected.rows);
             let response = figure_ui(ui, &texts, &format!("Missing in {name}"), colour);
-            response.on_hover_text(format!("{} of {} rows", summary.missing, inspected.inspection.rows));
+            response.on_hover_text(format!("{} of {} rows", summary.missing, inspected.rows));
         }
     };
     let remark_cell = move |ui: &mut Ui| {
         let shape = || {
-            let mut variables = inspected.inspection.variables.iter();
+            let mut variables = inspected.variables.iter();
             let single = variables.find(|variable| variable.columns == (column..column + 1))?;
             Some((single.shape.clone(), false))
         };
@@ -299,7 +299,7 @@ pub(super) fn meaning_ui(ui: &mut Ui, name: &str, meaning: Meaning, width: f32) 
     });
     let combo = ComboBox::from_id_salt(name).selected_text(text).width(width);
     let shown = combo.show_ui(ui, |ui| {
-        for option in Meaning::ALL {
+        for &option in Meaning::ALL {
             let choice = ui.selectable_label(option == meaning, option.to_string());
             if choice.on_hover_text(explanation(option)).clicked() && option != meaning {
                 picked = Some(option);

@@ -10,7 +10,7 @@ use std::{
 
 use decoupler_core::dataset::{DatasetError, Memory, Span, SplitBy};
 use decoupler_files::import::{
-    Condition, Derived, FileSet, ImportError, InspectedFile, Joined, Meaning, Missing, Plan, Recipe, TestFiles,
+    Condition, Derived, FileSet, ImportError, InspectedFile, Joined, Meaning, Missing, Plan, Recipe,
 };
 
 use super::columns_card::Renaming;
@@ -60,7 +60,7 @@ impl Draft {
         let derived = joined(&import.derive, ", ");
         let mut units = BTreeMap::new();
         for file in &files {
-            for (column, summary) in file.inspection.columns.iter().enumerate() {
+            for (column, summary) in file.columns.iter().enumerate() {
                 if let Some(unit) = import.units.remove(&file.full_name(column)) {
                     units.insert((file.path.clone(), summary.name.clone()), unit);
                 }
@@ -97,12 +97,21 @@ impl Draft {
         let mut draft = Self::new(plan.clone(), files);
         draft.split = Some(plan.division.by);
         for file in &draft.files {
-            for (column, meaning) in file.inspection.columns.iter().zip(&file.meanings) {
+            for (column, meaning) in file.columns.iter().zip(&file.meanings) {
                 draft.chosen.insert((file.path.clone(), column.name.clone()), *meaning);
             }
         }
         draft.of_recipe = draft.made_plan().ok().map(|own| Box::new([plan, own]));
         draft
+    }
+
+    /// Returns this import with this share held out for validation, unless a recipe gives another.
+    pub(super) fn holding_out(mut self, usual: f64) -> Self {
+        let of_recipe = self.of_recipe.iter_mut().flat_map(|plans| plans.iter_mut());
+        for plan in std::iter::once(&mut self.plan).chain(of_recipe) {
+            plan.division.validation_fraction.get_or_insert(usual);
+        }
+        self
     }
 
     /// Returns this import with the choices of the user in an older one, as far as they fit the files.
@@ -141,7 +150,7 @@ impl Draft {
         self.chosen.clone_from(&older.chosen);
         for ((path, name), meaning) in &older.chosen {
             let file = self.files.iter().position(|file| file.path == *path);
-            let columns = |file: usize| &self.files[file].inspection.columns;
+            let columns = |file: usize| &self.files[file].columns;
             let place =
                 file.and_then(|file| Some((file, columns(file).iter().position(|column| column.name == *name)?)));
             if let Some((file, column)) = place {
@@ -165,7 +174,7 @@ impl Draft {
     /// Columns of a variable of a file; `None` if the file does not have it.
     fn variable_columns(&self, path: &Path, name: &str) -> Option<Range<usize>> {
         let file = self.files.iter().find(|file| file.path == path)?;
-        let mut variables = file.inspection.variables.iter();
+        let mut variables = file.variables.iter();
         Some(variables.find(|variable| variable.name == name)?.columns.clone())
     }
 
@@ -180,8 +189,8 @@ impl Draft {
     /// samples.
     pub(super) fn choose_variable(&mut self, file: usize, variable: usize, meaning: Meaning) -> bool {
         let path = self.files[file].path.clone();
-        let name = self.files[file].inspection.variables[variable].name.clone();
-        let is_left_out = self.files[file].inspection.variables[variable].columns.is_empty();
+        let name = self.files[file].variables[variable].name.clone();
+        let is_left_out = self.files[file].variables[variable].columns.is_empty();
         if is_left_out {
             self.variables.insert(path, (name, meaning));
         } else {
@@ -233,7 +242,7 @@ impl Draft {
             for (index, found) in other.meanings.iter_mut().enumerate() {
                 if *found == meaning && (number, index) != (file, column) {
                     *found = Meaning::Unused;
-                    let name = other.inspection.columns[index].name.clone();
+                    let name = other.columns[index].name.clone();
                     given_up.push((other.path.clone(), name));
                 }
             }
@@ -245,7 +254,7 @@ impl Draft {
     /// Gives all inputs, targets and unused columns of a file this meaning, except for non-numeric ones.
     pub(super) fn choose_all(&mut self, file: usize, meaning: Meaning) {
         for column in 0..self.files[file].meanings.len() {
-            let of_column = &self.files[file].inspection.columns[column];
+            let of_column = &self.files[file].columns[column];
             let may_be_used = of_column.min.is_some() && of_column.texts == 0 && !of_column.is_constant;
             let is_plain =
                 [Meaning::Input, Meaning::Target, Meaning::Unused].contains(&self.files[file].meanings[column]);
@@ -294,13 +303,13 @@ impl Draft {
 
     fn key(&self, file: usize, column: usize) -> ColumnKey {
         let file = &self.files[file];
-        (file.path.clone(), file.inspection.columns[column].name.clone())
+        (file.path.clone(), file.columns[column].name.clone())
     }
 
     /// Returns the unit of a column as typed or in the header.
     pub(super) fn unit(&self, file: usize, column: usize) -> String {
         let given = self.units.get(&self.key(file, column));
-        let found = self.files[file].inspection.columns[column].unit.as_ref();
+        let found = self.files[file].columns[column].unit.as_ref();
         given.or(found).cloned().unwrap_or_default()
     }
 
@@ -308,7 +317,7 @@ impl Draft {
     pub(super) fn set_unit(&mut self, file: usize, column: usize, unit: &str) {
         let key = self.key(file, column);
         let unit = unit.trim();
-        let of_header = self.files[file].inspection.columns[column].unit.as_deref();
+        let of_header = self.files[file].columns[column].unit.as_deref();
         if unit.is_empty() || of_header == Some(unit) {
             self.units.remove(&key);
         } else {
@@ -398,7 +407,7 @@ impl Draft {
         import.group = of(Meaning::Group).pop();
         import.row_wire = of(Meaning::RowWire).pop();
         for file in self.files.iter().filter(|_| !self.units.is_empty()) {
-            for (column, summary) in file.inspection.columns.iter().enumerate() {
+            for (column, summary) in file.columns.iter().enumerate() {
                 let unit = self.units.get(&(file.path.clone(), summary.name.clone()));
                 import
                     .units
@@ -422,7 +431,7 @@ impl Draft {
         }
     }
 
-    fn test_files(&self) -> Result<Option<TestFiles>, String> {
+    fn test_files(&self) -> Result<Option<FileSet>, String> {
         if self.tests.is_empty() {
             return Ok(None);
         }
@@ -437,7 +446,7 @@ impl Draft {
             })?);
         }
         let mut files = files.into_iter();
-        Ok(files.next().map(|data| TestFiles {
+        Ok(files.next().map(|data| FileSet {
             data,
             join: files.collect(),
             append: self.more_tests.clone(),
@@ -545,7 +554,7 @@ fn is_taken(meaning: Meaning, is_same_file: bool) -> bool {
 /// Returns the name of the time column of a file, without its stem.
 fn time(file: &InspectedFile) -> Option<String> {
     let column = file.meanings.iter().position(|meaning| *meaning == Meaning::Time)?;
-    Some(file.inspection.columns[column].name.clone())
+    Some(file.columns[column].name.clone())
 }
 
 /// Cells that mean missing, as typed.

@@ -246,11 +246,7 @@ impl RecordingEditor {
             Opened::Recordings(draft) => {
                 let draft = match &self.draft {
                     Some(older) => draft.keeping(older),
-                    None => {
-                        let mut draft = *draft;
-                        draft.plan.division.validation_fraction = shared.recording.settings.validation_fraction();
-                        draft
-                    }
+                    None => draft.holding_out(shared.recording.settings.validation_fraction()),
                 };
                 self.show_import(draft, effects);
             }
@@ -259,7 +255,10 @@ impl RecordingEditor {
                     draft.plan.import.positions = Some(path);
                 }
             }
-            Opened::Recipe(draft) => self.show_import(*draft, effects),
+            Opened::Recipe(draft) => {
+                let usual = shared.recording.settings.validation_fraction();
+                self.show_import(draft.holding_out(usual), effects);
+            }
             Opened::Simulation(source) => {
                 let settings = RunSettings {
                     source: (*source).into(),
@@ -270,7 +269,7 @@ impl RecordingEditor {
             }
             Opened::Import(draft, reopened) => {
                 self.close_all();
-                self.draft = Some(*draft);
+                self.draft = Some(draft.holding_out(shared.recording.settings.validation_fraction()));
                 self.changed = reopened.changed;
                 if let Some(checkpoint) = reopened.checkpoint {
                     let setup = Setup::recording(checkpoint.settings, reopened.recorded.plan);
@@ -333,7 +332,7 @@ impl RecordingEditor {
         let fraction = settings.validation_fraction();
         let is_new = self.held_out.is_some_and(|before| before != fraction) && !self.opening.is_reopening;
         if let (true, Some(draft)) = (is_new, &mut self.draft) {
-            draft.plan.division.validation_fraction = fraction;
+            draft.plan.division.validation_fraction = Some(fraction);
         }
         self.held_out = Some(fraction);
     }

@@ -273,7 +273,7 @@ pub fn recipe_export(shared: &Shared) -> Export<'static> {
     let ask = shared.setup().map(|setup| -> Ask<'static> {
         Box::new(move || {
             let stem = file_stem("recipe", &setup);
-            let contents = Contents::new(move |path| RecipeFile::save(&setup, path));
+            let contents = Contents::new(move |path| RecipeFile::from(&setup).save(path));
             Effect::ChooseFile(FileTask::save(RECIPE, &stem, contents))
         })
     });
@@ -315,7 +315,7 @@ impl From<Plan> for Reopened {
             crc32: String::new(),
         };
         Self::from(Recorded {
-            files: plan.files().map(unknown).collect(),
+            files: plan.files().into_iter().map(unknown).collect(),
             samples_crc32: String::new(),
             search: None,
             combined: None,

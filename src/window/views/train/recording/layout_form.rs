@@ -45,7 +45,7 @@ pub(super) fn joined_ui(ui: &mut Ui, draft: &mut Draft) {
     }
     let intervals: Vec<Option<f64>> = draft.files[1..]
         .iter()
-        .map(|file| file.inspection.time.as_ref().and_then(|time| time.median_interval))
+        .map(|file| file.time.as_ref().and_then(|time| time.median_interval))
         .collect();
     let names: Vec<String> = draft.files[1..].iter().map(|file| file_name(&file.path)).collect();
     for ((joined, interval), name) in draft.joined().iter_mut().zip(intervals).zip(names) {
@@ -304,15 +304,9 @@ fn split_ui(ui: &mut Ui, draft: &mut Draft, usual_validation: f64, task: FileTas
     }
     let hint = "Share of the other samples that selects the best weights and ends the training. Bayesian regularisation \
                 needs none.";
-    percent_ui(
-        ui,
-        "Validation share",
-        hint,
-        &mut division.validation_fraction,
-        usual_validation,
-        0.0..=90.0,
-    );
-    if needs_validation && division.validation_fraction == 0.0 {
+    let share = division.validation_fraction.get_or_insert(usual_validation);
+    percent_ui(ui, "Validation share", hint, share, usual_validation, 0.0..=90.0);
+    if needs_validation && *share == 0.0 {
         note_ui(ui, "This method overfits where nothing is held out for validation.");
     }
     let button = ui.add(ghost_button("Test file…"));

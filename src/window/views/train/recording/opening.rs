@@ -13,7 +13,7 @@ use decoupler_core::{
     evaluation::recorded::{channel_remarks, extrapolation},
 };
 use decoupler_files::{
-    export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, RecipeSource, describe_positions},
+    export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, describe_positions},
     import::{
         Dropped, FileReport, FileSet, Format, InspectedFile, Joined, Plan, Progress, Recipe, Recording, Watch,
         holds_positions, suggested_plan, suggested_plan_in_order,
@@ -328,8 +328,8 @@ fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Op
     match kind {
         DocumentKind::Recipe => {
             let plan = match RecipeFile::load(path).map_err(|error| error.to_string())? {
-                RecipeSource::Recording(plan) => plan,
-                RecipeSource::Simulated(simulation) => return Ok(Opened::Simulation(Box::new(simulation))),
+                RecipeFile::Recording(plan) => plan,
+                RecipeFile::Simulated(simulation) => return Ok(Opened::Simulation(Box::new(simulation))),
             };
             match reopen(Reopened::from(plan), watch)? {
                 Opened::Import(draft, _) => Ok(Opened::Recipe(draft)),
@@ -449,23 +449,19 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
             ControlFlow::Continue(())
         }
     };
-    let sets = plan
-        .sets(Path::new(""), seed, &mut watch)
-        .map_err(|error| in_window(&error))?;
-    let recordings = || std::iter::once(&sets.recording).chain(&sets.test_recording);
+    let imported = plan.recordings(Path::new(""), &mut watch);
+    let (recording, test_recording) = imported.map_err(|error| in_window(&error))?;
+    let divided = plan.divide(&recording, test_recording.as_ref(), seed);
+    let (split, test) = divided.map_err(|error| in_window(&error))?;
+    let recordings = || std::iter::once(&recording).chain(&test_recording);
     let mut warnings = Recording::warnings_of(recordings());
-    let Recording {
-        inputs, targets, set, ..
-    } = &sets.recording;
-    warnings.extend(channel_remarks(set, plan.division.by, inputs, targets));
-    warnings.extend(extrapolation(&sets.split.training, &sets.test, inputs, targets).1);
-    let validation = sets.split.validation.as_ref().map_or(0, Dataset::samples);
+    let (inputs, targets) = (recording.problem.features(), &recording.problem.targets);
+    warnings.extend(channel_remarks(&recording.set, plan.division.by, &inputs, targets));
+    warnings.extend(extrapolation(&split.training, &test, &inputs, targets).1);
+    let validation = split.validation.as_ref().map_or(0, Dataset::samples);
     Ok(Box::new(Checked {
-        samples: [sets.split.training.samples(), validation, sets.test.samples()],
-        channels: (
-            sets.split.training.readings().ncols(),
-            sets.split.training.targets().ncols(),
-        ),
+        samples: [split.training.samples(), validation, test.samples()],
+        channels: (split.training.readings().ncols(), split.training.targets().ncols()),
         rows: recordings().map(|recording| recording.rows).sum(),
         dropped: recordings()
             .flat_map(|recording| recording.dropped.iter().cloned())
@@ -473,7 +469,7 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
         files: recordings()
             .flat_map(|recording| recording.files.iter().cloned())
             .collect(),
-        positions: describe_positions(&sets.recording.positions),
+        positions: describe_positions(&recording.problem.positions),
         warnings,
     }))
 }
