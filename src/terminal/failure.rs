@@ -99,14 +99,14 @@ impl From<SetupError> for Failure {
 /// The cure of an import error in terms of arguments, of which some are only for recipes.
 fn in_arguments(cure: &Cure) -> String {
     let cure = match cure {
-        Cure::CallMissing(text) => format!("correct it, or declare it as missing with --missing \"{text}\""),
-        Cure::NameTimes => "name the columns of their times with --time and --join-time".to_owned(),
-        Cure::NameJoinedTime => "name it with --join-time".to_owned(),
-        Cure::GiveLimit => "give the limit with --join-limit".to_owned(),
-        Cure::GiveJoinedFiles => "give as many --test-join as --join".to_owned(),
+        Cure::CallMissing(text) => &format!("correct it, or declare it as missing with --missing \"{text}\""),
+        Cure::NameTimes => "name their times with --time and --join-time, or leave out the last rows with --truncate",
+        Cure::NameJoinedTime => "name it with --join-time",
+        Cure::GiveLimit => "give the limit with --join-limit",
+        Cure::GiveJoinedFiles => "give as many --test-join as --join",
         other => return other.to_string(),
     };
-    cure + " in a recipe (decoupler inspect --recipe-out)"
+    format!("{cure} in a recipe (decoupler inspect --recipe-out)")
 }
 
 impl Failure {

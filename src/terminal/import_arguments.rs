@@ -135,6 +135,12 @@ pub(super) struct RecipeArguments {
     /// Number or text that marks a missing value, in all columns or in one, such as -1 or states.c5=-1; may be repeated
     #[arg(long, value_name = "[COLUMN=]VALUE", requires = "roles")]
     missing: Vec<Missing>,
+    /// Leave out files of --data that cannot be read, with a warning
+    #[arg(long, requires = "roles")]
+    skip_damaged: bool,
+    /// Leave out the last rows of files that are joined row by row and are longer than the others, with a warning
+    #[arg(long, requires = "join")]
+    truncate: bool,
     /// Unit of a column, such as states.c2=mm; may be repeated [default: from a header such as "x (mm)"]
     #[arg(long, value_name = "COLUMN=UNIT", value_parser = assignment, requires = "roles")]
     unit: Vec<(String, String)>,
@@ -300,24 +306,20 @@ impl ImportArguments {
     pub(super) fn check_resumed(&self, saved: &Plan) -> Result<(), Failure> {
         let (division, import) = (&saved.division, &saved.import);
         let none = || "none".to_owned();
-        let listed_conditions =
-            |conditions: &[Condition]| listed(&Vec::from_iter(conditions.iter().map(Condition::to_string)));
+        let by = self.split.map(|split| split.to_string());
+        let texts = |conditions: &[Condition]| listed(&Vec::from_iter(conditions.iter().map(Condition::to_string)));
         let [time, group, row_wire] =
             [&import.time, &import.group, &import.row_wire].map(|column| column.clone().unwrap_or_else(none));
         for (argument, given, saved) in [
-            (
-                "split",
-                self.split.map(|split| split.to_string()),
-                division.by.to_string(),
-            ),
+            ("split", by, division.by.to_string()),
             ("targets", listed(&self.targets), import.targets.join(",")),
             ("time", self.time.clone(), time),
             ("group", self.group.clone(), group),
             ("row-wire", self.row_wire.clone(), row_wire),
             (
                 "where",
-                listed_conditions(&self.conditions),
-                listed_conditions(&import.conditions).unwrap_or_else(none),
+                texts(&self.conditions),
+                texts(&import.conditions).unwrap_or_else(none),
             ),
         ] {
             check_same(argument, given, saved)?;
@@ -478,6 +480,8 @@ impl ImportArguments {
             conditions: self.conditions.clone(),
             derive: rest.derive.clone(),
             missing: rest.missing.clone(),
+            skip_damaged: rest.skip_damaged,
+            truncate: rest.truncate,
             units: rest.unit.iter().cloned().collect(),
             positions: rest.positions.clone(),
         })

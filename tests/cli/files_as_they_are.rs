@@ -71,6 +71,83 @@ fn a_pattern_or_a_folder_is_one_experiment_split_by_file() {
 }
 
 #[test]
+fn a_damaged_file_of_several_is_left_out_on_request() {
+    let folder = sessions();
+    let broken = folder.path().join("press_2.csv");
+    let whole = fs::read_to_string(&broken).unwrap();
+    fs::write(&broken, whole + "\"1,2,3,4\n").unwrap();
+    let roles = "--data press_?.csv --inputs u1,u2 --targets force";
+    let message = failure(&format!("inspect {roles} --recipe-out recipe.json"), folder.path());
+    assert!(
+        message.contains("press_2.csv") && message.contains("never closed"),
+        "{message}"
+    );
+    let report = json(
+        &format!("inspect {roles} --skip-damaged --recipe-out recipe.json --json"),
+        folder.path(),
+    );
+    let said = warnings(&report);
+    assert!(said.contains("left out") && said.contains("press_2.csv"), "{said}");
+    let train = "train --recipe recipe.json --hidden 3 --epochs 15 --starts 1 --seed 1 --json";
+    let with_damage = json(train, folder.path());
+    // The same training without the file.
+    fs::remove_file(&broken).unwrap();
+    let without = json(&format!("train --data press_?.csv {TRAIN}"), folder.path());
+    assert_eq!(with_damage["targets"], without["targets"]);
+    // Nothing is left of a single file.
+    fs::write(&broken, "\"1,2\n").unwrap();
+    let alone = "inspect --data press_2.csv --inputs u1,u2 --targets force --skip-damaged --recipe-out one.json";
+    let message = failure(alone, folder.path());
+    assert!(
+        message.contains("press_2.csv") && message.contains("never closed"),
+        "{message}"
+    );
+}
+
+#[test]
+fn files_of_different_length_are_joined_row_by_row_on_request() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = |from: usize, to: usize, header: &str| {
+        (from..to).fold(header.to_owned(), |mut text, row| {
+            writeln!(text, "{},{}", row % 7, (row * row) % 11).unwrap();
+            text
+        })
+    };
+    fs::write(folder.path().join("readings.csv"), rows(0, 103, "a,b\n")).unwrap();
+    fs::write(folder.path().join("forces.csv"), rows(0, 100, "x,y\n")).unwrap();
+    let roles = "--data readings.csv --join forces.csv --inputs a,b --targets forces.x";
+    let message = failure(&format!("inspect {roles} --recipe-out recipe.json"), folder.path());
+    assert!(message.contains("--truncate"), "{message}");
+    let report = json(
+        &format!("inspect {roles} --truncate --recipe-out recipe.json --json"),
+        folder.path(),
+    );
+    assert!(warnings(&report).contains("the last 3 rows are left out"), "{report}");
+    let train = "train --recipe recipe.json --hidden 3 --epochs 15 --starts 1 --seed 1 --json";
+    let truncated = json(train, folder.path());
+    fs::write(folder.path().join("readings.csv"), rows(0, 100, "a,b\n")).unwrap();
+    let equal = json(train, folder.path());
+    assert_eq!(truncated["targets"], equal["targets"]);
+}
+
+#[test]
+fn a_table_whose_rows_are_channels_is_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let row =
+        |channel: usize| Vec::from_iter((0..400).map(|sample| ((sample * (channel + 2)) % 13).to_string())).join(",");
+    let text = Vec::from_iter((0..4).map(row)).join("\n");
+    fs::write(folder.path().join("channels.csv"), text).unwrap();
+    let output = decoupler("inspect --data channels.csv", folder.path());
+    let printed = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    assert!(printed.contains("transpose it"), "{printed}");
+    // Few samples of many channels are not suspect.
+    let wide = |rows: usize| Vec::from_iter((0..rows).map(row)).join("\n");
+    fs::write(folder.path().join("wide.csv"), wide(24)).unwrap();
+    let output = decoupler("inspect --data wide.csv", folder.path());
+    assert!(!String::from_utf8_lossy(&output.stdout).contains("transpose it"));
+}
+
+#[test]
 fn test_samples_outside_the_training_range_are_reported() {
     let folder = sessions();
     let data = "train --data press_1.csv --data press_2.csv --test-data press_3.csv";

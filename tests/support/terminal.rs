@@ -6,7 +6,7 @@ use std::{
 };
 
 /// Options that only `inspect` has; other commands take them in a recipe.
-const OF_RECIPES: [&str; 17] = [
+const OF_RECIPES: [&str; 19] = [
     "--lags",
     "--differences",
     "--join-time",
@@ -23,6 +23,8 @@ const OF_RECIPES: [&str; 17] = [
     "--header",
     "--encoding",
     "--skip-lines",
+    "--skip-damaged",
+    "--truncate",
     "--recipe-out",
 ];
 

@@ -41,21 +41,29 @@ impl Recipe {
         watch: Watch<'_>,
     ) -> Result<Recording, ImportError> {
         let mut memory = memory.cloned();
-        let mut parts = Vec::new();
+        let (mut parts, mut damaged) = (Vec::new(), Vec::new());
         for set in sets {
             let imported = self.import_set(set, sets.len() == 1, memory.as_ref(), folder, watch);
-            let part = imported.map_err(|error| match sets {
-                [_] => error,
-                _ => error.of_file(&set.data),
-            })?;
+            let part = match imported {
+                Ok(part) => part,
+                Err(error @ ImportError::File { .. }) if self.skip_damaged => {
+                    damaged.push(error);
+                    continue;
+                }
+                Err(error) if sets.len() > 1 => return Err(error.of_file(&set.data)),
+                Err(error) => return Err(error),
+            };
             // Lags in seconds have as many samples in all files.
             memory.clone_from(&part.problem.memory);
             parts.push(part);
         }
-        let mut recording = match sets.len() {
+        let mut recording = match parts.len() {
+            0 => return Err(damaged.remove(0)),
             1 => parts.remove(0),
             _ => Recording::joined(parts)?,
         };
+        let left_out = damaged.iter().map(|error| format!("left out: {error}"));
+        recording.warnings.extend(left_out);
         let values = recording.set.targets();
         let targets = recording.problem.targets.iter().zip(values.columns());
         let rounded = targets.filter(|(_, values)| is_rounding(&values.to_vec()));
@@ -73,10 +81,21 @@ impl Recipe {
         folder: &Path,
         watch: Watch<'_>,
     ) -> Result<Recording, ImportError> {
-        let mut files = Files::of(self.read_set(set, &[], folder, watch)?, self.stems());
+        let mut tables = self.read_set(set, &[], folder, watch)?;
+        let mut warnings = Vec::new();
+        if self.truncate && self.time.is_none() {
+            let shortest = tables.iter().map(|table| table.rows).min().unwrap_or_default();
+            for table in tables.iter_mut().filter(|table| table.rows > shortest) {
+                let (rows, path) = (counted(table.rows - shortest, "row"), table.path.display());
+                warnings.push(format!(
+                    "'{path}': the last {rows} are left out; the other file ends before them"
+                ));
+                table.truncate(shortest);
+            }
+        }
+        let mut files = Files::of(tables, self.stems());
         files.meanings = Meanings::of(self, &files)?;
         files.give_units(self)?;
-        let mut warnings = Vec::new();
         for Table { path, notes, .. } in &files.tables {
             warnings.extend(notes.iter().map(|note| format!("'{}': {note}", path.display())));
         }
@@ -198,6 +217,7 @@ impl Recipe {
             used: used.filter_map(|name| own_name(name)).collect(),
         };
         let mut table = read(path, &reading, watch)?;
+        table.notes.extend(table.transposed_note());
         let time = joined.and_then(|(joined, _)| joined.time.as_deref());
         let time = time.or(self.time.as_deref()).map(|name| TimeColumn {
             name,
@@ -219,7 +239,7 @@ impl Recipe {
         let (main, table, joined) = (&files.tables[0], &files.tables[file], &self.join[file - 1]);
         let refuse = |reason: &str, cure| not_joined(&table.path, reason, cure);
         let Some(time) = files.meanings.time else {
-            if table.rows != main.rows {
+            if table.rows != main.rows && !self.truncate {
                 let reason = format!("it has {} and the other file {}", counted(table.rows, "row"), main.rows);
                 return Err(refuse(&reason, Cure::NameTimes));
             }

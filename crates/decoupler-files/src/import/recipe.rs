@@ -67,6 +67,12 @@ pub struct Recipe {
     /// Markers of missing values, in addition to empty cells.
     #[serde(default, skip_serializing_if = "Vec::is_empty", with = "texts")]
     pub missing: Vec<Missing>,
+    /// True if files that cannot be read are left out where there are several.
+    #[serde(default, skip_serializing_if = "is_off")]
+    pub skip_damaged: bool,
+    /// True if files that are joined row by row may differ in length: rows beyond the shortest are left out.
+    #[serde(default, skip_serializing_if = "is_off")]
+    pub truncate: bool,
     /// Units of columns that the header does not give.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub units: BTreeMap<String, String>,
@@ -74,6 +80,11 @@ pub struct Recipe {
     /// target, x and y (mm).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub positions: Option<PathBuf>,
+}
+
+/// Recipes leave out what is off.
+fn is_off(value: &bool) -> bool {
+    !value
 }
 
 /// File joined to the first, row by row or by time.

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler_core::text::clean_name;
+use decoupler_core::text::{clean_name, counted};
 
 use serde::Serialize;
 
@@ -96,6 +96,26 @@ impl Table {
         let reason = "the row has more cells than there are columns; correct it";
         let first = self.too_long.first.as_ref();
         first.map_or(Ok(()), |first| Err(TableError::in_row(first.line, reason)))
+    }
+
+    /// Leaves out the rows from this one on.
+    pub(super) fn truncate(&mut self, rows: usize) {
+        let kept = Vec::from_iter((0..rows as u32).map(Some));
+        self.columns.iter_mut().for_each(|column| column.take_rows(&kept));
+        self.rows = rows;
+    }
+
+    /// Returns a note on a table whose rows seem to be channels: few long rows.
+    pub(super) fn transposed_note(&self) -> Option<String> {
+        const LONGER: usize = 20;
+        let columns = self.columns.len();
+        let is_suspect = self.rows < LONGER && columns >= LONGER * self.rows.max(1);
+        is_suspect.then(|| {
+            format!(
+                "it has {} and {columns} columns; each row is a sample: if each row of this file is a channel, transpose it",
+                counted(self.rows, "row")
+            )
+        })
     }
 
     /// Returns `true` if the columns have names in the file.

@@ -77,7 +77,7 @@ pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, Com
 }
 
 /// Options that only a recipe has.
-const IN_RECIPE: [&str; 16] = [
+const IN_RECIPE: [&str; 18] = [
     "test-join",
     "test-fraction",
     "validation-fraction",
@@ -94,6 +94,8 @@ const IN_RECIPE: [&str; 16] = [
     "header",
     "encoding",
     "skip-lines",
+    "skip-damaged",
+    "truncate",
 ];
 
 fn written(options: &[GivenOption]) -> String {
@@ -249,6 +251,8 @@ fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
         conditions,
         derive,
         missing,
+        skip_damaged,
+        truncate,
         units,
         positions,
     } = recipe;
@@ -264,6 +268,7 @@ fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
         spans.map(|spans| texts(spans).join(","))
     };
     let has_differences = memory.as_ref().is_some_and(|memory| memory.differences);
+    let flag = |is_on: bool| Vec::from_iter(is_on.then(String::new));
     let units = units.iter().map(|(column, unit)| format!("{column}={unit}"));
     let options_of_columns = [
         ("join-time", times),
@@ -278,7 +283,9 @@ fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
         ("row-wire", texts(row_wire)),
         ("lags", texts(&spans(|memory| &memory.lags))),
         ("history", texts(&spans(|memory| &memory.averages))),
-        ("differences", Vec::from_iter(has_differences.then(String::new))),
+        ("differences", flag(has_differences)),
+        ("skip-damaged", flag(*skip_damaged)),
+        ("truncate", flag(*truncate)),
         ("where", texts(conditions)),
         ("derive", texts(derive)),
         ("missing", texts(missing)),
