@@ -217,7 +217,6 @@ impl Recipe {
             used: used.filter_map(|name| own_name(name)).collect(),
         };
         let mut table = read(path, &reading, watch)?;
-        table.notes.extend(table.transposed_note());
         let time = joined.and_then(|(joined, _)| joined.time.as_deref());
         let time = time.or(self.time.as_deref()).map(|name| TimeColumn {
             name,
@@ -303,7 +302,9 @@ pub fn read_table(path: &Path, choice: DialectChoice, watch: Watch<'_>) -> Resul
 }
 
 pub(super) fn read(path: &Path, reading: &Reading<'_>, watch: Watch<'_>) -> Result<Table, ImportError> {
-    format::read(path, reading, watch).map_err(|error| error.in_file(path))
+    let mut table = format::read(path, reading, watch).map_err(|error| error.in_file(path))?;
+    table.notes.extend(table.transposed_note());
+    Ok(table)
 }
 
 /// Measured samples with a description of their channels.
