@@ -15,6 +15,14 @@ use super::{
 };
 use crate::export::format_number;
 
+/// The word for a precision, of those for single and double precision.
+pub(super) fn word<T>(precision: Precision, [single, double]: [T; 2]) -> T {
+    match precision {
+        Precision::Single => single,
+        Precision::Double => double,
+    }
+}
+
 /// Everything that the printers of the formats need.
 pub(super) struct Contents {
     /// Prefix of the names of functions and files.

@@ -103,7 +103,8 @@ impl ExportedDecoder {
             BundleDecoder::Kind(kind) => set.decoder(kind, Precision::Double).map_err(Box::new)?,
             BundleDecoder::Chosen => None,
         };
-        let mut decoder = decoder.ok_or(BundleError::NoNetwork(kind))?;
+        let no_network = || BundleError::Unsuitable(format!("{kind} needs a trained network: train one first"));
+        let mut decoder = decoder.ok_or_else(no_network)?;
         Ok(Self {
             kind,
             program: decoder.program().expect("a decoder without a program is refused"),
@@ -316,10 +317,15 @@ impl ExportedDecoder {
 
     /// Readings that are uniform in their range in training.
     fn drawn(&self, channels: usize, count: usize) -> Result<Vec<GoldenRow>, BundleError> {
+        let no_range = || {
+            let cause = "the network file does not have the range of the readings in training, without which no bundle can be \
+                         verified: train again";
+            BundleError::Unsuitable(cause.to_owned())
+        };
         let mut rng = Seed::default().rng(Stream::Test);
         let row = |place: usize| {
             let row = place % self.reading_ranges.len();
-            let range = self.reading_ranges[row].as_ref().ok_or(BundleError::NoRange)?;
+            let range = self.reading_ranges[row].as_ref().ok_or_else(no_range)?;
             let readings = readings_at(range, channels, || rng.random::<f64>());
             Ok(GoldenRow::new(row, readings))
         };

@@ -5,7 +5,7 @@ mod npz;
 use decoupler_core::decoupling::{Domain, NodeId, Operation, Precision};
 
 use super::{
-    contents::{Contents, PrintedHistory, infix},
+    contents::{Contents, PrintedHistory, infix, word},
     folder::AtomicFolder,
     report::BundleError,
 };
@@ -89,10 +89,7 @@ fn returned_parts(contents: &Contents) -> Vec<String> {
 }
 
 fn dtype(precision: Precision) -> &'static str {
-    match precision {
-        Precision::Single => "np.float32",
-        Precision::Double => "np.float64",
-    }
+    word(precision, ["np.float32", "np.float64"])
 }
 
 /// A value in this precision.

@@ -1,6 +1,7 @@
 use decoupler_core::decoupling::Precision;
 
 use super::message::{DOUBLE, FLOAT, INT_ATTRIBUTE, INT64, Message};
+use crate::export::bundle::contents::word;
 
 /// Builder of a graph.
 #[derive(Default)]
@@ -12,10 +13,7 @@ pub(super) struct GraphBuilder {
 
 /// ONNX type of numbers of this precision.
 pub(super) fn element_type(precision: Precision) -> i64 {
-    match precision {
-        Precision::Single => FLOAT,
-        Precision::Double => DOUBLE,
-    }
+    word(precision, [FLOAT, DOUBLE])
 }
 
 impl GraphBuilder {
