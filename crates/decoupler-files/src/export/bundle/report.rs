@@ -70,13 +70,9 @@ impl BundleReport {
             let unit = output.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
             format!("{}{unit} ({})", format_number(*bound), output.name)
         };
-        let bounds: Vec<String> = self.bounds.iter().map(bound).collect();
-        (!bounds.is_empty()).then(|| {
-            format!(
-                "Proven bound on the error in fixed point, for readings that are not out of range: {}",
-                bounds.join(", ")
-            )
-        })
+        let bounds = Vec::from_iter(self.bounds.iter().map(bound)).join(", ");
+        let about = "Proven bound on the error in fixed point, for readings that are not out of range";
+        (!bounds.is_empty()).then(|| format!("{about}: {bounds}"))
     }
 
     /// Returns the sentence on [`Self::rounding`], if there is one.

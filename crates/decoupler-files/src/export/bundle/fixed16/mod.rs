@@ -73,12 +73,7 @@ impl FixedProgram {
     /// The range of the readings is not known, a step or a number has no form in integers, or the bound on the error is as
     /// large as the range of the targets.
     pub(super) fn of(contents: &Contents, limits: Option<&Limits>) -> Result<Self, BundleError> {
-        let Contents {
-            exported,
-            meaning,
-            scales,
-            ..
-        } = contents;
+        let (exported, meaning, scales) = (&contents.exported, &contents.meaning, &contents.scales);
         let (is_relative, reference, layers) = chain(exported)?;
         let no_range = "fixed16 needs the range of the readings in training, which the network file does not have: train again, \
                         or give --precision f32";

@@ -22,9 +22,7 @@ pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<St
 
 /// Text of the program.
 fn program(contents: &Contents) -> String {
-    let Contents {
-        noun, meaning, rows, ..
-    } = contents;
+    let (noun, meaning, rows) = (contents.noun, &contents.meaning, contents.rows);
     let (input, channels) = (meaning.readings(), contents.channels());
     let history = contents.history();
     let (mut row, mut row_text, mut row_check) = ("", "", "    row = np.ones(len(r), int)\n".to_owned());
