@@ -57,15 +57,13 @@ impl ExperimentTable {
             Vec::from_iter(labels.chain(figures))
         };
         let rows = Vec::from_iter(results.cells.iter().map(row));
-        let kinds = rows.first().into_iter().flatten().map(|&(_, kind, _)| kind);
-        let kinds = kinds.collect();
+        let kinds = rows.first().into_iter().flatten();
         let cells = |row: Vec<(_, _, Cell)>| {
-            row.into_iter()
-                .map(|(heading, _, value)| cell(heading, value))
-                .collect()
+            let cells = row.into_iter();
+            cells.map(|(heading, _, value)| cell(heading, value)).collect()
         };
         Self {
-            kinds,
+            kinds: kinds.map(|&(_, kind, _)| kind).collect(),
             table: Table::of_rows(rows.into_iter().map(cells)),
             note: match results.experiment.recording {
                 None => NODES_NOTE,

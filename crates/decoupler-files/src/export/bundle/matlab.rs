@@ -146,7 +146,7 @@ fn remembering(history: &PrintedHistory) -> String {
     let list = |values: Vec<String>| format!("[{}]", values.join("; "));
     let (per_second, per_reading) = history.rates();
     let texts = |values: Vec<f64>| values.iter().map(|value| format!("{value:e}")).collect();
-    let kept = history.kept;
+    let kept = constants.longest_lag();
     format!(
         "function [features, state] = remember(state, now, time_s)\n\
          has_started = state(1, 1) > 0;\nelapsed_s = time_s - state(2, 1);\n\

@@ -77,10 +77,8 @@ impl BundleReport {
 
     /// Returns the sentence on [`Self::rounding`], if there is one.
     pub fn describe_rounding(&self) -> Option<String> {
-        let rounding = self.rounding?;
-        Some(format!(
-            "Rounding the readings to single precision changes a target by at most {rounding:.1e}"
-        ))
+        let about = "Rounding the readings to single precision changes a target by at most";
+        self.rounding.map(|rounding| format!("{about} {rounding:.1e}"))
     }
 
     /// Returns the largest deviation of all checks; `None` if nothing evaluated the bundle.

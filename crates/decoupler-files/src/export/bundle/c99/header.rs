@@ -127,8 +127,8 @@ impl<'a> Header<'a> {
              double time_s;\n    int latest;\n{}{}}} {name}_state;\n\n\
              /* Forgets the past: the next reading is the first. */\nvoid {name}_start({name}_state *state);\n\n",
             wrapped(&about).join("\n   "),
-            array("kept", history.kept),
-            array("averages", history.averages),
+            array("kept", history.constants.longest_lag()),
+            array("averages", history.constants.averages.len()),
         )
     }
 }

@@ -139,7 +139,7 @@ fn answer(header: &Header<'_>) -> String {
 fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
     let (contents, constants) = (header.contents, &history.constants);
     let (name, channels) = (&contents.name, constants.channels);
-    let (kept, averages) = (history.kept, history.averages);
+    let (kept, averages) = (constants.longest_lag(), constants.averages.len());
     let mut text = String::new();
     let mut array = |kind: &str, name: &str, values: Vec<String>| {
         if !values.is_empty() {

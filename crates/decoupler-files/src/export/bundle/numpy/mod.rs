@@ -162,7 +162,7 @@ fn remembering(contents: &Contents, history: &PrintedHistory) -> String {
          past = np.concatenate([past_of_lags, averages])\n    \
          kept[1:], kept[:1] = kept[:-1].copy(), now\n    \
          return np.concatenate([now, {past}])\n\n\n",
-        kept = history.kept,
+        kept = constants.longest_lag(),
         rows = history.state_rows(),
         usual = constants.interval_s,
         channels = constants.channels,

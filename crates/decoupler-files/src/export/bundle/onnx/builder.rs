@@ -56,8 +56,7 @@ impl GraphBuilder {
 
     /// Adds an operation without a name of its own and returns that of its result.
     pub(super) fn op(&mut self, operation: &str, inputs: &[&str]) -> String {
-        let name = self.fresh(&operation.to_lowercase());
-        self.named(operation, inputs, &[], &name)
+        self.with(operation, inputs, &[])
     }
 
     /// Adds an operation with attributes that computes the value `output`, and returns that name.

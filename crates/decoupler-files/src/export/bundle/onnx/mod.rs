@@ -46,7 +46,7 @@ const MAX_LAG: usize = 1000;
 /// # Errors
 /// A lag is too long, or the operating system refuses.
 pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<String, BundleError> {
-    let lag = contents.history().map_or(0, |history| history.kept);
+    let lag = contents.history().map_or(0, |history| history.constants.longest_lag());
     if lag > MAX_LAG {
         return Err(BundleError::Unsuitable(format!(
             "a lag of {lag} samples is too long for an ONNX graph, which copies its state for each sample: export as c99, numpy \
