@@ -101,10 +101,7 @@ impl DocumentKind {
     /// # Errors
     /// The file cannot be read, or is of another kind or version.
     pub(super) fn read(self, path: &Path) -> Result<Vec<u8>, DocumentError> {
-        let bytes = read_limited(path).map_err(|source| DocumentError::Read {
-            path: path.to_owned(),
-            source,
-        })?;
+        let bytes = read_limited(path).map_err(|source| DocumentError::Read(path.to_owned(), source))?;
         let checked = self.check_heading(&bytes);
         checked.map_err(|defect| DocumentError::unusable(path, &defect))?;
         Ok(bytes)
@@ -303,21 +300,12 @@ fn too_large() -> io::Error {
 #[non_exhaustive]
 pub enum DocumentError {
     /// The operating system cannot read it.
-    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The error of the operating system.
-        source: io::Error,
-    },
-    /// The file is of another kind or version, cut off or damaged, or is not saved because it could not be read back.
-    #[error("'{}' {defect}", .path.display())]
-    Unusable {
-        /// The file.
-        path: PathBuf,
-        /// The defect, with the field or with line and column, and what to do, as the rest of a sentence about the file.
-        defect: String,
-    },
+    #[error("cannot read '{}': {}", .0.display(), system_cause(.1))]
+    Read(PathBuf, #[source] io::Error),
+    /// The file is of another kind or version, cut off or damaged, or is not saved because it could not be read back: the
+    /// defect, with the field or with line and column, and what to do, as the rest of a sentence about the file.
+    #[error("'{path}' {1}", path = .0.display())]
+    Unusable(PathBuf, String),
     /// The samples are recorded, and no plan is given.
     #[error(
         "a {0} of recorded samples names the recording: give the plan that reads it, or save the networks with serde"
@@ -330,16 +318,13 @@ pub enum DocumentError {
 
 impl DocumentError {
     pub(super) fn unusable(path: &Path, defect: &str) -> Self {
-        let (path, defect) = (path.to_owned(), in_one_line(defect));
-        Self::Unusable { path, defect }
+        Self::Unusable(path.to_owned(), in_one_line(defect))
     }
 
     /// The contents for `path` could not be read back.
     pub(super) fn unsound(path: &Path, defect: impl fmt::Display) -> Self {
-        Self::unusable(
-            path,
-            &format!("is not saved: {defect}; train again with other settings"),
-        )
+        let defect = format!("is not saved: {defect}; train again with other settings");
+        Self::unusable(path, &defect)
     }
 }
 

@@ -57,14 +57,14 @@ impl ExperimentTable {
             Vec::from_iter(labels.chain(figures))
         };
         let rows = Vec::from_iter(results.cells.iter().map(row));
+        let kinds = rows.first().into_iter().flatten();
+        let cells = |row: Vec<(_, _, Cell)>| {
+            let cells = row.into_iter();
+            cells.map(|(heading, _, value)| cell(heading, value)).collect()
+        };
         Self {
-            kinds: { rows.first().into_iter().flatten() }
-                .map(|&(_, kind, _)| kind)
-                .collect(),
-            table: Table::of_rows({ rows.into_iter() }.map(|row| {
-                let cells = row.into_iter();
-                cells.map(|(heading, _, value)| cell(heading, value)).collect()
-            })),
+            kinds: kinds.map(|&(_, kind, _)| kind).collect(),
+            table: Table::of_rows(rows.into_iter().map(cells)),
             note: match results.experiment.recording {
                 None => NODES_NOTE,
                 Some(_) => TARGETS_NOTE,
@@ -125,13 +125,10 @@ fn figures(of: &experiments::Cell) -> Vec<CellFigure> {
         ["mean %", "ridge %"]
     };
     let (name, seconds) = (percent_of(is_array).field(), Cell::Seconds(of.training_seconds()));
+    let [of_mean, of_linear] = [of.mean_percent(), of.linear_percent()].map(Cell::from);
     figures.extend([
-        (format!("mean_{name}"), Some((mean, Other)), of.mean_percent().into()),
-        (
-            format!("linear_{name}"),
-            Some((linear, Linear)),
-            of.linear_percent().into(),
-        ),
+        (format!("mean_{name}"), Some((mean, Other)), of_mean),
+        (format!("linear_{name}"), Some((linear, Linear)), of_linear),
         ("epochs_run".to_owned(), Some(("epochs", Other)), of.epochs_run().into()),
         ("training_seconds".to_owned(), Some(("training", Other)), seconds),
         ("epoch_ms".to_owned(), None, of.epoch_ms().into()),
@@ -165,11 +162,8 @@ pub fn trials_table(results: &ExperimentResults) -> Table {
             true => &[ZPercent, XPercent, YPercent, ZMm, WorstMm][..],
             false => &[RangePercent, R2],
         };
-        fields.extend(
-            measures
-                .iter()
-                .map(|&measure| cell(measure.field(), network.figure(measure))),
-        );
+        let errors = measures.iter();
+        fields.extend(errors.map(|&measure| cell(measure.field(), network.figure(measure))));
         // The errors of each target, in its unit.
         for (number, errors) in network.targets().iter().enumerate() {
             let name = targets.get(number).map(|target| target.name.clone());
@@ -311,9 +305,8 @@ fn describe_division(recording: &ExperimentRecording, varies: bool) -> String {
 pub fn describe_failures(results: &ExperimentResults) -> Vec<String> {
     let of_cell = |cell| {
         let label = results.cell_labels(cell).join(", ");
-        cell.failures
-            .iter()
-            .map(move |failure| format!("Failed at {label}, {failure}"))
+        let failures = cell.failures.iter();
+        failures.map(move |failure| format!("Failed at {label}, {failure}"))
     };
     results.cells.iter().flat_map(of_cell).collect()
 }

@@ -343,13 +343,7 @@ impl NetworkFile {
     /// # Errors
     /// The first defect, with its field.
     pub fn check(&self) -> Result<(), String> {
-        let Self {
-            settings,
-            problem,
-            network,
-            scores,
-            ..
-        } = self;
+        let (settings, problem, network, scores) = (&self.settings, &self.problem, &self.network, &self.scores);
         check_settings(settings, self.recorded.as_ref())?;
         let (simulation, targets) = (settings.simulation(), problem.targets.len());
         let is_impossible = |memory: &Memory| memory.check(problem.inputs.len()).is_err();
@@ -410,24 +404,18 @@ impl NetworkFile {
     }
 
     fn check_training(&self) -> Result<(), String> {
-        let TrainingRecord {
-            best_epoch,
-            epochs,
-            seconds,
-            history,
-            starts,
-            ..
-        } = &self.training;
-        let last = history.last().ok_or("training.history: it is empty")?.epoch;
+        let (training, starts) = (&self.training, &self.training.starts);
+        let (best_epoch, epochs, seconds) = (training.best_epoch, training.epochs, training.seconds);
+        let last = training.history.last().ok_or("training.history: it is empty")?.epoch;
         let (found, expected) = (starts.len(), self.settings.starts);
         let infinite = starts.iter().position(|start| {
             let figures = [Some(start.train_mse), start.validation_mse, start.percent()];
             figures.into_iter().flatten().any(|figure| !figure.is_finite())
         });
         let defects = [
-            (*epochs != last).then(|| format!("epochs: it is {epochs}, but the history ends with epoch {last}")),
-            (*best_epoch > last).then(|| format!("best_epoch: {best_epoch} is after the last, {last}")),
-            (!(0.0..f64::INFINITY).contains(seconds)).then(|| format!("seconds: {seconds} is not a time")),
+            (epochs != last).then(|| format!("epochs: it is {epochs}, but the history ends with epoch {last}")),
+            (best_epoch > last).then(|| format!("best_epoch: {best_epoch} is after the last, {last}")),
+            (!(0.0..f64::INFINITY).contains(&seconds)).then(|| format!("seconds: {seconds} is not a time")),
             (found != 0 && found != expected)
                 .then(|| format!("starts: {found} of them, but the settings ask for {expected}")),
             infinite.map(|place| format!("starts: an error of number {place} is not a finite number")),

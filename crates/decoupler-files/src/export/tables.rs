@@ -207,12 +207,10 @@ pub fn describe_half_widths(targets: &[Channel], intervals: &Intervals) -> Optio
         let half_width = half_width.as_ref()?;
         let widths = || half_width.by_answer.iter().map(|point| point[1]);
         let (min, max) = (widths().reduce(f64::min)?, widths().reduce(f64::max)?);
+        let [min, max, constant] = [min, max, half_width.constant].map(format_number);
+        let name = &target.name;
         Some(format!(
-            "{} {} to {} (one for all answers together: {})",
-            target.name,
-            format_number(min),
-            format_number(max),
-            format_number(half_width.constant)
+            "{name} {min} to {max} (one for all answers together: {constant})"
         ))
     };
     let described: Vec<String> = targets.iter().zip(&intervals.targets).filter_map(describe).collect();
@@ -316,13 +314,9 @@ pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
 
 /// Returns remarks on the channels and targets of a recording that is divided by `by`, and on possible leaks.
 pub fn describe_warnings(recording: &Recording, by: SplitBy, findings: &Findings) -> Vec<String> {
-    let mut warnings = channel_remarks(
-        &recording.set,
-        by,
-        &recording.problem.features(),
-        &recording.problem.targets,
-    );
-    warnings.extend(findings.record.leaks(&recording.problem.targets));
+    let Recording { problem, set, .. } = recording;
+    let mut warnings = channel_remarks(set, by, &problem.features(), &problem.targets);
+    warnings.extend(findings.record.leaks(&problem.targets));
     warnings
 }
 

@@ -8,7 +8,7 @@ use decoupler_core::{
 };
 
 use super::{
-    Table, format_duration,
+    Cell, Table, format_duration,
     table::cell,
     tables::{DECODER, FRAME, TIMES, error_cell, percent_of},
 };
@@ -19,17 +19,9 @@ use crate::{
 
 /// Returns the table of all points of all levels with all their figures, for programs.
 pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
-    /// Columns that a recording does not have.
-    const OF_ARRAYS: [&str; 7] = [
-        "noise",
-        "preset",
-        "samples",
-        "z_mm",
-        "residual",
-        "model_based_z_percent",
-        "model_based_z_mm",
-    ];
     let is_array = levels.iter().any(|level| level.noise.is_some());
+    // A recording does not have these columns.
+    let of_array = |name: &str, value: Cell| is_array.then(|| cell(name, value));
     let row = |noise: Option<f64>, point: &TradeOffPoint, on_decoding: bool, on_training: bool| {
         let report = &point.report;
         let (model_based, nodes) = (point.model_based.as_ref(), report.errors.nodes());
@@ -40,26 +32,28 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
         };
         let hidden = point.hidden();
         let cells = [
-            cell("noise", noise),
-            cell("preset", point.preset.map(|preset| preset.to_string())),
-            cell("decoder", report.kind.to_string()),
-            cell("precision", precision),
-            cell("hidden", hidden),
-            cell("method", point.method().map(|method| method.short_name())),
-            cell("samples", settings.simulation().map(|array| array.samples)),
-            cell("epochs", hidden.map(|_| settings.training.stopping.epochs)),
-            cell(percent_of(is_array).field(), report.errors.percent()),
-            cell("z_mm", nodes.map(|errors| errors.z_mm)),
-            cell("frame_us", report.frame_us),
-            cell("training_s", point.training_seconds),
-            cell("residual", report.residual),
-            cell("model_based_z_percent", model_based.map(|errors| errors.z_percent)),
-            cell("model_based_z_mm", model_based.map(|errors| errors.z_mm)),
-            cell("on_decoding_front", on_decoding.to_string()),
-            cell("on_training_front", on_training.to_string()),
+            of_array("noise", noise.into()),
+            of_array("preset", point.preset.map(|preset| preset.to_string()).into()),
+            Some(cell("decoder", report.kind.to_string())),
+            Some(cell("precision", precision)),
+            Some(cell("hidden", hidden)),
+            Some(cell("method", point.method().map(|method| method.short_name()))),
+            of_array("samples", settings.simulation().map(|array| array.samples).into()),
+            Some(cell("epochs", hidden.map(|_| settings.training.stopping.epochs))),
+            Some(cell(percent_of(is_array).field(), report.errors.percent())),
+            of_array("z_mm", nodes.map(|errors| errors.z_mm).into()),
+            Some(cell("frame_us", report.frame_us)),
+            Some(cell("training_s", point.training_seconds)),
+            of_array("residual", report.residual.into()),
+            of_array(
+                "model_based_z_percent",
+                model_based.map(|errors| errors.z_percent).into(),
+            ),
+            of_array("model_based_z_mm", model_based.map(|errors| errors.z_mm).into()),
+            Some(cell("on_decoding_front", on_decoding.to_string())),
+            Some(cell("on_training_front", on_training.to_string())),
         ];
-        let cells = cells.into_iter();
-        Vec::from_iter(cells.filter(|(column, _)| is_array || !OF_ARRAYS.contains(&&*column.field)))
+        cells.into_iter().flatten().collect()
     };
     Table::of_rows(levels.iter().flat_map(|level| {
         let [decoding, training] = TradeOffCost::ALL.map(|cost| level.front(cost));

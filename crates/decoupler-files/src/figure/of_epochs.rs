@@ -169,10 +169,8 @@ fn extremes(stretch: &[EpochRecord]) -> Vec<EpochRecord> {
     let mut places = vec![0, stretch.len() - 1];
     for of in QUANTITIES {
         let values = stretch.iter().map(|epoch| of(epoch).filter(|value| value.is_finite()));
-        let finite = values
-            .clone()
-            .enumerate()
-            .filter_map(|(place, value)| Some((place, value?)));
+        let finite = values.clone().enumerate();
+        let finite = finite.filter_map(|(place, value)| Some((place, value?)));
         let ends = super::extremes(finite, |(_, value)| *value);
         places.extend(ends.into_iter().flat_map(|(lowest, highest)| [lowest.0, highest.0]));
         places.extend(values.clone().position(|value| value.is_none()));

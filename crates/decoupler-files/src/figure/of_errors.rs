@@ -180,11 +180,8 @@ pub fn regression_figure(
         let ends = fitted.ends.into_iter().filter(|end| end.is_finite());
         Series::new(name, look, ends.map(|actual| [actual, of(actual)]))
     };
-    let dots = Series::new(
-        format!("{samples} of the test set"),
-        Look::marker(Ink::Blue, Marker::Dot),
-        dots,
-    );
+    let name_of_dots = format!("{samples} of the test set");
+    let dots = Series::new(name_of_dots, Look::marker(Ink::Blue, Marker::Dot), dots);
     let equal = line("equal", Look::line(Ink::Text, LineStyle::Dashed), &|actual| actual);
     let (mut series, mut notes) = (vec![dots, equal], Vec::new());
     let fit = *fitted;

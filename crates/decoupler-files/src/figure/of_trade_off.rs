@@ -93,19 +93,11 @@ impl TradeOffLevel {
 pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotFigure {
     let has = |is_so: fn(&TradeOffPoint) -> bool| level.points.iter().any(is_so);
     let marks = [
-        (has(|point| point.preset == Some(Preset::Paper)), "discs: paper preset"),
-        (has(|point| point.preset == Some(Preset::Best)), "diamonds: best preset"),
-        (
-            has(|point| point.report.precision == Precision::Single),
-            "hollow: 32 bits",
-        ),
+        has(|point| point.preset == Some(Preset::Paper)).then_some("discs: paper preset"),
+        has(|point| point.preset == Some(Preset::Best)).then_some("diamonds: best preset"),
+        has(|point| point.report.precision == Precision::Single).then_some("hollow: 32 bits"),
     ];
-    let marks = Vec::from_iter(
-        marks
-            .into_iter()
-            .filter(|(is_there, _)| *is_there)
-            .map(|(_, mark)| mark),
-    );
+    let marks = Vec::from_iter(marks.into_iter().flatten());
     let note = (!marks.is_empty()).then(|| format!("{}.", capitalised(&marks.join(", "))));
     PlotFigure::new(TradeOffCost::ALL.map(|cost| plot(level, limits, cost)), note)
 }
@@ -189,10 +181,8 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
 /// `Network f32, best preset, 12 hidden`.
 pub fn point_name(point: &TradeOffPoint) -> String {
     let method = || Some(point.method()?.short_name().to_owned());
-    named(
-        point,
-        point.preset.map(|preset| format!("{preset} preset")).or_else(method),
-    )
+    let preset = point.preset.map(|preset| format!("{preset} preset"));
+    named(point, preset.or_else(method))
 }
 
 /// The decoder of a point with its hidden nodes, and `how` it was trained.

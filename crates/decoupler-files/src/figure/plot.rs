@@ -354,9 +354,8 @@ impl Plot {
 pub(super) fn unbroken<T: Clone>(items: impl Iterator<Item = Option<T>>) -> Vec<Vec<T>> {
     let items: Vec<Option<T>> = items.collect();
     let stretches = items.split(Option::is_none).filter(|stretch| stretch.len() > 1);
-    stretches
-        .map(|stretch| stretch.iter().flatten().cloned().collect())
-        .collect()
+    let whole = |stretch: &[Option<T>]| stretch.iter().flatten().cloned().collect();
+    stretches.map(whole).collect()
 }
 
 /// Returns places along a line, which labels should avoid.

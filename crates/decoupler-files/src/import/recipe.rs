@@ -111,7 +111,7 @@ impl Recipe {
     }
 
     /// Returns the files whose rows become samples, with those joined to them.
-    pub(super) fn files(&self) -> FileSet {
+    pub(crate) fn files(&self) -> FileSet {
         FileSet {
             data: self.data.clone(),
             join: self.join.iter().map(|joined| joined.file.clone()).collect(),
@@ -148,7 +148,7 @@ pub struct FileSet {
 
 impl FileSet {
     /// Returns the first file with those joined to it, then those whose rows follow.
-    pub(super) fn flat(&self) -> Vec<Self> {
+    pub(crate) fn flat(&self) -> Vec<Self> {
         let first = Self {
             append: Vec::new(),
             ..self.clone()

@@ -52,30 +52,10 @@ pub enum BundlePrecision {
     Fixed16,
 }
 
-/// Errors of unsupported combinations.
+/// A combination of decoder, format and precision that is not exported: the cause, and what to give instead.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum ChoiceError {
-    /// Radial basis in fixed point.
-    #[error("fixed16 has no Gaussians: export rbf in f64 or f32, or another decoder")]
-    Gaussians,
-    /// A decoder that no other program can evaluate.
-    #[error("{} cannot be exported: {reason}", .decoder.name())]
-    NotDescribed {
-        /// The decoder.
-        decoder: BundleDecoder,
-        /// The cause.
-        reason: &'static str,
-    },
-    /// A precision that a format does not have.
-    #[error("{format} has no precision {precision}: give {}", .format.precision_names())]
-    Pair {
-        /// The format.
-        format: BundleFormat,
-        /// The precision it lacks.
-        precision: BundlePrecision,
-    },
-}
+#[error("{0}")]
+pub struct ChoiceError(String);
 
 /// Why a decoder that solves equations is not exported.
 const EQUATIONS: &str =
@@ -114,21 +94,18 @@ impl BundleFormat {
     /// It is not.
     pub fn check_for(self, decoder: BundleDecoder, precision: BundlePrecision) -> Result<(), ChoiceError> {
         if !self.precisions().contains(&precision) {
-            return Err(ChoiceError::Pair {
-                format: self,
-                precision,
-            });
+            let names = self.precisions().iter().map(BundlePrecision::to_string);
+            let names = Vec::from_iter(names).join(" or ");
+            return Err(ChoiceError(format!(
+                "{self} has no precision {precision}: give {names}"
+            )));
         }
         let has_gaussians = decoder == BundleDecoder::Kind(DecoderKind::RadialBasis);
         if precision == BundlePrecision::Fixed16 && has_gaussians {
-            return Err(ChoiceError::Gaussians);
+            let message = "fixed16 has no Gaussians: export rbf in f64 or f32, or another decoder";
+            return Err(ChoiceError(message.to_owned()));
         }
         decoder.check()
-    }
-
-    fn precision_names(self) -> String {
-        let names = self.precisions().iter().map(BundlePrecision::to_string);
-        names.collect::<Vec<_>>().join(" or ")
     }
 }
 
@@ -172,7 +149,7 @@ impl BundleDecoder {
             Self::Kind(DecoderKind::Fuzzy) => RULES,
             _ => return Ok(()),
         };
-        Err(ChoiceError::NotDescribed { decoder: self, reason })
+        Err(ChoiceError(format!("{} cannot be exported: {reason}", self.name())))
     }
 
     /// Help text on all decoders.

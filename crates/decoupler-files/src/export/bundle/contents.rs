@@ -15,6 +15,14 @@ use super::{
 };
 use crate::export::format_number;
 
+/// The word for a precision, of those for single and double precision.
+pub(super) fn word<T>(precision: Precision, [single, double]: [T; 2]) -> T {
+    match precision {
+        Precision::Single => single,
+        Precision::Double => double,
+    }
+}
+
 /// Everything that the printers of the formats need.
 pub(super) struct Contents {
     /// Prefix of the names of functions and files.
@@ -58,9 +66,6 @@ impl Constant<'_> {
 /// The past that a program takes, with its numbers.
 pub(super) struct PrintedHistory {
     pub(super) constants: MemoryConstants,
-    /// Number of the latest readings that it keeps.
-    pub(super) kept: usize,
-    pub(super) averages: usize,
     /// Pause in seconds after which it restarts, if the usual interval is known.
     pub(super) pause_s: f64,
 }
@@ -69,7 +74,7 @@ impl PrintedHistory {
     /// Rows of the state in languages with matrices: whether it has started, the latest time, the latest readings (the newest
     /// first), and the averages.
     pub(super) fn state_rows(&self) -> usize {
-        2 + self.kept + self.averages
+        2 + self.constants.longest_lag() + self.constants.averages.len()
     }
 
     /// Rates of the averages: per second, and per reading; one of the two is 0.
@@ -203,8 +208,6 @@ impl Contents {
                 let constants = MemoryConstants::of(memory, self.size(*of));
                 let constants = constants.expect("checked when the program was built");
                 Some(PrintedHistory {
-                    kept: constants.longest_lag(),
-                    averages: constants.averages.len(),
                     constants,
                     pause_s: memory.interval_s.map_or(f64::INFINITY, |usual_s| GAP * usual_s),
                 })

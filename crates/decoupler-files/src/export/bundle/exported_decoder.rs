@@ -103,7 +103,8 @@ impl ExportedDecoder {
             BundleDecoder::Kind(kind) => set.decoder(kind, Precision::Double).map_err(Box::new)?,
             BundleDecoder::Chosen => None,
         };
-        let mut decoder = decoder.ok_or(BundleError::NoNetwork(kind))?;
+        let no_network = || BundleError::Unsuitable(format!("{kind} needs a trained network: train one first"));
+        let mut decoder = decoder.ok_or_else(no_network)?;
         Ok(Self {
             kind,
             program: decoder.program().expect("a decoder without a program is refused"),
@@ -226,10 +227,8 @@ impl ExportedDecoder {
     /// No readings could be drawn, or one cannot be decoded.
     pub(super) fn contents(&self, name: &str, precision: BundlePrecision) -> Result<Contents, BundleError> {
         let (channels, meaning) = (self.problem.inputs.len(), self.meaning());
-        let unlimited = self
-            .unlimited
-            .as_ref()
-            .filter(|_| precision == BundlePrecision::Fixed16);
+        let saturates = precision == BundlePrecision::Fixed16;
+        let unlimited = self.unlimited.as_ref().filter(|_| saturates);
         let mut program = unlimited.unwrap_or(&self.program).clone();
         if let Some(memory) = self.memory() {
             let with_history = program.with_history(memory, channels);
@@ -316,10 +315,15 @@ impl ExportedDecoder {
 
     /// Readings that are uniform in their range in training.
     fn drawn(&self, channels: usize, count: usize) -> Result<Vec<GoldenRow>, BundleError> {
+        let no_range = || {
+            let cause = "the network file does not have the range of the readings in training, without which no bundle can be \
+                         verified: train again";
+            BundleError::Unsuitable(cause.to_owned())
+        };
         let mut rng = Seed::default().rng(Stream::Test);
         let row = |place: usize| {
             let row = place % self.reading_ranges.len();
-            let range = self.reading_ranges[row].as_ref().ok_or(BundleError::NoRange)?;
+            let range = self.reading_ranges[row].as_ref().ok_or_else(no_range)?;
             let readings = readings_at(range, channels, || rng.random::<f64>());
             Ok(GoldenRow::new(row, readings))
         };
@@ -328,16 +332,11 @@ impl ExportedDecoder {
 
     /// Collects the metadata of a bundle.
     fn metadata(&self, contents: &Contents) -> Value {
-        let list = |channels: &[Channel]| {
-            let channels = channels
-                .iter()
-                .map(|channel| (channel.name.clone(), channel.unit.clone()));
-            channels.unzip::<_, _, Vec<_>, Vec<_>>()
-        };
-        let ((inputs, input_units), (targets, target_units)) =
-            (list(&contents.meaning.inputs), list(&contents.meaning.targets));
+        let names = |channels: &[Channel]| Vec::from_iter(channels.iter().map(|channel| channel.name.clone()));
+        let units = |channels: &[Channel]| Vec::from_iter(channels.iter().map(|channel| channel.unit.clone()));
+        let (inputs, targets) = (&contents.meaning.inputs, &contents.meaning.targets);
         let named = |errors: &TestErrors| {
-            let of = |(name, errors): (&String, &TargetErrors)| json!({ "name": name, "errors": errors });
+            let of = |(target, errors): (&Channel, &TargetErrors)| json!({ "name": target.name, "errors": errors });
             targets.iter().zip(errors.targets()).map(of).collect::<Vec<_>>()
         };
         let row_wires = self.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
@@ -350,8 +349,8 @@ impl ExportedDecoder {
                 "scene": scene,
                 "rows": scene.rows.to_string(),
                 "row_numbers": contents.takes_row().then_some([1, contents.rows]),
-                "inputs": { "names": inputs, "unit": "ohm" },
-                "outputs": { "names": targets, "unit": "mm" },
+                "inputs": { "names": names(inputs), "unit": "ohm" },
+                "outputs": { "names": names(targets), "unit": "mm" },
                 "training_samples": samples,
                 "errors": self.errors.nodes(),
                 "readings_in_training_ohm": self.ranges(),
@@ -360,9 +359,9 @@ impl ExportedDecoder {
             None => json!({
                 "files": self.files,
                 "row_numbers": contents.takes_row().then(|| row_wires.collect::<Vec<_>>()),
-                "inputs": { "names": inputs, "units": input_units },
+                "inputs": { "names": names(inputs), "units": units(inputs) },
                 "memory": self.problem.memory,
-                "outputs": { "names": targets, "units": target_units },
+                "outputs": { "names": names(targets), "units": units(targets) },
                 "method": self.settings.training.method.short_name(),
                 "errors": named(&self.errors),
                 "errors_of_ridge": named(&self.errors_of_linear),

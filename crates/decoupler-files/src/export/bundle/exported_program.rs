@@ -99,9 +99,8 @@ impl ExportedProgram {
 
     /// The parts of an answer.
     pub(super) fn parts(&self) -> impl Iterator<Item = NodeId> {
-        [Some(self.targets), self.half_widths, self.outside]
-            .into_iter()
-            .flatten()
+        let parts = [Some(self.targets), self.half_widths, self.outside];
+        parts.into_iter().flatten()
     }
 
     /// Number of targets.

@@ -98,12 +98,8 @@ fn in_double(contents: &mut Contents) -> Result<f64, BundleError> {
     const ERROR: f64 = 1.0 / (1_u64 << 44) as f64;
     /// Factor for other orders of the sums, other functions, and errors that do not cancel.
     const SAFETY: f64 = 64.0;
-    check_constants(
-        contents,
-        f64::is_finite,
-        "double precision",
-        "train again with other settings",
-    )?;
+    let beyond = "double precision: train again with other settings";
+    check_constants(contents, f64::is_finite, beyond)?;
     let disturbed = contents.exported.disturbed(ERROR);
     let amplification = contents.golden.deviation(&disturbed, &contents.scales, as_it_is)? / ERROR;
     let limit = DOUBLE.max(SAFETY * 0.5 * f64::EPSILON * amplification);
@@ -129,19 +125,24 @@ fn in_single(contents: &mut Contents, report: &mut BundleReport) -> Result<(), B
     for row in contents.golden.all() {
         let is_taken = |&reading: &f64| (reading as f32).is_finite() && (!positive || reading as f32 > 0.0);
         if let Some(channel) = row.readings.iter().position(|reading| !is_taken(reading)) {
-            return Err(BundleError::ReadingBeyond {
-                channel: contents.meaning.inputs[channel].name.clone(),
-                reading: row.readings[channel],
-            });
+            return Err(BundleError::Unsuitable(format!(
+                "a reading of {:.1e} ({}) is beyond the range of the numbers in which the bundle takes it: give --precision f64",
+                row.readings[channel], contents.meaning.inputs[channel].name
+            )));
         }
     }
     let is_finite = |value: f64| (value as f32).is_finite();
-    check_constants(contents, is_finite, "single precision", "give --precision f64")?;
+    check_constants(contents, is_finite, "single precision: give --precision f64")?;
     let rounding = contents.golden.rounding(&contents.exported.program, &contents.scales)?;
     let change = contents.in_words(rounding);
     let cure = cure(contents);
+    let unresolved = |change: &str| {
+        BundleError::Unsuitable(format!(
+            "single precision cannot resolve the readings: rounding them to it changes the answers by up to {change}; {cure}"
+        ))
+    };
     if rounding.is_nan() || rounding > LARGEST_ROUNDING {
-        return Err(BundleError::Unresolved { change, cure });
+        return Err(unresolved(&change));
     }
     if rounding > SINGLE {
         contents.notes.push(format!(
@@ -163,8 +164,7 @@ fn in_single(contents: &mut Contents, report: &mut BundleReport) -> Result<(), B
     }
     let arithmetic = SINGLE.max(SAFETY * found);
     if found.is_nan() || arithmetic > LARGEST_ROUNDING {
-        let change = contents.in_words(arithmetic);
-        return Err(BundleError::Unresolved { change, cure });
+        return Err(unresolved(&contents.in_words(arithmetic)));
     }
     contents.exported = contents.exported.in_single(wide);
     let program = &contents.exported.program;
@@ -220,15 +220,11 @@ fn cure(contents: &Contents) -> String {
     format!("give --precision f64, or {smaller}")
 }
 
-/// Checks that all constants are finite in this precision.
-fn check_constants(
-    contents: &Contents,
-    is_finite: impl Fn(f64) -> bool,
-    precision: &'static str,
-    cure: &'static str,
-) -> Result<(), BundleError> {
-    match contents.constants().all(|constant| constant.values().all(&is_finite)) {
-        true => Ok(()),
-        false => Err(BundleError::NotFinite(precision, cure)),
+/// Checks that all constants are finite; `beyond` names the precision and what to do if they are not.
+fn check_constants(contents: &Contents, is_finite: impl Fn(f64) -> bool, beyond: &str) -> Result<(), BundleError> {
+    if contents.constants().all(|constant| constant.values().all(&is_finite)) {
+        return Ok(());
     }
+    let message = format!("a constant of the decoder is beyond the range of {beyond}");
+    Err(BundleError::Unsuitable(message))
 }

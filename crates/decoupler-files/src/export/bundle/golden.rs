@@ -141,10 +141,8 @@ impl Golden {
         let mut changes = answers(&self.rows, program, taken)?;
         for (row, answer) in self.rows.iter().zip(&mut changes) {
             answer.truncate(row.targets.len());
-            answer
-                .iter_mut()
-                .zip(&row.targets)
-                .for_each(|(answer, target)| *answer -= target);
+            let pairs = answer.iter_mut().zip(&row.targets);
+            pairs.for_each(|(answer, target)| *answer -= target);
         }
         Ok(changes)
     }
@@ -155,13 +153,9 @@ impl Golden {
         let meaning = &contents.meaning;
         let (is_sequence, takes_row) = (contents.history().is_some(), contents.takes_row());
         let mut names = Vec::new();
-        names.extend(
-            is_sequence
-                .then_some(["new_series", "time_s"])
-                .into_iter()
-                .flatten()
-                .map(str::to_owned),
-        );
+        if is_sequence {
+            names.extend(["new_series", "time_s"].map(str::to_owned));
+        }
         names.extend(takes_row.then(|| "row".to_owned()));
         let channels = meaning.inputs.iter().chain(&meaning.targets);
         names.extend(channels.map(|channel| inert(&channel.name)));

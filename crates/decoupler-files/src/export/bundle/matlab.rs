@@ -26,10 +26,9 @@ pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<St
 
 /// Text of the function file.
 fn function(contents: &Contents) -> String {
-    let Contents {
-        name, meaning, rows, ..
-    } = contents;
-    let (name, input, channels) = (format!("{name}_decode"), meaning.readings(), contents.channels());
+    let (meaning, rows) = (&contents.meaning, contents.rows);
+    let name = format!("{}_decode", contents.name);
+    let (input, channels) = (meaning.readings(), contents.channels());
     let (history, parts, arguments) = (contents.history(), contents.parts(), arguments(contents));
     let state = history.iter().map(|_| "state");
     let returned = Vec::from_iter(parts.iter().copied().chain(state)).join(", ");
@@ -147,7 +146,7 @@ fn remembering(history: &PrintedHistory) -> String {
     let list = |values: Vec<String>| format!("[{}]", values.join("; "));
     let (per_second, per_reading) = history.rates();
     let texts = |values: Vec<f64>| values.iter().map(|value| format!("{value:e}")).collect();
-    let kept = history.kept;
+    let kept = constants.longest_lag();
     format!(
         "function [features, state] = remember(state, now, time_s)\n\
          has_started = state(1, 1) > 0;\nelapsed_s = time_s - state(2, 1);\n\

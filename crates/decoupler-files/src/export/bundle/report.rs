@@ -70,21 +70,15 @@ impl BundleReport {
             let unit = output.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
             format!("{}{unit} ({})", format_number(*bound), output.name)
         };
-        let bounds: Vec<String> = self.bounds.iter().map(bound).collect();
-        (!bounds.is_empty()).then(|| {
-            format!(
-                "Proven bound on the error in fixed point, for readings that are not out of range: {}",
-                bounds.join(", ")
-            )
-        })
+        let bounds = Vec::from_iter(self.bounds.iter().map(bound)).join(", ");
+        let about = "Proven bound on the error in fixed point, for readings that are not out of range";
+        (!bounds.is_empty()).then(|| format!("{about}: {bounds}"))
     }
 
     /// Returns the sentence on [`Self::rounding`], if there is one.
     pub fn describe_rounding(&self) -> Option<String> {
-        let rounding = self.rounding?;
-        Some(format!(
-            "Rounding the readings to single precision changes a target by at most {rounding:.1e}"
-        ))
+        let about = "Rounding the readings to single precision changes a target by at most";
+        self.rounding.map(|rounding| format!("{about} {rounding:.1e}"))
     }
 
     /// Returns the largest deviation of all checks; `None` if nothing evaluated the bundle.
@@ -145,28 +139,15 @@ pub enum BundleError {
     /// The format does not have the precision.
     #[error(transparent)]
     Choice(#[from] ChoiceError),
-    /// The decoder needs a network, and none was trained.
-    #[error("{0} needs a trained network: train one first")]
-    NoNetwork(BundleDecoder),
-    /// The lag is too long for a graph.
-    #[error(
-        "a lag of {0} samples is too long for an ONNX graph, which copies its state for each sample: export as c99, numpy or matlab"
-    )]
-    LongLag(usize),
-    /// A constant of the program is beyond the range of the numbers.
-    #[error("a constant of the decoder is beyond the range of {0}: {1}")]
-    NotFinite(&'static str, &'static str),
+    /// The decoder, its numbers or the range of its readings do not suit the format or the precision: the cause, and what to do.
+    #[error("{0}")]
+    Unsuitable(String),
     /// The readings by which the accuracy is found could not be drawn or decoded.
     #[error("no readings to verify the bundle: {0}")]
     Readings(#[from] Box<RunError>),
     /// A reading could not be decoded.
     #[error("no readings to verify the bundle: {0}")]
     Decoding(#[from] DecodeError),
-    /// The network file does not have the range of the readings.
-    #[error(
-        "the network file does not have the range of the readings in training, without which no bundle can be verified: train again"
-    )]
-    NoRange,
     /// The samples to which the decoder is fitted could not be drawn or read again.
     #[error(transparent)]
     Samples(#[from] SetupError),
@@ -176,65 +157,7 @@ pub enum BundleError {
     /// The bundle cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// A reading that becomes 0 or infinite in the numbers of the bundle.
-    #[error(
-        "a reading of {reading:.1e} ({channel}) is beyond the range of the numbers in which the bundle takes it: give --precision f64"
-    )]
-    ReadingBeyond {
-        /// Name of the channel.
-        channel: String,
-        /// The reading.
-        reading: f64,
-    },
-    /// Single precision has too few digits for the readings.
-    #[error(
-        "single precision cannot resolve the readings: rounding them to it changes the answers by up to {change}; {cure}"
-    )]
-    Unresolved {
-        /// The change, with its unit.
-        change: String,
-        /// What to do.
-        cure: String,
-    },
-    /// Steps that have no form in integers (fixed16).
-    #[error("fixed16 has no {0}: give --precision f64 or f32")]
-    FixedStep(&'static str),
-    /// The file does not contain the range of the readings, which fixed16 needs.
-    #[error(
-        "fixed16 needs the range of the readings in training, which the network file does not have: train again, or give --precision f32"
-    )]
-    FixedNoRange,
-    /// Resistances that exceed 32 bits in every unit of fixed16.
-    #[error(
-        "fixed16 reads resistances up to 1e9 ohm, and in training they were up to {0:.1e} ohm: give --precision f32"
-    )]
-    FixedReading(f64),
-    /// Weights or outputs beyond the range of the numbers of fixed16.
-    #[error("fixed16 cannot hold the weights of {what}: {cure}, which keeps weights small, or give --precision f32")]
-    FixedRange {
-        /// A way to train a network with smaller weights.
-        cure: &'static str,
-        /// Name of the value that is too large.
-        what: &'static str,
-    },
-    /// An error bound of fixed16 that is too large.
-    #[error(
-        "in fixed point the error is only known to be below {bound:.3} times {scale}: {cure} (the decoder amplifies differences of its readings too much), or give --precision f32"
-    )]
-    FixedCoarse {
-        /// The bound, in proportion to the range.
-        bound: f64,
-        /// Name of the range.
-        scale: &'static str,
-        /// A way to train a network that amplifies less.
-        cure: &'static str,
-    },
     /// The C compiler refused the source, or its program failed.
-    #[error("{step} failed: {reason}; nothing is left of the bundle")]
-    SelfTest {
-        /// Compiling, or running.
-        step: &'static str,
-        /// First lines of the message.
-        reason: String,
-    },
+    #[error("{0} failed: {1}; nothing is left of the bundle")]
+    SelfTest(&'static str, String),
 }

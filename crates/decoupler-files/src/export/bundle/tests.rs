@@ -2,9 +2,7 @@
 
 use std::{fs, path::Path};
 
-use super::{
-    BundleDecoder, BundleError, BundleFormat, BundlePrecision, ExportedDecoder, contents::Contents, export_bundle,
-};
+use super::{BundleDecoder, BundleFormat, BundlePrecision, ExportedDecoder, contents::Contents, export_bundle};
 use crate::export::NetworkFile;
 use decoupler_core::{
     decoupling::{DecoderKind, Operation, Precision},
@@ -390,7 +388,7 @@ fn single_precision_is_judged_by_the_readings_of_the_caller() {
                 refused += 1;
                 let message = error.to_string();
                 assert!(
-                    matches!(error, BundleError::Unresolved { .. }) && largest > 2e-4,
+                    message.starts_with("single precision cannot resolve the readings") && largest > 2e-4,
                     "{message} {largest}"
                 );
                 assert!(

@@ -1,28 +1,19 @@
 //! The terminal command that repeats a training.
 
-use std::{
-    borrow::Cow,
-    fmt,
-    path::{Path, PathBuf},
-};
+use std::{borrow::Cow, path::Path};
 
-use crate::import::{DialectChoice, FileSet, Plan, Recipe, Setup};
+use crate::import::{FileSet, Plan, Recipe, Setup};
 use decoupler_core::{
     dataset::{Division, Memory, Simulation, Span},
     evaluation::{RUN_OPTIONS, RunOption, RunSettings},
     scene::RowModel,
-    text::Named as _,
 };
+use thiserror::Error;
 
 /// Settings for which the terminal has no option.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct CommandGap(Vec<&'static str>);
-
-impl fmt::Display for CommandGap {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "the terminal has no option for {}", self.0.join(", "))
-    }
-}
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("the terminal has no option for {0}")]
+pub struct CommandGap(String);
 
 /// Returns the terminal command that trains with `setup`. Options that have their default value are omitted. A plan
 /// that was read from `recipe` is given by that file; one that needs a recipe is first written to a recipe by another command.
@@ -37,11 +28,11 @@ pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, Com
         (Some(simulation), _) => check_simulation(simulation)?,
         (None, Some(plan)) => {
             usual = RunSettings::measured(RowModel::Shared);
-            check([(
-                settings.inputs.quantity != usual.inputs.quantity,
-                "the quantity of the inputs",
-            )])?;
-            check_plan(plan, recipe)?;
+            let is_other = settings.inputs.quantity != usual.inputs.quantity;
+            check([is_other.then_some("the quantity of the inputs")])?;
+            if recipe.is_none() {
+                check_plan(plan)?;
+            }
             of_plan = file_options(plan, recipe);
             match recipe {
                 // It has the fractions, but may have another rule.
@@ -52,7 +43,7 @@ pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, Com
             options.push(("hidden".into(), settings.hidden.to_string()));
             usual.hidden = settings.hidden;
         }
-        (None, None) => return Err(CommandGap(vec!["samples in memory"])),
+        (None, None) => return Err(CommandGap("samples in memory".to_owned())),
     }
     let method = settings.training.method;
     if method.short_name() != usual.training.method.short_name() {
@@ -66,7 +57,15 @@ pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, Com
         }
     }
     options.extend(changed_options(settings, &usual).map(|(word, value)| (word.into(), value)));
-    let (in_recipe, direct): (Vec<_>, Vec<_>) = of_plan.into_iter().partition(|(name, _)| IN_RECIPE.contains(&&**name));
+    let (mut direct, mut in_recipe) = (Vec::new(), Vec::new());
+    for option in of_plan {
+        match &*option.0 {
+            "recipe" | "data" | "test-data" | "join" | "inputs" | "targets" | "time" | "group" | "row-wire"
+            | "history" | "where" | "split" => direct.push(option),
+            // The others are only options of `inspect`.
+            _ => in_recipe.push(option),
+        }
+    }
     let [in_recipe, direct, options] = [in_recipe, direct, options].map(|options| written(&options));
     Ok(match &*in_recipe {
         "" => format!("decoupler train{direct}{options}"),
@@ -75,28 +74,6 @@ pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, Com
         ),
     })
 }
-
-/// Options that only a recipe has.
-const IN_RECIPE: [&str; 18] = [
-    "test-join",
-    "test-fraction",
-    "validation-fraction",
-    "join-time",
-    "join-limit",
-    "lags",
-    "differences",
-    "derive",
-    "missing",
-    "unit",
-    "positions",
-    "separator",
-    "decimal",
-    "header",
-    "encoding",
-    "skip-lines",
-    "skip-damaged",
-    "truncate",
-];
 
 fn written(options: &[GivenOption]) -> String {
     let written = options.iter().map(|(name, value)| match &**value {
@@ -146,41 +123,31 @@ fn check_simulation(source: &Simulation) -> Result<(), CommandGap> {
     }
     let described = described.simulation().copied().unwrap_or_default();
     let (scene, same) = (&source.scene, &described.scene);
+    let compressions = [scene, same].map(|scene| scene.largest_compression.to_bits());
     check([
-        (
-            described.sensor != source.sensor,
-            "the geometry or the resistance per mm",
-        ),
-        (
-            scene.largest_compression.to_bits() != same.largest_compression.to_bits(),
-            "the largest compression",
-        ),
-        (scene.movement != same.movement, "the largest shift sideways"),
-        (scene.loading != same.loading, "the sizes of the indenter"),
+        (described.sensor != source.sensor).then_some("the geometry or the resistance per mm"),
+        (compressions[0] != compressions[1]).then_some("the largest compression"),
+        (scene.movement != same.movement).then_some("the largest shift sideways"),
+        (scene.loading != same.loading).then_some("the sizes of the indenter"),
     ])
 }
 
-fn check_plan(plan: &Plan, recipe: Option<&Path>) -> Result<(), CommandGap> {
-    if recipe.is_some() {
-        return Ok(());
-    }
+fn check_plan(plan: &Plan) -> Result<(), CommandGap> {
     let join = &plan.import.join;
     let is_same_limit = join.windows(2).all(|pair| pair[0].limit == pair[1].limit);
     let times = join.iter().filter(|joined| joined.time.is_some()).count();
+    let has_some_times = times != 0 && times != join.len();
     let mut unnamed = plan.import.clone();
     unnamed.join.iter_mut().for_each(|joined| joined.stem = None);
     check([
-        (!is_same_limit, "a different --join-limit for each joined file"),
-        (
-            times != 0 && times != join.len(),
-            "a time column of some of the joined files only",
-        ),
-        (plan.import.stems() != unnamed.stems(), "other names for joined files"),
+        (!is_same_limit).then_some("a different --join-limit for each joined file"),
+        has_some_times.then_some("a time column of some of the joined files only"),
+        (plan.import.stems() != unnamed.stems()).then_some("other names for joined files"),
     ])
 }
 
-fn check<const N: usize>(gaps: [(bool, &'static str); N]) -> Result<(), CommandGap> {
-    let gaps = Vec::from_iter(gaps.into_iter().filter_map(|(is_gap, name)| is_gap.then_some(name)));
+fn check<const N: usize>(gaps: [Option<&str>; N]) -> Result<(), CommandGap> {
+    let gaps = Vec::from_iter(gaps.into_iter().flatten()).join(", ");
     if gaps.is_empty() { Ok(()) } else { Err(CommandGap(gaps)) }
 }
 
@@ -191,8 +158,7 @@ pub(super) fn file_options(plan: &Plan, recipe: Option<&Path>) -> Vec<GivenOptio
         None => import_options(&plan.import),
     };
     if let Some(test) = &plan.test {
-        let names = ["test-data", "test-join"];
-        options.extend(set_options(&test.data, &test.join, &test.append, names));
+        options.extend(set_options(test, ["test-data", "test-join"]));
     }
     options
 }
@@ -218,84 +184,57 @@ pub(super) fn division_options(plan: &Plan, usual: Option<f64>) -> Vec<GivenOpti
 }
 
 /// Options with the files of the first set and of those appended to it.
-fn set_options(data: &Path, join: &[PathBuf], append: &[FileSet], names: [&'static str; 2]) -> Vec<GivenOption> {
+fn set_options(set: &FileSet, names: [&'static str; 2]) -> Vec<GivenOption> {
     let [of_data, of_join] = names.map(|name| move |file: &Path| (name.into(), file.display().to_string()));
     let mut options = Vec::new();
-    let more = append.iter().map(|set| (&*set.data, &*set.join));
-    for (data, join) in std::iter::once((data, join)).chain(more) {
-        options.push(of_data(data));
+    for FileSet { data, join, .. } in set.flat() {
+        options.push(of_data(&data));
         options.extend(join.iter().map(|file| of_join(file)));
     }
     options
 }
 
 fn import_options(recipe: &Recipe) -> Vec<GivenOption> {
-    let Recipe {
-        data,
-        join,
-        append,
-        dialect:
-            DialectChoice {
-                encoding,
-                separator,
-                decimal,
-                header,
-                skip_lines,
-            },
-        inputs,
-        targets,
-        time,
-        group,
-        row_wire,
-        memory,
-        conditions,
-        derive,
-        missing,
-        skip_damaged,
-        truncate,
-        units,
-        positions,
-    } = recipe;
-    let joined = Vec::from_iter(join.iter().map(|joined| joined.file.clone()));
-    let mut options = set_options(data, &joined, append, ["data", "join"]);
+    let (join, memory, dialect) = (&recipe.join, &recipe.memory, &recipe.dialect);
+    let mut options = set_options(&recipe.files(), ["data", "join"]);
     let mut times = Vec::from_iter(join.iter().filter_map(|joined| joined.time.clone()));
     // One for all, or one for each.
     if times.windows(2).all(|pair| pair[0] == pair[1]) {
         times.truncate(1);
     }
+    let limit = join.first().and_then(|joined| joined.limit.as_ref());
     let spans = |of: fn(&Memory) -> &Vec<Span>| {
         let spans = memory.as_ref().map(of).filter(|spans| !spans.is_empty());
         spans.map(|spans| texts(spans).join(","))
     };
     let has_differences = memory.as_ref().is_some_and(|memory| memory.differences);
     let flag = |is_on: bool| Vec::from_iter(is_on.then(String::new));
-    let units = units.iter().map(|(column, unit)| format!("{column}={unit}"));
+    let positions = recipe.positions.as_ref().map(|file| file.display());
+    let header = dialect.header.map(|header| if header { "yes" } else { "no" });
+    let units = recipe.units.iter().map(|(column, unit)| format!("{column}={unit}"));
     let options_of_columns = [
         ("join-time", times),
-        (
-            "join-limit",
-            texts(join.first().and_then(|joined| joined.limit.as_ref())),
-        ),
-        ("inputs", vec![inputs.join(",")]),
-        ("targets", vec![targets.join(",")]),
-        ("time", texts(time)),
-        ("group", texts(group)),
-        ("row-wire", texts(row_wire)),
+        ("join-limit", texts(limit)),
+        ("inputs", vec![recipe.inputs.join(",")]),
+        ("targets", vec![recipe.targets.join(",")]),
+        ("time", texts(&recipe.time)),
+        ("group", texts(&recipe.group)),
+        ("row-wire", texts(&recipe.row_wire)),
         ("lags", texts(&spans(|memory| &memory.lags))),
         ("history", texts(&spans(|memory| &memory.averages))),
         ("differences", flag(has_differences)),
-        ("skip-damaged", flag(*skip_damaged)),
-        ("truncate", flag(*truncate)),
-        ("where", texts(conditions)),
-        ("derive", texts(derive)),
-        ("missing", texts(missing)),
+        ("skip-damaged", flag(recipe.skip_damaged)),
+        ("truncate", flag(recipe.truncate)),
+        ("where", texts(&recipe.conditions)),
+        ("derive", texts(&recipe.derive)),
+        ("missing", texts(&recipe.missing)),
         ("unit", units.collect()),
-        ("positions", texts(&positions.as_ref().map(|file| file.display()))),
-        ("separator", texts(&separator.map(|separator| separator.name()))),
-        ("decimal", texts(&decimal.map(|decimal| decimal.name()))),
-        ("header", texts(&header.map(|header| if header { "yes" } else { "no" }))),
-        ("encoding", texts(&encoding.map(|encoding| encoding.name()))),
-        ("skip-lines", texts(skip_lines)),
+        ("positions", texts(&positions)),
+        ("separator", texts(&dialect.separator)),
+        ("decimal", texts(&dialect.decimal)),
+        ("header", texts(&header)),
+        ("encoding", texts(&dialect.encoding)),
+        ("skip-lines", texts(&dialect.skip_lines)),
     ];
     let of_columns = options_of_columns.into_iter();
     options.extend(of_columns.flat_map(|(name, values)| values.into_iter().map(move |value| (name.into(), value))));

@@ -88,12 +88,9 @@ impl RunReport<'_> {
     }
 
     fn setup(&self, folder: &Path) -> Setup {
-        let recorded = self
-            .file
-            .recorded
-            .as_ref()
-            .map(|recorded| recorded.with_paths(|file| stored(file, folder)));
-        let setup = Setup::of(self.file.settings, recorded.map(|recorded| recorded.plan));
+        let plan = self.file.recorded.as_ref().map(|recorded| &recorded.plan);
+        let plan = plan.map(|plan| plan.with_paths(|file| stored(file, folder)));
+        let setup = Setup::of(self.file.settings, plan);
         setup.expect("a file of a recording has its plan")
     }
 
@@ -262,11 +259,8 @@ impl RunReport<'_> {
         }
         if let Some(plan) = setup.plan() {
             let measured = Determination::measure(self.test, answers.view(), plan.division.by);
-            remarks.extend(describe_determinacy(
-                &problem.targets,
-                &measured,
-                file.combined().is_some(),
-            ));
+            let is_combined = file.combined().is_some();
+            remarks.extend(describe_determinacy(&problem.targets, &measured, is_combined));
             remarks.extend(describe_worse_than_ridge(problem, scores));
             let is_optimistic = (plan.test_order() == SplitBy::Random).then_some(
                 "test samples are drawn at random, which is optimistic where neighbouring rows are similar; split by time \

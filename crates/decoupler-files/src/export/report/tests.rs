@@ -299,3 +299,47 @@ fn the_command_of_a_recording_names_files_columns_and_division() {
     plan.import.join[0].stem = Some("other".to_owned());
     assert!(command(&plan, settings, None).unwrap_err().contains("joined files"));
 }
+
+#[test]
+fn every_field_of_a_recipe_is_in_the_command() {
+    let recipe = serde_json::json!({
+        "data": "press.csv",
+        "join": [{"file": "states.csv", "time": "joined_time", "limit": 0.75}],
+        "append": [{"data": "second.csv", "join": ["second_states.csv"]}],
+        "dialect": {"encoding": "latin-1", "separator": "bar", "decimal": "comma", "header": true, "skip_lines": 17},
+        "inputs": ["c2..c5"],
+        "targets": ["force"],
+        "time": "clock",
+        "group": "session",
+        "row_wire": "wire",
+        "memory": {"lags": ["3"], "averages": ["0.25s"], "differences": true},
+        "where": ["t>4.5"],
+        "derive": ["power=force-speed"],
+        "missing": ["-99"],
+        "skip_damaged": true,
+        "truncate": true,
+        "units": {"depth": "mm"},
+        "positions": "taxels.csv",
+    });
+    let import: Recipe = serde_json::from_value(recipe.clone()).unwrap();
+    // A field that is added has to be added above.
+    let fields = |value: &serde_json::Value| Vec::from_iter(value.as_object().unwrap().keys().cloned());
+    assert_eq!(fields(&serde_json::json!(import)), fields(&recipe));
+    let plan = Plan {
+        import,
+        ..Plan::default()
+    };
+    let setup = Setup::recording(RunSettings::measured(RowModel::Shared), plan);
+    let command = train_command(&setup, None).unwrap();
+    for expected in [
+        "--data press.csv --join states.csv --data second.csv --join second_states.csv",
+        "--join-time joined_time --join-limit 0.75",
+        "--inputs c2..c5 --targets force --time clock --group session --row-wire wire --history 0.25s --where 't>4.5'",
+        "--lags 3 --differences --skip-damaged --truncate",
+        "--missing=-99 --unit depth=mm --positions taxels.csv --separator bar --decimal comma --header yes --encoding latin-1 \
+         --skip-lines 17",
+    ] {
+        assert!(command.contains(expected), "{expected}: {command}");
+    }
+    assert!(command.contains("--derive") && command.contains("power"), "{command}");
+}

@@ -36,9 +36,9 @@ pub struct SweepFiles {
 impl SweepFiles {
     /// Lists the files of `folder`, in the order of their names.
     pub fn list(folder: &Path) -> Result<Self, DocumentError> {
-        let error = |source: io::Error| DocumentError::Read {
-            path: folder.to_owned(),
-            source: io::Error::other(system_cause(&source)),
+        let error = |source: io::Error| {
+            let cause = io::Error::other(system_cause(&source));
+            DocumentError::Read(folder.to_owned(), cause)
         };
         let mut files = Self::default();
         for entry in fs::read_dir(folder).map_err(error)? {

@@ -129,15 +129,11 @@ pub fn recording_options(plan: &Plan, crc32: &[String]) -> TrialOptions {
 }
 
 fn division_options(division: &Division) -> TrialOptions {
-    let Division {
-        by,
-        test_fraction,
-        validation_fraction,
-    } = division;
+    let validation_fraction = division.validation_fraction.unwrap_or(0.0);
     let options = [
-        ("split", by.to_string().into()),
-        ("test-fraction", (test_fraction + 0.0).into()),
-        ("validation-fraction", (validation_fraction.unwrap_or(0.0) + 0.0).into()),
+        ("split", division.by.to_string().into()),
+        ("test-fraction", (division.test_fraction + 0.0).into()),
+        ("validation-fraction", (validation_fraction + 0.0).into()),
     ];
     options.map(|(option, value)| (option.to_owned(), value)).into()
 }

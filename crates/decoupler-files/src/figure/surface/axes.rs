@@ -89,13 +89,8 @@ impl<'a> Axes<'a> {
                 false => (0.5, edge.away, TICK + 2.0 * GAP),
             };
             let value = plot_box.min_mm.lerp(plot_box.max_mm, share)[axis];
-            put(
-                sight.drawn(moved(starts[axis], axis, value)),
-                away,
-                gap,
-                20,
-                names[axis],
-            );
+            let anchor = sight.drawn(moved(starts[axis], axis, value));
+            put(anchor, away, gap, 20, names[axis]);
         }
         let near = near_x | near_y;
         let mut lines = Vec::new();

@@ -193,13 +193,11 @@ impl Surface {
         let (inner, range) = (card.grown(-EDGE), self.usable_range());
         let axes = Axes::new(measure, inner, plot_box, camera, &range, names);
         let sight = axes.sight;
-        let (mesh, dots) = match self.values.len() == self.map.grid().len() {
-            true => (
-                Mesh::new(self, &sight, self.colour_map(errors)),
-                Dots::new(self, &sight),
-            ),
-            false => Default::default(),
-        };
+        let (mut mesh, mut dots) = (Mesh::default(), Dots::default());
+        if self.values.len() == self.map.grid().len() {
+            mesh = Mesh::new(self, &sight, self.colour_map(errors));
+            dots = Dots::new(self, &sight);
+        }
         let mut frame = axes.lines;
         frame.extend(axes.labels.shapes());
         let note = match (mesh.has_plateau, dots.beyond()) {

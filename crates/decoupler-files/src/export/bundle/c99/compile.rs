@@ -16,15 +16,7 @@ use crate::{
 
 const COMPILER: &str = "cc";
 /// The flags under which the source has no warning.
-const FLAGS: [&str; 7] = [
-    "-std=c99",
-    "-Wall",
-    "-Wextra",
-    "-Werror",
-    "-pedantic",
-    "-Wconversion",
-    "-O2",
-];
+const FLAGS: &str = "-std=c99 -Wall -Wextra -Werror -pedantic -Wconversion -O2";
 
 /// Compiles the source and the self-test in `folder` and runs the self-test; no files are left there. Returns the largest
 /// deviation of the golden answers, relative to the range of the outputs, or the reason why nothing was compiled.
@@ -36,7 +28,7 @@ pub(in crate::export::bundle) fn run_self_test(
     name: &str,
 ) -> Result<Result<f64, &'static str>, BundleError> {
     let sources = ["decode", "selftest"].map(|part| folder.join(format!("{name}_{part}.c")));
-    let failed = |step: &'static str, reason: String| BundleError::SelfTest { step, reason };
+    let failed = |step: &'static str, reason: String| BundleError::SelfTest(step, reason);
     let temporary = std::env::temp_dir();
     let home = UnfinishedFolder::begin(&temporary).map_err(|error| {
         let (folder, cause) = (temporary.display(), system_cause(&error));
@@ -73,7 +65,12 @@ pub(in crate::export::bundle) fn run_self_test(
 
 fn compile(sources: &[&Path], program: &Path, home: &Path) -> io::Result<Output> {
     let mut command = Command::new(COMPILER);
-    command.args(FLAGS).args(sources).arg("-o").arg(program).arg("-lm");
+    command
+        .args(FLAGS.split(' '))
+        .args(sources)
+        .arg("-o")
+        .arg(program)
+        .arg("-lm");
     output_within(&mut command, home, LONGEST_RUN)
 }
 

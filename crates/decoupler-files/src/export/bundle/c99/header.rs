@@ -66,14 +66,8 @@ impl<'a> Header<'a> {
 
     /// Text of the header file.
     pub(super) fn text(&self) -> String {
-        let Contents {
-            name,
-            noun,
-            meaning,
-            rows,
-            ..
-        } = self.contents;
         let (contents, number, upper) = (self.contents, self.number, self.upper());
+        let (name, noun, meaning, rows) = (&contents.name, contents.noun, &contents.meaning, contents.rows);
         let (mut include, mut units, mut definitions) = ("", String::new(), String::new());
         let mut overflow = format!(" Readings so extreme that the sums overflow give {upper}_BAD_READING.");
         if let Some(fixed) = self.fixed {
@@ -133,8 +127,8 @@ impl<'a> Header<'a> {
              double time_s;\n    int latest;\n{}{}}} {name}_state;\n\n\
              /* Forgets the past: the next reading is the first. */\nvoid {name}_start({name}_state *state);\n\n",
             wrapped(&about).join("\n   "),
-            array("kept", history.kept),
-            array("averages", history.averages),
+            array("kept", history.constants.longest_lag()),
+            array("averages", history.constants.averages.len()),
         )
     }
 }

@@ -11,7 +11,7 @@ use std::fmt::{Display, Write};
 use decoupler_core::decoupling::Precision;
 
 use super::{
-    contents::Contents,
+    contents::{Contents, word},
     fixed16::FixedProgram,
     folder::AtomicFolder,
     report::{BundleCheck, BundleError, BundleReport},
@@ -80,10 +80,7 @@ fn usage(header: &Header<'_>) -> String {
 
 /// Name of the C type of this precision.
 fn type_name(precision: Precision) -> &'static str {
-    match precision {
-        Precision::Single => "float",
-        Precision::Double => "double",
-    }
+    word(precision, ["float", "double"])
 }
 
 /// Formats a number that C reads back bit for bit.

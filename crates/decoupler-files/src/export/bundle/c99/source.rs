@@ -5,7 +5,7 @@ use std::fmt::Write;
 use decoupler_core::decoupling::{Domain, NodeId, Operation, Precision};
 
 use super::{header::Header, number, push_array, type_name};
-use crate::export::bundle::contents::{Contents, PrintedHistory, infix};
+use crate::export::bundle::contents::{Contents, PrintedHistory, infix, word};
 
 /// Writes the source.
 pub(super) fn source(header: &Header<'_>) -> String {
@@ -110,10 +110,7 @@ fn statements(contents: &Contents, upper: &str, id: NodeId, operation: &Operatio
 
 /// Name of the largest number.
 fn largest(precision: Precision) -> &'static str {
-    match precision {
-        Precision::Single => "FLT_MAX",
-        Precision::Double => "DBL_MAX",
-    }
+    word(precision, ["FLT_MAX", "DBL_MAX"])
 }
 
 /// Statements that check the outputs and write the answer.
@@ -142,7 +139,7 @@ fn answer(header: &Header<'_>) -> String {
 fn remembering(header: &Header<'_>, history: &PrintedHistory) -> String {
     let (contents, constants) = (header.contents, &history.constants);
     let (name, channels) = (&contents.name, constants.channels);
-    let (kept, averages) = (history.kept, history.averages);
+    let (kept, averages) = (constants.longest_lag(), constants.averages.len());
     let mut text = String::new();
     let mut array = |kind: &str, name: &str, values: Vec<String>| {
         if !values.is_empty() {

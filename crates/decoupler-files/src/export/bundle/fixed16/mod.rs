@@ -73,14 +73,11 @@ impl FixedProgram {
     /// The range of the readings is not known, a step or a number has no form in integers, or the bound on the error is as
     /// large as the range of the targets.
     pub(super) fn of(contents: &Contents, limits: Option<&Limits>) -> Result<Self, BundleError> {
-        let Contents {
-            exported,
-            meaning,
-            scales,
-            ..
-        } = contents;
+        let (exported, meaning, scales) = (&contents.exported, &contents.meaning, &contents.scales);
         let (is_relative, reference, layers) = chain(exported)?;
-        let limits = limits.ok_or(BundleError::FixedNoRange)?;
+        let no_range = "fixed16 needs the range of the readings in training, which the network file does not have: train again, \
+                        or give --precision f32";
+        let limits = limits.ok_or_else(|| BundleError::Unsuitable(no_range.to_owned()))?;
         let cure = meaning.smaller_weights();
         let rows = exported.program.rows();
         let tables = |id: NodeId, row: usize| table(exported.program.nodes(), id, row);
@@ -111,7 +108,11 @@ impl FixedProgram {
             let limits = PerRow::each(limits.clone());
             let layers = layers.iter().map(|layer| layer.map(|id| tables(id, row)));
             let bounds = fixed.push_row(tables(reference, row), &Vec::from_iter(layers), limits.at(row));
-            let bounds = bounds.map_err(|what| BundleError::FixedRange { what, cure })?;
+            let bounds = bounds.map_err(|what| {
+                BundleError::Unsuitable(format!(
+                    "fixed16 cannot hold the weights of {what}: {cure}, which keeps weights small, or give --precision f32"
+                ))
+            })?;
             for (target, (bound, of_row)) in fixed.bounds.iter_mut().zip(bounds).enumerate() {
                 *bound = bound.max(of_row * fixed.targets.unit(target));
             }
@@ -120,8 +121,11 @@ impl FixedProgram {
         if bound < 1.0 {
             return Ok(fixed);
         }
-        let scale = meaning.scale();
-        Err(BundleError::FixedCoarse { bound, scale, cure })
+        Err(BundleError::Unsuitable(format!(
+            "in fixed point the error is only known to be below {bound:.3} times {}: {cure} (the decoder amplifies differences of \
+             its readings too much), or give --precision f32",
+            meaning.scale()
+        )))
     }
 
     /// Largest bound relative to the scale of its target.
@@ -284,14 +288,16 @@ fn chain(exported: &ExportedProgram) -> Result<(bool, NodeId, Vec<[NodeId; 2]>),
         Operation::Divide(difference, readings) if is_valid(operation(*readings)) => *difference,
         _ => id,
     };
-    match operation(difference) {
+    let step = match operation(difference) {
         Operation::Subtract(readings, reference) if is_valid(operation(*readings)) => {
-            Ok((difference != id, *reference, layers))
+            return Ok((difference != id, *reference, layers));
         }
-        Operation::Map(Function::Gaussian, _) => Err(BundleError::FixedStep("Gaussians")),
-        Operation::Map(..) => Err(BundleError::FixedStep("logarithms")),
-        _ => Err(BundleError::FixedStep("history of readings")),
-    }
+        Operation::Map(Function::Gaussian, _) => "Gaussians",
+        Operation::Map(..) => "logarithms",
+        _ => "history of readings",
+    };
+    let message = format!("fixed16 has no {step}: give --precision f64 or f32");
+    Err(BundleError::Unsuitable(message))
 }
 
 /// `true` for readings that were checked.

@@ -27,8 +27,13 @@ impl Units {
         let decimals = if meaning.is_array {
             let largest_ohm = channels.clone().map(largest).fold(0.0, f64::max);
             let fits = |&decimals: &i32| largest_ohm * ten_to(decimals) <= LARGEST_READING;
-            let decimals = [9, 6, 3, 0].into_iter().find(fits);
-            vec![decimals.ok_or(BundleError::FixedReading(largest_ohm))?; channels.len()]
+            let decimals = [9, 6, 3, 0].into_iter().find(fits).ok_or_else(|| {
+                BundleError::Unsuitable(format!(
+                    "fixed16 reads resistances up to 1e9 ohm, and in training they were up to {largest_ohm:.1e} ohm: give \
+                     --precision f32"
+                ))
+            });
+            vec![decimals?; channels.len()]
         } else {
             channels
                 .map(|channel| max_decimals(largest(channel), LARGEST_READING))

@@ -5,7 +5,7 @@ mod npz;
 use decoupler_core::decoupling::{Domain, NodeId, Operation, Precision};
 
 use super::{
-    contents::{Contents, PrintedHistory, infix},
+    contents::{Contents, PrintedHistory, infix, word},
     folder::AtomicFolder,
     report::BundleError,
 };
@@ -22,9 +22,7 @@ pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<St
 
 /// Text of the program.
 fn program(contents: &Contents) -> String {
-    let Contents {
-        noun, meaning, rows, ..
-    } = contents;
+    let (noun, meaning, rows) = (contents.noun, &contents.meaning, contents.rows);
     let (input, channels) = (meaning.readings(), contents.channels());
     let history = contents.history();
     let (mut row, mut row_text, mut row_check) = ("", "", "    row = np.ones(len(r), int)\n".to_owned());
@@ -89,10 +87,7 @@ fn returned_parts(contents: &Contents) -> Vec<String> {
 }
 
 fn dtype(precision: Precision) -> &'static str {
-    match precision {
-        Precision::Single => "np.float32",
-        Precision::Double => "np.float64",
-    }
+    word(precision, ["np.float32", "np.float64"])
 }
 
 /// A value in this precision.
@@ -167,7 +162,7 @@ fn remembering(contents: &Contents, history: &PrintedHistory) -> String {
          past = np.concatenate([past_of_lags, averages])\n    \
          kept[1:], kept[:1] = kept[:-1].copy(), now\n    \
          return np.concatenate([now, {past}])\n\n\n",
-        kept = history.kept,
+        kept = constants.longest_lag(),
         rows = history.state_rows(),
         usual = constants.interval_s,
         channels = constants.channels,

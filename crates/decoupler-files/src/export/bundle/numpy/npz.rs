@@ -5,7 +5,7 @@ use std::io::{Cursor, Write};
 use decoupler_core::decoupling::Precision;
 use zip::{CompressionMethod, DateTime, ZipWriter, result::ZipResult, write::SimpleFileOptions};
 
-use crate::export::bundle::contents::Constant;
+use crate::export::bundle::contents::{Constant, word};
 
 const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
 
@@ -26,10 +26,7 @@ pub(super) fn write<'a>(arrays: impl Iterator<Item = Constant<'a>>) -> Vec<u8> {
 }
 
 fn write_array(array: &Constant<'_>) -> Vec<u8> {
-    let descr = match array.precision {
-        Precision::Single => "<f4",
-        Precision::Double => "<f8",
-    };
+    let descr = word(array.precision, ["<f4", "<f8"]);
     let sizes: Vec<_> = array.shape.iter().map(usize::to_string).collect();
     // A tuple of one element ends with a comma.
     let comma = if sizes.len() == 1 { "," } else { "" };

@@ -1,6 +1,7 @@
 use decoupler_core::decoupling::Precision;
 
 use super::message::{DOUBLE, FLOAT, INT_ATTRIBUTE, INT64, Message};
+use crate::export::bundle::contents::word;
 
 /// Builder of a graph.
 #[derive(Default)]
@@ -12,10 +13,7 @@ pub(super) struct GraphBuilder {
 
 /// ONNX type of numbers of this precision.
 pub(super) fn element_type(precision: Precision) -> i64 {
-    match precision {
-        Precision::Single => FLOAT,
-        Precision::Double => DOUBLE,
-    }
+    word(precision, [FLOAT, DOUBLE])
 }
 
 impl GraphBuilder {
@@ -58,8 +56,7 @@ impl GraphBuilder {
 
     /// Adds an operation without a name of its own and returns that of its result.
     pub(super) fn op(&mut self, operation: &str, inputs: &[&str]) -> String {
-        let name = self.fresh(&operation.to_lowercase());
-        self.named(operation, inputs, &[], &name)
+        self.with(operation, inputs, &[])
     }
 
     /// Adds an operation with attributes that computes the value `output`, and returns that name.

@@ -12,7 +12,7 @@ impl Printer<'_> {
     pub(super) fn add_history(&mut self, now: &str, name: &str) {
         let history = self.contents.history().expect("there is a history");
         let (builder, constants) = (&mut self.builder, &history.constants);
-        let (kept, averages, channels) = (history.kept, history.averages, constants.channels);
+        let (kept, averages, channels) = (constants.longest_lag(), constants.averages.len(), constants.channels);
         let axis = builder.whole(&[1], &[0]);
         let [zero, usual] = [0.0, constants.interval_s].map(|value| builder.scalar(DOUBLE, value));
         let started = builder.rows("state", 0..1, &axis);

@@ -28,7 +28,12 @@ use self::{
     builder::{GraphBuilder, element_type, value},
     message::{INT64, Message},
 };
-use super::{contents::Contents, folder::AtomicFolder, meaning::comment, report::BundleError};
+use super::{
+    contents::{Contents, word},
+    folder::AtomicFolder,
+    meaning::comment,
+    report::BundleError,
+};
 
 const OPSET: i64 = 13;
 /// The first version of the format with opset 13.
@@ -41,9 +46,12 @@ const MAX_LAG: usize = 1000;
 /// # Errors
 /// A lag is too long, or the operating system refuses.
 pub(super) fn print(contents: &Contents, folder: &mut AtomicFolder) -> Result<String, BundleError> {
-    let lag = contents.history().map_or(0, |history| history.kept);
+    let lag = contents.history().map_or(0, |history| history.constants.longest_lag());
     if lag > MAX_LAG {
-        return Err(BundleError::LongLag(lag));
+        return Err(BundleError::Unsuitable(format!(
+            "a lag of {lag} samples is too long for an ONNX graph, which copies its state for each sample: export as c99, numpy \
+             or matlab"
+        )));
     }
     let notes = contents.notes.iter().map(|note| format!(" Note: {note}."));
     let state = contents.state_in_words().map(|about| format!(" {about}"));
@@ -303,10 +311,7 @@ fn channel_names(what: &str, channels: &[Channel], is_array: bool) -> String {
 /// Lines of a program that decodes.
 fn usage(contents: &Contents) -> String {
     let (input, output) = (contents.meaning.readings(), contents.meaning.outputs());
-    let kind = match contents.outer_precision() {
-        Precision::Single => "float32",
-        Precision::Double => "float64",
-    };
+    let kind = word(contents.outer_precision(), ["float32", "float64"]);
     let row = match contents.takes_row() {
         true => ", \"row\": np.array([1], np.int64)",
         false => "",
