@@ -29,7 +29,7 @@ impl<R: Read> Rows<R> {
     pub(crate) fn new(source: R, separator: Separator, has_carriage_returns: bool) -> Self {
         Self {
             source: BufReader::with_capacity(BUFFER, source),
-            fields: Fields::new(separator, Some(MAX_CELLS)),
+            fields: Fields::new(separator, MAX_CELLS),
             longest: LONGEST_ROW,
             line_break: if has_carriage_returns { b'\r' } else { b'\n' },
             text: Vec::new(),
@@ -150,7 +150,7 @@ impl<R: Read> Rows<R> {
 
     /// Cells of the current row, without surrounding spaces.
     pub(super) fn cells(&self) -> impl DoubleEndedIterator<Item = &[u8]> + Clone {
-        self.fields.iter(&self.text)
+        self.fields.iter()
     }
 }
 

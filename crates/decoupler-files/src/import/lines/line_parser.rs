@@ -17,7 +17,7 @@ use super::{
         derived::DerivedStream,
         fields::Fields,
         format,
-        inputs::{InputColumns, OtherColumns},
+        inputs::InputColumns,
         selection::{LAST_ROW_WIRE, row_wire},
         table::excerpt,
         time_stamp::TimeStamp,
@@ -32,10 +32,8 @@ use super::{
 /// may be repeated, for example when a device restarts, and a comma may end a line.
 #[derive(Debug, Default)]
 pub struct LineParser {
-    pub(super) inputs: Vec<Channel>,
-    others: OtherColumns,
-    /// Columns computed from others.
-    derive: Vec<Derived>,
+    pub(super) problem: Problem,
+    recipe: Recipe,
     /// Channels by which a header is recognised: the inputs, and the columns from which derived inputs are computed.
     read: Vec<Channel>,
     /// Row-wires with their own readings; `None` if one network of a recording reads all.
@@ -149,11 +147,14 @@ impl LineParser {
         let inputs = Vec::from_iter(channels.map(|channel| Channel::new(format!("r_{channel}"), None)));
         Ok(Self {
             read: inputs.clone(),
-            inputs,
-            others: OtherColumns {
+            problem: Problem {
+                inputs,
+                ..Problem::default()
+            },
+            recipe: Recipe {
                 row_wire: Some("row".to_owned()),
                 time: Some("time_s".to_owned()),
-                ..OtherColumns::default()
+                ..Recipe::default()
             },
             rows: Some(RowWires {
                 read,
@@ -194,12 +195,11 @@ impl LineParser {
         });
         Ok(Self {
             read,
-            derive: recipe.derive.clone(),
             memory: memory
                 .map(|memory| MemoryStream::new(memory, inputs.len()))
                 .transpose()?,
-            inputs: inputs.clone(),
-            others: recipe.other_columns(problem),
+            problem: problem.clone(),
+            recipe: recipe.clone(),
             rows,
             ..Self::default()
         })
@@ -252,11 +252,11 @@ impl LineParser {
         self.fields.split(text);
         let number = |cell| format::parse(cell, Decimal::Point).number().unwrap_or(f64::NAN);
         self.cells.clear();
-        self.cells.extend(self.fields.iter(text).map(number));
-        self.read_stamp(text);
+        self.cells.extend(self.fields.iter().map(number));
+        self.read_stamp();
         // Only the first line, or a line that cannot be used, may be a header: other lines need no strings.
-        if self.check(line, text).is_err() {
-            let cells = self.fields.iter(text).map(String::from_utf8_lossy);
+        if self.check(line).is_err() {
+            let cells = self.fields.iter().map(String::from_utf8_lossy);
             let cells = Vec::from_iter(cells.map(|cell| cell.into_owned()));
             // After a line with readings, a device that starts again repeats its header whole; other texts are garbage, or an
             // overflow of the device.
@@ -275,26 +275,26 @@ impl LineParser {
                 let has_comma = cells.len() > 1 && cells.last().is_some_and(String::is_empty);
                 let found = self.find_columns(&[], cells.len() - usize::from(has_comma));
                 found.map_err(|reason| LineError::Malformed(line, reason))?;
-                self.read_stamp(text);
+                self.read_stamp();
             }
-            self.check(line, text)?;
+            self.check(line)?;
         }
         let row_index = self.row_index(line)?;
         self.has_readings = true;
-        self.readings_of(line, text, row_index)
+        self.readings_of(line, row_index)
     }
 
     /// Checks that the cells can be used.
-    fn check(&self, line: u64, text: &[u8]) -> Result<(), LineError> {
+    fn check(&self, line: u64) -> Result<(), LineError> {
         let (columns, width, found) = (&self.columns, self.columns.width, self.fields.len());
-        let has_trailing_comma = found == width + 1 && found > 1 && self.fields.get(text, width).is_empty();
+        let has_trailing_comma = found == width + 1 && found > 1 && self.fields.get(width).is_empty();
         if found != width && !has_trailing_comma {
             let found = counted(found, "cell");
             let reason = format!("{found} where {width} are needed, separated by commas");
             return Err(LineError::Malformed(line, reason));
         }
         let refused = |column: usize, needed: &str| {
-            let cell = excerpt(&String::from_utf8_lossy(self.fields.get(text, column)));
+            let cell = excerpt(&String::from_utf8_lossy(self.fields.get(column)));
             Err(LineError::Cell(line, column + 1, format!("'{cell}' is not {needed}")))
         };
         let is_bad = |column: &usize| !self.cells[*column].is_finite();
@@ -328,11 +328,11 @@ impl LineParser {
     }
 
     /// Gathers the readings of a line whose cells can be used.
-    fn readings_of(&mut self, line: u64, text: &[u8], row_index: Option<usize>) -> Result<Found, LineError> {
+    fn readings_of(&mut self, line: u64, row_index: Option<usize>) -> Result<Found, LineError> {
         let (columns, width) = (&self.columns, self.columns.width);
         self.cells.truncate(width);
         let group = columns.group.filter(|&column| column < width);
-        let group = group.map_or(0, |column| key(self.fields.get(text, column)));
+        let group = group.map_or(0, |column| key(self.fields.get(column)));
         let taken = self.derived.take(&mut self.cells);
         let Some(start) = taken.map_err(|error| LineError::Final(line, error.to_string()))? else {
             self.groups_of_start.push(group);
@@ -357,8 +357,7 @@ impl LineParser {
         for (&(column, _), kept) in columns.kept.iter().zip(&mut self.kept) {
             kept.text.clear();
             if column < width {
-                kept.text
-                    .push_str(&String::from_utf8_lossy(self.fields.get(text, column)));
+                kept.text.push_str(&String::from_utf8_lossy(self.fields.get(column)));
             } else if !self.cells[column].is_nan() {
                 kept.text.push_str(&self.cells[column].to_string());
             }
@@ -374,9 +373,9 @@ impl LineParser {
     }
 
     /// Replaces a time stamp by the time since the first.
-    fn read_stamp(&mut self, text: &[u8]) {
+    fn read_stamp(&mut self) {
         if let Some((column, unit_s)) = self.columns.time
-            && let Some(stamp) = TimeStamp::parse(self.fields.get(text, column))
+            && let Some(stamp) = TimeStamp::parse(self.fields.get(column))
         {
             let start = *self.start.get_or_insert(stamp);
             if start.has_zone == stamp.has_zone {
@@ -416,7 +415,7 @@ impl LineParser {
 
     /// Finds the inputs in the cells of a header, or in lines of `width` cells without one.
     fn find_columns(&mut self, header: &[String], width: usize) -> Result<(), String> {
-        let channels = self.inputs.len();
+        let channels = self.problem.inputs.len();
         let all = self.rows.as_ref().map_or(0, |rows| rows.read.len()) * channels;
         let needs_row_wire = self.rows.is_some() && !self.is_array;
         let is_unnamed_array = self.is_array && header.is_empty();
@@ -426,16 +425,15 @@ impl LineParser {
             let columns = InputColumns::in_order(count, !is_snapshot && width == count + 1);
             (columns, DerivedStream::default())
         } else {
-            let (inputs, others, derive) = (&self.inputs, &self.others, &self.derive);
-            InputColumns::of(header, width, inputs, others, derive, needs_row_wire)?
+            InputColumns::of(header, width, &self.problem, &self.recipe, needs_row_wire)?
         };
         if self.is_array
-            && let Some(name) = InputColumns::named_twice(header, &self.inputs)
+            && let Some(name) = InputColumns::named_twice(header, &self.problem.inputs)
         {
             return Err(format!("there are two columns '{name}'; keep one"));
         }
         if needs_row_wire && columns.row_wire.is_none() {
-            let name = self.others.row_wire.as_deref().unwrap_or("row");
+            let name = self.recipe.row_wire.as_deref().unwrap_or("row");
             return Err(format!(
                 "there is no column '{name}', which is an input of the network; each row-wire has its own network, which is \
                  selected by this column"
@@ -443,7 +441,8 @@ impl LineParser {
         }
         // The header of a device that starts again does not begin another start.
         if self.columns != columns {
-            let cells = columns.kept.iter().map(|(_, title)| KeptCell {
+            let cells = columns.kept.iter().filter(|_| !self.is_array);
+            let cells = cells.map(|(_, title)| KeptCell {
                 title: title.clone(),
                 text: String::new(),
             });

@@ -52,7 +52,7 @@ impl<R: Read> ReadingsFile<R> {
     /// If the file cannot be read, has no readings, or a line is malformed.
     pub fn read(&mut self, most: usize) -> Result<Option<Readings>, TableError> {
         let (mut values_ohm, mut lines, mut row_indices) = (Vec::new(), Vec::new(), Vec::new());
-        let channels = self.parser.inputs.len();
+        let channels = self.parser.problem.inputs.len();
         let mut taken = 0;
         while taken < most && self.torn_line.is_none() && self.rows.next_text()? {
             let (line, has_readings) = (self.rows.line(), self.parser.has_readings);
