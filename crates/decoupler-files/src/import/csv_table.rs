@@ -12,7 +12,6 @@ use super::{
     detection::{BEGINNING, detect, encoding_of},
     dialect::utf8_of_utf16,
     format::{Cell, parse},
-    progress::table_error,
     rows::Rows,
     table::{Labels, name_and_unit},
 };
@@ -98,7 +97,7 @@ pub(super) fn read(
     body.table.columns = columns;
     while has_row {
         if body.is_torn(&rows, width) {
-            body.table.torn_line = Some(rows.line());
+            body.table.torn_line = Some(rows.line);
         } else {
             body.add(&rows)?;
         }
@@ -110,8 +109,7 @@ pub(super) fn read(
 /// Reads the beginning, by which the layout is detected.
 fn beginning_of(source: &mut impl Read) -> Result<Vec<u8>, TableError> {
     let mut beginning = Vec::new();
-    let read = source.take(BEGINNING as u64).read_to_end(&mut beginning);
-    read.map_err(table_error)?;
+    source.take(BEGINNING as u64).read_to_end(&mut beginning)?;
     Ok(beginning)
 }
 
@@ -129,7 +127,7 @@ impl Body<'_> {
     /// Returns `true` if the row is the last of a file that is cut off, as when the disk was full: it ends without a line
     /// break, before the last of `width` columns or within its number.
     fn is_torn<R: Read>(&self, rows: &Rows<R>, width: usize) -> bool {
-        if rows.is_ended() || self.table.rows == 0 {
+        if rows.is_ended || self.table.rows == 0 {
             return false;
         }
         let columns = &self.table.columns;
@@ -140,7 +138,7 @@ impl Body<'_> {
     }
 
     fn add<R: Read>(&mut self, rows: &Rows<R>) -> Result<(), TableError> {
-        let (table, line, count) = (&mut self.table, rows.line(), rows.len());
+        let (table, line, count) = (&mut self.table, rows.line, rows.len());
         let (mut cells, width) = (rows.cells(), table.columns.len());
         // A separator at the end of a row does not start another cell.
         if count > width && (count > width + 1 || cells.clone().last().is_some_and(|cell| !cell.is_empty())) {

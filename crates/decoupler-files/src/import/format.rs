@@ -14,7 +14,7 @@ use super::{
     Decimal, Dialect, Table, TableError, Watch, arrays,
     csv_table::{self, Reading},
     matlab, numpy,
-    progress::{Watched, table_error},
+    progress::Watched,
     sheet,
 };
 use crate::machine::{OverBudget, ReadingBudget};
@@ -208,7 +208,7 @@ impl Element {
         while (numbers.len() as u64) < count {
             block.clear();
             let wanted = (count - numbers.len() as u64).min(BLOCK) * self.size as u64;
-            source.take(wanted).read_to_end(&mut block).map_err(table_error)?;
+            source.take(wanted).read_to_end(&mut block)?;
             numbers.extend(block.chunks_exact(self.size).map(|chunk| self.number(chunk)));
             if (block.len() as u64) < wanted {
                 break;

@@ -10,7 +10,6 @@ use super::{
     TableError, Watch,
     archive::for_each_entry,
     format::{Array, Element, written},
-    progress::table_error,
 };
 use crate::machine::ReadingBudget;
 
@@ -25,7 +24,7 @@ pub(super) fn read(name: &str, source: &mut dyn Read, budget: &mut ReadingBudget
         let mut bytes = vec![0; count];
         source.read_exact(&mut bytes).map_err(|error| match error.kind() {
             io::ErrorKind::UnexpectedEof => wrong("it is cut off; copy it again".to_owned()),
-            _ => table_error(error),
+            _ => error.into(),
         })?;
         Ok::<_, TableError>(bytes)
     };

@@ -17,10 +17,8 @@ use pathdiff::diff_paths;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Condition, Derived, DialectChoice, ImportError, Missing, Plan, Watch,
-    expression::texts,
-    progress::{Watched, table_error},
-    table::name_and_unit,
+    Condition, Derived, DialectChoice, ImportError, Missing, Plan, TableError, Watch, expression::texts,
+    progress::Watched, table::name_and_unit,
 };
 
 /// Recipe for importing samples: the files to read and to join, and the meaning of each column.
@@ -287,7 +285,7 @@ pub(super) fn is_irregular(path: &Path) -> bool {
 /// # Errors
 /// If the file cannot be read, or `watch` breaks.
 pub fn file_crc32(path: &Path, watch: Watch<'_>) -> Result<String, ImportError> {
-    let refused = |error| table_error(error).in_file(path);
+    let refused = |error| TableError::from(error).in_file(path);
     if is_irregular(path) {
         return Err(ImportError::Irregular(path.to_owned()));
     }

@@ -28,8 +28,10 @@ pub struct Readings {
 impl<R: Read> ReadingsFile<R> {
     /// Reads the lines of `source` by `parser`.
     pub fn new(source: R, parser: LineParser) -> Self {
+        let mut rows = Rows::new(source, Separator::Comma, false);
+        rows.longest = LONGEST_LINE;
         Self {
-            rows: Rows::new(source, Separator::Comma, false).limited(LONGEST_LINE),
+            rows,
             parser,
             torn_line: None,
         }
@@ -55,14 +57,14 @@ impl<R: Read> ReadingsFile<R> {
         let channels = self.parser.problem.inputs.len();
         let mut taken = 0;
         while taken < most && self.torn_line.is_none() && self.rows.next_text()? {
-            let (line, has_readings) = (self.rows.line(), self.parser.has_readings);
-            let (first_row, readings) = match self.parser.parse(line, self.rows.text()) {
+            let (line, has_readings) = (self.rows.line, self.parser.has_readings);
+            let (first_row, readings) = match self.parser.parse(line, &self.rows.text) {
                 Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => continue,
                 Ok(ParsedLine::Row {
                     row_index, readings, ..
                 }) => (row_index.unwrap_or(0), readings),
                 Ok(ParsedLine::Snapshot(readings)) => (0, readings),
-                Err(_) if has_readings && !self.rows.is_ended() => {
+                Err(_) if has_readings && !self.rows.is_ended => {
                     self.torn_line = Some(line);
                     break;
                 }
