@@ -27,12 +27,10 @@ pub enum ImportError {
     /// A name, range, meaning or condition of a recipe is wrong, or does not fit the files.
     #[error("{0}")]
     Columns(String),
-    /// The rows cannot become samples: a derived column has no value, a row-wire no number, or no row is left.
+    /// The rows cannot become samples: a derived column has no value, a row-wire no number, or no row is left; or files do not
+    /// fit together.
     #[error("{0}")]
     Samples(String),
-    /// The files of a recipe do not fit together, or those for training and for the test.
-    #[error("{0}")]
-    Files(String),
     /// A cell is not a number, or a file cannot be joined, with a remedy that each interface words in its own terms.
     #[error("{cause}; {cure}")]
     Curable {

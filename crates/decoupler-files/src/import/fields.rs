@@ -3,29 +3,22 @@ use std::ops::Range;
 use super::Separator;
 
 /// Cells of a row of text; the buffers are reused, so that rows of similar length need no allocation.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Fields {
     separator: Separator,
     /// Maximum number of cells; one more is found, so that a longer row is noticed.
-    limit: usize,
+    limit: Option<usize>,
     /// Text of the cells, without quotes and separators.
     text: Vec<u8>,
     ranges: Vec<Range<usize>>,
 }
 
-impl Default for Fields {
-    fn default() -> Self {
-        Self::new(Separator::Comma, usize::MAX)
-    }
-}
-
 impl Fields {
-    pub(super) fn new(separator: Separator, limit: usize) -> Self {
+    pub(super) fn new(separator: Separator, limit: Option<usize>) -> Self {
         Self {
             separator,
             limit,
-            text: Vec::new(),
-            ranges: Vec::new(),
+            ..Self::default()
         }
     }
 
@@ -44,7 +37,7 @@ impl Fields {
                 _ if is_quoted || !is_separator => self.text.push(byte),
                 _ => start = self.end_cell(start),
             }
-            if self.ranges.len() > self.limit {
+            if self.limit.is_some_and(|limit| self.ranges.len() > limit) {
                 return;
             }
         }
@@ -84,7 +77,7 @@ mod tests {
     #[test]
     fn cells_are_split_as_by_the_csv_crate() {
         let long = format!("\"{}\",{}", "x".repeat(5000), "1,".repeat(500));
-        let mut fields = Fields::new(Separator::Comma, usize::MAX);
+        let mut fields = Fields::new(Separator::Comma, None);
         for line in [
             "1.5, 2 ,3",
             "a",
@@ -108,7 +101,7 @@ mod tests {
     #[test]
     fn a_row_is_split_up_to_one_cell_beyond_the_limit() {
         for row in [",".repeat(1000), "\"\",".repeat(1000)] {
-            let mut fields = Fields::new(Separator::Comma, 20);
+            let mut fields = Fields::new(Separator::Comma, Some(20));
             fields.split(row.as_bytes());
             assert!(fields.len() > 20 && fields.len() < 100, "{}", fields.len());
         }

@@ -144,15 +144,6 @@ impl FileSet {
         std::iter::once(first).chain(following).collect()
     }
 
-    /// Returns these files replaced by others; `None` if one of them has no replacement.
-    pub(super) fn replaced(&self, of: &impl Fn(&Path) -> Option<PathBuf>) -> Option<Self> {
-        Some(Self {
-            data: of(&self.data)?,
-            join: self.join.iter().map(|path| of(path)).collect::<Option<_>>()?,
-            append: self.append.iter().map(|set| set.replaced(of)).collect::<Option<_>>()?,
-        })
-    }
-
     /// Returns the first file and those joined to it.
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
         std::iter::once(&self.data).chain(&self.join)

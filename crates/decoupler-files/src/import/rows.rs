@@ -30,7 +30,7 @@ impl<R: Read> Rows<R> {
     pub(super) fn new(source: R, separator: Separator, has_carriage_returns: bool) -> Self {
         Self {
             source: BufReader::with_capacity(BUFFER, source),
-            fields: Fields::new(separator, MAX_CELLS),
+            fields: Fields::new(separator, Some(MAX_CELLS)),
             longest: LONGEST_ROW,
             line_break: if has_carriage_returns { b'\r' } else { b'\n' },
             text: Vec::new(),
