@@ -257,9 +257,9 @@ fn read_resistances(
             kept: Vec::new(),
         })?;
     }
-    warn_if_torn(input, readings.torn_line());
+    warn_if_torn(input, readings.torn_line);
     let lines = readings.lines_in_turn();
-    if readings.torn_line().is_none() && !lines.is_multiple_of(read.len()) {
+    if readings.torn_line.is_none() && !lines.is_multiple_of(read.len()) {
         let rows = read.len();
         return Err(Failure::at(
             input,

@@ -368,7 +368,7 @@ impl Recording {
     ///
     /// # Errors
     /// If the memory is invalid for the readings, such as one in seconds without times.
-    pub fn with_memory(&self, memory: Option<&Memory>) -> Result<Self, DatasetError> {
+    pub fn with_memory(&self, memory: Option<&Memory>) -> Result<Self, ImportError> {
         let (memory, features) = remembered(&self.history, memory)?;
         let problem = Problem {
             memory,

@@ -1,6 +1,6 @@
 use std::{
     collections::BTreeSet,
-    hash::{DefaultHasher, Hash, Hasher},
+    hash::{BuildHasher as _, BuildHasherDefault, DefaultHasher},
 };
 
 use decoupler_core::{
@@ -332,7 +332,8 @@ impl LineParser {
         let (columns, width) = (&self.columns, self.columns.width);
         self.cells.truncate(width);
         let group = columns.group.filter(|&column| column < width);
-        let group = group.map_or(0, |column| key(self.fields.get(column)));
+        let hasher = BuildHasherDefault::<DefaultHasher>::default();
+        let group = group.map_or(0, |column| hasher.hash_one(self.fields.get(column)));
         let taken = self.derived.take(&mut self.cells);
         let Some(start) = taken.map_err(|error| LineError::Final(line, error.to_string()))? else {
             self.groups_of_start.push(group);
@@ -452,13 +453,6 @@ impl LineParser {
         (self.has_names, self.is_snapshot) = (!header.is_empty(), is_snapshot);
         Ok(())
     }
-}
-
-/// Number of a group, from its text.
-fn key(group: &[u8]) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    group.hash(&mut hasher);
-    hasher.finish()
 }
 
 impl InputColumns {

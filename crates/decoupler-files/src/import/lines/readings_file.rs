@@ -11,7 +11,9 @@ use super::{
 pub struct ReadingsFile<R> {
     rows: Rows<R>,
     parser: LineParser,
-    torn_line: Option<u64>,
+    /// Number of the last line if it is cut off: malformed and without a line break. It is ignored, unless it is the only line
+    /// with readings.
+    pub torn_line: Option<u64>,
 }
 
 /// Block of the readings of row-wires.
@@ -35,12 +37,6 @@ impl<R: Read> ReadingsFile<R> {
             parser,
             torn_line: None,
         }
-    }
-
-    /// Number of the last line if it is cut off: malformed and without a line break. It is ignored, unless it is the only line
-    /// with readings.
-    pub fn torn_line(&self) -> Option<u64> {
-        self.torn_line
     }
 
     /// Number of lines so far whose row-wire follows from their order.
@@ -136,7 +132,7 @@ mod tests {
             while let Some(block) = reader.read(2).unwrap() {
                 lines += block.lines.len();
             }
-            assert_eq!((lines, reader.torn_line()), (rows, torn), "{text}");
+            assert_eq!((lines, reader.torn_line), (rows, torn), "{text}");
         }
         for refused in ["1,2\n3\n5,6", "1,2\n3\n", "r_1,r_2\n1"] {
             assert!(read(refused).is_err(), "{refused}");
