@@ -11,7 +11,7 @@ use super::{
     Column, ImportError, Recipe, TableError, Watch,
     columns::{Files, Meanings, called, near, position},
     csv_table::named,
-    derived::{DerivedStream, TimeColumn},
+    derived::DerivedStream,
     selection::{order_note, seconds},
     table::name_and_unit,
 };
@@ -32,17 +32,9 @@ pub struct InputTable {
     /// Notes on times, which a memory needs: lines that are left out, and the order of the lines.
     pub warnings: Vec<String>,
     /// Columns of the recipe that say when or to what a sample belongs, as far as the file has them: time, group and
-    /// row-wire.
-    pub kept: Vec<KeptColumn>,
-}
-
-/// Column that is copied from an input to the output.
-#[derive(Clone, Debug)]
-pub struct KeptColumn {
-    /// Name, with the unit in brackets if there is one.
-    pub title: String,
-    /// Text of each cell; empty if it is missing.
-    pub cells: Vec<String>,
+    /// row-wire. Each has a title, with the unit in brackets if there is one, and the text of each cell, empty if it is
+    /// missing.
+    pub kept: Vec<(String, Vec<String>)>,
 }
 
 /// Columns of a table that contain the inputs of a network.
@@ -79,10 +71,7 @@ impl InputColumns {
         has_row_wire: bool,
     ) -> Result<(Self, DerivedStream), String> {
         let mut columns = named(header, width);
-        let time = recipe.time.as_deref().map(|name| TimeColumn {
-            name,
-            given_unit: recipe.unit_of(name),
-        });
+        let time = recipe.time.as_deref().map(|name| (name, recipe.unit_of(name)));
         let derived = DerivedStream::new(&recipe.derive, &mut columns, time).map_err(|error| error.to_string())?;
         let found = Self::find(&columns, !header.is_empty(), problem, recipe, has_row_wire)?;
         Ok((Self { width, ..found }, derived))
@@ -278,13 +267,8 @@ impl Recipe {
                 .map_err(|error| ImportError::from(error).of_file(path))?
                 .into_owned();
         }
-        let kept = found.kept.into_iter().map(|(column, title)| KeptColumn {
-            title,
-            cells: placed
-                .iter()
-                .map(|&row| columns[column].text(row).into_owned())
-                .collect(),
-        });
+        let texts = |id: usize| placed.iter().map(move |&row| columns[id].text(row).into_owned());
+        let kept = found.kept.into_iter().map(|(id, title)| (title, texts(id).collect()));
         Ok(InputTable {
             readings,
             row_wires: files.row_wires(&placed)?,

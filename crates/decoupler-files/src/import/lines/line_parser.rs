@@ -47,8 +47,8 @@ pub struct LineParser {
     is_snapshot: bool,
     /// `true` once a line had readings.
     pub(super) has_readings: bool,
-    /// Number of lines so far whose row-wire follows from their order, valid or not.
-    pub(super) lines_in_turn: usize,
+    /// Number of lines so far whose row-wire follows from their order, valid or not; `None` if it does not follow.
+    pub(super) lines_in_turn: Option<usize>,
     /// The derived columns, once the columns of the lines are known.
     derived: DerivedStream,
     /// Group of each line of the start, which is waited for.
@@ -72,18 +72,8 @@ struct RowWires {
     read: Vec<usize>,
     /// Largest number of a row-wire.
     last: usize,
-    unnumbered: Unnumbered,
-}
-
-/// What is known of the row-wire of a line without a row number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Unnumbered {
-    /// Nothing, and the network needs no row.
-    Any,
-    /// It follows from the number of lines so far; a single one is always in turn.
-    InTurn,
-    /// Nothing.
-    Refused,
+    /// `false` if the network of a line does not depend on its row-wire.
+    are_needed: bool,
 }
 
 /// Cell of a line that is copied to the output.
@@ -138,11 +128,9 @@ impl LineParser {
     /// If the array does not have the row.
     pub fn of_array(scale: ArrayScale, rows: Rows, is_complete: bool) -> Result<Self, SceneError> {
         let read = rows.read(scale.rows())?;
-        let unnumbered = match rows.model() {
-            RowModel::Shared => Unnumbered::Any,
-            RowModel::Each if is_complete || read.len() == 1 => Unnumbered::InTurn,
-            RowModel::Each => Unnumbered::Refused,
-        };
+        let are_needed = rows.model() == RowModel::Each;
+        // A single row-wire is always in turn.
+        let is_in_turn = are_needed && (is_complete || read.len() == 1);
         let channels = 1..=scale.columns();
         let inputs = Vec::from_iter(channels.map(|channel| Channel::new(format!("r_{channel}"), None)));
         Ok(Self {
@@ -159,8 +147,9 @@ impl LineParser {
             rows: Some(RowWires {
                 read,
                 last: scale.rows(),
-                unnumbered,
+                are_needed,
             }),
+            lines_in_turn: is_in_turn.then_some(0),
             is_array: true,
             ..Self::default()
         })
@@ -191,7 +180,7 @@ impl LineParser {
         let rows = row_wires.map(|read| RowWires {
             read,
             last: LAST_ROW_WIRE,
-            unnumbered: Unnumbered::Refused,
+            are_needed: true,
         });
         Ok(Self {
             read,
@@ -207,9 +196,8 @@ impl LineParser {
 
     /// Counts a malformed line, which still advances the row counter.
     pub fn count_bad(&mut self) {
-        let is_in_turn = |rows: &RowWires| rows.unnumbered == Unnumbered::InTurn;
         let has_no_row = self.columns.width > 0 && self.columns.row_wire.is_none();
-        self.lines_in_turn += usize::from(has_no_row && self.rows.as_ref().is_some_and(is_in_turn));
+        self.lines_in_turn = self.lines_in_turn.map(|lines| lines + usize::from(has_no_row));
     }
 
     /// Parses a line without its line break; `line` is its number, from 1.
@@ -392,14 +380,13 @@ impl LineParser {
             return Ok(Some(0));
         };
         let Some(column) = self.columns.row_wire else {
-            let turn = self.lines_in_turn % rows.read.len();
-            return match rows.unnumbered {
-                Unnumbered::Any => Ok(None),
-                Unnumbered::InTurn => {
-                    self.lines_in_turn += 1;
-                    Ok(Some(turn))
+            return match &mut self.lines_in_turn {
+                Some(lines) => {
+                    *lines += 1;
+                    Ok(Some((*lines - 1) % rows.read.len()))
                 }
-                Unnumbered::Refused => Err(LineError::Final(line, NO_ROW.to_owned())),
+                None if rows.are_needed => Err(LineError::Final(line, NO_ROW.to_owned())),
+                None => Ok(None),
             };
         };
         let row = self.cells[column] as usize;

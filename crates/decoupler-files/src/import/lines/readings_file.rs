@@ -41,7 +41,7 @@ impl<R: Read> ReadingsFile<R> {
 
     /// Number of lines so far whose row-wire follows from their order.
     pub fn lines_in_turn(&self) -> usize {
-        self.parser.lines_in_turn
+        self.parser.lines_in_turn.unwrap_or(0)
     }
 
     /// Reads at most `most` further lines; returns `None` at the end.
