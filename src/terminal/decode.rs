@@ -116,9 +116,9 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
             readings.clone_into(&mut answer.readings);
             values.clone_into(&mut answer.values);
             answer.kept.resize_with(block.kept.len(), KeptCell::default);
-            for (cell, column) in answer.kept.iter_mut().zip(&block.kept) {
-                cell.title.clone_from(&column.title);
-                cell.text.clone_from(&column.cells[row]);
+            for (cell, (title, texts)) in answer.kept.iter_mut().zip(&block.kept) {
+                cell.title.clone_from(title);
+                cell.text.clone_from(&texts[row]);
             }
             answers.write(&answer).map_err(refused)?;
         }

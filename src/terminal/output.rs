@@ -18,7 +18,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{NetworkFile, check_writable},
-    import::{self, InputTable, KeptColumn, ReadingsFile, Recipe},
+    import::{self, InputTable, ReadingsFile, Recipe},
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use ndarray::Array2;
@@ -186,8 +186,8 @@ pub(super) struct Readings {
     pub(super) lines: Vec<u64>,
     /// Index of the row-wire of each line among those that the network reads; 0 if one network reads all.
     pub(super) row_indices: Vec<usize>,
-    /// Columns copied to the output.
-    pub(super) kept: Vec<KeptColumn>,
+    /// Titles and cells of the columns copied to the output.
+    pub(super) kept: Vec<(String, Vec<String>)>,
 }
 
 /// Reads the file `input` for the network of `file` and passes its lines to `take`, block by block.
@@ -257,9 +257,9 @@ fn read_resistances(
             kept: Vec::new(),
         })?;
     }
-    warn_if_torn(input, readings.torn_line());
+    warn_if_torn(input, readings.torn_line);
     let lines = readings.lines_in_turn();
-    if readings.torn_line().is_none() && !lines.is_multiple_of(read.len()) {
+    if readings.torn_line.is_none() && !lines.is_multiple_of(read.len()) {
         let rows = read.len();
         return Err(Failure::at(
             input,

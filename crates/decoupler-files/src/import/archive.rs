@@ -4,10 +4,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use zip::{ZipArchive, result::ZipError};
 
-use super::{
-    TableError, Watch,
-    progress::{Watched, table_error},
-};
+use super::{TableError, Watch, progress::Watched};
 
 /// Passes the name, the size and the contents of each entry to `read`. Each is read to its end, where its checksum is verified,
 /// since damage can make it look like something else.
@@ -71,13 +68,13 @@ fn damage(name: &str, error: io::Error) -> TableError {
         io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput | io::ErrorKind::UnexpectedEof => {
             TableError::damaged(name, "its contents do not match its checksum; copy it again")
         }
-        _ => table_error(error),
+        _ => error.into(),
     }
 }
 
 fn defect(error: ZipError) -> TableError {
     match error {
-        ZipError::Io(error) => table_error(error),
+        ZipError::Io(error) => error.into(),
         error => TableError::damaged("the archive", format_args!("{error}; copy it again, or save it again")),
     }
 }

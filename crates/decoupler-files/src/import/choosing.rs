@@ -11,7 +11,7 @@ use decoupler_core::{
     scene::RowModel,
 };
 
-use super::{Plan, Progress, Recording, Recordings, Setup, SetupError, SetupSets, setup::watch};
+use super::{ImportError, Plan, Progress, Recording, Recordings, Setup, SetupError, SetupSets, setup::watch};
 use crate::machine::memory_budget;
 
 /// Progress of a choice of settings.
@@ -51,7 +51,7 @@ impl Setup {
     ) -> Result<(Self, SetupSets), SetupError> {
         let mut plan = self.plan().expect("settings are chosen for a recording").clone();
         let mut settings = *self.settings();
-        let mut read = |plan: &Plan| -> Result<_, SetupError> {
+        let mut read = |plan: &Plan| -> Result<_, ImportError> {
             let mut on_reading = |progress| on_progress(ChoosingProgress::Reading(progress));
             let (recording, test) = plan.recordings(folder, &mut watch(job, &mut on_reading))?;
             let raw = recording.with_memory(None)?;

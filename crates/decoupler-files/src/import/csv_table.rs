@@ -7,12 +7,11 @@ use std::{
 use decoupler_core::text::{clean_name, counted, original_name};
 
 use super::{
-    Column, Dialect, DialectChoice, Encoding, Fault, Faults, Format, Missing, Table, TableError,
+    Column, Decimal, Dialect, DialectChoice, Encoding, Fault, Format, Missing, Table, TableError,
     columns::position,
     detection::{BEGINNING, detect, encoding_of},
     dialect::utf8_of_utf16,
     format::{Cell, parse},
-    progress::table_error,
     rows::Rows,
     table::{Labels, name_and_unit},
 };
@@ -87,111 +86,96 @@ pub(super) fn read(
     };
     let empty_end = dialect.trailing_separator && headers.last().is_none_or(String::is_empty);
     let mut columns = named(&headers, width - usize::from(empty_end && width > 1));
-    let mut body = Body {
-        dialect,
-        budget,
-        missing: reading.give_roles(&mut columns),
-        too_short: Faults::default(),
-        table: Table::new(path, Format::Text(dialect)),
-    };
+    let markers = reading.give_roles(&mut columns);
     let width = if headers.is_empty() { width } else { columns.len() };
-    body.table.columns = columns;
+    let mut table = Table {
+        columns,
+        ..Table::new(path, Format::Text(dialect))
+    };
     while has_row {
-        if body.is_torn(&rows, width) {
-            body.table.torn_line = Some(rows.line());
+        if is_torn(&table, &rows, width, dialect.decimal) {
+            let line = rows.line;
+            table.torn_line = Some(line);
+            let note = format!("line {line}, the last, is cut off and left out");
+            table.notes.push(note);
         } else {
-            body.add(&rows)?;
+            add(&mut table, &rows, &markers, dialect, budget)?;
         }
         has_row = rows.advance()?;
     }
-    body.finish()
+    if table.rows == 0 {
+        return Err(TableError::Empty);
+    }
+    for (rows, what) in [
+        (
+            &table.too_short,
+            "fewer cells than there are columns, which are missing",
+        ),
+        (&table.too_long, "more cells than there are columns, left out"),
+    ] {
+        if let Some(Fault { line, .. }) = &rows.first {
+            let rows = counted(rows.count, "row");
+            let note = format!("{rows} with {what}, the first on line {line}");
+            table.notes.push(note);
+        }
+    }
+    Ok(table)
 }
 
 /// Reads the beginning, by which the layout is detected.
 fn beginning_of(source: &mut impl Read) -> Result<Vec<u8>, TableError> {
     let mut beginning = Vec::new();
-    let read = source.take(BEGINNING as u64).read_to_end(&mut beginning);
-    read.map_err(table_error)?;
+    source.take(BEGINNING as u64).read_to_end(&mut beginning)?;
     Ok(beginning)
 }
 
-/// The rows after the header.
-struct Body<'a> {
-    dialect: Dialect,
-    budget: &'a mut ReadingBudget,
-    /// Markers of missing values of each column.
-    missing: Vec<Vec<&'a Missing>>,
-    too_short: Faults,
-    table: Table,
+/// Returns `true` if the row is the last of a file that is cut off, as when the disk was full: it ends without a line break,
+/// before the last of `width` columns or within its number.
+fn is_torn<R: Read>(table: &Table, rows: &Rows<R>, width: usize, decimal: Decimal) -> bool {
+    if rows.is_ended || table.rows == 0 {
+        return false;
+    }
+    let is_text = |cell: &[u8]| parse(cell, decimal) == Cell::Text;
+    let has_numbers = |column: &Column| column.has_numbers() && column.faults.count == 0;
+    let ends_in_text = || rows.len() == table.columns.len() && rows.cells().last().is_some_and(is_text);
+    rows.len() < width || (table.columns.last().is_some_and(has_numbers) && ends_in_text())
 }
 
-impl Body<'_> {
-    /// Returns `true` if the row is the last of a file that is cut off, as when the disk was full: it ends without a line
-    /// break, before the last of `width` columns or within its number.
-    fn is_torn<R: Read>(&self, rows: &Rows<R>, width: usize) -> bool {
-        if rows.is_ended() || self.table.rows == 0 {
-            return false;
-        }
-        let columns = &self.table.columns;
-        let is_text = |cell: &[u8]| parse(cell, self.dialect.decimal) == Cell::Text;
-        let has_numbers = |column: &Column| column.has_numbers() && column.faults.count == 0;
-        let ends_in_text = || rows.len() == columns.len() && rows.cells().last().is_some_and(is_text);
-        rows.len() < width || (columns.last().is_some_and(has_numbers) && ends_in_text())
+/// Adds a row; `markers` are those of missing values of each column.
+fn add<R: Read>(
+    table: &mut Table,
+    rows: &Rows<R>,
+    markers: &[Vec<&Missing>],
+    dialect: Dialect,
+    budget: &mut ReadingBudget,
+) -> Result<(), TableError> {
+    let (line, count) = (rows.line, rows.len());
+    let (mut cells, width) = (rows.cells(), table.columns.len());
+    // A separator at the end of a row does not start another cell.
+    if count > width && (count > width + 1 || cells.clone().last().is_some_and(|cell| !cell.is_empty())) {
+        table.too_long.add(line, String::new);
+        return Ok(());
     }
-
-    fn add<R: Read>(&mut self, rows: &Rows<R>) -> Result<(), TableError> {
-        let (table, line, count) = (&mut self.table, rows.line(), rows.len());
-        let (mut cells, width) = (rows.cells(), table.columns.len());
-        // A separator at the end of a row does not start another cell.
-        if count > width && (count > width + 1 || cells.clone().last().is_some_and(|cell| !cell.is_empty())) {
-            table.too_long.add(line, String::new);
-            return Ok(());
-        }
-        if count < width {
-            self.too_short.add(line, String::new);
-        }
-        if table.rows == LARGEST_ROWS {
-            let reason = format!("it has more than {LARGEST_ROWS} rows; use every second row, or a part of the file");
-            return Err(TableError::Contents(reason));
-        }
-        self.budget.claim(NUMBER * width as u64)?;
-        let Dialect { decimal, encoding, .. } = self.dialect;
-        for (column, missing) in table.columns.iter_mut().zip(&self.missing) {
-            let cell = cells.next().unwrap_or_default();
-            let found = match parse(cell, decimal) {
-                found if missing.iter().any(|missing| missing.is(cell, found)) => Cell::Missing,
-                found => found,
-            };
-            if let Some(length) = column.push(line, cell, found, encoding) {
-                self.budget.claim(2 * (length as u64 + TEXT))?;
-            }
-        }
-        table.lines.push(table.rows, line);
-        table.rows += 1;
-        Ok(())
+    if count < width {
+        table.too_short.add(line, String::new);
     }
-
-    fn finish(self) -> Result<Table, TableError> {
-        let mut table = self.table;
-        if table.rows == 0 {
-            return Err(TableError::Empty);
-        }
-        let torn = table
-            .torn_line
-            .map(|line| format!("line {line}, the last, is cut off and left out"));
-        table.notes.extend(torn);
-        for (rows, what) in [
-            (&self.too_short, "fewer cells than there are columns, which are missing"),
-            (&table.too_long, "more cells than there are columns, left out"),
-        ] {
-            if let Some(Fault { line, .. }) = &rows.first {
-                let rows = counted(rows.count, "row");
-                let note = format!("{rows} with {what}, the first on line {line}");
-                table.notes.push(note);
-            }
-        }
-        Ok(table)
+    if table.rows == LARGEST_ROWS {
+        let reason = format!("it has more than {LARGEST_ROWS} rows; use every second row, or a part of the file");
+        return Err(TableError::Contents(reason));
     }
+    budget.claim(NUMBER * width as u64)?;
+    for (column, missing) in table.columns.iter_mut().zip(markers) {
+        let cell = cells.next().unwrap_or_default();
+        let found = match parse(cell, dialect.decimal) {
+            found if missing.iter().any(|missing| missing.is(cell, found)) => Cell::Missing,
+            found => found,
+        };
+        if let Some(length) = column.push(line, cell, found, dialect.encoding) {
+            budget.claim(2 * (length as u64 + TEXT))?;
+        }
+    }
+    table.add_row(line);
+    Ok(())
 }
 
 /// Returns `width` columns without cells, with names and units from the cells of the header, if there is one.

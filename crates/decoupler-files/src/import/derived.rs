@@ -12,14 +12,8 @@ use super::{
 /// Maximum number of cells of a stream that are kept until the start is over: 128 MB.
 const MAX_CELLS: usize = 1 << 24;
 
-/// Time column of a file.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct TimeColumn<'a> {
-    /// Name within the file.
-    pub(super) name: &'a str,
-    /// Unit given by the recipe instead of the header.
-    pub(super) given_unit: Option<&'a str>,
-}
+/// Name of the time column within the file, and the unit given by the recipe instead of the header.
+pub(super) type TimeColumn<'a> = (&'a str, Option<&'a str>);
 
 /// Derived column with the places of its columns in a table or in the lines of a stream.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,7 +82,7 @@ impl Derived {
 
     /// Returns the place of the time column and the seconds in its unit.
     fn clock(&self, columns: &[Column], time: Option<TimeColumn<'_>>) -> Result<(usize, f64), ImportError> {
-        let found = time.and_then(|time| Some((position(columns, time.name)?, time.given_unit)));
+        let found = time.and_then(|(name, given_unit)| Some((position(columns, name)?, given_unit)));
         let (place, given_unit) =
             found.ok_or_else(|| self.refused("seconds need the time column; give a number of rows"))?;
         let Column { name, unit, start, .. } = &columns[place];

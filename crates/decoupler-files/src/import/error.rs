@@ -6,6 +6,7 @@ use std::{
 use decoupler_core::{dataset::DatasetError, text::in_one_line};
 use thiserror::Error;
 
+use super::progress::Cancelled;
 use crate::machine::{OverBudget, system_cause};
 
 /// Error of an import. Lines and columns are counted from 1.
@@ -26,12 +27,10 @@ pub enum ImportError {
     /// A name, range, meaning or condition of a recipe is wrong, or does not fit the files.
     #[error("{0}")]
     Columns(String),
-    /// The rows cannot become samples: a derived column has no value, a row-wire no number, or no row is left.
+    /// The rows cannot become samples: a derived column has no value, a row-wire no number, or no row is left; or files do not
+    /// fit together.
     #[error("{0}")]
     Samples(String),
-    /// The files of a recipe do not fit together, or those for training and for the test.
-    #[error("{0}")]
-    Files(String),
     /// A cell is not a number, or a file cannot be joined, with a remedy that each interface words in its own terms.
     #[error("{cause}; {cure}")]
     Curable {
@@ -39,14 +38,6 @@ pub enum ImportError {
         cause: String,
         /// Remedy.
         cure: Cure,
-    },
-    /// One of several files of an experiment cannot be imported.
-    #[error("'{}': {source}", .path.display())]
-    OfFile {
-        /// The file.
-        path: PathBuf,
-        /// Error without a path of its own.
-        source: Box<ImportError>,
     },
     /// The samples are not a valid dataset, cannot be split, or the memory is invalid for them.
     #[error(transparent)]
@@ -60,10 +51,9 @@ impl ImportError {
     /// Returns the error with the file whose import failed, unless the message names a file already.
     pub(super) fn of_file(self, path: &Path) -> Self {
         match self {
-            Self::Columns(_) | Self::Samples(_) | Self::Dataset(_) => Self::OfFile {
-                path: path.to_owned(),
-                source: Box::new(self),
-            },
+            Self::Columns(_) | Self::Samples(_) | Self::Dataset(_) => {
+                Self::Samples(format!("'{}': {self}", path.display()))
+            }
             error => error,
         }
     }
@@ -71,7 +61,6 @@ impl ImportError {
     /// Returns the message with the cure in the caller's wording, for example with the names of fields or arguments.
     pub fn with_cure(&self, phrase: impl Fn(&Cure) -> String) -> String {
         match self {
-            Self::OfFile { path, source } => format!("'{}': {}", path.display(), source.with_cure(phrase)),
             Self::Curable { cause, cure } => format!("{cause}; {}", phrase(cure)),
             error => error.to_string(),
         }
@@ -84,7 +73,7 @@ impl ImportError {
 pub enum TableError {
     /// The file could not be read to the end.
     #[error("{}", system_cause(.0))]
-    Io(#[from] io::Error),
+    Io(io::Error),
     /// The caller cancelled the import.
     #[error("the import was cancelled")]
     Cancelled,
@@ -103,6 +92,15 @@ pub enum TableError {
     /// The contents are damaged, of another kind, or not the table that is needed: where, why, and what to do.
     #[error("{0}")]
     Contents(String),
+}
+
+impl From<io::Error> for TableError {
+    fn from(error: io::Error) -> Self {
+        match error.get_ref() {
+            Some(inner) if inner.is::<Cancelled>() => Self::Cancelled,
+            _ => Self::Io(error),
+        }
+    }
 }
 
 impl TableError {

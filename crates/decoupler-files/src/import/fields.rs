@@ -1,27 +1,16 @@
 use std::ops::Range;
 
-use csv_core::{ReadRecordResult, Reader, ReaderBuilder};
-
 use super::Separator;
 
 /// Cells of a row of text; the buffers are reused, so that rows of similar length need no allocation.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Fields {
     separator: Separator,
     /// Maximum number of cells; one more is found, so that a longer row is noticed.
     limit: Option<usize>,
-    parser: Reader,
-    /// Text of the cells of a row with quotes.
-    unquoted: Vec<u8>,
-    has_quotes: bool,
-    ends: Vec<usize>,
+    /// Text of the cells, without quotes and separators.
+    text: Vec<u8>,
     ranges: Vec<Range<usize>>,
-}
-
-impl Default for Fields {
-    fn default() -> Self {
-        Self::new(Separator::Comma, None)
-    }
 }
 
 impl Fields {
@@ -29,73 +18,39 @@ impl Fields {
         Self {
             separator,
             limit,
-            parser: ReaderBuilder::new().delimiter(separator.byte()).build(),
-            unquoted: Vec::new(),
-            has_quotes: false,
-            ends: Vec::new(),
-            ranges: Vec::new(),
+            ..Self::default()
         }
     }
 
-    /// Splits a row without its line break.
-    pub(super) fn split(&mut self, text: &[u8]) {
+    /// Splits a row without its line break. Quotes enclose a cell only from its start, and a doubled one is part of it.
+    pub(super) fn split(&mut self, row: &[u8]) {
         self.ranges.clear();
-        self.has_quotes = text.contains(&b'"');
-        if self.has_quotes {
-            self.split_quoted(text);
-            return;
-        }
-        let separator = self.separator.byte();
-        match self.separator {
-            Separator::Space => {
-                self.split_at(text, |byte| byte == separator || byte.is_ascii_whitespace());
-                self.ranges.retain(|range| !range.is_empty());
+        self.text.clear();
+        let (separator, has_spaces) = (self.separator.byte(), self.separator == Separator::Space);
+        let (mut start, mut is_quoted) = (0, false);
+        let mut bytes = row.iter().copied().peekable();
+        while let Some(byte) = bytes.next() {
+            let is_separator = byte == separator || (has_spaces && byte.is_ascii_whitespace());
+            match byte {
+                b'"' if is_quoted && bytes.next_if_eq(&b'"').is_none() => is_quoted = false,
+                b'"' if !is_quoted && self.text.len() == start => is_quoted = true,
+                _ if is_quoted || !is_separator => self.text.push(byte),
+                _ => start = self.end_cell(start),
             }
-            _ => self.split_at(text, |byte| byte == separator),
+            if self.limit.is_some_and(|limit| self.ranges.len() > limit) {
+                return;
+            }
         }
+        self.end_cell(start);
     }
 
-    fn split_at(&mut self, text: &[u8], is_separator: impl Fn(u8) -> bool) {
-        let mut start = 0;
-        for (place, &byte) in text.iter().enumerate() {
-            if is_separator(byte) {
-                self.ranges.push(start..place);
-                start = place + 1;
-                if self.limit.is_some_and(|limit| self.ranges.len() > limit) {
-                    return;
-                }
-            }
+    /// Ends a cell, unless it is nothing between two spaces; returns the start of the next.
+    fn end_cell(&mut self, start: usize) -> usize {
+        let end = self.text.len();
+        if self.separator != Separator::Space || end > start {
+            self.ranges.push(start..end);
         }
-        self.ranges.push(start..text.len());
-    }
-
-    fn split_quoted(&mut self, text: &[u8]) {
-        self.parser.reset();
-        // The text of the cells is never longer than the row.
-        self.unquoted.resize(self.unquoted.len().max(text.len() + 1), 0);
-        let (mut rest, mut written, mut count) = (text, 0, 0);
-        loop {
-            let (unquoted, ends) = (&mut self.unquoted[written..], &mut self.ends[count..]);
-            let (result, read, copied, found) = self.parser.read_record(rest, unquoted, ends);
-            rest = &rest[read..];
-            written += copied;
-            count += found;
-            match result {
-                // The parser treats empty input as the end of the record.
-                ReadRecordResult::InputEmpty => {}
-                ReadRecordResult::OutputEndsFull if self.limit.is_none_or(|limit| count <= limit) => {
-                    self.ends.resize(2 * count + 8, 0);
-                }
-                _ => break,
-            }
-        }
-        let mut start = 0;
-        for &end in &self.ends[..count] {
-            if self.separator != Separator::Space || end > start {
-                self.ranges.push(start..end);
-            }
-            start = end;
-        }
+        end
     }
 
     /// Number of cells.
@@ -103,17 +58,15 @@ impl Fields {
         self.ranges.len()
     }
 
-    /// Cells of the row `text`, which was split last, without surrounding spaces.
-    pub(super) fn iter<'a>(&'a self, text: &'a [u8]) -> impl DoubleEndedIterator<Item = &'a [u8]> + Clone {
-        let text = if self.has_quotes { &self.unquoted } else { text };
-        self.ranges.iter().map(|range| text[range.clone()].trim_ascii())
+    /// Cells of the row, without surrounding spaces.
+    pub(super) fn iter(&self) -> impl DoubleEndedIterator<Item = &[u8]> + Clone {
+        self.ranges.iter().map(|range| self.text[range.clone()].trim_ascii())
     }
 
-    /// Cell with this index, as from [`Self::iter`]; empty if there are not this many.
-    pub(super) fn get<'a>(&'a self, text: &'a [u8], index: usize) -> &'a [u8] {
-        let text = if self.has_quotes { &self.unquoted } else { text };
+    /// Cell with this index; empty if there are not this many.
+    pub(super) fn get(&self, index: usize) -> &[u8] {
         let range = self.ranges.get(index).cloned().unwrap_or_default();
-        text[range].trim_ascii()
+        self.text[range].trim_ascii()
     }
 }
 
@@ -141,7 +94,7 @@ mod tests {
                 .from_reader(line.as_bytes());
             assert!(reader.read_byte_record(&mut record).unwrap());
             record.trim();
-            assert!(fields.iter(line.as_bytes()).eq(&record), "{line}");
+            assert!(fields.iter().eq(&record), "{line}");
         }
     }
 

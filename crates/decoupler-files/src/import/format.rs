@@ -14,7 +14,7 @@ use super::{
     Decimal, Dialect, Table, TableError, Watch, arrays,
     csv_table::{self, Reading},
     matlab, numpy,
-    progress::{Watched, table_error},
+    progress::Watched,
     sheet,
 };
 use crate::machine::{OverBudget, ReadingBudget};
@@ -208,7 +208,7 @@ impl Element {
         while (numbers.len() as u64) < count {
             block.clear();
             let wanted = (count - numbers.len() as u64).min(BLOCK) * self.size as u64;
-            source.take(wanted).read_to_end(&mut block).map_err(table_error)?;
+            source.take(wanted).read_to_end(&mut block)?;
             numbers.extend(block.chunks_exact(self.size).map(|chunk| self.number(chunk)));
             if (block.len() as u64) < wanted {
                 break;
@@ -306,24 +306,13 @@ impl Cell {
     }
 }
 
-/// Maximum length of a number that is copied to the stack.
-const LONGEST: usize = 64;
-
 /// Parses a cell without surrounding spaces; the number is correctly rounded.
 pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Cell {
-    let number = match decimal {
-        Decimal::Point => parse_point(cell),
+    let number: Option<f64> = match decimal {
+        Decimal::Point => std::str::from_utf8(cell).ok().and_then(|text| text.parse().ok()),
         // A point would be a thousands separator, or a decimal point after all.
-        Decimal::Comma if cell.contains(&b'.') || cell.len() > LONGEST => None,
-        Decimal::Comma => {
-            let mut copy = [0; LONGEST];
-            let copy = &mut copy[..cell.len()];
-            copy.copy_from_slice(cell);
-            if let Some(comma) = copy.iter_mut().find(|byte| **byte == b',') {
-                *comma = b'.';
-            }
-            parse_point(copy)
-        }
+        Decimal::Comma if cell.contains(&b'.') => None,
+        Decimal::Comma => String::from_utf8_lossy(cell).replace(',', ".").parse().ok(),
     };
     match number {
         Some(number) if number.is_finite() => Cell::Number(number),
@@ -331,10 +320,6 @@ pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Cell {
         None if cell.is_empty() => Cell::Missing,
         _ => Cell::Text,
     }
-}
-
-fn parse_point(cell: &[u8]) -> Option<f64> {
-    std::str::from_utf8(cell).ok()?.parse().ok()
 }
 
 #[cfg(test)]

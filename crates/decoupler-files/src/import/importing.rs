@@ -15,7 +15,6 @@ use super::{
     Cure, Derived, DialectChoice, FileSet, Format, ImportError, Joined, Recipe, Table, Watch,
     columns::{Files, Meanings},
     csv_table::Reading,
-    derived::TimeColumn,
     format,
     join::{Partners, gather, median_interval, nearest},
     positions::read_positions,
@@ -218,10 +217,8 @@ impl Recipe {
         };
         let mut table = read(path, &reading, watch)?;
         let time = joined.and_then(|(joined, _)| joined.time.as_deref());
-        let time = time.or(self.time.as_deref()).map(|name| TimeColumn {
-            name,
-            given_unit: self.unit_of(&format!("{prefix}{name}")),
-        });
+        let time = time.or(self.time.as_deref());
+        let time = time.map(|name| (name, self.unit_of(&format!("{prefix}{name}"))));
         for derived in &self.derive {
             derived.add_to(&mut table, own_name, time)?;
         }
@@ -389,7 +386,7 @@ impl Recording {
     ///
     /// # Errors
     /// If the memory is invalid for the readings, such as one in seconds without times.
-    pub fn with_memory(&self, memory: Option<&Memory>) -> Result<Self, DatasetError> {
+    pub fn with_memory(&self, memory: Option<&Memory>) -> Result<Self, ImportError> {
         let (memory, features) = remembered(&self.history, memory)?;
         let problem = Problem {
             memory,

@@ -8,10 +8,10 @@ use decoupler_core::{
 use ndarray::Array2;
 
 use super::{
-    Column, Derived, ImportError, Recipe, TableError, Watch,
+    Column, ImportError, Recipe, TableError, Watch,
     columns::{Files, Meanings, called, near, position},
     csv_table::named,
-    derived::{DerivedStream, TimeColumn},
+    derived::DerivedStream,
     selection::{order_note, seconds},
     table::name_and_unit,
 };
@@ -32,17 +32,9 @@ pub struct InputTable {
     /// Notes on times, which a memory needs: lines that are left out, and the order of the lines.
     pub warnings: Vec<String>,
     /// Columns of the recipe that say when or to what a sample belongs, as far as the file has them: time, group and
-    /// row-wire.
-    pub kept: Vec<KeptColumn>,
-}
-
-/// Column that is copied from an input to the output.
-#[derive(Clone, Debug)]
-pub struct KeptColumn {
-    /// Name, with the unit in brackets if there is one.
-    pub title: String,
-    /// Text of each cell; empty if it is missing.
-    pub cells: Vec<String>,
+    /// row-wire. Each has a title, with the unit in brackets if there is one, and the text of each cell, empty if it is
+    /// missing.
+    pub kept: Vec<(String, Vec<String>)>,
 }
 
 /// Columns of a table that contain the inputs of a network.
@@ -62,25 +54,11 @@ pub(super) struct InputColumns {
     pub(super) width: usize,
 }
 
-/// Names of the columns that contain no inputs of a network.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct OtherColumns {
-    /// Column of row-wires.
-    pub(super) row_wire: Option<String>,
-    /// Time column, which a memory and derived columns need.
-    pub(super) time: Option<String>,
-    /// Unit of the times, if the header does not give it.
-    pub(super) time_unit: Option<String>,
-    /// Column of groups, which a memory needs.
-    pub(super) group: Option<String>,
-    /// Columns that say when or to what a sample belongs and are copied to the output.
-    pub(super) kept: Vec<String>,
-}
-
 impl InputColumns {
-    /// Finds the inputs of a network in the cells of a header or, without one, in `width` columns, and those of `derive`, whose
-    /// cells follow those of a line. Columns without names are called c1, c2, … as in a recording without a header; if the
-    /// inputs have other names, the columns are the inputs in their order, after the number of the row-wire if `has_row_wire`.
+    /// Finds the inputs of a network of `problem` and the other columns of `recipe` in the cells of a header or, without one, in
+    /// `width` columns, and those derived from them, whose cells follow those of a line. Columns without names are called c1, c2,
+    /// … as in a recording without a header; if the inputs have other names, the columns are the inputs in their order, after the
+    /// number of the row-wire if `has_row_wire`.
     ///
     /// # Errors
     /// If an input has no column of its name, or a column with a different unit, a derived column cannot be computed, or the
@@ -88,19 +66,14 @@ impl InputColumns {
     pub(super) fn of(
         header: &[String],
         width: usize,
-        inputs: &[Channel],
-        others: &OtherColumns,
-        derive: &[Derived],
+        problem: &Problem,
+        recipe: &Recipe,
         has_row_wire: bool,
     ) -> Result<(Self, DerivedStream), String> {
         let mut columns = named(header, width);
-        let time = others.time.as_deref().map(|name| TimeColumn {
-            name,
-            given_unit: others.time_unit.as_deref(),
-        });
-        let derived = DerivedStream::new(derive, &mut columns, time).map_err(|error| error.to_string())?;
-        let has_names = !header.is_empty() || !derive.is_empty();
-        let found = Self::find(&columns, has_names, inputs, others, has_row_wire)?;
+        let time = recipe.time.as_deref().map(|name| (name, recipe.unit_of(name)));
+        let derived = DerivedStream::new(&recipe.derive, &mut columns, time).map_err(|error| error.to_string())?;
+        let found = Self::find(&columns, !header.is_empty(), problem, recipe, has_row_wire)?;
         Ok((Self { width, ..found }, derived))
     }
 
@@ -135,7 +108,7 @@ impl InputColumns {
 
     /// Returns `true` if the cells are a header with the names of all inputs.
     pub(super) fn has_all(cells: &[String], inputs: &[Channel]) -> bool {
-        Self::of_names(&named(cells, cells.len()), inputs, &OtherColumns::default()).is_ok()
+        Self::inputs_of(&named(cells, cells.len()), inputs).is_ok()
     }
 
     /// Replaces `readings` by the inputs of a line.
@@ -150,17 +123,18 @@ impl InputColumns {
         time_s.filter(|time_s| time_s.is_finite())
     }
 
-    /// Finds the inputs by their names or, unless the columns have names, by their order.
+    /// Finds the inputs by their names or, unless the columns have names, as derived ones do, by their order.
     fn find(
         columns: &[Column],
-        has_names: bool,
-        inputs: &[Channel],
-        others: &OtherColumns,
+        has_header: bool,
+        problem: &Problem,
+        recipe: &Recipe,
         has_row_wire: bool,
     ) -> Result<Self, String> {
-        let found = Self::of_names(columns, inputs, others);
+        let inputs = &problem.inputs;
+        let found = Self::inputs_of(columns, inputs).map(|found| Self::with_others(columns, found, problem, recipe));
         let is_complete = |found: &Self| found.row_wire.is_some() >= has_row_wire;
-        if has_names || found.as_ref().is_ok_and(is_complete) {
+        if has_header || !recipe.derive.is_empty() || found.as_ref().is_ok_and(is_complete) {
             return found;
         }
         let expected = usize::from(has_row_wire) + inputs.len();
@@ -174,41 +148,48 @@ impl InputColumns {
         }
     }
 
-    fn of_names(columns: &[Column], inputs: &[Channel], others: &OtherColumns) -> Result<Self, String> {
-        let mut found = Vec::with_capacity(inputs.len());
-        for Channel { name, unit, .. } in inputs {
+    fn inputs_of(columns: &[Column], inputs: &[Channel]) -> Result<Vec<usize>, String> {
+        let find = |Channel { name, unit, .. }: &Channel| {
             let [column] = called(columns, name)[..] else {
                 let near = near(columns, name);
                 return Err(format!(
                     "there is no column '{name}', which is an input of the network; {near}"
                 ));
             };
-            if let (Some(found), Some(expected)) = (&columns[column].unit, unit)
-                && found != expected
-            {
-                let trained = format!("the network was trained on {expected}");
-                return Err(format!("column '{name}' is in {found}, and {trained}; convert it"));
+            match (&columns[column].unit, unit) {
+                (Some(found), Some(expected)) if found != expected => {
+                    let trained = format!("the network was trained on {expected}");
+                    Err(format!("column '{name}' is in {found}, and {trained}; convert it"))
+                }
+                _ => Ok(column),
             }
-            found.push(column);
-        }
+        };
+        inputs.iter().map(find).collect()
+    }
+
+    /// Returns the columns with the `inputs`, and the other columns of `recipe`.
+    fn with_others(columns: &[Column], inputs: Vec<usize>, problem: &Problem, recipe: &Recipe) -> Self {
         let other = |name: &Option<String>| position(columns, name.as_ref()?);
-        let time = other(&others.time).and_then(|column| {
-            let unit = columns[column].unit.as_deref().or(others.time_unit.as_deref());
+        let time = other(&recipe.time).and_then(|column| {
+            let unit = columns[column].unit.as_deref();
+            let unit = unit.or_else(|| recipe.unit_of(recipe.time.as_ref()?));
             Some((column, seconds(unit)?))
         });
-        let kept = others.kept.iter().filter_map(|name| position(columns, name));
-        let kept = kept.filter(|column| !found.contains(column)).map(|column| {
+        let group = other(&recipe.group);
+        let row_wire = other(&recipe.row_wire);
+        let kept = [other(&recipe.time), group, row_wire].into_iter().flatten();
+        let kept = kept.filter(|column| !inputs.contains(column)).map(|column| {
             let Column { name, unit, .. } = &columns[column];
             (column, Channel::new(name, unit.as_deref()).title())
         });
-        Ok(Self {
+        Self {
             kept: kept.collect(),
-            row_wire: other(&others.row_wire),
-            group: other(&others.group),
-            inputs: found,
+            row_wire,
+            group: group.filter(|_| problem.memory.is_some()),
+            inputs,
             time,
             width: columns.len(),
-        })
+        }
     }
 }
 
@@ -226,18 +207,17 @@ impl Recipe {
         has_row_wire: bool,
         watch: Watch<'_>,
     ) -> Result<InputTable, ImportError> {
-        let others = &self.other_columns(problem);
         let mut files = Files::of(vec![self.read(path, None, &[], watch)?], Vec::new());
         files.tables[0].check_widths().map_err(|error| error.in_file(path))?;
-        // Derived columns have names.
-        let has_names = files.tables[0].has_header() || !self.derive.is_empty();
-        let found = InputColumns::find(&files.columns, has_names, &problem.inputs, others, has_row_wire);
+        let has_header = files.tables[0].has_header();
+        let found = InputColumns::find(&files.columns, has_header, problem, self, has_row_wire);
         let found = found.map_err(|error| TableError::Contents(error).in_file(path))?;
         // A memory cannot place a row without a time.
         let time = found.time.filter(|_| problem.memory.is_some()).map(|(id, _)| id);
         if let Some(id) = time {
+            let given = self.time.as_deref().and_then(|name| self.unit_of(name));
             let unit = files.columns[id].unit.take();
-            files.columns[id].unit = unit.or(others.time_unit.clone());
+            files.columns[id].unit = unit.or(given.map(str::to_owned));
         }
         files.meanings = Meanings {
             inputs: found.inputs,
@@ -270,10 +250,9 @@ impl Recipe {
         let mut readings = Array2::from_shape_fn((placed.len(), meanings.inputs.len()), |(row, input)| {
             files.number(meanings.inputs[input], placed[row])
         });
-        let times_s = self.time.as_ref().and_then(|name| {
-            let id = position(columns, name)?;
-            let unit_s = seconds(columns[id].unit.as_deref().or_else(|| self.unit_of(name)))?;
-            Some(placed.iter().map(|&row| unit_s * files.number(id, row)).collect())
+        let times_s = found.time.map(|(id, unit_s)| {
+            let times_s = placed.iter().map(|&row| unit_s * files.number(id, row));
+            times_s.collect()
         });
         if let Some(memory) = &problem.memory {
             let needs_clock = self.memory.as_ref().is_some_and(Memory::needs_clock);
@@ -288,13 +267,8 @@ impl Recipe {
                 .map_err(|error| ImportError::from(error).of_file(path))?
                 .into_owned();
         }
-        let kept = found.kept.into_iter().map(|(column, title)| KeptColumn {
-            title,
-            cells: placed
-                .iter()
-                .map(|&row| columns[column].text(row).into_owned())
-                .collect(),
-        });
+        let texts = |id: usize| placed.iter().map(move |&row| columns[id].text(row).into_owned());
+        let kept = found.kept.into_iter().map(|(id, title)| (title, texts(id).collect()));
         Ok(InputTable {
             readings,
             row_wires: files.row_wires(&placed)?,
@@ -304,20 +278,5 @@ impl Recipe {
             warnings,
             kept: kept.collect(),
         })
-    }
-
-    /// Names of the columns that contain no inputs of a network of `problem`; times are used only by a memory and by derived
-    /// columns.
-    pub(super) fn other_columns(&self, problem: &Problem) -> OtherColumns {
-        let needs_time = problem.memory.is_some() || self.derive.iter().any(Derived::needs_time);
-        let time = self.time.clone().filter(|_| needs_time);
-        let kept = [&self.time, &self.group, &self.row_wire].into_iter().flatten();
-        OtherColumns {
-            kept: kept.cloned().collect(),
-            row_wire: self.row_wire.clone(),
-            group: self.group.clone().filter(|_| problem.memory.is_some()),
-            time_unit: time.as_deref().and_then(|time| self.unit_of(time)).map(str::to_owned),
-            time,
-        }
     }
 }

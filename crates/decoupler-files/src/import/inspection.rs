@@ -208,10 +208,10 @@ fn histogram(numbers: impl Iterator<Item = f64>, min: f64, max: f64) -> Vec<usiz
 fn name_duplicates(table: &Table, columns: &mut [ColumnSummary]) {
     let bits = |column: usize| table.columns[column].numbers.iter().map(|number| number.to_bits());
     let (state, mut known) = (RandomState::new(), HashMap::<u64, Vec<usize>>::new());
-    for index in (0..columns.len())
-        .filter(|&index| columns[index].min.is_some())
-        .collect::<Vec<_>>()
-    {
+    for index in 0..columns.len() {
+        if columns[index].min.is_none() {
+            continue;
+        }
         let hash = state.hash_one(Vec::from_iter(bits(index)));
         let earlier = known.entry(hash).or_default();
         match earlier.iter().find(|other| bits(**other).eq(bits(index))) {

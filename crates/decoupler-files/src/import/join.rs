@@ -14,9 +14,8 @@ pub(super) struct Partners {
 /// Finds the nearest of `joined` within `limit` for each of `times`; of two equally near ones, the earlier. Times may be in
 /// any order; NaN if missing.
 pub(super) fn nearest(times: &[f64], joined: &[f64], limit: f64) -> Partners {
-    let mut order: Vec<u32> = (0..joined.len() as u32)
-        .filter(|&row| !joined[row as usize].is_nan())
-        .collect();
+    let has_time = |row: &u32| !joined[*row as usize].is_nan();
+    let mut order = Vec::from_iter((0..joined.len() as u32).filter(has_time));
     order.sort_by(|&one, &other| joined[one as usize].total_cmp(&joined[other as usize]));
     let of = |place: usize| joined[order[place] as usize];
     let mut offsets = Vec::new();
@@ -50,14 +49,10 @@ pub(super) fn nearest(times: &[f64], joined: &[f64], limit: f64) -> Partners {
 
 /// Returns the median of the intervals between the sorted times, ignoring intervals of zero.
 pub(super) fn median_interval(times: &[f64]) -> Option<f64> {
-    let mut sorted: Vec<f64> = times.iter().copied().filter(|time| !time.is_nan()).collect();
+    let mut sorted = Vec::from_iter(times.iter().copied().filter(|time| !time.is_nan()));
     sorted.sort_by(f64::total_cmp);
-    let mut intervals: Vec<f64> = sorted
-        .windows(2)
-        .map(|pair| pair[1] - pair[0])
-        .filter(|interval| *interval > 0.0)
-        .collect();
-    median(&mut intervals)
+    let intervals = sorted.windows(2).map(|pair| pair[1] - pair[0]);
+    median(&mut Vec::from_iter(intervals.filter(|interval| *interval > 0.0)))
 }
 
 fn median(values: &mut [f64]) -> Option<f64> {

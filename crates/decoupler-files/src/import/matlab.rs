@@ -9,7 +9,6 @@ use flate2::read::ZlibDecoder;
 use super::{
     TableError,
     format::{Array, Element, written},
-    progress::table_error,
 };
 use crate::machine::ReadingBudget;
 
@@ -323,6 +322,6 @@ fn damage(error: io::Error) -> TableError {
             TableError::damaged("a variable", "its compressed data is corrupt; copy it again")
         }
         io::ErrorKind::UnexpectedEof => cut_off(),
-        _ => table_error(error),
+        _ => error.into(),
     }
 }

@@ -48,7 +48,7 @@ pub use error::{Cure, ImportError, TableError};
 pub use expression::{Condition, Derived, Missing};
 pub use format::Format;
 pub use importing::{Dropped, FileReport, JoinReport, Recording, read_table};
-pub use inputs::{InputTable, KeptColumn};
+pub use inputs::InputTable;
 pub use inspection::{ColumnKind, ColumnSummary, InspectedFile, TimeSummary};
 pub use lines::{KeptCell, LONGEST_LINE, LineError, LineParser, ParsedLine, Readings, ReadingsFile};
 pub use plan::Plan;

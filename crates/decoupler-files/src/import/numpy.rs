@@ -10,7 +10,6 @@ use super::{
     TableError, Watch,
     archive::for_each_entry,
     format::{Array, Element, written},
-    progress::table_error,
 };
 use crate::machine::ReadingBudget;
 
@@ -25,24 +24,24 @@ pub(super) fn read(name: &str, source: &mut dyn Read, budget: &mut ReadingBudget
         let mut bytes = vec![0; count];
         source.read_exact(&mut bytes).map_err(|error| match error.kind() {
             io::ErrorKind::UnexpectedEof => wrong("it is cut off; copy it again".to_owned()),
-            _ => table_error(error),
+            _ => error.into(),
         })?;
         Ok::<_, TableError>(bytes)
     };
-    let of_length = match bytes(8)?[..] {
-        [b'\x93', b'N', b'U', b'M', b'P', b'Y', 1, _] => 2,
-        [b'\x93', b'N', b'U', b'M', b'P', b'Y', 2 | 3, _] => 4,
-        [b'\x93', b'N', b'U', b'M', b'P', b'Y', version, _] => {
+    let start = bytes(8)?;
+    if !start.starts_with(b"\x93NUMPY") {
+        return Err(wrong("it is not a NumPy file; save it with numpy.save".to_owned()));
+    }
+    let of_length = match start[6] {
+        1 => 2,
+        2 | 3 => 4,
+        version => {
             let reason = format!("version {version} of the format is unknown; save it with numpy.save");
             return Err(wrong(reason));
         }
-        _ => return Err(wrong("it is not a NumPy file; save it with numpy.save".to_owned())),
     };
-    let length = bytes(of_length)?;
-    let length = length
-        .iter()
-        .rev()
-        .fold(0, |length, byte| (length << 8) + usize::from(*byte));
+    let digits = bytes(of_length)?.into_iter().rev();
+    let length = digits.fold(0, |length, byte| (length << 8) + usize::from(byte));
     if length > LONGEST_HEADER {
         return Err(wrong(format!("its header has {length} bytes; save it with numpy.save")));
     }

@@ -74,7 +74,7 @@ impl Recording {
 fn check_same(first: &Recording, other: &Recording) -> Result<(), ImportError> {
     let refuse = |found: String, expected: String| {
         let [path, first] = [other, first].map(|recording| recording.files[0].path.display());
-        ImportError::Files(format!(
+        ImportError::Samples(format!(
             "'{path}': {found}, and '{first}': {expected}; files of one experiment need the same columns"
         ))
     };

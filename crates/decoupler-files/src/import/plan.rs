@@ -51,7 +51,7 @@ impl Plan {
         let trained = HashSet::<PathBuf>::from_iter(self.import.data_files().filter_map(real));
         let is_trained = |path: &&PathBuf| real(path).is_some_and(|path| trained.contains(&path));
         match tests.iter().map(|set| &set.data).find(is_trained) {
-            Some(path) => Err(ImportError::Files(format!(
+            Some(path) => Err(ImportError::Samples(format!(
                 "'{}' is trained on, so it cannot be a test file; give another one",
                 path.display()
             ))),

@@ -51,11 +51,8 @@ fn table(path: &Path, watch: Watch<'_>) -> Result<Table, ImportError> {
 
 fn positions(table: &Table, targets: &[Channel]) -> Result<Vec<TargetPosition>, TableError> {
     table.check_widths()?;
-    let [names, x, y] = [
-        column(table, COLUMNS[0])?,
-        column(table, COLUMNS[1])?,
-        column(table, COLUMNS[2])?,
-    ];
+    let [names, x, y] = COLUMNS.map(|name| column(table, name));
+    let (names, x, y) = (names?, x?, y?);
     let places = HashMap::<&str, usize>::from_iter(targets.iter().map(|target| target.name.as_str()).zip(0..));
     let mut found: Vec<TargetPosition> = Vec::new();
     let (mut line_of_target, mut line_of_place) = (HashMap::new(), BTreeMap::new());
@@ -71,11 +68,12 @@ fn positions(table: &Table, targets: &[Channel]) -> Result<Vec<TargetPosition>, 
         };
         // −0 and 0 are the same position.
         let place = [x_mm, y_mm].map(|mm| (mm + 0.0).to_bits());
-        let same_target = line_of_target.insert(target, line);
-        let same_target = same_target.map(|first| (first, format!("both are the position of '{name}'; leave one out")));
         let same_place = line_of_place.insert(place, line);
-        let same_place = same_place.map(|first| (first, "two targets have the same position; correct one".to_owned()));
-        let twice = same_target.or(same_place);
+        let twice = match (line_of_target.insert(target, line), same_place) {
+            (Some(first), _) => Some((first, format!("both are the position of '{name}'; leave one out"))),
+            (_, Some(first)) => Some((first, "two targets have the same position; correct one".to_owned())),
+            _ => None,
+        };
         if let Some((first, reason)) = twice {
             return Err(TableError::Contents(format!("lines {first} and {line}: {reason}")));
         }

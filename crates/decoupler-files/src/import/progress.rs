@@ -3,8 +3,6 @@ use std::{
     ops::ControlFlow,
 };
 
-use super::TableError;
-
 /// Number of bytes between two progress reports.
 const INTERVAL: u64 = 1 << 20;
 
@@ -56,13 +54,4 @@ impl<R: Read> Read for Watched<'_, R> {
 /// Cancellation, passed as an I/O error through readers that support no other.
 #[derive(Debug, thiserror::Error)]
 #[error("cancelled")]
-struct Cancelled;
-
-/// Returns the error as reported by the import.
-pub(super) fn table_error(error: io::Error) -> TableError {
-    if error.get_ref().is_some_and(|inner| inner.is::<Cancelled>()) {
-        TableError::Cancelled
-    } else {
-        TableError::Io(error)
-    }
-}
+pub(super) struct Cancelled;

@@ -17,10 +17,8 @@ use pathdiff::diff_paths;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Condition, Derived, DialectChoice, ImportError, Missing, Plan, Watch,
-    expression::texts,
-    progress::{Watched, table_error},
-    table::name_and_unit,
+    Condition, Derived, DialectChoice, ImportError, Missing, Plan, TableError, Watch, expression::texts,
+    progress::Watched, table::name_and_unit,
 };
 
 /// Recipe for importing samples: the files to read and to join, and the meaning of each column.
@@ -157,15 +155,6 @@ impl FileSet {
         std::iter::once(first).chain(following).collect()
     }
 
-    /// Returns these files replaced by others; `None` if one of them has no replacement.
-    pub(super) fn replaced(&self, of: &impl Fn(&Path) -> Option<PathBuf>) -> Option<Self> {
-        Some(Self {
-            data: of(&self.data)?,
-            join: self.join.iter().map(|path| of(path)).collect::<Option<_>>()?,
-            append: self.append.iter().map(|set| set.replaced(of)).collect::<Option<_>>()?,
-        })
-    }
-
     /// Returns the first file and those joined to it.
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
         std::iter::once(&self.data).chain(&self.join)
@@ -298,7 +287,7 @@ pub(super) fn is_irregular(path: &Path) -> bool {
 /// # Errors
 /// If the file cannot be read, or `watch` breaks.
 pub fn file_crc32(path: &Path, watch: Watch<'_>) -> Result<String, ImportError> {
-    let refused = |error| table_error(error).in_file(path);
+    let refused = |error| TableError::from(error).in_file(path);
     if is_irregular(path) {
         return Err(ImportError::Irregular(path.to_owned()));
     }

@@ -1,6 +1,6 @@
 use std::io::{BufRead, BufReader, Read};
 
-use super::{Format, Separator, TableError, fields::Fields, progress::table_error};
+use super::{Format, Separator, TableError, fields::Fields};
 
 /// Maximum length of a row in bytes: 16 MiB, enough for more than ten thousand columns.
 pub(super) const LONGEST_ROW: usize = 1 << 24;
@@ -10,23 +10,24 @@ const BUFFER: usize = 1 << 18;
 
 /// Rows of a text file, split into cells and with their line numbers. A row may span several lines if the line breaks are
 /// quoted.
-pub(crate) struct Rows<R> {
+pub(super) struct Rows<R> {
     source: BufReader<R>,
     fields: Fields,
     /// Maximum length of a row in bytes, and of blank lines before it.
-    longest: usize,
+    pub(super) longest: usize,
     line_break: u8,
-    text: Vec<u8>,
+    /// Text of the current row, without its line break.
+    pub(super) text: Vec<u8>,
     /// `true` if the current row ends with a line break.
-    is_ended: bool,
+    pub(super) is_ended: bool,
     /// Line on which the current row starts, from 1.
-    line: u64,
+    pub(super) line: u64,
     /// Number of lines read.
     lines: u64,
 }
 
 impl<R: Read> Rows<R> {
-    pub(crate) fn new(source: R, separator: Separator, has_carriage_returns: bool) -> Self {
+    pub(super) fn new(source: R, separator: Separator, has_carriage_returns: bool) -> Self {
         Self {
             source: BufReader::with_capacity(BUFFER, source),
             fields: Fields::new(separator, Some(MAX_CELLS)),
@@ -37,11 +38,6 @@ impl<R: Read> Rows<R> {
             line: 0,
             lines: 0,
         }
-    }
-
-    /// Returns the rows with another maximum length in bytes.
-    pub(crate) fn limited(self, longest: usize) -> Self {
-        Self { longest, ..self }
     }
 
     /// Skips `lines` lines.
@@ -70,7 +66,7 @@ impl<R: Read> Rows<R> {
     }
 
     /// Advances to the [text](Self::text) of the next row that is not blank; returns `false` at the end.
-    pub(crate) fn next_text(&mut self) -> Result<bool, TableError> {
+    pub(super) fn next_text(&mut self) -> Result<bool, TableError> {
         let mut blank = 0;
         loop {
             self.text.clear();
@@ -112,9 +108,7 @@ impl<R: Read> Rows<R> {
     fn append_line(&mut self) -> Result<bool, TableError> {
         let left = self.longest.saturating_sub(self.text.len());
         let mut limited = (&mut self.source).take(left as u64 + 1);
-        let read = limited
-            .read_until(self.line_break, &mut self.text)
-            .map_err(table_error)?;
+        let read = limited.read_until(self.line_break, &mut self.text)?;
         if read > left {
             return Err(self.endless());
         }
@@ -128,21 +122,6 @@ impl<R: Read> Rows<R> {
         Ok(read > 0)
     }
 
-    /// Text of the current row, without its line break.
-    pub(crate) fn text(&self) -> &[u8] {
-        &self.text
-    }
-
-    /// Returns `true` if the current row ends with a line break.
-    pub(crate) fn is_ended(&self) -> bool {
-        self.is_ended
-    }
-
-    /// Line on which the current row starts, from 1.
-    pub(crate) fn line(&self) -> u64 {
-        self.line
-    }
-
     /// Number of cells in the current row.
     pub(super) fn len(&self) -> usize {
         self.fields.len()
@@ -150,7 +129,7 @@ impl<R: Read> Rows<R> {
 
     /// Cells of the current row, without surrounding spaces.
     pub(super) fn cells(&self) -> impl DoubleEndedIterator<Item = &[u8]> + Clone {
-        self.fields.iter(&self.text)
+        self.fields.iter()
     }
 }
 
@@ -176,14 +155,14 @@ mod tests {
         let mut all = Vec::new();
         while rows.advance().unwrap() {
             let cells = rows.cells().map(|cell| String::from_utf8_lossy(cell).into_owned());
-            all.push((rows.line(), cells.collect()));
+            all.push((rows.line, cells.collect()));
         }
         all
     }
 
     #[test]
     fn rows_are_split_as_by_the_csv_crate_with_line_numbers() {
-        let text = "\u{feff}a, \"b\nc\" ,d\r\n\r\n1,\"say \"\"yes\"\"\",\n  \n,,\n\"x,y\",2\n3";
+        let text = "a, \"b\nc\" ,d\r\n\r\n1,\"say \"\"yes\"\"\",\n  \n,,\n\"x,y\",2\n3";
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)

@@ -1,5 +1,7 @@
 //! Numbers that are no measurements: markers of missing values, and constants with rounding errors.
 
+use std::collections::HashSet;
+
 use serde::Serialize;
 
 /// Number that seems to mean "none": it is repeated at one end of a column, apart from the other numbers.
@@ -81,16 +83,11 @@ fn extremes(numbers: &[f64]) -> Option<[[f64; 2]; 2]> {
 
 /// Counts different numbers, up to one more than `limit`.
 fn distinct(numbers: &[f64], limit: usize) -> usize {
-    let mut known: Vec<f64> = Vec::new();
-    for &number in numbers.iter().filter(|number| !number.is_nan()) {
-        if !known.contains(&number) {
-            known.push(number);
-            if known.len() > limit {
-                break;
-            }
-        }
-    }
-    known.len()
+    let mut known = HashSet::new();
+    // −0 and 0 are the same number.
+    let present = numbers.iter().filter(|number| !number.is_nan());
+    let new = present.filter(|number| known.insert((**number + 0.0).to_bits()));
+    new.take(limit + 1).count()
 }
 
 /// Returns `true` if numbers differ, but by rounding only.

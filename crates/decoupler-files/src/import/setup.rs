@@ -1,7 +1,7 @@
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use decoupler_core::{
-    dataset::{DatasetError, Seed},
+    dataset::Seed,
     evaluation::{
         Intervals, Run, RunError, RunSets, RunSettings,
         experiments::{ExperimentRecording, TrialSamples},
@@ -69,12 +69,6 @@ pub enum SetupError {
 impl From<Cancelled> for SetupError {
     fn from(_: Cancelled) -> Self {
         Self::Import(ImportError::Cancelled)
-    }
-}
-
-impl From<DatasetError> for SetupError {
-    fn from(error: DatasetError) -> Self {
-        Self::Import(error.into())
     }
 }
 

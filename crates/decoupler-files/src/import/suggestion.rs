@@ -43,12 +43,17 @@ pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
     if !tests.is_empty() && tests.len() == training.len() {
         let plan = plan_of_series(&training);
         // Each training file has one for the test, such as `trainPose` and `testPose`.
-        let test = plan.import.files().replaced(&|path| {
+        let mut test = plan.import.files();
+        let has_tests = test.files_mut().into_iter().all(|path| {
             let mut tests = tests.iter().map(|test| &test.path);
-            tests.find(|test| without_part(test) == without_part(path)).cloned()
+            let found = tests.find(|test| without_part(test) == without_part(path));
+            found.map(|found| path.clone_from(found)).is_some()
         });
-        if test.is_some() {
-            return Plan { test, ..plan };
+        if has_tests {
+            return Plan {
+                test: Some(test),
+                ..plan
+            };
         }
     }
     plan_of_series(&Vec::from_iter(files))

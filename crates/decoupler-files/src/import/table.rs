@@ -30,7 +30,10 @@ pub struct Table {
     pub torn_line: Option<u64>,
     /// Rows that were left out because they have more cells than there are columns.
     pub too_long: Faults,
-    pub(super) lines: Lines,
+    /// Rows that have fewer cells than there are columns.
+    pub(super) too_short: Faults,
+    /// Rows that do not start on the line after the previous row, with their line: mostly few.
+    pub(super) jumps: Vec<(usize, u64)>,
 }
 
 /// Named array of numbers in a file.
@@ -42,32 +45,6 @@ pub struct Variable {
     pub shape: String,
     /// Indices of its columns; empty if it is left out, because its rows are not those of the samples.
     pub columns: Range<usize>,
-}
-
-/// Line of each row; compact, since rows are mostly on consecutive lines.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Lines {
-    /// Rows that do not start on the line after the previous row, with their line.
-    jumps: Vec<(usize, u64)>,
-    next: u64,
-}
-
-impl Lines {
-    pub(super) fn push(&mut self, row: usize, line: u64) {
-        if row == 0 || line != self.next {
-            self.jumps.push((row, line));
-        }
-        self.next = line + 1;
-    }
-
-    /// Returns the line of a row, or its number if the file has no lines; from 1.
-    pub(super) fn of(&self, row: usize) -> u64 {
-        let after = self.jumps.partition_point(|(first, _)| *first <= row);
-        match after.checked_sub(1).map(|index| self.jumps[index]) {
-            Some((first, line)) => line + (row - first) as u64,
-            None => row as u64 + 1,
-        }
-    }
 }
 
 impl Table {
@@ -82,13 +59,26 @@ impl Table {
             notes: Vec::new(),
             torn_line: None,
             too_long: Faults::default(),
-            lines: Lines::default(),
+            too_short: Faults::default(),
+            jumps: Vec::new(),
         }
     }
 
     /// Returns the line of a row of a text file, else the number of the row; from 1.
     pub fn line(&self, row: usize) -> u64 {
-        self.lines.of(row)
+        let after = self.jumps.partition_point(|(first, _)| *first <= row);
+        match after.checked_sub(1).map(|index| self.jumps[index]) {
+            Some((first, line)) => line + (row - first) as u64,
+            None => row as u64 + 1,
+        }
+    }
+
+    /// Adds a row that starts on this line, whose cells are in the columns.
+    pub(super) fn add_row(&mut self, line: u64) {
+        if self.line(self.rows) != line {
+            self.jumps.push((self.rows, line));
+        }
+        self.rows += 1;
     }
 
     /// Refuses a table with rows that were left out because they are too long.
@@ -321,16 +311,17 @@ mod tests {
 
     #[test]
     fn lines_are_found_across_gaps() {
-        let mut lines = Lines::default();
+        let mut table = Table::new(Path::new(""), Format::Npy);
         let known = [2, 3, 4, 7, 8, 12];
         for (row, line) in known.into_iter().enumerate() {
-            lines.push(row, line);
+            assert_eq!(table.rows, row);
+            table.add_row(line);
         }
-        assert_eq!(lines.jumps.len(), 3);
+        assert_eq!(table.jumps.len(), 3);
         for (row, line) in known.into_iter().enumerate() {
-            assert_eq!(lines.of(row), line);
+            assert_eq!(table.line(row), line);
         }
-        assert_eq!(Lines::default().of(4), 5);
+        assert_eq!(Table::new(Path::new(""), Format::Npy).line(4), 5);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 use std::{
     collections::BTreeSet,
-    hash::{DefaultHasher, Hash, Hasher},
+    hash::{BuildHasher as _, BuildHasherDefault, DefaultHasher},
 };
 
 use decoupler_core::{
@@ -17,7 +17,7 @@ use super::{
         derived::DerivedStream,
         fields::Fields,
         format,
-        inputs::{InputColumns, OtherColumns},
+        inputs::InputColumns,
         selection::{LAST_ROW_WIRE, row_wire},
         table::excerpt,
         time_stamp::TimeStamp,
@@ -32,10 +32,8 @@ use super::{
 /// may be repeated, for example when a device restarts, and a comma may end a line.
 #[derive(Debug, Default)]
 pub struct LineParser {
-    pub(super) inputs: Vec<Channel>,
-    others: OtherColumns,
-    /// Columns computed from others.
-    derive: Vec<Derived>,
+    pub(super) problem: Problem,
+    recipe: Recipe,
     /// Channels by which a header is recognised: the inputs, and the columns from which derived inputs are computed.
     read: Vec<Channel>,
     /// Row-wires with their own readings; `None` if one network of a recording reads all.
@@ -49,8 +47,8 @@ pub struct LineParser {
     is_snapshot: bool,
     /// `true` once a line had readings.
     pub(super) has_readings: bool,
-    /// Number of lines so far whose row-wire follows from their order, valid or not.
-    pub(super) lines_in_turn: usize,
+    /// Number of lines so far whose row-wire follows from their order, valid or not; `None` if it does not follow.
+    pub(super) lines_in_turn: Option<usize>,
     /// The derived columns, once the columns of the lines are known.
     derived: DerivedStream,
     /// Group of each line of the start, which is waited for.
@@ -74,18 +72,8 @@ struct RowWires {
     read: Vec<usize>,
     /// Largest number of a row-wire.
     last: usize,
-    unnumbered: Unnumbered,
-}
-
-/// What is known of the row-wire of a line without a row number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Unnumbered {
-    /// Nothing, and the network needs no row.
-    Any,
-    /// It follows from the number of lines so far; a single one is always in turn.
-    InTurn,
-    /// Nothing.
-    Refused,
+    /// `false` if the network of a line does not depend on its row-wire.
+    are_needed: bool,
 }
 
 /// Cell of a line that is copied to the output.
@@ -140,26 +128,28 @@ impl LineParser {
     /// If the array does not have the row.
     pub fn of_array(scale: ArrayScale, rows: Rows, is_complete: bool) -> Result<Self, SceneError> {
         let read = rows.read(scale.rows())?;
-        let unnumbered = match rows.model() {
-            RowModel::Shared => Unnumbered::Any,
-            RowModel::Each if is_complete || read.len() == 1 => Unnumbered::InTurn,
-            RowModel::Each => Unnumbered::Refused,
-        };
+        let are_needed = rows.model() == RowModel::Each;
+        // A single row-wire is always in turn.
+        let is_in_turn = are_needed && (is_complete || read.len() == 1);
         let channels = 1..=scale.columns();
         let inputs = Vec::from_iter(channels.map(|channel| Channel::new(format!("r_{channel}"), None)));
         Ok(Self {
             read: inputs.clone(),
-            inputs,
-            others: OtherColumns {
+            problem: Problem {
+                inputs,
+                ..Problem::default()
+            },
+            recipe: Recipe {
                 row_wire: Some("row".to_owned()),
                 time: Some("time_s".to_owned()),
-                ..OtherColumns::default()
+                ..Recipe::default()
             },
             rows: Some(RowWires {
                 read,
                 last: scale.rows(),
-                unnumbered,
+                are_needed,
             }),
+            lines_in_turn: is_in_turn.then_some(0),
             is_array: true,
             ..Self::default()
         })
@@ -190,16 +180,15 @@ impl LineParser {
         let rows = row_wires.map(|read| RowWires {
             read,
             last: LAST_ROW_WIRE,
-            unnumbered: Unnumbered::Refused,
+            are_needed: true,
         });
         Ok(Self {
             read,
-            derive: recipe.derive.clone(),
             memory: memory
                 .map(|memory| MemoryStream::new(memory, inputs.len()))
                 .transpose()?,
-            inputs: inputs.clone(),
-            others: recipe.other_columns(problem),
+            problem: problem.clone(),
+            recipe: recipe.clone(),
             rows,
             ..Self::default()
         })
@@ -207,9 +196,8 @@ impl LineParser {
 
     /// Counts a malformed line, which still advances the row counter.
     pub fn count_bad(&mut self) {
-        let is_in_turn = |rows: &RowWires| rows.unnumbered == Unnumbered::InTurn;
         let has_no_row = self.columns.width > 0 && self.columns.row_wire.is_none();
-        self.lines_in_turn += usize::from(has_no_row && self.rows.as_ref().is_some_and(is_in_turn));
+        self.lines_in_turn = self.lines_in_turn.map(|lines| lines + usize::from(has_no_row));
     }
 
     /// Parses a line without its line break; `line` is its number, from 1.
@@ -252,11 +240,11 @@ impl LineParser {
         self.fields.split(text);
         let number = |cell| format::parse(cell, Decimal::Point).number().unwrap_or(f64::NAN);
         self.cells.clear();
-        self.cells.extend(self.fields.iter(text).map(number));
-        self.read_stamp(text);
+        self.cells.extend(self.fields.iter().map(number));
+        self.read_stamp();
         // Only the first line, or a line that cannot be used, may be a header: other lines need no strings.
-        if self.check(line, text).is_err() {
-            let cells = self.fields.iter(text).map(String::from_utf8_lossy);
+        if self.check(line).is_err() {
+            let cells = self.fields.iter().map(String::from_utf8_lossy);
             let cells = Vec::from_iter(cells.map(|cell| cell.into_owned()));
             // After a line with readings, a device that starts again repeats its header whole; other texts are garbage, or an
             // overflow of the device.
@@ -275,26 +263,26 @@ impl LineParser {
                 let has_comma = cells.len() > 1 && cells.last().is_some_and(String::is_empty);
                 let found = self.find_columns(&[], cells.len() - usize::from(has_comma));
                 found.map_err(|reason| LineError::Malformed(line, reason))?;
-                self.read_stamp(text);
+                self.read_stamp();
             }
-            self.check(line, text)?;
+            self.check(line)?;
         }
         let row_index = self.row_index(line)?;
         self.has_readings = true;
-        self.readings_of(line, text, row_index)
+        self.readings_of(line, row_index)
     }
 
     /// Checks that the cells can be used.
-    fn check(&self, line: u64, text: &[u8]) -> Result<(), LineError> {
+    fn check(&self, line: u64) -> Result<(), LineError> {
         let (columns, width, found) = (&self.columns, self.columns.width, self.fields.len());
-        let has_trailing_comma = found == width + 1 && found > 1 && self.fields.get(text, width).is_empty();
+        let has_trailing_comma = found == width + 1 && found > 1 && self.fields.get(width).is_empty();
         if found != width && !has_trailing_comma {
             let found = counted(found, "cell");
             let reason = format!("{found} where {width} are needed, separated by commas");
             return Err(LineError::Malformed(line, reason));
         }
         let refused = |column: usize, needed: &str| {
-            let cell = excerpt(&String::from_utf8_lossy(self.fields.get(text, column)));
+            let cell = excerpt(&String::from_utf8_lossy(self.fields.get(column)));
             Err(LineError::Cell(line, column + 1, format!("'{cell}' is not {needed}")))
         };
         let is_bad = |column: &usize| !self.cells[*column].is_finite();
@@ -328,11 +316,12 @@ impl LineParser {
     }
 
     /// Gathers the readings of a line whose cells can be used.
-    fn readings_of(&mut self, line: u64, text: &[u8], row_index: Option<usize>) -> Result<Found, LineError> {
+    fn readings_of(&mut self, line: u64, row_index: Option<usize>) -> Result<Found, LineError> {
         let (columns, width) = (&self.columns, self.columns.width);
         self.cells.truncate(width);
         let group = columns.group.filter(|&column| column < width);
-        let group = group.map_or(0, |column| key(self.fields.get(text, column)));
+        let hasher = BuildHasherDefault::<DefaultHasher>::default();
+        let group = group.map_or(0, |column| hasher.hash_one(self.fields.get(column)));
         let taken = self.derived.take(&mut self.cells);
         let Some(start) = taken.map_err(|error| LineError::Final(line, error.to_string()))? else {
             self.groups_of_start.push(group);
@@ -357,8 +346,7 @@ impl LineParser {
         for (&(column, _), kept) in columns.kept.iter().zip(&mut self.kept) {
             kept.text.clear();
             if column < width {
-                kept.text
-                    .push_str(&String::from_utf8_lossy(self.fields.get(text, column)));
+                kept.text.push_str(&String::from_utf8_lossy(self.fields.get(column)));
             } else if !self.cells[column].is_nan() {
                 kept.text.push_str(&self.cells[column].to_string());
             }
@@ -374,9 +362,9 @@ impl LineParser {
     }
 
     /// Replaces a time stamp by the time since the first.
-    fn read_stamp(&mut self, text: &[u8]) {
+    fn read_stamp(&mut self) {
         if let Some((column, unit_s)) = self.columns.time
-            && let Some(stamp) = TimeStamp::parse(self.fields.get(text, column))
+            && let Some(stamp) = TimeStamp::parse(self.fields.get(column))
         {
             let start = *self.start.get_or_insert(stamp);
             if start.has_zone == stamp.has_zone {
@@ -392,14 +380,13 @@ impl LineParser {
             return Ok(Some(0));
         };
         let Some(column) = self.columns.row_wire else {
-            let turn = self.lines_in_turn % rows.read.len();
-            return match rows.unnumbered {
-                Unnumbered::Any => Ok(None),
-                Unnumbered::InTurn => {
-                    self.lines_in_turn += 1;
-                    Ok(Some(turn))
+            return match &mut self.lines_in_turn {
+                Some(lines) => {
+                    *lines += 1;
+                    Ok(Some((*lines - 1) % rows.read.len()))
                 }
-                Unnumbered::Refused => Err(LineError::Final(line, NO_ROW.to_owned())),
+                None if rows.are_needed => Err(LineError::Final(line, NO_ROW.to_owned())),
+                None => Ok(None),
             };
         };
         let row = self.cells[column] as usize;
@@ -416,7 +403,7 @@ impl LineParser {
 
     /// Finds the inputs in the cells of a header, or in lines of `width` cells without one.
     fn find_columns(&mut self, header: &[String], width: usize) -> Result<(), String> {
-        let channels = self.inputs.len();
+        let channels = self.problem.inputs.len();
         let all = self.rows.as_ref().map_or(0, |rows| rows.read.len()) * channels;
         let needs_row_wire = self.rows.is_some() && !self.is_array;
         let is_unnamed_array = self.is_array && header.is_empty();
@@ -426,16 +413,15 @@ impl LineParser {
             let columns = InputColumns::in_order(count, !is_snapshot && width == count + 1);
             (columns, DerivedStream::default())
         } else {
-            let (inputs, others, derive) = (&self.inputs, &self.others, &self.derive);
-            InputColumns::of(header, width, inputs, others, derive, needs_row_wire)?
+            InputColumns::of(header, width, &self.problem, &self.recipe, needs_row_wire)?
         };
         if self.is_array
-            && let Some(name) = InputColumns::named_twice(header, &self.inputs)
+            && let Some(name) = InputColumns::named_twice(header, &self.problem.inputs)
         {
             return Err(format!("there are two columns '{name}'; keep one"));
         }
         if needs_row_wire && columns.row_wire.is_none() {
-            let name = self.others.row_wire.as_deref().unwrap_or("row");
+            let name = self.recipe.row_wire.as_deref().unwrap_or("row");
             return Err(format!(
                 "there is no column '{name}', which is an input of the network; each row-wire has its own network, which is \
                  selected by this column"
@@ -443,7 +429,8 @@ impl LineParser {
         }
         // The header of a device that starts again does not begin another start.
         if self.columns != columns {
-            let cells = columns.kept.iter().map(|(_, title)| KeptCell {
+            let cells = columns.kept.iter().filter(|_| !self.is_array);
+            let cells = cells.map(|(_, title)| KeptCell {
                 title: title.clone(),
                 text: String::new(),
             });
@@ -453,13 +440,6 @@ impl LineParser {
         (self.has_names, self.is_snapshot) = (!header.is_empty(), is_snapshot);
         Ok(())
     }
-}
-
-/// Number of a group, from its text.
-fn key(group: &[u8]) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    group.hash(&mut hasher);
-    hasher.finish()
 }
 
 impl InputColumns {

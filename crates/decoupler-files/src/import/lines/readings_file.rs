@@ -11,7 +11,9 @@ use super::{
 pub struct ReadingsFile<R> {
     rows: Rows<R>,
     parser: LineParser,
-    torn_line: Option<u64>,
+    /// Number of the last line if it is cut off: malformed and without a line break. It is ignored, unless it is the only line
+    /// with readings.
+    pub torn_line: Option<u64>,
 }
 
 /// Block of the readings of row-wires.
@@ -28,22 +30,18 @@ pub struct Readings {
 impl<R: Read> ReadingsFile<R> {
     /// Reads the lines of `source` by `parser`.
     pub fn new(source: R, parser: LineParser) -> Self {
+        let mut rows = Rows::new(source, Separator::Comma, false);
+        rows.longest = LONGEST_LINE;
         Self {
-            rows: Rows::new(source, Separator::Comma, false).limited(LONGEST_LINE),
+            rows,
             parser,
             torn_line: None,
         }
     }
 
-    /// Number of the last line if it is cut off: malformed and without a line break. It is ignored, unless it is the only line
-    /// with readings.
-    pub fn torn_line(&self) -> Option<u64> {
-        self.torn_line
-    }
-
     /// Number of lines so far whose row-wire follows from their order.
     pub fn lines_in_turn(&self) -> usize {
-        self.parser.lines_in_turn
+        self.parser.lines_in_turn.unwrap_or(0)
     }
 
     /// Reads at most `most` further lines; returns `None` at the end.
@@ -52,17 +50,17 @@ impl<R: Read> ReadingsFile<R> {
     /// If the file cannot be read, has no readings, or a line is malformed.
     pub fn read(&mut self, most: usize) -> Result<Option<Readings>, TableError> {
         let (mut values_ohm, mut lines, mut row_indices) = (Vec::new(), Vec::new(), Vec::new());
-        let channels = self.parser.inputs.len();
+        let channels = self.parser.problem.inputs.len();
         let mut taken = 0;
         while taken < most && self.torn_line.is_none() && self.rows.next_text()? {
-            let (line, has_readings) = (self.rows.line(), self.parser.has_readings);
-            let (first_row, readings) = match self.parser.parse(line, self.rows.text()) {
+            let (line, has_readings) = (self.rows.line, self.parser.has_readings);
+            let (first_row, readings) = match self.parser.parse(line, &self.rows.text) {
                 Ok(ParsedLine::NoReadings | ParsedLine::Start { .. }) => continue,
                 Ok(ParsedLine::Row {
                     row_index, readings, ..
                 }) => (row_index.unwrap_or(0), readings),
                 Ok(ParsedLine::Snapshot(readings)) => (0, readings),
-                Err(_) if has_readings && !self.rows.is_ended() => {
+                Err(_) if has_readings && !self.rows.is_ended => {
                     self.torn_line = Some(line);
                     break;
                 }
@@ -134,7 +132,7 @@ mod tests {
             while let Some(block) = reader.read(2).unwrap() {
                 lines += block.lines.len();
             }
-            assert_eq!((lines, reader.torn_line()), (rows, torn), "{text}");
+            assert_eq!((lines, reader.torn_line), (rows, torn), "{text}");
         }
         for refused in ["1,2\n3\n5,6", "1,2\n3\n", "r_1,r_2\n1"] {
             assert!(read(refused).is_err(), "{refused}");
