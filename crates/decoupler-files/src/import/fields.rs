@@ -1,16 +1,26 @@
 use std::ops::Range;
 
+use csv_core::{ReadRecordResult, Reader, ReaderBuilder};
+
 use super::Separator;
 
 /// Cells of a row of text; the buffers are reused, so that rows of similar length need no allocation.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Fields {
     separator: Separator,
     /// Maximum number of cells; one more is found, so that a longer row is noticed.
     limit: Option<usize>,
-    /// Text of the cells, without quotes and separators.
+    parser: Reader,
+    /// Text of the row; without quotes and separators, if it has quotes.
     text: Vec<u8>,
+    ends: Vec<usize>,
     ranges: Vec<Range<usize>>,
+}
+
+impl Default for Fields {
+    fn default() -> Self {
+        Self::new(Separator::Comma, None)
+    }
 }
 
 impl Fields {
@@ -18,39 +28,67 @@ impl Fields {
         Self {
             separator,
             limit,
-            ..Self::default()
+            parser: ReaderBuilder::new().delimiter(separator.byte()).build(),
+            text: Vec::new(),
+            ends: Vec::new(),
+            ranges: Vec::new(),
         }
     }
 
-    /// Splits a row without its line break. Quotes enclose a cell only from its start, and a doubled one is part of it.
+    /// Splits a row without its line break.
     pub(super) fn split(&mut self, row: &[u8]) {
         self.ranges.clear();
-        self.text.clear();
-        let (separator, has_spaces) = (self.separator.byte(), self.separator == Separator::Space);
-        let (mut start, mut is_quoted) = (0, false);
-        let mut bytes = row.iter().copied().peekable();
-        while let Some(byte) = bytes.next() {
-            let is_separator = byte == separator || (has_spaces && byte.is_ascii_whitespace());
-            match byte {
-                b'"' if is_quoted && bytes.next_if_eq(&b'"').is_none() => is_quoted = false,
-                b'"' if !is_quoted && self.text.len() == start => is_quoted = true,
-                _ if is_quoted || !is_separator => self.text.push(byte),
-                _ => start = self.end_cell(start),
-            }
-            if self.limit.is_some_and(|limit| self.ranges.len() > limit) {
-                return;
-            }
+        let separator = self.separator.byte();
+        let is_spaced = self.separator == Separator::Space;
+        match (row.contains(&b'"'), is_spaced) {
+            (true, _) => self.split_quoted(row),
+            (false, true) => self.split_at(row, |byte| byte == separator || byte.is_ascii_whitespace()),
+            (false, false) => self.split_at(row, |byte| byte == separator),
         }
-        self.end_cell(start);
+        if is_spaced {
+            self.ranges.retain(|range| !range.is_empty());
+        }
     }
 
-    /// Ends a cell, unless it is nothing between two spaces; returns the start of the next.
-    fn end_cell(&mut self, start: usize) -> usize {
-        let end = self.text.len();
-        if self.separator != Separator::Space || end > start {
-            self.ranges.push(start..end);
+    fn split_at(&mut self, row: &[u8], is_separator: impl Fn(u8) -> bool) {
+        self.text.clear();
+        self.text.extend_from_slice(row);
+        let mut start = 0;
+        for (place, &byte) in row.iter().enumerate() {
+            if is_separator(byte) {
+                self.ranges.push(start..place);
+                start = place + 1;
+                if self.limit.is_some_and(|limit| self.ranges.len() > limit) {
+                    return;
+                }
+            }
         }
-        end
+        self.ranges.push(start..row.len());
+    }
+
+    fn split_quoted(&mut self, row: &[u8]) {
+        self.parser.reset();
+        // The text of the cells is never longer than the row.
+        self.text.resize(self.text.len().max(row.len() + 1), 0);
+        let (mut rest, mut written, mut count) = (row, 0, 0);
+        loop {
+            let (text, ends) = (&mut self.text[written..], &mut self.ends[count..]);
+            let (result, read, copied, found) = self.parser.read_record(rest, text, ends);
+            rest = &rest[read..];
+            written += copied;
+            count += found;
+            match result {
+                // The parser treats empty input as the end of the record.
+                ReadRecordResult::InputEmpty => {}
+                ReadRecordResult::OutputEndsFull if self.limit.is_none_or(|limit| count <= limit) => {
+                    self.ends.resize(2 * count + 8, 0);
+                }
+                _ => break,
+            }
+        }
+        let starts = std::iter::once(&0).chain(&self.ends);
+        let ranges = starts.zip(&self.ends[..count]).map(|(&start, &end)| start..end);
+        self.ranges.extend(ranges);
     }
 
     /// Number of cells.

@@ -306,13 +306,24 @@ impl Cell {
     }
 }
 
+/// Maximum length of a number with a decimal comma, which is copied to the stack.
+const LONGEST: usize = 64;
+
 /// Parses a cell without surrounding spaces; the number is correctly rounded.
 pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Cell {
-    let number: Option<f64> = match decimal {
-        Decimal::Point => std::str::from_utf8(cell).ok().and_then(|text| text.parse().ok()),
+    let of_point = |cell: &[u8]| std::str::from_utf8(cell).ok().and_then(|text| text.parse::<f64>().ok());
+    let number = match decimal {
+        Decimal::Point => of_point(cell),
         // A point would be a thousands separator, or a decimal point after all.
-        Decimal::Comma if cell.contains(&b'.') => None,
-        Decimal::Comma => String::from_utf8_lossy(cell).replace(',', ".").parse().ok(),
+        Decimal::Comma if cell.contains(&b'.') || cell.len() > LONGEST => None,
+        Decimal::Comma => {
+            let copy = &mut [0; LONGEST][..cell.len()];
+            copy.copy_from_slice(cell);
+            copy.iter_mut()
+                .filter(|byte| **byte == b',')
+                .for_each(|comma| *comma = b'.');
+            of_point(copy)
+        }
     };
     match number {
         Some(number) if number.is_finite() => Cell::Number(number),
