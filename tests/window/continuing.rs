@@ -108,9 +108,6 @@ fn several_starts_keep_the_best_and_show_how_all_spread() {
         }
         let kept = run.leader_number() + 1;
         expected.push(format!("Start {kept} is kept: it has the lowest {deciding}."));
-        expected.push(format!(
-            "starts against {of_test}: other starts, kept start, quartiles, median"
-        ));
         opened.driver.assert_shows(&expected);
 
         opened.change(|settings| settings.starts = 1);
@@ -433,13 +430,13 @@ fn the_spread_and_continue_fit_in_narrow_windows() {
         "{buttons:?}"
     );
     let column = driver.get("ERRORS ON THE TEST SET").rect().left();
-    let of_spread = |text: &str| text.starts_with("starts against test Z %") || text.starts_with("test Z %, ");
+    let of_spread = |text: &str| text.starts_with("test Z %, ");
     let places: Vec<_> = driver
         .places()
         .into_iter()
         .filter(|(text, _)| of_spread(text))
         .collect();
-    assert_eq!(places.len(), 4, "the chart and three figures");
+    assert_eq!(places.len(), 3, "three figures");
     for (text, place) in places {
         assert!(
             place.left() >= column - 0.5 && place.right() <= 960.0,

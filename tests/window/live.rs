@@ -14,7 +14,6 @@ use decoupler_core::{
     dataset::Seed,
     decoupling::Decoder,
     job::Job,
-    live::ZeroGains,
     scene::{Noise, Scene},
 };
 use decoupler_files::{
@@ -149,18 +148,15 @@ fn a_broken_wire_is_reported_left_out_and_cleared_once_it_is_repaired() {
     assert!(driver.says("Column-wire 7: open") && driver.says("Its readings are left out"));
     wait_for_frames(&mut driver, 20);
     let frame = driver.views().live.shown.frame.clone().unwrap();
-    let [by_all, left_out] = frame.since_named_mm.unwrap();
-    assert!(left_out < 0.5 * by_all, "{left_out} mm instead of {by_all} mm");
-    let residual = driver.views().live.shown.frame.as_ref().unwrap().residual;
+    let residual = frame.residual;
     assert!(residual < 5e-3, "{residual}: the broken wire's readings do not count");
-    assert!(driver.says("Error with all wires: ") && driver.says("Error without the fault: "));
     pick(&mut driver, "Wire fault", "None");
     driver.wait("recovery", |driver| driver.has("Fault: none"));
-    assert!(!driver.says("Error with all wires"));
+    assert!(!driver.says("Its readings are left out"));
 }
 
 #[test]
-fn re_zero_removes_a_drift_and_its_gains_are_saved() {
+fn re_zero_removes_a_drift() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open(folder.path());
     driver.enter("Frames per second", "0.1");
@@ -184,16 +180,8 @@ fn re_zero_removes_a_drift_and_its_gains_are_saved() {
         let expected = if index % 18 == 2 { 1.05 } else { 1.0 };
         assert!((gain / expected - 1.0).abs() < 2e-3, "{index}: {gain}");
     }
-    driver.click_button("Zero");
-    assert!(driver.has("Gains of the unloaded state"));
-    driver.click("■ Stop");
-    driver.settle();
-    let path = folder.path().join("zero.json");
-    driver.save("Save zero…", &path);
-    let saved: ZeroGains = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
-    assert_eq!(saved, zero);
     driver.click("Clear zero");
-    assert!(driver.views().live.zero.is_none() && !driver.has("Gains of the unloaded state"));
+    assert!(driver.views().live.zero.is_none() && !driver.says("Rows in contact"));
 }
 
 /// Draws frames until `ends`; returns all that were shown, by the bits of their times.

@@ -275,34 +275,27 @@ pub(crate) fn varies(values: ArrayView1<'_, f64>) -> bool {
     high - low > 4.0 * f64::EPSILON * high.abs().max(low.abs())
 }
 
-/// Minimum, quartiles and maximum of a set of numbers.
+/// Minimum, median and maximum of a set of numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
     /// Minimum of the numbers.
     pub smallest: f64,
-    /// Value below which a quarter of the numbers lie.
-    pub lower_quartile: f64,
     /// Value below which half of the numbers lie.
     pub median: f64,
-    /// Value below which three quarters of the numbers lie.
-    pub upper_quartile: f64,
     /// Maximum of the numbers.
     pub largest: f64,
 }
 
 impl Spread {
-    /// Summarises the finite numbers among `values`; returns `None` if there are none. Quartiles are interpolated
+    /// Summarises the finite numbers among `values`; returns `None` if there are none. The median is interpolated
     /// linearly (Hyndman and Fan 1996, definition 7).
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
         let last = sorted.len().checked_sub(1)?;
-        let quantile = |share: f64| interpolated(&sorted, share * last as f64);
         Some(Self {
             smallest: sorted[0],
-            lower_quartile: quantile(0.25),
-            median: quantile(0.5),
-            upper_quartile: quantile(0.75),
+            median: interpolated(&sorted, 0.5 * last as f64),
             largest: sorted[last],
         })
     }
@@ -448,14 +441,12 @@ mod tests {
     }
 
     #[test]
-    fn quartiles_follow_definition_7() {
+    fn the_median_follows_definition_7() {
         // R: quantile(c(1, 2, 4, 8, 16, 32), type = 7)
         let spread = Spread::of([32.0, 1.0, f64::NAN, 4.0, 16.0, 8.0, 2.0]).unwrap();
         let expected = Spread {
             smallest: 1.0,
-            lower_quartile: 2.5,
             median: 6.0,
-            upper_quartile: 14.0,
             largest: 32.0,
         };
         assert_eq!(spread, expected);

@@ -29,10 +29,7 @@ pub use of_errors::{
 };
 pub use of_experiment::experiment_figure;
 pub use of_recorded::{TargetSurface, hysteresis_figure, position_error_map};
-pub use of_sample::{
-    node_figure, readings_figure, sample_figure, singular_values_figure, starts_figure, targets_over_time_figure,
-    zero_gains_figure,
-};
+pub use of_sample::{node_figure, readings_figure, sample_figure, singular_values_figure, targets_over_time_figure};
 pub use of_trade_off::{
     TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure, training_time,
 };

@@ -3,12 +3,7 @@
 
 use std::sync::Arc;
 
-use decoupler_core::{
-    evaluation::{Intervals, Spread},
-    identifiability::Identifiability,
-    problem::Channel,
-    text::format_number,
-};
+use decoupler_core::{evaluation::Intervals, identifiability::Identifiability, problem::Channel, text::format_number};
 use glam::DVec3;
 use ndarray::Array2;
 
@@ -119,30 +114,6 @@ pub fn node_figure(
     Plot::new(x, PlotAxis::linear("z (mm)"), [actual, decoupled]).into()
 }
 
-/// Results of several starts of a training, as dots over `axis`: the start `kept` is highlighted, and a box reaches from the
-/// lower to the upper quartile, with a line at the median. Starts without a result have no dot.
-pub fn starts_figure(axis: &str, results: &[Option<f64>], kept: usize, spread: &Spread) -> PlotFigure {
-    let dots = |name: &str, ink: Ink, is_kept: bool| {
-        let all = results.iter().enumerate();
-        let shown = all.filter(|(start, _)| (*start == kept) == is_kept);
-        let points = shown.filter_map(|(start, result)| {
-            let note = format!("Start {}: {}", start + 1, format_number((*result)?));
-            // Three heights separate the dots of similar values.
-            Some(PlotPoint::from([(*result)?, (start % 3) as f64]).noted(note))
-        });
-        Series::new(name, Look::marker(ink, Marker::Disc), points).listed(None)
-    };
-    let y = PlotAxis::new("starts", Scale::Hidden).including([-1.0, 3.0]);
-    let quartiles = LineAt::Between([spread.lower_quartile, spread.upper_quartile]);
-    let series = [
-        dots("other starts", Ink::Grey, false),
-        dots("kept start", Ink::Blue, true),
-        Series::across("quartiles", quartiles, Ink::Grey, None).listed(None),
-        Series::across("median", LineAt::X(spread.median), Ink::Grey, LineStyle::Solid).listed(None),
-    ];
-    Plot::new(PlotAxis::linear(axis), y, series).into()
-}
-
 const HUES: [Ink; 6] = [Ink::Blue, Ink::Orange, Ink::Green, Ink::Violet, Ink::Cyan, Ink::Red];
 /// Maximum number of targets with their own colours and names; more targets are all drawn as fine lines.
 const MAX_CURVES: usize = 2 * HUES.len();
@@ -192,25 +163,15 @@ pub fn targets_over_time_figure(
 /// Colours span 0 to `largest_percent` and are comparable between frames; larger values have the colour of the end.
 pub fn readings_figure(drops_percent: Array2<f64>, rows: &[usize], largest_percent: f64) -> HeatMap {
     let axis = PlotAxis::linear("drop from unloaded (%)").including([0.0, largest_percent]);
-    of_wires(drops_percent, rows, axis.limited(0.0..=largest_percent))
-}
-
-/// Gains of the unloaded state, rows × columns, as their difference from 1 in percent; `rows` as for [`readings_figure`].
-pub fn zero_gains_figure(gains: &Array2<f64>, rows: &[usize]) -> HeatMap {
-    let percent = gains.mapv(|gain| 100.0 * (gain - 1.0));
-    of_wires(percent, rows, PlotAxis::linear("gain − 1, unloaded (%)"))
-}
-
-fn of_wires(values: Array2<f64>, rows: &[usize], value_axis: PlotAxis) -> HeatMap {
     HeatMap {
         colours: SequentialMap::default(),
         x_name: "column-wire".to_owned(),
         y_name: "row-wire".to_owned(),
-        columns: (1..=values.ncols()).map(|column| column.to_string()).collect(),
+        columns: (1..=drops_percent.ncols()).map(|column| column.to_string()).collect(),
         rows: rows.iter().map(|row| (row + 1).to_string()).collect(),
-        notes: Array2::default(values.dim()),
-        values,
-        value_axis,
+        notes: Array2::default(drops_percent.dim()),
+        values: drops_percent,
+        value_axis: axis.limited(0.0..=largest_percent),
     }
 }
 
@@ -358,12 +319,5 @@ mod live_tests {
             (slight.rows, slight.columns),
             (vec!["1".into(), "5".into()], vec!["1".into(), "2".into()])
         );
-    }
-
-    #[test]
-    fn gains_are_shown_by_their_difference_from_one() {
-        let figure = zero_gains_figure(&array![[1.02, 0.99]], &[0]);
-        assert!((figure.values[[0, 0]] - 2.0).abs() < 1e-12 && (figure.values[[0, 1]] + 1.0).abs() < 1e-12);
-        assert_eq!(figure.range(), figure.values[[0, 1]]..=figure.values[[0, 0]]);
     }
 }

@@ -37,8 +37,6 @@ pub struct LiveArray {
     is_new: Vec<bool>,
     check: Option<WireCheck>,
     checked: Option<Instant>,
-    /// Sums of the errors since a fault was named, with all wires and without the faulty ones, and their number.
-    pub(super) since_named: ([f64; 2], u64),
 }
 
 /// Result of fault detection.
@@ -95,7 +93,6 @@ impl LiveArray {
             watched,
             check: check.transpose()?,
             checked: None,
-            since_named: Default::default(),
             rows: rows.into(),
         })
     }
@@ -135,9 +132,6 @@ impl LiveArray {
         let event = check.check(&self.frame_ohm);
         self.checked = Some(now + begun.elapsed());
         self.watched = Watched::Checked(event?);
-        if self.watched.wire().is_some() {
-            self.since_named = Default::default();
-        }
         event
     }
 
@@ -177,13 +171,6 @@ impl LiveArray {
             .flat_map(|&row| truth.row_positions_mm(&self.sensor, row));
         let errors = answer_mm.chunks_exact(3).zip(truth_mm);
         errors.map(|(node, truth_mm)| (node[2] - truth_mm.z).abs()).sum::<f64>() / nodes as f64
-    }
-
-    /// Returns the mean errors of z in millimetres since a fault was named: with all wires, and without the faulty one. `None`
-    /// without a fault, and where the truth is unknown.
-    pub fn since_named_mm(&self) -> Option<[f64; 2]> {
-        let (sums, count) = self.since_named;
-        (self.watched.wire().is_some() && count > 0).then(|| sums.map(|sum| sum / count as f64))
     }
 
     /// Returns the drop of each reading of a whole frame from its value without load, in percent: rows × columns.

@@ -355,17 +355,8 @@ impl Session {
 
     /// Counts the answer, which has now been used.
     pub fn count(&mut self) {
-        let (truth, Answer { readings, values, .. }) = (self.input.truth(), &self.last);
-        let error_mm = truth.zip(self.array.as_mut()).map(|(truth, array)| {
-            let error_mm = array.error_mm(values, truth);
-            let mut by_all_mm = vec![0.0; values.len()];
-            if self.last.left_out.is_some() && self.decoder.decode(readings, &mut by_all_mm).is_ok() {
-                let ([by_all, left_out], count) = array.since_named;
-                let by_all = by_all + array.error_mm(&by_all_mm, truth);
-                array.since_named = ([by_all, left_out + error_mm], count + 1);
-            }
-            error_mm
-        });
+        let truth = self.input.truth().zip(self.array.as_ref());
+        let error_mm = truth.map(|(truth, array)| array.error_mm(&self.last.values, truth));
         let now = Instant::now();
         self.tally.good(self.last.read_at.unwrap_or(now), now, error_mm);
     }
@@ -655,7 +646,10 @@ mod tests {
         assert!(array.watched.wire().is_some(), "{:?}", array.watched);
         let residual = array.residual(&session.last);
         assert!(residual < 3e-3, "{residual}");
-        let [by_all, left_out] = array.since_named_mm().unwrap();
+        let mut by_all = vec![0.0; session.last.values.len()];
+        session.decoder.decode(&session.last.readings, &mut by_all).unwrap();
+        let truth = session.input.truth().unwrap();
+        let [by_all, left_out] = [&by_all, &session.last.values].map(|answer| array.error_mm(answer, truth));
         assert!(left_out < by_all, "{left_out} and {by_all}");
     }
 }

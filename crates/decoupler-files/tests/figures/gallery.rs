@@ -5,7 +5,7 @@ use std::{fs, path::Path, sync::Arc};
 use decoupler_core::{
     decoupling::DecoderKind,
     evaluation::{
-        Preset, Run, RunSettings, Spread, TradeOffPoint,
+        Preset, Run, RunSettings, TradeOffPoint,
         experiments::{Axis, AxisKind, ExperimentResults, PaperTable},
         measure_trade_off,
     },
@@ -20,7 +20,7 @@ use decoupler_files::{
     figure::{
         Decoded, Figure, RegressionLine, TradeOffLevel, TradeOffLimits, compared_losses_figure, experiment_figure,
         histogram_figure, loss_figure, node_figure, position_error_map, readings_figure, regression_figure,
-        sample_figure, section_figure, singular_values_figure, starts_figure,
+        sample_figure, section_figure, singular_values_figure,
         surface::{Quantity, Section, SectionLine, Surface, SurfaceFigure, ViewMode},
         targets_over_time_figure, trade_off_figure, training_state_figure, value_pairs,
     },
@@ -210,7 +210,4 @@ fn gallery_of_printed_figures() {
     let answers = targets.mapv(|value| value + 0.3 * (value * 2.0).sin());
     let of_positions = position_error_map(targets.view(), answers.view(), ["x", "y"], Some("mm"));
     draw("position-errors", of_positions.unwrap());
-    let results = [0.31, 0.35, 0.33, 0.5, 0.41].map(Some);
-    let spread = Spread::of(results.into_iter().flatten()).unwrap();
-    draw("starts", starts_figure("Z error (%)", &results, 0, &spread));
 }

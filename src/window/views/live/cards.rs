@@ -1,20 +1,15 @@
 use std::sync::Arc;
 
-use decoupler_core::{
-    live::{FaultyWire, ZeroGains},
-    sensor::ArrayScale,
-};
+use decoupler_core::{live::FaultyWire, sensor::ArrayScale};
 use decoupler_files::{
     export::format_number,
     figure::{
         HeatMap, SequentialMap, readings_figure,
         surface::{Quantity, Surface, SurfaceFigure},
-        zero_gains_figure,
     },
     live::{ConverterEnd, Fault, FaultEffect, SourcePlan, Watched},
 };
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
-use ndarray::Array2;
 
 use super::{LiveView, engine::LiveFrame, source_form::SourceKind};
 use crate::window::{
@@ -26,7 +21,7 @@ use crate::window::{
     widgets::{
         card_ui,
         fields::{count_ui, list_ui, options_ui, quantity_ui},
-        ghost_button, note_ui, primary_button, segmented_ui,
+        ghost_button, note_ui, primary_button,
     },
 };
 
@@ -235,49 +230,31 @@ fn words(view: &LiveView, shared: &Shared) -> (String, String) {
     ("Decode live readings".to_owned(), text)
 }
 
-/// Shows the readings of the frame as a map of rows and columns, or the gains of the unloaded state.
-pub fn readings_ui(ui: &mut Ui, view: &mut LiveView, colours: SequentialMap) {
+/// Shows the readings of the frame as a map of rows and columns.
+pub fn readings_ui(ui: &mut Ui, view: &LiveView, colours: SequentialMap) {
     let Some(frame) = &view.shown.frame else { return };
-    let gains = view.zero.as_ref().and_then(|zero| gains_of(zero, frame));
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         ui.label(RichText::new("Readings").font(semibold(type_size().title)));
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            if gains.is_some() {
-                let options = [(false, "Frame"), (true, "Zero")];
-                let picked = segmented_ui(ui, "Displayed readings", &options, view.shows_zero, false);
-                view.shows_zero = picked.unwrap_or(view.shows_zero);
-            }
-        });
     });
-    let (label, map) = match &gains {
-        Some(gains) if view.shows_zero => ("Gains of the unloaded state", zero_gains_figure(gains, &frame.rows)),
-        _ => ("Live readings", figure_of(frame, view.drops.largest_percent())),
-    };
-    let map = map.coloured(colours);
+    let map = figure_of(frame, view.drops.largest_percent()).coloured(colours);
     let (rows, columns) = marked(frame);
     let warning = Theme::of(ui).palette.warning;
-    let Some(([row, column], cell)) = cells_ui(ui, label, &map, (&rows, &columns, warning)) else {
+    let marks = (&*rows, &*columns, warning);
+    let Some(([row, column], cell)) = cells_ui(ui, "Live readings", &map, marks) else {
         return;
     };
     let value = format_number(map.values[[row, column]]);
-    let text = if gains.is_some() && view.shows_zero {
-        format!("gain − 1: {value} %")
-    } else {
-        format!("drop from unloaded: {value} %")
-    };
     let row = frame.rows.get(row).map_or(0, |row| row + 1);
-    cell.on_hover_text_at_pointer(format!("Row-wire {row}, column-wire {}\n{text}", column + 1));
+    cell.on_hover_text_at_pointer(format!(
+        "Row-wire {row}, column-wire {}\ndrop from unloaded: {value} %",
+        column + 1
+    ));
 }
 
 /// Returns the map of the readings of a frame.
 pub fn figure_of(frame: &LiveFrame, largest_percent: f64) -> HeatMap {
     readings_figure(frame.drops_percent.clone(), &frame.rows, largest_percent)
-}
-
-/// Returns the gains in the shape of the frame.
-fn gains_of(zero: &ZeroGains, frame: &LiveFrame) -> Option<Array2<f64>> {
-    Array2::from_shape_vec(frame.drops_percent.dim(), zero.gains.clone()).ok()
 }
 
 /// Returns the rows and columns of the map whose wires are faulty.

@@ -133,8 +133,6 @@ pub struct LiveFrame {
     pub residual: f64,
     /// Faults of wires.
     pub watched: Watched,
-    /// Mean errors of z in millimetres since a fault was named, with all wires and without the fault.
-    pub since_named_mm: Option<[f64; 2]>,
 }
 
 /// What is displayed, and what the answers of a session are drawn on.
@@ -221,7 +219,6 @@ impl Screen {
             drops_percent: array.drops_percent(&answer.readings),
             residual: array.residual(answer),
             watched: array.watched.clone(),
-            since_named_mm: array.since_named_mm(),
         })
     }
 }

@@ -1,10 +1,6 @@
 use eframe::egui::{RichText, Ui};
 
-use super::{
-    LiveView,
-    engine::LiveFrame,
-    tools::{save_recording, save_zero},
-};
+use super::{LiveView, engine::LiveFrame, tools::save_recording};
 use crate::window::{
     glossary,
     shared::{Effect, Shared},
@@ -29,7 +25,7 @@ pub fn figures_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &m
     section_heading_ui(ui, "Stream");
     stream_ui(ui, view);
     section_heading_ui(ui, "Zero");
-    zero_ui(ui, view, effects);
+    zero_ui(ui, view);
     section_heading_ui(ui, "Recording");
     recording_ui(ui, view, shared, effects);
     ui.add_space(space(2));
@@ -130,12 +126,6 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
     };
     let hint = "Mean |error| of z over all nodes, compared with the simulated truth, over the latest frames.";
     fact_ui(ui, "Error", hint, &in_mm(view.shown.counts.error_mm));
-    if let Some([by_all, left_out]) = frame.since_named_mm {
-        let hint = "Mean |error| of z since the fault was named, by the network with all wires.";
-        fact_ui(ui, "Error with all wires", hint, &in_mm(Some(by_all)));
-        let hint = "Mean |error| of z since the fault was named, without the faulty wires.";
-        fact_ui(ui, "Error without the fault", hint, &in_mm(Some(left_out)));
-    }
 }
 
 /// Shows how many of `of` readings, and of the targets, are outside the range seen in training.
@@ -156,7 +146,7 @@ pub fn outside_ui(ui: &mut Ui, outside: (Option<usize>, usize), of: usize, targe
     coloured_fact_ui(ui, "Outside training", hint, &value, colour);
 }
 
-fn zero_ui(ui: &mut Ui, view: &mut LiveView, effects: &mut Vec<Effect>) {
+fn zero_ui(ui: &mut Ui, view: &mut LiveView) {
     if let Some(problem) = &view.zero_problem {
         note_ui(ui, &format!("Not re-zeroed: {problem}."));
     }
@@ -178,20 +168,13 @@ fn zero_ui(ui: &mut Ui, view: &mut LiveView, effects: &mut Vec<Effect>) {
         hint,
         &format!("{touched} of {}", zero.in_contact.len()),
     );
-    ui.horizontal(|ui| {
-        let task = save_zero(&zero);
-        let save = ui.add(ghost_button("Save zero…"));
-        if save.on_hover_text(task.words.description).clicked() {
-            effects.push(Effect::ChooseFile(task));
-        }
-        let clear = ui.add(ghost_button("Clear zero"));
-        if clear
-            .on_hover_text("Compares readings with the model at rest again.")
-            .clicked()
-        {
-            view.clear_zero();
-        }
-    });
+    let clear = ui.add(ghost_button("Clear zero"));
+    if clear
+        .on_hover_text("Compares readings with the model at rest again.")
+        .clicked()
+    {
+        view.clear_zero();
+    }
 }
 
 fn format_gains(zero: &ZeroGains) -> String {

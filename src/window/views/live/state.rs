@@ -48,8 +48,6 @@ pub struct LiveView {
     pub(super) source: SourceForm,
     pub(super) fault: FaultForm,
     pub(super) drops: DropScale,
-    /// True if the readings' card shows the gains of the unloaded state.
-    pub(super) shows_zero: bool,
     /// The node under the pointer, marked on both surfaces.
     pub(super) node: Option<usize>,
     /// The stream that has ended by itself, as it was requested.
@@ -93,7 +91,6 @@ impl LiveView {
             source: SourceForm::default(),
             fault: FaultForm::default(),
             drops: DropScale::default(),
-            shows_zero: false,
             node: None,
             ended: None,
             is_to_be_drawn: false,
@@ -216,7 +213,6 @@ impl LiveView {
     fn begin(&mut self, network: String, plan: SessionPlan) {
         self.keep_recording();
         self.zero.clone_from(&plan.zero);
-        self.shows_zero &= self.zero.is_some();
         self.zero_problem = None;
         self.drops = DropScale::default();
         self.node = None;
@@ -293,7 +289,7 @@ impl LiveView {
 
     /// Stops dividing readings by gains.
     pub(super) fn clear_zero(&mut self) {
-        (self.zero, self.zero_problem, self.shows_zero) = (None, None, false);
+        (self.zero, self.zero_problem) = (None, None);
         self.change(|session| {
             session.array.as_mut()?.zero = None;
             None

@@ -7,7 +7,7 @@ use std::{
     sync::{Arc, mpsc::Sender},
 };
 
-use decoupler_core::{live::ZeroGains, problem::Channel};
+use decoupler_core::problem::Channel;
 use decoupler_files::{
     export::{Cell, Table, TableColumn, WriteError, atomic_write},
     figure::Figure,
@@ -179,7 +179,7 @@ fn speed_ui(ui: &mut Ui, view: &mut LiveView) {
     dim_ui(ui, "Speed");
 }
 
-/// Returns the exports: pictures of the latest frame, the recording and the unloaded state.
+/// Returns the exports: pictures of the latest frame, and the recording.
 pub fn live_exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a>> {
     if let Some(targets) = &view.shown.targets {
         return target_exports(targets, shared);
@@ -192,21 +192,12 @@ pub fn live_exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a
     let readings = frame
         .map(|frame| || Figure::from(figure_of(frame, view.drops.largest_percent()).coloured(shared.look.colours)));
     let recording = view.recorded.as_ref().map(save_recording);
-    let zero = view.zero.as_ref().map(save_zero);
-    let files = [
-        file_export(
-            "Recording",
-            "CSV",
-            recording,
-            "Nothing is recorded: press Record while a source runs.",
-        ),
-        file_export(
-            "Unloaded state",
-            "JSON",
-            zero,
-            "There is no unloaded state yet: press Re-zero while a source runs.",
-        ),
-    ];
+    let files = [file_export(
+        "Recording",
+        "CSV",
+        recording,
+        "Nothing is recorded: press Record while a source runs.",
+    )];
     picture_exports("Surface", "live-surface".to_owned(), surfaces)
         .chain(picture_exports("Readings", "live-readings".to_owned(), readings))
         .chain(files)
@@ -279,12 +270,6 @@ const RECORDING: FileWords = FileWords {
     extensions: &["csv"],
 };
 
-const ZERO: FileWords = FileWords {
-    kind: "unloaded state",
-    description: "Gain of every reading in the unloaded state, and the rows that were in contact, as JSON.",
-    extensions: &["json"],
-};
-
 /// A file that the user opens in the Live view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LiveFile {
@@ -340,15 +325,4 @@ pub fn save_recording(recorded: &Recorded) -> FileTask {
         atomic_write(path, |file| io::copy(&mut File::open(&from)?, file).map(drop))
     };
     FileTask::save(RECORDING, "recording", Contents::new(write))
-}
-
-/// Saves the unloaded state.
-pub fn save_zero(zero: &ZeroGains) -> FileTask {
-    let zero = zero.clone();
-    let write = move |path: &Path| {
-        atomic_write(path, |file| {
-            serde_json::to_writer_pretty(file, &zero).map_err(Into::into)
-        })
-    };
-    FileTask::save(ZERO, "zero", Contents::new(write))
 }

@@ -18,13 +18,12 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{Cell, Table, TableColumn, describe_search, format_duration, format_number},
-    figure::{frame_time, starts_figure},
+    figure::frame_time,
 };
-use eframe::egui::{Align, Layout, RichText, Ui, Vec2, WidgetInfo, accesskit::Role};
+use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 
 use crate::window::{
     glossary,
-    plotting::{Pointer, plots_ui},
     shared::{
         DecoderSource, Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence,
     },
@@ -380,21 +379,15 @@ pub fn conditioning_ui(ui: &mut Ui, test: &TestView) {
     note_ui(ui, &text);
 }
 
-/// Shows the spread of the results of several starts: a strip of dots and three figures. Nothing for one start.
+/// Shows the spread of the results of several starts: three figures of each error. Nothing for one start.
 pub fn spread_ui(ui: &mut Ui, problem: &Problem, combine: Combination, starts: &[StartRecord]) {
     let Some(best) = best_start(starts).filter(|_| starts.len() > 1) else {
         return;
     };
     let palette = Theme::of(ui).palette;
     section_heading_ui(ui, &format!("Spread over {} starts", starts.len()));
-    let percents: Vec<Option<f64>> = starts.iter().map(StartRecord::percent).collect();
-    let spread = Spread::of(percents.iter().copied().flatten());
+    let spread = Spread::of(starts.iter().filter_map(StartRecord::percent));
     let of_test = problem.test_percent_name();
-    if let Some(spread) = spread {
-        let figure = starts_figure(of_test, &percents, best, &spread);
-        let size = Vec2::new(ui.available_width(), space(22));
-        ui.allocate_ui(size, |ui| plots_ui(ui, "spread of the starts", &figure, Pointer::Picks));
-    }
     let is_held_out = starts.iter().all(|start| start.validation_mse.is_some());
     let error = if is_held_out { "validation mse" } else { "training mse" };
     let errors = Spread::of(starts.iter().map(StartRecord::deciding_mse));
