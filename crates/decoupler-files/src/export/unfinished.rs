@@ -12,7 +12,7 @@ const PREFIX: &str = ".decoupler-";
 const SUFFIX: &str = ".part";
 
 /// Paths of all unfinished files and folders, and the folders that were swept. A program that exits from another thread drops
-/// nothing, so [`exit_leaving_nothing`] removes the former.
+/// nothing, so [`exit_leaving_nothing`] removes the unfinished ones.
 static ALL: Mutex<(BTreeSet<PathBuf>, BTreeSet<PathBuf>)> = Mutex::new((BTreeSet::new(), BTreeSet::new()));
 
 /// An unfinished file or folder, removed when dropped. It is locked while in use; an unlocked one was left by a program that

@@ -27,8 +27,8 @@ pub enum ImportError {
     /// A name, range, meaning or condition of a recipe is wrong, or does not fit the files.
     #[error("{0}")]
     Columns(String),
-    /// The rows cannot become samples: a derived column has no value, a row-wire no number, or no row is left; or files do not
-    /// fit together.
+    /// The rows cannot become samples: a derived column has no value, a row-wire is not a number, or no row is left; or files
+    /// do not fit together.
     #[error("{0}")]
     Samples(String),
     /// A cell is not a number, or a file cannot be joined, with a remedy that each interface words in its own terms.
