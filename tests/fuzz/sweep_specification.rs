@@ -47,5 +47,5 @@ fn any_input() {
         for_each_seed(6, |rng| check(&mutated_document(bytes, rng)));
     });
     let accepted = accepted.into_inner();
-    assert!(accepted > 3, "only {accepted} specifications are accepted");
+    assert!(accepted >= 3, "only {accepted} specifications are accepted");
 }

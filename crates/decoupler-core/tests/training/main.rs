@@ -7,6 +7,8 @@ mod conformance;
 mod methods;
 mod problems;
 mod resume;
+mod rows_and_folds;
+mod run_starts;
 mod stopping;
 mod traces;
 mod wide;

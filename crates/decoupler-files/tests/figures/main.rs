@@ -1,9 +1,7 @@
-//! Surfaces against independent implementations, and figures on the screen and in print.
+//! Figures on the screen and in print, and the surfaces in them.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod gallery;
-mod lattice;
 mod print;
-mod scattered;
 mod surfaces;
