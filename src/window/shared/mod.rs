@@ -24,7 +24,7 @@ pub use offers::{Action, FileInUse, Offers, refuse_in_use};
 pub use run_list::{LoadedRun, PLACES, RunList, RunsWorker};
 pub use run_view::{RunCommand, RunView, run_buttons_ui, sentence};
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_scene};
-pub use training_form::{Effect, Matter, Notice, combination_name, method_choice_ui, method_settings_ui, stopping_ui};
+pub use training_form::{Effect, Matter, Notice};
 pub use view::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
 
 use run_view::training_status_ui;

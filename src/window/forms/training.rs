@@ -1,0 +1,123 @@
+//! The training: its method, the rules that end it, and its restarts.
+
+use decoupler_core::{evaluation::RunSettings, settings::Method, text::counted};
+use eframe::egui::Ui;
+
+use super::{Fields, Look, Row, SetBy, chosen_ui, number_ui};
+use crate::window::{
+    glossary,
+    widgets::{
+        dim_ui,
+        fields::{capitalised, input_text},
+        fold_ui,
+    },
+};
+
+/// Training method.
+pub const METHOD: Row = Row::new(
+    "method",
+    "Method",
+    glossary::METHOD.hint,
+    Look::Below(|| Vec::from_iter(Method::all().map(|method| (method.short_name(), method.name(), method.summary())))),
+);
+
+/// Largest number of epochs.
+pub const EPOCHS: Row = Row::new(
+    "epochs",
+    "Epochs",
+    "Largest number of epochs. An epoch is one pass over all training samples. Train counts from the first epoch, Train \
+     longer from the current one.",
+    Look::Number(""),
+);
+
+/// The other rules that end a training.
+const STOPPING: [Row; 3] = [
+    Row::new(
+        "max fail",
+        "Validation failures",
+        glossary::VALIDATION_FAILURES.hint,
+        Look::Number(""),
+    ),
+    Row::new(
+        "goal",
+        "Goal (mse)",
+        "Training error at which training ends: the mean square error of the scaled coordinates, each in [−1, 1].",
+        Look::Number(""),
+    ),
+    Row::new(
+        "min gradient",
+        "Smallest gradient",
+        "Norm of the gradient below which training ends: of the derivative of the training error with respect to the weights.",
+        Look::Number(""),
+    ),
+];
+
+/// Trainings from different random weights, and how they become one network.
+pub const RESTARTS: [Row; 2] = [
+    Row::new("starts", "Restarts", glossary::STARTS.hint, Look::Number("")),
+    Row::new(
+        "combine",
+        "Combine restarts",
+        glossary::COMBINE.hint,
+        Look::Below(|| {
+            vec![
+                ("best", "keep the best", "The one with the lowest validation error."),
+                (
+                    "mean",
+                    "average their answers",
+                    "One network with the hidden nodes of all.",
+                ),
+            ]
+        }),
+    ),
+];
+
+/// The method, and what it does.
+pub fn method_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
+    fields.show(ui, &[METHOD]);
+    if let SetBy::User = fields.set_by {
+        dim_ui(ui, fields.settings.training.method.summary());
+    }
+}
+
+/// The folded settings of the training. A paused one (`is_new` is false) keeps its restarts.
+pub fn training_ui(ui: &mut Ui, fields: &mut Fields<'_>, is_new: bool) {
+    let stopping = fields.summary(|settings| counted(settings.training.stopping.epochs, "epoch"));
+    fold_ui(ui, "When to stop", &stopping, |ui| {
+        fields.show(ui, &[EPOCHS]);
+        if let SetBy::User = fields.set_by {
+            fields.show(ui, &STOPPING);
+        }
+    });
+    fold_ui(ui, "Method settings", &fields.summary(of_method), |ui| {
+        method_settings_ui(ui, fields);
+        ui.add_enabled_ui(is_new, |ui| fields.show(ui, &RESTARTS));
+    });
+}
+
+/// The settings of the method.
+fn method_settings_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
+    let Some(method) = fields.known().map(|settings| settings.training.method) else {
+        return;
+    };
+    for setting in method.settings() {
+        let label = capitalised(setting.name);
+        match fields.set_by {
+            SetBy::User => {
+                let method = &mut fields.settings.training.method;
+                let usual = &fields.usual.training.method;
+                number_ui(ui, [&label, setting.help, ""], setting, method, usual);
+            }
+            SetBy::Choice(_) => chosen_ui(ui, &label, setting.number(&method).map(input_text)),
+        }
+    }
+}
+
+/// The first of the method's own settings, and the number of restarts.
+fn of_method(settings: &RunSettings) -> String {
+    let method = settings.training.method;
+    let first = method.settings().next();
+    let first = first.and_then(|setting| Some(format!("{} {}, ", setting.name, input_text(setting.number(&method)?))));
+    let starts = counted(settings.starts, "start");
+    format!("{}{starts}", first.unwrap_or_default())
+}
