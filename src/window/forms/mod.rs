@@ -1,5 +1,5 @@
-//! Forms of settings, for every view and both sources: sensor, scene, network and training. A form is a loop over rows of
-//! the table of settings; what is chosen automatically is shown disabled, with the reason.
+//! Forms of settings, for every view and both sources: sensor, scene, network and training. A field is a [`Row`] of the
+//! table of settings; what is chosen automatically is shown disabled, with the reason.
 
 mod network;
 mod presets;
@@ -9,20 +9,21 @@ mod training;
 
 pub use network::{hidden_ui, inputs_ui, of_inputs, workload_ui};
 pub use presets::{follow_preset, preset_ui, scene_choice_ui};
-pub use scene::{SAMPLES, condition_ui, of_samples, of_scene, outlook_notes_ui, scene_ui};
+pub use scene::{SAMPLES, of_samples, of_scene, outlook_notes_ui, scene_ui, size_ui};
 pub use sensor::{array_ui, geometry_ui, of_geometry};
-pub use training::{EPOCHS, METHOD, RESTARTS, method_ui, training_ui};
+pub use training::{method_ui, training_ui};
 
-use std::ops::RangeInclusive;
+use std::{collections::HashMap, ops::RangeInclusive, sync::LazyLock};
 
 use decoupler_core::{
     evaluation::{RUN_OPTIONS, RunSettings},
     scene::RowModel,
     settings::{Field, Kind, Setting, Value},
 };
-use eframe::egui::{Align, Align2, ComboBox, Response, TextEdit, Ui, vec2};
+use eframe::egui::{Align, Align2, ComboBox, TextEdit, Ui, vec2};
 
 use super::{
+    glossary,
     theme::space,
     widgets::fields::{
         Limits, capitalised, count_ui, field_ui, in_percent, input_text, list_ui, options_ui, percent_ui, quantity_ui,
@@ -50,28 +51,14 @@ pub enum SetBy<'a> {
     Choice(Option<&'a RunSettings>),
 }
 
-/// A setting with the name and the form that it has in the window.
+/// A row of the table of settings, with its name and its look in the window. Its tooltip is the definition of the name in
+/// the glossary or, for other names, the explanation in the table.
 #[derive(Clone, Copy, Debug)]
-pub struct Row {
-    label: &'static str,
-    /// Tooltip.
-    hint: &'static str,
-    look: Look,
-    setting: Source,
-}
+pub struct Row(&'static str, &'static str, Look);
 
-/// Where a setting is described.
+/// Look of a field.
 #[derive(Clone, Copy, Debug)]
-enum Source {
-    /// In the table of a run, under this name.
-    Table(&'static str),
-    /// Here.
-    Own(Setting<RunSettings>),
-}
-
-/// Form of a field.
-#[derive(Clone, Copy, Debug)]
-enum Look {
+pub enum Look {
     /// Number with this unit; a fraction of one if that is %.
     Number(&'static str),
     /// A few options side by side.
@@ -82,8 +69,15 @@ enum Look {
     Below(fn() -> Vec<Choice>),
 }
 
-/// Value of a setting, its text in the window, and its meaning.
+/// Value of a setting, its text in the window, and its meaning; without one, that in the glossary.
 type Choice = (&'static str, &'static str, &'static str);
+
+/// Value of a setting that has not been chosen yet.
+const AUTOMATIC: &str = "automatic";
+
+/// Tooltip of every setting that is chosen automatically.
+const REASON: &str = "Chosen by cross-validation when you press Train. To set it yourself, untick “Choose settings \
+                      automatically”.";
 
 impl<'a> Fields<'a> {
     /// A form for these settings, set by the user.
@@ -108,14 +102,13 @@ impl<'a> Fields<'a> {
                 SetBy::User => row.ui(ui, self.settings, &self.usual),
                 SetBy::Choice(chosen) => {
                     let value = chosen.and_then(|settings| row.text(settings));
-                    let field_ui = if row.is_below() { chosen_below_ui } else { chosen_ui };
-                    field_ui(ui, row.label, value);
+                    chosen_ui(ui, row.1, value, matches!(row.2, Look::Below(_)));
                 }
             }
         }
     }
 
-    /// Returns the settings to be summarised; none before they are chosen.
+    /// Returns the settings of network and training; none before they are chosen.
     pub fn known(&self) -> Option<&RunSettings> {
         match self.set_by {
             SetBy::User => Some(self.settings),
@@ -123,63 +116,20 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// Returns a summary of the settings.
+    /// Returns a summary of the settings of network or training.
     pub fn summary(&self, of: impl FnOnce(&RunSettings) -> String) -> String {
         self.known().map_or_else(|| AUTOMATIC.to_owned(), of)
     }
 }
 
-/// Value of a setting that has not been chosen yet.
-const AUTOMATIC: &str = "automatic";
-
-/// Tooltip of every setting that is chosen automatically.
-const REASON: &str = "Chosen by cross-validation when you press Train. To set it yourself, untick “Choose settings \
-                      automatically”.";
-
 impl Row {
-    /// A row of the table of a run.
-    const fn new(name: &'static str, label: &'static str, hint: &'static str, look: Look) -> Self {
-        let setting = Source::Table(name);
-        Self {
-            label,
-            hint,
-            look,
-            setting,
-        }
-    }
-
-    /// A number that only the window offers.
-    const fn number(
-        label: &'static str,
-        hint: &'static str,
-        (kind, unit): (Kind, &'static str),
-        field: fn(&mut RunSettings) -> Option<Field<'_>>,
-    ) -> Self {
-        Self {
-            label,
-            hint,
-            look: Look::Number(unit),
-            setting: Source::Own(Setting::new(label, kind, hint, field)),
-        }
-    }
-
-    fn setting(&self) -> Setting<RunSettings> {
-        match self.setting {
-            Source::Own(setting) => setting,
-            Source::Table(name) => {
-                let found = RUN_OPTIONS.iter().find(|option| option.setting.name == name);
-                found.expect("the table has every named row").setting
-            }
-        }
-    }
-
-    /// Returns true if the value is below the name.
-    fn is_below(&self) -> bool {
-        matches!(self.look, Look::Below(_))
+    fn setting(&self) -> &'static Setting<RunSettings> {
+        let found = RUN_OPTIONS.iter().find(|option| option.setting.name == self.0);
+        &found.expect("a row of the table").setting
     }
 
     fn choices(&self) -> Vec<Choice> {
-        match self.look {
+        match self.2 {
             Look::Number(_) => Vec::new(),
             Look::Options(choices) | Look::List(choices) => choices.to_vec(),
             Look::Below(choices) => choices(),
@@ -188,38 +138,41 @@ impl Row {
 
     /// Returns the value as the window writes it; none if the setting does not apply.
     fn text(&self, settings: &RunSettings) -> Option<String> {
-        let value = self.setting().get(settings)?;
-        Some(match value {
+        Some(match self.setting().get(settings)? {
             Value::Number(value) => input_text(value),
             Value::Integer(value) => value.to_string(),
-            Value::Text(value) => match self.choices().iter().find(|choice| is_value(choice, &value)) {
-                Some((_, text, _)) => (*text).to_owned(),
-                None => capitalised(&value),
-            },
+            Value::Text(value) => {
+                let choice = self.choices().into_iter().find(|(name, ..)| kind(name) == kind(&value));
+                choice.map_or_else(|| capitalised(&value), |(_, text, _)| text.to_owned())
+            }
         })
     }
 
     fn ui(&self, ui: &mut Ui, settings: &mut RunSettings, usual: &RunSettings) {
-        let (label, hint, setting) = (self.label, self.hint, self.setting());
-        if let Look::Number(unit) = self.look {
-            return number_ui(ui, [label, hint, unit], &setting, settings, usual);
+        let (Self(_, label, look), setting) = (*self, self.setting());
+        let hint = meaning(label).unwrap_or(setting.help);
+        if let Look::Number(unit) = look {
+            return number_ui(ui, [label, hint, unit], setting, settings, usual);
         }
         let Some(Value::Text(value)) = setting.get(settings) else {
             return;
         };
-        let choices = self.choices();
-        let listed = choices.iter().find(|choice| is_value(choice, &value));
-        let selected = listed.map_or(value.as_str(), |(name, ..)| *name);
-        let text = capitalised(&value);
-        let is_listed = listed.is_some();
-        let mut offered: Vec<(&str, &str, &str)> = choices;
-        if !is_listed {
-            offered.push((selected, &text, "A value from a file that the window does not offer."));
-        }
-        let picked = match self.look {
-            Look::Options(_) => options_ui(ui, label, hint, &offered, selected),
-            Look::List(_) => list_ui(ui, label, hint, &offered, selected),
-            _ => list_below_ui(ui, label, hint, &offered, selected),
+        let is_possible = |name: &str| {
+            setting
+                .set(&mut settings.clone(), &Value::Text(name.to_owned()))
+                .is_ok()
+        };
+        let choices = self.choices().into_iter().filter(|(name, ..)| is_possible(name));
+        let choices = Vec::from_iter(choices.map(|(name, text, of_choice)| match meaning(text) {
+            Some(meaning) if of_choice.is_empty() => (name, text, meaning),
+            _ => (name, text, of_choice),
+        }));
+        let listed = choices.iter().find(|(name, ..)| kind(name) == kind(&value));
+        let selected = listed.map_or("", |(name, ..)| *name);
+        let picked = match look {
+            Look::Options(_) => options_ui(ui, label, hint, &choices, selected),
+            Look::List(_) => list_ui(ui, label, hint, &choices, selected),
+            _ => list_below_ui(ui, label, hint, &choices, selected),
         };
         if let Some(picked) = picked {
             let set = setting.set(settings, &Value::Text(picked.to_owned()));
@@ -228,30 +181,37 @@ impl Row {
     }
 }
 
-/// Returns true if `choice` stands for `value`, whose sizes after a colon may differ.
-fn is_value(choice: &Choice, value: &str) -> bool {
-    let name = |text: &str| text.split(':').next().map(str::to_owned);
-    name(choice.0) == name(value)
+/// Returns the definition of a term.
+fn meaning(term: &str) -> Option<&'static str> {
+    static HINTS: LazyLock<HashMap<&str, &str>> = LazyLock::new(|| {
+        let terms = glossary::groups().into_iter().flat_map(|group| group.terms);
+        terms.map(|term| (term.name, term.hint)).collect()
+    });
+    HINTS.get(term).copied()
+}
+
+/// Returns the kind of a value, without the size after a colon: all numbers are of one kind.
+fn kind(value: &str) -> &str {
+    let (kind, _) = value.split_once(':').unwrap_or((value, ""));
+    if kind.parse::<usize>().is_ok() { "1" } else { kind }
 }
 
 /// Field with a value that is chosen automatically.
-fn chosen_ui(ui: &mut Ui, label: &str, value: Option<String>) {
-    field_ui(ui, label, REASON, |ui| fixed_ui(ui, value, space(21), Align::Center));
-}
-
-/// As [`chosen_ui`], with the value below its name.
-fn chosen_below_ui(ui: &mut Ui, label: &str, value: Option<String>) {
-    let label = ui.label(label).on_hover_text(REASON);
-    fixed_ui(ui, value, f32::INFINITY, Align::Min).labelled_by(label.id);
-}
-
-fn fixed_ui(ui: &mut Ui, value: Option<String>, width: f32, align: Align) -> Response {
+fn chosen_ui(ui: &mut Ui, label: &str, value: Option<String>, is_below: bool) {
     let mut text = value.unwrap_or_else(|| AUTOMATIC.to_owned());
-    let edit = TextEdit::singleline(&mut text)
-        .align(Align2([align, Align::Center]))
-        .margin(vec2(space(2), space(1)))
-        .desired_width(width);
-    ui.add_enabled(false, edit).on_disabled_hover_text(REASON)
+    let mut value_ui = |ui: &mut Ui, width: f32, align: Align| {
+        let edit = TextEdit::singleline(&mut text)
+            .align(Align2([align, Align::Center]))
+            .margin(vec2(space(2), space(1)))
+            .desired_width(width);
+        ui.add_enabled(false, edit).on_disabled_hover_text(REASON)
+    };
+    if is_below {
+        let label = ui.label(label).on_hover_text(REASON);
+        value_ui(ui, f32::INFINITY, Align::Min).labelled_by(label.id);
+    } else {
+        field_ui(ui, label, REASON, |ui| value_ui(ui, space(21), Align::Center));
+    }
 }
 
 /// Field of a setting of `of` that is a number, with its label, its hint and its unit.
@@ -259,9 +219,8 @@ fn number_ui<S: Clone>(ui: &mut Ui, texts: [&str; 3], setting: &Setting<S>, of: 
     let ([label, hint, unit], usual) = (texts, setting.number(usual));
     let Some(range) = setting.range() else { return };
     let (low, high) = range.clone().into_inner();
-    let shown = usual.map(|usual| input_text(if unit == "%" { in_percent(usual) } else { usual }));
-    let hint = match shown {
-        Some(shown) => format!("{hint}\n\nDefault {}.", format!("{shown} {unit}").trim_end()),
+    let hint = match usual {
+        Some(usual) => format!("{hint}\n\nDefault {}.", input_text(usual)),
         None => hint.to_owned(),
     };
     match (setting.field)(of) {
@@ -276,20 +235,15 @@ fn number_ui<S: Clone>(ui: &mut Ui, texts: [&str; 3], setting: &Setting<S>, of: 
             }
         }
         Some(Field::Count(count)) => {
-            let range = low as usize..=high as usize;
-            count_ui(
-                ui,
-                label,
-                &hint,
-                count,
-                limits(usual.map(|usual| usual as usize), range),
-            );
+            let limits = limits(usual.map(|usual| usual as usize), low as usize..=high as usize);
+            count_ui(ui, label, &hint, count, limits);
         }
         Some(Field::Integer(seed)) => {
             seed_ui(ui, label, &hint, seed, usual.map_or(0, |usual| usual as u64));
         }
         Some(Field::Optional(count)) => {
             let mut shown = count.map_or(0, usize::from);
+            let hint = format!("{hint} 0 for none.");
             count_ui(ui, label, &hint, &mut shown, usually(0, 0..=high as usize));
             *count = u8::try_from(shown).ok().filter(|&count| count > 0);
         }
@@ -305,13 +259,7 @@ fn limits<N>(usual: Option<N>, range: RangeInclusive<N>) -> Limits<N> {
 }
 
 /// A list below its name, as wide as the form. Returns the value just selected.
-fn list_below_ui<'a>(
-    ui: &mut Ui,
-    label: &str,
-    hint: &str,
-    choices: &[(&'a str, &str, &str)],
-    selected: &str,
-) -> Option<&'a str> {
+fn list_below_ui(ui: &mut Ui, label: &str, hint: &str, choices: &[Choice], selected: &str) -> Option<&'static str> {
     let named = ui.label(label).on_hover_text(hint);
     let shown = choices.iter().find(|(name, ..)| *name == selected);
     let combo = ComboBox::from_id_salt(label)

@@ -10,48 +10,45 @@ use eframe::egui::{RichText, Slider, SliderClamping, Stroke, Ui, WidgetInfo};
 
 use super::{Fields, Look, Row, SetBy};
 use crate::window::{
-    glossary,
     theme::{Theme, space, type_size},
     widgets::{dim_ui, fields::capitalised, slider_ui},
 };
 
-const HIDDEN: Row = Row::new("hidden", "Hidden nodes", glossary::HIDDEN_NODES.hint, Look::Number(""));
+const HIDDEN: Row = Row("hidden", "Hidden nodes", Look::Number(""));
 
-/// Quantity and scaling of the inputs.
-pub const INPUTS: [Row; 2] = [
-    Row::new(
+const INPUTS: [Row; 2] = [
+    Row(
         "inputs",
         "Inputs",
-        glossary::INPUTS.hint,
         Look::List(&[
             ("resistance", "Resistance", "R, as in the paper."),
-            ("conductance", "Conductance", glossary::CONDUCTANCE.hint),
-            ("log", "Log-resistance", glossary::LOG_RESISTANCE.hint),
+            ("conductance", "Conductance", ""),
+            ("log", "Log-resistance", ""),
         ]),
     ),
-    Row::new(
+    Row(
         "scaling",
         "Scaling",
-        glossary::SCALING.hint,
-        Look::Options(&[
-            ("minmax", "Min-max", glossary::MIN_MAX.hint),
-            ("whiten", "Whitening", glossary::WHITENING.hint),
-        ]),
+        Look::Options(&[("minmax", "Min-max", ""), ("whiten", "Whitening", "")]),
     ),
 ];
 
-/// Row model of a recording with a column of row numbers.
-const RECORDED_ROWS: Row = Row::new(
+/// Row-wires that are read; a recording has no choice of one.
+pub(super) const ROWS: Row = Row(
     "rows",
     "Rows",
-    glossary::ROWS.hint,
     Look::Options(&[
-        ("all", "All", "One network for all row-wires."),
+        (
+            "all",
+            "All",
+            "One network for every row, without the row number as an input, as in the paper.",
+        ),
         (
             "known",
             "Known",
-            "One network per row-wire, for electronics that know which row they address.",
+            "One small network per row, for electronics that know which row they address.",
         ),
+        ("1", "One", "One row-wire only; nothing else is modelled."),
     ]),
 );
 
@@ -113,7 +110,7 @@ pub fn workload_ui(ui: &mut Ui, settings: &RunSettings, size: TrainingSize) {
 pub fn inputs_ui(ui: &mut Ui, fields: &mut Fields<'_>, has_recorded_rows: bool, size: Option<TrainingSize>) {
     fields.show(ui, &INPUTS);
     if has_recorded_rows {
-        RECORDED_ROWS.ui(ui, fields.settings, &fields.usual);
+        ROWS.ui(ui, fields.settings, &fields.usual);
     }
     if let (SetBy::User, Some(size)) = (fields.set_by, size) {
         weights_ui(ui, fields.settings, size);

@@ -77,14 +77,11 @@ pub fn follow_preset(before: &RunSettings, settings: &mut RunSettings) {
 }
 
 /// The ready-made scenes. All other settings of a scene are folded below them.
-pub fn scene_choice_ui(ui: &mut Ui, settings: &mut RunSettings) {
-    let Some(simulation) = settings.simulation_mut() else {
-        return;
-    };
+pub fn scene_choice_ui(ui: &mut Ui, scene: &mut Scene) {
     ui.add_space(space(1));
     // The preset decides which rows share a network.
     let [print, paper] = [opening_scene(), Scene::default()].map(|ready| Scene {
-        rows: simulation.scene.rows,
+        rows: scene.rows,
         ..ready
     });
     let options = [
@@ -96,6 +93,5 @@ pub fn scene_choice_ui(ui: &mut Ui, settings: &mut RunSettings) {
         ),
         (paper, "Paper's scene", glossary::RANDOM_NODES.hint),
     ];
-    let scene = &mut simulation.scene;
     *scene = explained_options_ui(ui, "Ready-made scenes", &options, *scene, true).unwrap_or(*scene);
 }

@@ -1,97 +1,70 @@
 //! The array: its scale and its geometry.
 
 use decoupler_core::{
-    evaluation::RunSettings,
+    dataset::Simulation,
     scene::Rows,
-    sensor::{ArrayScale, Geometry},
-    settings::{Field, Kind},
+    sensor::{ArrayScale, Geometry, SensorModel},
     text::counted,
 };
 use eframe::egui::Ui;
 
-use super::{Fields, Row};
 use crate::window::{
     glossary,
     theme::space,
-    widgets::{dim_ui, fields::input_text, note_ui, segmented_ui, text_ui},
+    widgets::{
+        dim_ui,
+        fields::{input_text, quantity_ui, usually},
+        note_ui, segmented_ui, text_ui,
+    },
 };
 
-const LENGTH: (Kind, &str) = (Kind::Number(1e-6, 1e6), "mm");
-const COORDINATE: (Kind, &str) = (Kind::Number(-1e6, 1e6), "mm");
+/// A length of the geometry: its name, its meaning, and access to it.
+type Length = (&'static str, &'static str, fn(&mut Geometry) -> &mut f64);
 
-/// Lengths and resistivity of the array.
-const GEOMETRY: [Row; 9] = [
-    Row::number("Height", glossary::HEIGHT.hint, LENGTH, |run| {
-        Some(Field::Number(&mut geometry(run)?.height_mm))
-    }),
-    Row::number(
+const LENGTHS: [Length; 8] = [
+    ("Height", glossary::HEIGHT.hint, |at| &mut at.height_mm),
+    (
         "Row pitch",
         "Distance between row-wires, in mm (the paper's wire gap).",
-        LENGTH,
-        |run| Some(Field::Number(&mut geometry(run)?.row_pitch_mm)),
+        |at| &mut at.row_pitch_mm,
     ),
-    Row::number(
-        "Node pitch",
-        "Distance between nodes on a row-wire, in mm.",
-        LENGTH,
-        |run| Some(Field::Number(&mut geometry(run)?.node_pitch_mm)),
-    ),
-    Row::number(
+    ("Node pitch", "Distance between nodes on a row-wire, in mm.", |at| {
+        &mut at.node_pitch_mm
+    }),
+    (
         "Column pitch",
         "Distance between column-wires, in mm (the paper's wire gap).",
-        LENGTH,
-        |run| Some(Field::Number(&mut geometry(run)?.column_pitch_mm)),
+        |at| &mut at.column_pitch_mm,
     ),
-    Row::number(
+    (
         "Column node pitch",
         "Distance between nodes on a column-wire, in mm.",
-        LENGTH,
-        |run| Some(Field::Number(&mut geometry(run)?.column_node_pitch_mm)),
+        |at| &mut at.column_node_pitch_mm,
     ),
-    Row::number(
-        "First row at x",
-        "x coordinate of the first row-wire, in mm.",
-        COORDINATE,
-        |run| Some(Field::Number(&mut geometry(run)?.row_x0_mm)),
-    ),
-    Row::number(
+    ("First row at x", "x coordinate of the first row-wire, in mm.", |at| {
+        &mut at.row_x0_mm
+    }),
+    (
         "First column at y",
         "y coordinate of the first column-wire, in mm.",
-        COORDINATE,
-        |run| Some(Field::Number(&mut geometry(run)?.column_y0_mm)),
+        |at| &mut at.column_y0_mm,
     ),
-    Row::number(
+    (
         "First column node at x",
         "x coordinate of the first node on each column-wire, in mm. Shifting it breaks the symmetry that makes rows read \
          alike.",
-        COORDINATE,
-        |run| Some(Field::Number(&mut geometry(run)?.column_node_x0_mm)),
-    ),
-    Row::number(
-        "Resistivity",
-        glossary::RESISTIVITY.hint,
-        (Kind::Number(1e-12, 1e12), "Ω/mm"),
-        |run| Some(Field::Number(&mut run.simulation_mut()?.sensor.resistivity_ohm_per_mm)),
+        |at| &mut at.column_node_x0_mm,
     ),
 ];
 
-fn geometry(run: &mut RunSettings) -> Option<&mut Geometry> {
-    Some(&mut run.simulation_mut()?.sensor.geometry)
-}
-
 /// The scale of the array: one of the paper's, or any other typed.
-pub fn array_ui(ui: &mut Ui, settings: &mut RunSettings) {
-    let Some(simulation) = settings.simulation_mut() else {
-        return;
-    };
-    let scale = &mut simulation.sensor.scale;
+pub fn array_ui(ui: &mut Ui, Simulation { sensor, scene, .. }: &mut Simulation) {
+    let scale = &mut sensor.scale;
     let hint = glossary::ARRAY_SCALE.hint;
     text_ui(ui, "Array scale", hint, scale, ArrayScale::default());
     let names = ArrayScale::PRESETS.map(|scale| (scale, format!("{}×{}", scale.rows(), scale.nodes_per_row())));
     let options: Vec<_> = names.iter().map(|(scale, name)| (*scale, name.as_str())).collect();
-    if let Some(picked) = segmented_ui(ui, "Array scale of the paper", &options, *scale, true) {
-        *scale = picked;
-    }
+    *scale = segmented_ui(ui, "Array scale of the paper", &options, *scale, true).unwrap_or(*scale);
     let text = format!(
         "{} of {} over {} of {}",
         counted(scale.rows(), "row-wire"),
@@ -107,28 +80,41 @@ pub fn array_ui(ui: &mut Ui, settings: &mut RunSettings) {
     }
     ui.add_space(space(1));
     // The array may have become smaller.
-    if let Rows::One(row) = &mut simulation.scene.rows {
+    if let Rows::One(row) = &mut scene.rows {
         *row = (*row).min(scale.rows() - 1);
     }
 }
 
 /// Lengths and resistivity, and the way back to the assumed ones.
-pub fn geometry_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
-    fields.show(ui, &GEOMETRY);
+pub fn geometry_ui(ui: &mut Ui, sensor: &mut SensorModel) {
+    for (name, hint, length) in LENGTHS {
+        let usual = *length(&mut Geometry::default());
+        let range = if name.starts_with("First") {
+            -1e6..=1e6
+        } else {
+            1e-6..=1e6
+        };
+        quantity_ui(
+            ui,
+            name,
+            hint,
+            length(&mut sensor.geometry),
+            usually(usual, range),
+            "mm",
+        );
+    }
+    let usual = usually(SensorModel::new(sensor.scale).resistivity_ohm_per_mm, 1e-12..=1e12);
+    let (hint, resistivity) = (glossary::RESISTIVITY.hint, &mut sensor.resistivity_ohm_per_mm);
+    quantity_ui(ui, "Resistivity", hint, resistivity, usual, "Ω/mm");
     dim_ui(ui, Geometry::ASSUMPTION);
-    if let Some(geometry) = geometry(fields.settings).filter(|geometry| **geometry != Geometry::default())
-        && ui.button("Reset to the assumed geometry").clicked()
-    {
-        *geometry = Geometry::default();
+    if sensor.geometry != Geometry::default() && ui.button("Reset to the assumed geometry").clicked() {
+        sensor.geometry = Geometry::default();
     }
 }
 
 /// Height, and whether the geometry differs from the assumed one.
 pub fn of_geometry(geometry: &Geometry) -> String {
-    let height = input_text(geometry.height_mm);
-    if *geometry == Geometry::default() {
-        format!("assumed, {height} mm high")
-    } else {
-        format!("custom, {height} mm high")
-    }
+    let is_assumed = *geometry == Geometry::default();
+    let kind = if is_assumed { "assumed" } else { "custom" };
+    format!("{kind}, {} mm high", input_text(geometry.height_mm))
 }

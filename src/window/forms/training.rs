@@ -4,61 +4,35 @@ use decoupler_core::{evaluation::RunSettings, settings::Method, text::counted};
 use eframe::egui::Ui;
 
 use super::{Fields, Look, Row, SetBy, chosen_ui, number_ui};
-use crate::window::{
-    glossary,
-    widgets::{
-        dim_ui,
-        fields::{capitalised, input_text},
-        fold_ui,
-    },
+use crate::window::widgets::{
+    dim_ui,
+    fields::{capitalised, input_text},
+    fold_ui,
 };
 
-/// Training method.
-pub const METHOD: Row = Row::new(
+const METHOD: Row = Row(
     "method",
     "Method",
-    glossary::METHOD.hint,
-    Look::Below(|| Vec::from_iter(Method::all().map(|method| (method.short_name(), method.name(), method.summary())))),
+    Look::Below(|| {
+        Method::all()
+            .map(|method| (method.short_name(), method.name(), method.summary()))
+            .into()
+    }),
 );
 
-/// Largest number of epochs.
-pub const EPOCHS: Row = Row::new(
-    "epochs",
-    "Epochs",
-    "Largest number of epochs. An epoch is one pass over all training samples. Train counts from the first epoch, Train \
-     longer from the current one.",
-    Look::Number(""),
-);
+const EPOCHS: Row = Row("epochs", "Epochs", Look::Number(""));
 
-/// The other rules that end a training.
 const STOPPING: [Row; 3] = [
-    Row::new(
-        "max fail",
-        "Validation failures",
-        glossary::VALIDATION_FAILURES.hint,
-        Look::Number(""),
-    ),
-    Row::new(
-        "goal",
-        "Goal (mse)",
-        "Training error at which training ends: the mean square error of the scaled coordinates, each in [−1, 1].",
-        Look::Number(""),
-    ),
-    Row::new(
-        "min gradient",
-        "Smallest gradient",
-        "Norm of the gradient below which training ends: of the derivative of the training error with respect to the weights.",
-        Look::Number(""),
-    ),
+    Row("max fail", "Validation failures", Look::Number("")),
+    Row("goal", "Goal (mse)", Look::Number("")),
+    Row("min gradient", "Smallest gradient", Look::Number("")),
 ];
 
-/// Trainings from different random weights, and how they become one network.
-pub const RESTARTS: [Row; 2] = [
-    Row::new("starts", "Restarts", glossary::STARTS.hint, Look::Number("")),
-    Row::new(
+const RESTARTS: [Row; 2] = [
+    Row("starts", "Restarts", Look::Number("")),
+    Row(
         "combine",
         "Combine restarts",
-        glossary::COMBINE.hint,
         Look::Below(|| {
             vec![
                 ("best", "keep the best", "The one with the lowest validation error."),
@@ -108,7 +82,7 @@ fn method_settings_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
                 let usual = &fields.usual.training.method;
                 number_ui(ui, [&label, setting.help, ""], setting, method, usual);
             }
-            SetBy::Choice(_) => chosen_ui(ui, &label, setting.number(&method).map(input_text)),
+            SetBy::Choice(_) => chosen_ui(ui, &label, setting.number(&method).map(input_text), false),
         }
     }
 }

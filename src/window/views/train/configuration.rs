@@ -2,6 +2,7 @@
 //! in the order of the pipeline.
 
 use decoupler_core::{
+    dataset::Simulation,
     evaluation::{Outlook, RunSettings, TrainingSize, auto::AutoRecord},
     scene::RowModel,
 };
@@ -81,11 +82,9 @@ fn settings_ui(
 ) -> Option<PaperFigure> {
     let (is_recording, phase) = (shared.source == SourceKind::Recording, shared.phase);
     let (is_new, is_open) = (!phase.is_busy(), !phase.is_busy() || phase == Phase::Paused);
-    ui.add_enabled_ui(is_new, |ui| {
-        forms::array_ui(ui, fields.settings);
-        if is_recording {
-            recording.files_ui(ui, shared, effects);
-        }
+    ui.add_enabled_ui(is_new, |ui| match fields.settings.simulation_mut() {
+        Some(simulation) => forms::array_ui(ui, simulation),
+        None => recording.files_ui(ui, shared, effects),
     });
     if is_recording {
         recording.columns_button_ui(ui, shared);
@@ -93,17 +92,13 @@ fn settings_ui(
         ui.separator();
         automatic_choice_ui(ui, shared, effects);
     }
-    let size = if is_recording {
-        recording.training_size(fields.settings)
-    } else {
-        TrainingSize::drawn(fields.settings).ok()
-    };
-    let channels = match fields.settings.simulation() {
+    let (channels, size) = match fields.settings.simulation() {
         Some(simulation) => {
             let scale = simulation.sensor.scale;
-            Some((scale.columns(), scale.coordinates_per_row()))
+            let channels = (scale.columns(), scale.coordinates_per_row());
+            (Some(channels), TrainingSize::drawn(fields.settings).ok())
         }
-        None => recording.channels(),
+        None => (recording.channels(), recording.training_size(fields.settings)),
     };
     ui.add_enabled_ui(is_new, |ui| forms::hidden_ui(ui, fields, channels));
     ui.add_space(space(1));
@@ -113,16 +108,12 @@ fn settings_ui(
         forms::workload_ui(ui, fields.settings, size);
     }
     ui.add_enabled_ui(is_new, |ui| {
-        if !is_recording {
-            forms::preset_ui(ui, fields.settings);
-            forms::scene_choice_ui(ui, fields.settings);
-        }
-        ui.add_space(space(2));
-        ui.separator();
         if is_recording {
+            ui.add_space(space(2));
+            ui.separator();
             recording.folds_ui(ui, fields.settings, shared, effects);
         } else {
-            array_folds_ui(ui, fields, outlook(shared));
+            array_ui(ui, fields, outlook(shared));
         }
         fold_ui(ui, "Network inputs", &fields.summary(forms::of_inputs), |ui| {
             forms::inputs_ui(ui, fields, is_recording && recording.has_row_wires(), size);
@@ -138,21 +129,30 @@ fn settings_ui(
     picked
 }
 
-/// Scene, samples and geometry of a simulated array.
-fn array_folds_ui(ui: &mut Ui, fields: &mut Fields<'_>, outlook: Option<&Outlook>) {
-    let Some(simulation) = fields.settings.simulation().copied() else {
+/// Presets, scene, samples and geometry of a simulated array.
+fn array_ui(ui: &mut Ui, fields: &mut Fields<'_>, outlook: Option<&Outlook>) {
+    forms::preset_ui(ui, fields.settings);
+    let Some(simulation) = fields.settings.simulation_mut() else {
         return;
     };
-    forms::outlook_notes_ui(ui, &simulation.scene, outlook);
+    forms::scene_choice_ui(ui, &mut simulation.scene);
+    ui.add_space(space(2));
+    ui.separator();
+    if let Some(outlook) = outlook {
+        forms::outlook_notes_ui(ui, &simulation.scene, outlook);
+    }
+    let simulation = *simulation;
     fold_ui(ui, "Scene", &forms::of_scene(&simulation.scene), |ui| {
         forms::scene_ui(ui, fields);
-        forms::condition_ui(ui, outlook);
+        forms::size_ui(ui, &simulation, outlook);
     });
     fold_ui(ui, "Samples", &forms::of_samples(fields.settings), |ui| {
         fields.show(ui, &forms::SAMPLES);
     });
-    let geometry = forms::of_geometry(&simulation.sensor.geometry);
-    fold_ui(ui, "Geometry", &geometry, |ui| forms::geometry_ui(ui, fields));
+    if let Some(Simulation { sensor, .. }) = fields.settings.simulation_mut() {
+        let geometry = forms::of_geometry(&sensor.geometry);
+        fold_ui(ui, "Geometry", &geometry, |ui| forms::geometry_ui(ui, sensor));
+    }
 }
 
 /// Returns the outlook of the scene of the draft, if it is known.
