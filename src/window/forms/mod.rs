@@ -9,11 +9,11 @@ mod training;
 
 pub use network::{hidden_ui, inputs_ui, of_inputs, workload_ui};
 pub use presets::{follow_preset, preset_ui, scene_choice_ui};
-pub use scene::{SAMPLES, of_samples, of_scene, outlook_notes_ui, scene_ui, size_ui};
+pub use scene::{SAMPLES, of_samples, of_scene, scene_ui, size_ui};
 pub use sensor::{array_ui, geometry_ui, of_geometry};
 pub use training::{method_ui, training_ui};
 
-use std::{collections::HashMap, ops::RangeInclusive, sync::LazyLock};
+use std::{collections::HashMap, sync::LazyLock};
 
 use decoupler_core::{
     evaluation::{RUN_OPTIONS, RunSettings},
@@ -26,8 +26,8 @@ use super::{
     glossary,
     theme::space,
     widgets::fields::{
-        Limits, capitalised, count_ui, field_ui, in_percent, input_text, list_ui, options_ui, percent_ui, quantity_ui,
-        seed_ui, usually,
+        capitalised, count_ui, field_ui, in_percent, input_text, list_ui, options_ui, percent_ui, quantity_ui, seed_ui,
+        usually,
     },
 };
 
@@ -52,7 +52,7 @@ pub enum SetBy<'a> {
 }
 
 /// A row of the table of settings, with its name and its look in the window. Its tooltip is the definition of the name in
-/// the glossary or, for other names, the explanation in the table.
+/// the glossary or, for other names, the explanation in the table; so are those of its choices.
 #[derive(Clone, Copy, Debug)]
 pub struct Row(&'static str, &'static str, Look);
 
@@ -69,8 +69,8 @@ pub enum Look {
     Below(fn() -> Vec<Choice>),
 }
 
-/// Value of a setting, its text in the window, and its meaning; without one, that in the glossary.
-type Choice = (&'static str, &'static str, &'static str);
+/// Value of a setting in the table, and its text in the window.
+type Choice = (&'static str, &'static str);
 
 /// Value of a setting that has not been chosen yet.
 const AUTOMATIC: &str = "automatic";
@@ -108,17 +108,12 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// Returns the settings of network and training; none before they are chosen.
-    pub fn known(&self) -> Option<&RunSettings> {
-        match self.set_by {
-            SetBy::User => Some(self.settings),
-            SetBy::Choice(chosen) => chosen,
-        }
-    }
-
     /// Returns a summary of the settings of network or training.
     pub fn summary(&self, of: impl FnOnce(&RunSettings) -> String) -> String {
-        self.known().map_or_else(|| AUTOMATIC.to_owned(), of)
+        match self.set_by {
+            SetBy::User => of(self.settings),
+            SetBy::Choice(chosen) => chosen.map_or_else(|| AUTOMATIC.to_owned(), of),
+        }
     }
 }
 
@@ -142,8 +137,8 @@ impl Row {
             Value::Number(value) => input_text(value),
             Value::Integer(value) => value.to_string(),
             Value::Text(value) => {
-                let choice = self.choices().into_iter().find(|(name, ..)| kind(name) == kind(&value));
-                choice.map_or_else(|| capitalised(&value), |(_, text, _)| text.to_owned())
+                let choice = self.choices().into_iter().find(|(name, _)| kind(name) == kind(&value));
+                choice.map_or_else(|| capitalised(&value), |(_, text)| text.to_owned())
             }
         })
     }
@@ -162,11 +157,9 @@ impl Row {
                 .set(&mut settings.clone(), &Value::Text(name.to_owned()))
                 .is_ok()
         };
-        let choices = self.choices().into_iter().filter(|(name, ..)| is_possible(name));
-        let choices = Vec::from_iter(choices.map(|(name, text, of_choice)| match meaning(text) {
-            Some(meaning) if of_choice.is_empty() => (name, text, meaning),
-            _ => (name, text, of_choice),
-        }));
+        let choices = self.choices().into_iter().filter(|(name, _)| is_possible(name));
+        let choices = choices.map(|(name, text)| (name, text, meaning(text).unwrap_or(setting.help)));
+        let choices = Vec::from_iter(choices);
         let listed = choices.iter().find(|(name, ..)| kind(name) == kind(&value));
         let selected = listed.map_or("", |(name, ..)| *name);
         let picked = match look {
@@ -182,7 +175,7 @@ impl Row {
 }
 
 /// Returns the definition of a term.
-fn meaning(term: &str) -> Option<&'static str> {
+pub fn meaning(term: &str) -> Option<&'static str> {
     static HINTS: LazyLock<HashMap<&str, &str>> = LazyLock::new(|| {
         let terms = glossary::groups().into_iter().flat_map(|group| group.terms);
         terms.map(|term| (term.name, term.hint)).collect()
@@ -216,34 +209,31 @@ fn chosen_ui(ui: &mut Ui, label: &str, value: Option<String>, is_below: bool) {
 
 /// Field of a setting of `of` that is a number, with its label, its hint and its unit.
 fn number_ui<S: Clone>(ui: &mut Ui, texts: [&str; 3], setting: &Setting<S>, of: &mut S, usual: &S) {
-    let ([label, hint, unit], usual) = (texts, setting.number(usual));
+    let [label, hint, unit] = texts;
     let Some(range) = setting.range() else { return };
-    let (low, high) = range.clone().into_inner();
-    let hint = match usual {
-        Some(usual) => format!("{hint}\n\nDefault {}.", input_text(usual)),
-        None => hint.to_owned(),
-    };
+    let (low, high) = (*range.start(), *range.end());
+    let usual = setting.number(usual).unwrap_or(0.0);
+    let hint = &format!("{hint}\n\nDefault {}.", input_text(usual));
     match (setting.field)(of) {
         Some(Field::Number(share)) if unit == "%" => {
             let range = in_percent(low)..=in_percent(high).min(100.0);
-            percent_ui(ui, label, &hint, share, usual.unwrap_or(*share), range);
+            percent_ui(ui, label, hint, share, usual, range);
         }
         Some(Field::Number(value)) => {
-            quantity_ui(ui, label, &hint, value, limits(usual, range), unit);
+            quantity_ui(ui, label, hint, value, usually(usual, range), unit);
             if matches!(setting.kind, Kind::Integer(..)) {
                 *value = value.round();
             }
         }
         Some(Field::Count(count)) => {
-            let limits = limits(usual.map(|usual| usual as usize), low as usize..=high as usize);
-            count_ui(ui, label, &hint, count, limits);
+            let limits = usually(usual as usize, low as usize..=high as usize);
+            count_ui(ui, label, hint, count, limits);
         }
         Some(Field::Integer(seed)) => {
-            seed_ui(ui, label, &hint, seed, usual.map_or(0, |usual| usual as u64));
+            seed_ui(ui, label, hint, seed, usual as u64);
         }
         Some(Field::Optional(count)) => {
-            let mut shown = count.map_or(0, usize::from);
-            let hint = format!("{hint} 0 for none.");
+            let (mut shown, hint) = (count.map_or(0, usize::from), format!("{} 0 for none.", setting.help));
             count_ui(ui, label, &hint, &mut shown, usually(0, 0..=high as usize));
             *count = u8::try_from(shown).ok().filter(|&count| count > 0);
         }
@@ -251,15 +241,14 @@ fn number_ui<S: Clone>(ui: &mut Ui, texts: [&str; 3], setting: &Setting<S>, of: 
     }
 }
 
-fn limits<N>(usual: Option<N>, range: RangeInclusive<N>) -> Limits<N> {
-    match usual {
-        Some(usual) => usually(usual, range),
-        None => range.into(),
-    }
-}
-
 /// A list below its name, as wide as the form. Returns the value just selected.
-fn list_below_ui(ui: &mut Ui, label: &str, hint: &str, choices: &[Choice], selected: &str) -> Option<&'static str> {
+fn list_below_ui(
+    ui: &mut Ui,
+    label: &str,
+    hint: &str,
+    choices: &[(&'static str, &str, &str)],
+    selected: &str,
+) -> Option<&'static str> {
     let named = ui.label(label).on_hover_text(hint);
     let shown = choices.iter().find(|(name, ..)| *name == selected);
     let combo = ComboBox::from_id_salt(label)

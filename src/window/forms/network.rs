@@ -6,7 +6,7 @@ use decoupler_core::{
     text::counted,
 };
 use decoupler_files::export::{describe_recorded_workload, describe_workload};
-use eframe::egui::{RichText, Slider, SliderClamping, Stroke, Ui, WidgetInfo};
+use eframe::egui::{RichText, Slider, SliderClamping, Ui, WidgetInfo};
 
 use super::{Fields, Look, Row, SetBy};
 use crate::window::{
@@ -21,15 +21,15 @@ const INPUTS: [Row; 2] = [
         "inputs",
         "Inputs",
         Look::List(&[
-            ("resistance", "Resistance", "R, as in the paper."),
-            ("conductance", "Conductance", ""),
-            ("log", "Log-resistance", ""),
+            ("resistance", "Resistance"),
+            ("conductance", "Conductance"),
+            ("log", "Log-resistance"),
         ]),
     ),
     Row(
         "scaling",
         "Scaling",
-        Look::Options(&[("minmax", "Min-max", ""), ("whiten", "Whitening", "")]),
+        Look::Options(&[("minmax", "Min-max"), ("whiten", "Whitening")]),
     ),
 ];
 
@@ -37,19 +37,7 @@ const INPUTS: [Row; 2] = [
 pub(super) const ROWS: Row = Row(
     "rows",
     "Rows",
-    Look::Options(&[
-        (
-            "all",
-            "All",
-            "One network for every row, without the row number as an input, as in the paper.",
-        ),
-        (
-            "known",
-            "Known",
-            "One small network per row, for electronics that know which row they address.",
-        ),
-        ("1", "One", "One row-wire only; nothing else is modelled."),
-    ]),
+    Look::Options(&[("all", "All"), ("known", "Known"), ("1", "One")]),
 );
 
 /// Hidden nodes, with the rules of thumb for these numbers of inputs and outputs.
@@ -58,39 +46,24 @@ pub fn hidden_ui(ui: &mut Ui, fields: &mut Fields<'_>, channels: Option<(usize, 
     if let SetBy::Choice(_) = fields.set_by {
         return;
     }
-    let (usual, hidden) = (fields.usual.hidden, &mut fields.settings.hidden);
-    let Some((n, m)) = channels else {
-        return slider_with_marks_ui(ui, hidden, usual, &[]);
-    };
+    let hidden = &mut fields.settings.hidden;
+    let slider = Slider::new(hidden, 1..=64).clamping(SliderClamping::Never);
+    let width = ui.available_width();
+    let response = slider_ui(ui, slider, width);
+    if response.double_clicked() {
+        *hidden = fields.usual.hidden;
+    }
+    let value = *hidden as f64;
+    response.widget_info(|| WidgetInfo::slider(true, value, "Hidden nodes slider"));
+    ui.add_space(space(1));
+    let Some((n, m)) = channels else { return };
     let (square_root, logarithm) = suggested_hidden(n, m);
     let (low, high) = (*square_root.start(), *square_root.end());
-    slider_with_marks_ui(ui, hidden, usual, &[logarithm, low, high]);
     let text = format!("Rules of thumb: {logarithm}, or {low} to {high}");
     dim_ui(ui, &text).on_hover_text(format!(
         "Rules of the paper for n = {n} inputs and m = {m} outputs: log₂ n (Eq. 13), or √(n + m) + a with a from 1 to 10 \
          (Eq. 12). A starting point, not a limit."
     ));
-}
-
-/// A slider for small networks, with small marks at the suggestions.
-fn slider_with_marks_ui(ui: &mut Ui, hidden: &mut usize, usual: usize, suggestions: &[usize]) {
-    const MAX: usize = 64;
-    let slider = Slider::new(hidden, 1..=MAX).clamping(SliderClamping::Never);
-    let width = ui.available_width();
-    let response = slider_ui(ui, slider, width);
-    if response.double_clicked() {
-        *hidden = usual;
-    }
-    let rail = response.rect.x_range().shrink(0.4 * response.rect.height());
-    let stroke = Stroke::new(1.5, Theme::of(ui).palette.warning);
-    for &suggestion in suggestions.iter().filter(|suggestion| **suggestion <= MAX) {
-        let share = (suggestion - 1) as f32 / (MAX - 1) as f32;
-        let (x, bottom) = (rail.min + share * rail.span(), response.rect.bottom() + space(1));
-        ui.painter().vline(x, bottom - space(1)..=bottom, stroke);
-    }
-    let value = *hidden as f64;
-    response.widget_info(|| WidgetInfo::slider(true, value, "Hidden nodes slider"));
-    ui.add_space(space(1));
 }
 
 /// Notes the memory and time of a training of this size that needs much of either.

@@ -1,7 +1,6 @@
 //! Presets of a simulated array and ready-made scenes, one click each.
 
 use decoupler_core::{
-    dataset::Simulation,
     evaluation::{Preset, RunSettings},
     scene::Scene,
 };
@@ -42,28 +41,17 @@ fn preset_of(settings: &RunSettings) -> Option<Preset> {
 
 /// Returns the settings with those of `preset`: how readings are decoded and trained on, not the scene.
 fn with_preset(preset: Preset, settings: &RunSettings) -> RunSettings {
-    let Some(simulation) = settings.simulation() else {
-        return *settings;
-    };
-    let of_preset = preset.simulation_in(simulation.scene.noise);
-    let source = Simulation {
-        sensor: simulation.sensor,
-        scene: Scene {
-            rows: of_preset.scene.rows,
-            ..simulation.scene
-        },
-        test_samples: simulation.test_samples,
-        ..of_preset
-    };
-    RunSettings {
-        source: source.into(),
-        hidden: settings.hidden,
-        starts: settings.starts,
-        combine: settings.combine,
-        initialization: settings.initialization,
-        seed: settings.seed,
-        ..preset.settings_in(simulation.scene.noise)
+    let mut settings = *settings;
+    if let Some(simulation) = settings.simulation_mut() {
+        let noise = simulation.scene.noise;
+        let of_preset = preset.simulation_in(noise);
+        simulation.scene.rows = of_preset.scene.rows;
+        simulation.samples = of_preset.samples;
+        simulation.validation_samples = of_preset.validation_samples;
+        let RunSettings { inputs, training, .. } = preset.settings_in(noise);
+        (settings.inputs, settings.training) = (inputs, training);
     }
+    settings
 }
 
 /// Keeps to the preset that the settings followed `before` their noise changed: the best number of samples depends on it.

@@ -7,7 +7,7 @@ use decoupler_core::{
     text::counted,
 };
 use decoupler_files::export::format_number;
-use eframe::egui::{CollapsingHeader, Ui};
+use eframe::egui::Ui;
 
 use super::{Fields, Look, Row, network::ROWS};
 use crate::window::{
@@ -15,7 +15,7 @@ use crate::window::{
     widgets::{
         dim_ui,
         fields::{capitalised, count_ui, in_percent, input_text, list_ui, percent_ui, quantity_ui},
-        focus_ring_ui, note_ui,
+        fold_ui,
     },
 };
 
@@ -27,27 +27,16 @@ pub const SAMPLES: [Row; 4] = [
     Row("seed", "Seed", Look::Number("")),
 ];
 
-const AXES: Row = Row(
-    "axes",
-    "Axes",
-    Look::Options(&[
-        ("z", "z", "Nodes move up and down only, as in the paper."),
-        (
-            "xyz",
-            "x, y, z",
-            "Nodes also shift sideways: three times as many unknowns from the same readings.",
-        ),
-    ]),
-);
+const AXES: Row = Row("axes", "Axes", Look::Options(&[("z", "z"), ("xyz", "x, y, z")]));
 
 const LOADING: Row = Row(
     "loading",
     "Loading",
     // A correlation length of twice the assumed node pitch.
     Look::List(&[
-        ("random", "Random nodes", ""),
-        ("smooth:4", "Smooth field", ""),
-        ("indenter", "Indenter", ""),
+        ("random", "Random nodes"),
+        ("smooth:4", "Smooth field"),
+        ("indenter", "Indenter"),
     ]),
 );
 
@@ -61,19 +50,7 @@ const NOISE: [Row; 4] = [
 const NOISY_SETS: Row = Row(
     "noise in",
     "Noise in",
-    Look::Options(&[
-        (
-            "both",
-            "Both",
-            "Training and test samples: the network learns to handle the noise.",
-        ),
-        ("training", "Training", "Training samples only."),
-        (
-            "test",
-            "Test",
-            "Test samples only: the network is trained on clean readings.",
-        ),
-    ]),
+    Look::Options(&[("both", "Both"), ("training", "Training"), ("test", "Test")]),
 );
 
 /// Rows, axes, loading, compression and noise of the settings, which are of a simulated array.
@@ -107,7 +84,14 @@ pub fn scene_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
         let usual = Scene::default().largest_compression;
         percent_ui(ui, name, hint, &mut scene.largest_compression, usual, 0.001..=99.0);
     }
-    noise_ui(ui, fields);
+    let noise = fields.settings.simulation().map(|simulation| simulation.scene.noise);
+    let noise = noise.unwrap_or_default();
+    fold_ui(ui, "Noise on resistance", &of_noise(noise), |ui| {
+        fields.show(ui, &NOISE);
+        if !noise.is_none() {
+            fields.show(ui, &[NOISY_SETS]);
+        }
+    });
 }
 
 /// Shape and sizes of an indenter. A shape that the window does not offer, from a file, is shown and kept.
@@ -115,20 +99,16 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
     let hint =
         "Shape of the indenter. Its position, depth, size, direction and tilt are drawn at random for each snapshot.";
     let name = capitalised(indenter.name());
-    let [sphere, punch, ..] = Indenter::all();
     let mut shapes = vec![
-        (sphere.name(), "Sphere", "A ball."),
-        (punch.name(), "Flat punch", "The flat end of a round bar."),
+        ("sphere", "Sphere", "A ball."),
+        ("flat punch", "Flat punch", "The flat end of a round bar."),
     ];
     if !shapes.iter().any(|(shape, ..)| *shape == indenter.name()) {
         shapes.push((indenter.name(), &name, "A shape from a file."));
     }
     if let Some(picked) = list_ui(ui, "Shape", hint, &shapes, indenter.name()) {
-        indenter.shape = if picked == sphere.name() {
-            sphere.shape
-        } else {
-            punch.shape
-        };
+        let found = Indenter::all().into_iter().find(|offered| offered.name() == picked);
+        indenter.shape = found.map_or(indenter.shape, |found| found.shape);
     }
     let (radius, tilt) = match &mut indenter.shape {
         IndenterShape::Sphere { radius_mm } => (Some(radius_mm), None),
@@ -152,73 +132,21 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
             "Largest angle between the indenter and the surface, in degrees; each tilt is drawn between 0 and this.";
         quantity_ui(ui, "Largest tilt", hint, tilt, 0.0..=45.0, "°");
     }
-    quantity_ui(
-        ui,
-        "Spread",
-        glossary::SPREAD.hint,
-        &mut indenter.spread_mm,
-        1e-3..=1e6,
-        "mm",
-    );
-}
-
-/// The noise of the readings; a line summarises it while its fields are folded away.
-fn noise_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
-    let noise = |fields: &Fields<'_>| {
-        fields
-            .settings
-            .simulation()
-            .map(|of| of.scene.noise)
-            .filter(|noise| !noise.is_none())
-    };
-    let shown = CollapsingHeader::new("Noise on resistance").show(ui, |ui| {
-        fields.show(ui, &NOISE);
-        if noise(fields).is_some() {
-            fields.show(ui, &[NOISY_SETS]);
-        }
-    });
-    focus_ring_ui(ui, &shown.header_response);
-    if let (None, Some(noise)) = (shown.body_response, noise(fields)) {
-        dim_ui(ui, &of_noise(&noise));
-    }
+    let hint = glossary::SPREAD.hint;
+    quantity_ui(ui, "Spread", hint, &mut indenter.spread_mm, 1e-3..=1e6, "mm");
 }
 
 /// The noise in a line: `0.1 % relative, 12 bits, in test only`.
-fn of_noise(noise: &Noise) -> String {
+fn of_noise(noise: Noise) -> String {
     let percent = |share: f64| input_text(in_percent(share));
     let sources = [
         (noise.relative > 0.0).then(|| format!("{} % relative", percent(noise.relative))),
         (noise.additive_ohm > 0.0).then(|| format!("{} Ω", input_text(noise.additive_ohm))),
         noise.converter_bits.map(|bits| format!("{bits} bits")),
         (noise.drift > 0.0).then(|| format!("{} % drift", percent(noise.drift))),
-        (noise.sets != NoisySets::Both).then(|| format!("in {} only", <&str>::from(noise.sets))),
+        (!noise.is_none() && noise.sets != NoisySets::Both).then(|| format!("in {} only", <&str>::from(noise.sets))),
     ];
     sources.into_iter().flatten().collect::<Vec<_>>().join(", ")
-}
-
-/// Shows the warnings of the scene, which stay visible while its settings are folded away.
-pub fn outlook_notes_ui(ui: &mut Ui, scene: &Scene, outlook: &Outlook) {
-    if outlook.warnings.is_empty() && scene.movement != Movement::Z {
-        note_ui(ui, &of_sideways_shifts(outlook));
-    }
-    for warning in &outlook.warnings {
-        note_ui(ui, &capitalised(&format!("{warning}.")));
-    }
-}
-
-/// Returns the effect of sideways shifts on the readings as a sentence.
-fn of_sideways_shifts(outlook: &Outlook) -> String {
-    if outlook.noise.total() > 0.0 {
-        let spread = format_number(outlook.worst_spread_mm);
-        format!("With this noise, the worst-seen movement is known only to ±{spread} mm.")
-    } else {
-        // Relative change of the readings for 1 mm of the worst-seen movement.
-        let change = format_number(100.0 * outlook.worst_row.worst_spread_mm(1.0).recip());
-        format!(
-            "Sideways shifts are hard to see: 1 mm of the worst-seen movement changes the readings by {change} %. \
-             Noise above that hides it."
-        )
-    }
 }
 
 /// Numbers of unknowns and equations of the scene, and its condition number.
@@ -275,6 +203,6 @@ mod tests {
             sets: NoisySets::Test,
             ..Noise::default()
         };
-        assert_eq!(of_noise(&noise), "7 % relative, 12 bits, in test only");
+        assert_eq!(of_noise(noise), "7 % relative, 12 bits, in test only");
     }
 }

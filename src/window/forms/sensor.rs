@@ -8,6 +8,7 @@ use decoupler_core::{
 };
 use eframe::egui::Ui;
 
+use super::meaning;
 use crate::window::{
     glossary,
     theme::space,
@@ -18,44 +19,25 @@ use crate::window::{
     },
 };
 
-/// A length of the geometry: its name, its meaning, and access to it.
-type Length = (&'static str, &'static str, fn(&mut Geometry) -> &mut f64);
+/// A length of the geometry, and access to it.
+type Length = (&'static str, fn(&mut Geometry) -> &mut f64);
 
 const LENGTHS: [Length; 8] = [
-    ("Height", glossary::HEIGHT.hint, |at| &mut at.height_mm),
-    (
-        "Row pitch",
-        "Distance between row-wires, in mm (the paper's wire gap).",
-        |at| &mut at.row_pitch_mm,
-    ),
-    ("Node pitch", "Distance between nodes on a row-wire, in mm.", |at| {
-        &mut at.node_pitch_mm
-    }),
-    (
-        "Column pitch",
-        "Distance between column-wires, in mm (the paper's wire gap).",
-        |at| &mut at.column_pitch_mm,
-    ),
-    (
-        "Column node pitch",
-        "Distance between nodes on a column-wire, in mm.",
-        |at| &mut at.column_node_pitch_mm,
-    ),
-    ("First row at x", "x coordinate of the first row-wire, in mm.", |at| {
-        &mut at.row_x0_mm
-    }),
-    (
-        "First column at y",
-        "y coordinate of the first column-wire, in mm.",
-        |at| &mut at.column_y0_mm,
-    ),
-    (
-        "First column node at x",
-        "x coordinate of the first node on each column-wire, in mm. Shifting it breaks the symmetry that makes rows read \
-         alike.",
-        |at| &mut at.column_node_x0_mm,
-    ),
+    ("Height", |at| &mut at.height_mm),
+    ("Row pitch", |at| &mut at.row_pitch_mm),
+    ("Node pitch", |at| &mut at.node_pitch_mm),
+    ("Column pitch", |at| &mut at.column_pitch_mm),
+    ("Column node pitch", |at| &mut at.column_node_pitch_mm),
+    ("First row at x", |at| &mut at.row_x0_mm),
+    ("First column at y", |at| &mut at.column_y0_mm),
+    ("First column node at x", |at| &mut at.column_node_x0_mm),
 ];
+
+/// Tooltip of the lengths but the height.
+const PLACES: &str = "Row-wires run along y above the column-wires, which run along x. A pitch is the distance of neighbours, in \
+                      mm: between wires (the paper's wire gap), or between the nodes on a wire. The first wire or node of each \
+                      kind is placed by its coordinate, in mm. Shifting the nodes of the column-wires breaks the symmetry that \
+                      makes rows read alike.";
 
 /// The scale of the array: one of the paper's, or any other typed.
 pub fn array_ui(ui: &mut Ui, Simulation { sensor, scene, .. }: &mut Simulation) {
@@ -87,7 +69,8 @@ pub fn array_ui(ui: &mut Ui, Simulation { sensor, scene, .. }: &mut Simulation) 
 
 /// Lengths and resistivity, and the way back to the assumed ones.
 pub fn geometry_ui(ui: &mut Ui, sensor: &mut SensorModel) {
-    for (name, hint, length) in LENGTHS {
+    for (name, length) in LENGTHS {
+        let hint = meaning(name).unwrap_or(PLACES);
         let usual = *length(&mut Geometry::default());
         let range = if name.starts_with("First") {
             -1e6..=1e6
@@ -104,8 +87,15 @@ pub fn geometry_ui(ui: &mut Ui, sensor: &mut SensorModel) {
         );
     }
     let usual = usually(SensorModel::new(sensor.scale).resistivity_ohm_per_mm, 1e-12..=1e12);
-    let (hint, resistivity) = (glossary::RESISTIVITY.hint, &mut sensor.resistivity_ohm_per_mm);
-    quantity_ui(ui, "Resistivity", hint, resistivity, usual, "Ω/mm");
+    let hint = glossary::RESISTIVITY.hint;
+    quantity_ui(
+        ui,
+        "Resistivity",
+        hint,
+        &mut sensor.resistivity_ohm_per_mm,
+        usual,
+        "Ω/mm",
+    );
     dim_ui(ui, Geometry::ASSUMPTION);
     if sensor.geometry != Geometry::default() && ui.button("Reset to the assumed geometry").clicked() {
         sensor.geometry = Geometry::default();

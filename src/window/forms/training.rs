@@ -3,7 +3,7 @@
 use decoupler_core::{evaluation::RunSettings, settings::Method, text::counted};
 use eframe::egui::Ui;
 
-use super::{Fields, Look, Row, SetBy, chosen_ui, number_ui};
+use super::{Fields, Look, Row, SetBy, number_ui};
 use crate::window::widgets::{
     dim_ui,
     fields::{capitalised, input_text},
@@ -13,11 +13,7 @@ use crate::window::widgets::{
 const METHOD: Row = Row(
     "method",
     "Method",
-    Look::Below(|| {
-        Method::all()
-            .map(|method| (method.short_name(), method.name(), method.summary()))
-            .into()
-    }),
+    Look::Below(|| Vec::from(Method::all().map(|method| (method.short_name(), method.name())))),
 );
 
 const EPOCHS: Row = Row("epochs", "Epochs", Look::Number(""));
@@ -33,16 +29,7 @@ const RESTARTS: [Row; 2] = [
     Row(
         "combine",
         "Combine restarts",
-        Look::Below(|| {
-            vec![
-                ("best", "keep the best", "The one with the lowest validation error."),
-                (
-                    "mean",
-                    "average their answers",
-                    "One network with the hidden nodes of all.",
-                ),
-            ]
-        }),
+        Look::Below(|| vec![("best", "keep the best"), ("mean", "average their answers")]),
     ),
 ];
 
@@ -64,27 +51,15 @@ pub fn training_ui(ui: &mut Ui, fields: &mut Fields<'_>, is_new: bool) {
         }
     });
     fold_ui(ui, "Method settings", &fields.summary(of_method), |ui| {
-        method_settings_ui(ui, fields);
+        if let SetBy::User = fields.set_by {
+            let method = &mut fields.settings.training.method;
+            for setting in method.settings() {
+                let texts = [&capitalised(setting.name), setting.help, ""];
+                number_ui(ui, texts, setting, method, &fields.usual.training.method);
+            }
+        }
         ui.add_enabled_ui(is_new, |ui| fields.show(ui, &RESTARTS));
     });
-}
-
-/// The settings of the method.
-fn method_settings_ui(ui: &mut Ui, fields: &mut Fields<'_>) {
-    let Some(method) = fields.known().map(|settings| settings.training.method) else {
-        return;
-    };
-    for setting in method.settings() {
-        let label = capitalised(setting.name);
-        match fields.set_by {
-            SetBy::User => {
-                let method = &mut fields.settings.training.method;
-                let usual = &fields.usual.training.method;
-                number_ui(ui, [&label, setting.help, ""], setting, method, usual);
-            }
-            SetBy::Choice(_) => chosen_ui(ui, &label, setting.number(&method).map(input_text), false),
-        }
-    }
 }
 
 /// The first of the method's own settings, and the number of restarts.

@@ -6,8 +6,8 @@
 
 mod compare;
 mod experiments;
-mod identifiability;
 mod live;
+mod sensor;
 mod trade_off;
 mod train;
 
@@ -16,14 +16,13 @@ use std::{path::PathBuf, sync::Arc};
 use super::{job::Wake, shared::View};
 use decoupler_files::import::Plan;
 
-pub use identifiability::{Analysis, Question};
 pub use trade_off::{PlannedLevel, PlannedRun, TradeOffEnding, TradeOffPlan};
 pub(super) use train::CHECKPOINT;
 pub use train::{BottomTab, DecoderResult, Touch};
 
 use self::{
-    compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, live::LiveView,
-    trade_off::TradeOffView, train::TrainView,
+    compare::CompareView, experiments::ExperimentsView, live::LiveView, sensor::SensorView, trade_off::TradeOffView,
+    train::TrainView,
 };
 
 /// All views.
@@ -36,7 +35,7 @@ pub struct Views {
     /// Two finished trainings side by side.
     pub compare: CompareView,
     /// What the readings determine.
-    pub identifiability: IdentifiabilityView,
+    pub sensor: SensorView,
     /// Speed and accuracy of each decoder.
     pub trade_off: TradeOffView,
     /// Frames decoded as they arrive.
@@ -50,7 +49,7 @@ impl Views {
             train: TrainView::new(Arc::clone(wake)),
             experiments: ExperimentsView::new(Arc::clone(wake)),
             compare: CompareView::new(Arc::clone(wake)),
-            identifiability: IdentifiabilityView::new(Arc::clone(wake)),
+            sensor: SensorView::new(Arc::clone(wake)),
             trade_off: TradeOffView::new(Arc::clone(wake)),
             live: LiveView::new(Arc::clone(wake)),
         }
@@ -77,7 +76,7 @@ impl Views {
             &mut self.train,
             &mut self.experiments,
             &mut self.compare,
-            &mut self.identifiability,
+            &mut self.sensor,
             &mut self.trade_off,
             &mut self.live,
         ]

@@ -14,7 +14,7 @@ use crate::window::{
     glossary,
     shared::{Effect, Phase, Shared, SourceKind},
     theme::space,
-    widgets::{dim_ui, explained_options_ui, fold_ui, ghost_button, scrolled_ui},
+    widgets::{dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui, segmented_ui},
 };
 
 /// The source and the settings of the next training. Returns the figure of the paper that the user picked, if any.
@@ -56,18 +56,10 @@ pub fn configuration_ui(
 /// The choice between the simulated array and a recording.
 fn source_choice_ui(ui: &mut Ui, source: SourceKind, effects: &mut Vec<Effect>) {
     let options = [
-        (
-            SourceKind::Array,
-            "Simulated array",
-            "Samples are drawn from the resistance model of a row-column array.",
-        ),
-        (
-            SourceKind::Recording,
-            "Recording",
-            "Samples are read from files with readings and measured targets.",
-        ),
+        (SourceKind::Array, "Simulated array"),
+        (SourceKind::Recording, "Recording"),
     ];
-    if let Some(source) = explained_options_ui(ui, "Source", &options, source, true) {
+    if let Some(source) = segmented_ui(ui, "Source", &options, source, true) {
         effects.push(Effect::ChooseSource(source));
     }
 }
@@ -113,7 +105,7 @@ fn settings_ui(
             ui.separator();
             recording.folds_ui(ui, fields.settings, shared, effects);
         } else {
-            array_ui(ui, fields, outlook(shared));
+            array_ui(ui, fields, shared.test().and_then(|test| test.outlook.as_ref()));
         }
         fold_ui(ui, "Network inputs", &fields.summary(forms::of_inputs), |ui| {
             forms::inputs_ui(ui, fields, is_recording && recording.has_row_wires(), size);
@@ -138,8 +130,9 @@ fn array_ui(ui: &mut Ui, fields: &mut Fields<'_>, outlook: Option<&Outlook>) {
     forms::scene_choice_ui(ui, &mut simulation.scene);
     ui.add_space(space(2));
     ui.separator();
-    if let Some(outlook) = outlook {
-        forms::outlook_notes_ui(ui, &simulation.scene, outlook);
+    // They stay visible while the scene is folded away.
+    for warning in outlook.iter().flat_map(|outlook| &outlook.warnings) {
+        note_ui(ui, &capitalised(&format!("{warning}.")));
     }
     let simulation = *simulation;
     fold_ui(ui, "Scene", &forms::of_scene(&simulation.scene), |ui| {
@@ -153,21 +146,6 @@ fn array_ui(ui: &mut Ui, fields: &mut Fields<'_>, outlook: Option<&Outlook>) {
         let geometry = forms::of_geometry(&sensor.geometry);
         fold_ui(ui, "Geometry", &geometry, |ui| forms::geometry_ui(ui, sensor));
     }
-}
-
-/// Returns the outlook of the scene of the draft, if it is known.
-fn outlook(shared: &Shared) -> Option<&Outlook> {
-    let (settings, test) = match (&shared.preview, &shared.run) {
-        (Some(preview), _) => (&preview.settings, &preview.test),
-        (None, Some(run)) => (run.settings(), run.test.array()?),
-        (None, None) => return None,
-    };
-    let sensor_and_scene = |settings: &RunSettings| {
-        let simulation = settings.simulation()?;
-        Some((simulation.sensor, simulation.scene))
-    };
-    let is_same = sensor_and_scene(settings) == sensor_and_scene(&shared.draft);
-    test.outlook.as_ref().filter(|_| is_same)
 }
 
 /// The check box that leaves the settings of a recording to a choice by cross-validation, and what is known about it.
@@ -201,20 +179,17 @@ fn automatic_choice_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) 
 
 /// The paper's figures of single networks, one click each.
 fn paper_figures_ui(ui: &mut Ui) -> Option<PaperFigure> {
-    const GAP: f32 = space(1);
     let mut picked = None;
-    let width = 0.5 * (ui.available_width() - GAP);
-    ui.spacing_mut().item_spacing = [GAP, GAP].into();
-    for pair in PaperFigure::ALL.chunks(2) {
-        ui.horizontal(|ui| {
-            for figure in pair {
-                let button = ghost_button(figure.name()).min_size([width, space(7)].into());
-                if ui.add(button).on_hover_text(figure.description()).clicked() {
-                    picked = Some(*figure);
-                }
+    let width = 0.5 * (ui.available_width() - space(1));
+    ui.spacing_mut().item_spacing = [space(1); 2].into();
+    ui.horizontal_wrapped(|ui| {
+        for figure in PaperFigure::ALL {
+            let button = ghost_button(figure.name()).min_size([width, space(7)].into());
+            if ui.add(button).on_hover_text(figure.description()).clicked() {
+                picked = Some(figure);
             }
-        });
-    }
+        }
+    });
     picked
 }
 

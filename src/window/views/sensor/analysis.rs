@@ -1,45 +1,25 @@
-use std::sync::Arc;
+use std::{error::Error, sync::Arc};
 
-use glam::DVec3;
-use thiserror::Error;
-
-use crate::window::test_view::Frame;
 use decoupler_core::{
-    dataset::Simulation,
     identifiability::Identifiability,
-    scene::{RowModel, Scene, SceneError},
-    sensor::{RelativeNoise, SensorError, SensorModel},
-    surface::{SurfaceError, SurfaceMap},
+    scene::{RowModel, Scene},
+    sensor::{RelativeNoise, SensorModel},
+    surface::SurfaceMap,
 };
+use decoupler_files::figure::{
+    SequentialMap,
+    surface::{Quantity, Surface, ViewMode},
+};
+use glam::DVec3;
 
-/// Question to be analysed: a sensor, its scene, and the compression of its nodes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Question {
+/// What the readings of an array determine.
+#[derive(Clone, Debug)]
+pub(super) struct Analysis {
     /// The sensor.
     pub sensor: SensorModel,
     /// The rows that are read, the movement, and the noise of the readings.
     pub scene: Scene,
-    /// Uniform compression at which the Jacobian is evaluated, as a fraction of the height.
-    pub compression: f64,
-}
-
-impl Question {
-    /// Returns the question for the sensor and the scene of a simulation, at half the scene's largest compression.
-    pub fn of(simulation: &Simulation) -> Self {
-        Self {
-            sensor: simulation.sensor,
-            scene: simulation.scene,
-            compression: 0.5 * simulation.scene.largest_compression,
-        }
-    }
-}
-
-/// Identifiability of an array: what its readings determine.
-#[derive(Clone, Debug)]
-pub struct Analysis {
-    /// Question that was analysed.
-    pub question: Question,
-    /// Each row-wire that is read.
+    /// Each row-wire that is read, with its nodes pressed by half the stroke.
     pub rows: Vec<Identifiability>,
     /// Index in [`Self::rows`] of the row with the smallest singular value.
     pub worst: usize,
@@ -51,91 +31,59 @@ pub struct Analysis {
     pub alike: Option<([usize; 2], f64)>,
     /// Warnings, worst first.
     pub warnings: Vec<String>,
-    /// The surface through the nodes.
-    pub surface: Arc<SurfaceMap>,
-    /// For each moving axis, the worst-seen pattern of every row, scaled to a largest deflection of 1.
-    pub patterns: Vec<Frame>,
-    /// For each moving axis, the sensitivity of every node in 1/mm.
-    pub sensitivities: Vec<Frame>,
-}
-
-/// Error of an analysis.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum AnalysisError {
-    /// An invalid scene.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// An invalid sensor.
-    #[error(transparent)]
-    Sensor(#[from] SensorError),
-    /// No surface can be fitted through the nodes.
-    #[error(transparent)]
-    Surface(#[from] SurfaceError),
+    /// For each moving axis, the worst-seen pattern of every row, scaled to a largest deflection of 1, and the sensitivity of
+    /// every node in 1/mm.
+    pub surfaces: Vec<[Surface; 2]>,
 }
 
 impl Analysis {
     /// Analyses every row that is read; returns `None` once it `is_abandoned`.
     ///
     /// # Errors
-    /// If the sensor or the scene is invalid.
-    pub fn new(question: &Question, is_abandoned: impl Fn() -> bool) -> Result<Option<Self>, AnalysisError> {
-        let Question { sensor, scene, .. } = question;
+    /// If the sensor or the scene is invalid, or no surface can be fitted through the nodes.
+    pub fn new(
+        sensor: &SensorModel,
+        scene: &Scene,
+        is_abandoned: impl Fn() -> bool,
+    ) -> Result<Option<Self>, Box<dyn Error>> {
         sensor.check()?;
         scene.check()?;
-        let read = scene.rows.read(sensor.scale.rows())?;
-        let depth_mm = question.compression * sensor.geometry.height_mm;
+        let depth_mm = 0.5 * scene.stroke_mm(&sensor.geometry);
         let displacements_mm = vec![DVec3::Z * depth_mm; sensor.scale.nodes_per_row()];
-        let axes = scene.movement.axes();
-        let mut rows = Vec::with_capacity(read.len());
-        for row in read {
+        let of_row = |row: usize, noise: RelativeNoise| {
+            Identifiability::of_row(sensor, row, &displacements_mm, scene.movement.axes(), noise)
+        };
+        let mut rows = Vec::new();
+        for row in scene.rows.read(sensor.scale.rows())? {
             if is_abandoned() {
                 return Ok(None);
             }
-            rows.push(Identifiability::of_row(
-                sensor,
-                row,
-                &displacements_mm,
-                axes,
-                RelativeNoise::default(),
-            )?);
+            rows.push(of_row(row, RelativeNoise::default())?);
         }
-        align(&mut rows);
         let smallest = |seen: &Identifiability| seen.singular_values_per_mm.last().copied().unwrap_or(0.0);
         let worst = (0..rows.len()).min_by(|&a, &b| smallest(&rows[a]).total_cmp(&smallest(&rows[b])));
         let worst = worst.unwrap_or(0);
         let noise = RelativeNoise::of(scene.noise, sensor, &[rows[worst].row], depth_mm)?;
         if noise.common > 0.0 {
             for seen in &mut rows {
-                *seen = Identifiability::of_row(sensor, seen.row, &displacements_mm, axes, noise)?;
+                *seen = of_row(seen.row, noise)?;
             }
-            align(&mut rows);
         }
+        align(&mut rows);
         let alike = match scene.rows.model() {
-            RowModel::Shared => Some(Identifiability::most_alike_rows(sensor, noise)?),
+            RowModel::Shared => Identifiability::most_alike_rows(sensor, noise)?,
             RowModel::Each => None,
         };
         let prior_mm = scene.stroke_mm(&sensor.geometry) / 12.0_f64.sqrt();
-        let read = Vec::from_iter(rows.iter().map(|seen| seen.row));
-        let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &read);
-        let surface = SurfaceMap::shared(&x_mm, &y_mm)?;
-        let alike = alike.flatten();
-        let frames = |value: fn(&Identifiability, usize) -> DVec3, scale: f64| -> Vec<Frame> {
-            let of_axis = |&axis: &usize| frame(sensor, &rows, &surface, |seen, node| scale * value(seen, node)[axis]);
-            axes.indices().iter().map(of_axis).collect()
-        };
-        let deflections = rows.iter().flat_map(|seen| &seen.worst_pattern);
-        let largest = deflections.map(|u| u.abs().max_element()).fold(0.0, f64::max);
         Ok(Some(Self {
-            question: *question,
+            sensor: *sensor,
+            scene: *scene,
             worst,
             noise,
             prior_mm,
             alike,
             warnings: rows[worst].warnings(noise.own, prior_mm, alike),
-            patterns: frames(|seen, node| seen.worst_pattern[node], largest.recip()),
-            sensitivities: frames(|seen, node| seen.sensitivity_per_mm[node], 1.0),
-            surface,
+            surfaces: surfaces(sensor, scene, &rows)?,
             rows,
         }))
     }
@@ -171,39 +119,73 @@ fn align(rows: &mut [Identifiability]) {
     }
 }
 
-fn frame(
+fn surfaces(
     sensor: &SensorModel,
+    scene: &Scene,
     rows: &[Identifiability],
-    surface: &SurfaceMap,
-    value: impl Fn(&Identifiability, usize) -> f64,
-) -> Frame {
-    let nodes = 0..sensor.scale.nodes_per_row();
-    let nodes_mm = rows.iter().flat_map(|seen| {
-        let at = |node| sensor.geometry.row_node_mm(sensor.scale, seen.row, node);
-        nodes.clone().map(move |node| (seen, node, at(node)))
-    });
-    let nodes_mm: Vec<DVec3> = nodes_mm.map(|(seen, node, at)| at.with_z(value(seen, node))).collect();
-    let values: Vec<f64> = nodes_mm.iter().map(|node| node.z).collect();
-    Frame {
-        grid_mm: surface.evaluate(&values).into(),
-        nodes_mm: nodes_mm.into(),
-    }
+) -> Result<Vec<[Surface; 2]>, Box<dyn Error>> {
+    let read = Vec::from_iter(rows.iter().map(|seen| seen.row));
+    let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &read);
+    let map = SurfaceMap::shared(&x_mm, &y_mm)?;
+    let per_row = sensor.scale.nodes_per_row();
+    let nodes_mm = |row: usize| (0..per_row).map(move |node| sensor.geometry.row_node_mm(sensor.scale, row, node));
+    let surface = |title: &str, quantity: Quantity, range: [f64; 2], values: &[f64]| {
+        let nodes = read.iter().flat_map(|&row| nodes_mm(row)).zip(values);
+        Surface {
+            title: title.to_owned(),
+            map: Arc::clone(&map),
+            values: map.evaluate(values).into(),
+            nodes: nodes.map(|(node, &value)| node.with_z(value)).collect(),
+            quantity,
+            range: range[0]..=range[1],
+            mode: ViewMode::Top,
+            colours: SequentialMap::default(),
+        }
+    };
+    let largest = |of: fn(&Identifiability) -> &[DVec3]| {
+        let values = rows.iter().flat_map(of).map(|value| value.abs().max_element());
+        values
+            .filter(|value| value.is_finite())
+            .fold(f64::MIN_POSITIVE, f64::max)
+    };
+    let deflection = largest(|seen| &seen.worst_pattern);
+    let sensitivity = largest(|seen| &seen.sensitivity_per_mm);
+    let of_axis = |&axis: &usize| {
+        let patterns = rows.iter().flat_map(|seen| &seen.worst_pattern);
+        let patterns = Vec::from_iter(patterns.map(|u| u[axis] / deflection));
+        let sensitivities = rows.iter().flat_map(|seen| &seen.sensitivity_per_mm);
+        let sensitivities = Vec::from_iter(sensitivities.map(|s| s[axis]));
+        [
+            surface("Worst-seen deformation", Quantity::Pattern, [-1.0, 1.0], &patterns),
+            surface(
+                "Sensitivity of each node",
+                Quantity::Sensitivity,
+                [0.0, sensitivity],
+                &sensitivities,
+            ),
+        ]
+    };
+    Ok(scene.movement.axes().indices().iter().map(of_axis).collect())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use decoupler_core::scene::{Movement, Noise, Rows};
+    use decoupler_core::{
+        dataset::Simulation,
+        scene::{Movement, Noise, Rows},
+    };
 
-    fn analysis(question: &Question) -> Analysis {
-        Analysis::new(question, || false).unwrap().unwrap()
+    use super::*;
+
+    fn analysis(Simulation { sensor, scene, .. }: &Simulation) -> Analysis {
+        Analysis::new(sensor, scene, || false).unwrap().unwrap()
     }
 
     #[test]
     fn the_worst_row_has_the_smallest_singular_value_and_each_node_has_its_value() {
-        let question = Question::of(&Simulation::default());
+        let question = Simulation::default();
         let found = analysis(&question);
-        assert_eq!((found.rows.len(), found.patterns.len()), (10, 1));
+        assert_eq!((found.rows.len(), found.surfaces.len()), (10, 1));
         for row in 0..10 {
             let pressed = vec![DVec3::Z * 0.5; 10];
             let (axes, noise) = (found.rows[row].axes, RelativeNoise::default());
@@ -214,11 +196,11 @@ mod tests {
                 found.worst_row().singular_values_per_mm[9],
             );
             assert!(worst <= smallest);
-            let shown = &found.sensitivities[0].nodes_mm[10 * row..10 * row + 10];
+            let shown = &found.surfaces[0][1].nodes[10 * row..10 * row + 10];
             assert!(shown.iter().zip(&alone.sensitivity_per_mm).all(|(a, b)| a.z == b.z));
         }
-        let largest = found.patterns[0]
-            .nodes_mm
+        let largest = found.surfaces[0][0]
+            .nodes
             .iter()
             .map(|node| node.z.abs())
             .fold(0.0, f64::max);
@@ -229,8 +211,8 @@ mod tests {
 
     #[test]
     fn neighbouring_patterns_have_the_same_sign() {
-        let found = analysis(&Question::of(&Simulation::default()));
-        let nodes = &found.patterns[0].nodes_mm;
+        let found = analysis(&Simulation::default());
+        let nodes = &found.surfaces[0][0].nodes;
         for row in 1..10 {
             let along: f64 = (0..10)
                 .map(|node| nodes[10 * row + node].z * nodes[10 * row - 10 + node].z)
@@ -241,7 +223,7 @@ mod tests {
 
     #[test]
     fn every_source_of_noise_counts() {
-        let mut question = Question::of(&Simulation::default());
+        let mut question = Simulation::default();
         question.scene.noise = Noise {
             relative: 3e-3,
             drift: 4e-3,
@@ -257,7 +239,7 @@ mod tests {
 
     #[test]
     fn a_mirrored_layout_gives_a_warning_unless_the_row_is_known() {
-        let mut question = Question::of(&Simulation::default());
+        let mut question = Simulation::default();
         question.sensor = SensorModel::new("10x6_3x18".parse().unwrap());
         // Column nodes at 7.5, 12.5 and 17.5 mirror the rows about x = 12.5.
         question.sensor.geometry.column_node_x0_mm = 7.5;
@@ -272,13 +254,14 @@ mod tests {
 
     #[test]
     fn each_moving_axis_has_its_pictures_and_invalid_questions_give_a_reason() {
-        let mut question = Question::of(&Simulation::default());
+        let mut question = Simulation::default();
         question.scene.movement = Movement::SIDEWAYS;
         let found = analysis(&question);
-        assert_eq!((found.patterns.len(), found.sensitivities.len()), (3, 3));
-        assert!(Analysis::new(&question, || true).unwrap().is_none());
-        question.sensor.geometry.height_mm = -1.0;
-        let message = Analysis::new(&question, || false).unwrap_err().to_string();
+        assert_eq!(found.surfaces.len(), 3);
+        let Simulation { sensor, scene, .. } = &mut question;
+        assert!(Analysis::new(sensor, scene, || true).unwrap().is_none());
+        sensor.geometry.height_mm = -1.0;
+        let message = Analysis::new(sensor, scene, || false).unwrap_err().to_string();
         assert!(message.contains("height"), "{message}");
     }
 }
