@@ -11,7 +11,6 @@ use eframe::egui::Ui;
 use super::meaning;
 use crate::window::{
     glossary,
-    theme::space,
     widgets::{
         dim_ui,
         fields::{input_text, quantity_ui, usually},
@@ -60,7 +59,6 @@ pub fn array_ui(ui: &mut Ui, Simulation { sensor, scene, .. }: &mut Simulation) 
     if let Some(note) = scale.note() {
         note_ui(ui, &note);
     }
-    ui.add_space(space(1));
     // The array may have become smaller.
     if let Rows::One(row) = &mut scene.rows {
         *row = (*row).min(scale.rows() - 1);
