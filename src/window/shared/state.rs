@@ -15,7 +15,7 @@ use decoupler_files::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::{FileTask, Look, RunList, RunResult, RunView};
+use super::{Look, RunList, RunResult, RunView, ViewKind};
 use crate::window::test_view::{HeightScale, RecordedTest, TestView};
 
 /// State that all views read.
@@ -41,8 +41,10 @@ pub struct Shared {
     pub runs: RunList,
     /// Camera and mode of surfaces.
     pub look: Look,
-    /// The names of the views whose threads compute.
-    pub working: Vec<&'static str>,
+    /// The displayed view.
+    pub shown: ViewKind,
+    /// The views whose threads compute.
+    pub working: Vec<ViewKind>,
 }
 
 /// Kinds of source.
@@ -154,6 +156,7 @@ impl Shared {
                 heights: HeightScale::default(),
                 error_limit_mm: None,
             },
+            shown: ViewKind::default(),
             working: Vec::new(),
         }
     }
@@ -227,6 +230,11 @@ impl Shared {
         ended.map_or(Phase::Idle, Phase::Ended)
     }
 
+    /// Returns true if a training can begin, as far as the worker is concerned.
+    pub fn can_train(&self) -> bool {
+        !self.phase.is_busy() && self.phase != Phase::Died
+    }
+
     /// Returns true if the current training can continue from its present weights with the draft: its sets and networks
     /// must be the same. A paused training is resumed instead, unless the method or the stopping rules change.
     pub fn can_continue(&self) -> bool {
@@ -264,30 +272,5 @@ pub fn opening_scene() -> Scene {
     Scene {
         loading: Loading::Indenter(Indenter::default()),
         ..Scene::default()
-    }
-}
-
-/// Work that closing the window would cut short, or whose result it would discard.
-#[derive(Debug)]
-pub struct Unfinished {
-    /// Name that distinguishes the work from other work of the same view: "Training".
-    pub work: &'static str,
-    /// Its progress: "epoch 12 of 1000".
-    pub progress: String,
-    /// Saves what has been done so far, if that is possible.
-    pub saving: Option<FileTask>,
-    /// True if the result is kept after the window closes once the work has ended.
-    pub is_kept: bool,
-}
-
-impl Unfinished {
-    /// Work that can only be discarded, and whose result is lost when the window closes.
-    pub fn discarded(work: &'static str, progress: String) -> Self {
-        Self {
-            work,
-            progress,
-            saving: None,
-            is_kept: false,
-        }
     }
 }

@@ -34,7 +34,7 @@ use crate::window::{
         view::TrainView,
     },
     widgets::{
-        Landmark, described_table_ui, dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui,
+        described_table_ui, dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui,
         section_heading_ui,
     },
 };
@@ -78,7 +78,6 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         } else {
             expectation_ui(ui, shared);
         }
-        Landmark::Errors.stands_at(ui, ui.min_rect().with_min_y(heading.rect.top()));
         section_heading_ui(ui, "Open");
         let can_open = !shared.phase.is_busy() && shared.phase != Phase::Died;
         ui.add_enabled_ui(can_open, |ui| open_ui(ui, shared, effects));

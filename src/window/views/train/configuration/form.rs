@@ -23,7 +23,7 @@ use crate::window::{
     theme::{Theme, space, type_size},
     views::train::{exports::PaperFigure, recording::RecordingEditor},
     widgets::{
-        Landmark, dim_ui, explained_options_ui,
+        dim_ui, explained_options_ui,
         fields::{capitalised, input_text, list_ui, options_ui, quantity_ui, usually},
         fold_ui, ghost_button, scrolled_ui,
     },
@@ -93,7 +93,6 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
         workload_ui(ui, &draft);
     });
     method_ui(ui, &mut draft, shared.phase);
-    Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
     ui.add_enabled_ui(!is_busy, |ui| {
         preset_section_ui(ui, &mut draft);
         if let Some(simulation) = draft.simulation_mut() {
@@ -160,7 +159,6 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
             recorded_workload_ui(ui, &settings, size);
         }
     }
-    Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
     ui.add_space(space(2));
     ui.separator();
     ui.add_enabled_ui(!is_busy, |ui| {
