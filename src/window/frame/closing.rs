@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use decoupler_core::text::counted;
 use eframe::egui::{Align, Layout, RichText, Ui, ViewportCommand};
 
@@ -6,6 +8,7 @@ use super::{
     modal::{Modal, Reply, card_ui},
 };
 use crate::window::{
+    job::Background,
     shared::{Phase, Shared, SourceKind, Unfinished, ViewKind},
     theme::{semibold, space, type_size},
     widgets::{dim_ui, ghost_button, primary_button},
@@ -20,7 +23,8 @@ pub(super) struct Closing {
     can_save: bool,
     /// True once the user has decided to close: the window waits only for files that are being written.
     is_decided: bool,
-    keeps_training: bool,
+    /// Saves the running training for the next start, if the user has asked for that.
+    saving: Option<Background<()>>,
 }
 
 impl DecouplerWindow {
@@ -35,15 +39,19 @@ impl DecouplerWindow {
                 // Files alone need no question: the window shows that it waits for them.
                 is_decided: lines.is_empty(),
                 lines,
-                keeps_training: false,
+                saving: None,
             }));
         }
         let Some(Modal::Closing(closing)) = &self.modal else {
             return;
         };
-        let may_close = closing.is_decided && self.files.paths().next().is_none();
+        let is_saved = closing.saving.as_ref().is_none_or(|saving| {
+            saving.next_event();
+            !saving.is_under_way()
+        });
+        let may_close = closing.is_decided && is_saved && self.files.paths().next().is_none();
         match (is_requested, may_close) {
-            (true, true) if closing.keeps_training => {}
+            (true, true) if closing.saving.is_some() => {}
             (true, true) => self.worker.forget(),
             (false, true) => self.ctx.send_viewport_cmd(ViewportCommand::Close),
             (true, false) => {
@@ -58,14 +66,14 @@ impl DecouplerWindow {
     /// Closes the window once the files are written, that of the running training among them if it is to be kept.
     pub(super) fn leave(&mut self, keeps_training: bool) {
         if let Some(Modal::Closing(closing)) = &mut self.modal {
-            (closing.is_decided, closing.keeps_training) = (true, keeps_training);
-        }
-        if let Some((folder, _)) = self.keeping.as_ref().filter(|_| keeps_training) {
-            let save = self.worker.saver();
-            self.files.write(folder.clone(), move |_| {
-                save();
-                Ok::<_, String>("Saved the training".to_owned())
-            });
+            closing.is_decided = true;
+            if keeps_training {
+                let save = self.worker.saver();
+                let job = closing
+                    .saving
+                    .insert(Background::prompt("closing", Arc::clone(&self.wake)));
+                job.start(move |_| save(), |_| ());
+            }
         }
     }
 
@@ -109,12 +117,18 @@ pub(super) fn closing_ui(
     unfinished: &[(&'static str, Unfinished)],
     files: &str,
 ) -> Option<Reply> {
-    let heading = if closing.is_decided { "Finishing files" } else { "Close with unsaved work?" };
+    let heading = if closing.is_decided {
+        "Finishing files"
+    } else {
+        "Close with unsaved work?"
+    };
     card_ui(ui, "closing", space(150), |ui| {
         ui.label(RichText::new(heading).font(semibold(type_size().title)));
         ui.add_space(space(1));
         if closing.is_decided {
-            ui.label(format!("Still being written: {files}. The window will close afterwards."));
+            ui.label(format!(
+                "Still being written: {files}. The window will close afterwards."
+            ));
         }
         for (view, work) in closing.lines.iter().filter(|_| !closing.is_decided) {
             let now = unfinished.iter().find(|(of, now)| of == view && now.work == *work);

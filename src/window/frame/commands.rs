@@ -33,11 +33,9 @@ impl DecouplerWindow {
         view.take_commands(&mut offers, &self.shared, effects);
         // These have no keys, and take longer to list.
         if is_listed {
-            for export in view.exports(&self.shared) {
-                if offers.offer(Command::Export(export.action()), export.ask.is_ok())
-                    && let Ok(ask) = export.ask
-                {
-                    effects.push(ask());
+            for shown in view.shown(&self.shared) {
+                if offers.offer(Command::Export(shown.action()), shown.item.is_ok()) {
+                    effects.push(shown.ask());
                 }
             }
         }
@@ -141,7 +139,7 @@ impl DecouplerWindow {
             return;
         };
         match &recording.plan {
-            Ok(plan) if !recording.has_plan_of(&self.shared.recording) => self.views.open_plan(plan),
+            Ok(plan) if !self.shared.recording.is_plan(Some(plan)) => self.views.open_plan(plan),
             Ok(_) => {}
             // Undoing closes no files.
             Err(_) => recording.plan.clone_from(&self.shared.recording.plan),

@@ -9,12 +9,13 @@ use eframe::egui::{
 use super::{
     DecouplerWindow,
     closing::{Closing, closing_ui},
+    export_dialog::export_dialog_ui,
     help::{Help, Page, help_ui},
     save_form::{self, Saving, save_form_ui},
 };
 use crate::window::{
     glossary::{self, Term},
-    shared::{Command, Offer},
+    shared::{Command, Exporting, Offer},
     theme::{Theme, space},
     widgets::dim_ui,
 };
@@ -28,6 +29,8 @@ pub(super) enum Modal {
     Help(Help),
     /// A file waiting for its path.
     Path(Saving),
+    /// The form of an export.
+    Export(Exporting),
     /// The question about unfinished work before the window closes.
     Closing(Closing),
 }
@@ -58,11 +61,21 @@ impl DecouplerWindow {
             Some(Modal::Help(help)) => help_ui(ui, help, offers),
             Some(Modal::Closing(closing)) => closing_ui(ui, closing, &unfinished, &files),
             Some(Modal::Path(saving)) => match save_form_ui(ui, saving) {
-                Some(save_form::Reply::Path(path)) => return self.take_typed(path),
-                Some(save_form::Reply::Replace(path)) => return self.take_path(path),
+                Some(save_form::Reply::Path(path, asks)) => return self.take_typed(path, asks),
                 Some(save_form::Reply::Cancel) => Some(Reply::Close),
                 None => None,
             },
+            Some(Modal::Export(exporting)) => {
+                let shown = self.views.get(self.shared.shown).shown(&self.shared);
+                match export_dialog_ui(ui, exporting, shown) {
+                    Some(effect) => {
+                        self.modal = None;
+                        effect.into_iter().for_each(|effect| self.apply(effect));
+                        None
+                    }
+                    None => None,
+                }
+            }
         };
         match reply {
             None => return,
@@ -76,12 +89,7 @@ impl DecouplerWindow {
 }
 
 /// Shows a card over the window. Escape, or a click outside, closes it.
-pub(super) fn card_ui(
-    ui: &Ui,
-    id: &str,
-    width: f32,
-    add: impl FnOnce(&mut Ui) -> Option<Reply>,
-) -> Option<Reply> {
+pub(super) fn card_ui(ui: &Ui, id: &str, width: f32, add: impl FnOnce(&mut Ui) -> Option<Reply>) -> Option<Reply> {
     let frame = Frame::popup(ui.style()).inner_margin(Margin::same(16));
     let modal = EguiModal::new(Id::unique(id)).frame(frame).show(ui.ctx(), |ui| {
         ui.set_width(width);
@@ -120,7 +128,13 @@ impl Line<'_> {
                 let about = offer.command.about();
                 let keys = about.keys.map(|keys| ui.ctx().format_shortcut(&keys));
                 // The accessible name leaves out the keys.
-                (about.name.clone(), keys.unwrap_or_default(), about.name, about.hint, offer.is_possible)
+                (
+                    about.name.clone(),
+                    keys.unwrap_or_default(),
+                    about.name,
+                    about.hint,
+                    offer.is_possible,
+                )
             }
             Self::Term(term) => {
                 let label = format!("{} in the glossary", term.name);
@@ -136,7 +150,11 @@ impl Line<'_> {
         });
         let line = line.inner.on_disabled_hover_text("Not available now");
         line.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, &label));
-        if hint.is_empty() { line } else { line.on_hover_text(hint) }
+        if hint.is_empty() {
+            line
+        } else {
+            line.on_hover_text(hint)
+        }
     }
 }
 
@@ -194,7 +212,9 @@ fn matching<'a>(offers: &'a [Offer], typed: &str) -> Vec<Line<'a>> {
     }
     found.sort_by_key(|(rank, _)| *rank);
     let terms = glossary::groups().into_iter().flat_map(|group| group.terms);
-    let terms = terms.filter(|term| !words.is_empty() && has_words(term.name)).map(Line::Term);
+    let terms = terms
+        .filter(|term| !words.is_empty() && has_words(term.name))
+        .map(Line::Term);
     found.into_iter().map(|(_, line)| line).chain(terms).collect()
 }
 

@@ -1,43 +1,40 @@
-use std::{ops::RangeInclusive, path::PathBuf, sync::Arc, time::Duration};
+use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use decoupler_files::export::exit_leaving_nothing;
-use eframe::egui::{self, Context, Event, Frame as PanelFrame, Key, Margin, Modifiers, Panel, Ui};
+use eframe::egui::{self, Context, Event, Frame as PanelFrame, Margin, Panel, Ui, UiBuilder};
 
 use super::{
-    actions::{Overlay, Undoing},
-    clipboard::{Clipboard, Copying, copy_menu_ui},
-    closing::Closing,
-    files::{Dialogs, Files, PathChecks},
-    notices::{self, Notices, notice_ui},
+    clipboard::{Clipboard, Copying},
+    commands::{DraftsUndoer, SCALES, drafts},
+    export_dialog::{card_menu_ui, export_menu_ui},
+    files::{Dialogs, Files},
+    modal::Modal,
+    notices::Notices,
     remembered::{Memory, Remembered, WindowFile},
-    save_form::{self, Saving, save_form_ui},
-    top_bar::{Reach, edge_ui, export_menu_ui, top_bar_ui, widths_points},
-    tour::{self, Tour, tour_ui},
+    save_form::Saving,
+    top_bar::{edge_ui, top_bar_ui, widths_points},
 };
-use crate::signals::on_termination;
-use crate::window::{
-    job::{Background, Wake},
-    preview::PreviewEvent,
-    shared::{Action, Effect, Matter, Notice, Offers, Phase, RunsWorker, Shared},
-    theme::{self, Theme, space},
-    training_worker::{Request, Worker},
-    views::Views,
+use crate::{
+    signals::on_termination,
+    window::{
+        job::{Background, Wake},
+        preview::PreviewEvent,
+        shared::{Command, Effect, Matter, Notice, RunsWorker, Shared, ViewKind, training_status},
+        theme::{self, Theme, space},
+        training_worker::{Request, Worker},
+        views::Views,
+    },
 };
 
 /// The window: the shared state, the views, and the one place where their effects are applied.
 pub struct DecouplerWindow {
     pub(super) shared: Shared,
     pub(super) views: Views,
-    /// Places and names of the views.
-    pub(super) names: Vec<(usize, &'static str)>,
-    /// The place of the current view among all.
-    pub(super) shown: usize,
     pub(super) notices: Notices,
-    /// A file waiting for its path.
-    pub(super) saving: Option<Saving>,
+    /// The card over the window that must be answered first.
+    pub(super) modal: Option<Modal>,
     /// The path last typed, offered again for the same file.
     pub(super) typed: Option<Saving>,
-    pub(super) path_checks: PathChecks,
     /// The checkpoint that the training of the Train view was opened from.
     pub(super) opened: Option<PathBuf>,
     pub(super) worker: Worker,
@@ -48,16 +45,12 @@ pub struct DecouplerWindow {
     pub(super) files: Files,
     pub(super) copying: Copying,
     pub(super) dialogs: Dialogs,
-    pub(super) closing: Option<Closing>,
-    /// Modal list over the window.
-    pub(super) overlay: Overlay,
-    /// The tour, unless it has ended.
-    pub(super) tour: Option<Tour>,
-    /// Name of the action picked from the list, which runs in the next frame.
-    pub(super) picked: Option<String>,
-    pub(super) undoing: Undoing,
-    pub(super) remembered: Remembered,
-    /// The file that keeps it, if there is one.
+    /// Command picked from the list or by a button, which is carried out in the next frame.
+    pub(super) picked: Option<Command>,
+    pub(super) undoer: DraftsUndoer,
+    /// What the user has chosen and the shared state does not hold: theme, size, scale, and widths of columns.
+    pub(super) chosen: Remembered,
+    /// The file that keeps what is restored at the next start, if there is one.
     pub(super) memory: Option<Memory>,
     pub(super) wake: Wake,
     pub(super) ctx: Context,
@@ -75,25 +68,38 @@ impl DecouplerWindow {
 
     /// As [`Self::new`]; `wake` is called whenever there is an event to handle.
     pub(super) fn woken_by(wake: Wake, ctx: &Context, desktop: Desktop, file: Option<WindowFile>) -> Self {
-        let remembered = file.as_ref().map(|file| file.remembered.clone()).unwrap_or_default();
+        let mut remembered = file.as_ref().map(|file| file.remembered.clone()).unwrap_or_default();
         let damage = file.as_ref().and_then(|file| file.damage.clone());
-        let is_dark = remembered
-            .is_dark
-            .unwrap_or(ctx.system_theme() != Some(egui::Theme::Light));
+        let is_usually_dark = ctx.system_theme() != Some(egui::Theme::Light);
+        let is_dark = remembered.is_dark.unwrap_or(is_usually_dark);
         theme::install(ctx, is_dark);
         // Our own shortcuts keep to sizes at which everything fits.
         ctx.options_mut(|options| options.zoom_with_keyboard = false);
+        let mut shared = Shared::new(is_dark);
         let mut views = Views::new(&wake);
-        let names = views.all().into_iter().map(|view| view.name()).enumerate();
+        shared.look.colours = remembered.colours.unwrap_or(shared.look.colours);
+        shared.draft = remembered.draft.unwrap_or(shared.draft);
+        if let Some(settings) = remembered.recording {
+            // Files of older versions do not say it: settings that the user gave are not chosen.
+            let is_usual = settings == shared.recording.settings;
+            shared.recording.is_auto = remembered.is_auto.unwrap_or(is_usual);
+            shared.recording.settings = settings;
+        }
+        shared.source = remembered.source.unwrap_or_default();
+        if let Some(plan) = remembered.plan.take() {
+            views.open_plan(&plan.0);
+            shared.recording.plan = Ok(plan.0);
+        }
+        let shown = ViewKind::ALL
+            .into_iter()
+            .find(|view| Some(view.name()) == remembered.view.as_deref());
+        shared.shown = shown.unwrap_or_default();
         let mut window = Self {
-            names: names.collect(),
-            shared: Shared::new(is_dark),
+            shared,
             views,
-            shown: 0,
             notices: Notices::default(),
-            saving: None,
+            modal: None,
             typed: None,
-            path_checks: PathChecks::new(Arc::clone(&wake)),
             opened: None,
             worker: Worker::start(Arc::clone(&wake)),
             keeping: None,
@@ -101,15 +107,11 @@ impl DecouplerWindow {
             runs: RunsWorker::start(Arc::clone(&wake)),
             files: Files::new(Arc::clone(&wake)),
             copying: Copying::new(Clipboard::of(desktop), Arc::clone(&wake)),
-            dialogs: Dialogs::new(desktop),
-            closing: None,
-            overlay: Overlay::None,
-            // A window that cannot remember the end of the tour would begin it at every start.
-            tour: (file.is_some() && remembered.has_toured != Some(true)).then(Tour::default),
+            dialogs: Dialogs::new(desktop, Arc::clone(&wake)),
             picked: None,
-            undoing: Undoing::default(),
+            undoer: DraftsUndoer::default(),
             memory: file.map(|file| Memory::new(file, Arc::clone(&wake))),
-            remembered,
+            chosen: remembered,
             wake,
             ctx: ctx.clone(),
             given: Vec::new(),
@@ -117,28 +119,8 @@ impl DecouplerWindow {
         if let Some(damage) = damage {
             window.notices.fail(Matter::Memory, damage);
         }
-        if let Some(scale) = window.remembered.scale.filter(|scale| SCALES.contains(scale)) {
+        if let Some(scale) = window.chosen.scale.filter(|scale| SCALES.contains(scale)) {
             window.set_scale(scale);
-        }
-        if let Some(colours) = window.remembered.colours {
-            window.shared.look.colours = colours;
-        }
-        if let Some(draft) = window.remembered.draft {
-            window.shared.draft = draft;
-        }
-        if let Some(settings) = window.remembered.recording {
-            // Files of older versions do not say it: settings that the user gave are not chosen.
-            let is_usual = settings == window.shared.recording.settings;
-            window.shared.recording.is_auto = window.remembered.is_auto.unwrap_or(is_usual);
-            window.shared.recording.settings = settings;
-        }
-        window.shared.source = window.remembered.source.unwrap_or_default();
-        if let Some(plan) = window.remembered.plan.clone() {
-            window.views.open_plan(&plan);
-            window.shared.recording.plan = Ok(Arc::new(plan));
-        }
-        if let Some(place) = window.place_of(window.remembered.view.as_deref()) {
-            window.show(place);
         }
         window.request_preview();
         window
@@ -189,7 +171,7 @@ impl DecouplerWindow {
 
     /// The name of the current view.
     pub fn shown(&self) -> &'static str {
-        self.names[self.shown].1
+        self.shared.shown.name()
     }
 
     /// Newest notice that is shown to the user.
@@ -200,23 +182,18 @@ impl DecouplerWindow {
     /// Lays out the window and handles the input of the user.
     pub fn show_ui(&mut self, ui: &mut Ui) {
         // Another window may have changed the run list.
-        if ui.input(|input| input.events.contains(&egui::Event::WindowFocused(true))) {
+        if ui.input(|input| input.events.contains(&Event::WindowFocused(true))) {
             self.runs.look();
         }
         let mut effects = Vec::new();
-        let actions = self.offer_actions(ui.ctx(), &mut effects);
-        self.take_dropped(ui.ctx(), &mut effects);
-        let is_asked = self.is_asked();
-        let can_reconnect = self.views.live.can_retry(&self.shared);
-        let (view, shared) = (&mut *self.views.all()[self.shown], &self.shared);
-        if !is_asked {
-            view.take_pointer(ui.ctx(), shared);
-        }
+        let offers = self.take_commands(ui.ctx(), &mut effects);
+        self.take_dropped(ui.ctx());
+        let (kind, shared) = (self.shared.shown, &self.shared);
+        let view = self.views.get(kind);
         let palette = Theme::of(ui).palette;
         let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
-        let window_width = ui.available_width();
-        let columns = view.columns(window_width);
-        let [form_width, report_width] = widths_points(&columns, &self.remembered, window_width);
+        let columns = kind.columns(ui.available_width());
+        let [form_width, report_width] = widths_points(&columns, &self.chosen, ui.available_width());
         // The strip of the scroll bar is the margin on the right.
         let side = Margin {
             left: 12,
@@ -228,15 +205,15 @@ impl DecouplerWindow {
             .exact_size(space(11))
             .frame(panel(Margin::symmetric(8, 0)))
             .show(ui, |ui| {
-                top_bar_ui(ui, &self.names, self.shown, &actions, |ui| {
-                    export_menu_ui(ui, || view.exports(shared), &mut effects);
+                top_bar_ui(ui, kind, &offers, |ui| {
+                    export_menu_ui(ui, || view.shown(shared), &mut effects);
                     view.tools_ui(ui, shared, &mut effects);
                 })
             });
-        Panel::bottom("status line")
+        let status_line = Panel::bottom("status line")
             .exact_size(space(7))
             .frame(panel(Margin::symmetric(12, 0)))
-            .show(ui, |ui| view.status_ui(ui, shared));
+            .show(ui, |ui| ui.max_rect());
         let form = Panel::left("configuration")
             .exact_size(form_width)
             .resizable(false)
@@ -249,105 +226,48 @@ impl DecouplerWindow {
                 .frame(panel(side))
                 .show(ui, |ui| view.report_ui(ui, shared, &mut effects))
         });
-        if let Some(seconds) = self.notices.pass(ui.input(|input| input.time)) {
-            ui.ctx().request_repaint_after(Duration::from_secs_f64(seconds));
-        }
         let background = PanelFrame::new().fill(palette.background).inner_margin(Margin::same(8));
-        let replies = egui::CentralPanel::default().frame(background).show(ui, |ui| {
-            let mut replies = Vec::new();
-            for (place, (matter, notice)) in self.notices.iter().enumerate() {
-                let remedies = match matter {
-                    Matter::Training if shared.phase == Phase::Died => vec![notices::Reply::Restart],
-                    Matter::Live if can_reconnect => vec![notices::Reply::Reconnect],
-                    // From right to left.
-                    Matter::CutShort if !shared.phase.is_busy() => {
-                        vec![notices::Reply::Discard, notices::Reply::Resume]
-                    }
-                    _ => Vec::new(),
-                };
-                replies.extend(notice_ui(ui, notice, remedies).map(|reply| (place, reply)));
-            }
-            view.body_ui(ui, shared, &mut effects);
-            replies
-        });
-        for part in [Some(&replies.response), report.as_ref().map(|report| &report.response)]
-            .into_iter()
-            .flatten()
-        {
-            copy_menu_ui(part, || view.exports(shared), &mut effects);
+        let middle = egui::CentralPanel::default()
+            .frame(background)
+            .show(ui, |ui| view.body_ui(ui, shared, &mut effects));
+        let status = middle.inner.unwrap_or_else(|| training_status(shared));
+        status.show(&mut ui.new_child(UiBuilder::new().max_rect(status_line.inner)));
+        let parts = [Some(&middle.response), report.as_ref().map(|report| &report.response)];
+        for part in parts.into_iter().flatten() {
+            card_menu_ui(part, || view.shown(shared), &mut effects);
         }
-        let remembered = &mut self.remembered;
-        let (form, report) = (form.response.rect, report.map(|report| report.response.rect));
-        edge_ui(ui, "Width of the left column", form, true, &mut remembered.form_points);
+        edge_ui(
+            ui,
+            "Width of the left column",
+            form.response.rect,
+            true,
+            &mut self.chosen.form_points,
+        );
         if let Some(report) = report {
-            edge_ui(
-                ui,
-                "Width of the right column",
-                report,
-                false,
-                &mut remembered.report_points,
-            );
+            let width = &mut self.chosen.report_points;
+            edge_ui(ui, "Width of the right column", report.response.rect, false, width);
         }
         if changes_something(ui.ctx()) || !effects.is_empty() {
             self.ctx.request_repaint();
         }
-        // Before the layout changes.
-        for (place, reply) in replies.inner {
-            match reply {
-                notices::Reply::Dismiss => self.notices.dismiss(place),
-                notices::Reply::Restart => self.restart_worker(),
-                notices::Reply::Reconnect => self.views.live.retry(&self.shared, &mut effects),
-                notices::Reply::Resume => self.resume_cut_short(),
-                notices::Reply::Discard => self.discard_cut_short(),
-            }
-        }
+        self.notices_ui(ui, middle.response.rect, &mut effects);
         self.apply_all(effects);
-        match top_bar.inner {
-            Some(Reach::View(place)) => self.show(place),
-            Some(Reach::Action(name)) => {
-                self.picked = Some(name);
-                self.ctx.request_repaint();
-            }
-            None => {}
+        if let Some(command) = top_bar.inner {
+            self.carry_out(&command);
         }
-        self.undoing.follow(ui.input(|input| input.time), &self.shared);
-        self.overlay_ui(ui, &actions);
+        self.undoer
+            .feed_state(ui.input(|input| input.time), &drafts(&self.shared));
+        self.modal_ui(ui, &offers);
         self.dropping_ui(ui);
-        self.tour_ui(ui, &actions);
-        self.ask_for_path(ui);
         self.remember();
         // Work begun in this frame must be finished too.
         self.take_close_request();
-        self.closing_ui(ui);
     }
 
     /// Applies the effects requested by views.
     pub(super) fn apply_all(&mut self, effects: Vec<Effect>) {
         for effect in effects {
             self.apply(effect);
-        }
-    }
-
-    /// Shows the tour unless a modal is open, and carries out the answer of the user.
-    fn tour_ui(&mut self, ui: &Ui, actions: &[Action]) {
-        let Some(tour) = self.tour.filter(|_| !self.is_asked()) else {
-            return;
-        };
-        match tour_ui(ui, tour, actions) {
-            Some(tour::Reply::Show(tour)) => self.tour = Some(tour),
-            Some(tour::Reply::Do(name)) => self.picked = Some(name.to_owned()),
-            Some(tour::Reply::End) => self.end_tour(),
-            None => return,
-        }
-        self.ctx.request_repaint();
-    }
-
-    fn ask_for_path(&mut self, ui: &mut Ui) {
-        match self.saving.as_mut().and_then(|saving| save_form_ui(ui, saving)) {
-            Some(save_form::Reply::Path(path)) => self.take_typed(path),
-            Some(save_form::Reply::Replace(path)) => self.take_path(path),
-            Some(save_form::Reply::Cancel) => self.saving = None,
-            None => {}
         }
     }
 }
@@ -382,41 +302,4 @@ pub enum Desktop {
     Native,
     /// None: the window asks for paths itself, and copies stay within the toolkit. For tests.
     None,
-}
-
-/// Interface scales offered to the user, relative to the default.
-pub(super) const SCALES: RangeInclusive<f32> = 0.8..=2.0;
-
-/// Step between scales.
-const STEP: f32 = 0.1;
-
-impl DecouplerWindow {
-    /// Offers larger and smaller text and controls.
-    pub(super) fn offer_scales(&mut self, offers: &mut Offers<'_>) {
-        let scale = self.ctx.zoom_factor();
-        let can_grow = scale < *SCALES.end() - 0.5 * STEP;
-        let can_shrink = scale > *SCALES.start() + 0.5 * STEP;
-        // On many keyboards plus is the shifted equals sign.
-        let is_equals = can_grow
-            && self
-                .ctx
-                .input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Equals));
-        if offers.offer_keys("Larger interface", Modifiers::COMMAND, Key::Plus, can_grow) || is_equals {
-            self.set_scale(scale + STEP);
-        }
-        if offers.offer_keys("Smaller interface", Modifiers::COMMAND, Key::Minus, can_shrink) {
-            self.set_scale(scale - STEP);
-        }
-        let is_usual = (scale - 1.0).abs() < 0.5 * STEP;
-        if offers.offer_keys("Reset the interface size", Modifiers::COMMAND, Key::Num0, !is_usual) {
-            self.set_scale(1.0);
-        }
-    }
-
-    /// Sets the interface scale, rounded to whole steps and limited to [`SCALES`].
-    pub(super) fn set_scale(&mut self, scale: f32) {
-        let scale = ((scale / STEP).round() * STEP).clamp(*SCALES.start(), *SCALES.end());
-        self.ctx.set_zoom_factor(scale);
-        self.remembered.scale = Some(scale);
-    }
 }

@@ -11,11 +11,11 @@ use decoupler_core::{
 use decoupler_files::{
     export::{format_duration, format_number, format_percent},
     figure::EpochOutline,
-    import::{Progress as Reading, Setup},
+    import::{Plan, Progress as Reading, Setup},
 };
 use eframe::egui::{Key, Ui, WidgetInfo, accesskit::Role};
 
-use super::{Effect, Phase, Shared, SourceKind, Status, Tone};
+use super::{Effect, Phase, RecordingDraft, Shared, SourceKind, Status, Tone};
 use crate::window::{
     test_view::TestSet,
     theme::space,
@@ -33,6 +33,8 @@ pub struct RunView {
     /// Setup on the left when it began or was continued: as [`Self::setup`], but with the number of epochs requested
     /// from that point.
     pub asked: Setup,
+    /// Plan of [`Self::asked`] for a recording, shared with the settings on the left while they have the same.
+    pub plan: Option<Arc<Plan>>,
     /// Description of the readings and targets.
     pub problem: Arc<Problem>,
     /// Weights and biases of the network.
@@ -79,6 +81,7 @@ impl RunView {
         Self {
             id,
             published: setup.settings().published(),
+            plan: asked.plan().map(|plan| Arc::new(plan.clone())),
             asked,
             setup,
             search,
@@ -94,6 +97,13 @@ impl RunView {
             result: None,
             stop_reason: None,
             is_saved: false,
+        }
+    }
+
+    /// Shares the plan of `draft`, if that is the same.
+    pub fn share_plan(&mut self, draft: &RecordingDraft) {
+        if let (Ok(plan), true) = (&draft.plan, draft.is_plan(self.plan.as_ref())) {
+            self.plan = Some(Arc::clone(plan));
         }
     }
 
@@ -151,7 +161,11 @@ pub fn run_buttons_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
     // In a narrow window the buttons show only their symbols.
     let is_short = ui.available_width() < space(120);
     let mut button_ui = |ui: &mut Ui, text: &str, is_possible: bool, hint: String, effect: Effect| {
-        let shown = if is_short { text.split(' ').next().unwrap_or(text) } else { text };
+        let shown = if is_short {
+            text.split(' ').next().unwrap_or(text)
+        } else {
+            text
+        };
         let button = ui.add_enabled(is_possible, ghost_button(shown));
         button.widget_info(|| WidgetInfo::labeled(Role::Button, is_possible, text));
         if button.on_hover_text(hint).clicked() {
@@ -227,7 +241,11 @@ fn phase_in_words(shared: &Shared) -> Status {
         Phase::Paused => (Tone::Warning, "Paused"),
         Phase::Calibrating => (Tone::Busy, "Calibrating the 90 % intervals"),
         Phase::Ended(StopReason::Stopped) => {
-            let epoch = shared.run.as_ref().and_then(RunView::latest).map_or(0, |latest| latest.epoch);
+            let epoch = shared
+                .run
+                .as_ref()
+                .and_then(RunView::latest)
+                .map_or(0, |latest| latest.epoch);
             return Status::new(Tone::Calm, format!("Stopped at epoch {epoch}"));
         }
         Phase::Ended(reason) if reason.was_successful() => {

@@ -1,4 +1,4 @@
-use eframe::egui::{RichText, Sense, Ui};
+use eframe::egui::{Sense, Ui};
 
 use super::{
     LiveView,
@@ -6,12 +6,12 @@ use super::{
     figures_card::figures_ui,
     source_form,
     targets_card::targets_ui,
-    tools::{self, REPLAY_BAR_HEIGHT, live_exports, replay_bar_ui},
+    tools::{self, REPLAY_BAR_HEIGHT, replay_bar_ui},
 };
 use crate::window::{
-    shared::{Effect, Export, FileInUse, Offers, Shared, View},
-    theme::{Theme, space, type_size},
-    widgets::{card_ui, scrolled_ui, state_ui},
+    shared::{Effect, FileInUse, Holdings, Offers, Shared, Shown, Status, Tone, View},
+    theme::space,
+    widgets::{card_ui, scrolled_ui},
 };
 use decoupler_core::{live::FaultEvent, text::counted};
 use decoupler_files::live::{SourcePlan, Watched};
@@ -47,8 +47,8 @@ impl View for LiveView {
         tools::tools_ui(ui, self, shared, effects);
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        live_exports(self, shared)
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        tools::shown(self, shared)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -108,9 +108,7 @@ fn status(view: &LiveView) -> Status {
         (None, _) => (Tone::Calm, "Ready: press Start".to_owned()),
         (Some(_), _) if !view.shown.has_answer() => (Tone::Busy, "Waiting for the first frame".to_owned()),
         (Some(_), _) if counts.is_waiting => (Tone::Warning, "No frame for two seconds".to_owned()),
-        (Some(_), Some(Watched::Checked(FaultEvent::Named { wire, .. }))) => {
-            (Tone::Warning, format!("Fault: {wire}"))
-        }
+        (Some(_), Some(Watched::Checked(FaultEvent::Named { wire, .. }))) => (Tone::Warning, format!("Fault: {wire}")),
         (Some(_), Some(Watched::Checked(FaultEvent::Unexplained))) => {
             (Tone::Warning, "The readings contradict Eq. (2)".to_owned())
         }
@@ -130,12 +128,16 @@ fn status(view: &LiveView) -> Status {
             };
             status.notes.push(format!("{}, {source}", running.network));
             if counts.decoded > 0 {
-                status.notes.push(format!("{:.0} frames per second", counts.frames_per_second));
+                status
+                    .notes
+                    .push(format!("{:.0} frames per second", counts.frames_per_second));
             }
         }
         if let Some(recorded) = view.shown.recording.as_ref().filter(|_| view.recording.is_some()) {
             let frames = counted(recorded.frames, "frame");
-            status.notes.push(format!("● Recording: {frames}, {:.1} s", recorded.seconds));
+            status
+                .notes
+                .push(format!("● Recording: {frames}, {:.1} s", recorded.seconds));
         }
     }
     status

@@ -13,7 +13,7 @@ use decoupler_files::{
     export::{format_duration, trade_off_points, trade_off_summary},
     figure::{Figure, trade_off_figure},
 };
-use eframe::egui::{Align, ComboBox, Key, Layout, Modifiers, RichText, Sense, TextEdit, Ui, vec2};
+use eframe::egui::{Align, ComboBox, Key, Layout, RichText, Sense, TextEdit, Ui, vec2};
 
 use super::{
     PointWish, Thoroughness, TradeOffEnding, TradeOffForm, TradeOffLook, TradeOffOutcome, TradeOffView, WhichPresets,
@@ -23,13 +23,13 @@ use super::{
 };
 use crate::window::{
     shared::{
-        Effect, Export, FileWords, Matter, Notice, Offers, Shared, SourceKind, Unfinished, View, copy_exports,
-        csv_export, picture_exports, sentence,
+        Command, Effect, Holdings, Matter, Notice, Offers, Shared, Shown, SourceKind, Status, Tone, Unfinished, View,
+        sentence,
     },
-    theme::{Theme, semibold, space, type_size},
+    theme::{semibold, space, type_size},
     widgets::{
         card_ui, dim_ui, fields::count_ui, ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button,
-        progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui, state_ui, with_shortcut,
+        progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui, with_shortcut,
     },
 };
 
@@ -89,8 +89,8 @@ impl View for TradeOffView {
         }
     }
 
-    fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
-        trade_off_exports(self)
+    fn shown<'a>(&'a self, _shared: &'a Shared) -> Vec<Shown<'a>> {
+        shown(self)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -143,7 +143,7 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
             return;
         }
         let figure = trade_off_figure(level, &look.limits);
-        asked = charts_ui(ui, level, &figure, &mut look.marked, can_load, source);
+        asked = charts_ui(ui, level, &figure, &mut look.marked, can_load);
     });
     let choices_width = (0.4 * lower.width()).clamp(space(76), space(105));
     let (left, right) = lower.split_left_right_at_x(lower.right() - choices_width);
@@ -168,7 +168,7 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
                 effects.extend([Effect::TakeSetup(Box::new(setup)), Effect::ShowTraining]);
             }
         }
-        Some(PointWish::Export(task)) => effects.push(Effect::ChooseFile(*task)),
+        Some(PointWish::Export(exporting)) => effects.push(Effect::Export(exporting)),
         None => {}
     }
     trade.look = look;
@@ -255,20 +255,17 @@ fn status(trade: &TradeOffView) -> Status {
         Some(outcome) => {
             let unit = outcome.decoded.as_deref().filter(|_| !has_noise(outcome));
             let unit = unit.map_or_else(String::new, |unit| format!(", times of {unit}"));
-            status.with_note(format!("{}, one thread, median of many{unit}", outcome.plan.source_name()))
+            status.with_note(format!(
+                "{}, one thread, median of many{unit}",
+                outcome.plan.source_name()
+            ))
         }
         None => status,
     }
 }
 
-const POINTS: FileWords = FileWords {
-    kind: "points",
-    description: "Every point, of an array at every noise level, with every digit, as CSV.",
-    extensions: &["csv"],
-};
-
-/// Returns the exports: charts and table at the displayed noise level, and every point.
-pub(super) fn trade_off_exports(view: &TradeOffView) -> Vec<Export<'_>> {
+/// Returns what the view shows: charts and table at the displayed noise level, and every point.
+pub(super) fn shown(view: &TradeOffView) -> Vec<Shown<'_>> {
     let stem = || "trade_off".to_owned();
     let outcome = view.outcome.as_ref().filter(|outcome| outcome.points().0 > 0);
     let outcome = outcome.ok_or_else(|| "No point is measured yet: press Measure first.".to_owned());
@@ -282,19 +279,16 @@ pub(super) fn trade_off_exports(view: &TradeOffView) -> Vec<Export<'_>> {
     let charts = level
         .clone()
         .map(|level| move || Figure::from(trade_off_figure(level, &view.look.limits)));
-    let mut exports: Vec<Export<'_>> = picture_exports("Charts", stem(), charts).collect();
     let points = outcome.clone().map(|outcome| || trade_off_points(&outcome.levels));
-    exports.push(csv_export("All points", POINTS, stem(), points));
-    exports.extend(copy_exports(
-        "Trade-off table",
-        level.map(|level| move || trade_off_summary(level)),
-    ));
+    let table = level.map(|level| move || trade_off_summary(level));
+    let shown = [
+        Shown::figure("Charts", stem(), charts),
+        Shown::table("All points", stem(), points),
+        Shown::table("Trade-off table", stem(), table),
+    ];
     match outcome {
-        Ok(outcome) => exports
-            .into_iter()
-            .map(|export| export.noting(&outcome.is_saved))
-            .collect(),
-        Err(_) => exports,
+        Ok(outcome) => shown.map(|shown| shown.noting(&outcome.is_saved)).into(),
+        Err(_) => shown.into(),
     }
 }
 

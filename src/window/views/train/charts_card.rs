@@ -2,7 +2,7 @@ use decoupler_files::figure::{
     Decoded, ErrorBins, Figure, HeatMap, Ink, LineAt, LineStyle, PlotFigure, RegressionLine, Series, histogram_figure,
     hysteresis_figure, loss_figure, node_figure, regression_figure, sample_figure, training_state_figure,
 };
-use eframe::egui::{Key, Modifiers, Ui, UiBuilder};
+use eframe::egui::{Ui, UiBuilder};
 
 use super::{
     inspect::{Along, bar_nodes_ui, section_bar_ui, section_of, take_pointed, with_lights},
@@ -12,7 +12,7 @@ use super::{
 };
 use crate::window::{
     plotting::{Pointer, cells_ui, plots_ui},
-    shared::{Effect, Offers, Phase, Shared, SourceKind, target_choice_ui},
+    shared::{Command, Effect, Offers, Phase, Shared, SourceKind, target_choice_ui},
     test_view::Positions,
     theme::{Theme, space},
     widgets::{invitation_ui, tabs_ui},

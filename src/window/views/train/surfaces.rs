@@ -252,8 +252,7 @@ fn surface_ui(
     } else {
         surface_view.show(ui, look.camera)
     };
-    if role == Role::Actual {
-    }
+    if role == Role::Actual {}
     if let (Role::Actual, Some(test)) = (role, array) {
         view.press.take_target(&shown, surface);
         let painter = ui.painter();

@@ -1,8 +1,8 @@
-use std::{path::PathBuf, sync::Arc};
+use std::sync::Arc;
 
 use decoupler_core::{text::counted, training::StopReason};
 use decoupler_files::import::Setup;
-use eframe::egui::{Context, Key, Modifiers, Sense, Ui};
+use eframe::egui::{Sense, Ui};
 use ndarray::Array2;
 
 use super::{
@@ -10,10 +10,10 @@ use super::{
     configuration::configuration_ui,
     decoders::{DecoderMeasuring, DecodersState},
     drawn::{Drawn, Frames},
-    exports::{PaperFigure, checkpoint_task, train_exports},
+    exports::{PaperFigure, shown},
     inspect::{Lighting, SectionChoice, TestPlace, drawn_nodes},
     press::{PressState, readings_head_ui},
-    recording::{RecordingEditor, recipe_export},
+    recording::{RecordingEditor, recipe_task},
     report::{self, report_ui},
     scrub::ScrubState,
     surfaces::surfaces_ui,
@@ -21,8 +21,8 @@ use super::{
 use crate::window::{
     job::Wake,
     shared::{
-        Columns, Effect, Export, FileInUse, Look, Matter, Notice, Offers, Phase, RightCard, RunCommand, RunResult,
-        RunView, Shared, SourceKind, Unfinished, View, run_buttons_ui,
+        Command, Effect, Holdings, Look, MIN_WIDTH_FOR_REPORT, Matter, Notice, Offers, Phase, RightCard, RunResult,
+        RunView, Shared, Shown, SourceKind, Status, Unfinished, View, run_buttons_ui,
     },
     test_view::RecordedTest,
     theme::space,
@@ -55,7 +55,8 @@ impl View for TrainView {
     fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
         if offers.is_heard {
             let frames = self.frames().clone();
-            self.press.take_pointer(offers.ctx, shared.test(), &frames, self.lights.node);
+            self.press
+                .take_pointer(offers.ctx, shared.test(), &frames, self.lights.node);
             self.follow(shared);
         }
         let phase = shared.phase;
@@ -105,10 +106,10 @@ impl View for TrainView {
         }
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        let mut exports = train_exports(self, shared);
-        exports.push(recipe_export(shared));
-        exports
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        let mut shown = shown(self, shared);
+        shown.push(Shown::file("Recipe", recipe_task(shared)));
+        shown
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {

@@ -1,22 +1,22 @@
-//! The form, the results and the exports of the study of a recording.
+//! The form, and the results of the study of a recording.
 
 use decoupler_core::text::counted;
 use decoupler_files::{
     export::{describe_target, error_table, format_below_one, format_duration},
     import::Setup,
 };
-use eframe::egui::{Key, Modifiers, RichText, Sense, Ui};
+use eframe::egui::{Key, RichText, Sense, Ui};
 
 use super::{
     RecordingStudy,
     study::{FoldsResult, RecordingFindings, UnderWay},
 };
 use crate::window::{
-    shared::{Export, FileWords, Offers, Shared, copy_exports, csv_export, error_table_ui, sentence},
-    theme::{Theme, space, type_size},
+    shared::{Command, Offers, Shared, Shown, Status, Tone, error_table_ui, sentence},
+    theme::{space, type_size},
     widgets::{
         card_ui, dim_ui, fields::count_ui, ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button,
-        scrolled_ui, section_heading_ui, state_ui, with_shortcut,
+        scrolled_ui, section_heading_ui, with_shortcut,
     },
 };
 
@@ -167,23 +167,14 @@ pub fn findings_ui(ui: &mut Ui, found: &RecordingFindings) {
     );
 }
 
-const HELD_OUT: FileWords = FileWords {
-    kind: "cross-validation table",
-    description: "Errors of each target over all samples, each tested by models fitted to the other folds, with every \
-                  digit, as CSV.",
-    extensions: &["csv"],
-};
-
-/// Returns the exports: the errors of the cross-validation.
-pub fn study_exports(study: &RecordingStudy) -> Vec<Export<'_>> {
+/// Returns what the view shows: the errors of the cross-validation.
+pub fn shown(study: &RecordingStudy) -> Vec<Shown<'_>> {
     let validated = study.validated.as_deref();
     let source = validated.map_or(String::new(), |validated| validated.setup.source_name());
     let validated = validated.ok_or_else(|| "Nothing is cross-validated yet: press “Cross-validate” first.".to_owned());
     let errors = validated.map(|validated| move || error_table(&validated.table));
     let stem = format!("{source}-cross-validation");
-    let mut exports = vec![csv_export("Cross-validation table", HELD_OUT, stem, errors.clone())];
-    exports.extend(copy_exports("Cross-validation table", errors));
-    exports
+    vec![Shown::table("Cross-validation table", stem, errors)]
 }
 
 /// Largest number of folds offered.

@@ -78,7 +78,6 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
     let is_busy = shared.phase.is_busy();
     let noise_of = |draft: &RunSettings| draft.simulation().map(|simulation| simulation.scene.noise);
     let followed = present(&draft);
-    let top = ui.cursor().top();
     ui.add_enabled_ui(!is_busy, |ui| {
         let Some(simulation) = draft.simulation_mut() else {
             return;
@@ -139,7 +138,6 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
 fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, effects: &mut Vec<Effect>) {
     let mut settings = shared.recording.settings;
     let is_busy = shared.phase.is_busy();
-    let top = ui.cursor().top();
     ui.add_enabled_ui(!is_busy, |ui| recording.files_ui(ui, shared, effects));
     recording.columns_button_ui(ui, shared);
     ui.add_space(space(2));
