@@ -7,7 +7,7 @@ use decoupler_files::{
     import::{Plan, Setup},
 };
 
-use super::{FileTask, Look, SourceKind};
+use super::{Exporting, FileTask, Look, SourceKind};
 
 /// Request of a view to the window, which applies all of them in one place once everything is drawn.
 #[derive(Clone, Debug)]
@@ -46,8 +46,8 @@ pub enum Effect {
     Watch(usize),
     /// Ask for the path of a file.
     ChooseFile(FileTask),
-    /// Ask for the path in the window itself.
-    TypePath(FileTask),
+    /// Let the user choose the form of an export.
+    Export(Box<Exporting>),
     /// Put this text on the clipboard.
     Copy {
         /// The text.
@@ -81,6 +81,8 @@ pub enum Effect {
 pub enum Notice {
     /// Success.
     Done(String),
+    /// A file was written at this path.
+    Saved(String, PathBuf),
     /// Failure, with what to do.
     Failed(String),
 }

@@ -1,4 +1,4 @@
-//! The form, the status line and the exports of an experiment.
+//! The form and the status line of an experiment.
 
 use std::sync::Arc;
 
@@ -26,16 +26,13 @@ use super::{
     sweep_folder::folder_form_ui,
 };
 use crate::window::{
-    shared::{
-        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Shared, copy_exports, csv_export,
-        picture_exports,
-    },
-    theme::{Theme, space},
+    shared::{Effect, FileTask, FileWords, Shared, Shown, Status, Tone},
+    theme::space,
     widgets::{
         dim_ui,
         fields::{count_ui, seed_ui},
         ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui,
-        state_ui, with_shortcut,
+        with_shortcut,
     },
 };
 
@@ -270,17 +267,15 @@ fn progress_ui(ui: &mut Ui, running: &Running) {
 }
 
 /// Shows the state of the experiment in the line at the bottom.
-pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsView) {
-    let palette = Theme::of(ui).palette;
+pub fn status(experiments: &ExperimentsView) -> Status {
     let folder = experiments.shown_folder().filter(|_| experiments.running.is_none());
     let of_folder = folder.and_then(|folder| Some((folder.name(), folder.trials()?)));
     if let Some((name, finished)) = of_folder {
         let text = format!("Sweep folder {name}: {} finished", counted(finished, "trial"));
-        ui.horizontal_centered(|ui| state_ui(ui, palette.good, &text));
-        return;
+        return Status::new(Tone::Good, text);
     }
-    let (colour, text) = match (&experiments.running, experiments.outcome()) {
-        (Some(running), _) => (palette.accent, format!("Running {}", running.topic.name())),
+    let (tone, text) = match (&experiments.running, experiments.outcome()) {
+        (Some(running), _) => (Tone::Busy, format!("Running {}", running.topic.name())),
         (None, Some(outcome)) => {
             let (done, all) = outcome.trials();
             let took = outcome
@@ -288,16 +283,16 @@ pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsView) {
                 .map_or_else(String::new, |took| format!(" in {}", format_duration(took)));
             let name = experiments.topic.name();
             match outcome.ending {
-                Some(Ending::Complete) => (palette.good, format!("{name} finished: {all} trials{took}")),
+                Some(Ending::Complete) => (Tone::Good, format!("{name} finished: {all} trials{took}")),
                 _ => (
-                    palette.warning,
+                    Tone::Warning,
                     format!("{name} ended early: {done} of {all} trials{took}"),
                 ),
             }
         }
-        (None, None) => (palette.dim, "Ready: press Run".to_owned()),
+        (None, None) => (Tone::Calm, "Ready: press Run".to_owned()),
     };
-    ui.horizontal_centered(|ui| state_ui(ui, colour, &text));
+    Status::new(tone, text)
 }
 
 /// Opens a cell in the Train view: its settings with the seed of its median trial, and the network of that trial. A
@@ -323,26 +318,14 @@ pub fn open_cell(shared: &Shared, outcome: &Outcome, cell: usize, effects: &mut 
     effects.push(Effect::ShowTraining);
 }
 
-const CELLS: FileWords = FileWords {
-    kind: "table",
-    description: "The values of every cell with every digit, as CSV.",
-    extensions: &["csv"],
-};
-
-const TRIALS: FileWords = FileWords {
-    kind: "trials",
-    description: "Every trial with its seed and errors, as CSV.",
-    extensions: &["csv"],
-};
-
 const MARKDOWN: FileWords = FileWords {
     kind: "table",
     description: "The table as shown with the settings behind it, as Markdown.",
     extensions: &["md"],
 };
 
-/// Returns the exports of the current experiment: figure and tables.
-pub(super) fn experiment_exports(view: &ExperimentsView, colours: SequentialMap) -> Vec<Export<'_>> {
+/// Returns what the view shows of the current experiment: figure and tables.
+pub(super) fn shown(view: &ExperimentsView, colours: SequentialMap) -> Vec<Shown<'_>> {
     let topic = view.topic;
     let stem = topic.name().to_lowercase().replace(' ', "_");
     let outcome = view.outcome().filter(|outcome| outcome.trials().0 > 0);
@@ -353,38 +336,27 @@ pub(super) fn experiment_exports(view: &ExperimentsView, colours: SequentialMap)
             figure => figure,
         }
     });
-    let mut exports: Vec<Export<'_>> = picture_exports("Figure", stem.clone(), figure).collect();
+    let table = outcome.clone().map(|outcome| || outcome.table.table());
     let cells = outcome.clone().map(|outcome| || cells_table(&outcome.results));
-    exports.push(csv_export("Table", CELLS, stem.clone(), cells));
     let trials = outcome.clone().map(|outcome| || trials_table(&outcome.results));
-    exports.push(csv_export("Every trial", TRIALS, format!("{stem}_trials"), trials));
-    exports.push(Export {
-        group: ExportGroup::Tables,
-        name: "Table with settings".to_owned(),
-        form: "Markdown".to_owned(),
-        description: MARKDOWN.description,
-        ask: outcome.clone().map(|outcome| -> Ask<'_> {
-            Box::new(move || {
-                let results = Arc::clone(&outcome.results);
-                let contents = Contents::new(move |path| {
-                    let conditions = describe_conditions(&results.experiment);
-                    atomic_write(path, |writer| {
-                        write_experiment_markdown(&topic.heading(), &conditions, &results, writer)
-                    })
-                });
-                Effect::ChooseFile(FileTask::save(MARKDOWN, &stem, contents))
+    let markdown = outcome.clone().map(|outcome| {
+        let (results, heading) = (Arc::clone(&outcome.results), topic.heading());
+        FileTask::save(MARKDOWN, &stem, move |path| {
+            let conditions = describe_conditions(&results.experiment);
+            atomic_write(path, |writer| {
+                write_experiment_markdown(&heading, &conditions, &results, writer)
             })
-        }),
+        })
     });
-    exports.extend(copy_exports(
-        "Table",
-        outcome.clone().map(|outcome| || outcome.table.table()),
-    ));
+    let shown = [
+        Shown::figure("Figure", stem.clone(), figure),
+        Shown::table("Table", format!("{stem}_table"), table),
+        Shown::table("Every cell", stem.clone(), cells),
+        Shown::table("Every trial", format!("{stem}_trials"), trials),
+        Shown::file("Table with settings", markdown),
+    ];
     match outcome {
-        Ok(outcome) => exports
-            .into_iter()
-            .map(|export| export.noting(&outcome.is_saved))
-            .collect(),
-        Err(_) => exports,
+        Ok(outcome) => shown.map(|shown| shown.noting(&outcome.is_saved)).into(),
+        Err(_) => shown.into(),
     }
 }

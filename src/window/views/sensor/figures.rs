@@ -13,7 +13,7 @@ use super::{Analysis, SensorView};
 use crate::window::{
     forms::meaning,
     plotting::titled_plots_ui,
-    shared::{Effect, Export, Look, Shared, colour_scale_ui, follow_surface, picture_exports, view_mode_ui},
+    shared::{Effect, Look, Shared, Shown, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
     theme::{Theme, semibold, space, type_size},
     widgets::{card_ui, fact_ui, fields::capitalised, note_ui, scrolled_ui, section_heading_ui, segmented_ui},
@@ -140,8 +140,8 @@ fn node_ui(ui: &mut Ui, analysis: &Analysis, surface: &Surface, node: usize) {
     ui.label(RichText::new(text).size(type_size().note));
 }
 
-/// Returns the exports: surfaces and singular values.
-pub(super) fn exports<'a>(view: &'a SensorView, shared: &'a Shared) -> Vec<Export<'a>> {
+/// Returns what the view shows: surfaces and singular values.
+pub(super) fn shown<'a>(view: &'a SensorView, shared: &'a Shared) -> Vec<Shown<'a>> {
     let analysis = view.analysis.as_ref();
     let analysis = analysis.ok_or_else(|| match &view.problem {
         Some(problem) => problem.clone(),
@@ -151,9 +151,10 @@ pub(super) fn exports<'a>(view: &'a SensorView, shared: &'a Shared) -> Vec<Expor
         .clone()
         .map(|analysis| || Figure::from(surfaces_figure(view, analysis, shared.look)));
     let values = analysis.map(|analysis| || Figure::from(singular_values(analysis)));
-    let surfaces = picture_exports("Surfaces", "identifiability".to_owned(), surfaces);
-    let values = picture_exports("Singular values", "singular-values".to_owned(), values);
-    surfaces.chain(values).collect()
+    vec![
+        Shown::figure("Surfaces", "identifiability".to_owned(), surfaces),
+        Shown::figure("Singular values", "singular-values".to_owned(), values),
+    ]
 }
 
 /// Shows warnings with what to change, then the figures.

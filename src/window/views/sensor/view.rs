@@ -1,15 +1,15 @@
 use std::time::{Duration, Instant};
 
 use decoupler_core::{dataset::Simulation, scene::Scene, sensor::SensorModel, text::counted};
-use eframe::egui::{RichText, Ui};
+use eframe::egui::Ui;
 
 use super::{Analysis, figures};
 use crate::window::{
     forms::{self, Fields},
     job::{Background, Wake},
-    shared::{Effect, Export, Shared, SourceKind, View},
-    theme::{Theme, space, type_size},
-    widgets::{card_ui, dim_ui, note_ui, placeholder_ui, scrolled_ui, section_heading_ui, state_ui},
+    shared::{Effect, Shared, Shown, SourceKind, Status, Tone, View},
+    theme::space,
+    widgets::{card_ui, dim_ui, note_ui, placeholder_ui, scrolled_ui, section_heading_ui},
 };
 
 /// The Sensor view.
@@ -70,10 +70,6 @@ impl SensorView {
 }
 
 impl View for SensorView {
-    fn name(&self) -> &'static str {
-        "Sensor"
-    }
-
     fn take_events(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {
         while let Some(analysed) = self.job.next_event() {
             match analysed {
@@ -88,8 +84,8 @@ impl View for SensorView {
         }
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        figures::exports(self, shared)
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        figures::shown(self, shared)
     }
 
     /// Shows the array and the scene of the Train view.
@@ -118,50 +114,45 @@ impl View for SensorView {
         }
     }
 
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         let whole = ui.available_rect_before_wrap();
         if shared.source == SourceKind::Recording {
-            return card_ui(ui, whole, |ui| placeholder_ui(ui, RECORDED));
+            card_ui(ui, whole, |ui| placeholder_ui(ui, RECORDED));
+            return Some(Status::new(Tone::Calm, "No simulated array".to_owned()));
         }
         if let Some(simulation) = shared.draft.simulation() {
             self.follow(simulation);
         }
-        match (&self.problem, &self.analysis) {
-            (Some(problem), _) => card_ui(ui, whole, |ui| {
-                note_ui(ui, problem);
-            }),
+        let status = match (&self.problem, &self.analysis) {
+            (Some(problem), _) => {
+                card_ui(ui, whole, |ui| {
+                    note_ui(ui, problem);
+                });
+                let text = "This sensor or scene is not possible: the note says why";
+                Status::new(Tone::Bad, text.to_owned())
+            }
             (None, Some(analysis)) => {
                 (self.axis, self.node) = figures::analysis_ui(ui, self, analysis, shared.look, effects);
-            }
-            (None, None) => card_ui(ui, whole, |ui| {
-                placeholder_ui(ui, "The singular values are being computed.");
-            }),
-        }
-    }
-
-    fn status_ui(&self, ui: &mut Ui, shared: &Shared) {
-        let palette = Theme::of(ui).palette;
-        let (colour, text) = match (&self.problem, &self.analysis) {
-            _ if shared.source == SourceKind::Recording => (palette.dim, "No array".to_owned()),
-            _ if self.job.is_under_way() => (palette.accent, "Computing".to_owned()),
-            (Some(_), _) => (
-                palette.bad,
-                "This sensor or scene is not possible: the note says why".to_owned(),
-            ),
-            (None, Some(analysis)) => match analysis.warnings.len() {
-                0 => (palette.good, "No warnings: nothing prevents decoupling".to_owned()),
-                count => (palette.warning, counted(count, "warning")),
-            },
-            (None, None) => (palette.dim, "Nothing computed yet".to_owned()),
-        };
-        ui.horizontal_centered(|ui| {
-            state_ui(ui, colour, &text);
-            if let Some(analysis) = &self.analysis {
+                let (tone, text) = match analysis.warnings.len() {
+                    0 => (Tone::Good, "No warnings: nothing prevents decoupling".to_owned()),
+                    warnings => (Tone::Warning, counted(warnings, "warning")),
+                };
                 let rows = counted(analysis.rows.len(), "row");
-                let text = format!("{}, {rows} read", analysis.sensor.scale);
-                ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
+                Status::new(tone, text).with_note(format!("{}, {rows} read", analysis.sensor.scale))
             }
-        });
+            (None, None) => {
+                card_ui(ui, whole, |ui| {
+                    placeholder_ui(ui, "The singular values are being computed.")
+                });
+                Status::new(Tone::Calm, "Nothing computed yet".to_owned())
+            }
+        };
+        let is_computing = self.job.is_under_way();
+        Some(if is_computing {
+            Status::new(Tone::Busy, "Computing".to_owned())
+        } else {
+            status
+        })
     }
 }
 

@@ -24,7 +24,7 @@ use decoupler_files::{
 use super::TradeOffForm;
 use crate::window::{
     job::{Background, Report, Wake},
-    shared::{DecoderSource, Effect, FileTask, Matter, NetworkSource, Shared, View as _},
+    shared::{Effect, Exporting, Matter, NetworkSource, Shared, ViewKind},
 };
 
 /// The Trade-off view.
@@ -47,7 +47,7 @@ pub(super) enum PointWish {
     /// Load its configuration into the Train view.
     Load(usize),
     /// Write its decoder to a file.
-    Export(Box<FileTask>),
+    Export(Box<Exporting>),
 }
 
 /// State of the display of a measurement.
@@ -125,14 +125,14 @@ impl TradeOffOutcome {
     }
 
     /// Returns the samples and the network from which the decoder of a point can be exported.
-    pub(super) fn source_of(&self, level: usize, point: usize) -> Option<DecoderSource> {
+    pub(super) fn source_of(&self, level: usize, point: usize) -> Option<NetworkSource> {
         let setup = self.setup_of(level, point)?;
         Some(match self.networks.get(&(level, point)) {
             Some(file) => {
                 let name = point_name(self.levels.get(level)?.points.get(point)?);
-                DecoderSource::Run(NetworkSource::Kept(name, Arc::clone(file)))
+                NetworkSource::Kept(name, Arc::clone(file))
             }
-            None => DecoderSource::Samples(Box::new(setup), self.recorded.clone()),
+            None => NetworkSource::Samples(Box::new(setup), self.recorded.clone()),
         })
     }
 }
@@ -151,7 +151,7 @@ impl TradeOffView {
 
     /// Returns true if no other computation of this program is running, which would distort the times.
     pub(super) fn is_quiet(&self, shared: &Shared) -> bool {
-        !shared.phase.is_busy() && shared.working.iter().all(|&name| name == self.name())
+        !shared.phase.is_busy() && shared.working.iter().all(|&view| view == ViewKind::TradeOff)
     }
 
     /// Returns true if the form can be measured now.

@@ -13,7 +13,7 @@ use decoupler_files::{
     export::{format_duration, trade_off_points, trade_off_summary},
     figure::{Figure, trade_off_figure},
 };
-use eframe::egui::{Align, ComboBox, Key, Layout, Modifiers, RichText, Sense, TextEdit, Ui, vec2};
+use eframe::egui::{Align, ComboBox, Key, Layout, RichText, Sense, TextEdit, Ui, vec2};
 
 use super::{
     PointWish, Thoroughness, TradeOffEnding, TradeOffForm, TradeOffLook, TradeOffOutcome, TradeOffView, WhichPresets,
@@ -23,21 +23,17 @@ use super::{
 };
 use crate::window::{
     shared::{
-        Effect, Export, FileWords, Matter, Notice, Offers, Shared, SourceKind, Unfinished, View, copy_exports,
-        csv_export, picture_exports, sentence,
+        Command, Effect, Holdings, Matter, Notice, Offers, Shared, Shown, SourceKind, Status, Tone, Unfinished, View,
+        sentence,
     },
-    theme::{Theme, semibold, space, type_size},
+    theme::{semibold, space, type_size},
     widgets::{
         card_ui, dim_ui, fields::count_ui, ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button,
-        progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui, state_ui, with_shortcut,
+        progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui, with_shortcut,
     },
 };
 
 impl View for TradeOffView {
-    fn name(&self) -> &'static str {
-        "Trade-off"
-    }
-
     fn take_events(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
         while let Some(event) = self.job.next_event() {
             match event {
@@ -64,59 +60,46 @@ impl View for TradeOffView {
         }
     }
 
-    fn is_working(&self) -> bool {
-        self.running.is_some()
-    }
-
-    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
+    fn holdings(&self, _shared: &Shared) -> Holdings {
         let unfinished = self.outcome.iter().filter_map(|outcome| {
             let (done, all) = outcome.points();
             let progress = format!("{done} of {} measured", counted(all, "point"));
             let is_unsaved =
                 outcome.ending == Some(TradeOffEnding::Complete) && !outcome.is_saved.load(Ordering::Relaxed);
             if self.running.is_some() {
-                Some(Unfinished::discarded("Measurement", progress))
+                Some(Unfinished::new("Measurement", progress))
             } else {
                 let progress = format!("{progress}, not exported as a table");
-                is_unsaved.then(|| Unfinished::discarded("Measurement", progress))
+                is_unsaved.then(|| Unfinished::new("Measurement", progress))
             }
         });
-        unfinished.collect()
+        Holdings {
+            is_computing: self.running.is_some(),
+            unfinished: unfinished.collect(),
+            files: Vec::new(),
+        }
     }
 
-    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
-        if offers.offer_keys(
-            "Measure trade-off",
-            Modifiers::COMMAND,
-            Key::Enter,
-            self.can_measure(shared),
-        ) {
+    fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+        if offers.offer(Command::Begin("Measure trade-off"), self.can_measure(shared)) {
             self.measure(shared, effects);
         }
-        if offers.offer_keys(
-            "Cancel measuring",
-            Modifiers::COMMAND,
-            Key::Period,
-            self.running.is_some(),
-        ) {
+        if offers.offer(Command::Cancel("Cancel measuring"), self.running.is_some()) {
             self.cancel();
         }
     }
 
-    fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
-        trade_off_exports(self)
+    fn shown<'a>(&'a self, _shared: &'a Shared) -> Vec<Shown<'a>> {
+        shown(self)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         form_ui(ui, self, shared, effects);
     }
 
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         trade_ui(ui, self, shared, effects);
-    }
-
-    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
-        status_ui(ui, self);
+        Some(status(self))
     }
 }
 
@@ -160,7 +143,7 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
             return;
         }
         let figure = trade_off_figure(level, &look.limits);
-        asked = charts_ui(ui, level, &figure, &mut look.marked, can_load, source);
+        asked = charts_ui(ui, level, &figure, &mut look.marked, can_load);
     });
     let choices_width = (0.4 * lower.width()).clamp(space(76), space(105));
     let (left, right) = lower.split_left_right_at_x(lower.right() - choices_width);
@@ -185,7 +168,7 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
                 effects.extend([Effect::TakeSetup(Box::new(setup)), Effect::ShowTraining]);
             }
         }
-        Some(PointWish::Export(task)) => effects.push(Effect::ChooseFile(*task)),
+        Some(PointWish::Export(exporting)) => effects.push(Effect::Export(exporting)),
         None => {}
     }
     trade.look = look;
@@ -249,12 +232,11 @@ fn has_noise(outcome: &TradeOffOutcome) -> bool {
 }
 
 /// Shows the state of the measurement in the line at the bottom.
-fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
-    let palette = Theme::of(ui).palette;
-    let (colour, text) = match (&trade.running, &trade.outcome) {
+fn status(trade: &TradeOffView) -> Status {
+    let (tone, text) = match (&trade.running, &trade.outcome) {
         (Some(_), Some(outcome)) => {
             let (done, all) = outcome.points();
-            (palette.accent, format!("Measuring: {done} of {all} points"))
+            (Tone::Busy, format!("Measuring: {done} of {all} points"))
         }
         (_, Some(outcome)) => {
             let (done, all) = outcome.points();
@@ -262,31 +244,28 @@ fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
                 .took
                 .map_or_else(String::new, |took| format!(" in {}", format_duration(took)));
             match outcome.ending {
-                Some(TradeOffEnding::Complete) => (palette.good, format!("Measured {all} points{took}")),
-                _ => (palette.warning, format!("Ended early: {done} of {all} points{took}")),
+                Some(TradeOffEnding::Complete) => (Tone::Good, format!("Measured {all} points{took}")),
+                _ => (Tone::Warning, format!("Ended early: {done} of {all} points{took}")),
             }
         }
-        (_, None) => (palette.dim, "Ready: press Measure".to_owned()),
+        (_, None) => (Tone::Calm, "Ready: press Measure".to_owned()),
     };
-    ui.horizontal_centered(|ui| {
-        state_ui(ui, colour, &text);
-        if let Some(outcome) = &trade.outcome {
+    let status = Status::new(tone, text);
+    match &trade.outcome {
+        Some(outcome) => {
             let unit = outcome.decoded.as_deref().filter(|_| !has_noise(outcome));
             let unit = unit.map_or_else(String::new, |unit| format!(", times of {unit}"));
-            let text = format!("{}, one thread, median of many{unit}", outcome.plan.source_name());
-            ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
+            status.with_note(format!(
+                "{}, one thread, median of many{unit}",
+                outcome.plan.source_name()
+            ))
         }
-    });
+        None => status,
+    }
 }
 
-const POINTS: FileWords = FileWords {
-    kind: "points",
-    description: "Every point, of an array at every noise level, with every digit, as CSV.",
-    extensions: &["csv"],
-};
-
-/// Returns the exports: charts and table at the displayed noise level, and every point.
-pub(super) fn trade_off_exports(view: &TradeOffView) -> Vec<Export<'_>> {
+/// Returns what the view shows: charts and table at the displayed noise level, and every point.
+pub(super) fn shown(view: &TradeOffView) -> Vec<Shown<'_>> {
     let stem = || "trade_off".to_owned();
     let outcome = view.outcome.as_ref().filter(|outcome| outcome.points().0 > 0);
     let outcome = outcome.ok_or_else(|| "No point is measured yet: press Measure first.".to_owned());
@@ -300,19 +279,16 @@ pub(super) fn trade_off_exports(view: &TradeOffView) -> Vec<Export<'_>> {
     let charts = level
         .clone()
         .map(|level| move || Figure::from(trade_off_figure(level, &view.look.limits)));
-    let mut exports: Vec<Export<'_>> = picture_exports("Charts", stem(), charts).collect();
     let points = outcome.clone().map(|outcome| || trade_off_points(&outcome.levels));
-    exports.push(csv_export("All points", POINTS, stem(), points));
-    exports.extend(copy_exports(
-        "Trade-off table",
-        level.map(|level| move || trade_off_summary(level)),
-    ));
+    let table = level.map(|level| move || trade_off_summary(level));
+    let shown = [
+        Shown::figure("Charts", stem(), charts),
+        Shown::table("All points", stem(), points),
+        Shown::table("Trade-off table", stem(), table),
+    ];
     match outcome {
-        Ok(outcome) => exports
-            .into_iter()
-            .map(|export| export.noting(&outcome.is_saved))
-            .collect(),
-        Err(_) => exports,
+        Ok(outcome) => shown.map(|shown| shown.noting(&outcome.is_saved)).into(),
+        Err(_) => shown.into(),
     }
 }
 
