@@ -5,10 +5,9 @@
 //! `shared/effect.rs` and its implementation in `window/applying.rs`.
 
 mod compare;
-mod experiments;
 mod identifiability;
 mod live;
-mod trade_off;
+mod study;
 mod train;
 
 use std::{path::PathBuf, sync::Arc};
@@ -17,13 +16,12 @@ use super::{job::Wake, shared::View};
 use decoupler_files::import::Plan;
 
 pub use identifiability::{Analysis, Question};
-pub use trade_off::{PlannedLevel, PlannedRun, TradeOffEnding, TradeOffPlan};
+pub use study::{PlannedRun, SpeedPlan};
 pub(super) use train::CHECKPOINT;
 pub use train::{BottomTab, DecoderResult, Touch};
 
 use self::{
-    compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, live::LiveView,
-    trade_off::TradeOffView, train::TrainView,
+    compare::CompareView, identifiability::IdentifiabilityView, live::LiveView, study::StudyView, train::TrainView,
 };
 
 /// All views.
@@ -31,14 +29,12 @@ use self::{
 pub struct Views {
     /// One training and the sensor that it decodes.
     pub train: TrainView,
-    /// The paper's tables and sweeps.
-    pub experiments: ExperimentsView,
+    /// Many trainings or measurements at once.
+    pub study: StudyView,
     /// Two finished trainings side by side.
     pub compare: CompareView,
     /// What the readings determine.
     pub identifiability: IdentifiabilityView,
-    /// Speed and accuracy of each decoder.
-    pub trade_off: TradeOffView,
     /// Frames decoded as they arrive.
     pub live: LiveView,
 }
@@ -48,10 +44,9 @@ impl Views {
     pub fn new(wake: &Wake) -> Self {
         Self {
             train: TrainView::new(Arc::clone(wake)),
-            experiments: ExperimentsView::new(Arc::clone(wake)),
+            study: StudyView::new(Arc::clone(wake)),
             compare: CompareView::new(Arc::clone(wake)),
             identifiability: IdentifiabilityView::new(Arc::clone(wake)),
-            trade_off: TradeOffView::new(Arc::clone(wake)),
             live: LiveView::new(Arc::clone(wake)),
         }
     }
@@ -72,13 +67,12 @@ impl Views {
     }
 
     /// Returns the views in the order of the top bar; the first is the Train view.
-    pub fn all(&mut self) -> [&mut dyn View; 6] {
+    pub fn all(&mut self) -> [&mut dyn View; 5] {
         [
             &mut self.train,
-            &mut self.experiments,
+            &mut self.study,
             &mut self.compare,
             &mut self.identifiability,
-            &mut self.trade_off,
             &mut self.live,
         ]
     }

@@ -1,9 +1,7 @@
-//! The Identifiability view: what the readings determine. For a simulated array it is computed from the model as the
-//! geometry changes; for a recording, `recording` measures it by cross-validation on request.
+//! The Sensor view: what the readings of a simulated array determine, computed from its model as the geometry changes.
 
 mod analysis;
 mod array_view;
-mod recording;
 mod state;
 mod view;
 

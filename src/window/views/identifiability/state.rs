@@ -13,7 +13,7 @@ use decoupler_core::{
     sensor::{Axes, SensorModel},
 };
 
-use super::{Analysis, Question, recording::RecordingStudy};
+use super::{Analysis, Question};
 use crate::window::job::{Background, Wake};
 
 /// The Identifiability view.
@@ -34,8 +34,6 @@ pub struct IdentifiabilityView {
     /// The node under the pointer, marked on both pictures.
     pub(super) node: Option<usize>,
     pub(super) worker: IdentifiabilityWorker,
-    /// Analysis of a recording.
-    pub(super) study: RecordingStudy,
 }
 
 impl IdentifiabilityView {
@@ -49,7 +47,6 @@ impl IdentifiabilityView {
             axis: 2,
             followed: None,
             node: None,
-            study: RecordingStudy::new(Arc::clone(&wake)),
             worker: IdentifiabilityWorker::new(wake),
         }
     }

@@ -10,11 +10,10 @@ use eframe::egui::{Button, Slider, SliderClamping, Ui, WidgetInfo, emath::Numeri
 use super::{
     IdentifiabilityView, Question,
     array_view::{analysis_exports, identifiability_ui, status_ui},
-    recording,
 };
 use crate::window::{
     glossary,
-    shared::{Effect, Export, Offers, Shared, SourceKind, Unfinished, View},
+    shared::{Effect, Export, Shared, View},
     theme::space,
     widgets::{
         dim_ui,
@@ -25,7 +24,7 @@ use crate::window::{
 
 impl View for IdentifiabilityView {
     fn name(&self) -> &'static str {
-        "Identifiability"
+        "Sensor"
     }
 
     /// Shows the sensor and scene of the Train view, with what was last tried on them.
@@ -39,8 +38,7 @@ impl View for IdentifiabilityView {
         }
     }
 
-    fn take_events(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
-        self.study.take_events(effects);
+    fn take_events(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {
         while let Some(answer) = self.worker.next_answer() {
             if answer.is_newest {
                 self.is_pending = false;
@@ -55,46 +53,20 @@ impl View for IdentifiabilityView {
         }
     }
 
-    fn is_working(&self) -> bool {
-        self.study.is_under_way()
-    }
-
-    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
-        self.study.unfinished().into_iter().collect()
-    }
-
-    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, _effects: &mut Vec<Effect>) {
-        if shared.source == SourceKind::Recording {
-            recording::offer_actions(&mut self.study, offers, shared);
-        }
-    }
-
     fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        match shared.source {
-            SourceKind::Array => analysis_exports(self, shared),
-            SourceKind::Recording => recording::study_exports(&self.study),
-        }
+        analysis_exports(self, shared)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        match shared.source {
-            SourceKind::Array => array_form_ui(ui, self, shared, effects),
-            SourceKind::Recording => recording::form_ui(ui, &mut self.study, shared),
-        }
+        array_form_ui(ui, self, shared, effects);
     }
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        match shared.source {
-            SourceKind::Array => identifiability_ui(ui, self, shared, effects),
-            SourceKind::Recording => recording::body_ui(ui, &mut self.study, shared),
-        }
+        identifiability_ui(ui, self, shared, effects);
     }
 
-    fn status_ui(&self, ui: &mut Ui, shared: &Shared) {
-        match shared.source {
-            SourceKind::Array => status_ui(ui, self),
-            SourceKind::Recording => recording::status_ui(ui, &self.study, shared),
-        }
+    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
+        status_ui(ui, self);
     }
 }
 

@@ -1,0 +1,440 @@
+//! The paper's tables, and sweeps over any two settings: many trials, one thread per core.
+
+use std::{path::Path, sync::Arc};
+
+use decoupler_core::{
+    dataset::SplitBy,
+    evaluation::{
+        MAX_STARTS,
+        experiments::{
+            AxisKind, Cell, Experiment, ExperimentResults, Finished, PaperTable, Trial, TrialSamples, run_experiments,
+            worker_threads,
+        },
+    },
+    job::Job,
+    problem::Problem,
+    text::counted,
+    training::{EpochRecord, StoppingRules},
+};
+use decoupler_files::{
+    export::{
+        ExperimentColumnKind, ExperimentTable, describe_conditions, describe_failures, describe_worse_than_mean,
+        write_experiment_markdown,
+    },
+    figure::experiment_figure,
+    import::{Plan, Setup},
+};
+use eframe::egui::{Button, ComboBox, Ui};
+
+use super::{Note, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, topic::read, value_list::label};
+use crate::window::{
+    shared::Effect,
+    theme::space,
+    widgets::{
+        dim_ui,
+        fields::{count_ui, seed_ui},
+        section_heading_ui, segmented_ui,
+    },
+};
+
+/// Maximum number of seeds, repeats or folds.
+const MAX_TRIALS: usize = 1000;
+/// Maximum number of cells that are displayed.
+const MAX_CELLS: usize = 400;
+/// Memory limit for the finished trainings of one experiment. Trainings beyond it are not kept, but repeated when they
+/// are opened.
+const MAX_KEPT_BYTES: usize = 400_000_000;
+
+/// Form of an experiment.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExperimentForm {
+    /// The experiment without its axes, which are typed.
+    pub template: Experiment,
+    /// Plan by which a recording is read; `None` for a simulated array.
+    pub plan: Option<Arc<Plan>>,
+    /// The axis of a table, or both of a sweep.
+    pub axes: Vec<ValueList>,
+}
+
+impl ExperimentForm {
+    /// Returns the form of a table, with the paper's own values.
+    pub fn table(table: PaperTable) -> Self {
+        let template = table.experiment();
+        Self {
+            axes: vec![ValueList::of(&template.axis)],
+            template,
+            plan: None,
+        }
+    }
+
+    /// Returns the form of a small sweep.
+    pub fn sweep() -> Self {
+        let mut form = Self::table(PaperTable::HiddenNodes);
+        form.template.base.training.stopping.epochs = 60;
+        form.template.base.starts = 1;
+        form.template.seeds = 1;
+        form.axes = [AxisKind::Hidden, AxisKind::Samples].map(ValueList::new).into();
+        form
+    }
+
+    /// Uses `setup` as the base of a sweep. An axis that its source does not have is replaced by another.
+    pub fn take(&mut self, setup: &Setup) {
+        self.template.base = *setup.settings();
+        self.template.recording = setup.experiment_recording();
+        self.plan = setup.plan().cloned().map(Arc::new);
+        let offered = Vec::from_iter(AxisKind::of_runs(&self.template.base));
+        for place in 0..self.axes.len() {
+            let is_free = |kind: &&AxisKind| self.axes.iter().all(|axis| axis.kind != **kind);
+            if !offered.contains(&self.axes[place].kind)
+                && let Some(&kind) = offered.iter().find(is_free)
+            {
+                self.axes[place] = ValueList::new(kind);
+            }
+        }
+    }
+
+    /// Returns the experiment, checked as far as possible without running it.
+    ///
+    /// # Errors
+    /// If the form is not a valid experiment.
+    pub fn experiment(&self) -> Result<Experiment, String> {
+        let axes = self.axes.iter().map(ValueList::parse).collect::<Result<Vec<_>, _>>()?;
+        let lengths = axes.iter().map(|axis| axis.values.len());
+        let cells = lengths.fold(1, usize::saturating_mul);
+        if cells > MAX_CELLS {
+            let advice = format!("give fewer values, at most {MAX_CELLS} cells");
+            return Err(format!("{cells} cells are too many to display: {advice}"));
+        }
+        let mut experiment = self.template.clone();
+        let mut axes = axes.into_iter();
+        if let Some(first) = axes.next() {
+            experiment.axis = first;
+        }
+        experiment.second_axis = axes.next();
+        experiment.check().map_err(|error| error.to_string())?;
+        Ok(experiment)
+    }
+
+    /// Returns the task of the form.
+    ///
+    /// # Errors
+    /// If the form is not a valid experiment.
+    pub fn task(&self) -> Result<Task, String> {
+        let experiment = self.experiment()?;
+        let setup = Setup::of(experiment.base, self.plan.as_deref().cloned());
+        let setup = setup.expect("an experiment with other samples is refused");
+        Ok(Task::Experiment(Box::new(experiment), setup))
+    }
+
+    /// Shows the fields. `train` is the setup of the Train view, which a sweep can be based on.
+    pub fn fields_ui(&mut self, ui: &mut Ui, train: &Result<Setup, String>) {
+        let is_sweep = self.axes.len() > 1;
+        section_heading_ui(ui, "Values");
+        if is_sweep {
+            let offered = Vec::from_iter(AxisKind::of_runs(&self.template.base));
+            let names = [("Across", "Values across"), ("Down", "Values down")];
+            for (axis, (name, values)) in self.axes.iter_mut().zip(names) {
+                axis_ui(ui, name, axis, &offered);
+                axis.ui(ui, Some(values), "Values separated by commas");
+                ui.add_space(space(1));
+            }
+        } else {
+            for axis in &mut self.axes {
+                axis.ui(ui, None, "Values separated by commas");
+            }
+        }
+        self.cross_validation_ui(ui);
+        section_heading_ui(ui, "Training");
+        if is_sweep {
+            self.base_ui(ui, train);
+        }
+        let template = &mut self.template;
+        let hint = "Number of consecutive seeds for each cell, which show the spread of the results.";
+        count_ui(ui, "Seeds", hint, &mut template.seeds, 1..=MAX_TRIALS);
+        let hint = "First of the consecutive seeds. The same seeds give the same results.";
+        seed_ui(ui, "First seed", hint, &mut template.base.seed.0, 0);
+        let hint = "Largest number of epochs per training. The paper does not state its own.";
+        let epochs = &mut template.base.training.stopping.epochs;
+        count_ui(ui, "Epochs", hint, epochs, 1..=StoppingRules::MAX_EPOCHS);
+        let hint =
+            "Number of trainings from different random weights; the one with the lowest validation error is kept.";
+        count_ui(ui, "Restarts", hint, &mut template.base.starts, 1..=MAX_STARTS);
+    }
+
+    fn cross_validation_ui(&mut self, ui: &mut Ui) {
+        let Some(validation) = &mut self.template.cross_validation else {
+            return;
+        };
+        section_heading_ui(ui, "Cross-validation");
+        let hint = "Number of folds, k, into which the samples are split.";
+        count_ui(ui, "Folds", hint, &mut validation.folds, 2..=MAX_TRIALS);
+        let hint = "Number of shuffles into new folds, for each seed.";
+        count_ui(ui, "Repeats", hint, &mut validation.repeats, 1..=MAX_TRIALS);
+        let units = [(SplitBy::Random, "By sample"), (SplitBy::Group, "By snapshot")];
+        if let Some(unit) = segmented_ui(ui, "Unit of the folds", &units, validation.by, true) {
+            validation.by = unit;
+        }
+        let meaning = match validation.by {
+            SplitBy::Random => "As in the paper: rows of one snapshot may be in both the training and the test folds.",
+            _ => "Whole snapshots: no training sample is from the same moment as a test sample.",
+        };
+        dim_ui(ui, meaning);
+    }
+
+    /// Shows the settings common to all cells, and a button that takes them from the Train view.
+    fn base_ui(&mut self, ui: &mut Ui, train: &Result<Setup, String>) {
+        let base = &self.template.base;
+        let recording = self.template.recording.as_ref();
+        let mut parts = Vec::from_iter(recording.map(|recording| recording.name.clone()));
+        if let Some(array) = base.simulation() {
+            parts.extend([array.sensor.scale.to_string(), counted(array.samples, "sample")]);
+        }
+        parts.extend([counted(base.hidden, "hidden node"), base.training.method.name().to_owned()]);
+        dim_ui(ui, &format!("{}, unless an axis varies it", parts.join(", ")));
+        let is_base = |setup: &Setup| (setup.settings(), setup.plan()) == (base, self.plan.as_deref());
+        let (can_take, why_not) = match train {
+            Ok(setup) => (!is_base(setup), "These are the settings of the Train view"),
+            Err(missing) => (false, missing.as_str()),
+        };
+        let button = ui.add_enabled(can_take, Button::new("Use the settings of the Train view"));
+        let hint = "Copies the source of the samples, the network and the training settings from the Train view. The \
+                    source determines the available axes.";
+        let button = button.on_hover_text(hint).on_disabled_hover_text(why_not);
+        if let (true, Ok(setup)) = (button.clicked(), train) {
+            self.take(setup);
+        }
+    }
+}
+
+/// Shows the choice of the setting of an axis.
+fn axis_ui(ui: &mut Ui, name: &str, axis: &mut ValueList, offered: &[AxisKind]) {
+    let name_label = ui.label(name);
+    let combo = ComboBox::from_id_salt(name)
+        .selected_text(label(axis.kind))
+        .width(ui.available_width());
+    let shown = combo.show_ui(ui, |ui| {
+        for &kind in offered {
+            if ui.selectable_label(kind == axis.kind, label(kind)).clicked() && kind != axis.kind {
+                *axis = ValueList::new(kind);
+            }
+        }
+    });
+    shown.response.labelled_by(name_label.id);
+}
+
+/// Describes the number of trainings.
+pub fn describe_size(experiment: &Experiment) -> String {
+    let cells = experiment.cells();
+    let trials: usize = cells.iter().map(|cell| cell.expected).sum();
+    let folds = experiment.cross_validation.map_or(1, |validation| validation.folds);
+    let networks = trials.saturating_mul(folds).saturating_mul(experiment.base.starts);
+    let epochs = counted(experiment.base.training.stopping.epochs, "epoch");
+    format!("{} of at most {epochs}", counted(networks, "training"))
+}
+
+/// Runs every trial on the samples of `setup`, and reports each as it finishes.
+///
+/// # Errors
+/// If the samples cannot be read, or the experiment cannot be run.
+pub fn run(experiment: Experiment, setup: &Setup, reporter: &Reporter) -> Result<(), String> {
+    let is_cancelled = || reporter.is_cancelled();
+    // The paths of the window's plans are absolute.
+    let samples = setup.trial_samples(Path::new(""), &Job::new(&is_cancelled), &mut |progress| {
+        read(reporter, progress);
+    });
+    let samples = samples.map_err(|error| error.to_string())?;
+    if let TrialSamples::Recorded { problem, .. } = &samples {
+        reporter.send(StudyEvent::Problem(Arc::clone(problem)));
+    }
+    let on_finished = |finished| reporter.send(StudyEvent::Trial(Box::new(finished)));
+    let run = run_experiments(&[experiment], &samples, worker_threads(), is_cancelled, on_finished);
+    run.map_err(|error| error.to_string())
+}
+
+/// Results of an experiment so far.
+#[derive(Debug)]
+pub struct ExperimentOutcome {
+    /// Results of all trials.
+    pub results: ExperimentResults,
+    plan: Option<Plan>,
+    kept_bytes: usize,
+}
+
+impl ExperimentOutcome {
+    /// Creates empty results.
+    pub fn new(experiment: &Experiment, setup: &Setup) -> Self {
+        Self {
+            results: ExperimentResults::new(experiment.clone()),
+            plan: setup.plan().cloned(),
+            kept_bytes: 0,
+        }
+    }
+
+    /// Adds a trial that has finished or failed.
+    pub fn record(&mut self, finished: Finished) {
+        let hidden = self.results.cells[finished.cell].settings.hidden;
+        let outcome = finished.outcome.map(|mut trial| {
+            let bytes = bytes_of(&trial, hidden, self.results.problem.as_deref());
+            if self.kept_bytes + bytes > MAX_KEPT_BYTES {
+                trial.states = Vec::new();
+            } else {
+                self.kept_bytes += bytes;
+            }
+            trial
+        });
+        self.results.record(finished.cell, outcome);
+    }
+
+    /// Returns the numbers of finished and planned trials.
+    pub fn trials(&self) -> (usize, usize) {
+        let cells = self.results.cells.iter();
+        cells.fold((0, 0), |(done, all), cell| {
+            (done + cell.trials.len() + cell.failures.len(), all + cell.expected)
+        })
+    }
+
+    /// Returns the report of the results so far.
+    pub fn report(&self, headline: String) -> Report {
+        let results = &self.results;
+        let shown = ExperimentTable::new(results);
+        let tone = |kind: &ExperimentColumnKind, loses: bool| match kind {
+            ExperimentColumnKind::Axis => Tone::Strong,
+            ExperimentColumnKind::Ranking => Tone::Own,
+            ExperimentColumnKind::Published => Tone::Dim,
+            ExperimentColumnKind::Linear if loses => Tone::Beating,
+            _ => Tone::Usual,
+        };
+        let row = |(item, cell): (usize, &Cell)| {
+            let both = cell.percent().median.zip(cell.linear_percent());
+            let loses = both.is_some_and(|(network, linear)| network > linear);
+            Row {
+                tones: shown.kinds.iter().map(|kind| tone(kind, loses)).collect(),
+                ..Row::new(item, results.cell_labels(cell).join(", "))
+            }
+        };
+        let failures = describe_failures(results).into_iter().map(Note::Failure);
+        let remarks = describe_worse_than_mean(results).into_iter().map(Note::Remark);
+        let mut notes = Vec::from_iter(failures.chain(remarks));
+        if !notes.is_empty() {
+            notes.insert(0, Note::Heading("Remarks"));
+        }
+        let page = Page {
+            what: "Cell",
+            rows: results.cells.iter().enumerate().map(row).collect(),
+            table: shown.table(),
+            figure: Some(experiment_figure(results)),
+            notes,
+            ..Page::default()
+        };
+        Report {
+            headline,
+            conditions: format!("{}. {}", describe_conditions(&results.experiment), shown.note),
+            pages: vec![page],
+        }
+    }
+
+    /// Returns the table with the settings behind it, as Markdown.
+    pub fn markdown(&self, headline: &str) -> Vec<u8> {
+        let mut text = Vec::new();
+        let conditions = describe_conditions(&self.results.experiment);
+        // Writing to memory cannot fail.
+        let _ = write_experiment_markdown(headline, &conditions, &self.results, &mut text);
+        text
+    }
+
+    /// Opens a cell in the Train view: its settings with the seed of its median trial, and the network of that trial. A
+    /// network that was not kept, as in a cross-validation, is trained there.
+    pub fn open(&self, cell: usize) -> Vec<Effect> {
+        let Some(cell) = self.results.cells.get(cell) else {
+            return Vec::new();
+        };
+        let mut settings = cell.settings;
+        let median = cell.median_trial();
+        if let Some(trial) = median {
+            settings.seed = trial.seed;
+        }
+        let plan = self.plan.clone().zip(cell.division);
+        let plan = plan.map(|(plan, division)| Plan { division, ..plan });
+        let Some(setup) = Setup::of(settings, plan).map(Box::new) else {
+            return Vec::new();
+        };
+        match median {
+            Some(trial) if !trial.states.is_empty() => vec![Effect::TakeUp(setup, trial.states.clone())],
+            Some(_) => vec![Effect::TakeSetup(setup), Effect::Train],
+            None => vec![Effect::TakeSetup(setup)],
+        }
+    }
+}
+
+/// Returns the approximate size of the finished training of a trial in memory.
+fn bytes_of(trial: &Trial, hidden: usize, problem: Option<&Problem>) -> usize {
+    let weights = problem.map_or(0, |problem| {
+        hidden * (problem.feature_count() + 1) + (hidden + 1) * problem.targets.len()
+    });
+    // Current weights, best weights, and about as many numbers again for the state of the method.
+    let of_start = 4 * weights * size_of::<f64>();
+    trial.states.len() * of_start + trial.effort.epochs * size_of::<EpochRecord>()
+}
+
+#[cfg(test)]
+mod tests {
+    use decoupler_core::{
+        evaluation::{RunSettings, experiments::Axis},
+        scene::RowModel,
+        training::Method,
+    };
+
+    use super::*;
+
+    #[test]
+    fn the_default_forms_can_be_run() {
+        for table in [
+            PaperTable::HiddenNodes,
+            PaperTable::CrossValidation,
+            PaperTable::ArrayScales,
+        ] {
+            assert_eq!(ExperimentForm::table(table).experiment(), Ok(table.experiment()));
+        }
+        assert_eq!(ExperimentForm::sweep().experiment().unwrap().cells().len(), 12);
+    }
+
+    #[test]
+    fn axes_that_a_recording_lacks_are_replaced() {
+        let settings = RunSettings::measured(RowModel::Shared);
+        let setup = Setup::recording(settings, Plan::default());
+        let mut form = ExperimentForm::sweep();
+        form.take(&setup);
+        let kinds = Vec::from_iter(form.axes.iter().map(|axis| axis.kind));
+        assert_eq!(kinds, [AxisKind::Hidden, AxisKind::Scaling], "samples are of arrays");
+        let experiment = form.experiment().unwrap();
+        assert_eq!(experiment.base, settings);
+        // Bayesian regularisation has the settings that suit recordings, as in the Train view.
+        form.axes[1] = ValueList::of(&Axis::names(AxisKind::Method, ["lm", "br"]));
+        let cells = form.experiment().unwrap().cells();
+        let last = cells.last().unwrap().settings.training.method;
+        assert_eq!(last, Method::recorded_regularization());
+        form.axes[1] = ValueList::new(AxisKind::Split);
+        assert_eq!(form.experiment().unwrap().cells().len(), 8);
+        form.axes[1].values = "group".to_owned();
+        assert!(form.experiment().unwrap_err().contains("no column of groups"));
+        form.take(&RunSettings::default().into());
+        assert_eq!(form.axes[1].kind, AxisKind::Array);
+        assert_eq!(form.template.recording, None);
+    }
+
+    #[test]
+    fn invalid_forms_give_a_reason() {
+        let with = |values: &str| {
+            let mut form = ExperimentForm::sweep();
+            form.axes[0].values = values.to_owned();
+            form.experiment().unwrap_err()
+        };
+        assert!(with("").contains("no values for hidden nodes"));
+        assert!(with("0").contains("hidden nodes: 0 is not possible"));
+        let many = Vec::from_iter((1..=200).map(|hidden| hidden.to_string()));
+        assert!(with(&many.join(" ")).contains("600 cells"));
+        let mut form = ExperimentForm::sweep();
+        form.axes[1] = ValueList::new(AxisKind::Hidden);
+        assert!(form.experiment().unwrap_err().contains("both axes vary hidden nodes"));
+    }
+}

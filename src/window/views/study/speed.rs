@@ -1,0 +1,571 @@
+//! Speed against accuracy of every decoder, measured on this machine. While another view computes, the measurement waits,
+//! because the times would be distorted.
+
+use std::{
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+    time::Duration,
+};
+
+use decoupler_core::{
+    dataset::{LARGEST_SAMPLES, Seed, Simulation},
+    decoupling::{DecoderKind, Precision},
+    evaluation::{
+        Preset, Run, RunSettings, TradeOffPoint, Workload, decoded_unit, experiments::AxisKind, measure_trade_off,
+    },
+    job::Job,
+    scene::{Noise, Scene},
+    settings::Value,
+    text::counted,
+    training::{Method, StoppingRules},
+};
+use decoupler_files::{
+    export::{NetworkFile, format_percent, trade_off_summary},
+    figure::{
+        Ink, TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure,
+    },
+    import::{Plan, Recorded, Setup, SetupSets},
+    machine::memory_budget,
+};
+use eframe::egui::Ui;
+
+use super::{Note, Page, Point, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, topic::read};
+use crate::window::{
+    shared::{DecoderSource, NetworkSource, sentence},
+    widgets::{
+        dim_ui,
+        fields::{count_ui, quantity_ui},
+        section_heading_ui, segmented_ui,
+    },
+};
+
+/// Maximum number of points of a measurement.
+const MAX_POINTS: usize = 1000;
+
+/// Form of a measurement.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpeedForm {
+    noises: ValueList,
+    hidden: ValueList,
+    /// Training methods of the networks of a recording.
+    methods: ValueList,
+    /// Preset on which the settings of the networks of an array are based; `None` for both.
+    preset: Option<Preset>,
+    /// Decoders, in the order of [`DecoderKind::ALL`].
+    decoders: [bool; DecoderKind::ALL.len()],
+    /// True for trainings as in the presets or, for a recording, as in the Train view.
+    is_full: bool,
+    /// Maximum number of training samples of a quick look.
+    samples: usize,
+    /// Maximum number of epochs of a quick look.
+    epochs: usize,
+    /// Number of samples on which the errors are measured.
+    test_samples: usize,
+}
+
+impl Default for SpeedForm {
+    fn default() -> Self {
+        let list = |kind, values: &str| ValueList {
+            kind,
+            values: values.to_owned(),
+        };
+        Self {
+            noises: list(AxisKind::Noise, "0, 1e-4, 1e-3, 1e-2"),
+            hidden: list(AxisKind::Hidden, "6, 12"),
+            methods: list(AxisKind::Method, "br, lm"),
+            preset: None,
+            decoders: [true; DecoderKind::ALL.len()],
+            is_full: false,
+            samples: 2000,
+            epochs: 60,
+            test_samples: 100,
+        }
+    }
+}
+
+impl SpeedForm {
+    /// Returns the task on the source of `base`.
+    ///
+    /// # Errors
+    /// If the form is not a valid measurement.
+    pub fn task(&self, base: &Setup) -> Result<Task, String> {
+        let has_sensor = base.settings().simulation().is_some();
+        let chosen = DecoderKind::ALL.into_iter().zip(self.decoders);
+        let chosen = chosen.filter(|(kind, is_chosen)| *is_chosen && (has_sensor || !kind.needs_sensor()));
+        let decoders = Vec::from_iter(chosen.map(|(kind, _)| kind));
+        if decoders.is_empty() {
+            return Err("no decoder is chosen: choose at least one".to_owned());
+        }
+        let runs = match (base.settings().simulation(), base.plan()) {
+            (Some(array), _) => self.runs_of_array(array, base.settings().seed, &decoders)?,
+            (None, Some(plan)) => self.runs_of_recording(base.settings(), plan, &decoders)?,
+            (None, None) => Vec::new(),
+        };
+        let hidden = self.hidden.different()?.into_iter();
+        let hidden = hidden.filter_map(|value| match value {
+            Value::Integer(hidden) => usize::try_from(hidden).ok(),
+            _ => None,
+        });
+        let hidden = hidden.collect();
+        let plan = SpeedPlan { runs, hidden };
+        match plan.points() {
+            points if points > MAX_POINTS => Err(format!(
+                "{points} points are too many to display: give fewer values, at most {MAX_POINTS} points"
+            )),
+            _ => Ok(Task::Speed(plan)),
+        }
+    }
+
+    /// Returns a run for each noise and preset, with the sensor and the scene of `base`.
+    fn runs_of_array(
+        &self,
+        base: &Simulation,
+        seed: Seed,
+        decoders: &[DecoderKind],
+    ) -> Result<Vec<PlannedRun>, String> {
+        let presets = Preset::ALL.into_iter();
+        let presets = Vec::from_iter(presets.filter(|preset| self.preset.is_none_or(|only| only == *preset)));
+        let noises = self.noises.different()?.into_iter().enumerate();
+        let runs = noises.flat_map(|(level, noise)| {
+            let noise = match noise {
+                Value::Number(noise) => noise,
+                _ => 0.0,
+            };
+            presets.iter().map(move |&preset| PlannedRun {
+                level,
+                noise: Some(noise),
+                preset: Some(preset),
+                setup: self.settings(base, seed, preset, noise).into(),
+                decoders: decoders.to_vec(),
+            })
+        });
+        Ok(runs.collect())
+    }
+
+    /// Returns the settings of a preset at a noise level, with the sensor and the scene of `base`. The preset
+    /// determines the rows that are read and the inputs of the networks.
+    fn settings(&self, base: &Simulation, seed: Seed, preset: Preset, noise: f64) -> RunSettings {
+        let noise = Noise {
+            relative: noise,
+            ..base.scene.noise
+        };
+        let of_preset = preset.simulation_in(noise);
+        let mut source = Simulation {
+            sensor: base.sensor,
+            scene: Scene {
+                rows: of_preset.scene.rows,
+                noise,
+                ..base.scene
+            },
+            test_samples: self.test_samples,
+            ..of_preset
+        };
+        let mut settings = preset.settings_in(noise);
+        if !self.is_full {
+            source.samples = source.samples.min(self.samples);
+            source.validation_samples = source.validation_samples.min(source.samples.div_ceil(5));
+            self.shorten(&mut settings);
+        }
+        RunSettings {
+            source: source.into(),
+            seed,
+            ..settings
+        }
+    }
+
+    fn shorten(&self, settings: &mut RunSettings) {
+        let epochs = &mut settings.training.stopping.epochs;
+        *epochs = (*epochs).min(self.epochs);
+    }
+
+    /// Returns a run for each method, on the recording that `plan` reads. Decoders without a network do not depend on
+    /// the method, so the first run measures them.
+    fn runs_of_recording(
+        &self,
+        base: &RunSettings,
+        plan: &Plan,
+        decoders: &[DecoderKind],
+    ) -> Result<Vec<PlannedRun>, String> {
+        let mut methods = vec![base.training.method];
+        if decoders.iter().any(|kind| kind.needs_network()) {
+            let named = self.methods.different()?.into_iter();
+            let named = named.map(|value| Method::named(&value.to_string()).map_err(|error| error.to_string()));
+            methods = named.collect::<Result<_, _>>()?;
+        }
+        let run = |(place, method): (usize, &Method)| {
+            let mut settings = *base;
+            // The method of the Train view keeps its settings.
+            if method.short_name() != base.training.method.short_name() {
+                settings.choose_method(*method);
+            }
+            if !self.is_full {
+                self.shorten(&mut settings);
+            }
+            let mut plan = plan.clone();
+            // A share set by the user is kept.
+            if plan.division.validation_fraction == Some(base.validation_fraction()) {
+                plan.division.validation_fraction = Some(settings.validation_fraction());
+            }
+            let of_run = decoders.iter().filter(|kind| place == 0 || kind.needs_network());
+            PlannedRun {
+                level: 0,
+                noise: None,
+                preset: None,
+                setup: Setup::recording(settings, plan),
+                decoders: of_run.copied().collect(),
+            }
+        };
+        Ok(methods.iter().enumerate().map(run).collect())
+    }
+
+    /// Shows the fields; `is_array` for a simulated array.
+    pub fn fields_ui(&mut self, ui: &mut Ui, is_array: bool) {
+        if is_array {
+            let hint = "Noise of each reading (standard deviation), relative to the reading. Separate several levels \
+                        with commas.";
+            self.noises.ui(ui, None, hint);
+        }
+        let hint = "Numbers of hidden nodes of the networks, separated by commas.";
+        self.hidden.ui(ui, None, hint);
+        if is_array {
+            section_heading_ui(ui, "Presets");
+            let presets = [
+                (None, "Both"),
+                (Some(Preset::Paper), "Paper"),
+                (Some(Preset::Best), "Best"),
+            ];
+            self.preset = segmented_ui(ui, "Presets", &presets, self.preset, true).unwrap_or(self.preset);
+        } else {
+            let hint = "Training methods of the networks, separated by commas.";
+            self.methods.ui(ui, None, hint);
+        }
+        section_heading_ui(ui, "Decoders");
+        for (kind, is_chosen) in DecoderKind::ALL.into_iter().zip(&mut self.decoders) {
+            if is_array || !kind.needs_sensor() {
+                ui.checkbox(is_chosen, kind.name(Precision::Double))
+                    .on_hover_text(kind.meaning());
+            }
+        }
+        section_heading_ui(ui, "Training");
+        self.training_ui(ui, is_array);
+    }
+
+    fn training_ui(&mut self, ui: &mut Ui, is_array: bool) {
+        let (full, meaning) = match is_array {
+            true => (
+                "Full presets",
+                "Samples and epochs as in the presets: the best networks, at some minutes each.",
+            ),
+            false => ("As in Train view", "As many epochs as in the Train view."),
+        };
+        let lengths = [(false, "Quick look"), (true, full)];
+        self.is_full = segmented_ui(ui, "Training length", &lengths, self.is_full, true).unwrap_or(self.is_full);
+        if self.is_full {
+            dim_ui(ui, meaning);
+        } else {
+            if is_array {
+                let hint = "Largest number of training samples per network; a preset with fewer keeps its own number.";
+                count_ui(ui, "Maximum samples", hint, &mut self.samples, 1..=LARGEST_SAMPLES);
+            }
+            let hint = "Largest number of epochs per training.";
+            count_ui(ui, "Maximum epochs", hint, &mut self.epochs, 1..=StoppingRules::MAX_EPOCHS);
+        }
+        if is_array {
+            let hint = "Number of samples on which the errors are measured.";
+            count_ui(ui, "Test samples", hint, &mut self.test_samples, 1..=LARGEST_SAMPLES);
+        }
+    }
+}
+
+/// Shows the limits for the recommended decoders, which apply to the results that are shown.
+pub fn limits_ui(ui: &mut Ui, limits: &mut TradeOffLimits) {
+    section_heading_ui(ui, "Recommended decoders");
+    let hint = "Finds the decoder with the shortest decoding time among those whose Z error, or mean absolute error in \
+                percent of the range of a recording's targets, is at most this.";
+    quantity_ui(ui, "Fastest under", hint, &mut limits.percent, 1e-15..=1e6, "%");
+    let hint = "Finds the decoder with the smallest error among those that decode a frame, or a sample of a recording, \
+                within this time, in µs.";
+    let time = &mut limits.microseconds;
+    quantity_ui(ui, "Most accurate under", hint, time, 1e-6..=1e12, "µs");
+}
+
+/// Plan of a measurement.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SpeedPlan {
+    /// Runs that fit the decoders, level by level.
+    pub runs: Vec<PlannedRun>,
+    /// Numbers of hidden nodes of the networks.
+    pub hidden: Vec<usize>,
+}
+
+/// A run that fits decoders.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlannedRun {
+    /// Index of its noise level, or 0 for a recording.
+    pub level: usize,
+    /// Relative noise of a reading, if it is simulated.
+    pub noise: Option<f64>,
+    /// Preset from which its settings were derived, if any.
+    pub preset: Option<Preset>,
+    /// Setup, except for the hidden nodes.
+    pub setup: Setup,
+    /// Decoders to be measured.
+    pub decoders: Vec<DecoderKind>,
+}
+
+impl SpeedPlan {
+    /// Returns the number of points.
+    pub fn points(&self) -> usize {
+        let of_decoder = |kind: &DecoderKind| {
+            let networks = if kind.needs_network() { self.hidden.len() } else { 1 };
+            networks * kind.precisions().len()
+        };
+        self.runs.iter().flat_map(|run| &run.decoders).map(of_decoder).sum()
+    }
+}
+
+/// Interval at which a waiting measurement looks whether it can go on.
+const WAIT: Duration = Duration::from_millis(50);
+
+/// Measures run by run, and reports each point as it is measured; waits unless it `is_quiet`.
+///
+/// # Errors
+/// If the samples cannot be drawn or read, or a network cannot be trained on them.
+pub fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Result<(), String> {
+    // Asked before every epoch and every decoder, outside the times that are measured.
+    let is_cancelled = || {
+        while !is_quiet.load(Ordering::Relaxed) && !reporter.is_cancelled() {
+            thread::sleep(WAIT);
+        }
+        reporter.is_cancelled()
+    };
+    let job = Job::new(&is_cancelled);
+    let mut last: Option<(&Setup, SetupSets)> = None;
+    for (number, run) in plan.runs.iter().enumerate() {
+        if run.setup.plan().is_none() {
+            let workload = Workload::of_trade_off(run.setup.settings(), &plan.hidden, &run.decoders);
+            let checked = workload.and_then(|workload| workload.check_memory(memory_budget()));
+            checked.map_err(|error| error.to_string())?;
+        }
+        let sets = match last.take() {
+            // The samples of a recording are read only once.
+            Some((of, sets)) if of.plan().is_some() && of.plan() == run.setup.plan() => sets,
+            _ => {
+                let on_progress = &mut |progress| read(reporter, progress);
+                let sets = run.setup.sets(Path::new(""), &job, on_progress);
+                sets.map_err(|error| error.to_string())?
+            }
+        };
+        let recorded = sets.recorded();
+        reporter.send(StudyEvent::Samples {
+            decoded: decoded_unit(&sets.sets.test),
+            recorded: recorded.cloned().map(Box::new),
+        });
+        // Several decoders share a network.
+        let mut last_file: Option<Arc<NetworkFile>> = None;
+        let on_point = |kind, point, trained: Option<&Run>| {
+            let point = match point {
+                Ok(point) => point,
+                Err(error) => return reporter.send(StudyEvent::Refused(number, format!("{kind}: {error}"))),
+            };
+            last_file = trained.and_then(|trained| {
+                let last = last_file.take().filter(|file| file.settings == *trained.settings());
+                last.or_else(|| NetworkFile::from_run(trained, recorded).ok().map(Arc::new))
+            });
+            let point = TradeOffPoint {
+                preset: run.preset,
+                ..point
+            };
+            reporter.send(StudyEvent::Point(number, Box::new(point), last_file.clone()));
+        };
+        let settings = run.setup.settings();
+        let measured = measure_trade_off(settings, &sets.sets, &plan.hidden, &run.decoders, &job, on_point);
+        measured.map_err(|error| error.to_string())?;
+        last = Some((&run.setup, sets));
+    }
+    Ok(())
+}
+
+/// Points measured so far.
+#[derive(Debug)]
+pub struct SpeedOutcome {
+    plan: SpeedPlan,
+    /// One for each noise level, or a single one for a recording.
+    pub levels: Vec<TradeOffLevel>,
+    /// For each point of each level, the number of its run, and the file of its network if it has one.
+    origins: Vec<Vec<(usize, Option<Arc<NetworkFile>>)>>,
+    /// Decoders that cannot be used, each with the number of its run and the reason.
+    refused: Vec<(usize, String)>,
+    /// Unit that is decoded at a time, such as "a sample", once it is known.
+    pub decoded: String,
+    /// Origin of the samples of a recording, once they are read.
+    pub recorded: Option<Box<Recorded>>,
+}
+
+impl SpeedOutcome {
+    /// Creates an outcome without points.
+    pub fn new(plan: &SpeedPlan) -> Self {
+        let mut levels: Vec<TradeOffLevel> = Vec::new();
+        for run in &plan.runs {
+            if run.level == levels.len() {
+                levels.push(TradeOffLevel {
+                    noise: run.noise,
+                    points: Vec::new(),
+                });
+            }
+        }
+        Self {
+            origins: vec![Vec::new(); levels.len()],
+            levels,
+            plan: plan.clone(),
+            refused: Vec::new(),
+            decoded: String::new(),
+            recorded: None,
+        }
+    }
+
+    /// Adds a point of a run, with the file of its network if it has one.
+    pub fn record(&mut self, run: usize, point: TradeOffPoint, file: Option<Arc<NetworkFile>>) {
+        let level = self.plan.runs[run].level;
+        self.levels[level].points.push(point);
+        self.origins[level].push((run, file));
+    }
+
+    /// Adds the reason why a decoder cannot be used with the samples of a run.
+    pub fn refuse(&mut self, run: usize, reason: String) {
+        self.refused.push((run, reason));
+    }
+
+    /// Returns the number of points measured or refused, and the number of planned points.
+    pub fn points(&self) -> (usize, usize) {
+        let measured: usize = self.levels.iter().map(|level| level.points.len()).sum();
+        (measured + self.refused.len(), self.plan.points())
+    }
+
+    /// Returns the setup with which a point was measured.
+    pub fn setup_of(&self, level: usize, point: usize) -> Option<Setup> {
+        let (run, _) = self.origins.get(level)?.get(point)?;
+        let point = &self.levels[level].points[point];
+        Some(self.plan.runs[*run].setup.with_settings(point.settings))
+    }
+
+    /// Returns the decoder of a point, and the samples and the network from which it can be exported.
+    pub fn decoder_of(&self, level: usize, point: usize) -> Option<(DecoderKind, DecoderSource)> {
+        let setup = self.setup_of(level, point)?;
+        let (_, file) = &self.origins[level][point];
+        let point = &self.levels[level].points[point];
+        let source = match file {
+            Some(file) => DecoderSource::Run(NetworkSource::Kept(point_name(point), Arc::clone(file))),
+            None => DecoderSource::Samples(Box::new(setup), self.recorded.clone()),
+        };
+        Some((point.report.kind, source))
+    }
+
+    /// Returns the report of the points so far.
+    pub fn report(&self, limits: &TradeOffLimits) -> Report {
+        let source = self.plan.runs.first().map(|run| run.setup.source_name());
+        let unit = match &*self.decoded {
+            "" => String::new(),
+            unit => format!(", times of {unit}"),
+        };
+        let source = source.unwrap_or_default();
+        Report {
+            headline: "Speed against accuracy".to_owned(),
+            conditions: format!("{source}, one thread, median of many{unit}"),
+            pages: (0..self.levels.len()).map(|level| self.page(level, limits)).collect(),
+        }
+    }
+
+    fn page(&self, number: usize, limits: &TradeOffLimits) -> Page {
+        let level = &self.levels[number];
+        let table = trade_off_summary(level);
+        let points = level.points.iter().map(|point| {
+            let [decoding, training] = TradeOffCost::ALL.map(|cost| cost.of(point).into());
+            let mut facts = point_facts(point);
+            let samples = point.settings.simulation().map(|array| counted(array.samples, "training sample"));
+            let epochs = counted(point.settings.training.stopping.epochs, "epoch");
+            facts.extend(samples.into_iter().chain([format!("at most {epochs}")]));
+            Point {
+                name: point_name(point),
+                facts,
+                places: [("Decoding", decoding), ("Training", training)],
+            }
+        });
+        Page {
+            name: level.noise.map_or_else(String::new, noise_name),
+            what: "Point",
+            rows: rows(level, table.columns.len()),
+            table,
+            figure: Some(trade_off_figure(level, limits).into()),
+            points: points.collect(),
+            notes: self.notes(number, limits),
+        }
+    }
+
+    fn notes(&self, number: usize, limits: &TradeOffLimits) -> Vec<Note> {
+        let level = &self.levels[number];
+        let refused = self.refused.iter().filter(|(run, _)| self.plan.runs[*run].level == number);
+        let mut notes = Vec::from_iter(refused.map(|(_, reason)| Note::Warning(sentence(reason))));
+        notes.push(Note::Heading("Recommended decoders"));
+        let questions = [
+            ("Fastest", "No measured decoder is this accurate."),
+            ("Most accurate", "No measured decoder is this fast."),
+        ];
+        for ((question, none), answer) in questions.into_iter().zip(level.answers(limits)) {
+            notes.push(match answer {
+                Some(answer) => {
+                    let point = &level.points[answer];
+                    let (percent, time) = (point.report.errors.percent(), frame_time(point.report.frame_us));
+                    let (name, percent) = (point_name(point), format_percent(percent));
+                    Note::Pick(answer, format!("{question}: {name}, {percent}, {time}"))
+                }
+                None => Note::Dim(none.to_owned()),
+            });
+        }
+        let hint = "Click a row of the table to mark its point, or a point of a chart to open it in the Train view.";
+        notes.push(Note::Dim(hint.to_owned()));
+        notes
+    }
+}
+
+/// Returns the rows of the table of a level, fastest first.
+fn rows(level: &TradeOffLevel, columns: usize) -> Vec<Row> {
+    let [decoding, training] = TradeOffCost::ALL.map(|cost| level.front(cost));
+    let time = |place: &usize| level.points[*place].report.frame_us;
+    let mut order = Vec::from_iter(0..level.points.len());
+    order.sort_by(|a, b| time(a).total_cmp(&time(b)));
+    let row = |item: usize| {
+        let point = &level.points[item];
+        let is_chosen = decoding[item] || training[item];
+        let mut tones = vec![if is_chosen { Tone::Usual } else { Tone::Dim }; columns];
+        // The last columns are the costs.
+        for (place, is_on_front) in [(columns - 2, decoding[item]), (columns - 1, training[item])] {
+            if is_on_front {
+                tones[place] = Tone::Own;
+            }
+        }
+        if is_chosen {
+            tones[0] = Tone::Strong;
+        }
+        Row {
+            dot: Some(Ink::of_decoder(point.report.kind)),
+            meaning: "A blue time is on the Pareto front: no other point has as small an error in as little time.",
+            tones,
+            ..Row::new(item, point_name(point))
+        }
+    };
+    order.into_iter().map(row).collect()
+}
+
+/// Returns a noise level as it would be typed.
+fn noise_name(noise: f64) -> String {
+    if noise == 0.0 || noise >= 0.01 {
+        noise.to_string()
+    } else {
+        format!("{noise:e}")
+    }
+}

@@ -1,0 +1,173 @@
+use decoupler_core::{
+    evaluation::{
+        RunError,
+        experiments::{Axis, AxisKind},
+    },
+    settings::{Kind, SettingError, Value},
+};
+use eframe::egui::{TextEdit, Ui, vec2};
+
+use crate::window::theme::space;
+
+/// Values of a setting, as typed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ValueList {
+    /// Setting that is varied.
+    pub kind: AxisKind,
+    /// Its values, separated by commas or blanks.
+    pub values: String,
+}
+
+impl ValueList {
+    /// Creates the list with example values.
+    pub fn new(kind: AxisKind) -> Self {
+        Self {
+            kind,
+            values: example(kind).to_owned(),
+        }
+    }
+
+    /// Creates the list of the values of `axis`.
+    pub fn of(axis: &Axis) -> Self {
+        let values = Vec::from_iter((0..axis.values.len()).map(|index| axis.label(index)));
+        Self {
+            kind: axis.kind,
+            values: values.join(", "),
+        }
+    }
+
+    /// Parses the list.
+    ///
+    /// # Errors
+    /// The first value that cannot be parsed, with an example.
+    pub fn parse(&self) -> Result<Axis, String> {
+        let is_between = |letter: char| letter == ',' || letter == ';' || letter.is_whitespace();
+        let words = self.values.split(is_between).filter(|word| !word.is_empty());
+        Axis::parse(self.kind, words).map_err(|error| {
+            let name = label(self.kind);
+            match (&error, self.kind.setting().kind) {
+                (SettingError::Text(_, message), Kind::Choice | Kind::Text) => format!("{name}: {message}"),
+                (SettingError::Text(_, message), _) => {
+                    format!("{name}: {message}; write a list such as {}", example(self.kind))
+                }
+                _ => error.to_string(),
+            }
+        })
+    }
+
+    /// Returns each value once, at least one.
+    ///
+    /// # Errors
+    /// If the list is empty, or a value cannot be parsed.
+    pub fn different(&self) -> Result<Vec<Value>, String> {
+        let mut different: Vec<Value> = Vec::new();
+        for value in self.parse()?.values {
+            if !different.contains(&value) {
+                different.push(value);
+            }
+        }
+        if different.is_empty() {
+            return Err(RunError::NoValues(self.kind.name()).to_string());
+        }
+        Ok(different)
+    }
+
+    /// Shows the list as a text field, named after its setting unless `name` is given.
+    pub fn ui(&mut self, ui: &mut Ui, name: Option<&str>, hint: &str) {
+        let label = ui.label(name.unwrap_or(label(self.kind))).on_hover_text(hint);
+        let edit = TextEdit::multiline(&mut self.values)
+            .desired_rows(1)
+            .desired_width(f32::INFINITY)
+            .hint_text(example(self.kind))
+            .margin(vec2(space(2), space(1)));
+        ui.add(edit).labelled_by(label.id).on_hover_text(hint);
+    }
+}
+
+/// Returns the label of a list of values.
+pub fn label(kind: AxisKind) -> &'static str {
+    match kind {
+        AxisKind::Hidden => "Hidden nodes",
+        AxisKind::Array => "Array scales",
+        AxisKind::Samples => "Samples",
+        AxisKind::Noise => "Noise levels",
+        AxisKind::Inputs => "Inputs",
+        AxisKind::Scaling => "Scaling",
+        AxisKind::Method => "Methods",
+        AxisKind::Epochs => "Epochs",
+        AxisKind::Starts => "Restarts",
+        AxisKind::Split => "Split",
+        AxisKind::Seed => "Seeds",
+    }
+}
+
+fn example(kind: AxisKind) -> &'static str {
+    match kind {
+        AxisKind::Hidden => "6, 8, 10, 12",
+        AxisKind::Array => "10×6_3×18, 10×8_4×24, 10×10_5×30",
+        AxisKind::Samples => "100, 300, 1000",
+        AxisKind::Noise => "0, 0.001, 0.01",
+        AxisKind::Inputs => "resistance, conductance, log",
+        AxisKind::Scaling => "minmax, whiten",
+        AxisKind::Method => "lm, scg, rp",
+        AxisKind::Epochs => "30, 100, 300",
+        AxisKind::Starts => "1, 3, 10",
+        AxisKind::Split => "time, random",
+        AxisKind::Seed => "0, 1, 2",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use decoupler_core::evaluation::RunSettings;
+
+    use super::*;
+
+    #[test]
+    fn example_values_are_parsed_and_printed_unchanged() {
+        for kind in AxisKind::of_runs(&RunSettings::default()).chain([AxisKind::Split]) {
+            let list = ValueList::new(kind);
+            let axis = list.parse().unwrap();
+            assert!(axis.values.len() >= 2, "{kind:?}");
+            assert_eq!(ValueList::of(&axis), list);
+        }
+    }
+
+    #[test]
+    fn separators_do_not_matter_and_errors_name_the_value() {
+        let list = |kind, values: &str| ValueList {
+            kind,
+            values: values.to_owned(),
+        };
+        assert_eq!(
+            list(AxisKind::Hidden, " 6;8\n10,,12 ").parse(),
+            Ok(Axis::integers(AxisKind::Hidden, [6, 8, 10, 12]))
+        );
+        assert_eq!(list(AxisKind::Hidden, "6, 6 6").different().unwrap().len(), 1);
+        let cases = [
+            (AxisKind::Hidden, "", "no values for hidden nodes"),
+            (
+                AxisKind::Hidden,
+                "6, eight",
+                "Hidden nodes: 'eight' is not a whole number",
+            ),
+            (AxisKind::Samples, "-5", "Samples: '-5'"),
+            (AxisKind::Array, "10x6", "'10x6' is not an array scale"),
+            (AxisKind::Noise, "0.1 a", "Noise levels: 'a' is not a number"),
+            (
+                AxisKind::Split,
+                "time daily",
+                "Split: 'daily' is not a split: give time",
+            ),
+            (
+                AxisKind::Method,
+                "lm magic",
+                "'magic' is not a training method: give lm",
+            ),
+        ];
+        for (kind, values, expected) in cases {
+            let message = list(kind, values).different().unwrap_err();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+}
