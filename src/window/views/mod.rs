@@ -16,7 +16,6 @@ use super::{job::Wake, shared::View};
 use decoupler_files::import::Plan;
 
 pub use identifiability::{Analysis, Question};
-pub use study::{PlannedRun, SpeedPlan};
 pub(super) use train::CHECKPOINT;
 pub use train::{BottomTab, DecoderResult, Touch};
 

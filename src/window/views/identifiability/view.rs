@@ -9,11 +9,11 @@ use eframe::egui::{Button, Slider, SliderClamping, Ui, WidgetInfo, emath::Numeri
 
 use super::{
     IdentifiabilityView, Question,
-    array_view::{analysis_exports, identifiability_ui, status_ui},
+    array_view::{identifiability_ui, shown, status_ui},
 };
 use crate::window::{
     glossary,
-    shared::{Effect, Export, Shared, View},
+    shared::{Effect, Shared, Shown, View},
     theme::space,
     widgets::{
         dim_ui,
@@ -53,8 +53,8 @@ impl View for IdentifiabilityView {
         }
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        analysis_exports(self, shared)
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        shown(self, shared)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {

@@ -7,26 +7,25 @@ use decoupler_core::{
     evaluation::{
         MAX_STARTS,
         experiments::{
-            AxisKind, Cell, Experiment, ExperimentResults, Finished, PaperTable, Trial, TrialSamples, run_experiments,
+            AxisKind, Cell, Experiment, ExperimentResults, Finished, PaperTable, TrialSamples, run_experiments,
             worker_threads,
         },
     },
     job::Job,
-    problem::Problem,
     text::counted,
     training::{EpochRecord, StoppingRules},
 };
 use decoupler_files::{
     export::{
-        ExperimentColumnKind, ExperimentTable, describe_conditions, describe_failures, describe_worse_than_mean,
-        write_experiment_markdown,
+        ExperimentColumnKind, ExperimentTable, Table, cells_table, describe_conditions, describe_failures,
+        describe_worse_than_mean, sweep_specification, trials_table, write_experiment_markdown,
     },
-    figure::experiment_figure,
+    figure::{TradeOffLimits, experiment_figure},
     import::{Plan, Setup},
 };
 use eframe::egui::{Button, ComboBox, Ui};
 
-use super::{Note, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, topic::read, value_list::label};
+use super::{Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, value_list::label};
 use crate::window::{
     shared::Effect,
     theme::space,
@@ -48,12 +47,14 @@ const MAX_KEPT_BYTES: usize = 400_000_000;
 /// Form of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExperimentForm {
+    /// Title of the results.
+    heading: String,
     /// The experiment without its axes, which are typed.
-    pub template: Experiment,
+    template: Experiment,
     /// Plan by which a recording is read; `None` for a simulated array.
-    pub plan: Option<Arc<Plan>>,
+    plan: Option<Arc<Plan>>,
     /// The axis of a table, or both of a sweep.
-    pub axes: Vec<ValueList>,
+    axes: Vec<ValueList>,
 }
 
 impl ExperimentForm {
@@ -61,6 +62,7 @@ impl ExperimentForm {
     pub fn table(table: PaperTable) -> Self {
         let template = table.experiment();
         Self {
+            heading: table.heading(),
             axes: vec![ValueList::of(&template.axis)],
             template,
             plan: None,
@@ -70,6 +72,7 @@ impl ExperimentForm {
     /// Returns the form of a small sweep.
     pub fn sweep() -> Self {
         let mut form = Self::table(PaperTable::HiddenNodes);
+        form.heading = "Sweep over two axes".to_owned();
         form.template.base.training.stopping.epochs = 60;
         form.template.base.starts = 1;
         form.template.seeds = 1;
@@ -78,7 +81,7 @@ impl ExperimentForm {
     }
 
     /// Uses `setup` as the base of a sweep. An axis that its source does not have is replaced by another.
-    pub fn take(&mut self, setup: &Setup) {
+    fn take(&mut self, setup: &Setup) {
         self.template.base = *setup.settings();
         self.template.recording = setup.experiment_recording();
         self.plan = setup.plan().cloned().map(Arc::new);
@@ -94,10 +97,7 @@ impl ExperimentForm {
     }
 
     /// Returns the experiment, checked as far as possible without running it.
-    ///
-    /// # Errors
-    /// If the form is not a valid experiment.
-    pub fn experiment(&self) -> Result<Experiment, String> {
+    fn experiment(&self) -> Result<Experiment, String> {
         let axes = self.axes.iter().map(ValueList::parse).collect::<Result<Vec<_>, _>>()?;
         let lengths = axes.iter().map(|axis| axis.values.len());
         let cells = lengths.fold(1, usize::saturating_mul);
@@ -122,43 +122,65 @@ impl ExperimentForm {
     pub fn task(&self) -> Result<Task, String> {
         let experiment = self.experiment()?;
         let setup = Setup::of(experiment.base, self.plan.as_deref().cloned());
-        let setup = setup.expect("an experiment with other samples is refused");
-        Ok(Task::Experiment(Box::new(experiment), setup))
+        let setup = setup.expect("an experiment on other samples is refused");
+        let outcome = ExperimentOutcome {
+            heading: self.heading.clone(),
+            results: ExperimentResults::new(experiment.clone()),
+            plan: setup.plan().cloned(),
+            kept_bytes: 0,
+        };
+        let folds = experiment.cross_validation.map_or(1, |validation| validation.folds);
+        let (_, trials, _) = outcome.parts();
+        let networks = trials.saturating_mul(folds).saturating_mul(experiment.base.starts);
+        let epochs = counted(experiment.base.training.stopping.epochs, "epoch");
+        Ok(Task {
+            size: format!("{} of at most {epochs}", counted(networks, "training")),
+            outcome: Box::new(outcome),
+            setup: None,
+            run: Box::new(move |reporter| run(experiment, &setup, reporter)),
+        })
+    }
+
+    /// Returns the sweep for the terminal.
+    ///
+    /// # Errors
+    /// If the form is not valid, or the terminal has no options for it.
+    pub fn specification(&self) -> Result<serde_json::Value, String> {
+        sweep_specification(&self.experiment()?, self.plan.as_deref()).map_err(|gap| gap.to_string())
     }
 
     /// Shows the fields. `train` is the setup of the Train view, which a sweep can be based on.
     pub fn fields_ui(&mut self, ui: &mut Ui, train: &Result<Setup, String>) {
-        let is_sweep = self.axes.len() > 1;
         section_heading_ui(ui, "Values");
+        let hint = "Values separated by commas";
+        let is_sweep = self.axes.len() > 1;
         if is_sweep {
             let offered = Vec::from_iter(AxisKind::of_runs(&self.template.base));
             let names = [("Across", "Values across"), ("Down", "Values down")];
             for (axis, (name, values)) in self.axes.iter_mut().zip(names) {
                 axis_ui(ui, name, axis, &offered);
-                axis.ui(ui, Some(values), "Values separated by commas");
+                axis.ui(ui, Some(values), hint);
                 ui.add_space(space(1));
             }
         } else {
-            for axis in &mut self.axes {
-                axis.ui(ui, None, "Values separated by commas");
-            }
+            self.axes.iter_mut().for_each(|axis| axis.ui(ui, None, hint));
         }
         self.cross_validation_ui(ui);
         section_heading_ui(ui, "Training");
         if is_sweep {
             self.base_ui(ui, train);
         }
-        let template = &mut self.template;
+        let Experiment { base, seeds, .. } = &mut self.template;
         let hint = "Number of consecutive seeds for each cell, which show the spread of the results.";
-        count_ui(ui, "Seeds", hint, &mut template.seeds, 1..=MAX_TRIALS);
+        count_ui(ui, "Seeds", hint, seeds, 1..=MAX_TRIALS);
         let hint = "First of the consecutive seeds. The same seeds give the same results.";
-        seed_ui(ui, "First seed", hint, &mut template.base.seed.0, 0);
+        seed_ui(ui, "First seed", hint, &mut base.seed.0, 0);
         let hint = "Largest number of epochs per training. The paper does not state its own.";
-        let epochs = &mut template.base.training.stopping.epochs;
+        let epochs = &mut base.training.stopping.epochs;
         count_ui(ui, "Epochs", hint, epochs, 1..=StoppingRules::MAX_EPOCHS);
         let hint =
             "Number of trainings from different random weights; the one with the lowest validation error is kept.";
-        count_ui(ui, "Restarts", hint, &mut template.base.starts, 1..=MAX_STARTS);
+        count_ui(ui, "Restarts", hint, &mut base.starts, 1..=MAX_STARTS);
     }
 
     fn cross_validation_ui(&mut self, ui: &mut Ui) {
@@ -171,9 +193,8 @@ impl ExperimentForm {
         let hint = "Number of shuffles into new folds, for each seed.";
         count_ui(ui, "Repeats", hint, &mut validation.repeats, 1..=MAX_TRIALS);
         let units = [(SplitBy::Random, "By sample"), (SplitBy::Group, "By snapshot")];
-        if let Some(unit) = segmented_ui(ui, "Unit of the folds", &units, validation.by, true) {
-            validation.by = unit;
-        }
+        let unit = segmented_ui(ui, "Unit of the folds", &units, validation.by, true);
+        validation.by = unit.unwrap_or(validation.by);
         let meaning = match validation.by {
             SplitBy::Random => "As in the paper: rows of one snapshot may be in both the training and the test folds.",
             _ => "Whole snapshots: no training sample is from the same moment as a test sample.",
@@ -183,13 +204,15 @@ impl ExperimentForm {
 
     /// Shows the settings common to all cells, and a button that takes them from the Train view.
     fn base_ui(&mut self, ui: &mut Ui, train: &Result<Setup, String>) {
-        let base = &self.template.base;
-        let recording = self.template.recording.as_ref();
-        let mut parts = Vec::from_iter(recording.map(|recording| recording.name.clone()));
+        let Experiment { base, recording, .. } = &self.template;
+        let mut parts = Vec::from_iter(recording.as_ref().map(|recording| recording.name.clone()));
         if let Some(array) = base.simulation() {
             parts.extend([array.sensor.scale.to_string(), counted(array.samples, "sample")]);
         }
-        parts.extend([counted(base.hidden, "hidden node"), base.training.method.name().to_owned()]);
+        parts.extend([
+            counted(base.hidden, "hidden node"),
+            base.training.method.name().to_owned(),
+        ]);
         dim_ui(ui, &format!("{}, unless an axis varies it", parts.join(", ")));
         let is_base = |setup: &Setup| (setup.settings(), setup.plan()) == (base, self.plan.as_deref());
         let (can_take, why_not) = match train {
@@ -212,36 +235,24 @@ fn axis_ui(ui: &mut Ui, name: &str, axis: &mut ValueList, offered: &[AxisKind]) 
     let combo = ComboBox::from_id_salt(name)
         .selected_text(label(axis.kind))
         .width(ui.available_width());
+    let mut kind = axis.kind;
     let shown = combo.show_ui(ui, |ui| {
-        for &kind in offered {
-            if ui.selectable_label(kind == axis.kind, label(kind)).clicked() && kind != axis.kind {
-                *axis = ValueList::new(kind);
-            }
+        for &option in offered {
+            ui.selectable_value(&mut kind, option, label(option));
         }
     });
     shown.response.labelled_by(name_label.id);
-}
-
-/// Describes the number of trainings.
-pub fn describe_size(experiment: &Experiment) -> String {
-    let cells = experiment.cells();
-    let trials: usize = cells.iter().map(|cell| cell.expected).sum();
-    let folds = experiment.cross_validation.map_or(1, |validation| validation.folds);
-    let networks = trials.saturating_mul(folds).saturating_mul(experiment.base.starts);
-    let epochs = counted(experiment.base.training.stopping.epochs, "epoch");
-    format!("{} of at most {epochs}", counted(networks, "training"))
+    if kind != axis.kind {
+        *axis = ValueList::new(kind);
+    }
 }
 
 /// Runs every trial on the samples of `setup`, and reports each as it finishes.
-///
-/// # Errors
-/// If the samples cannot be read, or the experiment cannot be run.
-pub fn run(experiment: Experiment, setup: &Setup, reporter: &Reporter) -> Result<(), String> {
+fn run(experiment: Experiment, setup: &Setup, reporter: &Reporter) -> Result<(), String> {
     let is_cancelled = || reporter.is_cancelled();
+    let on_progress = &mut |progress| reporter.progress(StudyEvent::Reading(progress), |_, _| ());
     // The paths of the window's plans are absolute.
-    let samples = setup.trial_samples(Path::new(""), &Job::new(&is_cancelled), &mut |progress| {
-        read(reporter, progress);
-    });
+    let samples = setup.trial_samples(Path::new(""), &Job::new(&is_cancelled), on_progress);
     let samples = samples.map_err(|error| error.to_string())?;
     if let TrialSamples::Recorded { problem, .. } = &samples {
         reporter.send(StudyEvent::Problem(Arc::clone(problem)));
@@ -253,28 +264,24 @@ pub fn run(experiment: Experiment, setup: &Setup, reporter: &Reporter) -> Result
 
 /// Results of an experiment so far.
 #[derive(Debug)]
-pub struct ExperimentOutcome {
-    /// Results of all trials.
-    pub results: ExperimentResults,
+struct ExperimentOutcome {
+    heading: String,
+    results: ExperimentResults,
     plan: Option<Plan>,
     kept_bytes: usize,
 }
 
 impl ExperimentOutcome {
-    /// Creates empty results.
-    pub fn new(experiment: &Experiment, setup: &Setup) -> Self {
-        Self {
-            results: ExperimentResults::new(experiment.clone()),
-            plan: setup.plan().cloned(),
-            kept_bytes: 0,
-        }
-    }
-
     /// Adds a trial that has finished or failed.
-    pub fn record(&mut self, finished: Finished) {
-        let hidden = self.results.cells[finished.cell].settings.hidden;
+    fn record(&mut self, finished: Finished) {
         let outcome = finished.outcome.map(|mut trial| {
-            let bytes = bytes_of(&trial, hidden, self.results.problem.as_deref());
+            let weights = self.results.problem.as_ref().map_or(0, |problem| {
+                let hidden = self.results.cells[finished.cell].settings.hidden;
+                hidden * (problem.feature_count() + 1) + (hidden + 1) * problem.targets.len()
+            });
+            // Current weights, best weights, and about as many numbers again for the state of the method.
+            let of_start = 4 * weights * size_of::<f64>();
+            let bytes = trial.states.len() * of_start + trial.effort.epochs * size_of::<EpochRecord>();
             if self.kept_bytes + bytes > MAX_KEPT_BYTES {
                 trial.states = Vec::new();
             } else {
@@ -284,32 +291,41 @@ impl ExperimentOutcome {
         });
         self.results.record(finished.cell, outcome);
     }
+}
 
-    /// Returns the numbers of finished and planned trials.
-    pub fn trials(&self) -> (usize, usize) {
-        let cells = self.results.cells.iter();
-        cells.fold((0, 0), |(done, all), cell| {
-            (done + cell.trials.len() + cell.failures.len(), all + cell.expected)
-        })
+impl Outcome for ExperimentOutcome {
+    fn take(&mut self, event: StudyEvent) {
+        match event {
+            StudyEvent::Problem(problem) => self.results.problem = Some(problem),
+            StudyEvent::Trial(finished) => self.record(*finished),
+            _ => {}
+        }
     }
 
-    /// Returns the report of the results so far.
-    pub fn report(&self, headline: String) -> Report {
+    fn parts(&self) -> (usize, usize, &'static str) {
+        let cells = &self.results.cells;
+        let done = cells.iter().map(|cell| cell.trials.len() + cell.failures.len()).sum();
+        (done, cells.iter().map(|cell| cell.expected).sum(), "trial")
+    }
+
+    fn report(&self, _limits: &TradeOffLimits) -> Report {
         let results = &self.results;
         let shown = ExperimentTable::new(results);
-        let tone = |kind: &ExperimentColumnKind, loses: bool| match kind {
-            ExperimentColumnKind::Axis => Tone::Strong,
-            ExperimentColumnKind::Ranking => Tone::Own,
-            ExperimentColumnKind::Published => Tone::Dim,
-            ExperimentColumnKind::Linear if loses => Tone::Beating,
-            _ => Tone::Usual,
-        };
         let row = |(item, cell): (usize, &Cell)| {
             let both = cell.percent().median.zip(cell.linear_percent());
             let loses = both.is_some_and(|(network, linear)| network > linear);
+            let tone = |kind: &ExperimentColumnKind| match kind {
+                ExperimentColumnKind::Axis => Tone::Strong,
+                ExperimentColumnKind::Ranking => Tone::Own,
+                ExperimentColumnKind::Published => Tone::Dim,
+                ExperimentColumnKind::Linear if loses => Tone::Beating,
+                _ => Tone::Usual,
+            };
             Row {
-                tones: shown.kinds.iter().map(|kind| tone(kind, loses)).collect(),
-                ..Row::new(item, results.cell_labels(cell).join(", "))
+                item,
+                name: results.cell_labels(cell).join(", "),
+                tones: shown.kinds.iter().map(tone).collect(),
+                ..Row::default()
             }
         };
         let failures = describe_failures(results).into_iter().map(Note::Failure);
@@ -318,33 +334,23 @@ impl ExperimentOutcome {
         if !notes.is_empty() {
             notes.insert(0, Note::Heading("Remarks"));
         }
-        let page = Page {
-            what: "Cell",
-            rows: results.cells.iter().enumerate().map(row).collect(),
-            table: shown.table(),
-            figure: Some(experiment_figure(results)),
-            notes,
-            ..Page::default()
-        };
         Report {
-            headline,
+            headline: self.heading.clone(),
             conditions: format!("{}. {}", describe_conditions(&results.experiment), shown.note),
-            pages: vec![page],
+            pages: vec![Page {
+                what: "Cell",
+                rows: results.cells.iter().enumerate().map(row).collect(),
+                table: shown.table(),
+                figure: Some(experiment_figure(results)),
+                notes,
+                ..Page::default()
+            }],
         }
     }
 
-    /// Returns the table with the settings behind it, as Markdown.
-    pub fn markdown(&self, headline: &str) -> Vec<u8> {
-        let mut text = Vec::new();
-        let conditions = describe_conditions(&self.results.experiment);
-        // Writing to memory cannot fail.
-        let _ = write_experiment_markdown(headline, &conditions, &self.results, &mut text);
-        text
-    }
-
-    /// Opens a cell in the Train view: its settings with the seed of its median trial, and the network of that trial. A
-    /// network that was not kept, as in a cross-validation, is trained there.
-    pub fn open(&self, cell: usize) -> Vec<Effect> {
+    /// Opens a cell: its settings with the seed of its median trial, and the network of that trial. A network that was not
+    /// kept, as in a cross-validation, is trained there.
+    fn open(&self, _page: usize, cell: usize) -> Vec<Effect> {
         let Some(cell) = self.results.cells.get(cell) else {
             return Vec::new();
         };
@@ -355,25 +361,28 @@ impl ExperimentOutcome {
         }
         let plan = self.plan.clone().zip(cell.division);
         let plan = plan.map(|(plan, division)| Plan { division, ..plan });
-        let Some(setup) = Setup::of(settings, plan).map(Box::new) else {
-            return Vec::new();
-        };
+        let setup = Setup::of(settings, plan).expect("a cell has the source of its experiment");
+        let setup = Box::new(setup);
         match median {
             Some(trial) if !trial.states.is_empty() => vec![Effect::TakeUp(setup, trial.states.clone())],
             Some(_) => vec![Effect::TakeSetup(setup), Effect::Train],
             None => vec![Effect::TakeSetup(setup)],
         }
     }
-}
 
-/// Returns the approximate size of the finished training of a trial in memory.
-fn bytes_of(trial: &Trial, hidden: usize, problem: Option<&Problem>) -> usize {
-    let weights = problem.map_or(0, |problem| {
-        hidden * (problem.feature_count() + 1) + (hidden + 1) * problem.targets.len()
-    });
-    // Current weights, best weights, and about as many numbers again for the state of the method.
-    let of_start = 4 * weights * size_of::<f64>();
-    trial.states.len() * of_start + trial.effort.epochs * size_of::<EpochRecord>()
+    fn tables(&self) -> Vec<(&'static str, Box<dyn Fn() -> Table + '_>)> {
+        vec![
+            ("Every cell", Box::new(|| cells_table(&self.results))),
+            ("Every trial", Box::new(|| trials_table(&self.results))),
+        ]
+    }
+
+    fn markdown(&self) -> Option<Vec<u8>> {
+        let mut text = Vec::new();
+        let conditions = describe_conditions(&self.results.experiment);
+        write_experiment_markdown(&self.heading, &conditions, &self.results, &mut text).ok()?;
+        Some(text)
+    }
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! The Study view: many trainings or measurements at once, and what they show together.
 //!
-//! Every topic works alike. Its form is checked into a [`Task`], a background job carries the task out and sends
-//! [`StudyEvent`]s, an [`Outcome`] collects them, and a [`Report`] of tables, figures and notes shows the outcome. A new topic
-//! is a file with these four and a variant of [`Topic`] and of the enums of `topic`.
+//! Every topic works alike. Its [`Form`] makes a [`Task`], a background job carries the task out and sends [`StudyEvent`]s, an
+//! [`Outcome`] collects them, and its [`Report`] of tables, figures and notes is shown. A new topic is a variant of [`Topic`]
+//! and of [`Form`], and a file with its form, its work and its outcome.
 
 mod experiment;
 mod readings;
@@ -14,10 +14,7 @@ mod topic;
 mod value_list;
 mod view;
 
-use experiment::{ExperimentForm, ExperimentOutcome};
 use report::{Note, Page, Point, Report, Row, Tone};
-use speed::{SpeedForm, SpeedOutcome};
-pub use speed::{PlannedRun, SpeedPlan};
 pub use state::StudyView;
 use topic::{Form, Outcome, Reporter, StudyEvent, Task, Topic};
 use value_list::ValueList;

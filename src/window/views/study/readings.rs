@@ -1,6 +1,6 @@
 //! What the readings of a recording determine, and a cross-validation of its network.
 
-use std::{path::Path, time::Instant};
+use std::{ops::ControlFlow, path::Path, sync::Arc, time::Instant};
 
 use decoupler_core::{
     dataset::{Folds, SplitBy, Stream},
@@ -16,23 +16,19 @@ use decoupler_files::{
     machine::memory_budget,
 };
 
-use super::{Note, Page, Report, Reporter, Row, StudyEvent, Tone, topic::read};
+use super::{Note, Page, Report, Reporter, Row, StudyEvent, Tone};
 use crate::window::shared::sentence;
-
-/// Largest number of folds offered.
-pub const MAX_FOLDS: usize = 1000;
 
 /// Reads the recording of `setup`.
 fn recording<'a>(setup: &'a Setup, job: &Job<'_>, reporter: &Reporter) -> Result<(&'a Plan, Recording), String> {
-    use std::ops::ControlFlow;
     let plan = setup.plan().ok_or("This is not a recording.")?;
     // The paths of the window's plans are absolute.
     let recording = plan.recording(Path::new(""), &mut |progress| {
-        read(reporter, progress);
+        reporter.progress(StudyEvent::Reading(progress), |_, _| ());
         job.check().map_or(ControlFlow::Break(()), ControlFlow::Continue)
     });
     let recording = recording.map_err(|error| error.to_string())?;
-    reporter.send(StudyEvent::Read);
+    reporter.send(StudyEvent::Problem(Arc::new(recording.problem.clone())));
     Ok((plan, recording))
 }
 
@@ -95,12 +91,16 @@ pub fn cross_validate(setup: &Setup, folds: usize, reporter: &Reporter) -> Resul
     let validated = validated.map_err(|error| error.to_string())?;
     let mut remarks = channel_remarks(&set, by, &problem.features(), &problem.targets);
     let determined = Determination::measure(&set, validated.network.view(), by);
-    remarks.extend(problem.targets.iter().zip(&determined).map(|(target, determined)| {
-        match determined {
-            Ok(determined) => determined.sentence(&target.name, "the network explains"),
-            Err(cause) => format!("{}: {cause}", target.name),
-        }
-    }));
+    remarks.extend(
+        problem
+            .targets
+            .iter()
+            .zip(&determined)
+            .map(|(target, determined)| match determined {
+                Ok(determined) => determined.sentence(&target.name, "the network explains"),
+                Err(cause) => format!("{}: {cause}", target.name),
+            }),
+    );
     remarks.extend(ridge_remarks(&set, &validated, by, &problem.targets));
     let table = error_table(&ErrorTable::of_scores(&problem, &validated.scores(&set), None));
     // Its first columns are the target and the decoder.
@@ -109,8 +109,10 @@ pub fn cross_validate(setup: &Setup, folds: usize, reporter: &Reporter) -> Resul
         let is_network = cells[1] == Cell::from("network");
         let tone = if is_network { Tone::Own } else { Tone::Usual };
         Row {
+            item,
+            name: Vec::from_iter(texts).join(", "),
             tones: vec![tone; cells.len()],
-            ..Row::new(item, Vec::from_iter(texts).join(", "))
+            ..Row::default()
         }
     };
     let (samples, folds) = (set.samples(), by_folds(folds, by));

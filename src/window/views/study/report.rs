@@ -5,16 +5,15 @@ use decoupler_files::{
     figure::{Figure, Ink, SequentialMap},
 };
 use eframe::egui::{
-    Align, Color32, CursorIcon, Label, Layout, Pos2, Rect, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo,
-    accesskit::Role,
+    Color32, CursorIcon, Label, Pos2, Rect, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role,
 };
 
 use crate::window::{
     plotting::{CellPointed, Pointer, colour, heat_map_ui, plots_ui},
-    theme::{Palette, Theme, semibold, space, type_size},
+    theme::{Palette, Theme, semibold, type_size},
     widgets::{
-        ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, card_ui, dim_ui, invitation_ui,
-        note_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui,
+        ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui, note_ui, placeholder_ui,
+        section_heading_ui,
     },
 };
 
@@ -61,17 +60,6 @@ pub struct Row {
     pub dot: Option<Ink>,
     /// Tone of each cell.
     pub tones: Vec<Tone>,
-}
-
-impl Row {
-    /// Creates a row about an item.
-    pub fn new(item: usize, name: String) -> Self {
-        Self {
-            item,
-            name,
-            ..Self::default()
-        }
-    }
 }
 
 /// Tone of a cell.
@@ -149,107 +137,16 @@ pub struct Look {
 /// What the user asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wish {
-    /// Open this item of the page.
-    Open(usize),
-    /// Begin.
+    /// Begin the task.
     Begin,
-}
-
-/// Text and button that are shown before there are results.
-#[derive(Clone, Copy, Debug)]
-pub struct Invitation<'a> {
-    /// What there will be, or the reason why there is nothing.
-    pub text: &'a str,
-    /// Text of the button.
-    pub button: &'a str,
-    /// True if the work can begin.
-    pub is_possible: bool,
-}
-
-impl Invitation<'_> {
-    /// Shows it in the middle of a card.
-    pub fn ui(self, ui: &mut Ui) -> Option<Wish> {
-        invitation_ui(ui, self.text, self.button, self.is_possible).then_some(Wish::Begin)
-    }
-}
-
-/// Shows a report in the remaining space: title, conditions and table above, figure and notes below; notes without a table
-/// fill it. `tools_ui` adds to the title line, from right to left; `invitation` takes the place of the notes.
-pub fn report_ui(
-    ui: &mut Ui,
-    report: &Report,
-    look: &mut Look,
-    colours: SequentialMap,
-    invitation: Option<Invitation<'_>>,
-    tools_ui: impl FnOnce(&mut Ui),
-) -> Option<Wish> {
-    look.page = look.page.min(report.pages.len().saturating_sub(1));
-    let page = report.pages.get(look.page)?;
-    let whole = ui.available_rect_before_wrap();
-    let has_table = !page.table.columns.is_empty();
-    let has_aside = invitation.is_some() || !page.notes.is_empty();
-    let height = match (has_table, page.figure.is_some() || has_aside) {
-        (true, true) => (space(6) * page.rows.len() as f32 + space(28)).min(0.53 * whole.height()),
-        (false, true) => space(18),
-        (_, false) => whole.height(),
-    };
-    let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + height.round());
-    let lower = lower.with_min_y(lower.min.y + space(2));
-    let share = match (page.figure.is_some(), has_aside) {
-        (true, true) => 0.62,
-        (true, false) => 1.0,
-        (false, _) => 0.0,
-    };
-    let (left, right) = lower.split_left_right_at_x(lower.left() + (share * lower.width()).round());
-    let mut wish = None;
-    card_ui(ui, upper, |ui| {
-        head_ui(ui, report, look, tools_ui);
-        dim_ui(ui, &report.conditions);
-        if has_table {
-            wish = table_ui(ui, page, look);
-        }
-    });
-    if let Some(figure) = &page.figure {
-        card_ui(ui, left, |ui| {
-            wish = figure_ui(ui, &report.headline, page, figure, look, colours).or(wish);
-        });
-    }
-    if has_aside {
-        let gap = if share > 0.0 { space(2) } else { 0.0 };
-        card_ui(ui, right.with_min_x(right.min.x + gap), |ui| match invitation {
-            Some(invitation) => wish = invitation.ui(ui).or(wish),
-            None => scrolled_ui(ui, "notes", |ui| notes_ui(ui, page, look)),
-        });
-    }
-    ui.allocate_rect(whole, Sense::hover());
-    wish
-}
-
-/// Shows the title, and the choice of the page if there are several.
-fn head_ui(ui: &mut Ui, report: &Report, look: &mut Look, tools_ui: impl FnOnce(&mut Ui)) {
-    ui.horizontal(|ui| {
-        ui.set_min_height(space(7));
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            tools_ui(ui);
-            let names = report.pages.iter().map(|page| page.name.as_str()).enumerate();
-            let names = Vec::from_iter(names.filter(|(_, name)| !name.is_empty()));
-            if !names.is_empty() {
-                let picked = segmented_ui(ui, "Displayed noise level", &names, look.page, false);
-                if let Some(page) = picked {
-                    (look.page, look.marked) = (page, None);
-                }
-                dim_ui(ui, "Noise");
-            }
-            let heading = RichText::new(&report.headline).font(semibold(type_size().title));
-            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                ui.add(Label::new(heading).truncate())
-            });
-        });
-    });
+    /// Open this item of the page in the Train view.
+    Open(usize),
+    /// Show the sweep folder no more.
+    CloseFolder,
 }
 
 /// Shows the table. A click marks a row; returns the one opened by a double click.
-fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) -> Option<Wish> {
+pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) -> Option<Wish> {
     let palette = &Theme::of(ui).palette;
     let table = &page.table;
     let titles = Vec::from_iter(table.columns.iter().map(|column| column.title()));
@@ -303,21 +200,14 @@ fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) -> Option<Wish> {
 }
 
 /// Shows the figure. A click on a cell of a map marks it and a double click opens it; a click on a point opens it.
-fn figure_ui(
-    ui: &mut Ui,
-    headline: &str,
-    page: &Page,
-    figure: &Figure,
-    look: &mut Look,
-    colours: SequentialMap,
-) -> Option<Wish> {
+pub fn figure_ui(ui: &mut Ui, page: &Page, look: &mut Look, colours: SequentialMap) -> Option<Wish> {
     if page.rows.is_empty() {
         placeholder_ui(ui, "The points appear here as they are measured.");
         return None;
     }
-    match figure {
+    match page.figure.as_ref()? {
         Figure::HeatMap(map) => {
-            let columns = map.columns.len().max(1);
+            let columns = map.columns.len();
             let marked = look.marked.map(|cell| [cell / columns, cell % columns]);
             let map = (**map).clone().coloured(colours);
             let ([row, column], pointed) = heat_map_ui(ui, &map, marked)?;
@@ -332,7 +222,7 @@ fn figure_ui(
                 Pointer::Picks
             };
             let mut wish = None;
-            for (number, drawn) in plots_ui(ui, headline, plots, pointer).iter().enumerate() {
+            for (number, drawn) in plots_ui(ui, page.what, plots, pointer).iter().enumerate() {
                 for (item, point) in page.points.iter().enumerate() {
                     let Some(&(quantity, [x, y])) = point.places.get(number) else {
                         continue;
@@ -372,7 +262,7 @@ fn point_ui(ui: &mut Ui, point: &Point, quantity: &str, at: Pos2, is_marked: boo
 }
 
 /// Shows the notes, and the facts of the marked item.
-fn notes_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
+pub fn notes_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
     let palette = Theme::of(ui).palette;
     let coloured_ui = |ui: &mut Ui, text: &str, colour: Color32| {
         ui.label(RichText::new(text).size(type_size().note).color(colour));
@@ -388,7 +278,10 @@ fn notes_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
             Note::Pick(item, text) => {
                 let shown = RichText::new(text).size(type_size().note).color(palette.accent);
                 let pick = ui.selectable_label(look.marked == Some(*item), shown);
-                if pick.on_hover_text("Click to mark it in the figure and the table.").clicked() {
+                if pick
+                    .on_hover_text("Click to mark it in the figure and the table.")
+                    .clicked()
+                {
                     look.marked = Some(*item);
                 }
             }

@@ -24,18 +24,16 @@ use decoupler_core::{
     training::{Method, StoppingRules},
 };
 use decoupler_files::{
-    export::{NetworkFile, format_percent, trade_off_summary},
-    figure::{
-        Ink, TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure,
-    },
+    export::{NetworkFile, Table, format_percent, trade_off_points, trade_off_summary},
+    figure::{Ink, TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure},
     import::{Plan, Recorded, Setup, SetupSets},
     machine::memory_budget,
 };
 use eframe::egui::Ui;
 
-use super::{Note, Page, Point, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, topic::read};
+use super::{Note, Outcome, Page, Point, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList};
 use crate::window::{
-    shared::{DecoderSource, NetworkSource, sentence},
+    shared::{Effect, NetworkSource, sentence},
     widgets::{
         dim_ui,
         fields::{count_ui, quantity_ui},
@@ -88,11 +86,23 @@ impl Default for SpeedForm {
 }
 
 impl SpeedForm {
-    /// Returns the task on the source of `base`.
+    /// Returns the task on the source of `base`, which measures only while it `is_quiet`.
     ///
     /// # Errors
     /// If the form is not a valid measurement.
-    pub fn task(&self, base: &Setup) -> Result<Task, String> {
+    pub fn task(&self, base: &Setup, is_quiet: &Arc<AtomicBool>) -> Result<Task, String> {
+        let plan = self.plan(base)?;
+        let outcome = Box::new(SpeedOutcome::new(&plan));
+        let is_quiet = Arc::clone(is_quiet);
+        Ok(Task {
+            size: counted(plan.points(), "point"),
+            outcome,
+            setup: None,
+            run: Box::new(move |reporter| measure(&plan, &is_quiet, reporter)),
+        })
+    }
+
+    fn plan(&self, base: &Setup) -> Result<SpeedPlan, String> {
         let has_sensor = base.settings().simulation().is_some();
         let chosen = DecoderKind::ALL.into_iter().zip(self.decoders);
         let chosen = chosen.filter(|(kind, is_chosen)| *is_chosen && (has_sensor || !kind.needs_sensor()));
@@ -110,13 +120,15 @@ impl SpeedForm {
             Value::Integer(hidden) => usize::try_from(hidden).ok(),
             _ => None,
         });
-        let hidden = hidden.collect();
-        let plan = SpeedPlan { runs, hidden };
+        let plan = SpeedPlan {
+            runs,
+            hidden: hidden.collect(),
+        };
         match plan.points() {
             points if points > MAX_POINTS => Err(format!(
                 "{points} points are too many to display: give fewer values, at most {MAX_POINTS} points"
             )),
-            _ => Ok(Task::Speed(plan)),
+            _ => Ok(plan),
         }
     }
 
@@ -272,7 +284,13 @@ impl SpeedForm {
                 count_ui(ui, "Maximum samples", hint, &mut self.samples, 1..=LARGEST_SAMPLES);
             }
             let hint = "Largest number of epochs per training.";
-            count_ui(ui, "Maximum epochs", hint, &mut self.epochs, 1..=StoppingRules::MAX_EPOCHS);
+            count_ui(
+                ui,
+                "Maximum epochs",
+                hint,
+                &mut self.epochs,
+                1..=StoppingRules::MAX_EPOCHS,
+            );
         }
         if is_array {
             let hint = "Number of samples on which the errors are measured.";
@@ -294,32 +312,32 @@ pub fn limits_ui(ui: &mut Ui, limits: &mut TradeOffLimits) {
 }
 
 /// Plan of a measurement.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SpeedPlan {
+#[derive(Clone, Debug)]
+struct SpeedPlan {
     /// Runs that fit the decoders, level by level.
-    pub runs: Vec<PlannedRun>,
+    runs: Vec<PlannedRun>,
     /// Numbers of hidden nodes of the networks.
-    pub hidden: Vec<usize>,
+    hidden: Vec<usize>,
 }
 
 /// A run that fits decoders.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PlannedRun {
+#[derive(Clone, Debug)]
+struct PlannedRun {
     /// Index of its noise level, or 0 for a recording.
-    pub level: usize,
+    level: usize,
     /// Relative noise of a reading, if it is simulated.
-    pub noise: Option<f64>,
+    noise: Option<f64>,
     /// Preset from which its settings were derived, if any.
-    pub preset: Option<Preset>,
+    preset: Option<Preset>,
     /// Setup, except for the hidden nodes.
-    pub setup: Setup,
+    setup: Setup,
     /// Decoders to be measured.
-    pub decoders: Vec<DecoderKind>,
+    decoders: Vec<DecoderKind>,
 }
 
 impl SpeedPlan {
     /// Returns the number of points.
-    pub fn points(&self) -> usize {
+    fn points(&self) -> usize {
         let of_decoder = |kind: &DecoderKind| {
             let networks = if kind.needs_network() { self.hidden.len() } else { 1 };
             networks * kind.precisions().len()
@@ -332,10 +350,7 @@ impl SpeedPlan {
 const WAIT: Duration = Duration::from_millis(50);
 
 /// Measures run by run, and reports each point as it is measured; waits unless it `is_quiet`.
-///
-/// # Errors
-/// If the samples cannot be drawn or read, or a network cannot be trained on them.
-pub fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Result<(), String> {
+fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Result<(), String> {
     // Asked before every epoch and every decoder, outside the times that are measured.
     let is_cancelled = || {
         while !is_quiet.load(Ordering::Relaxed) && !reporter.is_cancelled() {
@@ -355,16 +370,14 @@ pub fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> 
             // The samples of a recording are read only once.
             Some((of, sets)) if of.plan().is_some() && of.plan() == run.setup.plan() => sets,
             _ => {
-                let on_progress = &mut |progress| read(reporter, progress);
+                let on_progress = &mut |progress| reporter.progress(StudyEvent::Reading(progress), |_, _| ());
                 let sets = run.setup.sets(Path::new(""), &job, on_progress);
                 sets.map_err(|error| error.to_string())?
             }
         };
         let recorded = sets.recorded();
-        reporter.send(StudyEvent::Samples {
-            decoded: decoded_unit(&sets.sets.test),
-            recorded: recorded.cloned().map(Box::new),
-        });
+        let unit = decoded_unit(&sets.sets.test);
+        reporter.send(StudyEvent::Samples(unit, recorded.cloned().map(Box::new)));
         // Several decoders share a network.
         let mut last_file: Option<Arc<NetworkFile>> = None;
         let on_point = |kind, point, trained: Option<&Run>| {
@@ -392,23 +405,22 @@ pub fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> 
 
 /// Points measured so far.
 #[derive(Debug)]
-pub struct SpeedOutcome {
+struct SpeedOutcome {
     plan: SpeedPlan,
     /// One for each noise level, or a single one for a recording.
-    pub levels: Vec<TradeOffLevel>,
+    levels: Vec<TradeOffLevel>,
     /// For each point of each level, the number of its run, and the file of its network if it has one.
     origins: Vec<Vec<(usize, Option<Arc<NetworkFile>>)>>,
     /// Decoders that cannot be used, each with the number of its run and the reason.
     refused: Vec<(usize, String)>,
     /// Unit that is decoded at a time, such as "a sample", once it is known.
-    pub decoded: String,
+    unit: String,
     /// Origin of the samples of a recording, once they are read.
-    pub recorded: Option<Box<Recorded>>,
+    recorded: Option<Box<Recorded>>,
 }
 
 impl SpeedOutcome {
-    /// Creates an outcome without points.
-    pub fn new(plan: &SpeedPlan) -> Self {
+    fn new(plan: &SpeedPlan) -> Self {
         let mut levels: Vec<TradeOffLevel> = Vec::new();
         for run in &plan.runs {
             if run.level == levels.len() {
@@ -423,92 +435,38 @@ impl SpeedOutcome {
             levels,
             plan: plan.clone(),
             refused: Vec::new(),
-            decoded: String::new(),
+            unit: String::new(),
             recorded: None,
         }
     }
 
-    /// Adds a point of a run, with the file of its network if it has one.
-    pub fn record(&mut self, run: usize, point: TradeOffPoint, file: Option<Arc<NetworkFile>>) {
-        let level = self.plan.runs[run].level;
-        self.levels[level].points.push(point);
-        self.origins[level].push((run, file));
-    }
-
-    /// Adds the reason why a decoder cannot be used with the samples of a run.
-    pub fn refuse(&mut self, run: usize, reason: String) {
-        self.refused.push((run, reason));
-    }
-
-    /// Returns the number of points measured or refused, and the number of planned points.
-    pub fn points(&self) -> (usize, usize) {
-        let measured: usize = self.levels.iter().map(|level| level.points.len()).sum();
-        (measured + self.refused.len(), self.plan.points())
-    }
-
     /// Returns the setup with which a point was measured.
-    pub fn setup_of(&self, level: usize, point: usize) -> Option<Setup> {
+    fn setup_of(&self, level: usize, point: usize) -> Option<Setup> {
         let (run, _) = self.origins.get(level)?.get(point)?;
         let point = &self.levels[level].points[point];
         Some(self.plan.runs[*run].setup.with_settings(point.settings))
     }
 
-    /// Returns the decoder of a point, and the samples and the network from which it can be exported.
-    pub fn decoder_of(&self, level: usize, point: usize) -> Option<(DecoderKind, DecoderSource)> {
-        let setup = self.setup_of(level, point)?;
-        let (_, file) = &self.origins[level][point];
-        let point = &self.levels[level].points[point];
-        let source = match file {
-            Some(file) => DecoderSource::Run(NetworkSource::Kept(point_name(point), Arc::clone(file))),
-            None => DecoderSource::Samples(Box::new(setup), self.recorded.clone()),
-        };
-        Some((point.report.kind, source))
-    }
-
-    /// Returns the report of the points so far.
-    pub fn report(&self, limits: &TradeOffLimits) -> Report {
-        let source = self.plan.runs.first().map(|run| run.setup.source_name());
-        let unit = match &*self.decoded {
-            "" => String::new(),
-            unit => format!(", times of {unit}"),
-        };
-        let source = source.unwrap_or_default();
-        Report {
-            headline: "Speed against accuracy".to_owned(),
-            conditions: format!("{source}, one thread, median of many{unit}"),
-            pages: (0..self.levels.len()).map(|level| self.page(level, limits)).collect(),
-        }
-    }
-
     fn page(&self, number: usize, limits: &TradeOffLimits) -> Page {
         let level = &self.levels[number];
         let table = trade_off_summary(level);
-        let points = level.points.iter().map(|point| {
-            let [decoding, training] = TradeOffCost::ALL.map(|cost| cost.of(point).into());
-            let mut facts = point_facts(point);
-            let samples = point.settings.simulation().map(|array| counted(array.samples, "training sample"));
-            let epochs = counted(point.settings.training.stopping.epochs, "epoch");
-            facts.extend(samples.into_iter().chain([format!("at most {epochs}")]));
-            Point {
-                name: point_name(point),
-                facts,
-                places: [("Decoding", decoding), ("Training", training)],
-            }
-        });
         Page {
             name: level.noise.map_or_else(String::new, noise_name),
             what: "Point",
             rows: rows(level, table.columns.len()),
             table,
             figure: Some(trade_off_figure(level, limits).into()),
-            points: points.collect(),
+            points: level.points.iter().map(point).collect(),
             notes: self.notes(number, limits),
         }
     }
 
     fn notes(&self, number: usize, limits: &TradeOffLimits) -> Vec<Note> {
         let level = &self.levels[number];
-        let refused = self.refused.iter().filter(|(run, _)| self.plan.runs[*run].level == number);
+        let refused = self
+            .refused
+            .iter()
+            .filter(|(run, _)| self.plan.runs[*run].level == number);
         let mut notes = Vec::from_iter(refused.map(|(_, reason)| Note::Warning(sentence(reason))));
         notes.push(Note::Heading("Recommended decoders"));
         let questions = [
@@ -516,15 +474,14 @@ impl SpeedOutcome {
             ("Most accurate", "No measured decoder is this fast."),
         ];
         for ((question, none), answer) in questions.into_iter().zip(level.answers(limits)) {
-            notes.push(match answer {
-                Some(answer) => {
-                    let point = &level.points[answer];
-                    let (percent, time) = (point.report.errors.percent(), frame_time(point.report.frame_us));
-                    let (name, percent) = (point_name(point), format_percent(percent));
-                    Note::Pick(answer, format!("{question}: {name}, {percent}, {time}"))
-                }
-                None => Note::Dim(none.to_owned()),
-            });
+            let Some(answer) = answer else {
+                notes.push(Note::Dim(none.to_owned()));
+                continue;
+            };
+            let point = &level.points[answer];
+            let (percent, time) = (point.report.errors.percent(), frame_time(point.report.frame_us));
+            let (name, percent) = (point_name(point), format_percent(percent));
+            notes.push(Note::Pick(answer, format!("{question}: {name}, {percent}, {time}")));
         }
         let hint = "Click a row of the table to mark its point, or a point of a chart to open it in the Train view.";
         notes.push(Note::Dim(hint.to_owned()));
@@ -532,33 +489,92 @@ impl SpeedOutcome {
     }
 }
 
+impl Outcome for SpeedOutcome {
+    fn take(&mut self, event: StudyEvent) {
+        match event {
+            StudyEvent::Samples(unit, recorded) => (self.unit, self.recorded) = (unit, recorded),
+            StudyEvent::Point(run, point, file) => {
+                let level = self.plan.runs[run].level;
+                self.levels[level].points.push(*point);
+                self.origins[level].push((run, file));
+            }
+            StudyEvent::Refused(run, reason) => self.refused.push((run, reason)),
+            _ => {}
+        }
+    }
+
+    fn parts(&self) -> (usize, usize, &'static str) {
+        let measured: usize = self.levels.iter().map(|level| level.points.len()).sum();
+        (measured + self.refused.len(), self.plan.points(), "point")
+    }
+
+    fn report(&self, limits: &TradeOffLimits) -> Report {
+        let source = self.plan.runs.first().map(|run| run.setup.source_name());
+        let (source, unit) = (source.unwrap_or_default(), &self.unit);
+        Report {
+            headline: "Speed against accuracy".to_owned(),
+            conditions: format!("{source}, one thread, median of many times of {unit}"),
+            pages: (0..self.levels.len()).map(|level| self.page(level, limits)).collect(),
+        }
+    }
+
+    fn open(&self, level: usize, point: usize) -> Vec<Effect> {
+        let setup = self.setup_of(level, point).map(Box::new);
+        Vec::from_iter(setup.map(Effect::TakeSetup))
+    }
+
+    fn decoder(&self, level: usize, point: usize) -> Option<(DecoderKind, NetworkSource)> {
+        let setup = self.setup_of(level, point)?;
+        let (_, file) = &self.origins[level][point];
+        let point = &self.levels[level].points[point];
+        let source = match file {
+            Some(file) => NetworkSource::Kept(point_name(point), Arc::clone(file)),
+            None => NetworkSource::Samples(Box::new(setup), self.recorded.clone()),
+        };
+        Some((point.report.kind, source))
+    }
+
+    fn tables(&self) -> Vec<(&'static str, Box<dyn Fn() -> Table + '_>)> {
+        vec![("All points", Box::new(|| trade_off_points(&self.levels)))]
+    }
+}
+
 /// Returns the rows of the table of a level, fastest first.
 fn rows(level: &TradeOffLevel, columns: usize) -> Vec<Row> {
     let [decoding, training] = TradeOffCost::ALL.map(|cost| level.front(cost));
-    let time = |place: &usize| level.points[*place].report.frame_us;
+    let time = |item: usize| level.points[item].report.frame_us;
     let mut order = Vec::from_iter(0..level.points.len());
-    order.sort_by(|a, b| time(a).total_cmp(&time(b)));
+    order.sort_by(|&a, &b| time(a).total_cmp(&time(b)));
     let row = |item: usize| {
-        let point = &level.points[item];
-        let is_chosen = decoding[item] || training[item];
-        let mut tones = vec![if is_chosen { Tone::Usual } else { Tone::Dim }; columns];
+        let of_cost = |is_on_front| if is_on_front { Tone::Own } else { Tone::Usual };
+        let mut tones = vec![Tone::Usual; columns];
         // The last columns are the costs.
-        for (place, is_on_front) in [(columns - 2, decoding[item]), (columns - 1, training[item])] {
-            if is_on_front {
-                tones[place] = Tone::Own;
-            }
-        }
-        if is_chosen {
-            tones[0] = Tone::Strong;
-        }
+        tones[columns - 2..].copy_from_slice(&[decoding[item], training[item]].map(of_cost));
         Row {
-            dot: Some(Ink::of_decoder(point.report.kind)),
+            item,
+            name: point_name(&level.points[item]),
             meaning: "A blue time is on the Pareto front: no other point has as small an error in as little time.",
+            dot: Some(Ink::of_decoder(level.points[item].report.kind)),
             tones,
-            ..Row::new(item, point_name(point))
         }
     };
     order.into_iter().map(row).collect()
+}
+
+fn point(point: &TradeOffPoint) -> Point {
+    let [decoding, training] = TradeOffCost::ALL.map(|cost| cost.of(point).into());
+    let mut facts = point_facts(point);
+    let samples = point
+        .settings
+        .simulation()
+        .map(|array| counted(array.samples, "training sample"));
+    let epochs = counted(point.settings.training.stopping.epochs, "epoch");
+    facts.extend(samples.into_iter().chain([format!("at most {epochs}")]));
+    Point {
+        name: point_name(point),
+        facts,
+        places: [("Decoding", decoding), ("Training", training)],
+    }
 }
 
 /// Returns a noise level as it would be typed.
@@ -567,5 +583,100 @@ fn noise_name(noise: f64) -> String {
         noise.to_string()
     } else {
         format!("{noise:e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use decoupler_core::scene::{RowModel, Rows};
+
+    use super::*;
+
+    fn plan(form: &SpeedForm, base: impl Into<Setup>) -> SpeedPlan {
+        form.plan(&base.into()).unwrap()
+    }
+
+    /// The settings of the run of a preset at a level.
+    fn settings(plan: &SpeedPlan, level: usize, preset: Preset) -> RunSettings {
+        let mut runs = plan.runs.iter();
+        let run = runs.find(|run| (run.level, run.preset) == (level, Some(preset)));
+        *run.unwrap().setup.settings()
+    }
+
+    #[test]
+    fn the_default_form_is_a_quick_look_at_all_decoders() {
+        let plan = plan(&SpeedForm::default(), RunSettings::default());
+        // Five without a network, then two sizes with two precisions and polish.
+        assert_eq!(plan.points(), 4 * 2 * (5 + 2 * 3));
+        let best = settings(&plan, 2, Preset::Best);
+        let simulation = best.simulation().unwrap();
+        assert_eq!((simulation.samples, best.training.stopping.epochs), (2000, 60));
+        let scene = simulation.scene;
+        assert_eq!((scene.rows, scene.noise.relative), (Rows::Known, 1e-3));
+    }
+
+    #[test]
+    fn a_full_measurement_uses_the_presets_in_the_current_scene() {
+        let mut base = RunSettings::default();
+        base.simulation_mut().unwrap().scene.largest_compression = 0.1;
+        base.simulation_mut().unwrap().sensor.geometry.height_mm = 4.0;
+        let form = SpeedForm {
+            is_full: true,
+            preset: Some(Preset::Best),
+            ..SpeedForm::default()
+        };
+        let (settings, preset) = (settings(&plan(&form, base), 0, Preset::Best), Preset::Best.settings());
+        let (simulation, of_preset) = (settings.simulation().unwrap(), preset.simulation().unwrap());
+        assert_eq!(
+            (simulation.samples, settings.training),
+            (of_preset.samples, preset.training)
+        );
+        assert_eq!(simulation.sensor, base.simulation().unwrap().sensor);
+        assert_eq!(simulation.scene.largest_compression, 0.1);
+    }
+
+    #[test]
+    fn each_method_trains_its_networks_and_other_decoders_are_measured_once() {
+        let base = RunSettings::measured(RowModel::Shared);
+        let recording = |plan: &Plan| Setup::recording(base, plan.clone());
+        let of = plan(&SpeedForm::default(), recording(&Plan::default()));
+        // Mean, ridge, radial basis and fuzzy rules once; two methods with two sizes in two precisions.
+        assert_eq!(of.points(), 4 + 2 * 2 * 2);
+        assert!(of.runs.iter().all(|run| run.noise.is_none()), "no noise is simulated");
+        let mut all = of.runs.iter().flat_map(|run| &run.decoders);
+        assert!(all.all(|kind| !kind.needs_sensor()));
+        let held_out = |plan: &SpeedPlan| {
+            let held_out = plan.runs.iter().map(|run| {
+                let settings = run.setup.settings();
+                assert_eq!(settings.training.stopping.epochs, 60);
+                let held_out = run.setup.plan().unwrap().division.validation_fraction;
+                (settings.training.method.short_name(), held_out.unwrap())
+            });
+            Vec::from_iter(held_out)
+        };
+        assert_eq!(held_out(&of), [("br", 0.0), ("lm", 0.2)]);
+        // A share set by the user applies to every method.
+        let mut chosen = Plan::default();
+        chosen.division.validation_fraction = Some(0.3);
+        let of = plan(&SpeedForm::default(), recording(&chosen));
+        assert_eq!(held_out(&of), [("br", 0.3), ("lm", 0.3)]);
+    }
+
+    #[test]
+    fn invalid_forms_give_a_reason() {
+        let error = |change: fn(&mut SpeedForm)| {
+            let mut form = SpeedForm::default();
+            change(&mut form);
+            form.plan(&RunSettings::default().into()).unwrap_err()
+        };
+        assert!(error(|form| form.noises.values = "0, much".to_owned()).contains("'much' is not a number"));
+        assert!(error(|form| form.noises.values = "2".to_owned()).contains("give from 0 to 1"));
+        assert!(error(|form| form.noises.values = " , ".to_owned()).contains("there are no values"));
+        assert!(error(|form| form.decoders.fill(false)).contains("choose at least one"));
+        let many = error(|form| {
+            let many = (1..=200).map(|hidden| hidden.to_string());
+            form.hidden.values = Vec::from_iter(many).join(" ");
+        });
+        assert!(many.contains("give fewer values"));
     }
 }

@@ -11,13 +11,13 @@ use std::{
 };
 
 use decoupler_core::text::counted;
-use decoupler_files::export::{Cell, MergedSweep, SweepFiles, SweepRow, Table};
+use decoupler_files::export::{Cell, MergedSweep, SweepFiles, Table};
 use serde_json::Value;
 
 use super::{Note, Page, Report, Row, Tone};
 use crate::window::{
     job::{self, Background, Wake},
-    shared::{FileTask, FileWords, Purpose},
+    shared::{FileTask, FileWords},
 };
 
 const FOLDER: FileWords = FileWords {
@@ -38,6 +38,9 @@ pub struct SweepFolder {
     chosen: Receiver<PathBuf>,
 }
 
+/// The report of a changed folder, or the reason why the folder is no longer read.
+type FolderEvent = Result<Option<Report>, String>;
+
 impl SweepFolder {
     /// Shows no folder; `wake` is called when a folder has changed.
     pub fn new(wake: &Wake) -> Self {
@@ -53,11 +56,7 @@ impl SweepFolder {
 
     /// Asks for a folder.
     pub fn choose(&self) -> FileTask {
-        FileTask {
-            words: FOLDER,
-            suggestion: String::new(),
-            purpose: Purpose::Choose(self.choices.clone()),
-        }
+        FileTask::choose(FOLDER, "", self.choices.clone())
     }
 
     /// Shows no folder any more.
@@ -71,7 +70,7 @@ impl SweepFolder {
         while let Ok(path) = self.chosen.try_recv() {
             let (watched, open) = channel();
             self.watched = Some(watched);
-            self.shown = Some(report(&path, "Reading the folder…".to_owned(), Page::default()));
+            self.shown = Some(report(&path, "Reading the folder…", Page::default()));
             self.job.start(
                 move |reporter| watch(&path, &open, reporter),
                 |ended| ended.map(|()| None).map_err(|error| error.to_string()),
@@ -94,11 +93,11 @@ fn failed(reason: String) -> Page {
     }
 }
 
-fn report(path: &Path, conditions: String, page: Page) -> Report {
+fn report(path: &Path, conditions: &str, page: Page) -> Report {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     Report {
         headline: format!("Sweep folder {name}"),
-        conditions,
+        conditions: conditions.to_owned(),
         pages: vec![page],
     }
 }
@@ -107,9 +106,6 @@ fn report(path: &Path, conditions: String, page: Page) -> Report {
 const BETWEEN_LOOKS: Duration = Duration::from_secs(1);
 /// Ratio of the pause between reads to the time of a read, so that a large folder does not keep the disk busy.
 const REST: u32 = 10;
-
-/// The report of a changed folder, or the reason why the folder is no longer read.
-type FolderEvent = Result<Option<Report>, String>;
 
 /// Reads the folder at `path` whenever its files change, until the other end of `open` is gone.
 fn watch(path: &Path, open: &Receiver<()>, reporter: &job::Report<FolderEvent>) {
@@ -123,8 +119,12 @@ fn watch(path: &Path, open: &Receiver<()>, reporter: &job::Report<FolderEvent>) 
                 merged.map_err(|error| error.to_string())
             });
             let shown = match merged {
-                Ok(merged) => report(path, conditions(&merged), page(&merged)),
-                Err(reason) => report(path, String::new(), failed(reason)),
+                Ok(merged) => {
+                    let (finished, begun) = (counted(merged.trials.len(), "trial"), merged.missing.len());
+                    let text = format!("{finished} finished, {begun} begun. New trials appear here automatically.");
+                    report(path, &text, page(&merged))
+                }
+                Err(reason) => report(path, "", failed(reason)),
             };
             // Only the newest of the reports not yet received is needed.
             reporter.progress(Ok(Some(shown)), |_, _| ());
@@ -137,105 +137,75 @@ fn watch(path: &Path, open: &Receiver<()>, reporter: &job::Report<FolderEvent>) 
     }
 }
 
-fn conditions(merged: &MergedSweep) -> String {
-    format!(
-        "{} finished, {} begun. New trials appear here automatically.",
-        counted(merged.trials.len(), "trial"),
-        merged.missing.len()
-    )
-}
-
-/// Results of a trial: heading, place in its report and, for a list of targets, the field whose mean over the targets
-/// is shown.
-type ResultColumn = (&'static str, &'static str, Option<&'static str>);
-
-/// Results on an array.
-const ON_NODES: [ResultColumn; 4] = [
-    ("Z %", "/errors/z_percent", None),
-    ("X %", "/errors/x_percent", None),
-    ("linear map Z %", "/baselines/linear/z_percent", None),
-    ("epochs", "/epochs", None),
+/// Results of a trial, on an array or on a recording: heading, place in its report and, for a list of targets, the field
+/// whose mean over the targets is shown.
+const RESULTS: [(&str, &str, &str); 7] = [
+    ("Z %", "/errors/z_percent", ""),
+    ("X %", "/errors/x_percent", ""),
+    ("linear map Z %", "/baselines/linear/z_percent", ""),
+    ("error %", "/targets", "percent_of_range"),
+    ("R²", "/targets", "r2"),
+    ("ridge %", "/baselines/ridge", "percent_of_range"),
+    ("epochs", "/epochs", ""),
 ];
-
-/// Results on a recording; the error is the mean absolute one in percent of the range.
-const ON_TARGETS: [ResultColumn; 4] = [
-    ("error %", "/targets", Some("percent_of_range")),
-    ("R²", "/targets", Some("r2")),
-    ("ridge %", "/baselines/ridge", Some("percent_of_range")),
-    ("epochs", "/epochs", None),
-];
-
-fn results_of(merged: &MergedSweep) -> Vec<ResultColumn> {
-    let is_recorded = |row: &&SweepRow| row.result.get("targets").is_some();
-    let recorded = merged.trials.iter().filter(is_recorded).count();
-    match recorded {
-        0 => ON_NODES.to_vec(),
-        _ if recorded == merged.trials.len() => ON_TARGETS.to_vec(),
-        _ => ON_NODES[..3].iter().chain(&ON_TARGETS).copied().collect(),
-    }
-}
 
 /// Maximum number of problems listed.
 const MAX_PROBLEMS: usize = 3;
 
-/// Returns the table of the trials, with the problems of the folder.
+/// Returns the table of the trials, with the options that differ and the results that there are, and the problems of the
+/// folder.
 fn page(merged: &MergedSweep) -> Page {
-    let options = varying(merged);
-    let results = results_of(merged);
-    let cells = |row: &SweepRow| {
-        let of_options = options.iter().map(|option| cell(row.options.get(option)));
-        let of_results = results.iter().map(|(_, place, field)| {
-            match (row.result.pointer(place), field) {
-                (Some(Value::Array(targets)), Some(field)) => mean(targets, field).into(),
-                (value, _) => cell(value),
-            }
+    let trials = &merged.trials;
+    let names: BTreeSet<&String> = trials.iter().flat_map(|row| row.options.keys()).collect();
+    let options = names.into_iter().map(|name| {
+        let cells = trials.iter().map(|row| cell(row.options.get(name)));
+        (name.as_str(), Vec::from_iter(cells))
+    });
+    let options = Vec::from_iter(options.filter(|(_, cells)| cells.iter().any(|cell| *cell != cells[0])));
+    let results = RESULTS.iter().map(|&(heading, place, field)| {
+        let cells = trials.iter().map(|row| match row.result.pointer(place) {
+            Some(Value::Array(targets)) => mean(targets, field).into(),
+            value => cell(value),
         });
-        let seconds = cell(row.time.get("seconds"));
-        Vec::from_iter(of_options.chain(of_results).chain([seconds]))
-    };
-    let headings = options.iter().map(String::as_str);
-    let headings = headings.chain(results.iter().map(|(heading, ..)| *heading)).chain(["seconds"]);
-    let table = Table::of_headings(headings, merged.trials.iter().map(cells));
-    let row = |(item, cells): (usize, &Vec<Cell>)| {
-        let named = options.iter().zip(cells);
-        let names = named.map(|(option, value)| format!("{option} {}", value.rounded()));
-        let mut tones = vec![Tone::Usual; cells.len()];
+        (heading, Vec::from_iter(cells))
+    });
+    let results = results.filter(|(_, cells)| cells.iter().any(|cell| cell.number().is_some()));
+    let seconds = trials.iter().map(|row| cell(row.time.get("seconds"))).collect();
+    let columns = options.iter().cloned().chain(results).chain([("seconds", seconds)]);
+    let columns = Vec::from_iter(columns);
+    let row = |item: usize| {
+        let named = options
+            .iter()
+            .map(|(name, cells)| format!("{name} {}", cells[item].rounded()));
+        let mut tones = vec![Tone::Usual; columns.len()];
         tones[..options.len()].fill(Tone::Strong);
         tones[options.len()] = Tone::Own;
         Row {
+            item,
+            name: Vec::from_iter(named).join(", "),
             tones,
-            ..Row::new(item, Vec::from_iter(names).join(", "))
+            ..Row::default()
         }
     };
     let conflicts = merged.conflicting.iter();
-    let conflicts =
-        conflicts.map(|files| format!("same options, different results: {files}; delete the wrong one"));
+    let conflicts = conflicts.map(|files| format!("same options, different results: {files}; delete the wrong one"));
     let problems = Vec::from_iter(merged.damaged.iter().cloned().chain(conflicts));
     let more = problems.len().saturating_sub(MAX_PROBLEMS);
     let mut notes = Vec::from_iter(problems.into_iter().take(MAX_PROBLEMS).map(Note::Warning));
     if more > 0 {
         notes.push(Note::Warning(format!("and {} more", counted(more, "problem"))));
     }
-    if merged.trials.is_empty() {
-        notes.push(Note::Dim("No trial has finished yet.".to_owned()));
-    }
+    let cells_of = |item: usize| columns.iter().map(|(_, cells)| cells[item].clone()).collect();
     Page {
         what: "Trial",
-        rows: table.rows.iter().enumerate().map(row).collect(),
-        table,
+        rows: (0..trials.len()).map(row).collect(),
+        table: Table::of_headings(
+            columns.iter().map(|(heading, _)| *heading),
+            (0..trials.len()).map(cells_of),
+        ),
         notes,
         ..Page::default()
     }
-}
-
-/// Returns the options that differ between trials.
-fn varying(merged: &MergedSweep) -> Vec<String> {
-    let names: BTreeSet<&String> = merged.trials.iter().flat_map(|row| row.options.keys()).collect();
-    let differs = |name: &&String| {
-        let mut values = merged.trials.iter().map(|row| row.options.get(*name));
-        values.next().is_some_and(|first| values.any(|value| value != first))
-    };
-    names.into_iter().filter(differs).cloned().collect()
 }
 
 /// Returns the mean of a field over the targets that have it.

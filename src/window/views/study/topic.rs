@@ -1,29 +1,28 @@
-//! The topics, with what each contributes to the one mechanism: form, task, outcome.
-
-use std::sync::{Arc, atomic::AtomicBool};
+use std::{
+    fmt::Debug,
+    sync::{Arc, atomic::AtomicBool},
+};
 
 use decoupler_core::{
+    decoupling::DecoderKind,
     evaluation::{
         TradeOffPoint,
-        experiments::{Experiment, Finished, PaperTable},
+        experiments::{Finished, PaperTable},
     },
     problem::Problem,
     text::counted,
 };
 use decoupler_files::{
-    export::{NetworkFile, Table, cells_table, trade_off_points, trials_table},
+    export::{NetworkFile, Table},
     figure::TradeOffLimits,
     import::{Progress, Recorded, Setup},
 };
 use eframe::egui::Ui;
 
-use super::{
-    ExperimentForm, ExperimentOutcome, Report, SpeedForm, SpeedOutcome, SpeedPlan, experiment,
-    readings::{self, MAX_FOLDS},
-    speed,
-};
+use super::{Report, experiment::ExperimentForm, readings, speed::SpeedForm};
 use crate::window::{
     job,
+    shared::{Effect, NetworkSource},
     widgets::{fields::count_ui, section_heading_ui},
 };
 
@@ -51,8 +50,6 @@ pub struct TopicWords {
     pub verb: &'static str,
     /// What it is about.
     pub meaning: &'static str,
-    /// What will be shown, before there is anything.
-    pub invitation: &'static str,
 }
 
 impl Topic {
@@ -94,94 +91,27 @@ impl Topic {
             Self::Speed => (
                 "Speed against accuracy",
                 "Measure",
-                "The error, the decoding time and the training time of every decoder, measured on this machine.",
+                "The error, the time for a frame and the training time of every decoder, for an array at several noise \
+                 levels, measured on this machine.",
             ),
             Self::Readings => (
                 "What the readings determine",
                 "Analyse",
-                "How well the readings of a recording determine each target, and channels without information; takes \
-                 seconds.",
+                "How well the readings of a recording determine each target: measured on held-out samples in seconds, \
+                 with confidence intervals of 95 % from independent stretches or groups of samples.",
             ),
             Self::Folds => (
                 "Cross-validation",
                 "Cross-validate",
-                "Every sample of a recording tested by networks trained on the other folds: one training per fold.",
+                "Every sample of a recording tested by a network trained on the other folds: one training per fold.",
             ),
         };
-        let invitation = match self {
-            Self::Table(_) | Self::Sweep => {
-                "Our figures appear next to the published ones as the trials finish."
-            }
-            Self::Speed => {
-                "The error, the time for a frame and the training time of every decoder, on an array at several noise \
-                 levels, measured on this machine."
-            }
-            Self::Readings => {
-                "How well the readings determine each target: measured on held-out samples, with confidence intervals of \
-                 95 % from independent stretches or groups of samples."
-            }
-            Self::Folds => "Tests on every sample and lists the held-out errors here.",
-        };
-        TopicWords {
-            name,
-            verb,
-            meaning,
-            invitation,
-        }
-    }
-
-    /// Returns the title of the results of an experiment.
-    pub fn heading(self) -> String {
-        match self {
-            Self::Table(table) => table.heading(),
-            Self::Sweep => "Sweep over two axes".to_owned(),
-            _ => self.words().name.to_owned(),
-        }
-    }
-
-    /// Returns the tables for programs of its results, each with its name and contents.
-    pub fn tables(self) -> &'static [(&'static str, &'static str, TableOf)] {
-        match self {
-            Self::Table(_) | Self::Sweep => &[
-                ("Every cell", "The values of every cell with every digit, as CSV.", every_cell),
-                ("Every trial", "Every trial with its seed and errors, as CSV.", every_trial),
-            ],
-            Self::Speed => &[(
-                "All points",
-                "Every point, of an array at every noise level, with every digit, as CSV.",
-                all_points,
-            )],
-            Self::Readings | Self::Folds => &[],
-        }
+        TopicWords { name, verb, meaning }
     }
 
     /// Returns true for topics about recordings.
     pub fn is_of_recordings(self) -> bool {
         matches!(self, Self::Readings | Self::Folds)
-    }
-}
-
-/// Makes a table of results.
-pub type TableOf = fn(&Outcome) -> Table;
-
-fn every_cell(outcome: &Outcome) -> Table {
-    match outcome {
-        Outcome::Experiment(outcome) => cells_table(&outcome.results),
-        _ => Table::default(),
-    }
-}
-
-fn every_trial(outcome: &Outcome) -> Table {
-    match outcome {
-        Outcome::Experiment(outcome) => trials_table(&outcome.results),
-        _ => Table::default(),
-    }
-}
-
-fn all_points(outcome: &Outcome) -> Table {
-    match outcome {
-        Outcome::Speed(outcome) => trade_off_points(&outcome.levels),
-        _ => Table::default(),
     }
 }
 
@@ -198,6 +128,9 @@ pub enum Form {
     Folds(usize),
 }
 
+/// Largest number of folds offered.
+const MAX_FOLDS: usize = 1000;
+
 impl Form {
     /// Returns the default form of a topic.
     pub fn new(topic: Topic) -> Self {
@@ -210,23 +143,35 @@ impl Form {
         }
     }
 
-    /// Returns the task of the form, checked as far as possible without beginning; `train` is the setup of the Train view.
+    /// Returns the task of the form, checked as far as possible without beginning. `train` is the setup of the Train view;
+    /// times are measured only while it `is_quiet`.
     ///
     /// # Errors
     /// If the form is not valid, or the Train view has no source; the message says what to do.
-    pub fn task(&self, train: &Result<Setup, String>) -> Result<Task, String> {
-        let recording = || {
-            let setup = train.clone()?;
-            let is_recording = setup.plan().is_some();
-            let advice = "choose Recording as the source in the Train view; the Sensor view shows it for a simulated array";
-            is_recording.then_some(setup).ok_or_else(|| format!("This is about a recording: {advice}."))
+    pub fn task(&self, train: &Result<Setup, String>, is_quiet: &Arc<AtomicBool>) -> Result<Task, String> {
+        let (setup, size) = match self {
+            Self::Experiment(form) => return form.task(),
+            Self::Speed(form) => return form.task(train.as_ref()?, is_quiet),
+            Self::Readings => (train.clone()?, String::new()),
+            Self::Folds(folds) => (train.clone()?, format!(", {}", counted(*folds, "training"))),
         };
-        match self {
-            Self::Experiment(form) => form.task(),
-            Self::Speed(form) => form.task(train.as_ref()?),
-            Self::Readings => Ok(Task::Readings(recording()?)),
-            Self::Folds(folds) => Ok(Task::Folds(recording()?, *folds)),
+        if setup.plan().is_none() {
+            return Err(
+                "This is about recordings: choose one as the source in the Train view. The Sensor view shows \
+                        what the readings of an array determine."
+                    .to_owned(),
+            );
         }
+        let (form, of) = (self.clone(), setup.clone());
+        Ok(Task {
+            size: format!("{}{size}", setup.source_name()),
+            outcome: Box::new(None::<Report>),
+            setup: Some(setup),
+            run: Box::new(move |reporter| match form {
+                Self::Folds(folds) => readings::cross_validate(&of, folds, reporter),
+                _ => readings::find(&of, reporter),
+            }),
+        })
     }
 
     /// Shows the fields.
@@ -236,7 +181,7 @@ impl Form {
             Self::Speed(form) => form.fields_ui(ui, train.as_ref().is_ok_and(|setup| setup.plan().is_none())),
             Self::Readings => {}
             Self::Folds(folds) => {
-                section_heading_ui(ui, "Cross-validation");
+                section_heading_ui(ui, "Folds");
                 let hint = "Number of parts. Each part is tested by networks trained on the other parts.";
                 count_ui(ui, "Folds", hint, folds, 2..=MAX_FOLDS);
             }
@@ -245,139 +190,87 @@ impl Form {
 }
 
 /// Work of a background job.
-#[derive(Clone, Debug)]
-pub enum Task {
-    /// Trials of an experiment, on the samples of a setup.
-    Experiment(Box<Experiment>, Setup),
-    /// Times and errors of decoders.
-    Speed(SpeedPlan),
-    /// Findings on a recording.
-    Readings(Setup),
-    /// A cross-validation with a number of folds.
-    Folds(Setup, usize),
-}
-
-impl Task {
-    /// Describes how much work it is.
-    pub fn size(&self) -> String {
-        match self {
-            Self::Experiment(experiment, _) => experiment::describe_size(experiment),
-            Self::Speed(plan) => counted(plan.points(), "point"),
-            Self::Readings(setup) => setup.source_name(),
-            Self::Folds(setup, folds) => format!("{}, {}", setup.source_name(), counted(*folds, "training")),
-        }
-    }
-
-    /// Does the work; measures times only while it `is_quiet`.
-    ///
-    /// # Errors
-    /// If the work cannot be done, with what to do.
-    pub fn run(self, is_quiet: &AtomicBool, reporter: &Reporter) -> Result<(), String> {
-        match self {
-            Self::Experiment(experiment, setup) => experiment::run(*experiment, &setup, reporter),
-            Self::Speed(plan) => speed::measure(&plan, is_quiet, reporter),
-            Self::Readings(setup) => readings::find(&setup, reporter),
-            Self::Folds(setup, folds) => readings::cross_validate(&setup, folds, reporter),
-        }
-    }
+pub struct Task {
+    /// How much work it is.
+    pub size: String,
+    /// The outcome without results.
+    pub outcome: Box<dyn Outcome>,
+    /// Setup of the recording, if it is about the one of the Train view.
+    pub setup: Option<Setup>,
+    /// Does the work, or says why that is not possible and what to do.
+    pub run: Box<dyn FnOnce(&Reporter) -> Result<(), String> + Send>,
 }
 
 /// Sending end of the events of a task.
-pub type Reporter = job::Report<StudyEvent>;
-
-/// Reports the progress of reading a file.
-pub fn read(reporter: &Reporter, progress: Progress) {
-    reporter.progress(StudyEvent::Reading(progress), |_, _| ());
-}
+pub(in crate::window) type Reporter = job::Report<StudyEvent>;
 
 /// Event of the newest task.
 #[derive(Debug)]
 pub enum StudyEvent {
     /// Progress of reading a file.
     Reading(Progress),
-    /// The files are read.
-    Read,
     /// A recording has been read, with these channels.
     Problem(Arc<Problem>),
     /// A trial has finished or failed.
     Trial(Box<Finished>),
-    /// The samples of a run are ready.
-    Samples {
-        /// Unit for which decoding is timed, such as "a sample".
-        decoded: String,
-        /// Origin of recorded samples.
-        recorded: Option<Box<Recorded>>,
-    },
+    /// The samples of a run are ready: the unit for which decoding is timed, such as "a sample", and the origin of recorded
+    /// ones.
+    Samples(String, Option<Box<Recorded>>),
     /// A point of a run is measured, with the file of its network if it has one.
     Point(usize, Box<TradeOffPoint>, Option<Arc<NetworkFile>>),
     /// A decoder cannot be used with the samples of a run, with the reason.
     Refused(usize, String),
-    /// The results of work that has none before its end.
+    /// Results of work that has none before its end.
     Report(Box<Report>),
     /// The work has ended, with the reason if it could not continue.
     Ended(Result<(), String>),
 }
 
 /// Results so far.
-#[derive(Debug)]
-pub enum Outcome {
-    /// Of a table or a sweep.
-    Experiment(ExperimentOutcome),
-    /// Of speed against accuracy.
-    Speed(SpeedOutcome),
-    /// Of work that has no results before its end.
-    Whole(Option<Report>),
+pub trait Outcome: Debug {
+    /// Adds what an event reports.
+    fn take(&mut self, event: StudyEvent);
+
+    /// Returns the numbers of finished and of planned parts, and the name of a part; no name for work without parts.
+    fn parts(&self) -> (usize, usize, &'static str);
+
+    /// Returns the results so far, with the decoders recommended within these limits.
+    fn report(&self, limits: &TradeOffLimits) -> Report;
+
+    /// Returns what opens an item of a page in the Train view.
+    fn open(&self, _page: usize, _item: usize) -> Vec<Effect> {
+        Vec::new()
+    }
+
+    /// Returns the decoder of an item, and what it is exported from.
+    fn decoder(&self, _page: usize, _item: usize) -> Option<(DecoderKind, NetworkSource)> {
+        None
+    }
+
+    /// Returns tables for programs, with their names.
+    fn tables(&self) -> Vec<(&'static str, Box<dyn Fn() -> Table + '_>)> {
+        Vec::new()
+    }
+
+    /// Returns the table with the settings behind it as Markdown, if there is one.
+    fn markdown(&self) -> Option<Vec<u8>> {
+        None
+    }
 }
 
-impl Outcome {
-    /// Creates an outcome without results.
-    pub fn new(task: &Task) -> Self {
-        match task {
-            Task::Experiment(experiment, setup) => Self::Experiment(ExperimentOutcome::new(experiment, setup)),
-            Task::Speed(plan) => Self::Speed(SpeedOutcome::new(plan)),
-            Task::Readings(_) | Task::Folds(..) => Self::Whole(None),
+/// Of work that has no results before its end.
+impl Outcome for Option<Report> {
+    fn take(&mut self, event: StudyEvent) {
+        if let StudyEvent::Report(report) = event {
+            *self = Some(*report);
         }
     }
 
-    /// Adds what an event reports.
-    pub fn take(&mut self, event: StudyEvent) {
-        match (self, event) {
-            (Self::Experiment(outcome), StudyEvent::Problem(problem)) => outcome.results.problem = Some(problem),
-            (Self::Experiment(outcome), StudyEvent::Trial(finished)) => outcome.record(*finished),
-            (Self::Speed(outcome), StudyEvent::Samples { decoded, recorded }) => {
-                (outcome.decoded, outcome.recorded) = (decoded, recorded);
-            }
-            (Self::Speed(outcome), StudyEvent::Point(run, point, file)) => outcome.record(run, *point, file),
-            (Self::Speed(outcome), StudyEvent::Refused(run, reason)) => outcome.refuse(run, reason),
-            (Self::Whole(whole), StudyEvent::Report(report)) => *whole = Some(*report),
-            _ => {}
-        }
+    fn parts(&self) -> (usize, usize, &'static str) {
+        (usize::from(self.is_some()), 1, "")
     }
 
-    /// Returns the numbers of finished and of planned parts, and the name of a part; none of work without parts.
-    pub fn parts(&self) -> Option<(usize, usize, &'static str)> {
-        let ((done, all), part) = match self {
-            Self::Experiment(outcome) => (outcome.trials(), "trial"),
-            Self::Speed(outcome) => (outcome.points(), "point"),
-            Self::Whole(_) => return None,
-        };
-        Some((done, all, part))
-    }
-
-    /// Returns true once there are results.
-    pub fn has_results(&self) -> bool {
-        match self {
-            Self::Whole(whole) => whole.is_some(),
-            _ => self.parts().is_some_and(|(done, ..)| done > 0),
-        }
-    }
-
-    /// Returns the report of the results so far; `limits` are those for the recommended decoders.
-    pub fn report(&self, topic: Topic, limits: &TradeOffLimits) -> Report {
-        match self {
-            Self::Experiment(outcome) => outcome.report(topic.heading()),
-            Self::Speed(outcome) => outcome.report(limits),
-            Self::Whole(whole) => whole.clone().unwrap_or_default(),
-        }
+    fn report(&self, _limits: &TradeOffLimits) -> Report {
+        self.clone().unwrap_or_default()
     }
 }

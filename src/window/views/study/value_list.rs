@@ -23,7 +23,7 @@ impl ValueList {
     pub fn new(kind: AxisKind) -> Self {
         Self {
             kind,
-            values: example(kind).to_owned(),
+            values: WORDS[kind as usize].1.to_owned(),
         }
     }
 
@@ -43,15 +43,11 @@ impl ValueList {
     pub fn parse(&self) -> Result<Axis, String> {
         let is_between = |letter: char| letter == ',' || letter == ';' || letter.is_whitespace();
         let words = self.values.split(is_between).filter(|word| !word.is_empty());
-        Axis::parse(self.kind, words).map_err(|error| {
-            let name = label(self.kind);
-            match (&error, self.kind.setting().kind) {
-                (SettingError::Text(_, message), Kind::Choice | Kind::Text) => format!("{name}: {message}"),
-                (SettingError::Text(_, message), _) => {
-                    format!("{name}: {message}; write a list such as {}", example(self.kind))
-                }
-                _ => error.to_string(),
-            }
+        let (name, example) = WORDS[self.kind as usize];
+        Axis::parse(self.kind, words).map_err(|error| match (&error, self.kind.setting().kind) {
+            (SettingError::Text(_, message), Kind::Choice | Kind::Text) => format!("{name}: {message}"),
+            (SettingError::Text(_, message), _) => format!("{name}: {message}; write a list such as {example}"),
+            _ => error.to_string(),
         })
     }
 
@@ -78,43 +74,30 @@ impl ValueList {
         let edit = TextEdit::multiline(&mut self.values)
             .desired_rows(1)
             .desired_width(f32::INFINITY)
-            .hint_text(example(self.kind))
+            .hint_text(WORDS[self.kind as usize].1)
             .margin(vec2(space(2), space(1)));
         ui.add(edit).labelled_by(label.id).on_hover_text(hint);
     }
 }
 
+/// Label and example of each list of values, in the order of [`AxisKind`].
+const WORDS: [(&str, &str); 11] = [
+    ("Hidden nodes", "6, 8, 10, 12"),
+    ("Array scales", "10×6_3×18, 10×8_4×24, 10×10_5×30"),
+    ("Samples", "100, 300, 1000"),
+    ("Noise levels", "0, 0.001, 0.01"),
+    ("Inputs", "resistance, conductance, log"),
+    ("Scaling", "minmax, whiten"),
+    ("Methods", "lm, scg, rp"),
+    ("Epochs", "30, 100, 300"),
+    ("Restarts", "1, 3, 10"),
+    ("Split", "time, random"),
+    ("Seeds", "0, 1, 2"),
+];
+
 /// Returns the label of a list of values.
 pub fn label(kind: AxisKind) -> &'static str {
-    match kind {
-        AxisKind::Hidden => "Hidden nodes",
-        AxisKind::Array => "Array scales",
-        AxisKind::Samples => "Samples",
-        AxisKind::Noise => "Noise levels",
-        AxisKind::Inputs => "Inputs",
-        AxisKind::Scaling => "Scaling",
-        AxisKind::Method => "Methods",
-        AxisKind::Epochs => "Epochs",
-        AxisKind::Starts => "Restarts",
-        AxisKind::Split => "Split",
-        AxisKind::Seed => "Seeds",
-    }
-}
-
-fn example(kind: AxisKind) -> &'static str {
-    match kind {
-        AxisKind::Hidden => "6, 8, 10, 12",
-        AxisKind::Array => "10×6_3×18, 10×8_4×24, 10×10_5×30",
-        AxisKind::Samples => "100, 300, 1000",
-        AxisKind::Noise => "0, 0.001, 0.01",
-        AxisKind::Inputs => "resistance, conductance, log",
-        AxisKind::Scaling => "minmax, whiten",
-        AxisKind::Method => "lm, scg, rp",
-        AxisKind::Epochs => "30, 100, 300",
-        AxisKind::Starts => "1, 3, 10",
-        AxisKind::Split => "time, random",
-        AxisKind::Seed => "0, 1, 2",
-    }
+    WORDS[kind as usize].0
 }
 
 #[cfg(test)]

@@ -1,24 +1,21 @@
 use decoupler_core::text::counted;
 use decoupler_files::{
-    export::{atomic_write, format_duration, sweep_specification},
+    export::{atomic_write, format_duration},
     figure::{Figure, SequentialMap},
 };
-use eframe::egui::{Button, Key, Modifiers, Sense, Ui, vec2};
+use eframe::egui::{Align, Button, Key, Label, Layout, Modifiers, RichText, Sense, Ui, vec2};
 
 use super::{
-    Form, Outcome, StudyView, Task, Topic,
-    report::{Invitation, Wish, report_ui},
+    Form, Report, StudyView, Topic,
+    report::{Look, Wish, figure_ui, notes_ui, table_ui},
     speed::limits_ui,
 };
 use crate::window::{
-    shared::{
-        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Offers, Shared, Unfinished, View, copy_exports,
-        csv_export, decoder_export_ui, picture_exports,
-    },
-    theme::{Theme, space},
+    shared::{Effect, Exporting, FileTask, FileWords, Offers, Shared, Shown, Unfinished, View},
+    theme::{Theme, semibold, space, type_size},
     widgets::{
-        card_ui, dim_ui, ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui,
-        state_ui, with_shortcut,
+        card_ui, dim_ui, ghost_button, invitation_ui, note_ui, primary_button, progress_bar_ui, scrolled_ui,
+        section_heading_ui, segmented_ui, state_ui, with_shortcut,
     },
 };
 
@@ -28,8 +25,8 @@ impl View for StudyView {
     }
 
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        let others_compute = shared.working.iter().any(|name| *name != self.name());
-        self.follow(shared, others_compute, effects);
+        let is_alone = shared.working.iter().all(|name| *name == self.name());
+        self.follow(shared, is_alone, effects);
     }
 
     fn is_working(&self) -> bool {
@@ -41,40 +38,51 @@ impl View for StudyView {
     }
 
     fn offer_actions(&mut self, offers: &mut Offers<'_>, _shared: &Shared, effects: &mut Vec<Effect>) {
-        let (can_begin, can_cancel) = (self.can_begin(), self.running.is_some());
-        if offers.offer_keys("Begin study", Modifiers::COMMAND, Key::Enter, can_begin) {
+        if offers.offer_keys("Begin the study", Modifiers::COMMAND, Key::Enter, self.can_begin()) {
             self.begin(effects);
         }
-        if offers.offer_keys("Cancel study", Modifiers::COMMAND, Key::Period, can_cancel) {
+        let can_cancel = self.running.is_some();
+        if offers.offer_keys("Cancel the study", Modifiers::COMMAND, Key::Period, can_cancel) {
             self.cancel();
         }
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        study_exports(self, shared.look.colours)
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        exports(self, shared.look.colours)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        scrolled_ui(ui, "study form", |ui| form_ui(ui, self, shared, effects));
+        scrolled_ui(ui, "study form", |ui| form_ui(ui, self, effects));
+        self.check(shared);
     }
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        let wish = body_ui(ui, self, shared, effects);
+        let whole = ui.available_rect_before_wrap();
+        let (mut look, mut wish) = (self.look, None);
+        match self.shown() {
+            Some(report) => wish = report_ui(ui, self, report, &mut look, shared, effects),
+            None => card_ui(ui, whole, |ui| wish = invited_ui(ui, self)),
+        }
+        ui.allocate_rect(whole, Sense::hover());
+        self.look = look;
         match wish {
-            Some(Wish::Open(item)) => self.open(item, shared, effects),
             Some(Wish::Begin) => self.begin(effects),
-            None => {}
+            Some(Wish::Open(item)) if !shared.phase.is_busy() => {
+                let study = self.study();
+                effects.extend(study.iter().flat_map(|study| study.outcome.open(look.page, item)));
+                effects.push(Effect::ShowTraining);
+            }
+            Some(Wish::CloseFolder) => self.folder.close(),
+            Some(Wish::Open(_)) | None => {}
         }
     }
 
     fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
         let palette = Theme::of(ui).palette;
-        let folder = self.folder.shown.as_ref().filter(|_| self.topic == Topic::Sweep);
-        let folder = folder.and_then(|folder| Some((folder, folder.pages.first()?)));
-        let (colour, text) = match (self.progress(), folder, self.ending()) {
+        let (colour, text) = match (self.progress(), self.shown(), self.ending()) {
             (Some((_, text)), ..) => (palette.accent, text),
-            (_, Some((folder, page)), _) => {
-                let trials = counted(page.rows.len(), "trial");
+            (_, Some(folder), _) if self.is_folder() => {
+                let trials = counted(folder.pages[0].rows.len(), "trial");
                 (palette.good, format!("{}: {trials} finished", folder.headline))
             }
             (.., Some((true, text))) => (palette.good, text),
@@ -86,30 +94,26 @@ impl View for StudyView {
 }
 
 /// Shows the list of topics, the fields of the topic, and the buttons.
-fn form_ui(ui: &mut Ui, view: &mut StudyView, shared: &Shared, effects: &mut Vec<Effect>) {
+fn form_ui(ui: &mut Ui, view: &mut StudyView, effects: &mut Vec<Effect>) {
     section_heading_ui(ui, "Study");
-    let mut chosen = view.topic;
+    let mut topic = view.topic;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(space(1), space(1));
-        for topic in Topic::ALL {
-            ui.selectable_value(&mut chosen, topic, topic.words().name);
+        for option in Topic::ALL {
+            ui.selectable_value(&mut topic, option, option.words().name);
         }
     });
-    if chosen != view.topic {
-        view.choose(chosen, shared);
+    if topic != view.topic {
+        view.choose(topic);
     }
-    let topic = view.topic;
     dim_ui(ui, topic.words().meaning);
     let is_idle = view.running.is_none();
-    let before = view.forms[&topic].clone();
-    let mut form = before.clone();
-    if let Some(train) = &view.train {
-        ui.add_enabled_ui(is_idle, |ui| form.fields_ui(ui, &train.setup));
-    }
-    match &view.checked {
-        Ok(task) => drop(dim_ui(ui, &task.size())),
-        Err(problem) => drop(note_ui(ui, problem)),
-    }
+    let mut form = view.forms[&topic].clone();
+    ui.add_enabled_ui(is_idle, |ui| form.fields_ui(ui, &view.train));
+    match &view.task {
+        Ok(task) => dim_ui(ui, &task.size),
+        Err(problem) => note_ui(ui, problem),
+    };
     ui.add_space(space(2));
     buttons_ui(ui, view, effects);
     if topic == Topic::Speed {
@@ -119,20 +123,17 @@ fn form_ui(ui: &mut Ui, view: &mut StudyView, shared: &Shared, effects: &mut Vec
             view.refresh(topic);
         }
     }
+    ui.add_space(space(2));
     let usual = Form::new(topic);
-    if form != Form::Readings {
-        ui.add_space(space(2));
-        let text = match topic {
-            Topic::Table(_) => "Reset to the paper's values",
-            _ => "Reset to the default values",
-        };
-        if ui.add_enabled(is_idle && form != usual, Button::new(text)).clicked() {
-            form = usual;
-        }
+    let text = match topic {
+        Topic::Table(_) => "Reset to the paper's values",
+        _ => "Reset to the default values",
+    };
+    if ui.add_enabled(is_idle && form != usual, Button::new(text)).clicked() {
+        form = usual;
     }
-    if form != before {
-        view.forms.insert(topic, form);
-        view.check(shared);
+    if form != view.forms[&topic] {
+        view.edit(form);
     }
     if topic == Topic::Sweep {
         folder_ui(ui, view, effects);
@@ -174,68 +175,132 @@ fn buttons_ui(ui: &mut Ui, view: &mut StudyView, effects: &mut Vec<Effect>) {
     }
 }
 
-/// Shows the report, or an invitation to begin.
-fn body_ui(ui: &mut Ui, view: &mut StudyView, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Wish> {
+/// Says what there will be, or why there is nothing, and offers to begin.
+fn invited_ui(ui: &mut Ui, view: &StudyView) -> Option<Wish> {
     let words = view.topic.words();
-    let button = format!("{} now", words.verb);
-    let text = match &view.checked {
+    let text = match (&view.task, view.topic) {
         _ if view.running.is_some() => "The results appear here when the work has finished.",
-        Err(problem) => problem.as_str(),
-        Ok(_) => words.invitation,
+        (Err(problem), _) => problem,
+        (Ok(_), Topic::Table(_)) => "Our figures appear next to the published ones as the trials finish.",
+        (Ok(_), _) => words.meaning,
     };
-    let invitation = Invitation {
-        text,
-        button: &button,
-        is_possible: view.can_begin(),
+    let button = format!("{} now", words.verb);
+    invitation_ui(ui, text, &button, view.can_begin()).then_some(Wish::Begin)
+}
+
+/// Shows a page of a report: title, conditions and table above, figure and notes below.
+fn report_ui(
+    ui: &mut Ui,
+    view: &StudyView,
+    report: &Report,
+    look: &mut Look,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) -> Option<Wish> {
+    look.page = look.page.min(report.pages.len() - 1);
+    let page = &report.pages[look.page];
+    let whole = ui.available_rect_before_wrap();
+    let has_table = !page.table.columns.is_empty();
+    let is_preview = view.study().is_none() && !view.is_folder();
+    let has_aside = is_preview || !page.notes.is_empty();
+    let height = match (has_table, page.figure.is_some() || has_aside) {
+        (true, true) => (space(6) * page.rows.len() as f32 + space(28)).min(0.53 * whole.height()),
+        (false, true) => space(18),
+        (_, false) => whole.height(),
     };
-    let Some(report) = view.shown() else {
-        let whole = ui.available_rect_before_wrap();
-        let mut wish = None;
-        card_ui(ui, whole, |ui| wish = invitation.ui(ui));
-        ui.allocate_rect(whole, Sense::hover());
-        return wish;
+    let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + height.round());
+    let lower = lower.with_min_y(lower.min.y + space(2));
+    let share = match (page.figure.is_some(), has_aside) {
+        (true, true) => 0.62,
+        (true, false) => 1.0,
+        (false, _) => 0.0,
     };
-    let is_folder = view.topic == Topic::Sweep && view.folder.shown.is_some();
-    let has_begun = is_folder || view.studies.contains_key(&view.topic);
-    let (mut look, mut is_closed, mut wish) = (view.look, false, None);
-    let tools_ui = |ui: &mut Ui| {
-        if is_folder {
-            is_closed = ui.add(ghost_button("Close folder")).clicked();
-            return;
+    let (left, right) = lower.split_left_right_at_x(lower.left() + (share * lower.width()).round());
+    let mut wish = None;
+    card_ui(ui, upper, |ui| {
+        wish = head_ui(ui, view, report, look, shared, effects);
+        dim_ui(ui, &report.conditions);
+        if has_table {
+            wish = wish.or(table_ui(ui, page, look));
         }
-        wish = tools_ui(ui, view, shared, effects);
-        if view.is_outdated() {
-            dim_ui(ui, "The recording or the settings have changed since: begin again.");
-        }
-    };
-    let invitation = (!has_begun).then_some(invitation);
-    let asked = report_ui(ui, report, &mut look, shared.look.colours, invitation, tools_ui);
-    view.look = look;
-    if is_closed {
-        view.folder.close();
+    });
+    if page.figure.is_some() {
+        card_ui(ui, left, |ui| {
+            wish = wish.or(figure_ui(ui, page, look, shared.look.colours));
+        });
     }
-    asked.or(wish)
+    if has_aside {
+        let gap = if share > 0.0 { space(2) } else { 0.0 };
+        card_ui(ui, right.with_min_x(right.min.x + gap), |ui| {
+            if is_preview {
+                wish = wish.or(invited_ui(ui, view));
+            } else {
+                scrolled_ui(ui, "notes", |ui| notes_ui(ui, page, look));
+            }
+        });
+    }
+    wish
+}
+
+/// Shows the title, the choice of the page, and what can be done with the marked item.
+fn head_ui(
+    ui: &mut Ui,
+    view: &StudyView,
+    report: &Report,
+    look: &mut Look,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) -> Option<Wish> {
+    let mut wish = None;
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if view.is_folder() {
+                wish = ui
+                    .add(ghost_button("Close folder"))
+                    .clicked()
+                    .then_some(Wish::CloseFolder);
+            } else if !view.topic.is_of_recordings() {
+                wish = marked_ui(ui, view, *look, shared, effects);
+            } else if view.is_outdated() {
+                dim_ui(ui, "The recording or the settings have changed since: begin again.");
+            }
+            let names = report.pages.iter().map(|page| page.name.as_str()).enumerate();
+            let names = Vec::from_iter(names.filter(|(_, name)| !name.is_empty()));
+            if !names.is_empty() {
+                let picked = segmented_ui(ui, "Displayed noise level", &names, look.page, false);
+                if let Some(page) = picked {
+                    (look.page, look.marked) = (page, None);
+                }
+                dim_ui(ui, "Noise");
+            }
+            let heading = RichText::new(&report.headline).font(semibold(type_size().title));
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                ui.add(Label::new(heading).truncate())
+            });
+        });
+    });
+    wish
 }
 
 /// Shows the buttons that open the marked item in the Train view, and export the decoder of a marked point.
-fn tools_ui(ui: &mut Ui, view: &StudyView, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Wish> {
-    if view.topic.is_of_recordings() {
-        return None;
-    }
-    let marked = view.look.marked;
-    let can_open = marked.is_some() && !shared.phase.is_busy();
-    let why_not = match marked {
+fn marked_ui(ui: &mut Ui, view: &StudyView, look: Look, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Wish> {
+    let why_not = match look.marked {
         Some(_) => "A training is running in the Train view: its settings cannot be changed now",
         None => "Click a row of the table or an item of the figure first",
     };
-    let hint = "Shows the settings of the marked item in the Train view, with the network of its median trial if it was kept.";
+    let hint = "Shows its settings in the Train view, with the network of its median trial if that was kept.";
+    let can_open = look.marked.is_some() && !shared.phase.is_busy();
     let open = ui.add_enabled(can_open, ghost_button("Open in Train view"));
     let open = open.on_hover_text(hint).on_disabled_hover_text(why_not);
-    if let Some((kind, source)) = view.marked_decoder() {
-        let task = decoder_export_ui(ui, ghost_button("Export this decoder…"), kind, &source);
-        effects.extend(task.map(Effect::ChooseFile));
+    let marked = look.marked?;
+    let decoder = view.study().and_then(|study| study.outcome.decoder(look.page, marked));
+    if let Some((kind, source)) = decoder
+        && ui.add(ghost_button("Export this decoder…")).clicked()
+    {
+        effects.push(Effect::Export(Box::new(Exporting::decoder(kind, source))));
     }
-    marked.filter(|_| open.clicked()).map(Wish::Open)
+    open.clicked().then_some(Wish::Open(marked))
 }
 
 const SPECIFICATION: FileWords = FileWords {
@@ -253,19 +318,17 @@ fn folder_ui(ui: &mut Ui, view: &StudyView, effects: &mut Vec<Effect>) {
     dim_ui(ui, text);
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.y = space(1);
-        let save = ui.add_enabled(view.checked.is_ok(), ghost_button("Save specification…"));
-        let save = save.on_hover_text(SPECIFICATION.description);
-        if let (true, Ok(Task::Experiment(experiment, setup))) = (save.clicked(), &view.checked) {
-            let specification = sweep_specification(experiment, setup.plan()).map_err(|gap| gap.to_string());
-            let contents = Contents::new(move |path| {
+        let save = ui.add_enabled(view.task.is_ok(), ghost_button("Save specification…"));
+        if save.on_hover_text(SPECIFICATION.description).clicked()
+            && let Form::Experiment(form) = &view.forms[&Topic::Sweep]
+        {
+            let specification = form.specification();
+            let task = FileTask::save(SPECIFICATION, "sweep", move |path| {
                 let specification = specification.clone()?;
-                let written = atomic_write(path, |writer| {
-                    serde_json::to_writer_pretty(&mut *writer, &specification)?;
-                    writeln!(writer)
-                });
+                let written = atomic_write(path, |writer| writeln!(writer, "{specification:#}"));
                 written.map_err(|error| error.to_string())
             });
-            effects.push(Effect::ChooseFile(FileTask::save(SPECIFICATION, "sweep", contents)));
+            effects.push(Effect::ChooseFile(task));
         }
         let open = ui.add(ghost_button("Open sweep folder…"));
         let open = open.on_hover_text("Shows the trials of a folder that decoupler sweep fills, as they finish.");
@@ -281,61 +344,39 @@ const MARKDOWN: FileWords = FileWords {
     extensions: &["md"],
 };
 
-fn csv_words(description: &'static str) -> FileWords {
-    FileWords {
-        kind: "table",
-        description,
-        extensions: &["csv"],
-    }
-}
-
-/// Returns the exports of the topic: the figure and the table of the displayed page, and what is behind them.
-fn study_exports(view: &StudyView, colours: SequentialMap) -> Vec<Export<'_>> {
+/// Returns what the topic shows: the figure and the table of the displayed page, and what is behind them.
+fn exports(view: &StudyView, colours: SequentialMap) -> Vec<Shown<'_>> {
     let words = view.topic.words();
     let stem = words.name.to_lowercase().replace(' ', "_");
-    let study = view.studies.get(&view.topic).filter(|study| study.outcome.has_results());
-    let study = study.ok_or_else(|| format!("Nothing has finished yet: press {} first.", words.verb));
-    let page = study.clone().and_then(|study| study.report.pages.get(view.look.page).ok_or_else(String::new));
-    let mut exports = Vec::new();
-    if !view.topic.is_of_recordings() {
-        let figure = page.clone().and_then(|page| page.figure.as_ref().ok_or_else(String::new));
-        let figure = figure.map(|figure| {
-            move || match figure.clone() {
-                Figure::HeatMap(map) => map.coloured(colours).into(),
-                figure => figure,
-            }
-        });
-        exports.extend(picture_exports("Figure", stem.clone(), figure));
+    let study = view.study().filter(|study| study.outcome.parts().0 > 0);
+    let Some((study, page)) = study.and_then(|study| Some((study, study.report.pages.get(view.look.page)?))) else {
+        let none = || Err::<fn() -> _, _>(format!("Nothing has finished yet: press {} first.", words.verb));
+        let figure = Err::<fn() -> _, _>(format!("Nothing has finished yet: press {} first.", words.verb));
+        return vec![
+            Shown::figure("Figure", String::new(), figure),
+            Shown::table("Table", String::new(), none()),
+        ];
+    };
+    let mut shown = Vec::new();
+    if let Some(figure) = &page.figure {
+        let figure = move || match figure.clone() {
+            Figure::HeatMap(map) => map.coloured(colours).into(),
+            figure => figure,
+        };
+        shown.push(Shown::figure("Figure", stem.clone(), Ok(figure)));
     }
-    let table = page.map(|page| || page.table.clone());
-    let words = csv_words("The table as shown, with every digit, as CSV.");
-    exports.push(csv_export("Table", words, stem.clone(), table.clone()));
-    for &(name, description, table) in view.topic.tables() {
-        let table = study.clone().map(|study| move || table(&study.outcome));
+    if !page.table.columns.is_empty() {
+        shown.push(Shown::table("Table", stem.clone(), Ok(|| page.table.clone())));
+    }
+    for (name, table) in study.outcome.tables() {
         let stem = format!("{stem}_{}", name.to_lowercase().replace(' ', "_"));
-        exports.push(csv_export(name, csv_words(description), stem, table));
+        shown.push(Shown::table(name, stem, Ok(table)));
     }
-    if matches!(view.topic, Topic::Table(_) | Topic::Sweep) {
-        exports.push(Export {
-            group: ExportGroup::Tables,
-            name: "Table with settings".to_owned(),
-            form: "Markdown".to_owned(),
-            description: MARKDOWN.description,
-            ask: study.clone().map(|study| -> Ask<'_> {
-                Box::new(move || {
-                    let text = match &study.outcome {
-                        Outcome::Experiment(outcome) => outcome.markdown(&study.report.headline),
-                        _ => Vec::new(),
-                    };
-                    let contents = Contents::new(move |path| atomic_write(path, |writer| writer.write_all(&text)));
-                    Effect::ChooseFile(FileTask::save(MARKDOWN, &stem, contents))
-                })
-            }),
+    if let Some(text) = study.outcome.markdown() {
+        let task = FileTask::save(MARKDOWN, &stem, move |path| {
+            atomic_write(path, |writer| writer.write_all(&text))
         });
+        shown.push(Shown::file("Table with settings", Ok(task)));
     }
-    exports.extend(copy_exports("Table", table));
-    match study {
-        Ok(study) => exports.into_iter().map(|export| export.noting(&study.is_saved)).collect(),
-        Err(_) => exports,
-    }
+    shown.into_iter().map(|shown| shown.noting(&study.is_saved)).collect()
 }
