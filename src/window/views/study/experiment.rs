@@ -23,7 +23,7 @@ use decoupler_files::{
     figure::{TradeOffLimits, experiment_figure},
     import::{Plan, Setup},
 };
-use eframe::egui::{Button, ComboBox, Ui};
+use eframe::egui::{ComboBox, Ui};
 
 use super::{Note, Outcome, Page, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList, value_list::label};
 use crate::window::{
@@ -49,10 +49,9 @@ const MAX_KEPT_BYTES: usize = 400_000_000;
 pub struct ExperimentForm {
     /// Title of the results.
     heading: String,
-    /// The experiment without its axes, which are typed.
+    /// The experiment without its axes, which are typed. A sweep takes its seed, epochs and restarts, and the rest from the
+    /// Train view.
     template: Experiment,
-    /// Plan by which a recording is read; `None` for a simulated array.
-    plan: Option<Arc<Plan>>,
     /// The axis of a table, or both of a sweep.
     axes: Vec<ValueList>,
 }
@@ -65,7 +64,6 @@ impl ExperimentForm {
             heading: table.heading(),
             axes: vec![ValueList::of(&template.axis)],
             template,
-            plan: None,
         }
     }
 
@@ -80,24 +78,13 @@ impl ExperimentForm {
         form
     }
 
-    /// Uses `setup` as the base of a sweep. An axis that its source does not have is replaced by another.
-    fn take(&mut self, setup: &Setup) {
-        self.template.base = *setup.settings();
-        self.template.recording = setup.experiment_recording();
-        self.plan = setup.plan().cloned().map(Arc::new);
-        let offered = Vec::from_iter(AxisKind::of_runs(&self.template.base));
-        for place in 0..self.axes.len() {
-            let is_free = |kind: &&AxisKind| self.axes.iter().all(|axis| axis.kind != **kind);
-            if !offered.contains(&self.axes[place].kind)
-                && let Some(&kind) = offered.iter().find(is_free)
-            {
-                self.axes[place] = ValueList::new(kind);
-            }
-        }
+    fn is_sweep(&self) -> bool {
+        self.axes.len() > 1
     }
 
-    /// Returns the experiment, checked as far as possible without running it.
-    fn experiment(&self) -> Result<Experiment, String> {
+    /// Returns the experiment and the setup of its samples, checked as far as possible without running it. `train` is the
+    /// setup of the Train view, which a sweep is based on.
+    fn experiment(&self, train: &Result<Setup, String>) -> Result<(Experiment, Setup), String> {
         let axes = self.axes.iter().map(ValueList::parse).collect::<Result<Vec<_>, _>>()?;
         let lengths = axes.iter().map(|axis| axis.values.len());
         let cells = lengths.fold(1, usize::saturating_mul);
@@ -106,23 +93,29 @@ impl ExperimentForm {
             return Err(format!("{cells} cells are too many to display: {advice}"));
         }
         let mut experiment = self.template.clone();
-        let mut axes = axes.into_iter();
-        if let Some(first) = axes.next() {
-            experiment.axis = first;
+        let mut setup = Setup::from(experiment.base);
+        if self.is_sweep() {
+            let typed = experiment.base;
+            let base = &mut experiment.base;
+            *base = *train.as_ref()?.settings();
+            (base.seed, base.starts) = (typed.seed, typed.starts);
+            base.training.stopping.epochs = typed.training.stopping.epochs;
+            setup = train.as_ref()?.with_settings(*base);
+            experiment.recording = setup.experiment_recording();
         }
+        let mut axes = axes.into_iter();
+        experiment.axis = axes.next().unwrap_or(experiment.axis);
         experiment.second_axis = axes.next();
         experiment.check().map_err(|error| error.to_string())?;
-        Ok(experiment)
+        Ok((experiment, setup))
     }
 
     /// Returns the task of the form.
     ///
     /// # Errors
     /// If the form is not a valid experiment.
-    pub fn task(&self) -> Result<Task, String> {
-        let experiment = self.experiment()?;
-        let setup = Setup::of(experiment.base, self.plan.as_deref().cloned());
-        let setup = setup.expect("an experiment on other samples is refused");
+    pub fn task(&self, train: &Result<Setup, String>) -> Result<Task, String> {
+        let (experiment, setup) = self.experiment(train)?;
         let outcome = ExperimentOutcome {
             heading: self.heading.clone(),
             results: ExperimentResults::new(experiment.clone()),
@@ -145,31 +138,33 @@ impl ExperimentForm {
     ///
     /// # Errors
     /// If the form is not valid, or the terminal has no options for it.
-    pub fn specification(&self) -> Result<serde_json::Value, String> {
-        sweep_specification(&self.experiment()?, self.plan.as_deref()).map_err(|gap| gap.to_string())
+    pub fn specification(&self, train: &Result<Setup, String>) -> Result<serde_json::Value, String> {
+        let (experiment, setup) = self.experiment(train)?;
+        sweep_specification(&experiment, setup.plan()).map_err(|gap| gap.to_string())
     }
 
-    /// Shows the fields. `train` is the setup of the Train view, which a sweep can be based on.
+    /// Shows the fields. `train` is the setup of the Train view.
     pub fn fields_ui(&mut self, ui: &mut Ui, train: &Result<Setup, String>) {
         section_heading_ui(ui, "Values");
         let hint = "Values separated by commas";
-        let is_sweep = self.axes.len() > 1;
-        if is_sweep {
-            let offered = Vec::from_iter(AxisKind::of_runs(&self.template.base));
+        if self.is_sweep() {
+            let settings = train.as_ref().map_or(self.template.base, |setup| *setup.settings());
+            let offered = Vec::from_iter(AxisKind::of_runs(&settings));
             let names = [("Across", "Values across"), ("Down", "Values down")];
             for (axis, (name, values)) in self.axes.iter_mut().zip(names) {
                 axis_ui(ui, name, axis, &offered);
                 axis.ui(ui, Some(values), hint);
                 ui.add_space(space(1));
             }
+            let source = train.as_ref().map_or_else(|_| String::new(), Setup::source_name);
+            let (hidden, method) = (counted(settings.hidden, "hidden node"), settings.training.method.name());
+            let base = format!("{source}, {hidden}, {method} as in the Train view, unless an axis varies it");
+            dim_ui(ui, &base);
         } else {
             self.axes.iter_mut().for_each(|axis| axis.ui(ui, None, hint));
         }
         self.cross_validation_ui(ui);
         section_heading_ui(ui, "Training");
-        if is_sweep {
-            self.base_ui(ui, train);
-        }
         let Experiment { base, seeds, .. } = &mut self.template;
         let hint = "Number of consecutive seeds for each cell, which show the spread of the results.";
         count_ui(ui, "Seeds", hint, seeds, 1..=MAX_TRIALS);
@@ -200,32 +195,6 @@ impl ExperimentForm {
             _ => "Whole snapshots: no training sample is from the same moment as a test sample.",
         };
         dim_ui(ui, meaning);
-    }
-
-    /// Shows the settings common to all cells, and a button that takes them from the Train view.
-    fn base_ui(&mut self, ui: &mut Ui, train: &Result<Setup, String>) {
-        let Experiment { base, recording, .. } = &self.template;
-        let mut parts = Vec::from_iter(recording.as_ref().map(|recording| recording.name.clone()));
-        if let Some(array) = base.simulation() {
-            parts.extend([array.sensor.scale.to_string(), counted(array.samples, "sample")]);
-        }
-        parts.extend([
-            counted(base.hidden, "hidden node"),
-            base.training.method.name().to_owned(),
-        ]);
-        dim_ui(ui, &format!("{}, unless an axis varies it", parts.join(", ")));
-        let is_base = |setup: &Setup| (setup.settings(), setup.plan()) == (base, self.plan.as_deref());
-        let (can_take, why_not) = match train {
-            Ok(setup) => (!is_base(setup), "These are the settings of the Train view"),
-            Err(missing) => (false, missing.as_str()),
-        };
-        let button = ui.add_enabled(can_take, Button::new("Use the settings of the Train view"));
-        let hint = "Copies the source of the samples, the network and the training settings from the Train view. The \
-                    source determines the available axes.";
-        let button = button.on_hover_text(hint).on_disabled_hover_text(why_not);
-        if let (true, Ok(setup)) = (button.clicked(), train) {
-            self.take(setup);
-        }
     }
 }
 
@@ -318,18 +287,27 @@ impl Outcome for ExperimentOutcome {
                 ExperimentColumnKind::Axis => Tone::Strong,
                 ExperimentColumnKind::Ranking => Tone::Own,
                 ExperimentColumnKind::Published => Tone::Dim,
-                ExperimentColumnKind::Linear if loses => Tone::Beating,
+                ExperimentColumnKind::Linear if loses => Tone::Warning,
                 _ => Tone::Usual,
+            };
+            let meaning = match loses {
+                true => "The linear baseline is more accurate here than the network.",
+                false => "",
             };
             Row {
                 item,
+                meaning,
                 name: results.cell_labels(cell).join(", "),
                 tones: shown.kinds.iter().map(tone).collect(),
                 ..Row::default()
             }
         };
-        let failures = describe_failures(results).into_iter().map(Note::Failure);
-        let remarks = describe_worse_than_mean(results).into_iter().map(Note::Remark);
+        let failures = describe_failures(results)
+            .into_iter()
+            .map(|text| Note::Line(Tone::Bad, text));
+        let remarks = describe_worse_than_mean(results)
+            .into_iter()
+            .map(|text| Note::Line(Tone::Warning, text));
         let mut notes = Vec::from_iter(failures.chain(remarks));
         if !notes.is_empty() {
             notes.insert(0, Note::Heading("Remarks"));
@@ -395,6 +373,10 @@ mod tests {
 
     use super::*;
 
+    fn train() -> Result<Setup, String> {
+        Ok(RunSettings::default().into())
+    }
+
     #[test]
     fn the_default_forms_can_be_run() {
         for table in [
@@ -402,33 +384,30 @@ mod tests {
             PaperTable::CrossValidation,
             PaperTable::ArrayScales,
         ] {
-            assert_eq!(ExperimentForm::table(table).experiment(), Ok(table.experiment()));
+            let (experiment, _) = ExperimentForm::table(table).experiment(&train()).unwrap();
+            assert_eq!(experiment, table.experiment());
         }
-        assert_eq!(ExperimentForm::sweep().experiment().unwrap().cells().len(), 12);
+        let (sweep, _) = ExperimentForm::sweep().experiment(&train()).unwrap();
+        assert_eq!((sweep.cells().len(), sweep.base.training.stopping.epochs), (12, 60));
     }
 
     #[test]
-    fn axes_that_a_recording_lacks_are_replaced() {
+    fn a_sweep_of_a_recording_has_its_settings() {
         let settings = RunSettings::measured(RowModel::Shared);
-        let setup = Setup::recording(settings, Plan::default());
+        let train = Ok(Setup::recording(settings, Plan::default()));
         let mut form = ExperimentForm::sweep();
-        form.take(&setup);
-        let kinds = Vec::from_iter(form.axes.iter().map(|axis| axis.kind));
-        assert_eq!(kinds, [AxisKind::Hidden, AxisKind::Scaling], "samples are of arrays");
-        let experiment = form.experiment().unwrap();
-        assert_eq!(experiment.base, settings);
+        let refused = form.experiment(&train).unwrap_err();
+        assert!(refused.contains("samples"), "samples are of arrays: {refused}");
         // Bayesian regularisation has the settings that suit recordings, as in the Train view.
         form.axes[1] = ValueList::of(&Axis::names(AxisKind::Method, ["lm", "br"]));
-        let cells = form.experiment().unwrap().cells();
-        let last = cells.last().unwrap().settings.training.method;
+        let (experiment, setup) = form.experiment(&train).unwrap();
+        let last = experiment.cells().last().unwrap().settings.training.method;
         assert_eq!(last, Method::recorded_regularization());
+        assert_eq!(setup.plan(), train.as_ref().unwrap().plan());
         form.axes[1] = ValueList::new(AxisKind::Split);
-        assert_eq!(form.experiment().unwrap().cells().len(), 8);
+        assert_eq!(form.experiment(&train).unwrap().0.cells().len(), 8);
         form.axes[1].values = "group".to_owned();
-        assert!(form.experiment().unwrap_err().contains("no column of groups"));
-        form.take(&RunSettings::default().into());
-        assert_eq!(form.axes[1].kind, AxisKind::Array);
-        assert_eq!(form.template.recording, None);
+        assert!(form.experiment(&train).unwrap_err().contains("no column of groups"));
     }
 
     #[test]
@@ -436,7 +415,7 @@ mod tests {
         let with = |values: &str| {
             let mut form = ExperimentForm::sweep();
             form.axes[0].values = values.to_owned();
-            form.experiment().unwrap_err()
+            form.experiment(&train()).unwrap_err()
         };
         assert!(with("").contains("no values for hidden nodes"));
         assert!(with("0").contains("hidden nodes: 0 is not possible"));
@@ -444,6 +423,7 @@ mod tests {
         assert!(with(&many.join(" ")).contains("600 cells"));
         let mut form = ExperimentForm::sweep();
         form.axes[1] = ValueList::new(AxisKind::Hidden);
-        assert!(form.experiment().unwrap_err().contains("both axes vary hidden nodes"));
+        let same = form.experiment(&train()).unwrap_err();
+        assert!(same.contains("both axes vary hidden nodes"));
     }
 }

@@ -50,13 +50,19 @@ pub fn find(setup: &Setup, reporter: &Reporter) -> Result<(), String> {
     let found = found.map_err(|error| error.to_string())?;
     let mut notes = Vec::new();
     for (index, (target, of_target)) in recording.problem.targets.iter().zip(&found.targets).enumerate() {
-        notes.push(Note::Text(sentence(&describe_target(&target.name, of_target))));
+        notes.push(Note::Line(
+            Tone::Usual,
+            sentence(&describe_target(&target.name, of_target)),
+        ));
         if let (Ok(ridge), Some(kernel)) = (of_target.ridge, of_target.kernel) {
             let [ridge, kernel] = [ridge, kernel].map(|of| format_below_one(of.r2.value, 3));
             let text = format!("R² of ridge regression {ridge}, of kernel ridge regression {kernel}");
-            notes.push(Note::Dim(text));
+            notes.push(Note::Line(Tone::Dim, text));
         }
-        notes.push(Note::Dim(sentence(&found.comparison.sentence(index, &target.name))));
+        notes.push(Note::Line(
+            Tone::Dim,
+            sentence(&found.comparison.sentence(index, &target.name)),
+        ));
     }
     let warnings = describe_warnings(&recording, by, &found).into_iter();
     notes.extend(warnings.map(|warning| Note::Warning(sentence(&warning))));
@@ -122,7 +128,10 @@ pub fn cross_validate(setup: &Setup, folds: usize, reporter: &Reporter) -> Resul
         pages: vec![Page {
             what: "Errors of",
             rows: table.rows.iter().enumerate().map(row).collect(),
-            notes: remarks.iter().map(|remark| Note::Text(sentence(remark))).collect(),
+            notes: remarks
+                .iter()
+                .map(|remark| Note::Line(Tone::Usual, sentence(remark)))
+                .collect(),
             table,
             ..Page::default()
         }],

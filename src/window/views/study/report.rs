@@ -62,7 +62,7 @@ pub struct Row {
     pub tones: Vec<Tone>,
 }
 
-/// Tone of a cell.
+/// Tone of a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tone {
     /// As other text.
@@ -73,23 +73,21 @@ pub enum Tone {
     Own,
     /// For comparison.
     Dim,
-    /// A baseline that is better than the network.
-    Beating,
+    /// A baseline that is better than the network; a remark.
+    Warning,
+    /// A failure.
+    Bad,
 }
 
 impl Tone {
-    fn cell<'a>(self, text: &str, palette: &Palette) -> TableCell<'a> {
-        let (colour, meaning) = match self {
-            Self::Usual | Self::Strong => (palette.text, ""),
-            Self::Own => (palette.accent, ""),
-            Self::Dim => (palette.dim, ""),
-            Self::Beating => (
-                palette.warning,
-                "The linear baseline is more accurate here than the network.",
-            ),
-        };
-        let is_strong = matches!(self, Self::Strong | Self::Own);
-        TableCell::new(text).colour(colour).strong(is_strong).meaning(meaning)
+    fn colour(self, palette: &Palette) -> Color32 {
+        match self {
+            Self::Usual | Self::Strong => palette.text,
+            Self::Own => palette.accent,
+            Self::Dim => palette.dim,
+            Self::Warning => palette.warning,
+            Self::Bad => palette.bad,
+        }
     }
 }
 
@@ -110,15 +108,9 @@ pub enum Note {
     /// Heading of the following lines.
     Heading(&'static str),
     /// A sentence.
-    Text(String),
-    /// A secondary sentence.
-    Dim(String),
-    /// A remark on the results, to be acted upon.
-    Remark(String),
+    Line(Tone, String),
     /// A warning.
     Warning(String),
-    /// A failure.
-    Failure(String),
     /// An item that is marked by a click.
     Pick(usize, String),
 }
@@ -141,8 +133,6 @@ pub enum Wish {
     Begin,
     /// Open this item of the page in the Train view.
     Open(usize),
-    /// Show the sweep folder no more.
-    CloseFolder,
 }
 
 /// Shows the table. A click marks a row; returns the one opened by a double click.
@@ -177,7 +167,10 @@ pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) -> Option<Wish> {
     let order = look.sort.order(table.rows.len(), figure);
     let row = |place: usize| {
         let (row, texts) = (&page.rows[order[place]], &texts[order[place]]);
-        let cells = row.tones.iter().zip(texts).map(|(tone, text)| tone.cell(text, palette));
+        let cells = row.tones.iter().zip(texts).map(|(tone, text)| {
+            let is_strong = matches!(tone, Tone::Strong | Tone::Own);
+            TableCell::new(text).colour(tone.colour(palette)).strong(is_strong)
+        });
         TableRow::new(cells)
             .labelled(format!("{} {}", page.what, row.name))
             .named(row.name.as_str())
@@ -264,17 +257,13 @@ fn point_ui(ui: &mut Ui, point: &Point, quantity: &str, at: Pos2, is_marked: boo
 /// Shows the notes, and the facts of the marked item.
 pub fn notes_ui(ui: &mut Ui, page: &Page, look: &mut Look) {
     let palette = Theme::of(ui).palette;
-    let coloured_ui = |ui: &mut Ui, text: &str, colour: Color32| {
-        ui.label(RichText::new(text).size(type_size().note).color(colour));
-    };
     for note in &page.notes {
         match note {
             Note::Heading(text) => drop(section_heading_ui(ui, text)),
-            Note::Text(text) => drop(ui.label(text)),
-            Note::Dim(text) => drop(dim_ui(ui, text)),
+            Note::Line(tone, text) => {
+                ui.label(RichText::new(text).size(type_size().note).color(tone.colour(&palette)));
+            }
             Note::Warning(text) => drop(note_ui(ui, text)),
-            Note::Remark(text) => coloured_ui(ui, text, palette.warning),
-            Note::Failure(text) => coloured_ui(ui, text, palette.bad),
             Note::Pick(item, text) => {
                 let shown = RichText::new(text).size(type_size().note).color(palette.accent);
                 let pick = ui.selectable_label(look.marked == Some(*item), shown);

@@ -19,7 +19,6 @@ use decoupler_core::{
     },
     job::Job,
     scene::{Noise, Scene},
-    settings::Value,
     text::counted,
     training::{Method, StoppingRules},
 };
@@ -92,11 +91,14 @@ impl SpeedForm {
     /// If the form is not a valid measurement.
     pub fn task(&self, base: &Setup, is_quiet: &Arc<AtomicBool>) -> Result<Task, String> {
         let plan = self.plan(base)?;
-        let outcome = Box::new(SpeedOutcome::new(&plan));
+        let outcome = SpeedOutcome {
+            plan: plan.clone(),
+            ..SpeedOutcome::default()
+        };
         let is_quiet = Arc::clone(is_quiet);
         Ok(Task {
             size: counted(plan.points(), "point"),
-            outcome,
+            outcome: Box::new(outcome),
             setup: None,
             run: Box::new(move |reporter| measure(&plan, &is_quiet, reporter)),
         })
@@ -115,14 +117,10 @@ impl SpeedForm {
             (None, Some(plan)) => self.runs_of_recording(base.settings(), plan, &decoders)?,
             (None, None) => Vec::new(),
         };
-        let hidden = self.hidden.different()?.into_iter();
-        let hidden = hidden.filter_map(|value| match value {
-            Value::Integer(hidden) => usize::try_from(hidden).ok(),
-            _ => None,
-        });
+        let hidden = self.hidden.numbers()?.into_iter();
         let plan = SpeedPlan {
             runs,
-            hidden: hidden.collect(),
+            hidden: hidden.map(|hidden| hidden as usize).collect(),
         };
         match plan.points() {
             points if points > MAX_POINTS => Err(format!(
@@ -141,12 +139,8 @@ impl SpeedForm {
     ) -> Result<Vec<PlannedRun>, String> {
         let presets = Preset::ALL.into_iter();
         let presets = Vec::from_iter(presets.filter(|preset| self.preset.is_none_or(|only| only == *preset)));
-        let noises = self.noises.different()?.into_iter().enumerate();
+        let noises = self.noises.numbers()?.into_iter().enumerate();
         let runs = noises.flat_map(|(level, noise)| {
-            let noise = match noise {
-                Value::Number(noise) => noise,
-                _ => 0.0,
-            };
             presets.iter().map(move |&preset| PlannedRun {
                 level,
                 noise: Some(noise),
@@ -312,7 +306,7 @@ pub fn limits_ui(ui: &mut Ui, limits: &mut TradeOffLimits) {
 }
 
 /// Plan of a measurement.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct SpeedPlan {
     /// Runs that fit the decoders, level by level.
     runs: Vec<PlannedRun>,
@@ -377,7 +371,7 @@ fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Resu
         };
         let recorded = sets.recorded();
         let unit = decoded_unit(&sets.sets.test);
-        reporter.send(StudyEvent::Samples(unit, recorded.cloned().map(Box::new)));
+        reporter.send(StudyEvent::Samples(number, unit, recorded.cloned().map(Box::new)));
         // Several decoders share a network.
         let mut last_file: Option<Arc<NetworkFile>> = None;
         let on_point = |kind, point, trained: Option<&Run>| {
@@ -404,7 +398,7 @@ fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Resu
 }
 
 /// Points measured so far.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct SpeedOutcome {
     plan: SpeedPlan,
     /// One for each noise level, or a single one for a recording.
@@ -420,26 +414,6 @@ struct SpeedOutcome {
 }
 
 impl SpeedOutcome {
-    fn new(plan: &SpeedPlan) -> Self {
-        let mut levels: Vec<TradeOffLevel> = Vec::new();
-        for run in &plan.runs {
-            if run.level == levels.len() {
-                levels.push(TradeOffLevel {
-                    noise: run.noise,
-                    points: Vec::new(),
-                });
-            }
-        }
-        Self {
-            origins: vec![Vec::new(); levels.len()],
-            levels,
-            plan: plan.clone(),
-            refused: Vec::new(),
-            unit: String::new(),
-            recorded: None,
-        }
-    }
-
     /// Returns the setup with which a point was measured.
     fn setup_of(&self, level: usize, point: usize) -> Option<Setup> {
         let (run, _) = self.origins.get(level)?.get(point)?;
@@ -451,7 +425,7 @@ impl SpeedOutcome {
         let level = &self.levels[number];
         let table = trade_off_summary(level);
         Page {
-            name: level.noise.map_or_else(String::new, noise_name),
+            name: level.noise.map_or_else(String::new, |noise| noise.to_string()),
             what: "Point",
             rows: rows(level, table.columns.len()),
             table,
@@ -475,7 +449,7 @@ impl SpeedOutcome {
         ];
         for ((question, none), answer) in questions.into_iter().zip(level.answers(limits)) {
             let Some(answer) = answer else {
-                notes.push(Note::Dim(none.to_owned()));
+                notes.push(Note::Line(Tone::Dim, none.to_owned()));
                 continue;
             };
             let point = &level.points[answer];
@@ -484,7 +458,7 @@ impl SpeedOutcome {
             notes.push(Note::Pick(answer, format!("{question}: {name}, {percent}, {time}")));
         }
         let hint = "Click a row of the table to mark its point, or a point of a chart to open it in the Train view.";
-        notes.push(Note::Dim(hint.to_owned()));
+        notes.push(Note::Line(Tone::Dim, hint.to_owned()));
         notes
     }
 }
@@ -492,7 +466,15 @@ impl SpeedOutcome {
 impl Outcome for SpeedOutcome {
     fn take(&mut self, event: StudyEvent) {
         match event {
-            StudyEvent::Samples(unit, recorded) => (self.unit, self.recorded) = (unit, recorded),
+            StudyEvent::Samples(run, unit, recorded) => {
+                let PlannedRun { level, noise, .. } = self.plan.runs[run];
+                if level == self.levels.len() {
+                    let points = Vec::new();
+                    self.levels.push(TradeOffLevel { noise, points });
+                    self.origins.push(Vec::new());
+                }
+                (self.unit, self.recorded) = (unit, recorded);
+            }
             StudyEvent::Point(run, point, file) => {
                 let level = self.plan.runs[run].level;
                 self.levels[level].points.push(*point);
@@ -574,15 +556,6 @@ fn point(point: &TradeOffPoint) -> Point {
         name: point_name(point),
         facts,
         places: [("Decoding", decoding), ("Training", training)],
-    }
-}
-
-/// Returns a noise level as it would be typed.
-fn noise_name(noise: f64) -> String {
-    if noise == 0.0 || noise >= 0.01 {
-        noise.to_string()
-    } else {
-        format!("{noise:e}")
     }
 }
 

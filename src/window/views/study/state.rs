@@ -1,9 +1,11 @@
 use std::{
     collections::HashMap,
     fmt,
+    path::PathBuf,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
+        mpsc::{Receiver, Sender, channel},
     },
     time::{Duration, Instant},
 };
@@ -15,7 +17,7 @@ use decoupler_files::{
     import::{Plan, Progress, Setup},
 };
 
-use super::{Form, Outcome, Report, StudyEvent, Task, Topic, report::Look, sweep_folder::SweepFolder};
+use super::{Form, Outcome, Report, StudyEvent, Task, Topic, report::Look, sweep_folder};
 use crate::window::{
     job::{Background, Wake},
     shared::{Effect, Matter, Notice, Phase, Shared, SourceKind, Unfinished},
@@ -38,7 +40,8 @@ pub struct StudyView {
     pub(super) studies: HashMap<Topic, Study>,
     pub(super) running: Option<Running>,
     pub(super) look: Look,
-    pub(super) folder: SweepFolder,
+    /// Folders of sweeps that were chosen.
+    pub(super) folders: (Sender<PathBuf>, Receiver<PathBuf>),
     job: Background<StudyEvent>,
     /// True while nothing else computes, which would distort times.
     is_quiet: Arc<AtomicBool>,
@@ -94,7 +97,7 @@ impl StudyView {
             studies: HashMap::new(),
             running: None,
             look: Look::default(),
-            folder: SweepFolder::new(&wake),
+            folders: channel(),
             job: Background::new("study", wake),
             is_quiet: Arc::new(AtomicBool::new(true)),
         }
@@ -131,7 +134,7 @@ impl StudyView {
     }
 
     pub(super) fn can_begin(&self) -> bool {
-        self.running.is_none() && self.task.is_ok()
+        (self.running.is_none() || self.is_folder()) && self.task.is_ok()
     }
 
     /// Begins the task of the form.
@@ -141,14 +144,13 @@ impl StudyView {
         }
         // The form is checked again for the next one.
         self.checked_on = None;
-        let Ok(task) = std::mem::replace(&mut self.task, Err(String::new())) else {
-            return;
-        };
-        effects.push(Effect::Settle(Matter::Study));
-        if self.topic == Topic::Sweep {
-            // The folder would be shown in place of the results.
-            self.folder.close();
+        if let Ok(task) = std::mem::replace(&mut self.task, Err(String::new())) {
+            effects.push(Effect::Settle(Matter::Study));
+            self.start(task);
         }
+    }
+
+    fn start(&mut self, task: Task) {
         let study = Study {
             report: task.outcome.report(&self.limits),
             outcome: task.outcome,
@@ -175,8 +177,11 @@ impl StudyView {
         );
     }
 
-    /// Cancels the task under way; finished parts are kept.
+    /// Cancels the task under way; finished parts are kept. A sweep folder is closed.
     pub(super) fn cancel(&mut self) {
+        if self.is_folder() {
+            self.studies.remove(&Topic::Sweep);
+        }
         self.job.abandon();
         self.end();
     }
@@ -228,7 +233,12 @@ impl StudyView {
         if let Some(topic) = changed {
             self.refresh(topic);
         }
-        self.folder.take_events();
+        if let Ok(path) = self.folders.1.try_recv()
+            && self.running.is_none()
+        {
+            self.choose(Topic::Sweep);
+            self.start(sweep_folder::task(path));
+        }
     }
 
     /// Returns true while a measurement of times waits for other work.
@@ -245,9 +255,11 @@ impl StudyView {
         self.studies.get(&self.topic)
     }
 
-    /// Returns true if a sweep folder is shown.
+    /// Returns true while a sweep folder is shown, which is no work of this program.
     pub(super) fn is_folder(&self) -> bool {
-        self.topic == Topic::Sweep && self.folder.shown.is_some()
+        let running = self.running.as_ref();
+        let study = running.and_then(|running| self.studies.get(&running.topic));
+        study.is_some_and(|study| study.size.is_empty())
     }
 
     /// Returns true if the results are of another recording or other settings than the Train view has now.
@@ -256,12 +268,11 @@ impl StudyView {
         setup.is_some_and(|setup| self.train.as_ref() != Ok(setup))
     }
 
-    /// Returns the report to show: the sweep folder, the results or, before there are any, the published figures.
+    /// Returns the report to show: the results or, before there are any, the published figures.
     pub(super) fn shown(&self) -> Option<&Report> {
-        let folder = self.folder.shown.as_ref().filter(|_| self.topic == Topic::Sweep);
         let study = self.study().map(|study| &study.report);
         let preview = Some(&self.preview).filter(|preview| preview.pages.iter().any(|page| !page.rows.is_empty()));
-        folder.or(study).or(preview).filter(|report| !report.pages.is_empty())
+        study.or(preview).filter(|report| !report.pages.is_empty())
     }
 
     /// Returns how far the task under way is, as a share and in words.
@@ -272,7 +283,9 @@ impl StudyView {
             return Some((share, format!("Reading the files… {:.0} %", 100.0 * share)));
         }
         let name = running.topic.words().name;
-        Some(match self.studies.get(&running.topic)?.outcome.parts() {
+        let study = self.studies.get(&running.topic)?;
+        Some(match study.outcome.parts() {
+            (1, ..) if self.is_folder() => (1.0, study.report.headline.clone()),
             (.., "") => (0.0, format!("{name}…")),
             (done, all, part) => {
                 let share = done as f32 / all.max(1) as f32;
@@ -302,7 +315,7 @@ impl StudyView {
             let study = self.studies.get(&topic)?;
             let is_running = self.running.as_ref().is_some_and(|running| running.topic == topic);
             let progress = match study.outcome.parts() {
-                (.., "") if is_running => study.size.clone(),
+                (.., "") if is_running && !self.is_folder() => study.size.clone(),
                 (.., "") => return None,
                 (done, all, part) if is_running => format!("{done} of {} finished", counted(all, part)),
                 (done, all, _) if done < all || study.is_saved.load(Ordering::Relaxed) => return None,

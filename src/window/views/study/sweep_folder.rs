@@ -3,10 +3,7 @@
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
-    sync::{
-        Arc,
-        mpsc::{Receiver, RecvTimeoutError, Sender, channel},
-    },
+    thread,
     time::{Duration, Instant},
 };
 
@@ -14,126 +11,76 @@ use decoupler_core::text::counted;
 use decoupler_files::export::{Cell, MergedSweep, SweepFiles, Table};
 use serde_json::Value;
 
-use super::{Note, Page, Report, Row, Tone};
-use crate::window::{
-    job::{self, Background, Wake},
-    shared::{FileTask, FileWords},
-};
+use super::{Note, Page, Report, Reporter, Row, StudyEvent, Task, Tone};
+use crate::window::shared::FileWords;
 
-const FOLDER: FileWords = FileWords {
+/// The folder of a sweep.
+pub const FOLDER: FileWords = FileWords {
     kind: "sweep folder",
     description: "A folder that decoupler sweep fills. Its finished trials are shown, and new ones as they arrive.",
     extensions: &[],
 };
 
-/// The folder that is shown, if any, and the dialogs that ask for one.
-#[derive(Debug)]
-pub struct SweepFolder {
-    /// The folder, with its trials so far.
-    pub shown: Option<Report>,
-    job: Background<FolderEvent>,
-    /// Ends the watch when dropped.
-    watched: Option<Sender<()>>,
-    choices: Sender<PathBuf>,
-    chosen: Receiver<PathBuf>,
-}
+/// Minimum time between two reads of the folder.
+const BETWEEN_LOOKS: Duration = Duration::from_secs(1);
+/// Ratio of the pause between reads to the time of a read, so that a large folder does not keep the disk busy.
+const REST: u32 = 10;
+/// Interval at which a pause looks whether it is to end.
+const WAIT: Duration = Duration::from_millis(50);
 
-/// The report of a changed folder, or the reason why the folder is no longer read.
-type FolderEvent = Result<Option<Report>, String>;
-
-impl SweepFolder {
-    /// Shows no folder; `wake` is called when a folder has changed.
-    pub fn new(wake: &Wake) -> Self {
-        let (choices, chosen) = channel();
-        Self {
-            shown: None,
-            job: Background::new("sweep folder", Arc::clone(wake)),
-            watched: None,
-            choices,
-            chosen,
-        }
-    }
-
-    /// Asks for a folder.
-    pub fn choose(&self) -> FileTask {
-        FileTask::choose(FOLDER, "", self.choices.clone())
-    }
-
-    /// Shows no folder any more.
-    pub fn close(&mut self) {
-        (self.shown, self.watched) = (None, None);
-        self.job.abandon();
-    }
-
-    /// Shows a folder that was chosen, and what has changed in it.
-    pub fn take_events(&mut self) {
-        while let Ok(path) = self.chosen.try_recv() {
-            let (watched, open) = channel();
-            self.watched = Some(watched);
-            self.shown = Some(report(&path, "Reading the folder…", Page::default()));
-            self.job.start(
-                move |reporter| watch(&path, &open, reporter),
-                |ended| ended.map(|()| None).map_err(|error| error.to_string()),
-            );
-        }
-        while let Some(event) = self.job.next_event() {
-            match (event, &mut self.shown) {
-                (Ok(Some(report)), shown) => *shown = Some(report),
-                (Err(reason), Some(shown)) => shown.pages = vec![failed(reason)],
-                _ => {}
-            }
-        }
+/// Returns the task that shows the folder until it is cancelled.
+pub fn task(path: PathBuf) -> Task {
+    Task {
+        size: String::new(),
+        outcome: Box::new(Some(report(&path, "Reading the folder…", Page::default()))),
+        setup: None,
+        run: Box::new(move |reporter| {
+            watch(&path, reporter);
+            Ok(())
+        }),
     }
 }
 
-fn failed(reason: String) -> Page {
-    Page {
-        notes: vec![Note::Warning(reason)],
-        ..Page::default()
+/// Reads the folder whenever its files change.
+fn watch(path: &Path, reporter: &Reporter) {
+    let mut before = None;
+    while !reporter.is_cancelled() {
+        let begun = Instant::now();
+        let files = SweepFiles::list(path).ok();
+        if before.as_ref() != Some(&files) {
+            let report = match MergedSweep::read(&[path.to_owned()]) {
+                Ok(merged) => {
+                    let text = format!("{} begun. New trials appear here automatically.", merged.missing.len());
+                    report(path, &text, page(&merged))
+                }
+                Err(error) => {
+                    let notes = vec![Note::Warning(error.to_string())];
+                    report(
+                        path,
+                        "",
+                        Page {
+                            notes,
+                            ..Page::default()
+                        },
+                    )
+                }
+            };
+            reporter.send(StudyEvent::Report(Box::new(report)));
+            before = Some(files);
+        }
+        let pause = BETWEEN_LOOKS.max(REST * begun.elapsed());
+        while begun.elapsed() < pause && !reporter.is_cancelled() {
+            thread::sleep(WAIT);
+        }
     }
 }
 
 fn report(path: &Path, conditions: &str, page: Page) -> Report {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     Report {
-        headline: format!("Sweep folder {name}"),
+        headline: format!("Sweep folder {name}: {} finished", counted(page.rows.len(), "trial")),
         conditions: conditions.to_owned(),
         pages: vec![page],
-    }
-}
-
-/// Minimum time between two reads of the folder.
-const BETWEEN_LOOKS: Duration = Duration::from_secs(1);
-/// Ratio of the pause between reads to the time of a read, so that a large folder does not keep the disk busy.
-const REST: u32 = 10;
-
-/// Reads the folder at `path` whenever its files change, until the other end of `open` is gone.
-fn watch(path: &Path, open: &Receiver<()>, reporter: &job::Report<FolderEvent>) {
-    let mut before = None;
-    loop {
-        let begun = Instant::now();
-        let files = SweepFiles::list(path).map_err(|error| error.to_string());
-        if before.as_ref() != Some(&files) {
-            let merged = files.as_ref().map_err(String::clone).and_then(|_| {
-                let merged = MergedSweep::read(&[path.to_owned()]);
-                merged.map_err(|error| error.to_string())
-            });
-            let shown = match merged {
-                Ok(merged) => {
-                    let (finished, begun) = (counted(merged.trials.len(), "trial"), merged.missing.len());
-                    let text = format!("{finished} finished, {begun} begun. New trials appear here automatically.");
-                    report(path, &text, page(&merged))
-                }
-                Err(reason) => report(path, "", failed(reason)),
-            };
-            // Only the newest of the reports not yet received is needed.
-            reporter.progress(Ok(Some(shown)), |_, _| ());
-            before = Some(files);
-        }
-        match open.recv_timeout(BETWEEN_LOOKS.max(REST * begun.elapsed())) {
-            Err(RecvTimeoutError::Timeout) if !reporter.is_cancelled() => {}
-            _ => return,
-        }
     }
 }
 
@@ -149,9 +96,6 @@ const RESULTS: [(&str, &str, &str); 7] = [
     ("epochs", "/epochs", ""),
 ];
 
-/// Maximum number of problems listed.
-const MAX_PROBLEMS: usize = 3;
-
 /// Returns the table of the trials, with the options that differ and the results that there are, and the problems of the
 /// folder.
 fn page(merged: &MergedSweep) -> Page {
@@ -161,7 +105,8 @@ fn page(merged: &MergedSweep) -> Page {
         let cells = trials.iter().map(|row| cell(row.options.get(name)));
         (name.as_str(), Vec::from_iter(cells))
     });
-    let options = Vec::from_iter(options.filter(|(_, cells)| cells.iter().any(|cell| *cell != cells[0])));
+    let mut columns = Vec::from_iter(options.filter(|(_, cells)| cells.iter().any(|cell| *cell != cells[0])));
+    let options = columns.len();
     let results = RESULTS.iter().map(|&(heading, place, field)| {
         let cells = trials.iter().map(|row| match row.result.pointer(place) {
             Some(Value::Array(targets)) => mean(targets, field).into(),
@@ -169,17 +114,17 @@ fn page(merged: &MergedSweep) -> Page {
         });
         (heading, Vec::from_iter(cells))
     });
-    let results = results.filter(|(_, cells)| cells.iter().any(|cell| cell.number().is_some()));
-    let seconds = trials.iter().map(|row| cell(row.time.get("seconds"))).collect();
-    let columns = options.iter().cloned().chain(results).chain([("seconds", seconds)]);
-    let columns = Vec::from_iter(columns);
+    columns.extend(results.filter(|(_, cells)| cells.iter().any(|cell| cell.number().is_some())));
+    columns.push((
+        "seconds",
+        trials.iter().map(|row| cell(row.time.get("seconds"))).collect(),
+    ));
     let row = |item: usize| {
-        let named = options
-            .iter()
-            .map(|(name, cells)| format!("{name} {}", cells[item].rounded()));
+        let named = columns[..options].iter();
+        let named = named.map(|(name, cells)| format!("{name} {}", cells[item].rounded()));
         let mut tones = vec![Tone::Usual; columns.len()];
-        tones[..options.len()].fill(Tone::Strong);
-        tones[options.len()] = Tone::Own;
+        tones[..options].fill(Tone::Strong);
+        tones[options] = Tone::Own;
         Row {
             item,
             name: Vec::from_iter(named).join(", "),
@@ -189,21 +134,14 @@ fn page(merged: &MergedSweep) -> Page {
     };
     let conflicts = merged.conflicting.iter();
     let conflicts = conflicts.map(|files| format!("same options, different results: {files}; delete the wrong one"));
-    let problems = Vec::from_iter(merged.damaged.iter().cloned().chain(conflicts));
-    let more = problems.len().saturating_sub(MAX_PROBLEMS);
-    let mut notes = Vec::from_iter(problems.into_iter().take(MAX_PROBLEMS).map(Note::Warning));
-    if more > 0 {
-        notes.push(Note::Warning(format!("and {} more", counted(more, "problem"))));
-    }
+    let problems = merged.damaged.iter().cloned().chain(conflicts);
     let cells_of = |item: usize| columns.iter().map(|(_, cells)| cells[item].clone()).collect();
+    let headings = columns.iter().map(|(heading, _)| *heading);
     Page {
         what: "Trial",
         rows: (0..trials.len()).map(row).collect(),
-        table: Table::of_headings(
-            columns.iter().map(|(heading, _)| *heading),
-            (0..trials.len()).map(cells_of),
-        ),
-        notes,
+        table: Table::of_headings(headings, (0..trials.len()).map(cells_of)),
+        notes: problems.map(Note::Warning).collect(),
         ..Page::default()
     }
 }
@@ -218,13 +156,10 @@ fn cell(value: Option<&Value>) -> Cell {
     match value {
         None | Some(Value::Null) => Cell::Number(None),
         Some(Value::String(text)) => Cell::Text(text.clone()),
-        Some(Value::Array(values)) => {
-            let texts = values.iter().map(|value| cell(Some(value)).rounded());
-            Cell::Text(Vec::from_iter(texts).join(" "))
-        }
-        Some(value) => match value.as_u64() {
+        Some(Value::Number(number)) => match number.as_u64() {
             Some(count) => Cell::Count(count),
-            None => Cell::Number(value.as_f64()),
+            None => Cell::Number(number.as_f64()),
         },
+        Some(value) => Cell::Text(value.to_string()),
     }
 }

@@ -108,11 +108,6 @@ impl Topic {
         };
         TopicWords { name, verb, meaning }
     }
-
-    /// Returns true for topics about recordings.
-    pub fn is_of_recordings(self) -> bool {
-        matches!(self, Self::Readings | Self::Folds)
-    }
 }
 
 /// Form of a topic.
@@ -150,7 +145,7 @@ impl Form {
     /// If the form is not valid, or the Train view has no source; the message says what to do.
     pub fn task(&self, train: &Result<Setup, String>, is_quiet: &Arc<AtomicBool>) -> Result<Task, String> {
         let (setup, size) = match self {
-            Self::Experiment(form) => return form.task(),
+            Self::Experiment(form) => return form.task(train),
             Self::Speed(form) => return form.task(train.as_ref()?, is_quiet),
             Self::Readings => (train.clone()?, String::new()),
             Self::Folds(folds) => (train.clone()?, format!(", {}", counted(*folds, "training"))),
@@ -215,7 +210,7 @@ pub enum StudyEvent {
     Trial(Box<Finished>),
     /// The samples of a run are ready: the unit for which decoding is timed, such as "a sample", and the origin of recorded
     /// ones.
-    Samples(String, Option<Box<Recorded>>),
+    Samples(usize, String, Option<Box<Recorded>>),
     /// A point of a run is measured, with the file of its network if it has one.
     Point(usize, Box<TradeOffPoint>, Option<Arc<NetworkFile>>),
     /// A decoder cannot be used with the samples of a run, with the reason.

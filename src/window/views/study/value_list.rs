@@ -68,6 +68,19 @@ impl ValueList {
         Ok(different)
     }
 
+    /// Returns each number once, at least one.
+    ///
+    /// # Errors
+    /// As [`Self::different`].
+    pub fn numbers(&self) -> Result<Vec<f64>, String> {
+        let number = |value| match value {
+            Value::Integer(value) => value as f64,
+            Value::Number(value) => value,
+            Value::Text(_) => f64::NAN,
+        };
+        Ok(self.different()?.into_iter().map(number).collect())
+    }
+
     /// Shows the list as a text field, named after its setting unless `name` is given.
     pub fn ui(&mut self, ui: &mut Ui, name: Option<&str>, hint: &str) {
         let label = ui.label(name.unwrap_or(label(self.kind))).on_hover_text(hint);

@@ -1,4 +1,3 @@
-use decoupler_core::text::counted;
 use decoupler_files::{
     export::{atomic_write, format_duration},
     figure::{Figure, SequentialMap},
@@ -9,6 +8,7 @@ use super::{
     Form, Report, StudyView, Topic,
     report::{Look, Wish, figure_ui, notes_ui, table_ui},
     speed::limits_ui,
+    sweep_folder::FOLDER,
 };
 use crate::window::{
     shared::{Effect, Exporting, FileTask, FileWords, Offers, Shared, Shown, Unfinished, View},
@@ -30,7 +30,7 @@ impl View for StudyView {
     }
 
     fn is_working(&self) -> bool {
-        self.running.is_some()
+        self.running.is_some() && !self.is_folder()
     }
 
     fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
@@ -72,21 +72,16 @@ impl View for StudyView {
                 effects.extend(study.iter().flat_map(|study| study.outcome.open(look.page, item)));
                 effects.push(Effect::ShowTraining);
             }
-            Some(Wish::CloseFolder) => self.folder.close(),
             Some(Wish::Open(_)) | None => {}
         }
     }
 
     fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
         let palette = Theme::of(ui).palette;
-        let (colour, text) = match (self.progress(), self.shown(), self.ending()) {
-            (Some((_, text)), ..) => (palette.accent, text),
-            (_, Some(folder), _) if self.is_folder() => {
-                let trials = counted(folder.pages[0].rows.len(), "trial");
-                (palette.good, format!("{}: {trials} finished", folder.headline))
-            }
-            (.., Some((true, text))) => (palette.good, text),
-            (.., Some((false, text))) => (palette.warning, text),
+        let (colour, text) = match (self.progress(), self.ending()) {
+            (Some((_, text)), _) => (palette.accent, text),
+            (_, Some((true, text))) => (palette.good, text),
+            (_, Some((false, text))) => (palette.warning, text),
             _ => (palette.dim, format!("Ready: press {}", self.topic.words().verb)),
         };
         ui.horizontal_centered(|ui| state_ui(ui, colour, &text));
@@ -201,7 +196,7 @@ fn report_ui(
     let page = &report.pages[look.page];
     let whole = ui.available_rect_before_wrap();
     let has_table = !page.table.columns.is_empty();
-    let is_preview = view.study().is_none() && !view.is_folder();
+    let is_preview = view.study().is_none();
     let has_aside = is_preview || !page.notes.is_empty();
     let height = match (has_table, page.figure.is_some() || has_aside) {
         (true, true) => (space(6) * page.rows.len() as f32 + space(28)).min(0.53 * whole.height()),
@@ -255,15 +250,10 @@ fn head_ui(
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            if view.is_folder() {
-                wish = ui
-                    .add(ghost_button("Close folder"))
-                    .clicked()
-                    .then_some(Wish::CloseFolder);
-            } else if !view.topic.is_of_recordings() {
-                wish = marked_ui(ui, view, *look, shared, effects);
-            } else if view.is_outdated() {
+            if view.is_outdated() {
                 dim_ui(ui, "The recording or the settings have changed since: begin again.");
+            } else if view.study().is_none_or(|study| !study.outcome.parts().2.is_empty()) {
+                wish = marked_ui(ui, view, *look, shared, effects);
             }
             let names = report.pages.iter().map(|page| page.name.as_str()).enumerate();
             let names = Vec::from_iter(names.filter(|(_, name)| !name.is_empty()));
@@ -322,10 +312,10 @@ fn folder_ui(ui: &mut Ui, view: &StudyView, effects: &mut Vec<Effect>) {
         if save.on_hover_text(SPECIFICATION.description).clicked()
             && let Form::Experiment(form) = &view.forms[&Topic::Sweep]
         {
-            let specification = form.specification();
+            let specification = form.specification(&view.train);
             let task = FileTask::save(SPECIFICATION, "sweep", move |path| {
-                let specification = specification.clone()?;
-                let written = atomic_write(path, |writer| writeln!(writer, "{specification:#}"));
+                let text = format!("{:#}\n", specification.clone()?);
+                let written = atomic_write(path, |writer| writer.write_all(text.as_bytes()));
                 written.map_err(|error| error.to_string())
             });
             effects.push(Effect::ChooseFile(task));
@@ -333,7 +323,8 @@ fn folder_ui(ui: &mut Ui, view: &StudyView, effects: &mut Vec<Effect>) {
         let open = ui.add(ghost_button("Open sweep folder…"));
         let open = open.on_hover_text("Shows the trials of a folder that decoupler sweep fills, as they finish.");
         if open.clicked() {
-            effects.push(Effect::ChooseFile(view.folder.choose()));
+            let task = FileTask::choose(FOLDER, "", view.folders.0.clone());
+            effects.push(Effect::ChooseFile(task));
         }
     });
 }
@@ -348,26 +339,22 @@ const MARKDOWN: FileWords = FileWords {
 fn exports(view: &StudyView, colours: SequentialMap) -> Vec<Shown<'_>> {
     let words = view.topic.words();
     let stem = words.name.to_lowercase().replace(' ', "_");
+    let missing = || format!("Nothing has finished yet: press {} first.", words.verb);
     let study = view.study().filter(|study| study.outcome.parts().0 > 0);
-    let Some((study, page)) = study.and_then(|study| Some((study, study.report.pages.get(view.look.page)?))) else {
-        let none = || Err::<fn() -> _, _>(format!("Nothing has finished yet: press {} first.", words.verb));
-        let figure = Err::<fn() -> _, _>(format!("Nothing has finished yet: press {} first.", words.verb));
-        return vec![
-            Shown::figure("Figure", String::new(), figure),
-            Shown::table("Table", String::new(), none()),
-        ];
-    };
-    let mut shown = Vec::new();
-    if let Some(figure) = &page.figure {
-        let figure = move || match figure.clone() {
+    let page = study.and_then(|study| study.report.pages.get(view.look.page));
+    let figure = page.and_then(|page| page.figure.as_ref()).ok_or_else(missing);
+    let figure = figure.map(|figure| {
+        move || match figure.clone() {
             Figure::HeatMap(map) => map.coloured(colours).into(),
             figure => figure,
-        };
-        shown.push(Shown::figure("Figure", stem.clone(), Ok(figure)));
-    }
-    if !page.table.columns.is_empty() {
-        shown.push(Shown::table("Table", stem.clone(), Ok(|| page.table.clone())));
-    }
+        }
+    });
+    let table = page.filter(|page| !page.table.columns.is_empty()).ok_or_else(missing);
+    let mut shown = vec![
+        Shown::figure("Figure", stem.clone(), figure),
+        Shown::table("Table", stem.clone(), table.map(|page| || page.table.clone())),
+    ];
+    let Some(study) = study else { return shown };
     for (name, table) in study.outcome.tables() {
         let stem = format!("{stem}_{}", name.to_lowercase().replace(' ', "_"));
         shown.push(Shown::table(name, stem, Ok(table)));
