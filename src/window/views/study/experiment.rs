@@ -18,7 +18,7 @@ use decoupler_core::{
 use decoupler_files::{
     export::{
         ExperimentColumnKind, ExperimentTable, Table, cells_table, describe_conditions, describe_failures,
-        describe_worse_than_mean, sweep_specification, trials_table, write_experiment_markdown,
+        describe_worse_than_mean, sweep_specification, trials_table,
     },
     figure::{TradeOffLimits, experiment_figure},
     import::{Plan, Setup},
@@ -353,13 +353,6 @@ impl Outcome for ExperimentOutcome {
             ("Every cell", Box::new(|| cells_table(&self.results))),
             ("Every trial", Box::new(|| trials_table(&self.results))),
         ]
-    }
-
-    fn markdown(&self) -> Option<Vec<u8>> {
-        let mut text = Vec::new();
-        let conditions = describe_conditions(&self.results.experiment);
-        write_experiment_markdown(&self.heading, &conditions, &self.results, &mut text).ok()?;
-        Some(text)
     }
 }
 

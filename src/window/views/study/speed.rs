@@ -15,7 +15,7 @@ use decoupler_core::{
     dataset::{LARGEST_SAMPLES, Seed, Simulation},
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        Preset, Run, RunSettings, TradeOffPoint, Workload, decoded_unit, experiments::AxisKind, measure_trade_off,
+        Preset, RunSettings, TradeOffPoint, Workload, decoded_unit, experiments::AxisKind, measure_trade_off,
     },
     job::Job,
     scene::{Noise, Scene},
@@ -23,16 +23,16 @@ use decoupler_core::{
     training::{Method, StoppingRules},
 };
 use decoupler_files::{
-    export::{NetworkFile, Table, format_percent, trade_off_points, trade_off_summary},
+    export::{Table, format_percent, trade_off_points, trade_off_summary},
     figure::{Ink, TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure},
-    import::{Plan, Recorded, Setup, SetupSets},
+    import::{Setup, SetupSets},
     machine::memory_budget,
 };
 use eframe::egui::Ui;
 
 use super::{Note, Outcome, Page, Point, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList};
 use crate::window::{
-    shared::{Effect, NetworkSource, sentence},
+    shared::{Effect, sentence},
     widgets::{
         dim_ui,
         fields::{count_ui, quantity_ui},
@@ -112,14 +112,12 @@ impl SpeedForm {
         if decoders.is_empty() {
             return Err("no decoder is chosen: choose at least one".to_owned());
         }
-        let runs = match (base.settings().simulation(), base.plan()) {
-            (Some(array), _) => self.runs_of_array(array, base.settings().seed, &decoders)?,
-            (None, Some(plan)) => self.runs_of_recording(base.settings(), plan, &decoders)?,
-            (None, None) => Vec::new(),
-        };
         let hidden = self.hidden.numbers()?.into_iter();
         let plan = SpeedPlan {
-            runs,
+            runs: match base.settings().simulation() {
+                Some(array) => self.runs_of_array(array, base.settings().seed, &decoders)?,
+                None => self.runs_of_recording(base, &decoders)?,
+            },
             hidden: hidden.map(|hidden| hidden as usize).collect(),
         };
         match plan.points() {
@@ -137,19 +135,18 @@ impl SpeedForm {
         seed: Seed,
         decoders: &[DecoderKind],
     ) -> Result<Vec<PlannedRun>, String> {
-        let presets = Preset::ALL.into_iter();
-        let presets = Vec::from_iter(presets.filter(|preset| self.preset.is_none_or(|only| only == *preset)));
-        let noises = self.noises.numbers()?.into_iter().enumerate();
-        let runs = noises.flat_map(|(level, noise)| {
-            presets.iter().map(move |&preset| PlannedRun {
-                level,
+        let mut runs = Vec::new();
+        for noise in self.noises.numbers()? {
+            let presets = Preset::ALL.into_iter();
+            let presets = presets.filter(|preset| self.preset.is_none_or(|only| only == *preset));
+            runs.extend(presets.map(|preset| PlannedRun {
                 noise: Some(noise),
                 preset: Some(preset),
                 setup: self.settings(base, seed, preset, noise).into(),
                 decoders: decoders.to_vec(),
-            })
-        });
-        Ok(runs.collect())
+            }));
+        }
+        Ok(runs)
     }
 
     /// Returns the settings of a preset at a noise level, with the sensor and the scene of `base`. The preset
@@ -188,44 +185,41 @@ impl SpeedForm {
         *epochs = (*epochs).min(self.epochs);
     }
 
-    /// Returns a run for each method, on the recording that `plan` reads. Decoders without a network do not depend on
-    /// the method, so the first run measures them.
-    fn runs_of_recording(
-        &self,
-        base: &RunSettings,
-        plan: &Plan,
-        decoders: &[DecoderKind],
-    ) -> Result<Vec<PlannedRun>, String> {
-        let mut methods = vec![base.training.method];
+    /// Returns a run for each method, on the recording of `base`. Decoders without a network do not depend on the method, so
+    /// the first run measures them.
+    fn runs_of_recording(&self, base: &Setup, decoders: &[DecoderKind]) -> Result<Vec<PlannedRun>, String> {
+        let present = base.settings().training.method;
+        let mut methods = vec![present];
         if decoders.iter().any(|kind| kind.needs_network()) {
             let named = self.methods.different()?.into_iter();
-            let named = named.map(|value| Method::named(&value.to_string()).map_err(|error| error.to_string()));
+            let named = named.map(|name| Method::named(&name.to_string()).map_err(|error| error.to_string()));
             methods = named.collect::<Result<_, _>>()?;
         }
-        let run = |(place, method): (usize, &Method)| {
-            let mut settings = *base;
+        let mut runs: Vec<PlannedRun> = Vec::new();
+        for method in methods {
+            let mut settings = *base.settings();
             // The method of the Train view keeps its settings.
-            if method.short_name() != base.training.method.short_name() {
-                settings.choose_method(*method);
+            if method.short_name() != present.short_name() {
+                settings.choose_method(method);
             }
             if !self.is_full {
                 self.shorten(&mut settings);
             }
-            let mut plan = plan.clone();
+            let mut plan = base.plan().cloned().ok_or("This is not a recording.")?;
             // A share set by the user is kept.
-            if plan.division.validation_fraction == Some(base.validation_fraction()) {
+            if plan.division.validation_fraction == Some(base.settings().validation_fraction()) {
                 plan.division.validation_fraction = Some(settings.validation_fraction());
             }
-            let of_run = decoders.iter().filter(|kind| place == 0 || kind.needs_network());
-            PlannedRun {
-                level: 0,
+            let of_run = decoders.iter().filter(|kind| runs.is_empty() || kind.needs_network());
+            let of_run = of_run.copied().collect();
+            runs.push(PlannedRun {
                 noise: None,
                 preset: None,
                 setup: Setup::recording(settings, plan),
-                decoders: of_run.copied().collect(),
-            }
-        };
-        Ok(methods.iter().enumerate().map(run).collect())
+                decoders: of_run,
+            });
+        }
+        Ok(runs)
     }
 
     /// Shows the fields; `is_array` for a simulated array.
@@ -261,30 +255,17 @@ impl SpeedForm {
     }
 
     fn training_ui(&mut self, ui: &mut Ui, is_array: bool) {
-        let (full, meaning) = match is_array {
-            true => (
-                "Full presets",
-                "Samples and epochs as in the presets: the best networks, at some minutes each.",
-            ),
-            false => ("As in Train view", "As many epochs as in the Train view."),
-        };
+        let full = if is_array { "Full presets" } else { "As in Train view" };
         let lengths = [(false, "Quick look"), (true, full)];
         self.is_full = segmented_ui(ui, "Training length", &lengths, self.is_full, true).unwrap_or(self.is_full);
-        if self.is_full {
-            dim_ui(ui, meaning);
-        } else {
+        if !self.is_full {
             if is_array {
                 let hint = "Largest number of training samples per network; a preset with fewer keeps its own number.";
                 count_ui(ui, "Maximum samples", hint, &mut self.samples, 1..=LARGEST_SAMPLES);
             }
+            let epochs = 1..=StoppingRules::MAX_EPOCHS;
             let hint = "Largest number of epochs per training.";
-            count_ui(
-                ui,
-                "Maximum epochs",
-                hint,
-                &mut self.epochs,
-                1..=StoppingRules::MAX_EPOCHS,
-            );
+            count_ui(ui, "Maximum epochs", hint, &mut self.epochs, epochs);
         }
         if is_array {
             let hint = "Number of samples on which the errors are measured.";
@@ -317,8 +298,6 @@ struct SpeedPlan {
 /// A run that fits decoders.
 #[derive(Clone, Debug)]
 struct PlannedRun {
-    /// Index of its noise level, or 0 for a recording.
-    level: usize,
     /// Relative noise of a reading, if it is simulated.
     noise: Option<f64>,
     /// Preset from which its settings were derived, if any.
@@ -369,25 +348,12 @@ fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Resu
                 sets.map_err(|error| error.to_string())?
             }
         };
-        let recorded = sets.recorded();
-        let unit = decoded_unit(&sets.sets.test);
-        reporter.send(StudyEvent::Samples(number, unit, recorded.cloned().map(Box::new)));
-        // Several decoders share a network.
-        let mut last_file: Option<Arc<NetworkFile>> = None;
-        let on_point = |kind, point, trained: Option<&Run>| {
-            let point = match point {
-                Ok(point) => point,
-                Err(error) => return reporter.send(StudyEvent::Refused(number, format!("{kind}: {error}"))),
-            };
-            last_file = trained.and_then(|trained| {
-                let last = last_file.take().filter(|file| file.settings == *trained.settings());
-                last.or_else(|| NetworkFile::from_run(trained, recorded).ok().map(Arc::new))
+        reporter.send(StudyEvent::Samples(number, decoded_unit(&sets.sets.test)));
+        let on_point = |kind, point: Result<TradeOffPoint, _>, _: Option<&_>| {
+            reporter.send(match point {
+                Ok(point) => StudyEvent::Point(number, Box::new(point)),
+                Err(error) => StudyEvent::Refused(format!("{kind}: {error}")),
             });
-            let point = TradeOffPoint {
-                preset: run.preset,
-                ..point
-            };
-            reporter.send(StudyEvent::Point(number, Box::new(point), last_file.clone()));
         };
         let settings = run.setup.settings();
         let measured = measure_trade_off(settings, &sets.sets, &plan.hidden, &run.decoders, &job, on_point);
@@ -403,24 +369,15 @@ struct SpeedOutcome {
     plan: SpeedPlan,
     /// One for each noise level, or a single one for a recording.
     levels: Vec<TradeOffLevel>,
-    /// For each point of each level, the number of its run, and the file of its network if it has one.
-    origins: Vec<Vec<(usize, Option<Arc<NetworkFile>>)>>,
-    /// Decoders that cannot be used, each with the number of its run and the reason.
+    /// The number of the run of each point of each level.
+    origins: Vec<Vec<usize>>,
+    /// Decoders that cannot be used, each with its level and the reason.
     refused: Vec<(usize, String)>,
     /// Unit that is decoded at a time, such as "a sample", once it is known.
     unit: String,
-    /// Origin of the samples of a recording, once they are read.
-    recorded: Option<Box<Recorded>>,
 }
 
 impl SpeedOutcome {
-    /// Returns the setup with which a point was measured.
-    fn setup_of(&self, level: usize, point: usize) -> Option<Setup> {
-        let (run, _) = self.origins.get(level)?.get(point)?;
-        let point = &self.levels[level].points[point];
-        Some(self.plan.runs[*run].setup.with_settings(point.settings))
-    }
-
     fn page(&self, number: usize, limits: &TradeOffLimits) -> Page {
         let level = &self.levels[number];
         let table = trade_off_summary(level);
@@ -437,10 +394,7 @@ impl SpeedOutcome {
 
     fn notes(&self, number: usize, limits: &TradeOffLimits) -> Vec<Note> {
         let level = &self.levels[number];
-        let refused = self
-            .refused
-            .iter()
-            .filter(|(run, _)| self.plan.runs[*run].level == number);
+        let refused = self.refused.iter().filter(|(of, _)| *of == number);
         let mut notes = Vec::from_iter(refused.map(|(_, reason)| Note::Warning(sentence(reason))));
         notes.push(Note::Heading("Recommended decoders"));
         let questions = [
@@ -466,21 +420,23 @@ impl SpeedOutcome {
 impl Outcome for SpeedOutcome {
     fn take(&mut self, event: StudyEvent) {
         match event {
-            StudyEvent::Samples(run, unit, recorded) => {
-                let PlannedRun { level, noise, .. } = self.plan.runs[run];
-                if level == self.levels.len() {
+            StudyEvent::Samples(run, unit) => {
+                let noise = self.plan.runs[run].noise;
+                if self.levels.last().is_none_or(|level| level.noise != noise) {
                     let points = Vec::new();
                     self.levels.push(TradeOffLevel { noise, points });
                     self.origins.push(Vec::new());
                 }
-                (self.unit, self.recorded) = (unit, recorded);
+                self.unit = unit;
             }
-            StudyEvent::Point(run, point, file) => {
-                let level = self.plan.runs[run].level;
-                self.levels[level].points.push(*point);
-                self.origins[level].push((run, file));
+            StudyEvent::Point(run, point) => {
+                if let (Some(level), Some(origins)) = (self.levels.last_mut(), self.origins.last_mut()) {
+                    let preset = self.plan.runs[run].preset;
+                    level.points.push(TradeOffPoint { preset, ..*point });
+                    origins.push(run);
+                }
             }
-            StudyEvent::Refused(run, reason) => self.refused.push((run, reason)),
+            StudyEvent::Refused(reason) => self.refused.push((self.levels.len() - 1, reason)),
             _ => {}
         }
     }
@@ -501,19 +457,9 @@ impl Outcome for SpeedOutcome {
     }
 
     fn open(&self, level: usize, point: usize) -> Vec<Effect> {
-        let setup = self.setup_of(level, point).map(Box::new);
-        Vec::from_iter(setup.map(Effect::TakeSetup))
-    }
-
-    fn decoder(&self, level: usize, point: usize) -> Option<(DecoderKind, NetworkSource)> {
-        let setup = self.setup_of(level, point)?;
-        let (_, file) = &self.origins[level][point];
-        let point = &self.levels[level].points[point];
-        let source = match file {
-            Some(file) => NetworkSource::Kept(point_name(point), Arc::clone(file)),
-            None => NetworkSource::Samples(Box::new(setup), self.recorded.clone()),
-        };
-        Some((point.report.kind, source))
+        let settings = self.levels[level].points[point].settings;
+        let setup = &self.plan.runs[self.origins[level][point]].setup;
+        vec![Effect::TakeSetup(Box::new(setup.with_settings(settings)))]
     }
 
     fn tables(&self) -> Vec<(&'static str, Box<dyn Fn() -> Table + '_>)> {
@@ -546,12 +492,10 @@ fn rows(level: &TradeOffLevel, columns: usize) -> Vec<Row> {
 fn point(point: &TradeOffPoint) -> Point {
     let [decoding, training] = TradeOffCost::ALL.map(|cost| cost.of(point).into());
     let mut facts = point_facts(point);
-    let samples = point
-        .settings
-        .simulation()
-        .map(|array| counted(array.samples, "training sample"));
-    let epochs = counted(point.settings.training.stopping.epochs, "epoch");
-    facts.extend(samples.into_iter().chain([format!("at most {epochs}")]));
+    facts.push(format!(
+        "at most {}",
+        counted(point.settings.training.stopping.epochs, "epoch")
+    ));
     Point {
         name: point_name(point),
         facts,
@@ -562,6 +506,7 @@ fn point(point: &TradeOffPoint) -> Point {
 #[cfg(test)]
 mod tests {
     use decoupler_core::scene::{RowModel, Rows};
+    use decoupler_files::import::Plan;
 
     use super::*;
 
@@ -569,10 +514,10 @@ mod tests {
         form.plan(&base.into()).unwrap()
     }
 
-    /// The settings of the run of a preset at a level.
-    fn settings(plan: &SpeedPlan, level: usize, preset: Preset) -> RunSettings {
+    /// The settings of the run of a preset at a noise.
+    fn settings(plan: &SpeedPlan, noise: f64, preset: Preset) -> RunSettings {
         let mut runs = plan.runs.iter();
-        let run = runs.find(|run| (run.level, run.preset) == (level, Some(preset)));
+        let run = runs.find(|run| (run.noise, run.preset) == (Some(noise), Some(preset)));
         *run.unwrap().setup.settings()
     }
 
@@ -581,7 +526,7 @@ mod tests {
         let plan = plan(&SpeedForm::default(), RunSettings::default());
         // Five without a network, then two sizes with two precisions and polish.
         assert_eq!(plan.points(), 4 * 2 * (5 + 2 * 3));
-        let best = settings(&plan, 2, Preset::Best);
+        let best = settings(&plan, 1e-3, Preset::Best);
         let simulation = best.simulation().unwrap();
         assert_eq!((simulation.samples, best.training.stopping.epochs), (2000, 60));
         let scene = simulation.scene;
@@ -598,7 +543,7 @@ mod tests {
             preset: Some(Preset::Best),
             ..SpeedForm::default()
         };
-        let (settings, preset) = (settings(&plan(&form, base), 0, Preset::Best), Preset::Best.settings());
+        let (settings, preset) = (settings(&plan(&form, base), 0.0, Preset::Best), Preset::Best.settings());
         let (simulation, of_preset) = (settings.simulation().unwrap(), preset.simulation().unwrap());
         assert_eq!(
             (simulation.samples, settings.training),

@@ -282,31 +282,22 @@ impl StudyView {
             let share = of.filter(|of| *of > 0).map_or(0.0, |of| bytes as f32 / of as f32);
             return Some((share, format!("Reading the files… {:.0} %", 100.0 * share)));
         }
-        let name = running.topic.words().name;
-        let study = self.studies.get(&running.topic)?;
+        let (name, study) = (running.topic.name(), self.studies.get(&running.topic)?);
         Some(match study.outcome.parts() {
-            (1, ..) if self.is_folder() => (1.0, study.report.headline.clone()),
+            _ if self.is_folder() => (1.0, study.report.headline.clone()),
             (.., "") => (0.0, format!("{name}…")),
-            (done, all, part) => {
-                let share = done as f32 / all.max(1) as f32;
-                (share, format!("{name}: {done} of {}", counted(all, part)))
-            }
+            (done, all, _) => (done as f32 / all.max(1) as f32, format!("{name}: {}", study.standing())),
         })
     }
 
     /// Returns whether everything planned was done, and in words how it ended.
     pub(super) fn ending(&self) -> Option<(bool, String)> {
         let study = self.study()?;
+        let (done, all, _) = study.outcome.parts();
+        let ended = if done < all { "ended early" } else { "finished" };
         let took = format_duration(study.took?);
-        let name = self.topic.words().name;
-        Some(match study.outcome.parts() {
-            (.., "") => (true, format!("{name} finished in {took}")),
-            (done, all, part) if done < all => {
-                let all = counted(all, part);
-                (false, format!("{name} ended early: {done} of {all} in {took}"))
-            }
-            (_, all, part) => (true, format!("{name} finished: {} in {took}", counted(all, part))),
-        })
+        let text = format!("{} {ended}: {} in {took}", self.topic.name(), study.standing());
+        Some((done == all, text))
     }
 
     /// Returns the work that closing the window would cut short or discard.
@@ -314,15 +305,27 @@ impl StudyView {
         let unfinished = |topic: Topic| {
             let study = self.studies.get(&topic)?;
             let is_running = self.running.as_ref().is_some_and(|running| running.topic == topic);
-            let progress = match study.outcome.parts() {
-                (.., "") if is_running && !self.is_folder() => study.size.clone(),
-                (.., "") => return None,
-                (done, all, part) if is_running => format!("{done} of {} finished", counted(all, part)),
-                (done, all, _) if done < all || study.is_saved.load(Ordering::Relaxed) => return None,
-                (_, all, part) => format!("{} finished, not exported as a table", counted(all, part)),
+            let (done, all, part) = study.outcome.parts();
+            let is_unsaved = done == all && !part.is_empty() && !study.is_saved.load(Ordering::Relaxed);
+            let standing = study.standing();
+            let progress = match is_running {
+                true if self.is_folder() => return None,
+                true => standing,
+                false => is_unsaved.then(|| format!("{standing} finished, not exported as a table"))?,
             };
-            Some(Unfinished::discarded(topic.words().name, progress))
+            Some(Unfinished::discarded(topic.name(), progress))
         };
         Topic::ALL.into_iter().filter_map(unfinished).collect()
+    }
+}
+
+impl Study {
+    /// Returns how much is done: "2 of 800 trials".
+    fn standing(&self) -> String {
+        match self.outcome.parts() {
+            (.., "") => self.size.clone(),
+            (done, all, part) if done < all => format!("{done} of {}", counted(all, part)),
+            (_, all, part) => counted(all, part),
+        }
     }
 }

@@ -11,7 +11,7 @@ use super::{
     sweep_folder::FOLDER,
 };
 use crate::window::{
-    shared::{Effect, Exporting, FileTask, FileWords, Offers, Shared, Shown, Unfinished, View},
+    shared::{Effect, FileTask, FileWords, Offers, Shared, Shown, Unfinished, View},
     theme::{Theme, semibold, space, type_size},
     widgets::{
         card_ui, dim_ui, ghost_button, invitation_ui, note_ui, primary_button, progress_bar_ui, scrolled_ui,
@@ -60,7 +60,7 @@ impl View for StudyView {
         let whole = ui.available_rect_before_wrap();
         let (mut look, mut wish) = (self.look, None);
         match self.shown() {
-            Some(report) => wish = report_ui(ui, self, report, &mut look, shared, effects),
+            Some(report) => wish = report_ui(ui, self, report, &mut look, shared),
             None => card_ui(ui, whole, |ui| wish = invited_ui(ui, self)),
         }
         ui.allocate_rect(whole, Sense::hover());
@@ -82,7 +82,7 @@ impl View for StudyView {
             (Some((_, text)), _) => (palette.accent, text),
             (_, Some((true, text))) => (palette.good, text),
             (_, Some((false, text))) => (palette.warning, text),
-            _ => (palette.dim, format!("Ready: press {}", self.topic.words().verb)),
+            _ => (palette.dim, format!("Ready: press {}", self.topic.words()[1])),
         };
         ui.horizontal_centered(|ui| state_ui(ui, colour, &text));
     }
@@ -95,13 +95,14 @@ fn form_ui(ui: &mut Ui, view: &mut StudyView, effects: &mut Vec<Effect>) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(space(1), space(1));
         for option in Topic::ALL {
-            ui.selectable_value(&mut topic, option, option.words().name);
+            ui.selectable_value(&mut topic, option, option.name());
         }
     });
     if topic != view.topic {
         view.choose(topic);
     }
-    dim_ui(ui, topic.words().meaning);
+    let [_, verb, meaning] = topic.words();
+    dim_ui(ui, meaning);
     let is_idle = view.running.is_none();
     let mut form = view.forms[&topic].clone();
     ui.add_enabled_ui(is_idle, |ui| form.fields_ui(ui, &view.train));
@@ -110,7 +111,7 @@ fn form_ui(ui: &mut Ui, view: &mut StudyView, effects: &mut Vec<Effect>) {
         Err(problem) => note_ui(ui, problem),
     };
     ui.add_space(space(2));
-    buttons_ui(ui, view, effects);
+    buttons_ui(ui, view, verb, effects);
     if topic == Topic::Speed {
         let limits = view.limits;
         limits_ui(ui, &mut view.limits);
@@ -137,14 +138,14 @@ fn form_ui(ui: &mut Ui, view: &mut StudyView, effects: &mut Vec<Effect>) {
 }
 
 /// Shows the buttons that begin and cancel, and the progress.
-fn buttons_ui(ui: &mut Ui, view: &mut StudyView, effects: &mut Vec<Effect>) {
+fn buttons_ui(ui: &mut Ui, view: &mut StudyView, verb: &str, effects: &mut Vec<Effect>) {
     let half = ((ui.available_width() - space(2)) / 2.0).floor();
     ui.horizontal(|ui| {
         let size = vec2(half, space(7));
-        let begin = primary_button(format!("▶ {}", view.topic.words().verb)).min_size(size);
+        let begin = primary_button(format!("▶ {verb}")).min_size(size);
         let begin = ui.add_enabled(view.can_begin(), begin);
         let why_not = match &view.running {
-            Some(running) => format!("{} is under way", running.topic.words().name),
+            Some(running) => format!("{} is under way", running.topic.name()),
             None => "The note above says what to change".to_owned(),
         };
         let hint = with_shortcut(ui, "Begins in the background", Key::Enter);
@@ -172,26 +173,19 @@ fn buttons_ui(ui: &mut Ui, view: &mut StudyView, effects: &mut Vec<Effect>) {
 
 /// Says what there will be, or why there is nothing, and offers to begin.
 fn invited_ui(ui: &mut Ui, view: &StudyView) -> Option<Wish> {
-    let words = view.topic.words();
+    let [_, verb, meaning] = view.topic.words();
     let text = match (&view.task, view.topic) {
         _ if view.running.is_some() => "The results appear here when the work has finished.",
         (Err(problem), _) => problem,
         (Ok(_), Topic::Table(_)) => "Our figures appear next to the published ones as the trials finish.",
-        (Ok(_), _) => words.meaning,
+        (Ok(_), _) => meaning,
     };
-    let button = format!("{} now", words.verb);
+    let button = format!("{verb} now");
     invitation_ui(ui, text, &button, view.can_begin()).then_some(Wish::Begin)
 }
 
 /// Shows a page of a report: title, conditions and table above, figure and notes below.
-fn report_ui(
-    ui: &mut Ui,
-    view: &StudyView,
-    report: &Report,
-    look: &mut Look,
-    shared: &Shared,
-    effects: &mut Vec<Effect>,
-) -> Option<Wish> {
+fn report_ui(ui: &mut Ui, view: &StudyView, report: &Report, look: &mut Look, shared: &Shared) -> Option<Wish> {
     look.page = look.page.min(report.pages.len() - 1);
     let page = &report.pages[look.page];
     let whole = ui.available_rect_before_wrap();
@@ -213,7 +207,7 @@ fn report_ui(
     let (left, right) = lower.split_left_right_at_x(lower.left() + (share * lower.width()).round());
     let mut wish = None;
     card_ui(ui, upper, |ui| {
-        wish = head_ui(ui, view, report, look, shared, effects);
+        wish = head_ui(ui, view, report, look, shared);
         dim_ui(ui, &report.conditions);
         if has_table {
             wish = wish.or(table_ui(ui, page, look));
@@ -238,14 +232,7 @@ fn report_ui(
 }
 
 /// Shows the title, the choice of the page, and what can be done with the marked item.
-fn head_ui(
-    ui: &mut Ui,
-    view: &StudyView,
-    report: &Report,
-    look: &mut Look,
-    shared: &Shared,
-    effects: &mut Vec<Effect>,
-) -> Option<Wish> {
+fn head_ui(ui: &mut Ui, view: &StudyView, report: &Report, look: &mut Look, shared: &Shared) -> Option<Wish> {
     let mut wish = None;
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
@@ -253,7 +240,7 @@ fn head_ui(
             if view.is_outdated() {
                 dim_ui(ui, "The recording or the settings have changed since: begin again.");
             } else if view.study().is_none_or(|study| !study.outcome.parts().2.is_empty()) {
-                wish = marked_ui(ui, view, *look, shared, effects);
+                wish = marked_ui(ui, *look, shared);
             }
             let names = report.pages.iter().map(|page| page.name.as_str()).enumerate();
             let names = Vec::from_iter(names.filter(|(_, name)| !name.is_empty()));
@@ -273,8 +260,8 @@ fn head_ui(
     wish
 }
 
-/// Shows the buttons that open the marked item in the Train view, and export the decoder of a marked point.
-fn marked_ui(ui: &mut Ui, view: &StudyView, look: Look, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Wish> {
+/// Shows the button that opens the marked item in the Train view.
+fn marked_ui(ui: &mut Ui, look: Look, shared: &Shared) -> Option<Wish> {
     let why_not = match look.marked {
         Some(_) => "A training is running in the Train view: its settings cannot be changed now",
         None => "Click a row of the table or an item of the figure first",
@@ -283,14 +270,7 @@ fn marked_ui(ui: &mut Ui, view: &StudyView, look: Look, shared: &Shared, effects
     let can_open = look.marked.is_some() && !shared.phase.is_busy();
     let open = ui.add_enabled(can_open, ghost_button("Open in Train view"));
     let open = open.on_hover_text(hint).on_disabled_hover_text(why_not);
-    let marked = look.marked?;
-    let decoder = view.study().and_then(|study| study.outcome.decoder(look.page, marked));
-    if let Some((kind, source)) = decoder
-        && ui.add(ghost_button("Export this decoder…")).clicked()
-    {
-        effects.push(Effect::Export(Box::new(Exporting::decoder(kind, source))));
-    }
-    open.clicked().then_some(Wish::Open(marked))
+    look.marked.filter(|_| open.clicked()).map(Wish::Open)
 }
 
 const SPECIFICATION: FileWords = FileWords {
@@ -329,17 +309,11 @@ fn folder_ui(ui: &mut Ui, view: &StudyView, effects: &mut Vec<Effect>) {
     });
 }
 
-const MARKDOWN: FileWords = FileWords {
-    kind: "table",
-    description: "The table as shown with the settings behind it, as Markdown.",
-    extensions: &["md"],
-};
-
 /// Returns what the topic shows: the figure and the table of the displayed page, and what is behind them.
 fn exports(view: &StudyView, colours: SequentialMap) -> Vec<Shown<'_>> {
-    let words = view.topic.words();
-    let stem = words.name.to_lowercase().replace(' ', "_");
-    let missing = || format!("Nothing has finished yet: press {} first.", words.verb);
+    let [name, verb, _] = view.topic.words();
+    let stem = name.to_lowercase().replace(' ', "_");
+    let missing = || format!("Nothing has finished yet: press {verb} first.");
     let study = view.study().filter(|study| study.outcome.parts().0 > 0);
     let page = study.and_then(|study| study.report.pages.get(view.look.page));
     let figure = page.and_then(|page| page.figure.as_ref()).ok_or_else(missing);
@@ -358,12 +332,6 @@ fn exports(view: &StudyView, colours: SequentialMap) -> Vec<Shown<'_>> {
     for (name, table) in study.outcome.tables() {
         let stem = format!("{stem}_{}", name.to_lowercase().replace(' ', "_"));
         shown.push(Shown::table(name, stem, Ok(table)));
-    }
-    if let Some(text) = study.outcome.markdown() {
-        let task = FileTask::save(MARKDOWN, &stem, move |path| {
-            atomic_write(path, |writer| writer.write_all(&text))
-        });
-        shown.push(Shown::file("Table with settings", Ok(task)));
     }
     shown.into_iter().map(|shown| shown.noting(&study.is_saved)).collect()
 }
