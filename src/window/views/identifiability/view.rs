@@ -9,11 +9,11 @@ use eframe::egui::{Button, Slider, SliderClamping, Ui, WidgetInfo, emath::Numeri
 
 use super::{
     IdentifiabilityView, Question,
-    array_view::{identifiability_ui, shown, status_ui},
+    array_view::{identifiability_ui, shown, status},
 };
 use crate::window::{
     glossary,
-    shared::{Effect, Shared, Shown, View},
+    shared::{Effect, Shared, Shown, Status, View, ViewKind},
     theme::space,
     widgets::{
         dim_ui,
@@ -23,22 +23,8 @@ use crate::window::{
 };
 
 impl View for IdentifiabilityView {
-    fn name(&self) -> &'static str {
-        "Sensor"
-    }
-
-    /// Shows the sensor and scene of the Train view, with what was last tried on them.
-    fn enter(&mut self, shared: &Shared) {
-        let is_other = shared
-            .draft
-            .simulation()
-            .is_some_and(|simulation| self.follow(simulation));
-        if is_other || self.problem.is_some() {
-            self.ask();
-        }
-    }
-
-    fn take_events(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {
+    fn take_events(&mut self, shared: &Shared, _effects: &mut Vec<Effect>) {
+        self.follow_shown(shared);
         while let Some(answer) = self.worker.next_answer() {
             if answer.is_newest {
                 self.is_pending = false;
@@ -61,12 +47,25 @@ impl View for IdentifiabilityView {
         array_form_ui(ui, self, shared, effects);
     }
 
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         identifiability_ui(ui, self, shared, effects);
+        Some(status(self))
     }
+}
 
-    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
-        status_ui(ui, self);
+impl IdentifiabilityView {
+    /// When the view is shown, takes the sensor and scene of the Train view, with what was last tried on them.
+    fn follow_shown(&mut self, shared: &Shared) {
+        let was_shown = std::mem::replace(&mut self.is_shown, shared.shown == ViewKind::Sensor);
+        if self.is_shown && !was_shown {
+            let is_other = shared
+                .draft
+                .simulation()
+                .is_some_and(|simulation| self.follow(simulation));
+            if is_other || self.problem.is_some() {
+                self.ask();
+            }
+        }
     }
 }
 

@@ -54,7 +54,7 @@ pub struct Row {
     pub item: usize,
     /// Name, which distinguishes it from other rows.
     pub name: String,
-    /// Meaning, as a tooltip.
+    /// Meaning of its coloured cells, as a tooltip.
     pub meaning: &'static str,
     /// Hue of the item in the figure.
     pub dot: Option<Ink>,
@@ -168,13 +168,16 @@ pub fn table_ui(ui: &mut Ui, page: &Page, look: &mut Look) -> Option<Wish> {
     let row = |place: usize| {
         let (row, texts) = (&page.rows[order[place]], &texts[order[place]]);
         let cells = row.tones.iter().zip(texts).map(|(tone, text)| {
-            let is_strong = matches!(tone, Tone::Strong | Tone::Own);
-            TableCell::new(text).colour(tone.colour(palette)).strong(is_strong)
+            let meaning = match tone {
+                Tone::Own | Tone::Warning => row.meaning,
+                _ => "",
+            };
+            let cell = TableCell::new(text).colour(tone.colour(palette)).meaning(meaning);
+            cell.strong(matches!(tone, Tone::Strong | Tone::Own))
         });
         TableRow::new(cells)
             .labelled(format!("{} {}", page.what, row.name))
             .named(row.name.as_str())
-            .meaning(row.meaning)
             .selected(look.marked == Some(row.item))
             .dot(row.dot.map(|ink| colour(ink, palette)))
     };

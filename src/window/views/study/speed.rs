@@ -34,7 +34,6 @@ use super::{Note, Outcome, Page, Point, Report, Reporter, Row, StudyEvent, Task,
 use crate::window::{
     shared::{Effect, sentence},
     widgets::{
-        dim_ui,
         fields::{count_ui, quantity_ui},
         section_heading_ui, segmented_ui,
     },
@@ -191,9 +190,11 @@ impl SpeedForm {
         let present = base.settings().training.method;
         let mut methods = vec![present];
         if decoders.iter().any(|kind| kind.needs_network()) {
-            let named = self.methods.different()?.into_iter();
-            let named = named.map(|name| Method::named(&name.to_string()).map_err(|error| error.to_string()));
-            methods = named.collect::<Result<_, _>>()?;
+            let named = self.methods.parse()?.values.into_iter();
+            methods = named.flat_map(|name| Method::named(&name.to_string())).collect();
+        }
+        if methods.is_empty() {
+            return Err("no training method is given: give at least one, or leave out the networks".to_owned());
         }
         let mut runs: Vec<PlannedRun> = Vec::new();
         for method in methods {

@@ -17,10 +17,21 @@ use decoupler_files::{
     import::{Plan, Progress, Setup},
 };
 
-use super::{Form, Outcome, Report, StudyEvent, Task, Topic, report::Look, sweep_folder};
+use eframe::egui::{Sense, Ui};
+
+use super::{
+    Form, Outcome, Report, StudyEvent, Task, Topic,
+    report::{Look, Wish},
+    sweep_folder,
+    view::{exports, form_ui, invited_ui, report_ui},
+};
 use crate::window::{
     job::{Background, Wake},
-    shared::{Effect, Matter, Notice, Phase, Shared, SourceKind, Unfinished},
+    shared::{
+        Command, Effect, Holdings, Matter, Notice, Offers, Phase, Shared, Shown, SourceKind, Status, Tone, Unfinished,
+        View, ViewKind,
+    },
+    widgets::{card_ui, scrolled_ui},
 };
 
 /// The Study view.
@@ -133,8 +144,13 @@ impl StudyView {
         self.checked_on = Some(basis);
     }
 
+    /// Returns true while nothing is computed.
+    pub(super) fn is_idle(&self) -> bool {
+        self.running.is_none() || self.is_folder()
+    }
+
     pub(super) fn can_begin(&self) -> bool {
-        (self.running.is_none() || self.is_folder()) && self.task.is_ok()
+        self.is_idle() && self.task.is_ok()
     }
 
     /// Begins the task of the form.
@@ -203,9 +219,60 @@ impl StudyView {
         }
     }
 
-    /// Takes the events of the job, and follows what the Train view has. `is_alone` unless another view computes.
-    pub(super) fn follow(&mut self, shared: &Shared, is_alone: bool, effects: &mut Vec<Effect>) {
+    /// Returns true while a measurement of times waits for other work.
+    pub(super) fn is_waiting(&self) -> bool {
+        let measures = self
+            .running
+            .as_ref()
+            .is_some_and(|running| running.topic == Topic::Speed);
+        measures && !self.is_quiet.load(Ordering::Relaxed)
+    }
+
+    /// Returns the results of the topic.
+    pub(super) fn study(&self) -> Option<&Study> {
+        self.studies.get(&self.topic)
+    }
+
+    /// Returns true while a sweep folder is shown, which is no work of this program.
+    pub(super) fn is_folder(&self) -> bool {
+        let running = self.running.as_ref();
+        let study = running.and_then(|running| self.studies.get(&running.topic));
+        study.is_some_and(|study| study.size.is_empty())
+    }
+
+    /// Returns true if the results are of another recording or other settings than the Train view has now.
+    pub(super) fn is_outdated(&self) -> bool {
+        let setup = self.study().and_then(|study| study.setup.as_ref());
+        setup.is_some_and(|setup| self.train.as_ref() != Ok(setup))
+    }
+
+    /// Returns the report to show: the results or, before there are any, the published figures.
+    fn displayed(&self) -> Option<&Report> {
+        let study = self.study().map(|study| &study.report);
+        let preview = Some(&self.preview).filter(|preview| preview.pages.iter().any(|page| !page.rows.is_empty()));
+        study.or(preview).filter(|report| !report.pages.is_empty())
+    }
+
+    /// Returns how far the task under way is, as a share and in words.
+    pub(super) fn progress(&self) -> Option<(f32, String)> {
+        let running = self.running.as_ref()?;
+        if let Some(Progress { bytes, of }) = running.reading {
+            let share = of.filter(|of| *of > 0).map_or(0.0, |of| bytes as f32 / of as f32);
+            return Some((share, format!("Reading the files… {:.0} %", 100.0 * share)));
+        }
+        let (name, study) = (running.topic.name(), self.studies.get(&running.topic)?);
+        Some(match study.outcome.parts() {
+            _ if self.is_folder() => (1.0, study.report.headline.clone()),
+            (.., "") => (0.0, format!("{name}…")),
+            (done, all, _) => (done as f32 / all.max(1) as f32, format!("{name}: {}", study.standing())),
+        })
+    }
+}
+
+impl View for StudyView {
+    fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         let trains = matches!(shared.phase, Phase::Preparing | Phase::Training | Phase::Calibrating);
+        let is_alone = shared.working.iter().all(|view| *view == ViewKind::Study);
         self.is_quiet.store(is_alone && !trains, Ordering::Relaxed);
         self.check(shared);
         let mut changed = None;
@@ -241,67 +308,16 @@ impl StudyView {
         }
     }
 
-    /// Returns true while a measurement of times waits for other work.
-    pub(super) fn is_waiting(&self) -> bool {
-        let measures = self
-            .running
-            .as_ref()
-            .is_some_and(|running| running.topic == Topic::Speed);
-        measures && !self.is_quiet.load(Ordering::Relaxed)
-    }
-
-    /// Returns the results of the topic.
-    pub(super) fn study(&self) -> Option<&Study> {
-        self.studies.get(&self.topic)
-    }
-
-    /// Returns true while a sweep folder is shown, which is no work of this program.
-    pub(super) fn is_folder(&self) -> bool {
-        let running = self.running.as_ref();
-        let study = running.and_then(|running| self.studies.get(&running.topic));
-        study.is_some_and(|study| study.size.is_empty())
-    }
-
-    /// Returns true if the results are of another recording or other settings than the Train view has now.
-    pub(super) fn is_outdated(&self) -> bool {
-        let setup = self.study().and_then(|study| study.setup.as_ref());
-        setup.is_some_and(|setup| self.train.as_ref() != Ok(setup))
-    }
-
-    /// Returns the report to show: the results or, before there are any, the published figures.
-    pub(super) fn shown(&self) -> Option<&Report> {
-        let study = self.study().map(|study| &study.report);
-        let preview = Some(&self.preview).filter(|preview| preview.pages.iter().any(|page| !page.rows.is_empty()));
-        study.or(preview).filter(|report| !report.pages.is_empty())
-    }
-
-    /// Returns how far the task under way is, as a share and in words.
-    pub(super) fn progress(&self) -> Option<(f32, String)> {
-        let running = self.running.as_ref()?;
-        if let Some(Progress { bytes, of }) = running.reading {
-            let share = of.filter(|of| *of > 0).map_or(0.0, |of| bytes as f32 / of as f32);
-            return Some((share, format!("Reading the files… {:.0} %", 100.0 * share)));
+    fn take_commands(&mut self, offers: &mut Offers<'_>, _shared: &Shared, effects: &mut Vec<Effect>) {
+        if offers.offer(Command::Begin("Begin the study"), self.can_begin()) {
+            self.begin(effects);
         }
-        let (name, study) = (running.topic.name(), self.studies.get(&running.topic)?);
-        Some(match study.outcome.parts() {
-            _ if self.is_folder() => (1.0, study.report.headline.clone()),
-            (.., "") => (0.0, format!("{name}…")),
-            (done, all, _) => (done as f32 / all.max(1) as f32, format!("{name}: {}", study.standing())),
-        })
+        if offers.offer(Command::Cancel("Cancel the study"), self.running.is_some()) {
+            self.cancel();
+        }
     }
 
-    /// Returns whether everything planned was done, and in words how it ended.
-    pub(super) fn ending(&self) -> Option<(bool, String)> {
-        let study = self.study()?;
-        let (done, all, _) = study.outcome.parts();
-        let ended = if done < all { "ended early" } else { "finished" };
-        let took = format_duration(study.took?);
-        let text = format!("{} {ended}: {} in {took}", self.topic.name(), study.standing());
-        Some((done == all, text))
-    }
-
-    /// Returns the work that closing the window would cut short or discard.
-    pub(super) fn to_be_discarded(&self) -> Vec<Unfinished> {
+    fn holdings(&self, _shared: &Shared) -> Holdings {
         let unfinished = |topic: Topic| {
             let study = self.studies.get(&topic)?;
             let is_running = self.running.as_ref().is_some_and(|running| running.topic == topic);
@@ -313,9 +329,56 @@ impl StudyView {
                 true => standing,
                 false => is_unsaved.then(|| format!("{standing} finished, not exported as a table"))?,
             };
-            Some(Unfinished::discarded(topic.name(), progress))
+            Some(Unfinished::new(topic.name(), progress))
         };
-        Topic::ALL.into_iter().filter_map(unfinished).collect()
+        Holdings {
+            is_computing: !self.is_idle(),
+            unfinished: Topic::ALL.into_iter().filter_map(unfinished).collect(),
+            files: Vec::new(),
+        }
+    }
+
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        exports(self, shared.look.colours)
+    }
+
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        scrolled_ui(ui, "study form", |ui| form_ui(ui, self, effects));
+        self.check(shared);
+    }
+
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
+        let whole = ui.available_rect_before_wrap();
+        let (mut look, mut wish) = (self.look, None);
+        match self.displayed() {
+            Some(report) => wish = report_ui(ui, self, report, &mut look, shared),
+            None => card_ui(ui, whole, |ui| wish = invited_ui(ui, self)),
+        }
+        ui.allocate_rect(whole, Sense::hover());
+        self.look = look;
+        match wish {
+            Some(Wish::Begin) => self.begin(effects),
+            Some(Wish::Open(item)) if !shared.phase.is_busy() => {
+                let study = self.study();
+                effects.extend(study.iter().flat_map(|study| study.outcome.open(look.page, item)));
+                effects.push(Effect::ShowTraining);
+            }
+            Some(Wish::Open(_)) | None => {}
+        }
+        let ended = self.study().and_then(|study| Some((study, study.took?)));
+        Some(match (self.progress(), ended) {
+            (Some((_, text)), _) => Status::new(Tone::Busy, text),
+            (None, Some((study, took))) => {
+                let (done, all, _) = study.outcome.parts();
+                let (tone, ended) = match done < all {
+                    true => (Tone::Warning, "ended early"),
+                    false => (Tone::Good, "finished"),
+                };
+                let (name, took) = (self.topic.name(), format_duration(took));
+                Status::new(tone, format!("{name} {ended}: {} in {took}", study.standing()))
+            }
+            (None, None) => Status::new(Tone::Calm, format!("Ready: press {}", self.topic.words()[1])),
+        })
     }
 }
 

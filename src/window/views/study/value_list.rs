@@ -51,34 +51,21 @@ impl ValueList {
         })
     }
 
-    /// Returns each value once, at least one.
+    /// Returns the numbers, at least one.
     ///
     /// # Errors
     /// If the list is empty, or a value cannot be parsed.
-    pub fn different(&self) -> Result<Vec<Value>, String> {
-        let mut different: Vec<Value> = Vec::new();
-        for value in self.parse()?.values {
-            if !different.contains(&value) {
-                different.push(value);
-            }
-        }
-        if different.is_empty() {
+    pub fn numbers(&self) -> Result<Vec<f64>, String> {
+        let values = self.parse()?.values;
+        if values.is_empty() {
             return Err(RunError::NoValues(self.kind.name()).to_string());
         }
-        Ok(different)
-    }
-
-    /// Returns each number once, at least one.
-    ///
-    /// # Errors
-    /// As [`Self::different`].
-    pub fn numbers(&self) -> Result<Vec<f64>, String> {
-        let number = |value| match value {
-            Value::Integer(value) => value as f64,
-            Value::Number(value) => value,
+        let numbers = values.iter().map(|value| match value {
+            Value::Integer(value) => *value as f64,
+            Value::Number(value) => *value,
             Value::Text(_) => f64::NAN,
-        };
-        Ok(self.different()?.into_iter().map(number).collect())
+        });
+        Ok(numbers.collect())
     }
 
     /// Shows the list as a text field, named after its setting unless `name` is given.
@@ -139,9 +126,14 @@ mod tests {
             list(AxisKind::Hidden, " 6;8\n10,,12 ").parse(),
             Ok(Axis::integers(AxisKind::Hidden, [6, 8, 10, 12]))
         );
-        assert_eq!(list(AxisKind::Hidden, "6, 6 6").different().unwrap().len(), 1);
+        assert_eq!(list(AxisKind::Noise, "0, 1e-3").numbers(), Ok(vec![0.0, 1e-3]));
+        assert!(
+            list(AxisKind::Hidden, "")
+                .numbers()
+                .unwrap_err()
+                .contains("no values for hidden nodes")
+        );
         let cases = [
-            (AxisKind::Hidden, "", "no values for hidden nodes"),
             (
                 AxisKind::Hidden,
                 "6, eight",
@@ -162,7 +154,7 @@ mod tests {
             ),
         ];
         for (kind, values, expected) in cases {
-            let message = list(kind, values).different().unwrap_err();
+            let message = list(kind, values).parse().unwrap_err();
             assert!(message.contains(expected), "{message}");
         }
     }

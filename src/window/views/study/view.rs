@@ -2,7 +2,7 @@ use decoupler_files::{
     export::{atomic_write, format_duration},
     figure::{Figure, SequentialMap},
 };
-use eframe::egui::{Align, Button, Key, Label, Layout, Modifiers, RichText, Sense, Ui, vec2};
+use eframe::egui::{Align, Button, Key, Label, Layout, RichText, Ui, vec2};
 
 use super::{
     Form, Report, StudyView, Topic,
@@ -11,85 +11,16 @@ use super::{
     sweep_folder::FOLDER,
 };
 use crate::window::{
-    shared::{Effect, FileTask, FileWords, Offers, Shared, Shown, Unfinished, View},
-    theme::{Theme, semibold, space, type_size},
+    shared::{Effect, FileTask, FileWords, Shared, Shown},
+    theme::{semibold, space, type_size},
     widgets::{
         card_ui, dim_ui, ghost_button, invitation_ui, note_ui, primary_button, progress_bar_ui, scrolled_ui,
-        section_heading_ui, segmented_ui, state_ui, with_shortcut,
+        section_heading_ui, segmented_ui, with_shortcut,
     },
 };
 
-impl View for StudyView {
-    fn name(&self) -> &'static str {
-        "Study"
-    }
-
-    fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        let is_alone = shared.working.iter().all(|name| *name == self.name());
-        self.follow(shared, is_alone, effects);
-    }
-
-    fn is_working(&self) -> bool {
-        self.running.is_some() && !self.is_folder()
-    }
-
-    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
-        self.to_be_discarded()
-    }
-
-    fn offer_actions(&mut self, offers: &mut Offers<'_>, _shared: &Shared, effects: &mut Vec<Effect>) {
-        if offers.offer_keys("Begin the study", Modifiers::COMMAND, Key::Enter, self.can_begin()) {
-            self.begin(effects);
-        }
-        let can_cancel = self.running.is_some();
-        if offers.offer_keys("Cancel the study", Modifiers::COMMAND, Key::Period, can_cancel) {
-            self.cancel();
-        }
-    }
-
-    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
-        exports(self, shared.look.colours)
-    }
-
-    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        scrolled_ui(ui, "study form", |ui| form_ui(ui, self, effects));
-        self.check(shared);
-    }
-
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        let whole = ui.available_rect_before_wrap();
-        let (mut look, mut wish) = (self.look, None);
-        match self.shown() {
-            Some(report) => wish = report_ui(ui, self, report, &mut look, shared),
-            None => card_ui(ui, whole, |ui| wish = invited_ui(ui, self)),
-        }
-        ui.allocate_rect(whole, Sense::hover());
-        self.look = look;
-        match wish {
-            Some(Wish::Begin) => self.begin(effects),
-            Some(Wish::Open(item)) if !shared.phase.is_busy() => {
-                let study = self.study();
-                effects.extend(study.iter().flat_map(|study| study.outcome.open(look.page, item)));
-                effects.push(Effect::ShowTraining);
-            }
-            Some(Wish::Open(_)) | None => {}
-        }
-    }
-
-    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
-        let palette = Theme::of(ui).palette;
-        let (colour, text) = match (self.progress(), self.ending()) {
-            (Some((_, text)), _) => (palette.accent, text),
-            (_, Some((true, text))) => (palette.good, text),
-            (_, Some((false, text))) => (palette.warning, text),
-            _ => (palette.dim, format!("Ready: press {}", self.topic.words()[1])),
-        };
-        ui.horizontal_centered(|ui| state_ui(ui, colour, &text));
-    }
-}
-
 /// Shows the list of topics, the fields of the topic, and the buttons.
-fn form_ui(ui: &mut Ui, view: &mut StudyView, effects: &mut Vec<Effect>) {
+pub fn form_ui(ui: &mut Ui, view: &mut StudyView, effects: &mut Vec<Effect>) {
     section_heading_ui(ui, "Study");
     let mut topic = view.topic;
     ui.horizontal_wrapped(|ui| {
@@ -103,7 +34,7 @@ fn form_ui(ui: &mut Ui, view: &mut StudyView, effects: &mut Vec<Effect>) {
     }
     let [_, verb, meaning] = topic.words();
     dim_ui(ui, meaning);
-    let is_idle = view.running.is_none();
+    let is_idle = view.is_idle();
     let mut form = view.forms[&topic].clone();
     ui.add_enabled_ui(is_idle, |ui| form.fields_ui(ui, &view.train));
     match &view.task {
@@ -172,7 +103,7 @@ fn buttons_ui(ui: &mut Ui, view: &mut StudyView, verb: &str, effects: &mut Vec<E
 }
 
 /// Says what there will be, or why there is nothing, and offers to begin.
-fn invited_ui(ui: &mut Ui, view: &StudyView) -> Option<Wish> {
+pub fn invited_ui(ui: &mut Ui, view: &StudyView) -> Option<Wish> {
     let [_, verb, meaning] = view.topic.words();
     let text = match (&view.task, view.topic) {
         _ if view.running.is_some() => "The results appear here when the work has finished.",
@@ -185,7 +116,7 @@ fn invited_ui(ui: &mut Ui, view: &StudyView) -> Option<Wish> {
 }
 
 /// Shows a page of a report: title, conditions and table above, figure and notes below.
-fn report_ui(ui: &mut Ui, view: &StudyView, report: &Report, look: &mut Look, shared: &Shared) -> Option<Wish> {
+pub fn report_ui(ui: &mut Ui, view: &StudyView, report: &Report, look: &mut Look, shared: &Shared) -> Option<Wish> {
     look.page = look.page.min(report.pages.len() - 1);
     let page = &report.pages[look.page];
     let whole = ui.available_rect_before_wrap();
@@ -310,7 +241,7 @@ fn folder_ui(ui: &mut Ui, view: &StudyView, effects: &mut Vec<Effect>) {
 }
 
 /// Returns what the topic shows: the figure and the table of the displayed page, and what is behind them.
-fn exports(view: &StudyView, colours: SequentialMap) -> Vec<Shown<'_>> {
+pub fn exports(view: &StudyView, colours: SequentialMap) -> Vec<Shown<'_>> {
     let [name, verb, _] = view.topic.words();
     let stem = name.to_lowercase().replace(' ', "_");
     let missing = || format!("Nothing has finished yet: press {verb} first.");
