@@ -27,15 +27,15 @@ use decoupler_core::{
     text::counted,
 };
 use decoupler_files::{
-    export::Table,
+    export::{NetworkFile, Table},
     figure::TradeOffLimits,
-    import::{Progress, Setup},
+    import::{Progress, Recorded, Setup},
 };
 use eframe::egui::Ui;
 
 use crate::window::{
     job,
-    shared::Effect,
+    shared::{Effect, Exporting},
     widgets::{fields::count_ui, section_heading_ui},
 };
 
@@ -217,10 +217,10 @@ enum StudyEvent {
     Problem(Arc<Problem>),
     /// A trial has finished or failed.
     Trial(Box<Finished>),
-    /// The samples of a run are ready, with the unit for which decoding is timed: "a sample".
-    Samples(usize, String),
-    /// A point of a run is measured.
-    Point(usize, Box<TradeOffPoint>),
+    /// The samples of a run are ready, with the unit for which decoding is timed, "a sample", and the origin of recorded ones.
+    Samples(usize, String, Option<Box<Recorded>>),
+    /// A point of a run is measured, with the file of its network if it has one.
+    Point(usize, Box<TradeOffPoint>, Option<Arc<NetworkFile>>),
     /// A decoder cannot be used with the samples of a run, with the reason.
     Refused(String),
     /// Results of work that has none before its end.
@@ -243,6 +243,11 @@ trait Outcome: Debug {
     /// Returns what opens an item of a page in the Train view.
     fn open(&self, _page: usize, _item: usize) -> Vec<Effect> {
         Vec::new()
+    }
+
+    /// Returns the export of the decoder of an item, if it has one.
+    fn decoder(&self, _page: usize, _item: usize) -> Option<Exporting> {
+        None
     }
 
     /// Returns tables for programs, with their names.

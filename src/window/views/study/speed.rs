@@ -15,7 +15,7 @@ use decoupler_core::{
     dataset::{LARGEST_SAMPLES, Seed, Simulation},
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        Preset, RunSettings, TradeOffPoint, Workload, decoded_unit, experiments::AxisKind, measure_trade_off,
+        Preset, Run, RunSettings, TradeOffPoint, Workload, decoded_unit, experiments::AxisKind, measure_trade_off,
     },
     job::Job,
     scene::{Noise, Scene},
@@ -23,16 +23,16 @@ use decoupler_core::{
     training::{Method, StoppingRules},
 };
 use decoupler_files::{
-    export::{Table, format_percent, trade_off_points, trade_off_summary},
+    export::{NetworkFile, Table, format_percent, trade_off_points, trade_off_summary},
     figure::{Ink, TradeOffCost, TradeOffLevel, TradeOffLimits, frame_time, point_facts, point_name, trade_off_figure},
-    import::{Setup, SetupSets},
+    import::{Recorded, Setup, SetupSets},
     machine::memory_budget,
 };
 use eframe::egui::Ui;
 
 use super::{Note, Outcome, Page, Point, Report, Reporter, Row, StudyEvent, Task, Tone, ValueList};
 use crate::window::{
-    shared::{Effect, sentence},
+    shared::{Effect, Exporting, NetworkSource, sentence},
     widgets::{
         fields::{count_ui, quantity_ui},
         section_heading_ui, segmented_ui,
@@ -349,10 +349,13 @@ fn measure(plan: &SpeedPlan, is_quiet: &AtomicBool, reporter: &Reporter) -> Resu
                 sets.map_err(|error| error.to_string())?
             }
         };
-        reporter.send(StudyEvent::Samples(number, decoded_unit(&sets.sets.test)));
-        let on_point = |kind, point: Result<TradeOffPoint, _>, _: Option<&_>| {
+        let recorded = sets.recorded();
+        let unit = decoded_unit(&sets.sets.test);
+        reporter.send(StudyEvent::Samples(number, unit, recorded.cloned().map(Box::new)));
+        let on_point = |kind, point: Result<TradeOffPoint, _>, trained: Option<&Run>| {
+            let file = trained.and_then(|trained| NetworkFile::from_run(trained, recorded).ok());
             reporter.send(match point {
-                Ok(point) => StudyEvent::Point(number, Box::new(point)),
+                Ok(point) => StudyEvent::Point(number, Box::new(point), file.map(Arc::new)),
                 Err(error) => StudyEvent::Refused(format!("{kind}: {error}")),
             });
         };
@@ -370,15 +373,24 @@ struct SpeedOutcome {
     plan: SpeedPlan,
     /// One for each noise level, or a single one for a recording.
     levels: Vec<TradeOffLevel>,
-    /// The number of the run of each point of each level.
-    origins: Vec<Vec<usize>>,
+    /// The number of the run of each point of each level, and the file of its network if it has one.
+    origins: Vec<Vec<(usize, Option<Arc<NetworkFile>>)>>,
     /// Decoders that cannot be used, each with its level and the reason.
     refused: Vec<(usize, String)>,
     /// Unit that is decoded at a time, such as "a sample", once it is known.
     unit: String,
+    /// Origin of the samples of a recording.
+    recorded: Option<Box<Recorded>>,
 }
 
 impl SpeedOutcome {
+    /// Returns the setup with which a point was measured.
+    fn setup_of(&self, level: usize, point: usize) -> Box<Setup> {
+        let (run, _) = &self.origins[level][point];
+        let settings = self.levels[level].points[point].settings;
+        Box::new(self.plan.runs[*run].setup.with_settings(settings))
+    }
+
     fn page(&self, number: usize, limits: &TradeOffLimits) -> Page {
         let level = &self.levels[number];
         let table = trade_off_summary(level);
@@ -421,20 +433,20 @@ impl SpeedOutcome {
 impl Outcome for SpeedOutcome {
     fn take(&mut self, event: StudyEvent) {
         match event {
-            StudyEvent::Samples(run, unit) => {
+            StudyEvent::Samples(run, unit, recorded) => {
                 let noise = self.plan.runs[run].noise;
                 if self.levels.last().is_none_or(|level| level.noise != noise) {
                     let points = Vec::new();
                     self.levels.push(TradeOffLevel { noise, points });
                     self.origins.push(Vec::new());
                 }
-                self.unit = unit;
+                (self.unit, self.recorded) = (unit, recorded);
             }
-            StudyEvent::Point(run, point) => {
+            StudyEvent::Point(run, point, file) => {
                 if let (Some(level), Some(origins)) = (self.levels.last_mut(), self.origins.last_mut()) {
                     let preset = self.plan.runs[run].preset;
                     level.points.push(TradeOffPoint { preset, ..*point });
-                    origins.push(run);
+                    origins.push((run, file));
                 }
             }
             StudyEvent::Refused(reason) => self.refused.push((self.levels.len() - 1, reason)),
@@ -458,9 +470,17 @@ impl Outcome for SpeedOutcome {
     }
 
     fn open(&self, level: usize, point: usize) -> Vec<Effect> {
-        let settings = self.levels[level].points[point].settings;
-        let setup = &self.plan.runs[self.origins[level][point]].setup;
-        vec![Effect::TakeSetup(Box::new(setup.with_settings(settings)))]
+        vec![Effect::TakeSetup(self.setup_of(level, point))]
+    }
+
+    fn decoder(&self, level: usize, point: usize) -> Option<Exporting> {
+        let (_, file) = self.origins.get(level)?.get(point)?;
+        let of_point = &self.levels[level].points[point];
+        let source = match file {
+            Some(file) => NetworkSource::Kept(point_name(of_point), Arc::clone(file)),
+            None => NetworkSource::Samples(self.setup_of(level, point), self.recorded.clone()),
+        };
+        Some(Exporting::decoder(of_point.report.kind, source))
     }
 
     fn tables(&self) -> Vec<(&'static str, Box<dyn Fn() -> Table + '_>)> {

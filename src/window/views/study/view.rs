@@ -171,7 +171,7 @@ fn head_ui(ui: &mut Ui, view: &StudyView, report: &Report, look: &mut Look, shar
             if view.is_outdated() {
                 dim_ui(ui, "The recording or the settings have changed since: begin again.");
             } else if view.study().is_none_or(|study| !study.outcome.parts().2.is_empty()) {
-                wish = marked_ui(ui, *look, shared);
+                wish = marked_ui(ui, view, *look, shared);
             }
             let names = report.pages.iter().map(|page| page.name.as_str()).enumerate();
             let names = Vec::from_iter(names.filter(|(_, name)| !name.is_empty()));
@@ -191,8 +191,8 @@ fn head_ui(ui: &mut Ui, view: &StudyView, report: &Report, look: &mut Look, shar
     wish
 }
 
-/// Shows the button that opens the marked item in the Train view.
-fn marked_ui(ui: &mut Ui, look: Look, shared: &Shared) -> Option<Wish> {
+/// Shows the buttons that open the marked item in the Train view, and export its decoder.
+fn marked_ui(ui: &mut Ui, view: &StudyView, look: Look, shared: &Shared) -> Option<Wish> {
     let why_not = match look.marked {
         Some(_) => "A training is running in the Train view: its settings cannot be changed now",
         None => "Click a row of the table or an item of the figure first",
@@ -201,7 +201,14 @@ fn marked_ui(ui: &mut Ui, look: Look, shared: &Shared) -> Option<Wish> {
     let can_open = look.marked.is_some() && !shared.phase.is_busy();
     let open = ui.add_enabled(can_open, ghost_button("Open in Train view"));
     let open = open.on_hover_text(hint).on_disabled_hover_text(why_not);
-    look.marked.filter(|_| open.clicked()).map(Wish::Open)
+    let marked = look.marked?;
+    let decoder = view.study().and_then(|study| study.outcome.decoder(look.page, marked));
+    if let Some(decoder) = decoder
+        && ui.add(ghost_button("Export this decoder…")).clicked()
+    {
+        return Some(Wish::Export(Box::new(decoder)));
+    }
+    open.clicked().then_some(Wish::Open(marked))
 }
 
 const SPECIFICATION: FileWords = FileWords {
