@@ -231,12 +231,13 @@ fn a_training_on_a_recording_is_saved_at_closing() {
 
 #[test]
 fn an_experiment_and_a_trade_off_are_not_ended_without_asking() {
-    for (view, run, line) in [
-        ("Experiments", "▶ Run", "Experiments: Experiment"),
-        ("Trade-off", "▶ Measure", "Trade-off: Measurement"),
+    for (topic, run, line) in [
+        ("Table 1", "▶ Run", "Study: Table 1"),
+        ("Speed against accuracy", "▶ Measure", "Study: Speed against accuracy"),
     ] {
         let mut driver = Driver::open();
-        driver.click_button(view);
+        driver.click_button("Study");
+        driver.click(topic);
         driver.click(run);
         ask(&mut driver);
         assert!(
@@ -255,12 +256,12 @@ fn an_experiment_and_a_trade_off_are_not_ended_without_asking() {
 fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = Driver::open();
-    driver.click_button("Experiments");
+    driver.click_button("Study");
     tiny(&mut driver);
     run_to_the_end(&mut driver);
     ask(&mut driver);
     assert!(
-        driver.has("Experiments: Table 1") && driver.has("will be discarded"),
+        driver.has("Study: Table 1") && driver.has("will be discarded"),
         "{:#?}",
         driver.texts()
     );
@@ -280,12 +281,13 @@ fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
 
     let mut driver = Driver::open();
     driver.click("10×6");
-    driver.click_button("Trade-off");
+    driver.click_button("Study");
+    driver.click("Speed against accuracy");
     trading::tiny(&mut driver);
     driver.type_into("Noise levels", "0");
     trading::measure(&mut driver);
     ask(&mut driver);
-    assert!(driver.has("Trade-off: Measurement") && driver.says("not exported as a table"));
+    assert!(driver.has("Study: Speed against accuracy") && driver.says("not exported as a table"));
     driver.click_button("Stay");
     driver.save("All points, CSV", &folder.path().join("points.csv"));
     assert!(close(&mut driver));
@@ -295,11 +297,12 @@ fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
 fn a_cross_validation_and_an_analysis_are_not_ended_without_asking() {
     let (mut driver, _path, _folder) = opened(160);
     driver.limit_epochs("100000");
-    driver.click_button("Identifiability");
-    driver.click_button("Cross-validate");
+    driver.click_button("Study");
+    driver.click("Cross-validation");
+    driver.click_button("▶ Cross-validate");
     ask(&mut driver);
     assert!(
-        driver.has("Identifiability: Cross-validation") && driver.has("5 folds"),
+        driver.has("Study: Cross-validation") && driver.says("5 trainings"),
         "{:#?}",
         driver.texts()
     );
@@ -307,10 +310,11 @@ fn a_cross_validation_and_an_analysis_are_not_ended_without_asking() {
     driver.click_button("Stay");
     driver.click("■ Cancel");
     driver.settle();
-    driver.click_button("Analyse readings");
+    driver.click("What the readings determine");
+    driver.click_button("▶ Analyse");
     ask(&mut driver);
     assert!(
-        driver.has("Identifiability: Analysis") && driver.has("will be discarded"),
+        driver.has("Study: What the readings determine") && driver.has("will be discarded"),
         "{:#?}",
         driver.texts()
     );

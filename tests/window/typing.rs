@@ -163,7 +163,7 @@ fn a_double_click_sets_every_slider_to_its_default_value() {
     double_click_slider(&mut driver, "Depth of the press");
     assert_eq!(driver.views().train.press.finger.depth_share, 0.8);
 
-    driver.act("Show Identifiability");
+    driver.act("Show Sensor");
     let usual = Simulation::default();
     for (field, typed) in [
         ("Height", "7"),

@@ -10,7 +10,6 @@ use eframe::egui::{
 
 use crate::window::{
     plotting::{CellPointed, Pointer, colour, heat_map_ui, plots_ui},
-    shared::Exporting,
     theme::{Palette, Theme, semibold, type_size},
     widgets::{
         ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui, note_ui, placeholder_ui,
@@ -128,14 +127,14 @@ pub struct Look {
 }
 
 /// What the user asks for.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub enum Wish {
     /// Begin the task.
     Begin,
     /// Open this item of the page in the Train view.
     Open(usize),
-    /// Export a decoder.
-    Export(Box<Exporting>),
+    /// Export the decoder of this item.
+    Export(usize),
 }
 
 /// Shows the table. A click marks a row; returns the one opened by a double click.

@@ -363,7 +363,10 @@ impl View for StudyView {
                 effects.extend(study.iter().flat_map(|study| study.outcome.open(look.page, item)));
                 effects.push(Effect::ShowTraining);
             }
-            Some(Wish::Export(decoder)) => effects.push(Effect::Export(decoder)),
+            Some(Wish::Export(item)) => {
+                let decoder = self.study().and_then(|study| study.outcome.decoder(look.page, item));
+                effects.extend(decoder.map(|decoder| Effect::Export(Box::new(decoder))));
+            }
             Some(Wish::Open(_)) | None => {}
         }
         let ended = self.study().and_then(|study| Some((study, study.took?)));

@@ -203,10 +203,8 @@ fn marked_ui(ui: &mut Ui, view: &StudyView, look: Look, shared: &Shared) -> Opti
     let open = open.on_hover_text(hint).on_disabled_hover_text(why_not);
     let marked = look.marked?;
     let decoder = view.study().and_then(|study| study.outcome.decoder(look.page, marked));
-    if let Some(decoder) = decoder
-        && ui.add(ghost_button("Export this decoder…")).clicked()
-    {
-        return Some(Wish::Export(Box::new(decoder)));
+    if decoder.is_some() && ui.add(ghost_button("Export this decoder…")).clicked() {
+        return Some(Wish::Export(marked));
     }
     open.clicked().then_some(Wish::Open(marked))
 }
