@@ -6,7 +6,7 @@ use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use crate::driver::Driver;
 
-const VIEWS: [&str; 6] = ["Train", "Experiments", "Compare", "Sensor", "Trade-off", "Live"];
+const VIEWS: [&str; 5] = ["Train", "Study", "Compare", "Sensor", "Live"];
 
 /// Roles of controls.
 const CONTROLS: [Role; 10] = [

@@ -18,17 +18,21 @@ use crate::{
     sources::{Opened, open_small, probe},
 };
 
-/// Opens a window with a recording in the Identifiability view.
-fn open_recording() -> Opened {
+/// Opens a window with a recording in the Study view, with this topic.
+fn open_recording(topic: &str) -> Opened {
     let mut opened = open_small(SourceKind::Recording);
-    opened.driver.click_button("Identifiability");
+    opened.driver.click_button("Study");
+    opened.driver.click(topic);
     opened.driver.settle();
     opened
 }
 
+const READINGS: &str = "What the readings determine";
+const FOLDS: &str = "Cross-validation";
+
 /// Analyses the readings.
 fn analyse(driver: &mut Driver) {
-    driver.click_button("Analyse readings");
+    driver.click_button("▶ Analyse");
     driver.wait("the analysis", |driver| driver.says("folds by time; analysed in"));
     driver.settle();
 }
@@ -39,7 +43,7 @@ fn the_analysis_of_a_recording_agrees_with_the_library() {
         mut driver,
         setup,
         folder: _folder,
-    } = open_recording();
+    } = open_recording(READINGS);
     analyse(&mut driver);
     let plan = setup.plan().unwrap();
     let recording = plan
@@ -81,7 +85,8 @@ fn channels_of_a_recording_without_information_are_named() {
     plan.import.targets.pop();
     let mut driver = Driver::open();
     driver.take_recording(&Setup::recording(*setup.settings(), plan));
-    driver.click_button("Identifiability");
+    driver.click_button("Study");
+    driver.click(READINGS);
     analyse(&mut driver);
     for expected in ["u3 is 2.5 in every sample", "u2 repeats u1"] {
         assert!(driver.says(expected), "{expected} is not among {:#?}", driver.texts());
@@ -94,9 +99,9 @@ fn a_cross_validation_of_a_recording_agrees_with_the_library() {
         mut driver,
         setup,
         folder: _folder,
-    } = open_recording();
+    } = open_recording(FOLDS);
     driver.enter("Folds", "3");
-    driver.click_button("Cross-validate");
+    driver.click_button("▶ Cross-validate");
     driver.wait("the folds", |driver| driver.says("3 folds by time"));
     driver.settle();
     let plan = setup.plan().unwrap();
@@ -120,21 +125,21 @@ fn a_cross_validation_of_a_recording_agrees_with_the_library() {
 
 #[test]
 fn an_analysis_of_a_recording_can_be_cancelled_and_closing_asks_about_it() {
-    let mut opened = open_recording();
+    let mut opened = open_recording(FOLDS);
     opened.change(|settings| settings.training.stopping.epochs = 100_000);
     let driver = &mut opened.driver;
     driver.settle();
-    driver.click_button("Cross-validate");
+    driver.click_button("▶ Cross-validate");
     driver.wait("the trainings", |driver| driver.says("Cross-validation…"));
     assert!(!driver.close(), "the analysis is not lost without a question");
     driver.harness().run_steps(2);
     assert!(
-        driver.has("Identifiability: Cross-validation") && driver.says("will be discarded"),
+        driver.has("Study: Cross-validation") && driver.says("will be discarded"),
         "{:#?}",
         driver.texts()
     );
     driver.click_button("Stay");
     driver.click_button("■ Cancel");
     driver.settle();
-    assert!(driver.is_enabled("Analyse readings"));
+    assert!(driver.is_enabled("▶ Cross-validate"));
 }

@@ -98,8 +98,8 @@ fn train_view_before_and_after_a_training() {
 }
 
 #[test]
-fn experiments_view() {
-    looks_as_before(&mut open_view("Experiments"), "experiments");
+fn study_view() {
+    looks_as_before(&mut open_view("Study"), "study");
 }
 
 #[test]
@@ -124,11 +124,6 @@ fn sensor_view() {
     driver.wait("the answer", |driver| driver.says("Condition number: "));
     driver.settle();
     looks_as_before(&mut driver, "sensor");
-}
-
-#[test]
-fn trade_off_view() {
-    looks_as_before(&mut open_view("Trade-off"), "trade-off");
 }
 
 #[test]

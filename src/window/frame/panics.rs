@@ -149,15 +149,11 @@ fn jobs_of_the_other_views_can_be_started_again_after_a_panic() {
     driver.act("Copy singular values as a picture");
     driver.wait("the picture", |driver| matches!(driver.notice(), Some(Notice::Done(_))));
 
-    driver.click_button("Trade-off");
-    panics(&mut driver, "trade-off", |driver| driver.click("▶ Measure"));
-    assert!(driver.is_enabled("▶ Measure"));
-
-    driver.click_button("Experiments");
-    panics(&mut driver, "experiments", |driver| driver.click("▶ Run"));
+    driver.click_button("Study");
+    panics(&mut driver, "study", |driver| driver.click("▶ Run"));
     assert!(driver.is_enabled("▶ Run"));
     driver.click("Sweep");
-    panics(&mut driver, "sweep folder", |driver| {
+    panics(&mut driver, "study", |driver| {
         driver.open_form("Open sweep folder…");
         driver.type_into("File", "nowhere");
         driver.click_button("Open");
@@ -191,9 +187,10 @@ fn jobs_of_a_recording_can_be_started_again_after_a_panic() {
     };
     panics(&mut driver, "opening", open);
     panics(&mut driver, "import", open);
-    driver.click_button("Identifiability");
-    panics(&mut driver, "recording study", |driver| driver.act("Analyse readings"));
-    driver.act("Analyse readings");
+    driver.click_button("Study");
+    driver.click("What the readings determine");
+    panics(&mut driver, "study", |driver| driver.act("Begin the study"));
+    driver.act("Begin the study");
     driver.wait("the findings", |driver| driver.says("R²"));
 }
 

@@ -104,12 +104,8 @@ pub enum Matter {
     Clipboard,
     /// The run list.
     RunList,
-    /// The Experiments view.
-    Experiments,
-    /// The Identifiability view.
-    Identifiability,
-    /// The Trade-off view.
-    TradeOff,
+    /// The Study view.
+    Study,
     /// The Live view.
     Live,
     /// Files of the recording that is trained on.

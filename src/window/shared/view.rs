@@ -62,44 +62,34 @@ pub enum ViewKind {
     /// One training and the sensor that it decodes.
     #[default]
     Train,
-    /// The paper's tables and sweeps.
+    /// Many trainings or measurements at once.
     Study,
     /// Two finished trainings side by side.
     Compare,
     /// What the readings determine.
     Sensor,
-    /// Speed and accuracy of each decoder.
-    TradeOff,
     /// Frames decoded as they arrive.
     Live,
 }
 
 impl ViewKind {
     /// All views.
-    pub const ALL: [Self; 6] = [
-        Self::Train,
-        Self::Study,
-        Self::Compare,
-        Self::Sensor,
-        Self::TradeOff,
-        Self::Live,
-    ];
+    pub const ALL: [Self; 5] = [Self::Train, Self::Study, Self::Compare, Self::Sensor, Self::Live];
 
     /// Returns its name in the top bar.
     pub fn name(self) -> &'static str {
         match self {
             Self::Train => "Train",
-            Self::Study => "Experiments",
+            Self::Study => "Study",
             Self::Compare => "Compare",
             Self::Sensor => "Sensor",
-            Self::TradeOff => "Trade-off",
             Self::Live => "Live",
         }
     }
 
     /// Returns the key that shows it, with Ctrl.
     pub fn key(self) -> Key {
-        const KEYS: [Key; 6] = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6];
+        const KEYS: [Key; 5] = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5];
         KEYS[self as usize]
     }
 
