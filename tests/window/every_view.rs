@@ -77,14 +77,20 @@ fn every_view_is_named_described_and_whole() {
             for tab in tabs(driver) {
                 driver.click(&tab);
                 driver.settle();
-                faults.extend(unnamed(driver).into_iter().map(|fault| format!("{place}, {tab}: {fault}")));
+                faults.extend(
+                    unnamed(driver)
+                        .into_iter()
+                        .map(|fault| format!("{place}, {tab}: {fault}")),
+                );
             }
             faults.extend(unnamed(driver).into_iter().map(|fault| format!("{place}: {fault}")));
             for size in SIZES {
                 for zoom_percent in ZOOMS_PERCENT {
                     driver.harness().set_size(size * 100.0 / zoom_percent);
                     driver.settle();
-                    let cuts = cut_texts(driver).into_iter().map(|text| without_digits(&format!("{place}: {text}")));
+                    let cuts = cut_texts(driver)
+                        .into_iter()
+                        .map(|text| without_digits(&format!("{place}: {text}")));
                     faults.extend(cuts.filter(|cut| !KNOWN_CUTS.lines().any(|known| known == cut)));
                     if zoom_percent == 100.0 {
                         take_pictures(driver, &format!("{view}-{}-{}x{}", name_of(source), size.x, size.y));
@@ -174,7 +180,9 @@ fn without_digits(text: &str) -> String {
 
 /// Writes the window as it is, in both themes, where the environment names a folder for pictures.
 fn take_pictures(driver: &mut Driver, name: &str) {
-    let Some(folder) = env::var_os("PICTURES").map(PathBuf::from) else { return };
+    let Some(folder) = env::var_os("PICTURES").map(PathBuf::from) else {
+        return;
+    };
     fs::create_dir_all(&folder).unwrap();
     for theme in ["Light theme", "Dark theme"] {
         driver.act(theme);

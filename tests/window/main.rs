@@ -33,6 +33,7 @@ mod remembering;
 mod results;
 mod scenes;
 mod scrubbing;
+mod sensor;
 mod snapshots;
 mod sources;
 mod surface_view;

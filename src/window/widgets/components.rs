@@ -1,9 +1,9 @@
 //! Components that egui lacks, each accessible by its label, and the reason why text typed into a field was refused.
 
 use eframe::egui::{
-    self, Align, Button, CollapsingHeader, Color32, Context, DragValue, FontId, Frame, Id, Key, KeyboardShortcut,
-    Label, Layout, Margin, Modifiers, ProgressBar, Rect, Response, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui,
-    UiBuilder, Vec2, Widget, WidgetInfo, WidgetText,
+    Align, Button, CollapsingHeader, Color32, DragValue, FontId, Frame, Id, Key, KeyboardShortcut, Label, Layout,
+    Margin, Modifiers, ProgressBar, Rect, Response, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, UiBuilder,
+    Vec2, Widget, WidgetInfo, WidgetText,
     accesskit::{Invalid, Role},
     vec2,
 };
@@ -203,9 +203,7 @@ pub fn tabs_ui<T: Copy + PartialEq>(ui: &mut Ui, label: &str, tabs: &[(T, &str)]
                     .stroke(Stroke::NONE)
                     .min_size(vec2(width + 2.0 * padding, 0.0));
                 let tab_response = ui.add(button);
-                tab_response.widget_info(|| {
-                    WidgetInfo::selected(Role::Tab, true, is_selected, text)
-                });
+                tab_response.widget_info(|| WidgetInfo::selected(Role::Tab, true, is_selected, text));
                 if is_selected || tab_response.hovered() {
                     let line = tab_response.rect.x_range().shrink(padding);
                     let colour = if is_selected { palette.accent } else { palette.line };
@@ -436,7 +434,10 @@ pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> O
         let arrow = ui.add_enabled(to.is_some(), Button::new(sign).min_size(Vec2::splat(space(6))));
         let label = format!("{name} {what}");
         arrow.widget_info(|| WidgetInfo::labeled(Role::Button, to.is_some(), &label));
-        if arrow.on_hover_text(format!("{label} of the test set ({key})")).clicked() {
+        if arrow
+            .on_hover_text(format!("{label} of the test set ({key})"))
+            .clicked()
+        {
             picked = to;
         }
     };
@@ -446,7 +447,9 @@ pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> O
     let mut number = shown + 1;
     let suffix = format!(" of {}", snapshots.max(1));
     let field = DragValue::new(&mut number).range(1..=snapshots.max(1)).suffix(suffix);
-    let field = ui.add_enabled(snapshots > 0, field).on_hover_text("Type a number, or drag.");
+    let field = ui
+        .add_enabled(snapshots > 0, field)
+        .on_hover_text("Type a number, or drag.");
     arrow_ui(ui, "‹", shown.checked_sub(1), "Previous", "Page up");
     if number != shown + 1 && snapshots > 0 {
         picked = Some(number - 1);

@@ -6,8 +6,8 @@ use std::{cell::RefCell, fmt::Display, ops::RangeInclusive, str::FromStr};
 pub(crate) use decoupler_core::sensor::short as input_text;
 pub use decoupler_core::text::capitalised;
 use eframe::egui::{
-    Align, ComboBox, Context, CornerRadius, DragValue, Id, Key, Layout, Rect, Response, Sense, Slider, Stroke,
-    TextEdit, Ui, Vec2, emath::Numeric, vec2,
+    Align, ComboBox, CornerRadius, DragValue, Key, Layout, Response, Sense, Slider, Stroke, TextEdit, Ui, Vec2,
+    emath::Numeric, vec2,
 };
 
 use super::{
@@ -294,10 +294,6 @@ fn typed_number_ui<N: Numeric>(
     });
     take_refusal(ui, &response, tried, &value.to_f64().to_string());
     (response, typed)
-}
-
-fn with_unit<N: Numeric>(value: N, unit: &str) -> String {
-    format!("{} {unit}", input_text(value.to_f64())).trim_end().to_owned()
 }
 
 /// Usual size of a field, in points.

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::window::{
     theme::{Theme, radius, space, type_size},
-    widgets::{components::focus_ring_ui, fields::value_under},
+    widgets::components::focus_ring_ui,
 };
 
 /// Width of a scroll bar.
@@ -289,7 +289,6 @@ impl<'a> Shown<'a> {
         if !cell.mark.is_empty() {
             rect.max.x -= MARK_WIDTH;
         }
-        value_under(ui, whole, &cell.text);
         let text = text_ui(ui, rect, column.is_figure, &cell, self.widths.size);
         if !cell.mark.is_empty() {
             mark_ui(ui, text.rect, cell.mark);
