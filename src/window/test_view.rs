@@ -77,11 +77,6 @@ impl TestSet {
             Self::Recording(test) => test.set.samples(),
         }
     }
-
-    /// Returns the description of the channels of a recording; `None` for a simulated array.
-    pub fn problem(&self) -> Option<&Problem> {
-        self.recording().map(|test| &*test.problem)
-    }
 }
 
 /// Appearance of the surfaces of a test set.
@@ -95,6 +90,32 @@ pub struct SurfaceStyle {
     pub heights: HeightScale,
     /// Range of the error colours in millimetres, if locked; else that of the displayed errors.
     pub error_limit_mm: Option<f64>,
+}
+
+impl SurfaceStyle {
+    /// Returns `surface`, which spans its whole range, in this style.
+    pub fn of(&self, surface: Surface) -> Surface {
+        let locked = self.error_limit_mm.map(|limit| -limit..=limit);
+        let range = match (&surface.quantity, self.heights) {
+            (Quantity::Error, _) => locked,
+            (quantity, HeightScale::Fitted) if !quantity.is_diverging() => range_of(&surface.nodes),
+            _ => None,
+        };
+        Surface {
+            range: range.unwrap_or_else(|| surface.range.clone()),
+            mode: self.mode,
+            colours: self.colours,
+            ..surface
+        }
+    }
+}
+
+/// Returns the lowest and highest value at a node; `None` without nodes.
+fn range_of(nodes: &[DVec3]) -> Option<RangeInclusive<f64>> {
+    let values = || nodes.iter().map(|node| node.z).filter(|value| value.is_finite());
+    let (low, high) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
+    // The resolution is a nanometre.
+    Some(low..=high.max(low + 1e-6))
 }
 
 /// Range of heights shown by colours and axes.
@@ -213,28 +234,33 @@ impl TestView {
 
     /// Returns the surface of heights.
     pub fn heights(&self, title: impl Into<String>, frame: &Frame, style: SurfaceStyle) -> Surface {
-        Surface {
-            quantity: Quantity::Height,
-            range: match style.heights {
-                HeightScale::Stroke => self.z_range_mm(),
-                HeightScale::Fitted => frame.range_mm().unwrap_or_else(|| self.z_range_mm()),
-            },
-            ..self.errors(title, frame, style)
-        }
+        style.of(self.through(title, frame, Quantity::Height, self.z_range_mm()))
     }
 
     /// Returns the surface of errors of z.
     pub fn errors(&self, title: impl Into<String>, frame: &Frame, style: SurfaceStyle) -> Surface {
-        let locked = style.error_limit_mm.map(|limit| -limit..=limit);
+        let errors = frame.nodes_mm.iter().map(|node| node.z.abs());
+        // The resolution is a nanometre.
+        let largest = errors.filter(|error| error.is_finite()).fold(1e-6, f64::max);
+        style.of(self.through(title, frame, Quantity::Error, -largest..=largest))
+    }
+
+    fn through(
+        &self,
+        title: impl Into<String>,
+        frame: &Frame,
+        quantity: Quantity,
+        range: RangeInclusive<f64>,
+    ) -> Surface {
         Surface {
             title: title.into(),
             map: Arc::clone(&self.surface),
             values: Arc::clone(&frame.grid_mm),
             nodes: Arc::clone(&frame.nodes_mm),
-            quantity: Quantity::Error,
-            range: locked.unwrap_or_else(|| frame.symmetric_range_mm()),
-            mode: style.mode,
-            colours: style.colours,
+            quantity,
+            range,
+            mode: ViewMode::default(),
+            colours: SequentialMap::default(),
         }
     }
 }
@@ -300,19 +326,7 @@ impl Frame {
 
     /// Returns the lowest and highest z of a node; `None` without nodes.
     pub fn range_mm(&self) -> Option<RangeInclusive<f64>> {
-        let heights = || self.nodes_mm.iter().map(|node| node.z).filter(|z| z.is_finite());
-        let (low, high) = (heights().reduce(f64::min)?, heights().reduce(f64::max)?);
-        // The resolution is a nanometre.
-        Some(low..=high.max(low + 1e-6))
-    }
-
-    /// Returns a range symmetric about zero that contains z of all nodes, so that zero keeps its colour.
-    pub fn symmetric_range_mm(&self) -> RangeInclusive<f64> {
-        let heights = self.nodes_mm.iter().map(|node| node.z.abs());
-        let largest = heights.filter(|z| z.is_finite()).fold(0.0, f64::max);
-        // The resolution is a nanometre.
-        let largest = largest.max(1e-6);
-        -largest..=largest
+        range_of(&self.nodes_mm)
     }
 }
 
