@@ -352,7 +352,7 @@ pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, share
             look.marked = Some(order[place]);
             open_cell(shared, outcome, order[place], effects);
         }
-        Some(TableClick::Point(_)) | None => {}
+        None => {}
     }
 }
 

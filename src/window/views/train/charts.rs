@@ -370,23 +370,22 @@ pub fn charts_card_ui(
     });
     view.tab = tabs_ui(ui, "Charts", &Vec::from_iter(tabs), chart.name).unwrap_or(chart.name);
     (chart.bar_ui)(ui, view, shared);
-    if chart.name == READINGS.name {
-        return readings_of_view_ui(ui, view, shared);
-    }
-    let Some(figure) = chart.figure(view, shared) else {
-        let is_possible = !shared.phase.is_busy() && shared.phase != Phase::Died;
-        if invitation_ui(ui, chart.hint, "Train now", is_possible) {
-            effects.push(Effect::Train);
-        }
-        return;
-    };
     let past = shared.shown_run().map(|run| &run.past);
     let past = past.filter(|past| past.epochs().len() > 1);
     let mut place = ui.available_rect_before_wrap();
     if past.is_some() {
         place.max.y -= scrub::HEIGHT;
     }
-    ui.scope_builder(UiBuilder::new().max_rect(place), |ui| chart.figure_ui(ui, &figure, view, shared));
+    ui.scope_builder(UiBuilder::new().max_rect(place), |ui| {
+        let is_possible = !shared.phase.is_busy() && shared.phase != Phase::Died;
+        if chart.name == READINGS.name {
+            readings_of_view_ui(ui, view, shared);
+        } else if let Some(figure) = chart.figure(view, shared) {
+            chart.figure_ui(ui, &figure, view, shared);
+        } else if invitation_ui(ui, chart.hint, "Train now", is_possible) {
+            effects.push(Effect::Train);
+        }
+    });
     if let Some(past) = past {
         scrub_bar_ui(ui, &mut view.scrub, past);
     }

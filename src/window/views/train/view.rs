@@ -6,16 +6,16 @@ use eframe::egui::{Context, Key, Modifiers, Sense, Ui};
 use ndarray::Array2;
 
 use super::{
-    charts_card::{BottomTab, charts_card_ui, readings_of_view_ui},
+    charts::{charts_card_ui, readings_of_view_ui},
     configuration::configuration_ui,
-    decoders::{DecoderMeasuring, DecodersState},
+    decoders::Decoders,
     drawn::{Drawn, Frames},
     exports::{PaperFigure, checkpoint_task, shown},
-    inspect::{Lighting, SectionChoice, TestPlace, drawn_nodes},
     press::{PressState, readings_head_ui},
     recording::{RecordingEditor, recipe_task},
     report::{self, report_ui},
     scrub::ScrubState,
+    section::SectionChoice,
     surfaces::surfaces_ui,
 };
 use crate::window::{
@@ -36,7 +36,7 @@ impl View for TrainView {
 
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.recording.take_events(shared, effects);
-        self.measuring.follow(shared, &mut self.decoders);
+        self.decoders.follow(shared);
         let failure = self.scrub.take_failure();
         effects.extend(failure.map(|reason| Effect::Notify(Matter::Training, Notice::Failed(reason))));
     }
@@ -270,6 +270,15 @@ pub fn workbench_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects:
     ui.allocate_rect(whole, Sense::hover());
 }
 
+/// The item under the pointer in one of the pictures, which lights up in all of them.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Lighting {
+    /// A node, by its number among those drawn; a target of a recording.
+    pub node: Option<usize>,
+    /// A row-wire, by its place among those read: a reading is that of all its nodes.
+    pub row: Option<usize>,
+}
+
 /// The Train view.
 #[derive(Debug)]
 pub struct TrainView {
@@ -281,8 +290,8 @@ pub struct TrainView {
     pub(super) watched: usize,
     /// Surface shown on the right-hand card.
     pub right: RightCard,
-    /// The chart below.
-    pub tab: BottomTab,
+    /// Name of the chart below.
+    pub tab: &'static str,
     /// Item lit by the pointer, in every picture.
     pub lights: Lighting,
     /// The wire along which the surfaces are cut.
@@ -298,8 +307,7 @@ pub struct TrainView {
     /// Editor of the recording that is trained on.
     pub(in crate::window) recording: RecordingEditor,
     /// Results of other decoders on the test set.
-    pub decoders: DecodersState,
-    pub(super) measuring: DecoderMeasuring,
+    pub decoders: Decoders,
 }
 
 impl TrainView {
@@ -310,7 +318,7 @@ impl TrainView {
             target: 0,
             watched: 0,
             right: RightCard::default(),
-            tab: BottomTab::default(),
+            tab: "Loss",
             lights: Lighting::default(),
             section: SectionChoice::default(),
             has_error_bars: false,
@@ -318,8 +326,7 @@ impl TrainView {
             press: PressState::new(&wake),
             scrub: ScrubState::new(Arc::clone(&wake)),
             recording: RecordingEditor::new(&wake),
-            decoders: DecodersState::default(),
-            measuring: DecoderMeasuring::new(wake),
+            decoders: Decoders::new(wake),
         }
     }
 
@@ -330,8 +337,9 @@ impl TrainView {
         let target = shared.recorded_test().map_or(0, |test| self.target_of(test));
         self.snapshot = self.drawn.follow(shared, result, self.snapshot, target);
         self.press.follow(shared, result);
-        let nodes = drawn_nodes(shared, self.frames().actual.nodes_mm.len());
-        self.lights.node = self.lights.node.filter(|&node| node < nodes);
+        let of_recording = shared.recorded_test().map(|test| test.set.outputs());
+        let items = of_recording.unwrap_or(self.frames().actual.nodes_mm.len());
+        self.lights.node = self.lights.node.filter(|&item| item < items);
     }
 
     /// Returns the current result: that of the training so far, or of the displayed past epoch.
@@ -370,15 +378,10 @@ impl TrainView {
         self.target.min(test.set.outputs().saturating_sub(1))
     }
 
-    /// Returns the root mean square error of each node, where error bars are on and there is a result.
-    pub fn error_bars_mm(&self) -> Option<&[f64]> {
-        self.has_error_bars.then(|| self.drawn.spread_mm()).flatten()
-    }
-
-    /// Goes to this value of the test set and marks its node.
-    pub(super) fn go_to(&mut self, place: TestPlace) {
-        self.show_snapshot(place.snapshot);
-        self.lights.node = place.node;
+    /// Goes to a snapshot of the test set and marks one of its nodes, or a target of a recording.
+    pub(super) fn go_to(&mut self, snapshot: usize, node: Option<usize>) {
+        self.show_snapshot(snapshot);
+        self.lights.node = node;
     }
 
     /// Displays a figure of the paper, and trains its network unless that is the current one.

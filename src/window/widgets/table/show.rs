@@ -1,7 +1,7 @@
 //! Layout and painting of a table.
 
 use eframe::egui::{
-    Align, Align2, Color32, CursorIcon, FontId, Layout, Rangef, Rect, ScrollArea, Sense, Shape, Stroke, TextWrapMode,
+    Align, Align2, AsIdSalt, Color32, CursorIcon, FontId, Layout, Rangef, Rect, ScrollArea, Sense, Shape, Stroke, TextWrapMode,
     Ui, UiBuilder, WidgetInfo, WidgetText, accesskit::Role, pos2, vec2,
 };
 
@@ -326,7 +326,7 @@ fn font(size: f32, is_strong: bool) -> FontId {
 }
 
 /// Adds a label and a tooltip for the contents of `rect`; does nothing if both are empty.
-fn label_ui(ui: &Ui, rect: Rect, id: impl std::hash::Hash, label: &str, meaning: &str) {
+fn label_ui(ui: &Ui, rect: Rect, id: impl AsIdSalt, label: &str, meaning: &str) {
     if label.is_empty() && meaning.is_empty() {
         return;
     }
