@@ -79,45 +79,6 @@ impl TestSet {
     }
 }
 
-/// Appearance of the surfaces of a test set.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SurfaceStyle {
-    /// Perspective view or top view.
-    pub mode: ViewMode,
-    /// Colour map of heights.
-    pub colours: SequentialMap,
-    /// Range of heights shown by colours and axes.
-    pub heights: HeightScale,
-    /// Range of the error colours in millimetres, if locked; else that of the displayed errors.
-    pub error_limit_mm: Option<f64>,
-}
-
-impl SurfaceStyle {
-    /// Returns `surface`, which spans its whole range, in this style.
-    pub fn of(&self, surface: Surface) -> Surface {
-        let locked = self.error_limit_mm.map(|limit| -limit..=limit);
-        let range = match (&surface.quantity, self.heights) {
-            (Quantity::Error, _) => locked,
-            (quantity, HeightScale::Fitted) if !quantity.is_diverging() => range_of(&surface.nodes),
-            _ => None,
-        };
-        Surface {
-            range: range.unwrap_or_else(|| surface.range.clone()),
-            mode: self.mode,
-            colours: self.colours,
-            ..surface
-        }
-    }
-}
-
-/// Returns the lowest and highest value at a node; `None` without nodes.
-fn range_of(nodes: &[DVec3]) -> Option<RangeInclusive<f64>> {
-    let values = || nodes.iter().map(|node| node.z).filter(|value| value.is_finite());
-    let (low, high) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
-    // The resolution is a nanometre.
-    Some(low..=high.max(low + 1e-6))
-}
-
 /// Range of heights shown by colours and axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HeightScale {
@@ -232,17 +193,17 @@ impl TestView {
         self.set.readings().select(Axis(0), samples)
     }
 
-    /// Returns the surface of heights.
-    pub fn heights(&self, title: impl Into<String>, frame: &Frame, style: SurfaceStyle) -> Surface {
-        style.of(self.through(title, frame, Quantity::Height, self.z_range_mm()))
+    /// Returns the surface of heights, over the whole stroke.
+    pub fn heights(&self, title: impl Into<String>, frame: &Frame) -> Surface {
+        self.through(title, frame, Quantity::Height, self.z_range_mm())
     }
 
     /// Returns the surface of errors of z.
-    pub fn errors(&self, title: impl Into<String>, frame: &Frame, style: SurfaceStyle) -> Surface {
+    pub fn errors(&self, title: impl Into<String>, frame: &Frame) -> Surface {
         let errors = frame.nodes_mm.iter().map(|node| node.z.abs());
         // The resolution is a nanometre.
         let largest = errors.filter(|error| error.is_finite()).fold(1e-6, f64::max);
-        style.of(self.through(title, frame, Quantity::Error, -largest..=largest))
+        self.through(title, frame, Quantity::Error, -largest..=largest)
     }
 
     fn through(
@@ -326,7 +287,10 @@ impl Frame {
 
     /// Returns the lowest and highest z of a node; `None` without nodes.
     pub fn range_mm(&self) -> Option<RangeInclusive<f64>> {
-        range_of(&self.nodes_mm)
+        let heights = || self.nodes_mm.iter().map(|node| node.z).filter(|z| z.is_finite());
+        let (low, high) = (heights().reduce(f64::min)?, heights().reduce(f64::max)?);
+        // The resolution is a nanometre.
+        Some(low..=high.max(low + 1e-6))
     }
 }
 

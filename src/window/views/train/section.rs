@@ -88,7 +88,7 @@ impl SectionChoice {
 
 /// Returns the figure of the section through the displayed surfaces.
 pub fn section_of(choice: &SectionChoice, test: &TestView, frames: &Frames, look: Look) -> PlotFigure {
-    let surface = |frame| test.heights("", frame, look.style());
+    let surface = |frame| look.dressed(&test.heights("", frame), String::new());
     let decoded = frames.decoupled.as_ref().map(|(decoded, _)| surface(decoded));
     let (section, actual) = (choice.section(test), surface(&frames.actual));
     section_figure(&section, &test.rows, &actual, decoded.as_ref())

@@ -68,24 +68,25 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Share
 
 /// Returns the displayed surfaces of the snapshot: the actual one, and the one of the network if there is one.
 pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
-    let (frames, style) = (view.frames(), shared.look.style());
+    let frames = view.frames();
     let mut surfaces = Vec::new();
     if let Some(test) = shared.test() {
-        surfaces.push(test.heights("Actual", &frames.actual, style));
+        surfaces.push(test.heights("Actual", &frames.actual));
         surfaces.extend(frames.decoupled.as_ref().map(|(decoded, error)| match view.right {
-            RightCard::Decoupled => test.heights("Decoded", decoded, style),
-            RightCard::Error => test.errors("Error", error, style),
+            RightCard::Decoupled => test.heights("Decoded", decoded),
+            RightCard::Error => test.errors("Error", error),
         }));
     } else if let Some([actual, decoded, error]) = &view.drawn.target_surfaces {
-        surfaces.push(style.of(actual.clone()));
+        surfaces.push(actual.clone());
         surfaces.extend(frames.decoupled.is_some().then(|| match view.right {
-            RightCard::Decoupled => style.of(decoded.clone()),
-            RightCard::Error => style.of(error.clone()),
+            RightCard::Decoupled => decoded.clone(),
+            RightCard::Error => error.clone(),
         }));
     }
+    let dressed = |surface: Surface| shared.look.dressed(&surface, surface.title.clone());
     let is_cut = view.tab == SECTION.name;
     SurfaceFigure {
-        surfaces,
+        surfaces: surfaces.into_iter().map(dressed).collect(),
         camera: shared.look.camera,
         marked_node: view.lights.node.and_then(|item| match through(shared) {
             Some(through) => through.nodes().iter().position(|node| node.target == item),
