@@ -302,7 +302,8 @@ fn decoded<'a>(view: &TrainView, shared: &'a Shared) -> Option<Decoded<'a>> {
 
 fn add_line(figure: &mut PlotFigure, name: &str, at: Option<LineAt>) {
     if let (Some(at), Some(plot)) = (at, figure.plots.first_mut()) {
-        plot.series.push(Series::across(name, at, Ink::Orange, LineStyle::Solid));
+        plot.series
+            .push(Series::across(name, at, Ink::Orange, LineStyle::Solid));
     }
 }
 
@@ -363,7 +364,11 @@ pub fn charts_card_ui(
     const NARROW: f32 = space(106);
     let is_narrow = ui.available_width() < NARROW;
     let offered = Vec::from_iter(charts(shared, has_readings));
-    let chart = offered.iter().copied().find(|chart| chart.name == view.tab).unwrap_or(&LOSS);
+    let chart = offered
+        .iter()
+        .copied()
+        .find(|chart| chart.name == view.tab)
+        .unwrap_or(&LOSS);
     let tabs = offered.iter().map(|chart| match chart.name {
         "Training state" if is_narrow => (chart.name, "State"),
         name => (name, name),
@@ -416,7 +421,10 @@ impl TrainView {
         let Some(test) = shared.test().filter(|_| self.tab == SECTION.name) else {
             return;
         };
-        let steps = [(-1, "Previous section", Key::OpenBracket), (1, "Next section", Key::CloseBracket)];
+        let steps = [
+            (-1, "Previous section", Key::OpenBracket),
+            (1, "Next section", Key::CloseBracket),
+        ];
         for (by, name, key) in steps {
             let stepped = self.section.stepped(by, test);
             if offers.offer_keys(name, Modifiers::NONE, key, stepped.is_some()) {

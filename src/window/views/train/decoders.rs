@@ -287,7 +287,9 @@ fn measured_ui(
     if ui.available_width() < space(80) {
         figures.retain(|figure| figure.heading != R2);
     }
-    let headings = figures.iter().map(|figure| TableColumn::figure(figure.heading).meaning(figure.meaning));
+    let headings = figures
+        .iter()
+        .map(|figure| TableColumn::figure(figure.heading).meaning(figure.meaning));
     let mut columns = vec![TableColumn::text("")];
     columns.extend(headings);
     columns.push(TableColumn::text("").width(ColumnWidth::Points(space(7))));
@@ -318,7 +320,9 @@ fn measured_ui(
         })
     });
     let of_model_based = model_based.map(|errors| {
-        let cells = figures.iter().map(|figure| format_number((figure.of_model_based)(errors)));
+        let cells = figures
+            .iter()
+            .map(|figure| format_number((figure.of_model_based)(errors)));
         TableRow::figures("model-based", cells)
             .meaning(glossary::MODEL_BASED.hint)
             .colour(palette.dim)

@@ -80,7 +80,11 @@ pub(super) fn shown<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Shown<'a
         let figure = figure.ok_or("This chart has nothing to show yet.")?;
         Ok(move || figure.clone())
     });
-    shown.push(Shown::figure("Chart", stem(&chart.to_lowercase().replace(' ', "-")), figure));
+    shown.push(Shown::figure(
+        "Chart",
+        stem(&chart.to_lowercase().replace(' ', "-")),
+        figure,
+    ));
     let errors = trained.map(|(run, latest)| {
         let result = view.result(shared).unwrap_or(latest);
         move || error_table(&run.error_table(result))

@@ -19,9 +19,7 @@ use decoupler_files::{
 };
 use eframe::egui::{Align, Layout, Response, RichText, Ui};
 
-use super::{
-    decoders::decoders_ui, exports::open_task, press::press_section_ui, recording::bias, view::TrainView,
-};
+use super::{decoders::decoders_ui, exports::open_task, press::press_section_ui, recording::bias, view::TrainView};
 use crate::window::{
     glossary,
     shared::{Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
@@ -188,7 +186,8 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
     if let Some((preview, simulation, baselines)) = known {
         // The settings may have changed to a scene whose baselines are still being computed.
         let draft = shared.draft.simulation();
-        let is_of_draft = draft.is_some_and(|draft| (simulation.sensor, simulation.scene) == (draft.sensor, draft.scene));
+        let is_of_draft =
+            draft.is_some_and(|draft| (simulation.sensor, simulation.scene) == (draft.sensor, draft.scene));
         let published = shared.draft.published().filter(|_| is_of_draft);
         let scores = Scores {
             network: baselines.mean.clone(),
@@ -198,16 +197,20 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
         };
         let mut tables = ErrorTable::of_scores(&simulation.problem(), &scores, published.as_ref());
         let rows = tables.iter_mut().flat_map(|table| &mut table.rows);
-        rows.filter(|row| row.name == NETWORK).for_each(|row| row.errors.fill(None));
+        rows.filter(|row| row.name == NETWORK)
+            .for_each(|row| row.errors.fill(None));
         error_table_ui(ui, &tables);
         conditioning_ui(ui, &preview.test);
         ui.add_space(space(2));
     }
     // The paper's own network, not only its scene.
-    dim_ui(ui, match shared.draft.published() {
-        Some(_) => "Press Train to fill in the network's row. The paper's network takes a few seconds.",
-        None => "Press Train to fill in the network's row.",
-    });
+    dim_ui(
+        ui,
+        match shared.draft.published() {
+            Some(_) => "Press Train to fill in the network's row. The paper's network takes a few seconds.",
+            None => "Press Train to fill in the network's row.",
+        },
+    );
 }
 
 /// Reports where a baseline is better and what would help, or by how much the network is better.
@@ -318,11 +321,19 @@ fn spread_ui(ui: &mut Ui, run: &RunView) {
     let is_held_out = starts.iter().all(|start| start.validation_mse.is_some());
     let error = if is_held_out { "validation mse" } else { "training mse" };
     let spreads = [
-        (run.problem.test_percent_name(), Spread::of(starts.iter().filter_map(StartRecord::percent))),
+        (
+            run.problem.test_percent_name(),
+            Spread::of(starts.iter().filter_map(StartRecord::percent)),
+        ),
         (error, Spread::of(starts.iter().map(StartRecord::deciding_mse))),
     ];
     let row = |(name, spread): (&str, Option<Spread>)| {
-        let Spread { smallest, median, largest, .. } = spread?;
+        let Spread {
+            smallest,
+            median,
+            largest,
+            ..
+        } = spread?;
         Some(vec![Cell::from(name), smallest.into(), median.into(), largest.into()])
     };
     let table = Table {
@@ -336,8 +347,11 @@ fn spread_ui(ui: &mut Ui, run: &RunView) {
     };
     described_table_ui(ui, "spread", &table);
     let best = best + 1;
-    dim_ui(ui, &match run.settings().combine {
-        Combination::Best => format!("Start {best} is kept: it has the lowest {error}."),
-        Combination::Mean => format!("The mean of all starts is kept; start {best} has the lowest {error}."),
-    });
+    dim_ui(
+        ui,
+        &match run.settings().combine {
+            Combination::Best => format!("Start {best} is kept: it has the lowest {error}."),
+            Combination::Mean => format!("The mean of all starts is kept; start {best} has the lowest {error}."),
+        },
+    );
 }

@@ -113,10 +113,22 @@ pub fn section_bar_ui(ui: &mut Ui, choice: &mut SectionChoice, test: &TestView) 
         let picked = explained_options_ui(ui, "Section along", &DIRECTIONS, choice.along, false);
         choice.along = picked.unwrap_or(choice.along);
         ui.add_space(space(1));
-        let before = step_ui(ui, "‹", "Previous section", "Cuts along the previous wire ([).", choice.stepped(-1, test));
+        let before = step_ui(
+            ui,
+            "‹",
+            "Previous section",
+            "Cuts along the previous wire ([).",
+            choice.stepped(-1, test),
+        );
         let axis = choice.along as usize;
         ui.label(format!("{} of {}", choice.wires(test)[axis] + 1, counts(test)[axis]));
-        let after = step_ui(ui, "›", "Next section", "Cuts along the next wire (]).", choice.stepped(1, test));
+        let after = step_ui(
+            ui,
+            "›",
+            "Next section",
+            "Cuts along the next wire (]).",
+            choice.stepped(1, test),
+        );
         *choice = before.or(after).unwrap_or(*choice);
         let hint = "or click a surface or a reading";
         let font = TextStyle::Body.resolve(ui.style());

@@ -131,7 +131,9 @@ fn head_ui(ui: &mut Ui, place: Place, view: &mut TrainView, shared: &Shared, eff
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         let font = semibold(type_size().title);
-        let galley = ui.painter().layout_no_wrap(title.to_owned(), font.clone(), Color32::WHITE);
+        let galley = ui
+            .painter()
+            .layout_no_wrap(title.to_owned(), font.clone(), Color32::WHITE);
         if galley.size().x + options_width <= ui.available_width() {
             ui.label(RichText::new(title).font(font));
             if let Some(note) = note.filter(|_| options_width + space(14) <= ui.available_width()) {

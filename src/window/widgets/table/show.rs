@@ -1,8 +1,8 @@
 //! Layout and painting of a table.
 
 use eframe::egui::{
-    Align, Align2, AsIdSalt, Color32, CursorIcon, FontId, Layout, Rangef, Rect, ScrollArea, Sense, Shape, Stroke, TextWrapMode,
-    Ui, UiBuilder, WidgetInfo, WidgetText, accesskit::Role, pos2, vec2,
+    Align, Align2, AsIdSalt, Color32, CursorIcon, FontId, Layout, Rangef, Rect, ScrollArea, Sense, Shape, Stroke,
+    TextWrapMode, Ui, UiBuilder, WidgetInfo, WidgetText, accesskit::Role, pos2, vec2,
 };
 
 use super::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView};
@@ -99,12 +99,7 @@ impl<'a> Lines<'a> {
         }
     }
 
-    fn show<'r>(
-        &self,
-        ui: &mut Ui,
-        rows: usize,
-        row: &mut dyn FnMut(usize) -> TableRow<'r>,
-    ) -> Option<TableClick> {
+    fn show<'r>(&self, ui: &mut Ui, rows: usize, row: &mut dyn FnMut(usize) -> TableRow<'r>) -> Option<TableClick> {
         let height = self.table.row_height;
         let mut size = vec2(self.width, height * (rows + 1) as f32);
         if self.fills {
@@ -225,7 +220,8 @@ impl<'a> Lines<'a> {
             let whole = rect;
             if place == 0 {
                 if let Some(colour) = row.dot {
-                    ui.painter().circle_filled(rect.left_center() + vec2(4.0, 0.0), 3.0, colour);
+                    ui.painter()
+                        .circle_filled(rect.left_center() + vec2(4.0, 0.0), 3.0, colour);
                     rect.min.x += DOT_WIDTH;
                 }
                 if !row.mark.is_empty() {
@@ -349,7 +345,10 @@ fn text_ui(ui: &Ui, rect: Rect, is_figure: bool, cell: &TableCell<'_>, size: f32
     let text = WidgetText::from(cell.text.as_str());
     // The width was measured from the same text, but positions are rounded.
     let galley = text.into_galley(ui, Some(wrap), rect.width() + 0.5, font(size, cell.is_strong));
-    let (place, is_cut) = (align.anchor_size(align.pos_in_rect(&rect), galley.size()), galley.elided);
+    let (place, is_cut) = (
+        align.anchor_size(align.pos_in_rect(&rect), galley.size()),
+        galley.elided,
+    );
     let colour = cell.colour.unwrap_or_else(|| Theme::of(ui).palette.text);
     ui.painter().galley(place.min, galley, colour);
     (place, is_cut)
