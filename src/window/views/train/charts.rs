@@ -6,7 +6,7 @@ use decoupler_files::figure::{
     hysteresis_figure, loss_figure, node_figure, pair_address, pair_sample, regression_figure, sample_figure,
     training_state_figure,
 };
-use eframe::egui::{Key, Modifiers, Ui, UiBuilder};
+use eframe::egui::{Ui, UiBuilder};
 
 use super::{
     press::readings_ui,
@@ -16,7 +16,7 @@ use super::{
 };
 use crate::window::{
     plotting::{Pointer, cells_ui, plots_ui},
-    shared::{Effect, Offers, Phase, RunResult, RunView, Shared, SourceKind, target_choice_ui},
+    shared::{Command, Effect, Offers, Phase, RunResult, RunView, Shared, SourceKind, target_choice_ui},
     test_view::{Positions, TargetCharts},
     theme::{Theme, space},
     widgets::{invitation_ui, tabs_ui},
@@ -414,28 +414,24 @@ impl TrainView {
     pub(super) fn offer_charts(&mut self, offers: &mut Offers<'_>, shared: &Shared) {
         // The readings have their own card if there is room.
         for chart in charts(shared, false) {
-            if offers.offer(format!("Chart: {}", chart.name), chart.name != self.tab) {
+            if offers.offer(Command::Chart(chart.name), chart.name != self.tab) {
                 self.tab = chart.name;
             }
         }
         let Some(test) = shared.test().filter(|_| self.tab == SECTION.name) else {
             return;
         };
-        let steps = [
-            (-1, "Previous section", Key::OpenBracket),
-            (1, "Next section", Key::CloseBracket),
-        ];
-        for (by, name, key) in steps {
+        for (by, command) in [(-1, Command::PreviousSection), (1, Command::NextSection)] {
             let stepped = self.section.stepped(by, test);
-            if offers.offer_keys(name, Modifiers::NONE, key, stepped.is_some()) {
+            if offers.offer(command, stepped.is_some()) {
                 self.section = stepped.unwrap_or(self.section);
             }
         }
-        let (name, other) = match self.section.along {
-            Along::RowWires => ("Section along a column-wire", Along::ColumnWires),
-            Along::ColumnWires => ("Section along a row-wire", Along::RowWires),
+        let (command, other) = match self.section.along {
+            Along::RowWires => (Command::SectionAlongColumns, Along::ColumnWires),
+            Along::ColumnWires => (Command::SectionAlongRows, Along::RowWires),
         };
-        if offers.offer_keys(name, Modifiers::NONE, Key::Backslash, true) {
+        if offers.offer(command, true) {
             self.section.along = other;
         }
     }

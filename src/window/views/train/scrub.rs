@@ -54,6 +54,12 @@ impl ScrubState {
         self.result.as_ref().filter(|_| self.wanted.is_some())
     }
 
+    /// Returns the result of the displayed network of the current training, if it has one.
+    pub(super) fn shown<'a>(&'a self, shared: &'a Shared) -> Option<&'a RunResult> {
+        let latest = shared.result()?;
+        Some(self.result().unwrap_or(latest))
+    }
+
     /// Returns the requested epoch; `None` for the latest.
     pub fn epoch(&self) -> Option<usize> {
         self.wanted

@@ -338,7 +338,10 @@ fn label_ui(ui: &Ui, rect: Rect, id: impl AsIdSalt, label: &str, meaning: &str) 
 /// Paints the text of a cell: a figure is aligned right and never truncated; text is aligned left and truncated to fit.
 /// Returns where it is, and true if it was truncated.
 fn text_ui(ui: &Ui, rect: Rect, is_figure: bool, cell: &TableCell<'_>, size: f32) -> (Rect, bool) {
-    let (font, colour) = (font(size, cell.is_strong), cell.colour.unwrap_or(Theme::of(ui).palette.text));
+    let (font, colour) = (
+        font(size, cell.is_strong),
+        cell.colour.unwrap_or(Theme::of(ui).palette.text),
+    );
     if is_figure {
         let right = rect.right_center();
         let place = ui.painter().text(right, Align2::RIGHT_CENTER, &cell.text, font, colour);
@@ -347,7 +350,10 @@ fn text_ui(ui: &Ui, rect: Rect, is_figure: bool, cell: &TableCell<'_>, size: f32
     let text = WidgetText::from(cell.text.as_str());
     // The width was measured from the same text, but positions are rounded.
     let galley = text.into_galley(ui, Some(TextWrapMode::Truncate), rect.width() + 0.5, font);
-    let (place, is_cut) = (Align2::LEFT_CENTER.anchor_size(rect.left_center(), galley.size()), galley.elided);
+    let (place, is_cut) = (
+        Align2::LEFT_CENTER.anchor_size(rect.left_center(), galley.size()),
+        galley.elided,
+    );
     ui.painter().galley(place.min, galley, colour);
     (place, is_cut)
 }
