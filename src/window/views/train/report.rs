@@ -4,17 +4,12 @@ use std::time::Duration;
 
 use decoupler_core::{
     dataset::SplitBy,
-    evaluation::{
-        Combination, ErrorTable, Initialization, Scores, Spread, StartRecord, TestErrors,
-        auto::{Tried, TriedModel},
-        best_start, error_remarks,
-    },
+    evaluation::{Combination, ErrorTable, Scores, Spread, StartRecord, TestErrors, best_start, error_remarks},
     identifiability::Identifiability,
-    text::counted,
     training::StopReason,
 };
 use decoupler_files::{
-    export::{Cell, Table, TableColumn, describe_search, format_duration, format_number},
+    export::{Cell, Table, TableColumn, describe_search, format_duration, format_number, search_table},
     figure::frame_time,
 };
 use eframe::egui::{Align, Layout, Response, RichText, Ui};
@@ -24,7 +19,7 @@ use crate::window::{
     glossary,
     shared::{Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
     test_view::TestView,
-    theme::{Theme, space, type_size},
+    theme::{space, type_size},
     widgets::{
         described_table_ui, dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui,
         section_heading_ui,
@@ -125,52 +120,27 @@ fn line_ui(ui: &mut Ui, name: RichText, value_ui: impl FnOnce(&mut Ui) -> Respon
     .inner
 }
 
-/// The candidates from which the settings were chosen, folded.
+/// The candidates from which the settings were chosen, folded; those with the lowest errors first.
 fn search_ui(ui: &mut Ui, run: &RunView) {
     let Some(search) = &run.search else { return };
+    let mut table = search_table(search);
+    let place = |heading: &str| table.columns.iter().position(|column| column.heading == heading);
+    if let (Some(model), Some(error)) = (place("model"), place("error")) {
+        let error_of = |row: &[Cell]| row[error].number().unwrap_or(f64::INFINITY);
+        table
+            .rows
+            .sort_by(|one, other| error_of(one).total_cmp(&error_of(other)));
+        table.columns.swap(0, model);
+        table.rows.iter_mut().for_each(|row| row.swap(0, model));
+    }
     let summary = format!("{} tried", search.tried.len());
     fold_ui(ui, "Choice of settings", &summary, |ui| {
         dim_ui(ui, &format!("{}.", describe_search(search)));
-        let text = "Cross-validation error, % of the targets' standard deviation, best first:";
-        dim_ui(ui, text);
-        let mut candidates: Vec<(usize, &Tried)> = search.tried.iter().enumerate().collect();
-        candidates.sort_by(|(_, one), (_, other)| one.error.total_cmp(&other.error));
-        for (place, tried) in candidates {
-            ui.scope(|ui| tried_ui(ui, tried, place == search.chosen || tried.share > 0.0));
-        }
+        described_table_ui(ui, "candidates", &table);
         for remark in search.remarks(&run.problem.targets) {
             note_ui(ui, &remark);
         }
     });
-}
-
-/// A candidate in two lines that fit the card: model and error, inputs and epochs.
-fn tried_ui(ui: &mut Ui, tried: &Tried, is_chosen: bool) {
-    let palette = Theme::of(ui).palette;
-    let (mark, colour) = match is_chosen {
-        true => ("* ", palette.accent),
-        false => ("", palette.text),
-    };
-    let error = format!("{:.1} ± {:.1} %", 100.0 * tried.error, 100.0 * tried.standard_error);
-    ui.spacing_mut().item_spacing.y = 0.0;
-    ui.spacing_mut().interact_size.y = space(5);
-    let model = RichText::new(format!("{mark}{}", tried.model)).color(colour);
-    line_ui(ui, model, |ui| ui.label(RichText::new(error).color(colour)));
-    let mut text = tried.features();
-    if tried.share > 0.0 {
-        text = format!("{:.0} % of the answer; {text}", 100.0 * tried.share);
-    }
-    if let TriedModel::Network { begin, epochs, .. } = tried.model {
-        text += &format!("; {}", counted(epochs, "epoch"));
-        if begin != Initialization::default() {
-            text += &format!(" from {begin}");
-        }
-        if tried.is_cut_off {
-            text += ", cut off by the budget";
-        }
-    }
-    dim_ui(ui, &text);
-    ui.add_space(space(1));
 }
 
 /// The table with the network's row still empty.
