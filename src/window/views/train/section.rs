@@ -113,23 +113,10 @@ pub fn section_bar_ui(ui: &mut Ui, choice: &mut SectionChoice, test: &TestView) 
         let picked = explained_options_ui(ui, "Section along", &DIRECTIONS, choice.along, false);
         choice.along = picked.unwrap_or(choice.along);
         ui.add_space(space(1));
-        let before = step_ui(
-            ui,
-            "‹",
-            "Previous section",
-            "Cuts along the previous wire ([).",
-            choice.stepped(-1, test),
-        );
+        step_ui(ui, choice, -1, test);
         let axis = choice.along as usize;
         ui.label(format!("{} of {}", choice.wires(test)[axis] + 1, counts(test)[axis]));
-        let after = step_ui(
-            ui,
-            "›",
-            "Next section",
-            "Cuts along the next wire (]).",
-            choice.stepped(1, test),
-        );
-        *choice = before.or(after).unwrap_or(*choice);
+        step_ui(ui, choice, 1, test);
         let hint = "or click a surface or a reading";
         let font = TextStyle::Body.resolve(ui.style());
         let galley = ui.painter().layout_no_wrap(hint.to_owned(), font, Color32::WHITE);
@@ -139,9 +126,16 @@ pub fn section_bar_ui(ui: &mut Ui, choice: &mut SectionChoice, test: &TestView) 
     });
 }
 
-/// An arrow to a neighbour, if there is one. Returns it if the arrow was clicked.
-fn step_ui<T>(ui: &mut Ui, text: &str, name: &str, hint: &str, neighbour: Option<T>) -> Option<T> {
-    let arrow = ui.add_enabled(neighbour.is_some(), Button::new(text).min_size(Vec2::splat(space(6))));
-    arrow.widget_info(|| WidgetInfo::labeled(Role::Button, neighbour.is_some(), name));
-    neighbour.filter(|_| arrow.on_hover_text(hint).clicked())
+/// An arrow to the wire before (`by` −1) or after (+1).
+fn step_ui(ui: &mut Ui, choice: &mut SectionChoice, by: isize, test: &TestView) {
+    let (text, name, hint) = match by {
+        ..0 => ("‹", "Previous section", "Cuts along the previous wire ([)."),
+        _ => ("›", "Next section", "Cuts along the next wire (])."),
+    };
+    let stepped = choice.stepped(by, test);
+    let arrow = ui.add_enabled(stepped.is_some(), Button::new(text).min_size(Vec2::splat(space(6))));
+    arrow.widget_info(|| WidgetInfo::labeled(Role::Button, stepped.is_some(), name));
+    if arrow.on_hover_text(hint).clicked() {
+        *choice = stepped.unwrap_or(*choice);
+    }
 }
