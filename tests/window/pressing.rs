@@ -79,7 +79,7 @@ fn expected(run: &Run, touch: &Touch) -> (Array2<f64>, Errors, String) {
 #[track_caller]
 fn assert_shows_touch(driver: &Driver, run: &Run) {
     let (readings, errors, heights) = expected(run, &touch(driver));
-    assert_eq!(driver.get("Decoupled surface").value(), Some(heights));
+    assert_eq!(driver.get("Decoded surface").value(), Some(heights));
     let mean = format!("Network, mean mm: {}", format_number(errors.z_mm));
     let worst = format!("Network, worst mm: {}", format_number(errors.worst_mm));
     assert!(driver.has(&mean) && driver.has(&worst), "{mean}: {:?}", driver.texts());
@@ -127,7 +127,7 @@ fn the_whole_window_follows_the_finger_in_the_same_frame() {
         heights.starts_with("z 4.2") && heights.ends_with("to 5.00 mm"),
         "{heights}"
     );
-    assert!(driver.has("Decoupled surface"));
+    assert!(driver.has("Decoded surface"));
 
     for away in [vec2(30.0, 8.0), vec2(-45.0, 20.0), vec2(2.0, -30.0)] {
         let before = touch(&driver);
@@ -213,7 +213,7 @@ fn a_newcomer_presses_before_any_training_and_a_small_network_answers() {
     assert!(driver.says("Press the surface on the left"));
     driver.click_button("Press it");
     driver.wait("the small network's answer", |driver| driver.says("Network, mean mm: "));
-    assert!(driver.has("Decoupled surface") && driver.says("A small network answers"));
+    assert!(driver.has("Decoded surface") && driver.says("A small network answers"));
     let rest_mm = 0.8 * 0.5;
     let start = "Network, worst mm: ";
     let text = driver.texts().into_iter().find(|text| text.starts_with(start)).unwrap();

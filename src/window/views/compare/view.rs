@@ -126,14 +126,15 @@ impl CompareView {
         let surface = |place: usize| {
             let Compared { test, drawn, .. } = self.places[place].compared.as_ref()?;
             let name = shared.runs.pinned(place).map_or("", |run| run.name);
-            let (letter, style) = (PLACES[place], look.style());
+            let letter = PLACES[place];
             match (drawn, test) {
                 (Drawn::Frames(frames), TestSet::Array(test)) => {
                     let [_, decoupled, error] = &**frames;
-                    Some(match self.card {
-                        RightCard::Decoupled => test.heights(format!("{letter}: {name}, decoupled"), decoupled, style),
-                        RightCard::Error => test.errors(format!("{letter}: {name}, error"), error, style),
-                    })
+                    let (surface, what) = match self.card {
+                        RightCard::Decoupled => (test.heights("", decoupled), "decoupled"),
+                        RightCard::Error => (test.errors("", error), "error"),
+                    };
+                    Some(look.dressed(&surface, format!("{letter}: {name}, {what}")))
                 }
                 (Drawn::Surfaces(surfaces), _) => {
                     let [_, decoded, error] = &**surfaces;
