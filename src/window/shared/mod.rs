@@ -3,6 +3,7 @@
 
 mod error_table;
 mod export;
+mod look;
 mod network_exports;
 mod offers;
 mod run_list;
@@ -17,6 +18,7 @@ pub use export::{
     Ask, Contents, Export, ExportGroup, FileTask, FileWords, Purpose, copy_exports, csv_export, error_table_export,
     loss_export, picture_exports,
 };
+pub use look::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
 pub use network_exports::{
     DecoderSource, NetworkSource, decoder_export_ui, decoder_forms_ui, file_stem, network_exports,
 };
@@ -25,7 +27,6 @@ pub use run_list::{LoadedRun, PLACES, RunList, RunsWorker};
 pub use run_view::{RunCommand, RunView, run_buttons_ui, sentence};
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_scene};
 pub use training_form::{Effect, Matter, Notice, combination_name, method_choice_ui, method_settings_ui, stopping_ui};
-pub use view::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
 
 use run_view::training_status_ui;
 pub use state::Unfinished;
