@@ -1,18 +1,278 @@
 //! Pressing: the user's finger on the actual surface, and the answers of all decoders.
 //!
-//! `state` holds the finger and its [`Touch`], and has the touch answered in the same frame,
-//! or in the background for large arrays. `pointer` turns mouse and keys into a touch before anything of the frame is
-//! drawn, and trains a small network (`ready_settings`) that answers until there is another. `comparing` asks the other
-//! decoders in the background. `pressed` is the touched sensor with its readings. `section` computes and shows the answers.
+//! `pointer` turns mouse and keys into a [`Touch`] before anything of the frame is drawn. `solving` computes what is shown of
+//! it in the background, the newest first; `decoders` asks the other decoders, and trains a small network that answers until
+//! there is another. `section` shows the answers.
 
-mod comparing;
+mod decoders;
 mod pointer;
-mod pressed;
-mod ready_settings;
 mod section;
-mod state;
-mod touch;
+mod solving;
 
-pub use section::{Shown, press_section_ui, readings_head_ui, readings_ui};
-pub use state::{Hand, PressState};
-pub use touch::Touch;
+use std::sync::Arc;
+
+use decoupler_files::figure::surface::{Sight, Surface};
+use eframe::egui::{Id, Rect};
+use glam::DVec2;
+
+use self::{
+    decoders::{Comparison, Demo},
+    solving::{Question, Subject, solve},
+};
+use crate::window::{
+    job::{Background, JobError, Wake},
+    shared::{RunResult, Shared},
+    surface_view::SurfaceViewResponse,
+    test_view::TestView,
+    views::train::drawn::Frames,
+};
+
+pub use section::{press_section_ui, readings_head_ui, readings_ui};
+pub use solving::{Shown, Touch};
+
+/// The finger, what it presses, and everything known about that.
+#[derive(Debug)]
+pub struct PressState {
+    /// Work of the pointer on the actual surface.
+    pub hand: Hand,
+    /// The finger that presses.
+    pub finger: Finger,
+    /// What is pressed; `None` while the test set is displayed.
+    touch: Option<Touch>,
+    /// Hold of the pointer, while its button is down.
+    grip: Option<Grip>,
+    /// The actual surface as last drawn.
+    target: Option<Target>,
+    /// True once the user was about to press.
+    is_wanted: bool,
+    /// The latest answer, or why there is none, with its question.
+    answered: Option<(Question, Result<Shown, String>)>,
+    solving: Background<Result<(Question, Result<Shown, String>), JobError>>,
+    comparison: Comparison,
+    demo: Demo,
+}
+
+impl PressState {
+    /// Nothing pressed. `wake` is called when something was computed in the background.
+    pub fn new(wake: &Wake) -> Self {
+        Self {
+            hand: Hand::default(),
+            finger: Finger::default(),
+            touch: None,
+            grip: None,
+            target: None,
+            is_wanted: false,
+            answered: None,
+            solving: Background::prompt("press", Arc::clone(wake)),
+            comparison: Comparison::new(wake),
+            demo: Demo::new(wake),
+        }
+    }
+
+    /// Returns true while something is pressed.
+    pub fn is_pressing(&self) -> bool {
+        self.touch.is_some()
+    }
+
+    /// What is pressed; `None` while the test set is displayed.
+    pub fn touch(&self) -> Option<&Touch> {
+        self.touch.as_ref()
+    }
+
+    /// What is shown of the touch; `None` while the test set is displayed, or before the first answer.
+    pub fn shown(&self) -> Option<&Shown> {
+        self.answered.as_ref()?.1.as_ref().ok()
+    }
+
+    /// Surfaces of the touch.
+    pub fn frames(&self) -> Option<&Frames> {
+        self.shown().map(|shown| &shown.frames)
+    }
+
+    /// Goes back to the test set.
+    pub fn let_go(&mut self) {
+        (self.touch, self.grip, self.answered) = (None, None, None);
+        self.solving.abandon();
+    }
+
+    /// Presses the ball onto the middle of the nodes.
+    pub fn press_middle(&mut self, test: &TestView) {
+        let last = test.sensor.scale.nodes_per_row() - 1;
+        let corner = |row: Option<&usize>, node| {
+            let row = row.copied().unwrap_or(0);
+            test.sensor.geometry.row_node_mm(test.sensor.scale, row, node)
+        };
+        let (first, last) = (corner(test.rows.first(), 0), corner(test.rows.last(), last));
+        self.finger.tool = Tool::Ball;
+        self.press(0.5 * (first + last).truncate(), test.stroke_mm);
+    }
+
+    /// Presses the ball onto a place.
+    fn press(&mut self, place_mm: DVec2, stroke_mm: f64) {
+        self.touch = Some(self.finger.touch(place_mm, stroke_mm));
+    }
+
+    /// Presses as the finger does now, after it has changed.
+    fn follow_finger(&mut self, stroke_mm: f64) {
+        if let Some(Touch::Ball { place_mm, .. }) = self.touch {
+            self.press(place_mm, stroke_mm);
+        }
+    }
+
+    /// Takes the actual surface as it was drawn.
+    pub fn take_target(&mut self, drawn: &SurfaceViewResponse, surface: &Surface) {
+        self.target = drawn.sight.map(|sight| Target {
+            id: drawn.response.id,
+            rect: drawn.response.rect,
+            sight,
+            surface: surface.clone(),
+        });
+        self.is_wanted |= self.hand == Hand::Press && drawn.response.hovered();
+    }
+
+    /// Has the touch answered, one question at a time; `result` is that of the displayed network.
+    pub fn follow(&mut self, shared: &Shared, result: Option<&RunResult>) {
+        self.demo.take_events();
+        let Some(test) = shared.test() else {
+            // A recording has no sensor model to press.
+            self.let_go();
+            (self.target, self.is_wanted) = (None, false);
+            return;
+        };
+        let own = shared.shown_run().zip(result).map(|(run, result)| Subject {
+            networks: Arc::clone(&result.networks),
+            settings: *run.settings(),
+            is_demo: false,
+            is_idle: result.is_idle,
+        });
+        if (self.is_wanted || self.is_pressing()) && own.is_none() {
+            self.demo.ask(shared);
+        }
+        if self
+            .answered
+            .as_ref()
+            .is_some_and(|(question, _)| !question.is_of(test))
+        {
+            // Another array, or another scene.
+            self.let_go();
+        }
+        let Some(touch) = self.touch.clone() else { return };
+        let question = Question {
+            touch,
+            test: test.clone(),
+            subject: own.or_else(|| self.demo.subject(shared)),
+        };
+        while let Some(answered) = self.solving.next_event() {
+            let failed = |error: JobError| (question.clone(), Err(error.to_string()));
+            self.answered = Some(answered.unwrap_or_else(failed));
+        }
+        let is_answered = self
+            .answered
+            .as_ref()
+            .is_some_and(|(answered, _)| answered.is(&question));
+        if !is_answered && !self.solving.is_under_way() {
+            self.solving.start(move |_| solve(question), |answered| answered);
+        }
+        if let Some((question, Ok(shown))) = &self.answered {
+            self.comparison.follow(question, &shown.pressed);
+        }
+    }
+
+    /// Text of the network's card while something is pressed and no network has answered.
+    pub fn waiting_text(&self, shared: &Shared) -> &'static str {
+        if self.demo.is_awaited(shared) {
+            "The built-in demo network is being trained…"
+        } else if shared.phase.is_busy() {
+            "The network answers here once its training has begun."
+        } else {
+            "This array is too large for the demo network: press Train, and your network answers here."
+        }
+    }
+}
+
+/// A surface on the screen that can be touched.
+#[derive(Clone, Debug)]
+struct Target {
+    id: Id,
+    rect: Rect,
+    sight: Sight,
+    surface: Surface,
+}
+
+/// Hold of the pointer on the surface while its button is down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Grip {
+    /// The ball moves in the horizontal plane of the first contact, so that it does not jump as the surface gives way.
+    Level(f64),
+    /// A node moves up and down.
+    Node {
+        /// Its place among those drawn.
+        node: usize,
+        /// Height of the node above the pointer's.
+        above_mm: f64,
+        /// Height of the node, and of the pointer on the screen, when it was taken.
+        begin: (f64, f32),
+    },
+    /// The button went down next to the surface.
+    Missed,
+}
+
+/// Work of the pointer on the actual surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Hand {
+    /// It presses.
+    #[default]
+    Press,
+    /// It turns the surface.
+    Turn,
+}
+
+/// What presses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tool {
+    /// A ball.
+    #[default]
+    Ball,
+    /// Two fingertips that move one node up and down.
+    Node,
+}
+
+/// Tool of the user with its size and depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Finger {
+    /// What presses.
+    pub tool: Tool,
+    /// Radius of the ball.
+    pub radius_mm: f64,
+    /// Depth of the ball as a part of the stroke, from 0 to 1.
+    pub depth_share: f64,
+}
+
+impl Default for Finger {
+    fn default() -> Self {
+        Self {
+            tool: Tool::default(),
+            radius_mm: 4.0,
+            depth_share: 0.8,
+        }
+    }
+}
+
+impl Finger {
+    /// Radii offered.
+    const RADIUS_MM: std::ops::RangeInclusive<f64> = 0.5..=20.0;
+
+    /// The ball pressed onto a place.
+    fn touch(&self, place_mm: DVec2, stroke_mm: f64) -> Touch {
+        Touch::Ball {
+            place_mm,
+            radius_mm: self.radius_mm,
+            depth_mm: self.depth_share * stroke_mm,
+        }
+    }
+
+    /// Presses deeper by a part of the stroke.
+    fn deepen(&mut self, share: f64) {
+        self.depth_share = (self.depth_share + share).clamp(0.0, 1.0);
+    }
+}

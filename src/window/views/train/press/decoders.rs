@@ -1,0 +1,286 @@
+//! The other decoders, and the built-in demo network.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use decoupler_core::{
+    dataset::{Dataset, Simulation},
+    decoupling::{Decoder, DecoderKind, Precision},
+    evaluation::{DecoderSet, Run, RunError, RunSets, RunSettings},
+    job::Job,
+    machine::node_pairs_per_row,
+    network::{InputChoice, Networks, Quantity, ScalingChoice},
+    scene::{Indenter, Loading, Noise, Rows, Scene},
+};
+use decoupler_files::machine::memory_budget;
+
+use super::solving::{Answer, Question, Subject, decode};
+use crate::window::{
+    job::{Background, JobError, Report, Wake},
+    shared::Shared,
+    test_view::TestView,
+};
+
+/// Decoders compared with the network, the fastest first.
+pub(super) const KINDS: [DecoderKind; 5] = [
+    DecoderKind::Mean,
+    DecoderKind::Ridge,
+    DecoderKind::RadialBasis,
+    DecoderKind::Polish,
+    DecoderKind::Newton,
+];
+
+/// Answer of a decoder to the pressed sensor `of`.
+#[derive(Debug)]
+pub(super) struct Compared {
+    pub(super) kind: DecoderKind,
+    pub(super) answer: Result<Answer, String>,
+    pub(super) of: Arc<Dataset>,
+}
+
+/// Event of the job: an answer, or the reason why it died; nothing when it has ended.
+type CompareEvent = Option<Result<Compared, JobError>>;
+
+/// The other decoders: fitted and asked in the background, one touch at a time; the newest touch wins.
+#[derive(Debug)]
+pub(super) struct Comparison {
+    job: Background<CompareEvent>,
+    fitted: Arc<Mutex<Fitted>>,
+    /// The network whose training the decoders share.
+    of: Option<Arc<Networks>>,
+    /// The pressed sensor that they were asked about last.
+    asked: Option<Arc<Dataset>>,
+    /// The latest answer of each, also to an earlier touch.
+    pub(super) answers: Vec<Compared>,
+    /// Reason why the job died.
+    pub(super) failure: Option<String>,
+}
+
+/// Decoders fitted so far, in the order of [`KINDS`].
+#[derive(Default)]
+struct Fitted {
+    of: Option<Arc<Networks>>,
+    decoders: Vec<Result<Box<dyn Decoder>, String>>,
+}
+
+impl std::fmt::Debug for Fitted {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Fitted").finish_non_exhaustive()
+    }
+}
+
+impl Comparison {
+    pub(super) fn new(wake: &Wake) -> Self {
+        Self {
+            job: Background::prompt("comparison", Arc::clone(wake)),
+            fitted: Arc::default(),
+            of: None,
+            asked: None,
+            answers: Vec::new(),
+            failure: None,
+        }
+    }
+
+    /// Takes answers, and asks about the pressed sensor of `question`, unless its network still learns.
+    pub(super) fn follow(&mut self, question: &Question, pressed: &TestView) {
+        let subject = question.subject.as_ref().filter(|subject| subject.is_idle);
+        let networks = subject.map(|subject| &subject.networks);
+        if self.of.as_ref().map(Arc::as_ptr) != networks.map(Arc::as_ptr) {
+            self.job.abandon();
+            self.of = networks.cloned();
+            (self.asked, self.answers, self.failure) = (None, Vec::new(), None);
+        }
+        while let Some(event) = self.job.next_event() {
+            match event {
+                Some(Ok(compared)) => {
+                    self.answers.retain(|other| other.kind != compared.kind);
+                    self.answers.push(compared);
+                }
+                Some(Err(error)) => self.failure = Some(error.to_string()),
+                None => {}
+            }
+        }
+        let is_asked = self
+            .asked
+            .as_ref()
+            .is_some_and(|asked| Arc::ptr_eq(asked, &pressed.set));
+        let Some(subject) = subject.filter(|_| !is_asked) else {
+            return;
+        };
+        if self.job.is_under_way() {
+            // Its decoder answers, or is fitted, and then they are asked about this touch.
+            return self.job.cancel();
+        }
+        (self.asked, self.failure) = (Some(Arc::clone(&pressed.set)), None);
+        let (subject, pressed, fitted) = (subject.clone(), pressed.clone(), Arc::clone(&self.fitted));
+        self.job.start(
+            move |report| compare(&subject, &pressed, &fitted, report),
+            |ended| ended.err().map(Err),
+        );
+    }
+}
+
+/// Asks one decoder after the other, each fitted when it is first asked.
+fn compare(subject: &Subject, pressed: &TestView, fitted: &Mutex<Fitted>, report: &Report<CompareEvent>) {
+    // Only one job runs at a time, and a panic leaves whole decoders.
+    let mut fitted = fitted.lock().unwrap_or_else(PoisonError::into_inner);
+    if !fitted.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, &subject.networks)) {
+        *fitted = Fitted::default();
+        fitted.of = Some(Arc::clone(&subject.networks));
+    }
+    let is_cancelled = || report.is_cancelled();
+    let mut set = None;
+    for (index, kind) in KINDS.into_iter().enumerate() {
+        if fitted.decoders.len() == index {
+            let set = set.get_or_insert_with(|| {
+                let sets = RunSets::draw(&subject.settings, memory_budget(), &Job::new(&is_cancelled))?;
+                let networks = Some(Networks::clone(&subject.networks));
+                Ok::<_, RunError>(DecoderSet::new(subject.settings, sets.split.training, networks))
+            });
+            let decoder = match set {
+                Ok(set) => set.decoder(kind, Precision::Double).map_err(|error| error.to_string()),
+                Err(error) => Err(error.to_string()),
+            };
+            if is_cancelled() {
+                return;
+            }
+            let decoder = decoder.and_then(|decoder| decoder.ok_or_else(|| "it needs a trained network".to_owned()));
+            fitted.decoders.push(decoder);
+        }
+        if is_cancelled() {
+            return;
+        }
+        let answer = match &mut fitted.decoders[index] {
+            Ok(decoder) => decode(&mut **decoder, pressed).map(|(_, answer)| answer),
+            Err(reason) => Err(reason.clone()),
+        };
+        let of = Arc::clone(&pressed.set);
+        report.send(Some(Ok(Compared { kind, answer, of })));
+    }
+}
+
+/// A small network for the displayed sensor, trained quickly in the background once the user is about to press and there is
+/// no other.
+#[derive(Debug)]
+pub(super) struct Demo {
+    job: Background<Result<Result<Networks, RunError>, JobError>>,
+    /// Settings of the network that is there or being trained.
+    of: Option<RunSettings>,
+    /// The network, or why it could not be trained.
+    networks: Option<Result<Arc<Networks>, String>>,
+}
+
+impl Demo {
+    pub(super) fn new(wake: &Wake) -> Self {
+        Self {
+            job: Background::prompt("demo network", Arc::clone(wake)),
+            of: None,
+            networks: None,
+        }
+    }
+
+    /// Takes the network once it is trained.
+    pub(super) fn take_events(&mut self) {
+        while let Some(trained) = self.job.next_event() {
+            let trained = trained.map_err(|error| error.to_string());
+            let trained = trained.and_then(|trained| trained.map_err(|error| error.to_string()));
+            self.networks = Some(trained.map(Arc::new));
+        }
+    }
+
+    /// Trains the network of the current test set, unless it exists or is too large to be trained quickly.
+    pub(super) fn ask(&mut self, shared: &Shared) {
+        let Some(settings) = settings_of(shared).filter(|settings| self.of != Some(*settings)) else {
+            return;
+        };
+        (self.of, self.networks) = (Some(settings), None);
+        self.job.start(
+            move |report| {
+                let is_cancelled = || report.is_cancelled();
+                let job = Job::new(&is_cancelled);
+                let sets = RunSets::draw(&settings, memory_budget(), &job)?;
+                let mut run = Run::new(settings, sets, None, &job)?;
+                run.finish(&job)?;
+                Ok(run.network())
+            },
+            |trained| trained,
+        );
+    }
+
+    /// Returns the settings of the network, if it is that of the current test set.
+    fn current(&self, shared: &Shared) -> Option<RunSettings> {
+        settings_of(shared).filter(|settings| self.of == Some(*settings))
+    }
+
+    /// Returns true while the network of the current test set is being trained.
+    pub(super) fn is_awaited(&self, shared: &Shared) -> bool {
+        self.current(shared).is_some() && self.networks.is_none()
+    }
+
+    /// Returns the reason why the network of the current test set could not be trained.
+    pub(super) fn failure(&self, shared: &Shared) -> Option<&String> {
+        self.current(shared)?;
+        self.networks.as_ref()?.as_ref().err()
+    }
+
+    /// Returns the network, if it is that of the current test set.
+    pub(super) fn subject(&self, shared: &Shared) -> Option<Subject> {
+        Some(Subject {
+            settings: self.current(shared)?,
+            networks: Arc::clone(self.networks.as_ref()?.as_ref().ok()?),
+            is_demo: true,
+            is_idle: true,
+        })
+    }
+}
+
+/// Returns the settings of the demo network for the current test set; `None` if training would take long.
+fn settings_of(shared: &Shared) -> Option<RunSettings> {
+    let settings = match (&shared.preview, &shared.run) {
+        (Some(preview), _) => &preview.settings,
+        (None, Some(run)) => run.settings(),
+        (None, None) => return None,
+    };
+    demo_settings(settings.simulation()?)
+}
+
+/// Returns the settings of a small network that learns imprints of balls on the sensor of `source` in a fraction of a
+/// second, with its rows, axes and stroke, and without noise; `None` for arrays for which training would take longer.
+///
+/// One network for each known row, with conductances scaled to [−1, 1], was the best choice for so few samples.
+pub(super) fn demo_settings(source: &Simulation) -> Option<RunSettings> {
+    /// Number of training samples per row.
+    const SAMPLES: usize = 200;
+    /// Maximum number of pairs of nodes in all samples: about a tenth of a second.
+    const MAX_PAIRS: f64 = 5e7;
+    /// Maximum number of unknowns and readings of all rows, with which the time of an epoch grows.
+    const MAX_CHANNELS: usize = 2000;
+    let (rows, scale) = (source.rows().ok()?, source.sensor.scale);
+    let samples = SAMPLES * rows;
+    let channels = rows * (source.scene.unknowns_per_row(scale) + scale.columns());
+    if samples as f64 * node_pairs_per_row(&source.sensor) > MAX_PAIRS || channels > MAX_CHANNELS {
+        return None;
+    }
+    let scene = Scene {
+        rows: match source.scene.rows {
+            Rows::All | Rows::Known => Rows::Known,
+            one @ Rows::One(_) => one,
+        },
+        loading: Loading::Indenter(Indenter::default()),
+        noise: Noise::default(),
+        ..source.scene
+    };
+    let mut settings = RunSettings::from(Simulation {
+        sensor: source.sensor,
+        scene,
+        samples,
+        validation_samples: 0,
+        test_samples: rows,
+    });
+    settings.inputs = InputChoice {
+        quantity: Quantity::Conductance,
+        scaling: ScalingChoice::MinMax,
+    };
+    settings.hidden = 6;
+    settings.training.stopping.epochs = 30;
+    Some(settings)
+}

@@ -1,0 +1,227 @@
+//! What is pressed, and its answer by the network.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use decoupler_core::{
+    dataset::Dataset,
+    decoupling::{Decoder, decode_set},
+    evaluation::{Errors, RunSettings},
+    network::Networks,
+    scene::{Deformation, Indenter, IndenterShape, Radii},
+    sensor::SensorModel,
+};
+use glam::{DVec2, DVec3};
+use ndarray::Array2;
+
+use crate::window::{test_view::TestView, views::train::drawn::Frames};
+
+/// What is pressed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Touch {
+    /// A ball.
+    Ball {
+        /// Position of its centre.
+        place_mm: DVec2,
+        /// Its radius.
+        radius_mm: f64,
+        /// Depth at its centre.
+        depth_mm: f64,
+    },
+    /// Nodes moved one by one: depths in millimetres of those drawn, row by row.
+    Nodes(Vec<f64>),
+}
+
+impl Touch {
+    /// The ball, if it is one.
+    pub(super) fn indenter(radius_mm: f64) -> Indenter {
+        let radius_mm = Radii {
+            smallest: radius_mm,
+            largest: radius_mm,
+        };
+        Indenter {
+            shape: IndenterShape::Sphere { radius_mm },
+            ..Indenter::default()
+        }
+    }
+
+    /// Returns the deformation of an array of which `rows` are read and drawn.
+    pub fn deformation(&self, sensor: &SensorModel, rows: &[usize]) -> Deformation {
+        match self {
+            &Self::Ball {
+                place_mm,
+                radius_mm,
+                depth_mm,
+            } => Self::indenter(radius_mm).press(sensor, place_mm, depth_mm),
+            Self::Nodes(depths_mm) => Deformation::from_fn(sensor.scale, |row, node| {
+                let index = rows.iter().position(|read| *read == row);
+                let index = index.map(|index| index * sensor.scale.nodes_per_row() + node);
+                let depth_mm = index.and_then(|index| depths_mm.get(index));
+                DVec3::Z * depth_mm.copied().unwrap_or(0.0)
+            }),
+        }
+    }
+}
+
+/// The network that decodes the touch.
+#[derive(Clone, Debug)]
+pub(super) struct Subject {
+    /// The network, or one for each row.
+    pub(super) networks: Arc<Networks>,
+    /// Settings that it was trained with.
+    pub(super) settings: RunSettings,
+    /// True for the built-in one.
+    pub(super) is_demo: bool,
+    /// True once it no longer changes.
+    pub(super) is_idle: bool,
+}
+
+/// Everything that a touch and the network's answer depend on.
+#[derive(Clone, Debug)]
+pub(super) struct Question {
+    pub(super) touch: Touch,
+    pub(super) test: TestView,
+    pub(super) subject: Option<Subject>,
+}
+
+impl Question {
+    /// Returns true if both questions are the same.
+    pub(super) fn is(&self, other: &Self) -> bool {
+        self.is_of(&other.test) && self.touch == other.touch && self.networks() == other.networks()
+    }
+
+    /// Returns true if it is about this sensor, with the same rows and stroke: a new training has another test set of the
+    /// same sensor.
+    pub(super) fn is_of(&self, test: &TestView) -> bool {
+        (self.test.sensor, self.test.stroke_mm) == (test.sensor, test.stroke_mm) && self.test.rows == test.rows
+    }
+
+    /// Address of the networks.
+    fn networks(&self) -> Option<*const Networks> {
+        self.subject.as_ref().map(|subject| Arc::as_ptr(&subject.networks))
+    }
+}
+
+/// What is shown of a touch.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// The pressed sensor: a test set of one snapshot, without noise.
+    pub(super) pressed: TestView,
+    /// Its surface, the network's, and their difference.
+    pub(super) frames: Frames,
+    /// Drops of its readings below those at rest, in percent: rows read × M4.
+    pub drops_percent: Option<Array2<f64>>,
+    /// The network's answer, if there is a network, or why it has none.
+    pub(super) answer: Option<Result<Answer, String>>,
+    /// Number of readings outside the range of the network's training.
+    pub(super) outside: usize,
+}
+
+/// Answer of a decoder to a pressed sensor.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Answer {
+    pub(super) errors: Errors,
+    /// Time to decode the frame: the shortest of several, since other load on the machine can only increase it.
+    pub(super) time: Duration,
+}
+
+/// Presses, reads and decodes.
+pub(super) fn solve(question: Question) -> (Question, Result<Shown, String>) {
+    let shown = press(&question.touch, &question.test).map(|pressed| {
+        let networks = question.subject.as_ref().map(|subject| &*subject.networks);
+        let decoded = networks.map(|networks| decode(&mut networks.decoder(), &pressed));
+        let actual = pressed.frame(pressed.set.targets(), 0);
+        let answers = decoded.as_ref().and_then(|decoded| decoded.as_ref().ok());
+        let decoupled = answers.map(|(answers, _)| {
+            let decoupled = pressed.frame(answers.view(), 0);
+            let error = actual.error_of(&decoupled);
+            (decoupled, error)
+        });
+        Shown {
+            frames: Frames { actual, decoupled },
+            drops_percent: pressed.drops_percent(&pressed.readings_ohm(0)),
+            answer: decoded.map(|decoded| decoded.map(|(_, answer)| answer)),
+            outside: networks.map_or(0, |networks| outside(networks, &pressed.set)),
+            pressed,
+        }
+    });
+    (question, shown)
+}
+
+/// Returns the sensor of `test` pressed: positions of its nodes, and readings of its wires by Eq. (2).
+fn press(touch: &Touch, test: &TestView) -> Result<TestView, String> {
+    let (sensor, rows) = (&test.sensor, &test.rows);
+    let deformation = touch.deformation(sensor, rows);
+    let (mut readings_ohm, mut places_mm) = (Vec::new(), Vec::new());
+    for &row in rows {
+        let readings = sensor.row_resistances(row, deformation.row_mm(row));
+        readings_ohm.extend(readings.map_err(|error| error.to_string())?);
+        places_mm.extend(
+            deformation
+                .row_positions_mm(sensor, row)
+                .flat_map(|place| place.to_array()),
+        );
+    }
+    let [readings_ohm, places_mm] = [readings_ohm, places_mm].map(|values| {
+        let shape = (rows.len(), values.len() / rows.len().max(1));
+        Array2::from_shape_vec(shape, values).expect("every row has as many values")
+    });
+    let set = Dataset::new(readings_ohm, places_mm, Some(rows), vec![0; rows.len()]);
+    let set = Arc::new(set.map_err(|error| error.to_string())?);
+    Ok(TestView {
+        snapshots: Arc::new(set.snapshots()),
+        set,
+        ..test.clone()
+    })
+}
+
+/// Decodes a pressed sensor; the answers are rows read × 3·M2.
+pub(super) fn decode(decoder: &mut dyn Decoder, pressed: &TestView) -> Result<(Array2<f64>, Answer), String> {
+    /// Number of repeats.
+    const REPEATS: usize = 4;
+    /// Maximum time spent on the repeats.
+    const LONGEST: Duration = Duration::from_millis(30);
+    let mut timed = || {
+        let begun = Instant::now();
+        let answers = decode_set(decoder, &pressed.set).map_err(|error| error.to_string())?;
+        Ok::<_, String>((answers, begun.elapsed()))
+    };
+    let begun = Instant::now();
+    let (answers, mut time) = timed()?;
+    for _ in 0..REPEATS {
+        if begun.elapsed() < LONGEST {
+            time = time.min(timed()?.1);
+        }
+    }
+    let errors = Errors::measure(&pressed.set, &answers, pressed.stroke_mm);
+    Ok((answers, Answer { errors, time }))
+}
+
+/// Number of readings outside the range that the networks were trained in.
+fn outside(networks: &Networks, pressed: &Dataset) -> usize {
+    let of_sample = |sample| {
+        let inputs = networks.at(pressed.row_index(sample)).inputs();
+        let range = inputs.range();
+        range.map_or(0, |range| {
+            range
+                .outside(inputs.quantity(), pressed.sample_readings(sample))
+                .count()
+        })
+    };
+    (0..pressed.samples()).map(of_sample).sum()
+}
+
+/// Returns the depths of the drawn nodes that leave every one at its place.
+pub(super) fn depths_mm(test: &TestView, nodes_mm: &[DVec3]) -> Vec<f64> {
+    let nodes = nodes_mm.iter().enumerate();
+    nodes.map(|(node, place)| at_rest(test, node).z - place.z).collect()
+}
+
+/// Returns the place at rest of a node drawn.
+pub(super) fn at_rest(test: &TestView, node: usize) -> DVec3 {
+    let per_row = test.sensor.scale.nodes_per_row();
+    let row = test.rows.get(node / per_row).copied().unwrap_or(0);
+    test.sensor.geometry.row_node_mm(test.sensor.scale, row, node % per_row)
+}
