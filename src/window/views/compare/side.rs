@@ -1,0 +1,171 @@
+use std::{path::Path, sync::Arc};
+
+use decoupler_core::{dataset::Dataset, job::Job};
+use decoupler_files::{
+    export::NetworkFile,
+    figure::{Decoded, PlotFigure, RegressionLine, regression_figure, surface::Surface},
+    import::Recorded,
+};
+use ndarray::Array2;
+
+use crate::window::{
+    job::{Background, Wake},
+    shared::LoadedRun,
+    test_view::{Positions, RecordedTest, SurfaceStyle, TestSet, TestView},
+};
+
+/// One side of the comparison.
+#[derive(Debug)]
+pub(super) struct Side {
+    /// The run on this side.
+    id: Option<u64>,
+    /// Its test set with the answers, or why they are not available; `None` until they are ready.
+    pub(super) compared: Option<Result<Compared, String>>,
+    /// Target of a recording whose chart is shown.
+    pub(super) target: usize,
+    /// Work that prepares them; the newest run wins.
+    job: Background<Result<Compared, String>>,
+}
+
+impl Side {
+    pub(super) fn new(wake: &Wake) -> Self {
+        Self {
+            id: None,
+            compared: None,
+            target: 0,
+            job: Background::new("compared run", Arc::clone(wake)),
+        }
+    }
+
+    /// Prepares `run` in the background if it is another one, and takes what is ready, to show it at `snapshot`.
+    pub(super) fn follow(&mut self, run: Option<LoadedRun<'_>>, snapshot: usize) {
+        let id = run.map(|run| run.id);
+        if self.id != id {
+            (self.id, self.compared) = (id, None);
+            self.job.abandon();
+            if let Some(run) = run {
+                let file = Arc::clone(run.file);
+                self.job.start(
+                    move |report| Compared::new(&file, &Job::new(&|| report.is_cancelled())),
+                    |prepared| {
+                        let failed = |error| format!("The test samples of this run could not be prepared: {error}");
+                        prepared.map_err(failed)?
+                    },
+                );
+            }
+        }
+        if let Some(compared) = self.job.next_event() {
+            self.compared = Some(compared);
+            self.show(snapshot);
+        }
+    }
+
+    /// Draws the surfaces of a snapshot, or of the last one if there are fewer.
+    pub(super) fn show(&mut self, snapshot: usize) {
+        if let Some(Ok(compared)) = &mut self.compared {
+            compared.surfaces = surfaces(&compared.test, &compared.answers, snapshot);
+        }
+    }
+
+    /// Returns the decoded surface and its error, if the run has surfaces.
+    pub(super) fn surfaces(&self) -> Option<&[Surface; 2]> {
+        self.compared.as_ref()?.as_ref().ok()?.surfaces.as_ref()
+    }
+
+    /// Returns the number of snapshots that can be drawn.
+    pub(super) fn snapshots(&self) -> usize {
+        match &self.compared {
+            Some(Ok(compared)) if compared.surfaces.is_some() => compared.test.snapshots(),
+            _ => 0,
+        }
+    }
+
+    /// Returns the chart of decoded against actual values of the chosen target, if the run has no surfaces.
+    pub(super) fn chart(&self) -> Option<PlotFigure> {
+        self.compared.as_ref()?.as_ref().ok()?.chart(self.target)
+    }
+}
+
+/// Test set of a run with the answers of its network.
+#[derive(Debug)]
+pub(super) struct Compared {
+    pub(super) test: TestSet,
+    /// Samples × targets.
+    answers: Array2<f64>,
+    /// The decoded surface of the snapshot and its error, where there is one through the targets.
+    surfaces: Option<[Surface; 2]>,
+    /// Regression lines of the targets of a recording.
+    lines: Vec<RegressionLine>,
+}
+
+impl Compared {
+    /// Simulates the test set of a run again, or reads it from the files of its recording.
+    fn new(file: &NetworkFile, job: &Job<'_>) -> Result<Self, String> {
+        let test = match &file.recorded {
+            None => TestSet::Array(TestView::draw(&file.settings).map_err(|error| error.to_string())?),
+            Some(recorded) => TestSet::Recording(recorded_test(file, recorded, job)?),
+        };
+        let answers = file.decoder().answers_to(test.set());
+        Ok(Self {
+            surfaces: None,
+            lines: test
+                .recording()
+                .map_or_else(Vec::new, |test| test.charts(&answers).lines),
+            test,
+            answers,
+        })
+    }
+
+    fn chart(&self, target: usize) -> Option<PlotFigure> {
+        let test = self.test.recording().filter(|_| self.surfaces.is_none())?;
+        let (line, channel) = self.lines.get(target).zip(test.problem.targets.get(target))?;
+        let pair = |sample| (test.set.targets()[[sample, target]], self.answers[[sample, target]]);
+        let samples: (usize, &dyn Fn(usize) -> (f64, f64)) = (test.set.samples(), &pair);
+        Some(regression_figure(samples, line, Decoded::Target(channel)))
+    }
+}
+
+/// Reads the test samples of a network again.
+fn recorded_test(file: &NetworkFile, recorded: &Recorded, job: &Job<'_>) -> Result<RecordedTest, String> {
+    if let [missing, ..] = recorded.missing()[..] {
+        return Err(format!(
+            "The recording '{}' no longer exists, so its test samples cannot be shown. Put the file back to see them; \
+             errors, loss and settings are kept with the run.",
+            missing.display()
+        ));
+    }
+    let sets = file.setup().sets(Path::new(""), job, &mut |_| ());
+    let sets = sets.map_err(|error| error.to_string())?;
+    let now = sets.recorded().map(|now| &now.samples_crc32);
+    if now != Some(&recorded.samples_crc32) {
+        let data = recorded.plan.import.data.display();
+        return Err(format!(
+            "'{data}' has changed since this network was trained, so its samples are not shown. Restore the original \
+             file, or train again."
+        ));
+    }
+    let (set, problem): (Arc<Dataset>, _) = (Arc::clone(&sets.sets.test), Arc::new(file.problem.clone()));
+    Ok(RecordedTest::new(set, problem, recorded.plan.test_order()))
+}
+
+/// Returns the decoded surface of `snapshot`, or of the last one if there are fewer, and its error; `None` if there is no
+/// surface through the targets.
+fn surfaces(test: &TestSet, answers: &Array2<f64>, snapshot: usize) -> Option<[Surface; 2]> {
+    let snapshot = snapshot.min(test.snapshots().saturating_sub(1));
+    match test {
+        TestSet::Array(test) => {
+            let [actual, decoded] = [test.set.targets(), answers.view()].map(|values| test.frame(values, snapshot));
+            let style = SurfaceStyle::default();
+            let error = test.errors("", &actual.error_of(&decoded), style);
+            Some([test.heights("", &decoded, style), error])
+        }
+        TestSet::Recording(test) => {
+            let Positions::Surface(through) = &test.positions else {
+                return None;
+            };
+            let [actual, decoded] = [test.set.targets(), answers.view()].map(|values| values.row(snapshot).to_vec());
+            let [_, decoded, error] = through.surfaces(&actual, &decoded, through.range_of(&test.ranges));
+            Some([decoded, error])
+        }
+    }
+}
