@@ -147,7 +147,7 @@ impl CompareView {
     fn figure(&self, shared: &Shared) -> SurfaceFigure {
         let look = shared.look;
         let surface = |place: usize| {
-            let [decoded, error] = self.sides[place].surfaces()?;
+            let [decoded, error] = self.sides[place].ready()?.surfaces.as_ref()?;
             let (surface, what) = match self.card {
                 RightCard::Decoupled => (decoded, "decoded"),
                 RightCard::Error => (error, "error"),

@@ -67,22 +67,27 @@ impl Side {
         }
     }
 
-    /// Returns the decoded surface and its error, if the run has surfaces.
-    pub(super) fn surfaces(&self) -> Option<&[Surface; 2]> {
-        self.compared.as_ref()?.as_ref().ok()?.surfaces.as_ref()
+    /// Returns what is ready.
+    pub(super) fn ready(&self) -> Option<&Compared> {
+        self.compared.as_ref()?.as_ref().ok()
     }
 
     /// Returns the number of snapshots that can be drawn.
     pub(super) fn snapshots(&self) -> usize {
-        match &self.compared {
-            Some(Ok(compared)) if compared.surfaces.is_some() => compared.test.snapshots(),
-            _ => 0,
-        }
+        let drawn = self.ready().filter(|compared| compared.surfaces.is_some());
+        drawn.map_or(0, |compared| compared.test.snapshots())
     }
 
     /// Returns the chart of decoded against actual values of the chosen target, if the run has no surfaces.
     pub(super) fn chart(&self) -> Option<PlotFigure> {
-        self.compared.as_ref()?.as_ref().ok()?.chart(self.target)
+        let Compared {
+            test, answers, lines, ..
+        } = self.ready().filter(|compared| compared.surfaces.is_none())?;
+        let (test, target) = (test.recording()?, self.target);
+        let (line, channel) = lines.get(target).zip(test.problem.targets.get(target))?;
+        let pair = |sample| (test.set.targets()[[sample, target]], answers[[sample, target]]);
+        let samples: (usize, &dyn Fn(usize) -> (f64, f64)) = (test.set.samples(), &pair);
+        Some(regression_figure(samples, line, Decoded::Target(channel)))
     }
 }
 
@@ -93,7 +98,7 @@ pub(super) struct Compared {
     /// Samples × targets.
     answers: Array2<f64>,
     /// The decoded surface of the snapshot and its error, where there is one through the targets.
-    surfaces: Option<[Surface; 2]>,
+    pub(super) surfaces: Option<[Surface; 2]>,
     /// Regression lines of the targets of a recording.
     lines: Vec<RegressionLine>,
 }
@@ -114,14 +119,6 @@ impl Compared {
             test,
             answers,
         })
-    }
-
-    fn chart(&self, target: usize) -> Option<PlotFigure> {
-        let test = self.test.recording().filter(|_| self.surfaces.is_none())?;
-        let (line, channel) = self.lines.get(target).zip(test.problem.targets.get(target))?;
-        let pair = |sample| (test.set.targets()[[sample, target]], self.answers[[sample, target]]);
-        let samples: (usize, &dyn Fn(usize) -> (f64, f64)) = (test.set.samples(), &pair);
-        Some(regression_figure(samples, line, Decoded::Target(channel)))
     }
 }
 

@@ -9,14 +9,13 @@ use decoupler_core::{
     job::Job,
     machine::node_pairs_per_row,
     network::{InputChoice, Networks, Quantity, ScalingChoice},
-    scene::{Indenter, Loading, Noise, Rows, Scene},
+    scene::{Indenter, Loading, Rows, Scene},
 };
 use decoupler_files::machine::memory_budget;
 
 use super::solving::{Answer, Question, Subject, decode};
 use crate::window::{
     job::{Background, JobError, Report, Wake},
-    shared::Shared,
     test_view::TestView,
 };
 
@@ -55,11 +54,14 @@ pub(super) struct Comparison {
     pub(super) failure: Option<String>,
 }
 
+/// A decoder, or why it could not be fitted.
+type FitResult = Result<Box<dyn Decoder>, String>;
+
 /// Decoders fitted so far, in the order of [`KINDS`].
 #[derive(Default)]
 struct Fitted {
     of: Option<Arc<Networks>>,
-    decoders: Vec<Result<Box<dyn Decoder>, String>>,
+    decoders: Vec<FitResult>,
 }
 
 impl std::fmt::Debug for Fitted {
@@ -124,30 +126,23 @@ fn compare(subject: &Subject, pressed: &TestView, fitted: &Mutex<Fitted>, report
     // Only one job runs at a time, and a panic leaves whole decoders.
     let mut fitted = fitted.lock().unwrap_or_else(PoisonError::into_inner);
     if !fitted.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, &subject.networks)) {
-        *fitted = Fitted::default();
         fitted.of = Some(Arc::clone(&subject.networks));
+        fitted.decoders.clear();
     }
-    let is_cancelled = || report.is_cancelled();
     let mut set = None;
     for (index, kind) in KINDS.into_iter().enumerate() {
         if fitted.decoders.len() == index {
-            let set = set.get_or_insert_with(|| {
-                let sets = RunSets::draw(&subject.settings, memory_budget(), &Job::new(&is_cancelled))?;
-                let networks = Some(Networks::clone(&subject.networks));
-                Ok::<_, RunError>(DecoderSet::new(subject.settings, sets.split.training, networks))
+            let set = set.get_or_insert_with(|| decoder_set(subject, report));
+            let decoder = set.as_ref().map_err(ToString::to_string).and_then(|set| {
+                let decoder = set
+                    .decoder(kind, Precision::Double)
+                    .map_err(|error| error.to_string())?;
+                decoder.ok_or_else(|| "it needs a trained network".to_owned())
             });
-            let decoder = match set {
-                Ok(set) => set.decoder(kind, Precision::Double).map_err(|error| error.to_string()),
-                Err(error) => Err(error.to_string()),
-            };
-            if is_cancelled() {
+            if report.is_cancelled() {
                 return;
             }
-            let decoder = decoder.and_then(|decoder| decoder.ok_or_else(|| "it needs a trained network".to_owned()));
             fitted.decoders.push(decoder);
-        }
-        if is_cancelled() {
-            return;
         }
         let answer = match &mut fitted.decoders[index] {
             Ok(decoder) => decode(&mut **decoder, pressed).map(|(_, answer)| answer),
@@ -155,7 +150,21 @@ fn compare(subject: &Subject, pressed: &TestView, fitted: &Mutex<Fitted>, report
         };
         let of = Arc::clone(&pressed.set);
         report.send(Some(Ok(Compared { kind, answer, of })));
+        if report.is_cancelled() {
+            return;
+        }
     }
+}
+
+/// Draws the samples that the network was trained on.
+fn decoder_set(subject: &Subject, report: &Report<CompareEvent>) -> Result<DecoderSet, RunError> {
+    let Subject { settings, networks, .. } = subject;
+    let sets = RunSets::draw(settings, memory_budget(), &Job::new(&|| report.is_cancelled()))?;
+    Ok(DecoderSet::new(
+        *settings,
+        sets.split.training,
+        Some(Networks::clone(networks)),
+    ))
 }
 
 /// A small network for the displayed sensor, trained quickly in the background once the user is about to press and there is
@@ -163,114 +172,85 @@ fn compare(subject: &Subject, pressed: &TestView, fitted: &Mutex<Fitted>, report
 #[derive(Debug)]
 pub(super) struct Demo {
     job: Background<Result<Result<Networks, RunError>, JobError>>,
-    /// Settings of the network that is there or being trained.
-    of: Option<RunSettings>,
+    /// Settings of the network that is there or being trained; `None` for an array that is too large.
+    settings: Option<RunSettings>,
     /// The network, or why it could not be trained.
-    networks: Option<Result<Arc<Networks>, String>>,
+    pub(super) subject: Option<Result<Subject, String>>,
 }
 
 impl Demo {
     pub(super) fn new(wake: &Wake) -> Self {
         Self {
             job: Background::prompt("demo network", Arc::clone(wake)),
-            of: None,
-            networks: None,
+            settings: None,
+            subject: None,
         }
     }
 
-    /// Takes the network once it is trained.
-    pub(super) fn take_events(&mut self) {
-        while let Some(trained) = self.job.next_event() {
+    /// Takes the network for the sensor of `test`, which is trained unless that takes long.
+    pub(super) fn follow(&mut self, test: &TestView) {
+        let settings = demo_settings(test);
+        if self.settings != settings {
+            (self.settings, self.subject) = (settings, None);
+            self.job.abandon();
+            if let Some(settings) = settings {
+                let work = move |report: &Report<_>| train(settings, &Job::new(&|| report.is_cancelled()));
+                self.job.start(work, |trained| trained);
+            }
+        }
+        if let (Some(trained), Some(settings)) = (self.job.next_event(), settings) {
             let trained = trained.map_err(|error| error.to_string());
             let trained = trained.and_then(|trained| trained.map_err(|error| error.to_string()));
-            self.networks = Some(trained.map(Arc::new));
+            self.subject = Some(trained.map(|networks| Subject {
+                networks: Arc::new(networks),
+                settings,
+                is_demo: true,
+                is_idle: true,
+            }));
         }
     }
 
-    /// Trains the network of the current test set, unless it exists or is too large to be trained quickly.
-    pub(super) fn ask(&mut self, shared: &Shared) {
-        let Some(settings) = settings_of(shared).filter(|settings| self.of != Some(*settings)) else {
-            return;
-        };
-        (self.of, self.networks) = (Some(settings), None);
-        self.job.start(
-            move |report| {
-                let is_cancelled = || report.is_cancelled();
-                let job = Job::new(&is_cancelled);
-                let sets = RunSets::draw(&settings, memory_budget(), &job)?;
-                let mut run = Run::new(settings, sets, None, &job)?;
-                run.finish(&job)?;
-                Ok(run.network())
-            },
-            |trained| trained,
-        );
-    }
-
-    /// Returns the settings of the network, if it is that of the current test set.
-    fn current(&self, shared: &Shared) -> Option<RunSettings> {
-        settings_of(shared).filter(|settings| self.of == Some(*settings))
-    }
-
-    /// Returns true while the network of the current test set is being trained.
-    pub(super) fn is_awaited(&self, shared: &Shared) -> bool {
-        self.current(shared).is_some() && self.networks.is_none()
-    }
-
-    /// Returns the reason why the network of the current test set could not be trained.
-    pub(super) fn failure(&self, shared: &Shared) -> Option<&String> {
-        self.current(shared)?;
-        self.networks.as_ref()?.as_ref().err()
-    }
-
-    /// Returns the network, if it is that of the current test set.
-    pub(super) fn subject(&self, shared: &Shared) -> Option<Subject> {
-        Some(Subject {
-            settings: self.current(shared)?,
-            networks: Arc::clone(self.networks.as_ref()?.as_ref().ok()?),
-            is_demo: true,
-            is_idle: true,
-        })
+    /// Returns true while the network is being trained.
+    pub(super) fn is_awaited(&self) -> bool {
+        self.settings.is_some() && self.subject.is_none()
     }
 }
 
-/// Returns the settings of the demo network for the current test set; `None` if training would take long.
-fn settings_of(shared: &Shared) -> Option<RunSettings> {
-    let settings = match (&shared.preview, &shared.run) {
-        (Some(preview), _) => &preview.settings,
-        (None, Some(run)) => run.settings(),
-        (None, None) => return None,
-    };
-    demo_settings(settings.simulation()?)
+fn train(settings: RunSettings, job: &Job<'_>) -> Result<Networks, RunError> {
+    let sets = RunSets::draw(&settings, memory_budget(), job)?;
+    let mut run = Run::new(settings, sets, None, job)?;
+    run.finish(job)?;
+    Ok(run.network())
 }
 
-/// Returns the settings of a small network that learns imprints of balls on the sensor of `source` in a fraction of a
-/// second, with its rows, axes and stroke, and without noise; `None` for arrays for which training would take longer.
+/// Returns the settings of a small network that learns imprints of balls on the sensor of `test` in a fraction of a second,
+/// with its rows and stroke, and without noise; `None` for arrays for which training would take longer.
 ///
 /// One network for each known row, with conductances scaled to [−1, 1], was the best choice for so few samples.
-pub(super) fn demo_settings(source: &Simulation) -> Option<RunSettings> {
+fn demo_settings(test: &TestView) -> Option<RunSettings> {
     /// Number of training samples per row.
     const SAMPLES: usize = 200;
     /// Maximum number of pairs of nodes in all samples: about a tenth of a second.
     const MAX_PAIRS: f64 = 5e7;
     /// Maximum number of unknowns and readings of all rows, with which the time of an epoch grows.
     const MAX_CHANNELS: usize = 2000;
-    let (rows, scale) = (source.rows().ok()?, source.sensor.scale);
+    let (scale, rows) = (test.sensor.scale, test.rows.len());
     let samples = SAMPLES * rows;
-    let channels = rows * (source.scene.unknowns_per_row(scale) + scale.columns());
-    if samples as f64 * node_pairs_per_row(&source.sensor) > MAX_PAIRS || channels > MAX_CHANNELS {
+    let channels = rows * (scale.nodes_per_row() + scale.columns());
+    if samples as f64 * node_pairs_per_row(&test.sensor) > MAX_PAIRS || channels > MAX_CHANNELS {
         return None;
     }
     let scene = Scene {
-        rows: match source.scene.rows {
-            Rows::All | Rows::Known => Rows::Known,
-            one @ Rows::One(_) => one,
+        rows: match test.rows[..] {
+            [row] => Rows::One(row),
+            _ => Rows::Known,
         },
         loading: Loading::Indenter(Indenter::default()),
-        noise: Noise::default(),
-        ..source.scene
+        largest_compression: test.stroke_mm / test.sensor.geometry.height_mm,
+        ..Scene::default()
     };
     let mut settings = RunSettings::from(Simulation {
-        sensor: source.sensor,
+        sensor: test.sensor,
         scene,
         samples,
         validation_samples: 0,

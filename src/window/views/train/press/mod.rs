@@ -37,14 +37,13 @@ pub struct PressState {
     pub hand: Hand,
     /// The finger that presses.
     pub finger: Finger,
-    /// What is pressed; `None` while the test set is displayed.
-    touch: Option<Touch>,
-    /// Hold of the pointer, while its button is down.
-    grip: Option<Grip>,
+    /// Place that it presses; `None` while the test set is displayed.
+    place_mm: Option<DVec2>,
+    /// Height of the plane in which the pointer moves it, while the button is down: that of the first contact, so that it
+    /// does not jump as the surface gives way.
+    grip_mm: Option<f64>,
     /// The actual surface as last drawn.
     target: Option<Target>,
-    /// True once the user was about to press.
-    is_wanted: bool,
     /// The latest answer, or why there is none, with its question.
     answered: Option<(Question, Result<Shown, String>)>,
     solving: Background<Result<(Question, Result<Shown, String>), JobError>>,
@@ -58,10 +57,9 @@ impl PressState {
         Self {
             hand: Hand::default(),
             finger: Finger::default(),
-            touch: None,
-            grip: None,
+            place_mm: None,
+            grip_mm: None,
             target: None,
-            is_wanted: false,
             answered: None,
             solving: Background::prompt("press", Arc::clone(wake)),
             comparison: Comparison::new(wake),
@@ -71,12 +69,12 @@ impl PressState {
 
     /// Returns true while something is pressed.
     pub fn is_pressing(&self) -> bool {
-        self.touch.is_some()
+        self.place_mm.is_some()
     }
 
-    /// What is pressed; `None` while the test set is displayed.
-    pub fn touch(&self) -> Option<&Touch> {
-        self.touch.as_ref()
+    /// What is pressed on a sensor whose nodes can travel `stroke_mm`; `None` while the test set is displayed.
+    pub fn touch(&self, stroke_mm: f64) -> Option<Touch> {
+        self.place_mm.map(|place_mm| self.finger.touch(place_mm, stroke_mm))
     }
 
     /// What is shown of the touch; `None` while the test set is displayed, or before the first answer.
@@ -91,32 +89,17 @@ impl PressState {
 
     /// Goes back to the test set.
     pub fn let_go(&mut self) {
-        (self.touch, self.grip, self.answered) = (None, None, None);
+        (self.place_mm, self.grip_mm, self.answered) = (None, None, None);
         self.solving.abandon();
     }
 
-    /// Presses the ball onto the middle of the nodes.
+    /// Presses the middle of the nodes.
     pub fn press_middle(&mut self, test: &TestView) {
-        let last = test.sensor.scale.nodes_per_row() - 1;
-        let corner = |row: Option<&usize>, node| {
-            let row = row.copied().unwrap_or(0);
-            test.sensor.geometry.row_node_mm(test.sensor.scale, row, node)
-        };
-        let (first, last) = (corner(test.rows.first(), 0), corner(test.rows.last(), last));
-        self.finger.tool = Tool::Ball;
-        self.press(0.5 * (first + last).truncate(), test.stroke_mm);
-    }
-
-    /// Presses the ball onto a place.
-    fn press(&mut self, place_mm: DVec2, stroke_mm: f64) {
-        self.touch = Some(self.finger.touch(place_mm, stroke_mm));
-    }
-
-    /// Presses as the finger does now, after it has changed.
-    fn follow_finger(&mut self, stroke_mm: f64) {
-        if let Some(Touch::Ball { place_mm, .. }) = self.touch {
-            self.press(place_mm, stroke_mm);
-        }
+        let (geometry, scale) = (&test.sensor.geometry, test.sensor.scale);
+        let [first, last] = [test.rows.first(), test.rows.last()].map(|row| row.copied().unwrap_or(0));
+        let first = geometry.row_node_mm(scale, first, 0);
+        let last = geometry.row_node_mm(scale, last, scale.nodes_per_row() - 1);
+        self.place_mm = Some(0.5 * (first + last).truncate());
     }
 
     /// Takes the actual surface as it was drawn.
@@ -127,27 +110,16 @@ impl PressState {
             sight,
             surface: surface.clone(),
         });
-        self.is_wanted |= self.hand == Hand::Press && drawn.response.hovered();
     }
 
     /// Has the touch answered, one question at a time; `result` is that of the displayed network.
     pub fn follow(&mut self, shared: &Shared, result: Option<&RunResult>) {
-        self.demo.take_events();
         let Some(test) = shared.test() else {
             // A recording has no sensor model to press.
             self.let_go();
-            (self.target, self.is_wanted) = (None, false);
+            self.target = None;
             return;
         };
-        let own = shared.shown_run().zip(result).map(|(run, result)| Subject {
-            networks: Arc::clone(&result.networks),
-            settings: *run.settings(),
-            is_demo: false,
-            is_idle: result.is_idle,
-        });
-        if (self.is_wanted || self.is_pressing()) && own.is_none() {
-            self.demo.ask(shared);
-        }
         if self
             .answered
             .as_ref()
@@ -156,11 +128,22 @@ impl PressState {
             // Another array, or another scene.
             self.let_go();
         }
-        let Some(touch) = self.touch.clone() else { return };
+        let Some(touch) = self.touch(test.stroke_mm) else {
+            return;
+        };
+        let own = shared.shown_run().zip(result).map(|(run, result)| Subject {
+            networks: Arc::clone(&result.networks),
+            settings: *run.settings(),
+            is_demo: false,
+            is_idle: result.is_idle,
+        });
+        if own.is_none() {
+            self.demo.follow(test);
+        }
         let question = Question {
             touch,
             test: test.clone(),
-            subject: own.or_else(|| self.demo.subject(shared)),
+            subject: own.or_else(|| self.demo.subject.clone()?.ok()),
         };
         while let Some(answered) = self.solving.next_event() {
             let failed = |error: JobError| (question.clone(), Err(error.to_string()));
@@ -180,7 +163,7 @@ impl PressState {
 
     /// Text of the network's card while something is pressed and no network has answered.
     pub fn waiting_text(&self, shared: &Shared) -> &'static str {
-        if self.demo.is_awaited(shared) {
+        if self.demo.is_awaited() {
             "The built-in demo network is being trained…"
         } else if shared.phase.is_busy() {
             "The network answers here once its training has begun."
@@ -199,24 +182,6 @@ struct Target {
     surface: Surface,
 }
 
-/// Hold of the pointer on the surface while its button is down.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Grip {
-    /// The ball moves in the horizontal plane of the first contact, so that it does not jump as the surface gives way.
-    Level(f64),
-    /// A node moves up and down.
-    Node {
-        /// Its place among those drawn.
-        node: usize,
-        /// Height of the node above the pointer's.
-        above_mm: f64,
-        /// Height of the node, and of the pointer on the screen, when it was taken.
-        begin: (f64, f32),
-    },
-    /// The button went down next to the surface.
-    Missed,
-}
-
 /// Work of the pointer on the actual surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Hand {
@@ -227,31 +192,18 @@ pub enum Hand {
     Turn,
 }
 
-/// What presses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tool {
-    /// A ball.
-    #[default]
-    Ball,
-    /// Two fingertips that move one node up and down.
-    Node,
-}
-
-/// Tool of the user with its size and depth.
+/// The ball that presses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Finger {
-    /// What presses.
-    pub tool: Tool,
-    /// Radius of the ball.
+    /// Its radius.
     pub radius_mm: f64,
-    /// Depth of the ball as a part of the stroke, from 0 to 1.
+    /// Its depth as a part of the stroke, from 0 to 1.
     pub depth_share: f64,
 }
 
 impl Default for Finger {
     fn default() -> Self {
         Self {
-            tool: Tool::default(),
             radius_mm: 4.0,
             depth_share: 0.8,
         }
@@ -259,12 +211,9 @@ impl Default for Finger {
 }
 
 impl Finger {
-    /// Radii offered.
-    const RADIUS_MM: std::ops::RangeInclusive<f64> = 0.5..=20.0;
-
     /// The ball pressed onto a place.
     fn touch(&self, place_mm: DVec2, stroke_mm: f64) -> Touch {
-        Touch::Ball {
+        Touch {
             place_mm,
             radius_mm: self.radius_mm,
             depth_mm: self.depth_share * stroke_mm,

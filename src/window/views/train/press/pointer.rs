@@ -2,18 +2,13 @@ use decoupler_files::figure::surface::Ray;
 use eframe::egui::{Context, Key, Modifiers, Painter, PointerButton, Pos2, Response, Shape, Stroke, pos2};
 use glam::{DVec2, DVec3};
 
-use super::{
-    Grip, Hand, PressState, Target, Tool, Touch,
-    solving::{at_rest, depths_mm},
-};
+use super::{Hand, PressState, Target};
 use crate::window::{test_view::TestView, theme::Palette, views::train::drawn::Frames};
 
 /// Share of the stroke per point of scrolling: the whole stroke takes about ten notches of a typical wheel.
 const SHARE_PER_POINT: f64 = 0.002;
 /// Share of the stroke per press of a key.
 const SHARE_PER_KEY: f64 = 0.05;
-/// Distance by which a node seen from above is dragged through the whole stroke, in points.
-const POINTS_PER_STROKE: f64 = 120.0;
 /// Number of segments of a circle.
 const PIECES: usize = 64;
 /// Length of a dash and of the gap behind it, in points.
@@ -32,93 +27,31 @@ impl PressState {
         let (Some(target), Some(test)) = (target, test) else {
             return;
         };
-        let Some(response) = ctx.read_response(target.id).filter(|_| self.hand == Hand::Press) else {
-            self.grip = None;
+        let response = ctx.read_response(target.id).filter(|_| self.hand == Hand::Press);
+        let Some(response) = response else {
+            self.grip_mm = None;
             return;
         };
-        self.take_button(ctx, &response, &target, test, (frames, lit));
+        let is_held = ctx.input(|input| input.pointer.button_down(PointerButton::Primary) && !input.modifiers.shift);
+        let at = response.interact_pointer_pos();
+        let at = at.filter(|_| is_held && response.is_pointer_button_down_on());
+        let ray = at.map(|at| target.sight.ray(points(at)));
+        let met = ray.and_then(|ray| match self.grip_mm {
+            Some(level_mm) => ray.at_level(level_mm),
+            // The line of sight may miss a lit node on a crest, and meet the surface far behind it.
+            None => match lit.and_then(|node| frames.actual.nodes_mm.get(node)) {
+                Some(node) => ray.at_level(node.z),
+                None => target.surface.pick(&ray),
+            },
+        });
+        self.grip_mm = at.and(self.grip_mm.or(met.map(|met| met.z)));
+        if let Some(met) = met {
+            self.place_mm = Some(within(&target, met));
+        }
         self.take_wheel_and_keys(ctx, &response, &target, test);
     }
 
-    fn take_button(
-        &mut self,
-        ctx: &Context,
-        response: &Response,
-        target: &Target,
-        test: &TestView,
-        (frames, lit): (&Frames, Option<usize>),
-    ) {
-        let is_held = ctx.input(|input| input.pointer.button_down(PointerButton::Primary) && !input.modifiers.shift);
-        let at = response.interact_pointer_pos();
-        let Some(at) = at.filter(|_| is_held && response.is_pointer_button_down_on()) else {
-            self.grip = None;
-            return;
-        };
-        match self.grip {
-            None => self.grip = Some(self.take_hold(target, test, (frames, lit), at)),
-            Some(Grip::Level(z_mm)) => {
-                if let Some(met) = target.sight.ray(points(at)).at_level(z_mm) {
-                    self.press(within(target, met), test.stroke_mm);
-                }
-            }
-            Some(Grip::Node { node, above_mm, begin }) => {
-                let rest = at_rest(test, node);
-                let pointer_mm = target.sight.height_mm(rest, test.stroke_mm, points(at));
-                let dragged_mm = f64::from(at.y - begin.1) / POINTS_PER_STROKE * test.stroke_mm;
-                let height_mm = pointer_mm.map_or(begin.0 - dragged_mm, |pointer_mm| pointer_mm + above_mm);
-                if let Some(Touch::Nodes(depths_mm)) = &mut self.touch
-                    && let Some(depth_mm) = depths_mm.get_mut(node)
-                {
-                    *depth_mm = (rest.z - height_mm).clamp(0.0, test.stroke_mm);
-                }
-            }
-            Some(Grip::Missed) => {}
-        }
-    }
-
-    /// The button went down.
-    fn take_hold(
-        &mut self,
-        target: &Target,
-        test: &TestView,
-        (frames, lit): (&Frames, Option<usize>),
-        at: Pos2,
-    ) -> Grip {
-        let ray = target.sight.ray(points(at));
-        let nodes_mm = &frames.actual.nodes_mm;
-        let lit = lit.and_then(|node| Some((node, *nodes_mm.get(node)?)));
-        // Next to a lit node on a crest the line of sight may miss the surface, or meet it far behind: the node is meant.
-        let on_level = lit.and_then(|(_, place)| ray.at_level(place.z).map(|met| (met, met.distance(place))));
-        let picked = target.surface.pick(&ray);
-        let met = match (picked, on_level, lit) {
-            (Some(picked), Some((_, distance)), Some((_, place))) if picked.distance(place) <= distance => picked,
-            (_, Some((on_level, _)), _) => on_level,
-            (Some(picked), None, _) => picked,
-            (None, None, _) => return Grip::Missed,
-        };
-        if self.finger.tool == Tool::Ball {
-            self.press(within(target, met), test.stroke_mm);
-            return Grip::Level(met.z);
-        }
-        let distance = |node: &DVec3| node.truncate().distance_squared(met.truncate());
-        let nearest = || {
-            let nodes = nodes_mm.iter().copied().enumerate();
-            nodes.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))
-        };
-        let Some((node, place)) = lit.or_else(nearest) else {
-            return Grip::Missed;
-        };
-        self.touch = Some(Touch::Nodes(depths_mm(test, nodes_mm)));
-        let pointer_mm = target.sight.height_mm(at_rest(test, node), test.stroke_mm, points(at));
-        Grip::Node {
-            node,
-            above_mm: pointer_mm.map_or(0.0, |pointer_mm| place.z - pointer_mm),
-            begin: (place.z, at.y),
-        }
-    }
-
     fn take_wheel_and_keys(&mut self, ctx: &Context, response: &Response, target: &Target, test: &TestView) {
-        let before = self.finger;
         if response.contains_pointer() {
             // Consumed, so that nothing else scrolls or zooms; with Ctrl it zooms as usual.
             let points = ctx.input_mut(|input| std::mem::take(&mut input.smooth_scroll_delta).y);
@@ -136,20 +69,17 @@ impl PressState {
                 self.step(target, test, step);
             }
         }
-        if self.finger != before {
-            self.follow_finger(test.stroke_mm);
-        }
     }
 
     /// Moves the ball by half a pitch of the nodes; the first step puts it onto the middle.
     fn step(&mut self, target: &Target, test: &TestView, step: DVec2) {
-        let Some(Touch::Ball { place_mm, .. }) = self.touch else {
+        let Some(place_mm) = self.place_mm else {
             return self.press_middle(test);
         };
         let geometry = &test.sensor.geometry;
         let pitch_mm = DVec2::new(geometry.row_pitch_mm, geometry.node_pitch_mm).abs();
         let moved = place_mm + 0.5 * step * pitch_mm;
-        self.press(within(target, moved.extend(0.0)), test.stroke_mm);
+        self.place_mm = Some(within(target, moved.extend(0.0)));
     }
 
     /// Draws where the ball touches the surface, and the line from there to the top of the axes: at the touch, otherwise
@@ -160,20 +90,15 @@ impl PressState {
         };
         let hovered = || {
             let met = target.surface.pick(&target.sight.ray(points(pointer?)))?;
-            (self.finger.tool == Tool::Ball).then(|| self.finger.touch(met.truncate(), stroke_mm))
+            Some(met.truncate())
         };
-        let Some(Touch::Ball {
-            place_mm,
-            radius_mm,
-            depth_mm,
-        }) = self.touch.clone().or_else(hovered)
-        else {
+        let Some(place_mm) = self.place_mm.or_else(hovered) else {
             return;
         };
-        let half_width_mm = Touch::indenter(radius_mm).contact_half_width_mm(depth_mm);
+        let contact_mm = self.finger.touch(place_mm, stroke_mm).contact_mm();
         let circle = (0..=PIECES).map(|piece| {
             let angle = std::f64::consts::TAU * piece as f64 / PIECES as f64;
-            on_surface(target, place_mm + half_width_mm * DVec2::from_angle(angle))
+            on_surface(target, place_mm + contact_mm * DVec2::from_angle(angle))
         });
         let circle = Vec::from_iter(circle);
         let top = place_mm.extend(*target.surface.range.end());

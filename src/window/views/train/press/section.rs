@@ -1,4 +1,4 @@
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
@@ -8,12 +8,12 @@ use decoupler_files::{
     export::format_number,
     figure::{SequentialMap, readings_figure},
 };
-use eframe::egui::{Align, Layout, Response, RichText, Slider, Ui, Vec2, WidgetInfo};
+use eframe::egui::{Align, Layout, Response, RichText, Slider, Ui, WidgetInfo, vec2};
 use ndarray::Array2;
 
 use super::{
-    Finger, PressState, Tool,
-    decoders::KINDS,
+    Finger, PressState,
+    decoders::{Comparison, KINDS},
     solving::{Answer, Question, Shown},
 };
 use crate::window::{
@@ -23,15 +23,10 @@ use crate::window::{
     test_view::TestView,
     theme::{Theme, semibold, space, type_size},
     widgets::{
-        TableColumn, TableRow, TableView, dim_ui, explained_options_ui, note_ui, number_ui, placeholder_ui, refusal_ui,
-        section_heading_ui, slider_ui, usually,
+        TableColumn, TableRow, TableView, dim_ui, note_ui, number_ui, placeholder_ui, refusal_ui, section_heading_ui,
+        slider_ui, usually,
     },
 };
-
-const TOOLS: [(Tool, &str, &str); 2] = [
-    (Tool::Ball, "Ball", "Presses a ball onto the surface."),
-    (Tool::Node, "Node", "Moves a single node: drag it up or down."),
-];
 
 const COLUMNS: [TableColumn<'_>; 4] = [
     TableColumn::text(""),
@@ -76,30 +71,22 @@ pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
     }
 }
 
+/// Radius and depth of the finger.
 fn finger_ui(ui: &mut Ui, press: &mut PressState, test: &TestView) {
     let before = press.finger;
     let finger = &mut press.finger;
-    finger.tool = explained_options_ui(ui, "Press with", &TOOLS, finger.tool, true).unwrap_or(finger.tool);
-    if finger.tool == Tool::Node {
-        ui.horizontal(|ui| {
-            ui.set_min_height(space(7));
-            dim_ui(ui, "Take a node and drag it up or down.");
-        });
-        return;
-    }
     let line = ui.horizontal(|ui| {
         ui.set_min_height(space(7));
-        let hint = "Radius of the ball, in mm.";
+        let hint = "Radius of the ball that presses, in mm.";
         let label = ui.label("Radius").on_hover_text(hint);
-        let limits = usually(Finger::default().radius_mm, Finger::RADIUS_MM);
-        let radius = number_ui(ui, &mut finger.radius_mm, &limits, "mm", Vec2::new(space(14), space(6)));
+        let limits = usually(Finger::default().radius_mm, 0.5..=20.0);
+        let radius = number_ui(ui, &mut finger.radius_mm, &limits, "mm", vec2(space(14), space(6)));
         ui.add_space(space(1));
         let depth = depth_ui(ui, finger, test.stroke_mm);
         [radius.labelled_by(label.id).on_hover_text(hint), depth]
     });
     line.inner.iter().for_each(|field| refusal_ui(ui, field));
     if *finger != before {
-        press.follow_finger(test.stroke_mm);
         ui.request_repaint();
     }
 }
@@ -108,31 +95,27 @@ fn finger_ui(ui: &mut Ui, press: &mut PressState, test: &TestView) {
 fn depth_ui(ui: &mut Ui, finger: &mut Finger, stroke_mm: f64) -> Response {
     let limit = format_number(stroke_mm);
     let hint = format!("Depth of the press in mm, up to the scene's largest compression of {limit} mm.");
-    let mut depth_mm = finger.depth_share * stroke_mm;
-    let before_mm = depth_mm;
+    let depth_mm = finger.depth_share * stroke_mm;
     let usual_mm = Finger::default().depth_share * stroke_mm;
+    // A thousandth of a millimetre is finer than any finger.
+    let shown_mm = (1e3 * depth_mm).round() / 1e3;
+    let (mut typed_mm, mut slid_mm) = (shown_mm, depth_mm);
     let label = ui.label("Depth").on_hover_text(&hint);
     let field = ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         let limits = usually(usual_mm, 0.0..=stroke_mm);
-        // A thousandth of a millimetre is finer than any finger.
-        let shown_mm = (1e3 * depth_mm).round() / 1e3;
-        let mut typed_mm = shown_mm;
-        let number = number_ui(ui, &mut typed_mm, &limits, "mm", Vec2::new(space(16), space(6)));
-        if typed_mm != shown_mm {
-            depth_mm = typed_mm;
-        }
-        let number = number.labelled_by(label.id).on_hover_text(&hint);
+        let number = number_ui(ui, &mut typed_mm, &limits, "mm", vec2(space(16), space(6)));
         let width = (ui.available_width() - space(2)).max(space(8));
-        let slider = slider_ui(ui, Slider::new(&mut depth_mm, 0.0..=stroke_mm), width);
+        let slider = slider_ui(ui, Slider::new(&mut slid_mm, 0.0..=stroke_mm), width);
         if slider.double_clicked() {
-            depth_mm = usual_mm;
+            slid_mm = usual_mm;
         }
-        slider.widget_info(|| WidgetInfo::slider(true, depth_mm, "Depth of the press"));
+        slider.widget_info(|| WidgetInfo::slider(true, slid_mm, "Depth of the press"));
         slider.on_hover_text(&hint);
-        number
+        number.labelled_by(label.id).on_hover_text(&hint)
     });
-    if depth_mm != before_mm {
-        finger.depth_share = (depth_mm / stroke_mm).clamp(0.0, 1.0);
+    let changed_mm = if typed_mm == shown_mm { slid_mm } else { typed_mm };
+    if changed_mm != depth_mm {
+        finger.depth_share = (changed_mm / stroke_mm).clamp(0.0, 1.0);
     }
     field.inner
 }
@@ -140,7 +123,7 @@ fn depth_ui(ui: &mut Ui, finger: &mut Finger, stroke_mm: f64) -> Response {
 /// The table of decoders, the network first and the best in bold, and why some have no answer.
 fn answers_ui(ui: &mut Ui, press: &PressState, question: &Question, shown: &Shown) {
     let palette = Theme::of(ui).palette;
-    let (answers, failure) = (&press.comparison.answers, press.comparison.failure.as_ref());
+    let Comparison { answers, failure, .. } = &press.comparison;
     let network = shown
         .answer
         .as_ref()
@@ -149,7 +132,7 @@ fn answers_ui(ui: &mut Ui, press: &PressState, question: &Question, shown: &Show
     let others = KINDS.iter().filter(|_| is_compared).map(|&kind| {
         let compared = answers.iter().find(|compared| compared.kind == kind);
         // Answers to an earlier touch are pale.
-        let is_present = compared.is_some_and(|compared| std::sync::Arc::ptr_eq(&compared.of, &shown.pressed.set));
+        let is_present = compared.is_some_and(|compared| Arc::ptr_eq(&compared.of, &shown.pressed.set));
         let colour = if is_present { palette.text } else { palette.dim };
         (kind, compared.map(|compared| &compared.answer), colour)
     });
@@ -171,7 +154,7 @@ fn answers_ui(ui: &mut Ui, press: &PressState, question: &Question, shown: &Show
             note_ui(ui, &format!("{}: {reason}", kind.name(Precision::Double)));
         }
     }
-    if let Some(reason) = failure.filter(|_| is_compared) {
+    if let Some(reason) = failure {
         note_ui(ui, &format!("The other decoders did not answer: {reason}."));
     }
 }
@@ -210,9 +193,12 @@ fn remarks_ui(ui: &mut Ui, press: &PressState, question: &Question, shown: &Show
         Some(subject) if subject.is_demo => "Decoded by a built-in demo network. Train to use your own.",
         Some(subject) if !subject.is_idle => "The other decoders answer when the training is paused or finished.",
         Some(_) => "",
-        None if press.demo.is_awaited(shared) => "The built-in demo network is being trained…",
+        None if press.demo.is_awaited() => "The built-in demo network is being trained…",
         None if shared.phase == Phase::Preparing => "The network answers once its training has begun.",
-        None => "Train a network to see how it decodes this touch.",
+        None => match &press.demo.subject {
+            Some(Err(reason)) => reason,
+            _ => "Train a network to see how it decodes this touch.",
+        },
     };
     if !text.is_empty() {
         dim_ui(ui, text);
@@ -221,9 +207,6 @@ fn remarks_ui(ui: &mut Ui, press: &PressState, question: &Question, shown: &Show
     let simulation = own.and_then(|subject| subject.settings.simulation());
     if simulation.is_some_and(|simulation| !simulation.scene.noise.is_none()) {
         dim_ui(ui, "The readings of a press are without the scene's noise.");
-    }
-    if let (None, Some(reason)) = (subject, press.demo.failure(shared)) {
-        note_ui(ui, &format!("The demo network could not be trained: {reason}"));
     }
 }
 

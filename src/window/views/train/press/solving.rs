@@ -13,33 +13,27 @@ use decoupler_core::{
     scene::{Deformation, Indenter, IndenterShape, Radii},
     sensor::SensorModel,
 };
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use ndarray::Array2;
 
 use crate::window::{test_view::TestView, views::train::drawn::Frames};
 
-/// What is pressed.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Touch {
-    /// A ball.
-    Ball {
-        /// Position of its centre.
-        place_mm: DVec2,
-        /// Its radius.
-        radius_mm: f64,
-        /// Depth at its centre.
-        depth_mm: f64,
-    },
-    /// Nodes moved one by one: depths in millimetres of those drawn, row by row.
-    Nodes(Vec<f64>),
+/// A ball pressed onto the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// Position of its centre.
+    pub place_mm: DVec2,
+    /// Its radius.
+    pub radius_mm: f64,
+    /// Depth at its centre.
+    pub depth_mm: f64,
 }
 
 impl Touch {
-    /// The ball, if it is one.
-    pub(super) fn indenter(radius_mm: f64) -> Indenter {
+    fn indenter(&self) -> Indenter {
         let radius_mm = Radii {
-            smallest: radius_mm,
-            largest: radius_mm,
+            smallest: self.radius_mm,
+            largest: self.radius_mm,
         };
         Indenter {
             shape: IndenterShape::Sphere { radius_mm },
@@ -47,21 +41,14 @@ impl Touch {
         }
     }
 
-    /// Returns the deformation of an array of which `rows` are read and drawn.
-    pub fn deformation(&self, sensor: &SensorModel, rows: &[usize]) -> Deformation {
-        match self {
-            &Self::Ball {
-                place_mm,
-                radius_mm,
-                depth_mm,
-            } => Self::indenter(radius_mm).press(sensor, place_mm, depth_mm),
-            Self::Nodes(depths_mm) => Deformation::from_fn(sensor.scale, |row, node| {
-                let index = rows.iter().position(|read| *read == row);
-                let index = index.map(|index| index * sensor.scale.nodes_per_row() + node);
-                let depth_mm = index.and_then(|index| depths_mm.get(index));
-                DVec3::Z * depth_mm.copied().unwrap_or(0.0)
-            }),
-        }
+    /// Returns the deformation of an array.
+    pub fn deformation(&self, sensor: &SensorModel) -> Deformation {
+        self.indenter().press(sensor, self.place_mm, self.depth_mm)
+    }
+
+    /// Returns the radius of the disc in which it touches the surface.
+    pub(super) fn contact_mm(&self) -> f64 {
+        self.indenter().contact_half_width_mm(self.depth_mm)
     }
 }
 
@@ -153,7 +140,7 @@ pub(super) fn solve(question: Question) -> (Question, Result<Shown, String>) {
 /// Returns the sensor of `test` pressed: positions of its nodes, and readings of its wires by Eq. (2).
 fn press(touch: &Touch, test: &TestView) -> Result<TestView, String> {
     let (sensor, rows) = (&test.sensor, &test.rows);
-    let deformation = touch.deformation(sensor, rows);
+    let deformation = touch.deformation(sensor);
     let (mut readings_ohm, mut places_mm) = (Vec::new(), Vec::new());
     for &row in rows {
         let readings = sensor.row_resistances(row, deformation.row_mm(row));
@@ -211,17 +198,4 @@ fn outside(networks: &Networks, pressed: &Dataset) -> usize {
         })
     };
     (0..pressed.samples()).map(of_sample).sum()
-}
-
-/// Returns the depths of the drawn nodes that leave every one at its place.
-pub(super) fn depths_mm(test: &TestView, nodes_mm: &[DVec3]) -> Vec<f64> {
-    let nodes = nodes_mm.iter().enumerate();
-    nodes.map(|(node, place)| at_rest(test, node).z - place.z).collect()
-}
-
-/// Returns the place at rest of a node drawn.
-pub(super) fn at_rest(test: &TestView, node: usize) -> DVec3 {
-    let per_row = test.sensor.scale.nodes_per_row();
-    let row = test.rows.get(node / per_row).copied().unwrap_or(0);
-    test.sensor.geometry.row_node_mm(test.sensor.scale, row, node % per_row)
 }
