@@ -4,7 +4,6 @@
 mod error_table;
 mod export;
 mod look;
-mod network_exports;
 mod offers;
 mod run_list;
 mod run_view;
@@ -15,13 +14,9 @@ mod view;
 pub use super::training_worker::RunResult;
 pub use error_table::error_table_ui;
 pub use export::{
-    Ask, Contents, Export, ExportGroup, FileTask, FileWords, Purpose, copy_exports, csv_export, error_table_export,
-    loss_export, picture_exports,
+    ExportLine, Exporting, FileTask, FileWords, Format, Item, NetworkSource, Purpose, Shown, file_stem, saying_saved,
 };
 pub use look::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
-pub use network_exports::{
-    DecoderSource, NetworkSource, decoder_export_ui, decoder_forms_ui, file_stem, network_exports,
-};
 pub use offers::{Action, FileInUse, Offers, refuse_in_use};
 pub use run_list::{LoadedRun, PLACES, RunList, RunsWorker};
 pub use run_view::{RunCommand, RunView, run_buttons_ui, sentence};

@@ -21,8 +21,8 @@ use crate::window::{
     job::Wake,
     plotting::{Pointer, plots_ui, titled_plots_ui},
     shared::{
-        Effect, Export, NetworkSource, PLACES, RightCard, RunList, Shared, View, colour_scale_ui, copy_exports,
-        follow_surface, network_exports, picture_exports, target_choice_ui, view_mode_ui,
+        Effect, NetworkSource, PLACES, RightCard, RunList, Shared, Shown, View, colour_scale_ui, follow_surface,
+        target_choice_ui, view_mode_ui,
     },
     surface_view::{ColourBar, SurfaceView},
     theme::{Theme, semibold, space, type_size},
@@ -65,8 +65,8 @@ impl View for CompareView {
         }
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        compare_exports(self, shared)
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        compared(self, shared)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -260,44 +260,38 @@ fn losses(runs: &RunList) -> Option<PlotFigure> {
         .then(|| compared_losses_figure(curves))
 }
 
-/// Returns the exports: networks of both runs, pictures and table.
-fn compare_exports<'a>(view: &'a CompareView, shared: &'a Shared) -> Vec<Export<'a>> {
+/// Returns what can be exported: networks of both runs, pictures and table.
+fn compared<'a>(view: &'a CompareView, shared: &'a Shared) -> Vec<Shown<'a>> {
+    const NOTHING: &str = "No run is chosen: choose one in the list.";
     let runs = &shared.runs;
-    let mut exports = Vec::new();
+    let mut shown = Vec::new();
     for (place, letter) in PLACES.into_iter().enumerate() {
         let run = runs.pinned(place);
+        let name = run.map_or_else(|| letter.to_owned(), |_| name_of(runs, place));
         let source = run.map(|run| NetworkSource::Kept(run.name.to_owned(), Arc::clone(run.file)));
         let source = source.ok_or_else(|| format!("No run is chosen as {letter}: choose one in the list."));
-        exports.extend(network_exports(&format!("{letter}: "), &source, Vec::new));
+        shown.extend(Shown::network(&name, source, Vec::new()));
     }
-    // Both networks share a section of the menu.
-    exports.sort_by_key(|export| export.group);
-    let nothing = || "No run is chosen: choose one in the list.".to_owned();
-    let mut pictures = Vec::new();
+    let mut picture = |name: &str, stem: &str, figure: Option<Figure>| {
+        let figure = figure
+            .ok_or_else(|| NOTHING.to_owned())
+            .map(|figure| move || figure.clone());
+        shown.push(Shown::figure(name, stem.to_owned(), figure));
+    };
     let surfaces = Some(view.figure(shared)).filter(|figure| !figure.surfaces.is_empty());
-    pictures.push((
-        "Surfaces".to_owned(),
-        "compared-surfaces".to_owned(),
-        surfaces.map(Figure::from),
-    ));
+    picture("Surfaces", "compared-surfaces", surfaces.map(Figure::from));
     for (side, letter) in view.sides.iter().zip(PLACES) {
-        let (name, stem) = (
-            format!("Regression of {letter}"),
-            format!("regression-{}", letter.to_lowercase()),
-        );
-        pictures.extend(side.chart().map(|chart| (name, stem, Some(Figure::from(chart)))));
+        if let Some(chart) = side.chart() {
+            let stem = format!("regression-{}", letter.to_lowercase());
+            picture(&format!("Regression of {letter}"), &stem, Some(chart.into()));
+        }
     }
-    let losses = losses(runs);
-    let table = losses.is_some().then_some(|| compared_table(runs)).ok_or_else(nothing);
-    pictures.push((
-        "Loss chart".to_owned(),
-        "compared-loss".to_owned(),
-        losses.map(Figure::from),
-    ));
-    for (name, stem, figure) in pictures {
-        let figure = figure.ok_or_else(nothing).map(|figure| move || figure.clone());
-        exports.extend(picture_exports(&name, stem, figure));
-    }
-    exports.extend(copy_exports("Table of both runs", table));
-    exports
+    let losses = losses(runs).map(Figure::from);
+    let table = losses
+        .as_ref()
+        .map(|_| || compared_table(runs))
+        .ok_or_else(|| NOTHING.to_owned());
+    picture("Loss chart", "compared-loss", losses);
+    shown.push(Shown::table("Table of both runs", "compared".to_owned(), table));
+    shown
 }

@@ -1,4 +1,4 @@
-//! The toolbar, the replay bar, the actions, the exports and the files of the Live view.
+//! The toolbar, the replay bar, the actions and the files of the Live view.
 
 use std::{
     fs::File,
@@ -10,7 +10,6 @@ use std::{
 use decoupler_core::problem::Channel;
 use decoupler_files::{
     export::{Cell, Table, TableColumn, WriteError, atomic_write},
-    figure::Figure,
     live::Recorded,
 };
 use eframe::egui::{Align, Button, Key, Label, Layout, Modifiers, RichText, Slider, Ui, WidgetInfo};
@@ -23,10 +22,7 @@ use super::{
 };
 use crate::window::{
     glossary,
-    shared::{
-        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Offers, Purpose, Shared, csv_export,
-        picture_exports,
-    },
+    shared::{Effect, FileTask, FileWords, Offers, Shared, Shown},
     theme::{Theme, space, type_size},
     widgets::{dim_ui, ghost_button, primary_button, slider_ui, with_shortcut},
 };
@@ -179,49 +175,38 @@ fn speed_ui(ui: &mut Ui, view: &mut LiveView) {
     dim_ui(ui, "Speed");
 }
 
-/// Returns the exports: pictures of the latest frame, and the recording.
-pub fn live_exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a>> {
+/// Returns what the view shows: pictures of the latest frame and the recording, or the values of a network of a recording.
+pub fn shown<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Shown<'a>> {
     if let Some(targets) = &view.shown.targets {
-        return target_exports(targets, shared);
+        let chart = Ok(|| targets_card::chart(targets).into());
+        let mut shown = vec![Shown::figure("Decoded values", "live-values".to_owned(), chart)];
+        if let Some(figure) = targets_card::surface_figure(targets, None, shared.look) {
+            let surface = Ok(move || figure.clone().into());
+            shown.push(Shown::figure("Surface", "live-surface".to_owned(), surface));
+        }
+        let values = Ok(|| values_table(targets));
+        shown.push(Shown::table("Decoded values", "live-values".to_owned(), values));
+        return shown;
     }
     let frame = view.shown.frame.as_ref();
     let frame = frame.ok_or_else(|| "There is no frame yet: start a source.".to_owned());
-    let surfaces = frame
+    let surface = frame
         .clone()
-        .map(|frame| || Figure::from(surface_figure(frame, None, shared.look)));
-    let readings = frame
-        .map(|frame| || Figure::from(figure_of(frame, view.drops.largest_percent()).coloured(shared.look.colours)));
+        .map(|frame| || surface_figure(frame, None, shared.look).into());
+    let readings = frame.map(|frame| {
+        || {
+            figure_of(frame, view.drops.largest_percent())
+                .coloured(shared.look.colours)
+                .into()
+        }
+    });
     let recording = view.recorded.as_ref().map(save_recording);
-    let files = [file_export(
-        "Recording",
-        "CSV",
-        recording,
-        "Nothing is recorded: press Record while a source runs.",
-    )];
-    picture_exports("Surface", "live-surface".to_owned(), surfaces)
-        .chain(picture_exports("Readings", "live-readings".to_owned(), readings))
-        .chain(files)
-        .collect()
-}
-
-const VALUES: FileWords = FileWords {
-    kind: "decoded values",
-    description: "The decoded values with their times, in full precision, as CSV: all so far of a recording, and the last 20 s of a \
-                  stream.",
-    extensions: &["csv"],
-};
-
-/// Returns the exports of the values of a network of a recording.
-fn target_exports<'a>(targets: &'a LiveTargets, shared: &'a Shared) -> Vec<Export<'a>> {
-    let chart = Ok(move || Figure::from(targets_card::chart(targets)));
-    let mut exports: Vec<Export<'a>> = picture_exports("Decoded values", "live-values".to_owned(), chart).collect();
-    if let Some(figure) = targets_card::surface_figure(targets, None, shared.look) {
-        let surface = Ok(move || Figure::from(figure.clone()));
-        exports.extend(picture_exports("Surface", "live-surface".to_owned(), surface));
-    }
-    let values = Ok(move || values_table(targets));
-    exports.push(csv_export("Decoded values", VALUES, "live-values".to_owned(), values));
-    exports
+    let recording = recording.ok_or_else(|| "Nothing is recorded: press Record while a source runs.".to_owned());
+    vec![
+        Shown::figure("Surface", "live-surface".to_owned(), surface),
+        Shown::figure("Readings", "live-readings".to_owned(), readings),
+        Shown::file("Recording", recording),
+    ]
 }
 
 fn values_table(targets: &LiveTargets) -> Table {
@@ -236,18 +221,6 @@ fn values_table(targets: &LiveTargets) -> Table {
             .map(TableColumn::field)
             .collect(),
         rows: targets.all.all().iter().map(row).collect(),
-    }
-}
-
-fn file_export(name: &str, form: &str, task: Option<FileTask>, reason: &str) -> Export<'static> {
-    Export {
-        group: ExportGroup::Tables,
-        name: name.to_owned(),
-        form: form.to_owned(),
-        description: task.as_ref().map_or("", |task| task.words.description),
-        ask: task
-            .map(|task| -> Ask<'static> { Box::new(move || Effect::ChooseFile(task)) })
-            .ok_or_else(|| reason.to_owned()),
     }
 }
 
@@ -302,11 +275,7 @@ impl LiveFile {
             Self::Network => "network.json",
             Self::Frames => "recording.csv",
         };
-        FileTask {
-            words: self.words(),
-            suggestion: suggestion.to_owned(),
-            purpose: Purpose::Choose(chosen),
-        }
+        FileTask::choose(self.words(), suggestion, chosen)
     }
 }
 
@@ -324,5 +293,5 @@ pub fn save_recording(recorded: &Recorded) -> FileTask {
         }
         atomic_write(path, |file| io::copy(&mut File::open(&from)?, file).map(drop))
     };
-    FileTask::save(RECORDING, "recording", Contents::new(write))
+    FileTask::save(RECORDING, "recording", write)
 }

@@ -6,10 +6,10 @@ use super::{
     figures_card::figures_ui,
     source_form,
     targets_card::targets_ui,
-    tools::{self, REPLAY_BAR_HEIGHT, live_exports, replay_bar_ui},
+    tools::{self, REPLAY_BAR_HEIGHT, replay_bar_ui},
 };
 use crate::window::{
-    shared::{Effect, Export, FileInUse, Offers, Shared, View},
+    shared::{Effect, FileInUse, Offers, Shared, Shown, View},
     theme::{Theme, space, type_size},
     widgets::{card_ui, scrolled_ui, state_ui},
 };
@@ -51,8 +51,8 @@ impl View for LiveView {
         tools::tools_ui(ui, self, shared, effects);
     }
 
-    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        live_exports(self, shared)
+    fn shown<'a>(&'a self, shared: &'a Shared) -> Vec<Shown<'a>> {
+        tools::shown(self, shared)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
