@@ -30,5 +30,5 @@ mod widgets;
 pub use frame::{DecouplerWindow, Desktop, OpenError, WindowFile, open};
 pub use shared::{Effect, Matter, Notice, Phase, Shared, SourceKind};
 pub use views::{
-    Analysis, BottomTab, DecoderResult, PlannedLevel, PlannedRun, Question, Touch, TradeOffEnding, TradeOffPlan, Views,
+    Analysis, BottomTab, DecoderResult, PlannedLevel, PlannedRun, Question, TradeOffEnding, TradeOffPlan, Views,
 };

@@ -128,7 +128,7 @@ fn album(size: Vec2, is_dark: bool) {
             album.take(&format!("8-{}", tab.replace(' ', "-").to_lowercase()));
         }
     }
-    let surface = album.driver.get("Decoupled surface").rect();
+    let surface = album.driver.get("Decoded surface").rect();
     let places = (0..400).map(|step| vec2((step % 20) as f32 / 20.0, (step / 20) as f32 / 20.0));
     for place in places {
         album.driver.harness().hover_at(surface.lerp_inside(place));

@@ -52,12 +52,12 @@ fn plot_place(driver: &mut Driver, part: &str) -> eframe::egui::Rect {
 fn a_node_lit_on_a_surface_is_lit_in_the_charts_and_the_readings() {
     let mut driver = trained();
     driver.click("Top view");
-    let surface = driver.get("Decoupled surface").rect();
+    let surface = driver.get("Decoded surface").rect();
     let found = hover_a_node(&mut driver, surface.center() - vec2(60.0, 0.0), vec2(3.0, 2.0), 40);
     let (node, _) = found.expect("a node under the pointer");
     for (tab, halo) in [("Nodes", "1 point of lit"), ("Regression", "lit: ")] {
         driver.click(tab);
-        let place = driver.get("Decoupled surface").rect();
+        let place = driver.get("Decoded surface").rect();
         let again = hover_a_node(&mut driver, place.center() - vec2(60.0, 0.0), vec2(3.0, 2.0), 40);
         assert!(again.is_some(), "{tab}");
         let text = description(&mut driver, Role::Image, "z (mm)");
@@ -66,7 +66,7 @@ fn a_node_lit_on_a_surface_is_lit_in_the_charts_and_the_readings() {
     }
     let _ = node;
     driver.click("Histogram");
-    let place = driver.get("Decoupled surface").rect();
+    let place = driver.get("Decoded surface").rect();
     hover_a_node(&mut driver, place.center() - vec2(60.0, 0.0), vec2(3.0, 2.0), 40).unwrap();
     let text = description(&mut driver, Role::Image, "error of z");
     assert!(text.contains("node under the pointer at "), "{text}");
@@ -133,7 +133,7 @@ fn a_section_follows_keys_clicks_and_the_readings_and_is_exported() {
     assert!(words(&mut driver).contains("row-wire 10"), "{}", words(&mut driver));
     // A click on the surface from above chooses the nearest wire: the middle of ten.
     driver.click("Top view");
-    let surface = driver.get("Decoupled surface").rect();
+    let surface = driver.get("Decoded surface").rect();
     driver.harness().drag_at(surface.center());
     driver.harness().drop_at(surface.center());
     driver.harness().run_steps(3);
@@ -275,7 +275,7 @@ fn a_right_click_copies_the_value_under_the_pointer() {
 #[test]
 fn a_picture_is_copied_from_its_card() {
     let mut driver = trained();
-    driver.right_click("Decoupled surface");
+    driver.right_click("Decoded surface");
     driver.click("Copy surfaces as a picture");
     driver.wait("the picture", |driver| driver.says("Copied the surfaces as a picture"));
 }

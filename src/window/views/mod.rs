@@ -19,7 +19,7 @@ use decoupler_files::import::Plan;
 pub use identifiability::{Analysis, Question};
 pub use trade_off::{PlannedLevel, PlannedRun, TradeOffEnding, TradeOffPlan};
 pub(super) use train::CHECKPOINT;
-pub use train::{BottomTab, DecoderResult, Touch};
+pub use train::{BottomTab, DecoderResult};
 
 use self::{
     compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, live::LiveView,

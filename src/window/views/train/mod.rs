@@ -16,5 +16,4 @@ mod view;
 pub use charts_card::BottomTab;
 pub use decoders::DecoderResult;
 pub use exports::CHECKPOINT;
-pub use press::Touch;
 pub use view::TrainView;

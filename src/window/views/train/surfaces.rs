@@ -64,7 +64,7 @@ pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
     let (frames, style) = (view.frames(), shared.look.style());
     let of_array = |test: &TestView| {
         let right = frames.decoupled.as_ref().map(|(decoupled, error)| match view.right {
-            RightCard::Decoupled => test.heights("Decoupled", decoupled, style),
+            RightCard::Decoupled => test.heights("Decoded", decoupled, style),
             RightCard::Error => test.errors("Error", error, style),
         });
         let actual = test.heights("Actual", &frames.actual, style);
@@ -207,11 +207,7 @@ fn right_card_ui(
         let time = view.press.shown().and_then(Shown::network_time);
         title_ui(ui, "Network", time.as_deref().unwrap_or_default(), space(36));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let decoded = match shared.source {
-                SourceKind::Array => "Decoupled",
-                SourceKind::Recording => "Decoded",
-            };
-            let options = [(RightCard::Decoupled, decoded), (RightCard::Error, "Error")];
+            let options = [(RightCard::Decoupled, "Decoded"), (RightCard::Error, "Error")];
             let picked = segmented_ui(ui, "Network card", &options, view.right, false);
             view.right = picked.unwrap_or(view.right);
         });
@@ -298,7 +294,7 @@ impl NodeWords {
             let row = test.rows.get(node / per_row).map_or(0, |row| row + 1);
             return Some(Self {
                 name: format!("Row {row}, node {}", node % per_row + 1),
-                values: ["z", "decoupled"],
+                values: ["z", "decoded"],
                 unit: " mm".to_owned(),
             });
         }

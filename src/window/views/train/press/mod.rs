@@ -17,7 +17,7 @@ use glam::DVec2;
 
 use self::{
     decoders::{Comparison, Demo},
-    solving::{Question, Subject, solve},
+    solving::{Question, Subject, Touch, solve},
 };
 use crate::window::{
     job::{Background, JobError, Wake},
@@ -28,7 +28,7 @@ use crate::window::{
 };
 
 pub use section::{press_section_ui, readings_head_ui, readings_ui};
-pub use solving::{Shown, Touch};
+pub use solving::Shown;
 
 /// The finger, what it presses, and everything known about that.
 #[derive(Debug)]
@@ -73,7 +73,7 @@ impl PressState {
     }
 
     /// What is pressed on a sensor whose nodes can travel `stroke_mm`; `None` while the test set is displayed.
-    pub fn touch(&self, stroke_mm: f64) -> Option<Touch> {
+    fn touch(&self, stroke_mm: f64) -> Option<Touch> {
         self.place_mm.map(|place_mm| self.finger.touch(place_mm, stroke_mm))
     }
 

@@ -10,8 +10,7 @@ use decoupler_core::{
     decoupling::{Decoder, decode_set},
     evaluation::{Errors, RunSettings},
     network::Networks,
-    scene::{Deformation, Indenter, IndenterShape, Radii},
-    sensor::SensorModel,
+    scene::{Indenter, IndenterShape, Radii},
 };
 use glam::DVec2;
 use ndarray::Array2;
@@ -20,13 +19,13 @@ use crate::window::{test_view::TestView, views::train::drawn::Frames};
 
 /// A ball pressed onto the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
+pub(super) struct Touch {
     /// Position of its centre.
-    pub place_mm: DVec2,
+    pub(super) place_mm: DVec2,
     /// Its radius.
-    pub radius_mm: f64,
+    pub(super) radius_mm: f64,
     /// Depth at its centre.
-    pub depth_mm: f64,
+    pub(super) depth_mm: f64,
 }
 
 impl Touch {
@@ -39,11 +38,6 @@ impl Touch {
             shape: IndenterShape::Sphere { radius_mm },
             ..Indenter::default()
         }
-    }
-
-    /// Returns the deformation of an array.
-    pub fn deformation(&self, sensor: &SensorModel) -> Deformation {
-        self.indenter().press(sensor, self.place_mm, self.depth_mm)
     }
 
     /// Returns the radius of the disc in which it touches the surface.
@@ -140,7 +134,7 @@ pub(super) fn solve(question: Question) -> (Question, Result<Shown, String>) {
 /// Returns the sensor of `test` pressed: positions of its nodes, and readings of its wires by Eq. (2).
 fn press(touch: &Touch, test: &TestView) -> Result<TestView, String> {
     let (sensor, rows) = (&test.sensor, &test.rows);
-    let deformation = touch.deformation(sensor);
+    let deformation = touch.indenter().press(sensor, touch.place_mm, touch.depth_mm);
     let (mut readings_ohm, mut places_mm) = (Vec::new(), Vec::new());
     for &row in rows {
         let readings = sensor.row_resistances(row, deformation.row_mm(row));
