@@ -39,11 +39,13 @@ pub(super) struct Compared {
 /// Event of the job: an answer, or the reason why it died; nothing when it has ended.
 type CompareEvent = Option<Result<Compared, JobError>>;
 
+/// Decoders fitted so far, in the order of [`KINDS`], or why they could not be fitted.
+type Fitted = Mutex<Vec<Result<Box<dyn Decoder>, String>>>;
+
 /// The other decoders: fitted and asked in the background, one touch at a time; the newest touch wins.
-#[derive(Debug)]
 pub(super) struct Comparison {
     job: Background<CompareEvent>,
-    fitted: Arc<Mutex<Fitted>>,
+    fitted: Arc<Fitted>,
     /// The network whose training the decoders share.
     of: Option<Arc<Networks>>,
     /// The pressed sensor that they were asked about last.
@@ -54,19 +56,9 @@ pub(super) struct Comparison {
     pub(super) failure: Option<String>,
 }
 
-/// A decoder, or why it could not be fitted.
-type FitResult = Result<Box<dyn Decoder>, String>;
-
-/// Decoders fitted so far, in the order of [`KINDS`].
-#[derive(Default)]
-struct Fitted {
-    of: Option<Arc<Networks>>,
-    decoders: Vec<FitResult>,
-}
-
-impl std::fmt::Debug for Fitted {
+impl std::fmt::Debug for Comparison {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Fitted").finish_non_exhaustive()
+        f.debug_struct("Comparison").finish_non_exhaustive()
     }
 }
 
@@ -88,7 +80,7 @@ impl Comparison {
         let networks = subject.map(|subject| &subject.networks);
         if self.of.as_ref().map(Arc::as_ptr) != networks.map(Arc::as_ptr) {
             self.job.abandon();
-            self.of = networks.cloned();
+            (self.of, self.fitted) = (networks.cloned(), Arc::default());
             (self.asked, self.answers, self.failure) = (None, Vec::new(), None);
         }
         while let Some(event) = self.job.next_event() {
@@ -122,16 +114,12 @@ impl Comparison {
 }
 
 /// Asks one decoder after the other, each fitted when it is first asked.
-fn compare(subject: &Subject, pressed: &TestView, fitted: &Mutex<Fitted>, report: &Report<CompareEvent>) {
+fn compare(subject: &Subject, pressed: &TestView, fitted: &Fitted, report: &Report<CompareEvent>) {
     // Only one job runs at a time, and a panic leaves whole decoders.
     let mut fitted = fitted.lock().unwrap_or_else(PoisonError::into_inner);
-    if !fitted.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, &subject.networks)) {
-        fitted.of = Some(Arc::clone(&subject.networks));
-        fitted.decoders.clear();
-    }
     let mut set = None;
     for (index, kind) in KINDS.into_iter().enumerate() {
-        if fitted.decoders.len() == index {
+        if fitted.len() == index {
             let set = set.get_or_insert_with(|| decoder_set(subject, report));
             let decoder = set.as_ref().map_err(ToString::to_string).and_then(|set| {
                 let decoder = set
@@ -142,9 +130,9 @@ fn compare(subject: &Subject, pressed: &TestView, fitted: &Mutex<Fitted>, report
             if report.is_cancelled() {
                 return;
             }
-            fitted.decoders.push(decoder);
+            fitted.push(decoder);
         }
-        let answer = match &mut fitted.decoders[index] {
+        let answer = match &mut fitted[index] {
             Ok(decoder) => decode(&mut **decoder, pressed).map(|(_, answer)| answer),
             Err(reason) => Err(reason.clone()),
         };

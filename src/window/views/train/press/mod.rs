@@ -11,13 +11,14 @@ mod solving;
 
 use std::sync::Arc;
 
+use decoupler_core::scene::{Indenter, IndenterShape, Radii};
 use decoupler_files::figure::surface::{Sight, Surface};
 use eframe::egui::{Id, Rect};
 use glam::DVec2;
 
 use self::{
     decoders::{Comparison, Demo},
-    solving::{Question, Subject, Touch, solve},
+    solving::{Question, Subject, solve},
 };
 use crate::window::{
     job::{Background, JobError, Wake},
@@ -72,11 +73,6 @@ impl PressState {
         self.place_mm.is_some()
     }
 
-    /// What is pressed on a sensor whose nodes can travel `stroke_mm`; `None` while the test set is displayed.
-    fn touch(&self, stroke_mm: f64) -> Option<Touch> {
-        self.place_mm.map(|place_mm| self.finger.touch(place_mm, stroke_mm))
-    }
-
     /// What is shown of the touch; `None` while the test set is displayed, or before the first answer.
     pub fn shown(&self) -> Option<&Shown> {
         self.answered.as_ref()?.1.as_ref().ok()
@@ -128,9 +124,7 @@ impl PressState {
             // Another array, or another scene.
             self.let_go();
         }
-        let Some(touch) = self.touch(test.stroke_mm) else {
-            return;
-        };
+        let Some(place_mm) = self.place_mm else { return };
         let own = shared.shown_run().zip(result).map(|(run, result)| Subject {
             networks: Arc::clone(&result.networks),
             settings: *run.settings(),
@@ -141,7 +135,8 @@ impl PressState {
             self.demo.follow(test);
         }
         let question = Question {
-            touch,
+            finger: self.finger,
+            place_mm,
             test: test.clone(),
             subject: own.or_else(|| self.demo.subject.clone()?.ok()),
         };
@@ -211,12 +206,14 @@ impl Default for Finger {
 }
 
 impl Finger {
-    /// The ball pressed onto a place.
-    fn touch(&self, place_mm: DVec2, stroke_mm: f64) -> Touch {
-        Touch {
-            place_mm,
-            radius_mm: self.radius_mm,
-            depth_mm: self.depth_share * stroke_mm,
+    fn indenter(&self) -> Indenter {
+        let radius_mm = Radii {
+            smallest: self.radius_mm,
+            largest: self.radius_mm,
+        };
+        Indenter {
+            shape: IndenterShape::Sphere { radius_mm },
+            ..Indenter::default()
         }
     }
 

@@ -95,7 +95,8 @@ impl PressState {
         let Some(place_mm) = self.place_mm.or_else(hovered) else {
             return;
         };
-        let contact_mm = self.finger.touch(place_mm, stroke_mm).contact_mm();
+        let depth_mm = self.finger.depth_share * stroke_mm;
+        let contact_mm = self.finger.indenter().contact_half_width_mm(depth_mm);
         let circle = (0..=PIECES).map(|piece| {
             let angle = std::f64::consts::TAU * piece as f64 / PIECES as f64;
             on_surface(target, place_mm + contact_mm * DVec2::from_angle(angle))

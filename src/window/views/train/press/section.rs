@@ -8,7 +8,7 @@ use decoupler_files::{
     export::format_number,
     figure::{SequentialMap, readings_figure},
 };
-use eframe::egui::{Align, Layout, Response, RichText, Slider, Ui, WidgetInfo, vec2};
+use eframe::egui::{Align, Layout, RichText, Slider, Ui, WidgetInfo, vec2};
 use ndarray::Array2;
 
 use super::{
@@ -40,7 +40,7 @@ const COLUMNS: [TableColumn<'_>; 4] = [
 pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
     let Some(test) = shared.test() else { return };
     section_heading_ui(ui, "Press");
-    finger_ui(ui, press, test);
+    finger_ui(ui, press, test.stroke_mm);
     ui.add_space(space(1));
     match &press.answered {
         Some((question, Ok(shown))) => {
@@ -71,53 +71,46 @@ pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
     }
 }
 
-/// Radius and depth of the finger.
-fn finger_ui(ui: &mut Ui, press: &mut PressState, test: &TestView) {
-    let before = press.finger;
+/// Radius and depth of the finger; the depth as a number, and on a slider that ends at the scene's largest compression.
+fn finger_ui(ui: &mut Ui, press: &mut PressState, stroke_mm: f64) {
+    let (before, usual) = (press.finger, Finger::default());
     let finger = &mut press.finger;
-    let line = ui.horizontal(|ui| {
-        ui.set_min_height(space(7));
-        let hint = "Radius of the ball that presses, in mm.";
-        let label = ui.label("Radius").on_hover_text(hint);
-        let limits = usually(Finger::default().radius_mm, 0.5..=20.0);
-        let radius = number_ui(ui, &mut finger.radius_mm, &limits, "mm", vec2(space(14), space(6)));
-        ui.add_space(space(1));
-        let depth = depth_ui(ui, finger, test.stroke_mm);
-        [radius.labelled_by(label.id).on_hover_text(hint), depth]
-    });
-    line.inner.iter().for_each(|field| refusal_ui(ui, field));
-    if *finger != before {
-        ui.request_repaint();
-    }
-}
-
-/// The depth as a number and on a slider that ends at the scene's largest compression.
-fn depth_ui(ui: &mut Ui, finger: &mut Finger, stroke_mm: f64) -> Response {
     let limit = format_number(stroke_mm);
     let hint = format!("Depth of the press in mm, up to the scene's largest compression of {limit} mm.");
-    let depth_mm = finger.depth_share * stroke_mm;
-    let usual_mm = Finger::default().depth_share * stroke_mm;
+    let (depth_mm, usual_mm) = (finger.depth_share * stroke_mm, usual.depth_share * stroke_mm);
     // A thousandth of a millimetre is finer than any finger.
     let shown_mm = (1e3 * depth_mm).round() / 1e3;
     let (mut typed_mm, mut slid_mm) = (shown_mm, depth_mm);
-    let label = ui.label("Depth").on_hover_text(&hint);
-    let field = ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        let limits = usually(usual_mm, 0.0..=stroke_mm);
-        let number = number_ui(ui, &mut typed_mm, &limits, "mm", vec2(space(16), space(6)));
-        let width = (ui.available_width() - space(2)).max(space(8));
-        let slider = slider_ui(ui, Slider::new(&mut slid_mm, 0.0..=stroke_mm), width);
-        if slider.double_clicked() {
-            slid_mm = usual_mm;
-        }
-        slider.widget_info(|| WidgetInfo::slider(true, slid_mm, "Depth of the press"));
-        slider.on_hover_text(&hint);
-        number.labelled_by(label.id).on_hover_text(&hint)
+    let line = ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        let meaning = "Radius of the ball that presses, in mm.";
+        let label = ui.label("Radius").on_hover_text(meaning);
+        let limits = usually(usual.radius_mm, 0.5..=20.0);
+        let radius = number_ui(ui, &mut finger.radius_mm, &limits, "mm", vec2(space(14), space(6)));
+        ui.add_space(space(1));
+        let name = ui.label("Depth").on_hover_text(&hint);
+        let depth = ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let limits = usually(usual_mm, 0.0..=stroke_mm);
+            let number = number_ui(ui, &mut typed_mm, &limits, "mm", vec2(space(16), space(6)));
+            let width = (ui.available_width() - space(2)).max(space(8));
+            let slider = slider_ui(ui, Slider::new(&mut slid_mm, 0.0..=stroke_mm), width);
+            if slider.double_clicked() {
+                slid_mm = usual_mm;
+            }
+            slider.widget_info(|| WidgetInfo::slider(true, slid_mm, "Depth of the press"));
+            slider.on_hover_text(&hint);
+            number.labelled_by(name.id).on_hover_text(&hint)
+        });
+        [radius.labelled_by(label.id).on_hover_text(meaning), depth.inner]
     });
+    line.inner.iter().for_each(|field| refusal_ui(ui, field));
     let changed_mm = if typed_mm == shown_mm { slid_mm } else { typed_mm };
     if changed_mm != depth_mm {
         finger.depth_share = (changed_mm / stroke_mm).clamp(0.0, 1.0);
     }
-    field.inner
+    if *finger != before {
+        ui.request_repaint();
+    }
 }
 
 /// The table of decoders, the network first and the best in bold, and why some have no answer.

@@ -1,4 +1,4 @@
-//! What is pressed, and its answer by the network.
+//! The pressed sensor, and its answer by the network.
 
 use std::{
     sync::Arc,
@@ -10,41 +10,12 @@ use decoupler_core::{
     decoupling::{Decoder, decode_set},
     evaluation::{Errors, RunSettings},
     network::Networks,
-    scene::{Indenter, IndenterShape, Radii},
 };
 use glam::DVec2;
 use ndarray::Array2;
 
+use super::Finger;
 use crate::window::{test_view::TestView, views::train::drawn::Frames};
-
-/// A ball pressed onto the surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Touch {
-    /// Position of its centre.
-    pub(super) place_mm: DVec2,
-    /// Its radius.
-    pub(super) radius_mm: f64,
-    /// Depth at its centre.
-    pub(super) depth_mm: f64,
-}
-
-impl Touch {
-    fn indenter(&self) -> Indenter {
-        let radius_mm = Radii {
-            smallest: self.radius_mm,
-            largest: self.radius_mm,
-        };
-        Indenter {
-            shape: IndenterShape::Sphere { radius_mm },
-            ..Indenter::default()
-        }
-    }
-
-    /// Returns the radius of the disc in which it touches the surface.
-    pub(super) fn contact_mm(&self) -> f64 {
-        self.indenter().contact_half_width_mm(self.depth_mm)
-    }
-}
 
 /// The network that decodes the touch.
 #[derive(Clone, Debug)]
@@ -62,7 +33,8 @@ pub(super) struct Subject {
 /// Everything that a touch and the network's answer depend on.
 #[derive(Clone, Debug)]
 pub(super) struct Question {
-    pub(super) touch: Touch,
+    pub(super) finger: Finger,
+    pub(super) place_mm: DVec2,
     pub(super) test: TestView,
     pub(super) subject: Option<Subject>,
 }
@@ -70,7 +42,7 @@ pub(super) struct Question {
 impl Question {
     /// Returns true if both questions are the same.
     pub(super) fn is(&self, other: &Self) -> bool {
-        self.is_of(&other.test) && self.touch == other.touch && self.networks() == other.networks()
+        self.is_of(&other.test) && self.key() == other.key()
     }
 
     /// Returns true if it is about this sensor, with the same rows and stroke: a new training has another test set of the
@@ -79,9 +51,9 @@ impl Question {
         (self.test.sensor, self.test.stroke_mm) == (test.sensor, test.stroke_mm) && self.test.rows == test.rows
     }
 
-    /// Address of the networks.
-    fn networks(&self) -> Option<*const Networks> {
-        self.subject.as_ref().map(|subject| Arc::as_ptr(&subject.networks))
+    fn key(&self) -> (Finger, DVec2, Option<*const Networks>) {
+        let networks = self.subject.as_ref().map(|subject| Arc::as_ptr(&subject.networks));
+        (self.finger, self.place_mm, networks)
     }
 }
 
@@ -110,7 +82,7 @@ pub(super) struct Answer {
 
 /// Presses, reads and decodes.
 pub(super) fn solve(question: Question) -> (Question, Result<Shown, String>) {
-    let shown = press(&question.touch, &question.test).map(|pressed| {
+    let shown = press(&question).map(|pressed| {
         let networks = question.subject.as_ref().map(|subject| &*subject.networks);
         let decoded = networks.map(|networks| decode(&mut networks.decoder(), &pressed));
         let actual = pressed.frame(pressed.set.targets(), 0);
@@ -131,10 +103,14 @@ pub(super) fn solve(question: Question) -> (Question, Result<Shown, String>) {
     (question, shown)
 }
 
-/// Returns the sensor of `test` pressed: positions of its nodes, and readings of its wires by Eq. (2).
-fn press(touch: &Touch, test: &TestView) -> Result<TestView, String> {
+/// Returns the sensor pressed: positions of its nodes, and readings of its wires by Eq. (2).
+fn press(question: &Question) -> Result<TestView, String> {
+    let Question {
+        finger, place_mm, test, ..
+    } = question;
     let (sensor, rows) = (&test.sensor, &test.rows);
-    let deformation = touch.indenter().press(sensor, touch.place_mm, touch.depth_mm);
+    let depth_mm = finger.depth_share * test.stroke_mm;
+    let deformation = finger.indenter().press(sensor, *place_mm, depth_mm);
     let (mut readings_ohm, mut places_mm) = (Vec::new(), Vec::new());
     for &row in rows {
         let readings = sensor.row_resistances(row, deformation.row_mm(row));
