@@ -18,17 +18,9 @@ const COLUMNS: [TableColumn<'_>; 3] = [
     TableColumn::figure("B").meaning("The run chosen as B"),
 ];
 
-/// A setting of a run.
-pub(super) struct Named {
-    pub(super) name: &'static str,
-    pub(super) value: Value,
-    /// True if it is the usual value.
-    pub(super) is_usual: bool,
-}
-
-/// Returns the settings of scene and network, and the method. Those that are rarely changed are left out while they are
-/// usual.
-pub(super) fn named_settings(settings: &RunSettings) -> impl Iterator<Item = Named> {
+/// Returns the settings of scene and network, and the method: name, value, and whether that is usual. Those that are rarely
+/// changed are left out while they are usual.
+pub(super) fn named_settings(settings: &RunSettings) -> impl Iterator<Item = (&'static str, Value, bool)> {
     let usual = match settings.simulation() {
         Some(_) => RunSettings::default(),
         None => RunSettings::measured(settings.source.row_model()),
@@ -43,7 +35,7 @@ pub(super) fn named_settings(settings: &RunSettings) -> impl Iterator<Item = Nam
             "starts" => "restarts",
             name => name,
         };
-        (!is_usual || !option.is_rare()).then_some(Named { name, value, is_usual })
+        (!is_usual || !option.is_rare()).then_some((name, value, is_usual))
     })
 }
 
@@ -79,7 +71,7 @@ fn figures(file: &NetworkFile) -> Vec<(String, Cell)> {
         };
         add("split", split.into());
     }
-    named_settings(&file.settings).for_each(|setting| add(setting.name, setting.value.into()));
+    named_settings(&file.settings).for_each(|(name, value, _)| add(name, value.into()));
     let best_epoch = format!("{} of {}", training.best_epoch, training.epochs);
     add("best epoch", best_epoch.into());
     add("training time, one thread", Cell::Seconds(Some(training.seconds)));
@@ -141,10 +133,8 @@ mod tests {
 
     /// Returns the settings that are not usual.
     fn changed(settings: &RunSettings) -> Vec<String> {
-        let changed = named_settings(settings).filter(|setting| !setting.is_usual);
-        changed
-            .map(|setting| format!("{} {}", setting.name, setting.value))
-            .collect()
+        let changed = named_settings(settings).filter(|(.., is_usual)| !is_usual);
+        changed.map(|(name, value, _)| format!("{name} {value}")).collect()
     }
 
     #[test]

@@ -123,8 +123,8 @@ fn conditions(setup: &Setup) -> String {
             .map(|simulation| counted(simulation.samples, "sample")),
     );
     parts.push(format!("seed {}", settings.seed));
-    let others = named_settings(settings).filter(|setting| !setting.is_usual);
-    let others = others.filter(|setting| !["hidden nodes", "method"].contains(&setting.name));
-    parts.extend(others.map(|setting| format!("{} {}", setting.name, setting.value)));
+    let others = named_settings(settings).filter(|(.., is_usual)| !is_usual);
+    let others = others.filter(|(name, ..)| !["hidden nodes", "method"].contains(name));
+    parts.extend(others.map(|(name, value, _)| format!("{name} {value}")));
     parts.join(", ")
 }

@@ -1,16 +1,15 @@
 use std::{path::Path, sync::Arc};
 
-use decoupler_core::{dataset::Dataset, job::Job};
+use decoupler_core::job::Job;
 use decoupler_files::{
     export::NetworkFile,
     figure::{Decoded, PlotFigure, RegressionLine, regression_figure, surface::Surface},
-    import::Recorded,
 };
 use ndarray::Array2;
 
 use crate::window::{
     job::{Background, Wake},
-    shared::LoadedRun,
+    shared::{LoadedRun, sentence},
     test_view::{Positions, RecordedTest, SurfaceStyle, TestSet, TestView},
 };
 
@@ -108,7 +107,20 @@ impl Compared {
     fn new(file: &NetworkFile, job: &Job<'_>) -> Result<Self, String> {
         let test = match &file.recorded {
             None => TestSet::Array(TestView::draw(&file.settings).map_err(|error| error.to_string())?),
-            Some(recorded) => TestSet::Recording(recorded_test(file, recorded, job)?),
+            Some(recorded) => {
+                if let [missing, ..] = recorded.missing()[..] {
+                    return Err(format!(
+                        "The recording '{}' no longer exists, so its test samples cannot be shown. Put the file back to \
+                         see them; errors, loss and settings are kept with the run.",
+                        missing.display()
+                    ));
+                }
+                let sets = file.setup().sets(Path::new(""), job, &mut |_| ());
+                let sets = sets.and_then(|sets| sets.check_saved(Some(recorded)).map(|()| sets));
+                let set = sets.map_err(|error| sentence(&error.to_string()))?.sets.test;
+                let (problem, order) = (Arc::new(file.problem.clone()), recorded.plan.test_order());
+                TestSet::Recording(RecordedTest::new(set, problem, order))
+            }
         };
         let answers = file.decoder().answers_to(test.set());
         Ok(Self {
@@ -120,29 +132,6 @@ impl Compared {
             answers,
         })
     }
-}
-
-/// Reads the test samples of a network again.
-fn recorded_test(file: &NetworkFile, recorded: &Recorded, job: &Job<'_>) -> Result<RecordedTest, String> {
-    if let [missing, ..] = recorded.missing()[..] {
-        return Err(format!(
-            "The recording '{}' no longer exists, so its test samples cannot be shown. Put the file back to see them; \
-             errors, loss and settings are kept with the run.",
-            missing.display()
-        ));
-    }
-    let sets = file.setup().sets(Path::new(""), job, &mut |_| ());
-    let sets = sets.map_err(|error| error.to_string())?;
-    let now = sets.recorded().map(|now| &now.samples_crc32);
-    if now != Some(&recorded.samples_crc32) {
-        let data = recorded.plan.import.data.display();
-        return Err(format!(
-            "'{data}' has changed since this network was trained, so its samples are not shown. Restore the original \
-             file, or train again."
-        ));
-    }
-    let (set, problem): (Arc<Dataset>, _) = (Arc::clone(&sets.sets.test), Arc::new(file.problem.clone()));
-    Ok(RecordedTest::new(set, problem, recorded.plan.test_order()))
 }
 
 /// Returns the decoded surface of `snapshot`, or of the last one if there are fewer, and its error; `None` if there is no

@@ -156,14 +156,13 @@ impl PressState {
         }
     }
 
-    /// Text of the network's card while something is pressed and no network has answered.
-    pub fn waiting_text(&self, shared: &Shared) -> &'static str {
-        if self.demo.is_awaited() {
-            "The built-in demo network is being trained…"
-        } else if shared.phase.is_busy() {
-            "The network answers here once its training has begun."
-        } else {
-            "This array is too large for the demo network: press Train, and your network answers here."
+    /// Text while something is pressed and no network has answered.
+    pub fn waiting_text(&self, shared: &Shared) -> &str {
+        match &self.demo.subject {
+            Some(Err(reason)) => reason,
+            _ if self.demo.is_awaited() => "The built-in demo network is being trained…",
+            _ if shared.phase.is_busy() => "The network answers here once its training has begun.",
+            _ => "This array is too large for the demo network: press Train, and your network answers here.",
         }
     }
 }

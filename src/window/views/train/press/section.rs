@@ -19,7 +19,7 @@ use super::{
 use crate::window::{
     glossary,
     plotting::cells_ui,
-    shared::{Phase, Shared},
+    shared::Shared,
     test_view::TestView,
     theme::{Theme, semibold, space, type_size},
     widgets::{
@@ -183,15 +183,10 @@ fn remarks_ui(ui: &mut Ui, press: &PressState, question: &Question, shown: &Show
     }
     let subject = question.subject.as_ref();
     let text = match subject {
+        None => press.waiting_text(shared),
         Some(subject) if subject.is_demo => "Decoded by a built-in demo network. Train to use your own.",
         Some(subject) if !subject.is_idle => "The other decoders answer when the training is paused or finished.",
         Some(_) => "",
-        None if press.demo.is_awaited() => "The built-in demo network is being trained…",
-        None if shared.phase == Phase::Preparing => "The network answers once its training has begun.",
-        None => match &press.demo.subject {
-            Some(Err(reason)) => reason,
-            _ => "Train a network to see how it decodes this touch.",
-        },
     };
     if !text.is_empty() {
         dim_ui(ui, text);
