@@ -29,6 +29,4 @@ mod widgets;
 
 pub use frame::{DecouplerWindow, Desktop, OpenError, WindowFile, open};
 pub use shared::{Effect, Matter, Notice, Phase, Shared, SourceKind};
-pub use views::{
-    Analysis, BottomTab, DecoderResult, PlannedLevel, PlannedRun, Question, TradeOffEnding, TradeOffPlan, Views,
-};
+pub use views::{Analysis, DecoderResult, PlannedLevel, PlannedRun, Question, TradeOffEnding, TradeOffPlan, Views};

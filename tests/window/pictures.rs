@@ -118,7 +118,7 @@ fn album(size: Vec2, is_dark: bool) {
     album.take("5-error");
     album.driver.click_button("Top view");
     album.take("6-error-top");
-    album.driver.click_button("Decoupled");
+    album.driver.click_button("Decoded");
     album.take("7-top");
     album.driver.click_button("3-D");
     // The first has a shorter name in a narrow window.

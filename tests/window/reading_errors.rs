@@ -1,8 +1,7 @@
-//! Inspecting errors: the item under the pointer lights up everywhere; sections, the nodes in a bar, colours and scales.
+//! Inspecting errors: the item under the pointer lights up everywhere; sections, colours and scales.
 
-use decoupler::window::BottomTab;
 use decoupler_files::figure::SequentialMap;
-use eframe::egui::{Key, PointerButton, Pos2, accesskit::Role, pos2, vec2};
+use eframe::egui::{Key, Pos2, accesskit::Role, pos2, vec2};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use crate::driver::Driver;
@@ -150,68 +149,6 @@ fn a_section_follows_keys_clicks_and_the_readings_and_is_exported() {
 }
 
 #[test]
-fn a_bar_of_the_histogram_lists_and_lights_its_nodes() {
-    let mut driver = trained();
-    driver.click("Histogram");
-    driver.settle();
-    assert!(!driver.says("Go to"), "nothing is chosen");
-    let plot = plot_place(&mut driver, "nodes of the test set against error");
-    // The bars of small errors are just above the axis, in the middle of the plot.
-    let at = pos2(plot.left() + 0.56 * plot.width(), plot.bottom() - 40.0);
-    driver.harness().drag_at(at);
-    driver.harness().drop_at(at);
-    driver.harness().run_steps(3);
-    let bar = driver.views().train.lights.bar.expect("a bar under the pointer");
-    let listed = driver
-        .texts()
-        .into_iter()
-        .filter(|text| text.starts_with("Snapshot "))
-        .count();
-    assert!(listed > 0, "its nodes are listed");
-    driver.press(Key::CloseBracket);
-    assert_eq!(driver.views().train.lights.bar, Some(bar + 1));
-    driver.press(Key::OpenBracket);
-    // Each listed node has an error within the bar.
-    let texts = driver.texts();
-    let range = texts
-        .iter()
-        .find(|text| text.contains(" to ") && text.ends_with(" mm") && !text.starts_with('z'));
-    let ends: Vec<f64> = range
-        .expect("its range")
-        .trim_end_matches(" mm")
-        .split(" to ")
-        .map(|end| end.replace('−', "-").parse().unwrap())
-        .collect();
-    let label = texts
-        .iter()
-        .find(|text| text.starts_with("Snapshot ") && text.contains(": "))
-        .unwrap();
-    let error = label
-        .split(": ")
-        .nth(1)
-        .unwrap()
-        .trim_end_matches(" mm")
-        .replace('−', "-");
-    let error: f64 = error.parse().unwrap();
-    let slack = 0.01 * (ends[1] - ends[0]).abs() + 1e-3 * error.abs();
-    assert!(
-        ends[0] - slack <= error && error <= ends[1] + slack,
-        "{error} in {ends:?}"
-    );
-    // A click on a listed node goes to it.
-    let label = label.clone();
-    driver.click(&label);
-    driver.settle();
-    let numbers: Vec<usize> = label
-        .split(|c: char| !c.is_ascii_digit())
-        .filter_map(|word| word.parse().ok())
-        .take(3)
-        .collect();
-    assert_eq!(driver.views().train.snapshot, numbers[0] - 1);
-    assert_eq!(lit(&driver), Some((numbers[1] - 1) * 6 + numbers[2] - 1));
-}
-
-#[test]
 fn colours_and_scales_are_chosen_at_the_bar_and_colours_are_remembered() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("window.json");
@@ -245,31 +182,6 @@ fn colours_and_scales_are_chosen_at_the_bar_and_colours_are_remembered() {
     drop(driver);
     let driver = Driver::open_remembering(&path);
     assert_eq!(driver.state().look.colours, SequentialMap::Cividis);
-}
-
-#[test]
-fn a_right_click_copies_the_value_under_the_pointer() {
-    let mut driver = trained();
-    let cell = driver
-        .table()
-        .into_iter()
-        .find(|cell| cell.starts_with("network, Z %"))
-        .unwrap();
-    let number = cell.split(": ").nth(1).unwrap().to_owned();
-    driver.right_click(&cell);
-    let copied = driver.click_and_copy(&format!("Copy “{number}”"));
-    assert_eq!(copied, Some(number));
-    driver.right_click(&cell);
-    let table = driver.click_and_copy("Copy error table as Markdown").unwrap();
-    assert!(table.starts_with("| ") && table.contains("| network |"), "{table}");
-    // A field has its own menu.
-    driver.right_click("Hidden nodes");
-    assert_eq!(driver.click_and_copy("Copy 6"), Some("6".to_owned()));
-    driver.right_click("Hidden nodes");
-    driver.click("Reset to 12");
-    assert_eq!(driver.state().draft.hidden, 12);
-    let _ = PointerButton::Secondary;
-    assert_eq!(driver.views().train.tab, BottomTab::Loss);
 }
 
 #[test]

@@ -78,7 +78,7 @@ fn every_picture_of_a_trained_network_can_be_displayed() {
     let error = driver.get("Error surface").value().unwrap();
     assert!(error.starts_with("error ") && error.ends_with(" mm"), "{error}");
     assert!(!driver.has("Decoded surface"));
-    driver.click_button("Decoupled");
+    driver.click_button("Decoded");
     assert!(driver.has("Decoded surface"));
 
     driver.click_button("Top view");

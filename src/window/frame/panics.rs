@@ -8,7 +8,7 @@ use crate::{
     driver::{Driver, small},
     window::{
         job::planned_panic::{MESSAGE, is_pending, plan},
-        shared::{Effect, Notice, Phase, View as _},
+        shared::{Effect, Notice, Phase},
     },
 };
 
@@ -186,10 +186,7 @@ fn jobs_of_a_recording_can_be_started_again_after_a_panic() {
     fs::write(&path, format!("time (s),u (V),d (mm)\n{}", String::from_iter(rows))).unwrap();
     let mut driver = Driver::open();
     let open = |driver: &mut Driver| {
-        let mut effects = Vec::new();
-        let window = driver.window_mut();
-        let (view, shared) = (&mut window.views.train, &window.shared);
-        assert!(view.take_files(std::slice::from_ref(&path), shared, &mut effects));
+        driver.window_mut().views.open_files(vec![path.clone()]);
         driver.harness().step();
     };
     panics(&mut driver, "opening", open);

@@ -15,7 +15,7 @@ use eframe::egui::{
 use super::Effect;
 use crate::window::{
     surface_view::{ColourBar, SurfaceViewResponse},
-    test_view::{HeightScale, SurfaceStyle},
+    test_view::HeightScale,
     theme::{Theme, rgb, space},
     widgets::{dim_ui, section_heading_ui, segmented_ui},
 };
@@ -38,16 +38,6 @@ pub struct Look {
 }
 
 impl Look {
-    /// Returns the look of the surfaces of a test set.
-    pub fn style(&self) -> SurfaceStyle {
-        SurfaceStyle {
-            mode: self.mode,
-            colours: self.colours,
-            heights: self.heights,
-            error_limit_mm: self.error_limit_mm,
-        }
-    }
-
     /// Returns a surface in this look. Its own range is that of a locked scale of values, or of a free one of errors.
     pub fn dressed(&self, surface: &Surface, title: String) -> Surface {
         let values = || {

@@ -21,8 +21,8 @@ use crate::window::{
     job::Wake,
     plotting::{Pointer, plots_ui, titled_plots_ui},
     shared::{
-        Effect, NetworkSource, PLACES, RightCard, RunList, Shared, Shown, View, colour_scale_ui, follow_surface,
-        target_choice_ui, view_mode_ui,
+        Effect, NetworkSource, PLACES, RightCard, RunList, Shared, Shown, Status, View, colour_scale_ui,
+        follow_surface, target_choice_ui, view_mode_ui,
     },
     surface_view::{ColourBar, SurfaceView},
     theme::{Theme, semibold, space, type_size},
@@ -47,10 +47,6 @@ pub struct CompareView {
 }
 
 impl View for CompareView {
-    fn name(&self) -> &'static str {
-        "Compare"
-    }
-
     fn take_events(&mut self, shared: &Shared, _effects: &mut Vec<Effect>) {
         for (place, side) in self.sides.iter_mut().enumerate() {
             side.follow(shared.runs.pinned(place), self.snapshot);
@@ -75,7 +71,7 @@ impl View for CompareView {
     }
 
     /// Shows the surfaces of both runs above, their curves and figures below.
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         let whole = ui.available_rect_before_wrap();
         let gap = space(2);
         let lower_height = (0.42 * whole.height()).clamp(space(50), space(96));
@@ -113,6 +109,7 @@ impl View for CompareView {
             });
         });
         ui.allocate_rect(whole, Sense::hover());
+        None
     }
 }
 
@@ -215,7 +212,7 @@ impl CompareView {
                 follow_surface(&shown, shared.look, &mut self.node, effects);
             }
             (Some(Ok(compared)), None) => {
-                let targets = compared.test.problem().map_or(&[][..], |problem| &problem.targets);
+                let targets = compared.test.recording().map_or(&[][..], |test| &test.problem.targets);
                 target_choice_ui(ui, "Target", &format!("target of {letter}"), targets, &mut side.target);
                 if let Some(chart) = &chart {
                     plots_ui(ui, &format!("Regression of {letter}"), chart, Pointer::Moves);

@@ -10,7 +10,7 @@ use ndarray::Array2;
 use crate::window::{
     job::{Background, Wake},
     shared::{LoadedRun, sentence},
-    test_view::{Positions, RecordedTest, SurfaceStyle, TestSet, TestView},
+    test_view::{Positions, RecordedTest, TestSet, TestView},
 };
 
 /// One side of the comparison.
@@ -141,9 +141,8 @@ fn surfaces(test: &TestSet, answers: &Array2<f64>, snapshot: usize) -> Option<[S
     match test {
         TestSet::Array(test) => {
             let [actual, decoded] = [test.set.targets(), answers.view()].map(|values| test.frame(values, snapshot));
-            let style = SurfaceStyle::default();
-            let error = test.errors("", &actual.error_of(&decoded), style);
-            Some([test.heights("", &decoded, style), error])
+            let error = test.errors("", &actual.error_of(&decoded));
+            Some([test.heights("", &decoded), error])
         }
         TestSet::Recording(test) => {
             let Positions::Surface(through) = &test.positions else {

@@ -12,7 +12,7 @@ use decoupler_files::{
     export::{Cell, Table, TableColumn, WriteError, atomic_write},
     live::Recorded,
 };
-use eframe::egui::{Align, Button, Key, Label, Layout, Modifiers, RichText, Slider, Ui, WidgetInfo};
+use eframe::egui::{Align, Button, Key, Label, Layout, RichText, Slider, Ui, WidgetInfo};
 
 use super::{
     LiveView,
@@ -22,7 +22,7 @@ use super::{
 };
 use crate::window::{
     glossary,
-    shared::{Effect, FileTask, FileWords, Offers, Shared, Shown},
+    shared::{Command, Effect, FileTask, FileWords, Offers, Shared, Shown},
     theme::{Theme, space, type_size},
     widgets::{dim_ui, ghost_button, primary_button, slider_ui, with_shortcut},
 };
@@ -97,20 +97,20 @@ fn record_ui(ui: &mut Ui, view: &LiveView, shared: &Shared) {
 pub fn offer_actions(view: &mut LiveView, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
     let is_running = view.running.is_some();
     let can_start = !is_running && view.obstacle(shared).is_none();
-    if offers.offer_keys("Start live decoding", Modifiers::COMMAND, Key::Enter, can_start) {
+    if offers.offer(Command::Begin("Start live decoding"), can_start) {
         view.start(shared, effects);
     }
-    if offers.offer_keys("Stop live decoding", Modifiers::COMMAND, Key::Period, is_running) {
+    if offers.offer(Command::Cancel("Stop live decoding"), is_running) {
         view.stop();
     }
-    if offers.offer_keys("Start or end recording", Modifiers::COMMAND, Key::R, view.can_record()) {
+    if offers.offer(Command::Record, view.can_record()) {
         view.toggle_recording(shared);
     }
-    if offers.offer("Re-zero", is_running && view.has_sensor(shared)) {
+    if offers.offer(Command::ReZero, is_running && view.has_sensor(shared)) {
         view.re_zero();
     }
     let replay = view.shown.replay;
-    let is_pressed = offers.offer_keys("Pause or resume replay", Modifiers::COMMAND, Key::P, replay.is_some());
+    let is_pressed = offers.offer(Command::PlayReplay, replay.is_some());
     if let Some(replay) = replay.filter(|_| is_pressed) {
         view.control(move |control, now| control.play(!replay.is_playing, now));
     }

@@ -1,4 +1,4 @@
-use eframe::egui::{RichText, Sense, Ui};
+use eframe::egui::{Sense, Ui};
 
 use super::{
     LiveView,
@@ -9,18 +9,14 @@ use super::{
     tools::{self, REPLAY_BAR_HEIGHT, replay_bar_ui},
 };
 use crate::window::{
-    shared::{Effect, FileInUse, Offers, Shared, Shown, View},
-    theme::{Theme, space, type_size},
-    widgets::{card_ui, scrolled_ui, state_ui},
+    shared::{Effect, FileInUse, Holdings, Offers, Shared, Shown, Status, Tone, View},
+    theme::space,
+    widgets::{card_ui, scrolled_ui},
 };
 use decoupler_core::{live::FaultEvent, text::counted};
 use decoupler_files::live::{SourcePlan, Watched};
 
 impl View for LiveView {
-    fn name(&self) -> &'static str {
-        "Live"
-    }
-
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.follow(effects);
         if self.network.take_events() && self.running.is_some() {
@@ -30,20 +26,20 @@ impl View for LiveView {
         self.take_sample(shared, effects);
     }
 
-    fn is_working(&self) -> bool {
-        self.running.is_some()
-    }
-
-    fn files_in_use(&self) -> Vec<FileInUse> {
+    fn holdings(&self, _shared: &Shared) -> Holdings {
         let replayed = self.running.as_ref().and_then(|running| match &running.source {
             SourcePlan::Replay(path) => Some(FileInUse::Recording(path.clone())),
             _ => None,
         });
         let recorded = self.recording.clone().map(FileInUse::Recorded);
-        replayed.into_iter().chain(recorded).collect()
+        Holdings {
+            is_computing: self.running.is_some(),
+            unfinished: Vec::new(),
+            files: replayed.into_iter().chain(recorded).collect(),
+        }
     }
 
-    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn take_commands(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
         tools::offer_actions(self, offers, shared, effects);
     }
 
@@ -59,13 +55,10 @@ impl View for LiveView {
         source_form::form_ui(ui, self, shared, effects);
     }
 
-    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<Status> {
         live_ui(ui, self, shared, effects);
         self.report_drawn();
-    }
-
-    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
-        status_ui(ui, self);
+        Some(status(self))
     }
 }
 
@@ -104,48 +97,48 @@ fn live_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<
 }
 
 /// Shows the state of the stream in the line at the bottom.
-fn status_ui(ui: &mut Ui, view: &LiveView) {
-    let palette = Theme::of(ui).palette;
+fn status(view: &LiveView) -> Status {
     let counts = &view.shown.counts;
     let watched = view.shown.frame.as_ref().map(|frame| &frame.watched);
-    let (colour, text) = match (&view.running, watched) {
+    let (tone, text) = match (&view.running, watched) {
         (None, _) if counts.decoded > 0 => (
-            palette.dim,
+            Tone::Calm,
             format!("Stopped after {}", counted(counts.decoded, "frame")),
         ),
-        (None, _) => (palette.dim, "Ready: press Start".to_owned()),
-        (Some(_), _) if !view.shown.has_answer() => (palette.accent, "Waiting for the first frame".to_owned()),
-        (Some(_), _) if counts.is_waiting => (palette.warning, "No frame for two seconds".to_owned()),
-        (Some(_), Some(Watched::Checked(FaultEvent::Named { wire, .. }))) => {
-            (palette.warning, format!("Fault: {wire}"))
-        }
+        (None, _) => (Tone::Calm, "Ready: press Start".to_owned()),
+        (Some(_), _) if !view.shown.has_answer() => (Tone::Busy, "Waiting for the first frame".to_owned()),
+        (Some(_), _) if counts.is_waiting => (Tone::Warning, "No frame for two seconds".to_owned()),
+        (Some(_), Some(Watched::Checked(FaultEvent::Named { wire, .. }))) => (Tone::Warning, format!("Fault: {wire}")),
         (Some(_), Some(Watched::Checked(FaultEvent::Unexplained))) => {
-            (palette.warning, "The readings contradict Eq. (2)".to_owned())
+            (Tone::Warning, "The readings contradict Eq. (2)".to_owned())
         }
         (Some(running), _) => match (&running.source, view.shown.replay) {
-            (SourcePlan::Replay(_), Some(replay)) if !replay.is_playing => (palette.dim, "Replay paused".to_owned()),
-            (SourcePlan::Replay(_), _) => (palette.good, "Replaying".to_owned()),
-            _ => (palette.good, "Live".to_owned()),
+            (SourcePlan::Replay(_), Some(replay)) if !replay.is_playing => (Tone::Calm, "Replay paused".to_owned()),
+            (SourcePlan::Replay(_), _) => (Tone::Good, "Replaying".to_owned()),
+            _ => (Tone::Good, "Live".to_owned()),
         },
     };
-    ui.horizontal_centered(|ui| {
-        state_ui(ui, colour, &text);
-        let dim = |ui: &mut Ui, text: String| ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
+    let mut status = Status::new(tone, text);
+    {
         if let Some(running) = &view.running {
             let source = match &running.source {
                 SourcePlan::Simulated(_) => "simulated".to_owned(),
                 SourcePlan::Replay(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
                 SourcePlan::Stream(source) => source.to_string(),
             };
-            dim(ui, format!("{}, {source}", running.network));
+            status.notes.push(format!("{}, {source}", running.network));
             if counts.decoded > 0 {
-                dim(ui, format!("{:.0} frames per second", counts.frames_per_second));
+                status
+                    .notes
+                    .push(format!("{:.0} frames per second", counts.frames_per_second));
             }
         }
         if let Some(recorded) = view.shown.recording.as_ref().filter(|_| view.recording.is_some()) {
             let frames = counted(recorded.frames, "frame");
-            let text = format!("● Recording: {frames}, {:.1} s", recorded.seconds);
-            ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
+            status
+                .notes
+                .push(format!("● Recording: {frames}, {:.1} s", recorded.seconds));
         }
-    });
+    }
+    status
 }
