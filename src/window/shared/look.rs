@@ -175,32 +175,23 @@ fn colours_ui(ui: &mut Ui, scale: &Surface, look: &mut Look) {
 /// The choice between a locked and a free scale, where there is one; changes `look`.
 fn lock_ui(ui: &mut Ui, scale: &Surface, look: &mut Look) {
     let limit_mm = *scale.range.end();
-    let (is_locked, meanings) = match scale.quantity {
-        Quantity::Height => (
-            look.heights == HeightScale::Stroke,
-            [
-                "Spans the whole stroke, from full compression to rest: colours mean the same on every surface.".to_owned(),
-                "Spans the displayed heights: small differences are visible, but colours are not comparable between plots."
-                    .to_owned(),
-            ],
-        ),
-        Quantity::Target(_) => (
-            look.heights == HeightScale::Stroke,
-            [
-                "Spans the values of all test samples: colours mean the same for every sample.".to_owned(),
-                "Spans the displayed values: small differences are visible, but colours are not comparable between plots."
-                    .to_owned(),
-            ],
-        ),
-        Quantity::Error => (
-            look.error_limit_mm.is_some(),
-            [
-                format!("Keeps ± {} mm for whatever is shown next.", format_number(limit_mm)),
-                "Spans ± the largest displayed error.".to_owned(),
-            ],
-        ),
+    let keeps = format!("Keeps ± {} mm for whatever is shown next.", format_number(limit_mm));
+    let meanings = match scale.quantity {
+        Quantity::Height => [
+            "Spans the whole stroke, from full compression to rest: colours mean the same on every surface.",
+            "Spans the displayed heights: small differences are visible, but colours are not comparable between plots.",
+        ],
+        Quantity::Target(_) => [
+            "Spans the values of all test samples: colours mean the same for every sample.",
+            "Spans the displayed values: small differences are visible, but colours are not comparable between plots.",
+        ],
+        Quantity::Error => [&*keeps, "Spans ± the largest displayed error."],
         // The limit of errors is in millimetres, which these are not.
         Quantity::Pattern | Quantity::Sensitivity | Quantity::TargetError(_) => return,
+    };
+    let is_locked = match scale.quantity {
+        Quantity::Error => look.error_limit_mm.is_some(),
+        _ => look.heights == HeightScale::Stroke,
     };
     section_heading_ui(ui, "Scale");
     for ((locks, text), meaning) in [(true, "Locked"), (false, "Free")].into_iter().zip(meanings) {
@@ -214,6 +205,6 @@ fn lock_ui(ui: &mut Ui, scale: &Surface, look: &mut Look) {
                 (_, false) => look.heights = HeightScale::Fitted,
             }
         }
-        dim_ui(ui, &meaning);
+        dim_ui(ui, meaning);
     }
 }

@@ -15,5 +15,4 @@ mod view;
 
 pub use decoders::DecoderResult;
 pub use exports::CHECKPOINT;
-pub use press::Touch;
 pub use view::TrainView;
