@@ -1,39 +1,97 @@
-use std::sync::Arc;
+//! The cards in the middle: the decoded surfaces, the readings or the values over time, and the figures of the stream.
 
-use decoupler_core::{live::FaultyWire, sensor::ArrayScale};
+use decoupler_core::{
+    live::{FaultEvent, FaultyWire, ZeroGains},
+    text::{capitalised, counted},
+};
 use decoupler_files::{
-    export::format_number,
+    export::{format_duration, format_number, format_percent},
     figure::{
-        HeatMap, SequentialMap, readings_figure,
+        SequentialMap,
         surface::{Quantity, Surface, SurfaceFigure},
     },
-    live::{ConverterEnd, Fault, FaultEffect, SourcePlan, Watched},
+    live::{SourcePlan, Tally, Watched},
 };
-use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
+use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, Vec2};
 
-use super::{LiveView, engine::LiveFrame, source_form::SourceKind};
+use super::{
+    LiveView,
+    engine::{Answered, Evidence},
+    tools::{REPLAY_BAR_HEIGHT, replay_bar_ui, save_recording},
+};
 use crate::window::{
-    plotting::cells_ui,
+    glossary,
+    plotting::{cells_ui, titled_plots_ui},
     shared::{Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
-    test_view::{Frame, HeightScale},
+    test_view::HeightScale,
     theme::{Theme, semibold, space, type_size},
     widgets::{
-        card_ui,
-        fields::{count_ui, list_ui, options_ui, quantity_ui},
-        ghost_button, note_ui, primary_button,
+        card_ui, coloured_fact_ui, dim_ui, fact_ui, ghost_button, note_ui, primary_button, scrolled_ui,
+        section_heading_ui,
     },
 };
 
-/// Shows the decoupled surface, the actual one next to it if it is known, and their colour scale.
-pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let Some(frame) = &view.shown.frame else { return };
-    let figure = surface_figure(frame, view.node, shared.look);
+/// Shows the answers above, the readings or values and the figures below, and the replay bar at the bottom.
+pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let whole = ui.available_rect_before_wrap();
+    let Some(answer) = view.shown.answer.clone() else {
+        card_ui(ui, whole, |ui| invitation_ui(ui, view, shared, effects));
+        ui.allocate_rect(whole, Sense::hover());
+        return;
+    };
+    let gap = space(2);
+    let mut cards = whole;
+    if view.shown.replay.is_some() {
+        let (rest, bar) = whole.split_top_bottom_at_y(whole.bottom() - REPLAY_BAR_HEIGHT);
+        card_ui(ui, bar, |ui| replay_bar_ui(ui, view, shared, effects));
+        cards = rest.with_max_y(rest.bottom() - gap);
+    }
+    let lower_height = (0.46 * cards.height()).clamp(space(60), space(100));
+    let (upper, lower) = cards.split_top_bottom_at_y(cards.bottom() - lower_height);
+    let figures_width = (0.42 * lower.width()).clamp(space(75), space(110));
+    let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
+    let (mut upper, left) = (
+        upper.with_max_y(upper.bottom() - gap),
+        left.with_max_x(left.right() - gap),
+    );
+    match &answer.evidence {
+        Evidence::Array { .. } => card_ui(ui, left, |ui| readings_ui(ui, &answer, shared.look.colours)),
+        Evidence::Targets { chart, .. } => {
+            let (surface, beside) = upper.split_left_right_at_x(upper.center().x);
+            let place = if answer.surfaces.is_empty() { upper } else { beside };
+            let title = match answer.network.intervals {
+                Some(_) => "Decoded values with their 90 % intervals",
+                None => "Decoded values",
+            };
+            card_ui(ui, place, |ui| titled_plots_ui(ui, title, chart));
+            card_ui(ui, left, |ui| {
+                scrolled_ui(ui, "live targets", |ui| values_ui(ui, &answer))
+            });
+            upper = surface;
+        }
+    }
+    surfaces_ui(ui, upper, &answer, &mut view.node, shared.look, effects);
+    card_ui(ui, right, |ui| {
+        scrolled_ui(ui, "live figures", |ui| figures_ui(ui, view, &answer, shared, effects));
+    });
+    ui.allocate_rect(whole, Sense::hover());
+}
+
+/// Shows the decoded surface, the actual one next to it if it is known, and their colour scale.
+fn surfaces_ui(
+    ui: &mut Ui,
+    rect: Rect,
+    answer: &Answered,
+    node: &mut Option<usize>,
+    look: Look,
+    effects: &mut Vec<Effect>,
+) {
+    let figure = surface_figure(answer, *node, look);
     let gap = space(2);
     let (cards, scale) = rect.split_left_right_at_x(rect.right() - ColourBar::WIDTH);
     let count = figure.surfaces.len() as f32;
     let width = (cards.width() - gap * (count - 1.0)) / count;
-    let mut node = view.node;
     for (index, surface) in figure.surfaces.iter().enumerate() {
         let left = cards.left() + (width + gap) * index as f32;
         let card = Rect::from_min_size([left, cards.top()].into(), Vec2::new(width, cards.height()));
@@ -43,40 +101,61 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, shared: &Shared
                 ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     if index == 0 {
-                        view_mode_ui(ui, shared.look, effects);
+                        view_mode_ui(ui, look, effects);
                     }
                 });
             });
-            surface_ui(ui, surface, frame, shared.look, &mut node, effects);
+            let shown = SurfaceView {
+                label: &format!("Live {} surface", surface.title.to_lowercase()),
+                surface,
+                marked_node: *node,
+                lit_nodes: &[],
+                section: None,
+                theme: Theme::of(ui),
+            }
+            .show(ui, look.camera);
+            follow_surface(&shown, look, node, effects);
+            shown.node_tooltip_ui(|ui, node| {
+                let name = answer.nodes.get(node).map_or("", String::as_str);
+                ui.label(RichText::new(name).font(semibold(type_size().note)));
+                let values = answer.surfaces.iter().filter_map(|surface| {
+                    let value = format_number(surface.nodes.get(node)?.z);
+                    let unit = if surface.quantity == Quantity::Height {
+                        " mm"
+                    } else {
+                        ""
+                    };
+                    Some(format!("{} {value}{unit}", surface.title.to_lowercase()))
+                });
+                ui.label(RichText::new(Vec::from_iter(values).join(", ")).size(type_size().note));
+            });
         });
     }
     if let [colours, ..] = &figure.scales()[..] {
         let slot = scale.shrink2(Vec2::new(0.0, space(4)));
-        colour_scale_ui(ui, slot, colours, &figure.note(), shared.look, effects);
+        colour_scale_ui(ui, slot, colours, &figure.note(), look, effects);
     }
-    view.node = node;
 }
 
-/// Returns the surfaces of a frame on a common scale.
-pub fn surface_figure(frame: &LiveFrame, marked_node: Option<usize>, look: Look) -> SurfaceFigure {
-    let surface = |title: &str, heights: &Frame| Surface {
-        title: title.to_owned(),
-        map: Arc::clone(&frame.surface),
-        values: Arc::clone(&heights.grid_mm),
-        nodes: Arc::clone(&heights.nodes_mm),
-        quantity: Quantity::Height,
-        range: match look.heights {
-            HeightScale::Stroke => frame.z_range_mm.clone(),
-            HeightScale::Fitted => heights.range_mm().unwrap_or_else(|| frame.z_range_mm.clone()),
-        },
-        mode: look.mode,
-        colours: look.colours,
+/// Returns the surfaces of an answer on a common scale.
+pub fn surface_figure(answer: &Answered, marked_node: Option<usize>, look: Look) -> SurfaceFigure {
+    let dressed = |surface: &Surface| {
+        let heights = surface.nodes.iter().map(|node| node.z).filter(|z| z.is_finite());
+        let (low, high) = heights.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
+        let range = match look.heights {
+            // The resolution is a nanometre.
+            HeightScale::Fitted if low <= high => low..=high.max(low + 1e-6),
+            HeightScale::Fitted | HeightScale::Stroke => surface.range.clone(),
+        };
+        Surface {
+            range,
+            mode: look.mode,
+            colours: look.colours,
+            ..surface.clone()
+        }
     };
-    let actual = frame.actual.as_ref().map(|actual| surface("Actual", actual));
     SurfaceFigure {
-        surfaces: std::iter::once(surface("Decoupled", &frame.decoupled))
-            .chain(actual)
-            .collect(),
+        surfaces: answer.surfaces.iter().map(dressed).collect(),
         camera: look.camera,
         marked_node,
         ..SurfaceFigure::default()
@@ -84,116 +163,40 @@ pub fn surface_figure(frame: &LiveFrame, marked_node: Option<usize>, look: Look)
     .with_common_scales()
 }
 
-fn surface_ui(
-    ui: &mut Ui,
-    surface: &Surface,
-    frame: &LiveFrame,
-    look: Look,
-    node: &mut Option<usize>,
-    effects: &mut Vec<Effect>,
-) {
-    let shown = SurfaceView {
-        label: &format!("Live {} surface", surface.title.to_lowercase()),
-        surface,
-        marked_node: *node,
-        lit_nodes: &[],
-        section: None,
-        theme: Theme::of(ui),
-    }
-    .show(ui, look.camera);
-    follow_surface(&shown, look, node, effects);
-    shown.node_tooltip_ui(|ui, node| {
-        let per_row = frame.sensor.scale.nodes_per_row();
-        let (Some(decoupled), Some(row)) = (frame.decoupled.nodes_mm.get(node), frame.rows.get(node / per_row)) else {
-            return;
-        };
-        let name = format!("Row {}, node {}", row + 1, node % per_row + 1);
-        ui.label(RichText::new(name).font(semibold(type_size().note)));
-        let mut text = format!("decoupled z {} mm", format_number(decoupled.z));
-        if let Some(actual) = frame.actual.as_ref().and_then(|actual| actual.nodes_mm.get(node)) {
-            text += &format!(", actual {} mm", format_number(actual.z));
-        }
-        ui.label(RichText::new(text).size(type_size().note));
-    });
-}
-
-/// Upper limit of the colour scale of the readings. It follows the largest drop in round steps and falls slowly, which
-/// keeps colours comparable from frame to frame.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct DropScale {
-    peak_percent: f64,
-    watched: Option<Watched>,
-}
-
-/// Minimum of the upper limit, in percent.
-const MIN_PERCENT: f64 = 0.5;
-/// Decay of the peak per frame.
-const DECAY: f64 = 0.999;
-
-impl DropScale {
-    /// Updates the limit with a frame; faulty wires do not count.
-    pub fn take(&mut self, frame: &LiveFrame) {
-        let is_healthy = |row: usize, column: usize| !frame.watched.leaves_out(frame.rows[row], column);
-        let drops = frame.drops_percent.indexed_iter();
-        let drops = drops.filter(|((row, column), drop)| is_healthy(*row, *column) && drop.is_finite());
-        let largest = drops.map(|(_, &drop)| drop).fold(0.0, f64::max);
-        if self.watched.as_ref() != Some(&frame.watched) {
-            // Discard the peak that a fault has caused.
-            self.watched = Some(frame.watched.clone());
-            self.peak_percent = 0.0;
-        }
-        self.peak_percent = largest.max(DECAY * self.peak_percent);
-    }
-
-    /// Returns the upper limit in percent: 1, 2 or 5 times a power of ten.
-    pub fn largest_percent(&self) -> f64 {
-        let peak = self.peak_percent.max(MIN_PERCENT);
-        let decade = 10_f64.powf(peak.log10().floor());
-        let steps = [1.0, 2.0, 5.0].map(|step| step * decade);
-        steps
-            .into_iter()
-            .find(|step| *step >= peak * (1.0 - 1e-9))
-            .unwrap_or(10.0 * decade)
-    }
-}
-
 /// Shows the text of an empty view, and the button that starts decoding.
-pub fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let palette = Theme::of(ui).palette;
+fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let (heading, text, button) = invitation(view, shared);
     ui.vertical_centered(|ui| {
         ui.add_space((0.5 * ui.available_height() - space(20)).max(0.0));
         ui.set_max_width(ui.available_width().min(space(105)));
-        let (heading, text) = words(view, shared);
         ui.label(RichText::new(heading).font(semibold(type_size().title)));
         ui.add_space(space(1));
-        ui.label(RichText::new(text).color(palette.dim));
+        ui.label(RichText::new(text).color(Theme::of(ui).palette.dim));
         ui.add_space(space(4));
         if view.running.is_some() {
             return;
         }
-        if view.network.network(&shared.runs).is_none() {
-            let is_free = !shared.phase.is_busy();
-            if is_free && ui.add(primary_button("Train a network now")).clicked() {
-                effects.extend([Effect::ShowTraining, Effect::Train]);
+        if button.is_some_and(|button| ui.add(primary_button(button)).clicked()) {
+            match button {
+                Some(TRAIN) => effects.extend([Effect::ShowTraining, Effect::Train]),
+                _ => view.start(shared, effects),
             }
-        } else if view.source.kind == SourceKind::Simulated && view.has_sensor(shared) {
-            if ui.add(primary_button("Start the simulated source")).clicked() {
-                view.start(shared, effects);
-            }
-        } else if view.obstacle(shared).is_none() && ui.add(primary_button("Start this source")).clicked() {
-            view.start(shared, effects);
         }
         ui.add_space(space(2));
         let hint = "Four seconds of a ball that wanders over a simulated array, with a network that decodes them.";
         let sample = ui.add(ghost_button("Play the sample recording"));
         if sample.on_hover_text(hint).clicked() {
-            view.ask_for_sample(shared);
+            view.play_sample(shared);
         }
     });
 }
 
-fn words(view: &LiveView, shared: &Shared) -> (String, String) {
-    let (counts, network) = (&view.shown.counts, view.network.network(&shared.runs));
+/// Button that trains a network.
+const TRAIN: &str = "Train a network now";
+
+/// Returns the heading and the text of an empty view, and its button.
+fn invitation(view: &LiveView, shared: &Shared) -> (String, String, Option<&'static str>) {
+    let counts = &view.shown.counts;
     if let Some(running) = &view.running {
         let source = match &running.source {
             SourcePlan::Simulated(_) => "the simulated source".to_owned(),
@@ -204,241 +207,325 @@ fn words(view: &LiveView, shared: &Shared) -> (String, String) {
             Some(reason) => format!("Malformed lines: {}. Last: {reason}.", counts.bad),
             None => "It appears here as soon as it arrives.".to_owned(),
         };
-        return (format!("Waiting for the first frame from {source}"), text);
+        return (format!("Waiting for the first frame from {source}"), text, None);
     }
-    let Some((name, _)) = network else {
-        let text = if shared.phase.is_busy() {
-            "Live decoding needs a trained network. One is being trained in the Train view: it can be used here as soon \
-             as it is finished."
-        } else {
-            "Live decoding needs a trained network. Train one with the settings of the Train view, which takes from \
-             seconds to minutes, or open a network file."
+    let Some((name, file)) = view.network.network(&shared.runs) else {
+        let (text, button) = match shared.phase.is_busy() {
+            true => (
+                "Live decoding needs a trained network. One is being trained in the Train view: it can be used here as soon \
+                 as it is finished.",
+                None,
+            ),
+            false => (
+                "Live decoding needs a trained network. Train one with the settings of the Train view, which takes from \
+                 seconds to minutes, or open a network file.",
+                Some(TRAIN),
+            ),
         };
-        return ("No network yet".to_owned(), text.to_owned());
+        return ("No network yet".to_owned(), text.to_owned(), button);
     };
-    let text = match view.source.kind {
-        SourceKind::Simulated if view.has_sensor(shared) => format!(
-            "An indenter wanders over a simulated array and the network '{name}' decodes its readings, without any \
-             hardware. To decode your own, choose a replay, a serial port or a TCP address on the left."
-        ),
-        _ => match view.obstacle(shared) {
-            Some(obstacle) => obstacle,
-            None if view.has_sensor(shared) => format!("The network '{name}' decodes its frames as they arrive."),
-            None => format!("The network '{name}' decodes its samples as they arrive, by the names of their columns."),
-        },
+    let (text, button) = match view.plan(shared).map(|(_, plan)| plan.source) {
+        Err(obstacle) => (obstacle, None),
+        Ok(SourcePlan::Simulated(_)) => {
+            let text = format!(
+                "An indenter wanders over a simulated array and the network '{name}' decodes its readings, without any \
+                 hardware. To decode your own, choose a replay, a serial port or a TCP address on the left."
+            );
+            (text, Some("Start the simulated source"))
+        }
+        Ok(_) => {
+            let what = match file.problem.sensor {
+                Some(_) => "frames as they arrive",
+                None => "samples as they arrive, by the names of their columns",
+            };
+            let text = format!("The network '{name}' decodes its {what}.");
+            (text, Some("Start this source"))
+        }
     };
-    ("Decode live readings".to_owned(), text)
+    ("Decode live readings".to_owned(), text, button)
 }
 
-/// Shows the readings of the frame as a map of rows and columns.
-pub fn readings_ui(ui: &mut Ui, view: &LiveView, colours: SequentialMap) {
-    let Some(frame) = &view.shown.frame else { return };
+/// Shows the readings of an array as a map of rows and columns, with the faulty wires marked.
+fn readings_ui(ui: &mut Ui, answer: &Answered, colours: SequentialMap) {
+    let Evidence::Array {
+        rows,
+        readings,
+        watched,
+        ..
+    } = &answer.evidence
+    else {
+        return;
+    };
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         ui.label(RichText::new("Readings").font(semibold(type_size().title)));
     });
-    let map = figure_of(frame, view.drops.largest_percent()).coloured(colours);
-    let (rows, columns) = marked(frame);
-    let warning = Theme::of(ui).palette.warning;
-    let marks = (&*rows, &*columns, warning);
+    let (mut faulty_rows, mut faulty_columns) = (Vec::new(), Vec::new());
+    if let Some(wire) = watched.wire() {
+        faulty_rows.extend((0..rows.len()).filter(|&place| wire == FaultyWire::Row(rows[place])));
+        faulty_columns.extend(wire.columns());
+    }
+    let marks = (&*faulty_rows, &*faulty_columns, Theme::of(ui).palette.warning);
+    let map = readings.clone().coloured(colours);
     let Some(([row, column], cell)) = cells_ui(ui, "Live readings", &map, marks) else {
         return;
     };
-    let value = format_number(map.values[[row, column]]);
-    let row = frame.rows.get(row).map_or(0, |row| row + 1);
+    let drop_percent = format_number(map.values[[row, column]]);
+    let (row, column) = (rows.get(row).map_or(0, |row| row + 1), column + 1);
     cell.on_hover_text_at_pointer(format!(
-        "Row-wire {row}, column-wire {}\ndrop from unloaded: {value} %",
-        column + 1
+        "Row-wire {row}, column-wire {column}\ndrop from unloaded: {drop_percent} %"
     ));
 }
 
-/// Returns the map of the readings of a frame.
-pub fn figure_of(frame: &LiveFrame, largest_percent: f64) -> HeatMap {
-    readings_figure(frame.drops_percent.clone(), &frame.rows, largest_percent)
-}
-
-/// Returns the rows and columns of the map whose wires are faulty.
-fn marked(frame: &LiveFrame) -> (Vec<usize>, Vec<usize>) {
-    let Some(wire) = frame.watched.wire() else {
-        return (Vec::new(), Vec::new());
-    };
-    let rows = frame.rows.iter().enumerate();
-    let rows = rows
-        .filter(|(_, row)| wire == FaultyWire::Row(**row))
-        .map(|(place, _)| place);
-    (rows.collect(), wire.columns().collect())
-}
-
-/// Form of the fault of the simulated wires.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FaultForm {
-    kind: Option<FaultKind>,
-    /// Row-wire or column-wire, from 1; the first of two shorted wires.
-    wire: usize,
-    /// Node before which a wire is broken, from 1.
-    node: usize,
-    gain_percent: f64,
-    end: ConverterEnd,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum FaultKind {
-    BrokenRow,
-    BrokenColumn,
-    ShortedColumns,
-    Gain,
-    Saturated,
-}
-
-impl Default for FaultForm {
-    fn default() -> Self {
-        Self {
-            kind: None,
-            wire: 3,
-            node: 1,
-            gain_percent: 5.0,
-            end: ConverterEnd::High,
-        }
-    }
-}
-
-impl FaultForm {
-    /// Returns the fault in an array of this scale; the number of the wire is limited to that of the last wire.
-    pub fn fault(&self, scale: ArrayScale) -> Option<Fault> {
-        let last = self.kind?.wires(scale);
-        let (wire, node) = (self.wire.clamp(1, last.max(1)) - 1, self.node.max(1) - 1);
-        let column = FaultyWire::Column(wire);
-        let (wire, effect) = match self.kind? {
-            FaultKind::BrokenRow => (
-                FaultyWire::Row(wire),
-                FaultEffect::Open(node.min(scale.nodes_per_row() - 1)),
+/// Shows the latest value of each target, with its uncertainty.
+fn values_ui(ui: &mut Ui, answer: &Answered) {
+    section_heading_ui(ui, "Targets");
+    let intervals = answer.network.intervals.as_ref();
+    for (index, (target, &value)) in answer.network.problem.targets.iter().zip(&answer.values).enumerate() {
+        let half_width = intervals.and_then(|intervals| intervals.half_width(index, value));
+        let (hint, uncertainty) = match half_width {
+            Some(half_width) => (
+                "Latest decoded value ± half-width of its 90 % prediction interval.",
+                format!(" ± {}", format_number(half_width)),
             ),
-            FaultKind::BrokenColumn => (column, FaultEffect::Open(node.min(scale.nodes_per_column() - 1))),
-            FaultKind::ShortedColumns => (FaultyWire::Columns(wire), FaultEffect::Shorted),
-            FaultKind::Gain if self.gain_percent == 0.0 => return None,
-            FaultKind::Gain => (column, FaultEffect::Gain(self.gain_percent / 100.0)),
-            FaultKind::Saturated => (column, FaultEffect::Stuck(self.end)),
+            None => ("Latest decoded value.", String::new()),
         };
-        Some(Fault { wire, effect })
-    }
-
-    /// Shows the form for an array of this scale in which these row-wires are read.
-    pub fn form_ui(&mut self, ui: &mut Ui, scale: ArrayScale, read: &[usize]) {
-        let hint = "A fault of the simulated wires or electronics, which takes effect at once.";
-        if let Some(kind) = list_ui(ui, "Wire fault", hint, &KINDS, self.kind) {
-            self.kind = kind;
-        }
-        let Some(kind) = self.kind else { return };
-        let (name, hint) = kind.wire_field();
-        let last = kind.wires(scale).max(1);
-        self.wire = self.wire.clamp(1, last);
-        count_ui(ui, name, hint, &mut self.wire, 1..=last);
-        match kind {
-            FaultKind::BrokenRow | FaultKind::BrokenColumn => {
-                let nodes = match kind {
-                    FaultKind::BrokenRow => scale.nodes_per_row(),
-                    _ => scale.nodes_per_column(),
-                };
-                self.node = self.node.clamp(1, nodes);
-                let hint = "Node before which the wire is broken, counted from its connector: before node 1 it is \
-                            broken at the connector.";
-                count_ui(ui, "Before node", hint, &mut self.node, 1..=nodes);
-            }
-            FaultKind::Gain => {
-                let hint = "Error of the amplifier's gain, in percent: all readings of the column-wire are too large by \
-                            this much.";
-                quantity_ui(ui, "Gain error", hint, &mut self.gain_percent, -90.0..=1000.0, "%");
-            }
-            FaultKind::Saturated => {
-                let ends = [
-                    (ConverterEnd::Low, "Low", "At its first step."),
-                    (ConverterEnd::High, "High", "At its full scale."),
-                ];
-                let hint = "End of the converter's range at which it is stuck.";
-                self.end = options_ui(ui, "Stuck at", hint, &ends, self.end).unwrap_or(self.end);
-            }
-            FaultKind::ShortedColumns => {}
-        }
-        if let Some(problem) = self.problem(scale, read) {
-            note_ui(ui, &format!("This fault is not possible: {problem}."));
-        }
-    }
-
-    /// Returns the reason why the array cannot have this fault, if there is one.
-    pub fn problem(&self, scale: ArrayScale, read: &[usize]) -> Option<String> {
-        let checked = self.fault(scale)?.check(scale, read);
-        checked.err().map(|error| error.to_string())
+        fact_ui(
+            ui,
+            &target.title(),
+            hint,
+            &format!("{}{uncertainty}", format_number(value)),
+        );
     }
 }
 
-const KINDS: [(Option<FaultKind>, &str, &str); 6] = [
-    (None, "None", "No wire is faulty."),
-    (
-        Some(FaultKind::BrokenRow),
-        "Broken row-wire",
-        "Its nodes beyond the break carry no current.",
-    ),
-    (
-        Some(FaultKind::BrokenColumn),
-        "Broken column-wire",
-        "Its nodes beyond the break carry no current.",
-    ),
-    (
-        Some(FaultKind::ShortedColumns),
-        "Shorted column-wires",
-        "Two neighbours touch, and read the same.",
-    ),
-    (
-        Some(FaultKind::Gain),
-        "Gain drift",
-        "The amplifier of a column-wire has drifted.",
-    ),
-    (
-        Some(FaultKind::Saturated),
-        "Saturated converter",
-        "The converter of a column-wire is stuck at an end of its range.",
-    ),
-];
-
-impl FaultKind {
-    /// Returns the number of wires that can have it.
-    fn wires(self, scale: ArrayScale) -> usize {
-        match self {
-            Self::BrokenRow => scale.rows(),
-            Self::ShortedColumns => scale.columns().saturating_sub(1),
-            Self::BrokenColumn | Self::Gain | Self::Saturated => scale.columns(),
-        }
+/// Shows confidence, the stream, and of an array the unloaded state and the recording; warnings above everything else.
+fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shared, effects: &mut Vec<Effect>) {
+    let is_array = matches!(answer.evidence, Evidence::Array { .. });
+    if let Evidence::Array { watched, .. } = &answer.evidence {
+        warning_ui(ui, watched);
     }
-
-    fn wire_field(self) -> (&'static str, &'static str) {
-        match self {
-            Self::BrokenRow => ("Row-wire", "Number of the broken row-wire."),
-            Self::ShortedColumns => ("First column-wire", "It touches the next one."),
-            Self::BrokenColumn | Self::Gain | Self::Saturated => ("Column-wire", "Number of the column-wire."),
-        }
+    section_heading_ui(ui, "Confidence");
+    confidence_ui(ui, answer, &view.shown.counts);
+    section_heading_ui(ui, "Stream");
+    stream_ui(ui, &view.shown.counts);
+    if is_array {
+        section_heading_ui(ui, "Zero");
+        zero_ui(ui, view);
+        section_heading_ui(ui, "Recording");
+        recording_ui(ui, view, shared, effects);
     }
+    ui.add_space(space(2));
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_scale_ends_at_round_numbers() {
-        for (peak_percent, expected) in [
-            (0.0, 0.5),
-            (0.6, 1.0),
-            (1.0, 1.0),
-            (1.3, 2.0),
-            (4.9, 5.0),
-            (73.0, 100.0),
-        ] {
-            let scale = DropScale {
-                peak_percent,
-                watched: None,
+fn warning_ui(ui: &mut Ui, watched: &Watched) {
+    let Watched::Checked(event) = watched else { return };
+    let text = match event {
+        FaultEvent::Named { wire, .. } => {
+            let its = match wire {
+                FaultyWire::Row(_) | FaultyWire::Column(_) => "Its",
+                FaultyWire::Columns(_) => "Their",
             };
-            let found = scale.largest_percent();
-            assert!((found / expected - 1.0).abs() < 1e-9, "{peak_percent}: {found}");
+            let event = capitalised(&event.to_string());
+            format!("{event}. {its} readings are left out, and the others decoded by Gauss-Newton steps on Eq. (2).")
+        }
+        FaultEvent::Unexplained => {
+            "The readings contradict Eq. (2), and no fault of a single wire explains them: the answers may be wrong. Check the \
+             wiring, the geometry, the order of the rows, and the relative noise on the left."
+                .to_owned()
+        }
+        FaultEvent::Recovered => return,
+    };
+    note_ui(ui, &text);
+}
+
+fn confidence_ui(ui: &mut Ui, answer: &Answered, counts: &Tally) {
+    match &answer.evidence {
+        Evidence::Array {
+            readings,
+            watched,
+            residual,
+            noise,
+            ..
+        } => {
+            let mut value = format_percent(100.0 * residual);
+            if *noise > 0.0 && residual.is_finite() {
+                value += &format!(" ({} × noise)", format_number(residual / noise));
+            }
+            let hint = format!(
+                "{}\n\nIt is as small as the noise of a reading if the answer explains the readings.",
+                glossary::RESIDUAL.hint
+            );
+            fact_ui(ui, "Residual of Eq. (2)", &hint, &value);
+            let hint = "Readings beyond the range seen in training by more than a tenth of it, and coordinates beyond by more \
+                        than all of it. There the network extrapolates: check these readings, or train with a scene that \
+                        covers them, for the simulated source with an indenter as the loading.";
+            outside_ui(ui, answer.outside, readings.values.len(), "coordinate", hint);
+            fault_ui(ui, watched);
+            if answer.surfaces.len() > 1 {
+                let hint =
+                    "Mean |error| of z over all nodes, compared with the simulated truth, over the latest frames.";
+                let error = counts.error_mm.map(|mm| format!("{} mm", format_number(mm)));
+                fact_ui(ui, "Error", hint, &error.unwrap_or_else(|| format_number(None)));
+            }
+        }
+        Evidence::Targets { drift, .. } => {
+            let hint = "Readings beyond the range seen in training by more than a tenth of it, and targets beyond by more than \
+                        all of it. There the network extrapolates: check these readings, or train on a recording that covers \
+                        them.";
+            let problem = &answer.network.problem;
+            outside_ui(ui, answer.outside, problem.feature_count(), "target", hint);
+            let palette = Theme::of(ui).palette;
+            let (hint, value, colour) = match drift {
+                Err(reason) => (
+                    format!("Drift is not monitored: {reason}."),
+                    "not monitored".to_owned(),
+                    palette.dim,
+                ),
+                Ok(None) => (DRIFT.to_owned(), "none".to_owned(), palette.text),
+                Ok(Some(drift)) => (
+                    DRIFT.to_owned(),
+                    capitalised(&drift.describe(&problem.inputs)),
+                    palette.warning,
+                ),
+            };
+            coloured_fact_ui(ui, "Drift of the readings", &hint, &value, colour);
         }
     }
+}
+
+const DRIFT: &str = "Readings that do not look like those of the training: prediction intervals do not hold. Check the sensor and \
+                     its connection, re-zero it, or train with recent samples. The warning ends when the readings are back to \
+                     normal. In readings like those of the training, a false alarm occurs on average at most once in 10 000 \
+                     blocks of readings, each at least five times as long as neighbouring readings are correlated.";
+
+/// Shows how many of `of` readings, and of the targets, are outside the range seen in training.
+fn outside_ui(ui: &mut Ui, (readings, targets): (Option<usize>, usize), of: usize, target: &str, hint: &str) {
+    let mut value = match readings {
+        None => "readings not known".to_owned(),
+        Some(0) if targets == 0 => "none".to_owned(),
+        Some(readings) => format!("{} of {of}", counted(readings, "reading")),
+    };
+    if targets > 0 {
+        value += &format!(", {}", counted(targets, target));
+    }
+    let palette = Theme::of(ui).palette;
+    let is_outside = readings.unwrap_or(0) + targets > 0;
+    let colour = if is_outside { palette.warning } else { palette.text };
+    coloured_fact_ui(ui, "Outside training", hint, &value, colour);
+}
+
+fn fault_ui(ui: &mut Ui, watched: &Watched) {
+    let value = match watched {
+        Watched::NoNoise | Watched::TooLarge => {
+            let reason = match watched {
+                Watched::NoNoise => "without noise, deviations cannot be judged; give the noise of a reading",
+                _ => "the array is too large to check every frame",
+            };
+            dim_ui(ui, &format!("Faults of wires are not looked for: {reason}."));
+            return;
+        }
+        Watched::Checked(FaultEvent::Recovered) => "none".to_owned(),
+        Watched::Checked(FaultEvent::Unexplained) => "not a single-wire fault".to_owned(),
+        Watched::Checked(FaultEvent::Named { wire, .. }) => wire.to_string(),
+    };
+    fact_ui(ui, "Fault", glossary::WIRE_FAULT.hint, &value);
+}
+
+/// Shows rate, latency and losses of the stream.
+fn stream_ui(ui: &mut Ui, counts: &Tally) {
+    let rate = match counts.is_waiting {
+        true => "waiting".to_owned(),
+        false => format!("{:.0} frames per second", counts.frames_per_second),
+    };
+    let latency = match [0.5, 0.99].map(|share| counts.latencies.quantile(share)) {
+        [Some(median), Some(high)] => format!("p50 {}, p99 {}", format_duration(median), format_duration(high)),
+        _ => format_number(None),
+    };
+    for (name, hint, value) in [
+        ("Rate", "Frames per second (recent).", rate),
+        (
+            "Latency",
+            "Time from reading a frame to its answer: median, and the 99th percentile, which one frame in a hundred exceeds.",
+            latency,
+        ),
+        ("Decoded", "Frames decoded since the start.", counts.decoded.to_string()),
+        (
+            "Dropped",
+            "Frames (lines of a device) that were replaced by newer ones before they could be decoded.",
+            counts.dropped.to_string(),
+        ),
+        (
+            "Bad",
+            "Malformed lines, and frames that could not be decoded.",
+            counts.bad.to_string(),
+        ),
+    ] {
+        fact_ui(ui, name, hint, &value);
+    }
+    if let Some(reason) = &counts.last_bad {
+        dim_ui(ui, &format!("Last: {reason}"));
+    }
+}
+
+fn zero_ui(ui: &mut Ui, view: &mut LiveView) {
+    let Some(ZeroGains { gains, in_contact, .. }) = &view.shown.zero else {
+        dim_ui(
+            ui,
+            "Readings are compared with the model at rest. Re-zero uses the current state of the array instead.",
+        );
+        return;
+    };
+    let (low, high) = gains.iter().fold((f64::MAX, f64::MIN), |(low, high), &gain| {
+        (low.min(gain), high.max(gain))
+    });
+    let hint = "Smallest and largest gain: reading in the unloaded state over the resistance of the model at rest.";
+    fact_ui(ui, "Gains", hint, &format!("{low:.4} to {high:.4}"));
+    let hint =
+        "Rows in contact during the re-zero: only the gains of their columns were taken, so that the contact is kept.";
+    let touched = in_contact.iter().filter(|touched| **touched).count();
+    fact_ui(
+        ui,
+        "Rows in contact",
+        hint,
+        &format!("{touched} of {}", in_contact.len()),
+    );
+    let clear = ui.add(ghost_button("Clear zero"));
+    if clear
+        .on_hover_text("Compares readings with the model at rest again.")
+        .clicked()
+    {
+        view.clear_zero();
+    }
+}
+
+fn recording_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let Some(recorded) = view.shown.recorded.clone() else {
+        dim_ui(
+            ui,
+            "Record keeps every frame with its time, to be replayed with any network.",
+        );
+        return;
+    };
+    let length = format!("{}, {:.1} s", counted(recorded.frames, "frame"), recorded.seconds);
+    if view.is_recording() {
+        let bad = Theme::of(ui).palette.bad;
+        ui.label(RichText::new(format!("● {length}")).size(type_size().note).color(bad));
+        return;
+    }
+    dim_ui(ui, &format!("Recorded {length}.")).on_hover_text(recorded.path.display().to_string());
+    ui.horizontal(|ui| {
+        let replay = ui.add_enabled(recorded.frames > 0, ghost_button("Replay recording"));
+        if replay
+            .on_hover_text("Replays it with the network on the left.")
+            .clicked()
+        {
+            view.replay(&recorded.path, shared, effects);
+        }
+        let task = save_recording(&recorded);
+        let save = ui.add(ghost_button("Save recording…"));
+        if save.on_hover_text(task.words.description).clicked() {
+            effects.push(Effect::ChooseFile(task));
+        }
+    });
 }

@@ -1,11 +1,10 @@
 //! The decoding thread: a session decodes what its source sends, and the window displays the latest.
 //!
-//! [`run`] is the loop. [`Command`]s change the session while it runs, and [`LiveEvent`]s report its results. A [`LiveShown`] is
-//! sent only after the window has drawn the previous one, so frames do not queue up.
+//! [`run`] is the loop. [`Command`]s change the session while it runs. A [`Snapshot`] is sent only after the window has drawn
+//! the previous one, so frames do not queue up.
 
 use std::{
     ops::RangeInclusive,
-    path::PathBuf,
     sync::{
         Arc,
         mpsc::{Receiver, RecvTimeoutError},
@@ -16,211 +15,283 @@ use std::{
 use decoupler_core::{
     job::Job,
     live::{Drift, LiveError, ZeroGains},
-    sensor::SensorModel,
     surface::SurfaceMap,
 };
 use decoupler_files::{
     export::NetworkFile,
-    figure::TargetSurface,
+    figure::{
+        HeatMap, PlotFigure, TargetSurface, readings_figure,
+        surface::{Quantity, Surface},
+        targets_over_time_figure,
+    },
     live::{
-        History, Input, LiveArray, Note, Recorded, ReplayState, Session, SessionEvent, SessionPlan, SourcePlan, Tally,
-        Watched,
+        History, Input, LiveArray, Note, Recorded, ReplayState, Session, SessionEvent, SessionPlan, Tally, Watched,
     },
 };
 use glam::DVec3;
 use ndarray::Array2;
 
-use crate::window::{job::Report, test_view::Frame};
+use crate::window::job::Report;
 
 /// Message to the thread.
 pub enum Command {
-    /// The last frame was drawn: send the next one.
+    /// The last snapshot was drawn: send the next one.
     Drawn,
-    /// Change the session, and send the event that this returns.
+    /// Change the session.
     Change(Change),
 }
 
-/// Change of the session.
-pub type Change = Box<dyn FnOnce(&mut Session) -> Option<LiveEvent> + Send>;
+/// Change of the session, which may fail with a reason.
+pub type Change = Box<dyn FnOnce(&mut Session) -> Result<(), String> + Send>;
 
 /// Event from the thread.
 #[derive(Debug)]
 pub enum LiveEvent {
-    /// The source, according to the file at its path.
-    Source(SourcePlan),
-    /// The latest frame, with the status of decoding.
-    Shown(Box<LiveShown>),
-    /// Gains of the unloaded state, or the reason why there are none.
-    Zeroed(Result<ZeroGains, String>),
-    /// A recording has begun.
-    Recording(PathBuf),
-    /// A recording has ended, with the reason if the user did not end it.
-    Recorded(Recorded, Option<String>),
-    /// A change has failed, with the reason.
+    /// The latest state.
+    Shown(Box<Snapshot>),
+    /// A change has failed, or a recording has ended by itself, with the reason.
     Failed(String),
     /// Decoding has ended, with the reason if it could not continue.
     Ended(Result<(), String>),
 }
 
-/// State of decoding.
+/// State of a session, ready to be drawn.
 #[derive(Clone, Debug, Default)]
-pub struct LiveShown {
-    /// The last frame of an array with an answer; `None` before the first.
-    pub frame: Option<LiveFrame>,
-    /// The last sample with an answer, of a network of a recording; `None` before the first.
-    pub targets: Option<LiveTargets>,
-    /// Readings of this frame or sample outside the range seen in training, `None` if that is not known, and targets far outside.
-    pub outside: (Option<usize>, usize),
-    /// Number of frames and their times.
+pub struct Snapshot {
+    /// The last answer; `None` before the first.
+    pub answer: Option<Arc<Answered>>,
+    /// Number of answers and their times.
     pub counts: Tally,
-    /// The recording under way.
-    pub recording: Option<Recorded>,
+    /// The latest recording, possibly of an earlier session.
+    pub recorded: Option<Recorded>,
+    /// True while it is under way.
+    pub is_recording: bool,
     /// Position in the replayed recording.
     pub replay: Option<ReplayState>,
+    /// Gains of the unloaded state by which readings are divided.
+    pub zero: Option<ZeroGains>,
 }
 
-impl LiveShown {
-    /// Returns true once there is something to be drawn.
-    pub fn has_answer(&self) -> bool {
-        self.frame.is_some() || self.targets.is_some()
-    }
-}
-
-/// Latest answers of a network of a recording.
+/// One answer, ready to be drawn.
 #[derive(Clone, Debug)]
-pub struct LiveTargets {
+pub struct Answered {
     /// The network, which describes the targets and may have prediction intervals.
     pub network: Arc<NetworkFile>,
-    /// Present drift of the readings, or the reason why they are not monitored.
-    pub drift: Result<Option<Drift>, LiveError>,
-    /// Surface through the targets, if they have positions.
-    pub surface: Option<Arc<TargetSurface>>,
-    /// Smallest and largest value of each target so far.
-    pub ranges: Vec<(f64, f64)>,
-    /// Times in seconds and values of the targets that are displayed, the latest last.
-    pub history: Vec<(f64, Arc<[f64]>)>,
-    /// All values: of a recording, from its beginning.
-    pub all: History,
-}
-
-impl LiveTargets {
-    /// Returns the latest values.
-    pub fn values(&self) -> &[f64] {
-        self.history.last().map_or(&[], |(_, values)| values)
-    }
-}
-
-/// One decoded frame, ready to be drawn.
-#[derive(Clone, Debug)]
-pub struct LiveFrame {
-    /// Sensor whose frames these are.
-    pub sensor: SensorModel,
-    /// Row-wires read, from 0.
-    pub rows: Arc<[usize]>,
-    /// The surface through its nodes.
-    pub surface: Arc<SurfaceMap>,
-    /// z from full compression to rest, in millimetres.
-    pub z_range_mm: RangeInclusive<f64>,
-    /// The decoded deformation.
-    pub decoupled: Frame,
-    /// The true one, of a simulated source.
-    pub actual: Option<Frame>,
-    /// Drop of each reading from its value without load, in percent: rows × columns.
-    pub drops_percent: Array2<f64>,
-    /// Time of the frame in its source, in seconds.
+    /// Time in its source, in seconds.
     pub time_s: f64,
-    /// Root mean square of m/R − 1 over the readings m that are used, R from Eq. (2) at the decoded deformation.
-    pub residual: f64,
-    /// Faults of wires.
-    pub watched: Watched,
+    /// The decoded values: rows × targets.
+    pub values: Vec<f64>,
+    /// The decoded surface, and the actual one if it is known; none if the targets have no positions.
+    pub surfaces: Vec<Surface>,
+    /// Names of the nodes of the surfaces.
+    pub nodes: Arc<[String]>,
+    /// Readings outside the range seen in training, `None` if that is not known, and targets far outside.
+    pub outside: (Option<usize>, usize),
+    /// What tells how far the answer can be trusted.
+    pub evidence: Evidence,
 }
 
-/// What is displayed, and what the answers of a session are drawn on.
+/// What a source shows besides its answers.
+#[derive(Clone, Debug)]
+pub enum Evidence {
+    /// Of an array, whose sensor model explains the readings.
+    Array {
+        /// Row-wires read, from 0.
+        rows: Arc<[usize]>,
+        /// The readings as drops from their values without load.
+        readings: HeatMap,
+        /// Faults of wires.
+        watched: Watched,
+        /// Root mean square of m/R − 1 over the readings m that are used, R from Eq. (2) at the decoded deformation.
+        residual: f64,
+        /// Noise of a reading, relative to the reading.
+        noise: f64,
+    },
+    /// Of a network of a recording.
+    Targets {
+        /// The values over time.
+        chart: PlotFigure,
+        /// Present drift of the readings, or the reason why they are not monitored.
+        drift: Result<Option<Drift>, LiveError>,
+        /// All values: of a recording, from its beginning.
+        all: History,
+    },
+}
+
+/// What the answers of a session are drawn on.
+enum Ground {
+    /// The nodes of an array, and z from full compression to rest in millimetres.
+    Nodes(Arc<SurfaceMap>, RangeInclusive<f64>),
+    /// Targets with positions.
+    Targets(TargetSurface),
+    /// Targets without.
+    None,
+}
+
+/// What is displayed.
 struct Screen {
     network: Arc<NetworkFile>,
-    /// Surface through the nodes of an array, and z from full compression to rest in millimetres.
-    nodes: Option<(Arc<SurfaceMap>, RangeInclusive<f64>)>,
-    targets: Option<Arc<TargetSurface>>,
-    shown: LiveShown,
+    noise: f64,
+    ground: Ground,
+    nodes: Arc<[String]>,
+    drops: DropScale,
+    shown: Snapshot,
     /// True if the session has an answer that is not displayed yet.
     has_answer: bool,
 }
 
 impl Screen {
-    fn new(network: Arc<NetworkFile>) -> Result<Self, String> {
-        let problem = &network.problem;
-        let mut nodes = None;
-        if let Some(simulation) = &problem.sensor {
-            let (sensor, scene) = (&simulation.sensor, &simulation.scene);
-            let rows = scene
-                .rows
-                .read(sensor.scale.rows())
-                .map_err(|error| error.to_string())?;
-            let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &rows);
-            let surface = SurfaceMap::shared(&x_mm, &y_mm).map_err(|error| error.to_string())?;
-            let height_mm = sensor.geometry.height_mm;
-            nodes = Some((surface, height_mm - scene.stroke_mm(&sensor.geometry)..=height_mm));
-        }
-        let targets = TargetSurface::new(&problem.positions, &problem.targets);
+    fn new(plan: &SessionPlan, shown: Snapshot) -> Result<Self, String> {
+        let problem = &plan.network.problem;
+        let (ground, nodes) = match &problem.sensor {
+            Some(simulation) => {
+                let (sensor, scene) = (&simulation.sensor, &simulation.scene);
+                let rows = scene.rows.read(sensor.scale.rows());
+                let rows = rows.map_err(|error| error.to_string())?;
+                let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &rows);
+                let map = SurfaceMap::shared(&x_mm, &y_mm).map_err(|error| error.to_string())?;
+                let height_mm = sensor.geometry.height_mm;
+                let of_row =
+                    |row| (1..=sensor.scale.nodes_per_row()).map(move |node| format!("Row {row}, node {node}"));
+                let nodes = rows.iter().flat_map(|row| of_row(row + 1)).collect();
+                let range_mm = height_mm - scene.stroke_mm(&sensor.geometry)..=height_mm;
+                (Ground::Nodes(map, range_mm), nodes)
+            }
+            None => match TargetSurface::new(&problem.positions, &problem.targets) {
+                Ok(surface) if !problem.positions.is_empty() => {
+                    let nodes = surface.nodes().iter().map(|node| problem.targets[node.target].title());
+                    let nodes = nodes.collect();
+                    (Ground::Targets(surface), nodes)
+                }
+                _ => (Ground::None, Arc::default()),
+            },
+        };
         Ok(Self {
+            network: Arc::clone(&plan.network),
+            noise: plan.noise.relative,
+            ground,
             nodes,
-            targets: targets.ok().filter(|_| !problem.positions.is_empty()).map(Arc::new),
-            network,
-            shown: LiveShown::default(),
+            drops: DropScale::default(),
+            shown,
             has_answer: false,
         })
     }
 
-    /// Displays the last answer, if there is a new one, and the status of decoding.
+    /// Takes the length of the recording in progress, which is gone once it has ended.
+    fn follow_recording(&mut self, session: &Session) {
+        self.shown.is_recording = session.recording.is_some();
+        if let Some(file) = &session.recording {
+            self.shown.recorded = Some(file.recorded.clone());
+        }
+    }
+
+    /// Displays the last answer, if there is a new one, and the state of decoding.
     fn show(&mut self, session: &Session, report: &Report<LiveEvent>) {
         if std::mem::take(&mut self.has_answer) {
-            let drift = session.monitor.as_ref();
-            let frame = session.array.as_ref().and_then(|array| self.frame(session, array));
-            self.shown.targets = frame.is_none().then(|| LiveTargets {
-                network: Arc::clone(&self.network),
-                drift: drift.map(|monitor| monitor.drift().copied()).map_err(Clone::clone),
-                surface: self.targets.clone(),
-                ranges: session.ranges.clone(),
-                history: session.history.until(session.last.time_s),
-                all: session.history.clone(),
-            });
-            (self.shown.frame, self.shown.outside) = (frame, session.outside());
+            self.shown.answer = Some(Arc::new(self.answered(session)));
         }
+        self.follow_recording(session);
         self.shown.counts = session.tally.clone();
-        self.shown.recording = session.recording.as_ref().map(|file| file.recorded.clone());
-        if let Input::Replay(replay) = &session.input {
-            self.shown.replay = Some(replay.state);
-        }
+        self.shown.zero = session.array.as_ref().and_then(|array| array.zero.clone());
+        self.shown.replay = match &session.input {
+            Input::Replay(replay) => Some(replay.state),
+            _ => None,
+        };
         report.progress(LiveEvent::Shown(Box::new(self.shown.clone())), |_, _| {});
     }
 
-    fn frame(&self, session: &Session, array: &LiveArray) -> Option<LiveFrame> {
-        let (surface, z_range_mm) = self.nodes.as_ref()?;
-        let (sensor, answer) = (&array.sensor, &session.last);
-        let frame = |nodes_mm: Arc<[DVec3]>| {
-            let z_mm: Vec<f64> = nodes_mm.iter().map(|node| node.z).collect();
-            Frame {
-                grid_mm: surface.evaluate(&z_mm).into(),
-                nodes_mm,
+    fn answered(&mut self, session: &Session) -> Answered {
+        let last = &session.last;
+        let evidence = match &session.array {
+            Some(array) => {
+                let drops_percent = array.drops_percent(&last.readings);
+                let largest_percent = self.drops.largest_percent(&drops_percent, array);
+                Evidence::Array {
+                    readings: readings_figure(drops_percent, &array.rows, largest_percent),
+                    rows: Arc::clone(&array.rows),
+                    watched: array.watched.clone(),
+                    residual: array.residual(last),
+                    noise: self.noise,
+                }
+            }
+            None => {
+                let history = session.history.until(last.time_s);
+                let (targets, intervals) = (&self.network.problem.targets, self.network.intervals.as_ref());
+                let monitor = session.monitor.as_ref();
+                Evidence::Targets {
+                    chart: targets_over_time_figure(targets, &history, intervals),
+                    drift: monitor.map(|monitor| monitor.drift().copied()).map_err(Clone::clone),
+                    all: session.history.clone(),
+                }
             }
         };
-        let actual = session.input.truth().map(|truth| {
-            let nodes_mm = array.rows.iter().flat_map(|&row| truth.row_positions_mm(sensor, row));
-            frame(nodes_mm.collect())
-        });
-        Some(LiveFrame {
-            time_s: answer.time_s,
-            sensor: *sensor,
-            rows: Arc::clone(&array.rows),
-            surface: Arc::clone(surface),
-            z_range_mm: z_range_mm.clone(),
-            decoupled: frame(answer.values.chunks_exact(3).map(DVec3::from_slice).collect()),
-            actual,
-            drops_percent: array.drops_percent(&answer.readings),
-            residual: array.residual(answer),
-            watched: array.watched.clone(),
-        })
+        Answered {
+            network: Arc::clone(&self.network),
+            time_s: last.time_s,
+            values: last.values.clone(),
+            surfaces: self.surfaces(session),
+            nodes: Arc::clone(&self.nodes),
+            outside: session.outside(),
+            evidence,
+        }
     }
+
+    fn surfaces(&self, session: &Session) -> Vec<Surface> {
+        let values = &session.last.values;
+        match (&self.ground, &session.array) {
+            (Ground::Nodes(map, range_mm), Some(array)) => {
+                let surface = |title: &str, nodes_mm: Vec<DVec3>| {
+                    Surface::through(title, map, nodes_mm, Quantity::Height, range_mm.clone())
+                };
+                let decoded = surface("Decoded", values.chunks_exact(3).map(DVec3::from_slice).collect());
+                let actual = session.input.truth().map(|truth| {
+                    let rows = array.rows.iter();
+                    let nodes_mm = rows.flat_map(|&row| truth.row_positions_mm(&array.sensor, row));
+                    surface("Actual", nodes_mm.collect())
+                });
+                std::iter::once(decoded).chain(actual).collect()
+            }
+            (Ground::Targets(surface), _) => {
+                let [_, decoded, _] = surface.surfaces(values, values, surface.range_of(&session.ranges));
+                vec![decoded]
+            }
+            (Ground::Nodes(..) | Ground::None, _) => Vec::new(),
+        }
+    }
+}
+
+/// Upper limit of the colour scale of the readings. It follows the largest drop in round steps and falls slowly, which
+/// keeps colours comparable from frame to frame.
+#[derive(Debug, Default)]
+struct DropScale {
+    peak_percent: f64,
+    watched: Option<Watched>,
+}
+
+impl DropScale {
+    /// Returns the limit in percent with the drops of a frame, of which those of faulty wires do not count.
+    fn largest_percent(&mut self, drops_percent: &Array2<f64>, array: &LiveArray) -> f64 {
+        /// Decay of the peak per frame.
+        const DECAY: f64 = 0.999;
+        if self.watched.as_ref() != Some(&array.watched) {
+            // Discard the peak that a fault has caused.
+            (self.watched, self.peak_percent) = (Some(array.watched.clone()), 0.0);
+        }
+        let is_healthy = |row: usize, column: usize| !array.watched.leaves_out(array.rows[row], column);
+        let drops = drops_percent.indexed_iter();
+        let drops = drops.filter(|((row, column), drop)| is_healthy(*row, *column) && drop.is_finite());
+        let largest = drops.map(|(_, &drop)| drop).fold(0.0, f64::max);
+        self.peak_percent = largest.max(DECAY * self.peak_percent);
+        round_up(self.peak_percent.max(0.5))
+    }
+}
+
+/// Returns the next 1, 2 or 5 times a power of ten.
+fn round_up(value: f64) -> f64 {
+    let decade = 10_f64.powf(value.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].map(|step| step * decade);
+    let step = step.into_iter().find(|step| *step >= value * (1.0 - 1e-9));
+    step.unwrap_or(10.0 * decade)
 }
 
 /// Minimum time between displayed frames.
@@ -230,14 +301,19 @@ const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
 /// Maximum wait for a command while the source is paused.
 const LONGEST_WAIT: Duration = Duration::from_secs(60);
 
-/// Runs `plan` until its source ends, the sender of the commands is gone, or the work is cancelled.
+/// Runs `plan` until its source ends, the sender of the commands is gone, or the work is cancelled; `shown` is what was
+/// displayed before.
 ///
 /// # Errors
 /// If decoding cannot begin or continue, with the reason.
-pub fn run(mut plan: SessionPlan, commands: &Receiver<Command>, report: &Report<LiveEvent>) -> Result<(), String> {
+pub fn run(
+    mut plan: SessionPlan,
+    shown: Snapshot,
+    commands: &Receiver<Command>,
+    report: &Report<LiveEvent>,
+) -> Result<(), String> {
     plan.source = plan.source.resolved();
-    report.send(LiveEvent::Source(plan.source.clone()));
-    let mut screen = Screen::new(Arc::clone(&plan.network))?;
+    let mut screen = Screen::new(&plan, shown)?;
     let mut session = match Session::open(plan, &Job::new(&|| report.is_cancelled())) {
         Err(_) if report.is_cancelled() => return Ok(()),
         opened => opened.map_err(|error| error.to_string())?,
@@ -259,8 +335,9 @@ pub fn run(mut plan: SessionPlan, commands: &Receiver<Command>, report: &Report<
         match commands.recv_timeout(until.saturating_duration_since(now)) {
             Ok(Command::Drawn) => is_drawn = true,
             Ok(Command::Change(change)) => {
+                screen.follow_recording(&session);
                 has_news = true;
-                change(&mut session).into_iter().for_each(|event| report.send(event));
+                change(&mut session).unwrap_or_else(|reason| report.send(LiveEvent::Failed(reason)));
             }
             Err(RecvTimeoutError::Timeout) => match session.next(Instant::now(), BETWEEN_LOOKS) {
                 SessionEvent::Answer => {
@@ -280,16 +357,35 @@ pub fn run(mut plan: SessionPlan, commands: &Receiver<Command>, report: &Report<
             },
             Err(RecvTimeoutError::Disconnected) => break Ok(()),
         }
-        for note in session.notes.drain(..) {
+        for note in std::mem::take(&mut session.notes) {
             if let Note::RecordingEnded(recorded, reason) = note {
-                report.send(LiveEvent::Recorded(recorded, Some(reason)));
+                screen.shown.recorded = Some(recorded);
+                screen.show(&session, report);
+                report.send(LiveEvent::Failed(reason));
             }
         }
     };
-    if let Some(file) = session.recording.take() {
-        report.send(LiveEvent::Recorded(file.recorded, None));
-    }
     // The last frame stays on the screen.
     screen.show(&session, report);
     end
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scale_ends_at_round_numbers() {
+        for (peak, expected) in [
+            (0.5, 0.5),
+            (0.6, 1.0),
+            (1.0, 1.0),
+            (1.3, 2.0),
+            (4.9, 5.0),
+            (73.0, 100.0),
+        ] {
+            let found = round_up(peak);
+            assert!((found / expected - 1.0).abs() < 1e-9, "{peak}: {found}");
+        }
+    }
 }

@@ -1,122 +1,147 @@
-//! The toolbar, the replay bar, the actions, the exports and the files of the Live view.
+//! The tools: buttons, keys and names of the actions, the replay bar, and the exports.
 
-use std::{
-    fs::File,
-    io,
-    path::{Path, PathBuf},
-    sync::{Arc, mpsc::Sender},
-};
+use std::{fs::File, io, path::Path, sync::Arc};
 
 use decoupler_core::problem::Channel;
 use decoupler_files::{
-    export::{Cell, Table, TableColumn, WriteError, atomic_write},
+    export::{Cell, Table, TableColumn, WriteError, atomic_write, is_same},
     figure::Figure,
-    live::Recorded,
+    live::{History, Recorded},
 };
-use eframe::egui::{Align, Button, Key, Label, Layout, Modifiers, RichText, Slider, Ui, WidgetInfo};
+use eframe::egui::{Align, Key, Label, Layout, Modifiers, RichText, Slider, Ui, Widget, WidgetInfo};
 
 use super::{
     LiveView,
-    cards::{figure_of, surface_figure},
-    engine::LiveTargets,
-    targets_card,
+    cards::surface_figure,
+    engine::{Answered, Evidence},
 };
 use crate::window::{
     glossary,
     shared::{
-        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Offers, Purpose, Shared, csv_export,
-        picture_exports,
+        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Offers, Shared, csv_export, picture_exports,
     },
     theme::{Theme, space, type_size},
     widgets::{dim_ui, ghost_button, primary_button, slider_ui, with_shortcut},
 };
 
-/// Shows the buttons that control the source, from right to left.
-pub fn tools_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let is_running = view.running.is_some();
-    let stop = ui.add_enabled(is_running, ghost_button("■ Stop"));
-    if stop
-        .on_hover_text(with_shortcut(ui, "Ends live decoding", Key::Period))
-        .clicked()
-    {
-        view.stop();
+/// What the user does with a source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Tool {
+    Stop,
+    Start,
+    Record,
+    ReZero,
+    Play,
+}
+
+impl Tool {
+    /// All of them, from right to left.
+    const ALL: [Self; 5] = [Self::Stop, Self::Start, Self::Record, Self::ReZero, Self::Play];
+
+    /// Returns its name, its key and its hint.
+    fn words(self) -> (&'static str, Option<Key>, &'static str) {
+        match self {
+            Self::Stop => ("Stop live decoding", Some(Key::Period), "Ends live decoding"),
+            Self::Start => (
+                "Start live decoding",
+                Some(Key::Enter),
+                "Decodes the frames of the source as they arrive",
+            ),
+            Self::Record => (
+                "Start or end recording",
+                Some(Key::R),
+                "Writes every frame with its time to a new file, as it arrives",
+            ),
+            Self::ReZero => ("Re-zero", None, glossary::UNLOADED_STATE.hint),
+            Self::Play => ("Pause or resume replay", Some(Key::P), "Plays or pauses the recording"),
+        }
     }
-    let obstacle = view.obstacle(shared);
-    let start = ui.add_enabled(!is_running && obstacle.is_none(), primary_button("▶ Start"));
-    let why_not = obstacle.as_deref().unwrap_or("Frames are being decoded.");
-    if start
-        .on_hover_text(with_shortcut(
-            ui,
-            "Decodes the frames of the source as they arrive",
-            Key::Enter,
-        ))
-        .on_disabled_hover_text(why_not)
-        .clicked()
-    {
-        view.start(shared, effects);
+
+    /// Returns the text of its button.
+    fn button(self, view: &LiveView) -> &'static str {
+        match self {
+            Self::Stop => "■ Stop",
+            Self::Start => "▶ Start",
+            Self::Record if view.is_recording() => "■ End recording",
+            Self::Record => "● Record",
+            Self::ReZero => "Re-zero",
+            Self::Play if view.shown.replay.is_some_and(|replay| replay.is_playing) => "⏸ Pause",
+            Self::Play => "▶ Play",
+        }
     }
-    ui.add_space(space(2));
-    if !view.has_sensor(shared) {
-        return;
+
+    /// Returns the reason why it is not available now, if there is one.
+    fn obstacle(self, view: &LiveView, shared: &Shared) -> Option<String> {
+        let is_running = view.running.is_some();
+        let reason = match self {
+            Self::Start if is_running => "Frames are being decoded.",
+            Self::Start => return view.plan(shared).err(),
+            _ if !is_running => "Start a source first.",
+            Self::Play if view.shown.replay.is_none() => "There is no replay.",
+            Self::Record | Self::ReZero if !view.has_sensor(shared) => "This needs the sensor model of an array.",
+            Self::Record if view.shown.replay.is_some() => "A replay cannot be recorded.",
+            Self::Stop | Self::Record | Self::ReZero | Self::Play => return None,
+        };
+        Some(reason.to_owned())
     }
-    record_ui(ui, view, shared);
-    let zero = ui.add_enabled(is_running, ghost_button("Re-zero"));
-    let hint = glossary::UNLOADED_STATE.hint;
-    if zero.on_hover_text(hint).clicked() {
-        view.re_zero();
+
+    fn act(self, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+        match self {
+            Self::Stop => view.stop(),
+            Self::Start => view.start(shared, effects),
+            Self::Record => view.record(shared),
+            Self::ReZero => view.re_zero(),
+            Self::Play => {
+                let plays = view.shown.replay.is_some_and(|replay| !replay.is_playing);
+                view.control(move |control, now| control.play(plays, now));
+            }
+        }
+    }
+
+    /// Shows its button.
+    fn ui(self, ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+        let (_, key, hint) = self.words();
+        let hint = key.map_or_else(|| hint.to_owned(), |key| with_shortcut(ui, hint, key));
+        let obstacle = self.obstacle(view, shared);
+        let text = self.button(view);
+        let button = ui.add_enabled_ui(obstacle.is_none(), |ui| match self {
+            Self::Start => primary_button(text).ui(ui),
+            Self::Record if view.is_recording() => ui.add(ghost_button(text).fill(Theme::of(ui).palette.selected)),
+            Self::Play => ui.add(ghost_button(text).min_size([space(18), space(6)].into())),
+            Self::Stop | Self::Record | Self::ReZero => ui.add(ghost_button(text)),
+        });
+        let button = button.inner.on_hover_text(hint);
+        if button.on_disabled_hover_text(obstacle.unwrap_or_default()).clicked() {
+            self.act(view, shared, effects);
+        }
     }
 }
 
-fn record_ui(ui: &mut Ui, view: &LiveView, shared: &Shared) {
-    let is_recording = view.recording.is_some();
-    let text = if is_recording {
-        "■ End recording"
-    } else {
-        "● Record"
-    };
-    let mut button: Button<'_> = ghost_button(text);
-    if is_recording {
-        button = button.fill(Theme::of(ui).palette.selected);
-    }
-    let button = ui.add_enabled(view.can_record(), button);
-    let why_not = if view.running.is_some() {
-        "A replay cannot be recorded."
-    } else {
-        "Start a source first."
-    };
-    if button
-        .on_hover_text(with_shortcut(
-            ui,
-            "Writes every frame with its time to a new file, as it arrives",
-            Key::R,
-        ))
-        .on_disabled_hover_text(why_not)
-        .clicked()
-    {
-        view.toggle_recording(shared);
+/// Shows the buttons that control the source, from right to left.
+pub fn tools_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    for tool in Tool::ALL {
+        match tool {
+            Tool::Play => continue,
+            Tool::Record | Tool::ReZero if !view.has_sensor(shared) => continue,
+            Tool::Record => ui.add_space(space(2)),
+            Tool::Stop | Tool::Start | Tool::ReZero => {}
+        }
+        tool.ui(ui, view, shared, effects);
     }
 }
 
 /// Offers the actions on the source.
 pub fn offer_actions(view: &mut LiveView, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
-    let is_running = view.running.is_some();
-    let can_start = !is_running && view.obstacle(shared).is_none();
-    if offers.offer_keys("Start live decoding", Modifiers::COMMAND, Key::Enter, can_start) {
-        view.start(shared, effects);
-    }
-    if offers.offer_keys("Stop live decoding", Modifiers::COMMAND, Key::Period, is_running) {
-        view.stop();
-    }
-    if offers.offer_keys("Start or end recording", Modifiers::COMMAND, Key::R, view.can_record()) {
-        view.toggle_recording(shared);
-    }
-    if offers.offer("Re-zero", is_running && view.has_sensor(shared)) {
-        view.re_zero();
-    }
-    let replay = view.shown.replay;
-    let is_pressed = offers.offer_keys("Pause or resume replay", Modifiers::COMMAND, Key::P, replay.is_some());
-    if let Some(replay) = replay.filter(|_| is_pressed) {
-        view.control(move |control, now| control.play(!replay.is_playing, now));
+    for tool in Tool::ALL {
+        let (name, key, _) = tool.words();
+        let is_possible = tool.obstacle(view, shared).is_none();
+        let is_wanted = match key {
+            Some(key) => offers.offer_keys(name, Modifiers::COMMAND, key, is_possible),
+            None => offers.offer(name, is_possible),
+        };
+        if is_wanted {
+            tool.act(view, shared, effects);
+        }
     }
 }
 
@@ -124,83 +149,89 @@ pub fn offer_actions(view: &mut LiveView, offers: &mut Offers<'_>, shared: &Shar
 pub const REPLAY_BAR_HEIGHT: f32 = space(12);
 
 /// Shows the position in the recording and the speed.
-pub fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView) {
+pub fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let Some(replay) = view.shown.replay else { return };
     let is_running = view.running.is_some();
-    ui.add_enabled_ui(is_running, |ui| {
-        ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-            let text = if replay.is_playing { "⏸ Pause" } else { "▶ Play" };
-            let play = ui.add(ghost_button(text).min_size([space(18), space(6)].into()));
-            if play
-                .on_hover_text(with_shortcut(ui, "Plays or pauses the recording", Key::P))
-                .clicked()
-            {
-                view.control(move |control, now| control.play(!replay.is_playing, now));
+    ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+        Tool::Play.ui(ui, view, shared, effects);
+        if !is_running {
+            ui.disable();
+        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            speed_ui(ui, view);
+            ui.add_space(space(2));
+            let text = format!("{:.2} of {:.2} s", replay.at_s, replay.length_s);
+            ui.label(RichText::new(text).size(type_size().note));
+            let mut at_s = replay.at_s;
+            let slider = Slider::new(&mut at_s, 0.0..=replay.length_s.max(f64::MIN_POSITIVE));
+            let width = ui.available_width() - space(2);
+            let slider = slider_ui(ui, slider, width);
+            slider.widget_info(|| WidgetInfo::slider(is_running, replay.at_s, "Replay position"));
+            if slider.double_clicked() {
+                at_s = 0.0;
             }
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                speed_ui(ui, view);
-                ui.add_space(space(2));
-                let text = format!("{:.2} of {:.2} s", replay.at_s, replay.length_s);
-                ui.label(RichText::new(text).size(type_size().note));
-                let mut at_s = replay.at_s;
-                let slider = Slider::new(&mut at_s, 0.0..=replay.length_s.max(f64::MIN_POSITIVE));
-                let width = ui.available_width() - space(2);
-                let slider = slider_ui(ui, slider, width);
-                slider.widget_info(|| WidgetInfo::slider(is_running, replay.at_s, "Replay position"));
-                if slider.double_clicked() {
-                    view.control(|control, now| control.seek(0.0, now));
-                } else if slider.changed() {
-                    view.control(move |control, now| control.seek(at_s, now));
-                }
-            });
+            if at_s != replay.at_s {
+                view.control(move |control, now| control.seek(at_s, now));
+            }
         });
     });
 }
 
 fn speed_ui(ui: &mut Ui, view: &mut LiveView) {
-    let colour = Theme::of(ui).palette.text;
-    let text = format!("{:.1}×", view.source.speed);
-    ui.add_sized(
-        [space(8), space(6)],
-        Label::new(RichText::new(text).size(type_size().note).color(colour)),
-    );
     let before = view.source.speed;
-    let slider = Slider::new(&mut view.source.speed, 0.1..=10.0).logarithmic(true);
+    let mut speed = before;
+    let text = RichText::new(format!("{before:.1}×")).size(type_size().note);
+    let text = text.color(Theme::of(ui).palette.text);
+    ui.add_sized([space(8), space(6)], Label::new(text));
+    let slider = Slider::new(&mut speed, 0.1..=10.0).logarithmic(true);
     let slider = slider_ui(ui, slider, space(24));
     if slider.double_clicked() {
-        view.source.speed = 1.0;
+        speed = 1.0;
     }
     slider.widget_info(|| WidgetInfo::slider(true, before, "Replay speed"));
     slider.on_hover_text("Recorded seconds per second, from 0.1 to 10. A double click sets it to 1.");
-    if view.source.speed != before {
-        let speed = view.source.speed;
+    if speed != before {
+        view.source.speed = speed;
         view.control(move |control, now| control.set_speed(speed, now));
     }
     dim_ui(ui, "Speed");
 }
 
-/// Returns the exports: pictures of the latest frame, and the recording.
-pub fn live_exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a>> {
-    if let Some(targets) = &view.shown.targets {
-        return target_exports(targets, shared);
-    }
-    let frame = view.shown.frame.as_ref();
-    let frame = frame.ok_or_else(|| "There is no frame yet: start a source.".to_owned());
-    let surfaces = frame
+/// Returns the exports: pictures of the latest answer, the values over time, and the recording.
+pub fn exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a>> {
+    let answer = view.shown.answer.as_deref();
+    let answer = answer.ok_or_else(|| "There is no frame yet: start a source.".to_owned());
+    let surface = answer
         .clone()
-        .map(|frame| || Figure::from(surface_figure(frame, None, shared.look)));
-    let readings = frame
-        .map(|frame| || Figure::from(figure_of(frame, view.drops.largest_percent()).coloured(shared.look.colours)));
-    let recording = view.recorded.as_ref().map(save_recording);
-    let files = [file_export(
-        "Recording",
-        "CSV",
-        recording,
-        "Nothing is recorded: press Record while a source runs.",
-    )];
-    picture_exports("Surface", "live-surface".to_owned(), surfaces)
+        .map(|answer| move || Figure::from(surface_figure(answer, None, shared.look)));
+    if let Ok(answer) = answer
+        && let Evidence::Targets { chart, all, .. } = &answer.evidence
+    {
+        let values = Ok(move || values_table(answer, all));
+        let chart = Ok(move || Figure::from(chart.clone()));
+        let surface = picture_exports("Surface", "live-surface".to_owned(), surface);
+        return picture_exports("Decoded values", "live-values".to_owned(), chart)
+            .chain(surface.filter(|_| !answer.surfaces.is_empty()))
+            .chain([csv_export("Decoded values", VALUES, "live-values".to_owned(), values)])
+            .collect();
+    }
+    let readings = answer.and_then(|answer| match &answer.evidence {
+        Evidence::Array { readings, .. } => Ok(readings),
+        Evidence::Targets { .. } => Err(String::new()),
+    });
+    let readings = readings.map(|readings| move || Figure::from(readings.clone().coloured(shared.look.colours)));
+    let recorded = view.shown.recorded.as_ref().map(save_recording);
+    let recorded = recorded.map(|task| -> Ask<'a> { Box::new(move || Effect::ChooseFile(task)) });
+    let recording = Export {
+        group: ExportGroup::Tables,
+        name: "Recording".to_owned(),
+        form: "CSV".to_owned(),
+        description: RECORDING.description,
+        ask: recorded.ok_or_else(|| "Nothing is recorded: press Record while a source runs.".to_owned()),
+    };
+    picture_exports("Surface", "live-surface".to_owned(), surface)
         .chain(picture_exports("Readings", "live-readings".to_owned(), readings))
-        .chain(files)
+        .chain([recording])
         .collect()
 }
 
@@ -211,21 +242,15 @@ const VALUES: FileWords = FileWords {
     extensions: &["csv"],
 };
 
-/// Returns the exports of the values of a network of a recording.
-fn target_exports<'a>(targets: &'a LiveTargets, shared: &'a Shared) -> Vec<Export<'a>> {
-    let chart = Ok(move || Figure::from(targets_card::chart(targets)));
-    let mut exports: Vec<Export<'a>> = picture_exports("Decoded values", "live-values".to_owned(), chart).collect();
-    if let Some(figure) = targets_card::surface_figure(targets, None, shared.look) {
-        let surface = Ok(move || Figure::from(figure.clone()));
-        exports.extend(picture_exports("Surface", "live-surface".to_owned(), surface));
-    }
-    let values = Ok(move || values_table(targets));
-    exports.push(csv_export("Decoded values", VALUES, "live-values".to_owned(), values));
-    exports
-}
+const RECORDING: FileWords = FileWords {
+    kind: "recording",
+    description: "Every frame with its time, as CSV: a line for each row-wire. It can be replayed here, and the \
+                  terminal command decode reads it.",
+    extensions: &["csv"],
+};
 
-fn values_table(targets: &LiveTargets) -> Table {
-    let names = targets.network.problem.targets.iter().map(Channel::title);
+fn values_table(answer: &Answered, all: &History) -> Table {
+    let names = answer.network.problem.targets.iter().map(Channel::title);
     let row = |(time_s, values): &(f64, Arc<[f64]>)| {
         let values = std::iter::once(time_s).chain(values.iter());
         values.map(|&value| Cell::from(value)).collect()
@@ -235,78 +260,7 @@ fn values_table(targets: &LiveTargets) -> Table {
             .chain(names)
             .map(TableColumn::field)
             .collect(),
-        rows: targets.all.all().iter().map(row).collect(),
-    }
-}
-
-fn file_export(name: &str, form: &str, task: Option<FileTask>, reason: &str) -> Export<'static> {
-    Export {
-        group: ExportGroup::Tables,
-        name: name.to_owned(),
-        form: form.to_owned(),
-        description: task.as_ref().map_or("", |task| task.words.description),
-        ask: task
-            .map(|task| -> Ask<'static> { Box::new(move || Effect::ChooseFile(task)) })
-            .ok_or_else(|| reason.to_owned()),
-    }
-}
-
-const NETWORK: FileWords = FileWords {
-    kind: "network",
-    description: "A network saved by the Train view or by train --out in a terminal.",
-    extensions: &["json"],
-};
-
-const FRAMES: FileWords = FileWords {
-    kind: "frames",
-    description: "A recording made here, or lines of resistances in ohm as the terminal command decode reads them.",
-    extensions: &["csv"],
-};
-
-const RECORDING: FileWords = FileWords {
-    kind: "recording",
-    description: "Every frame with its time, as CSV: a line for each row-wire. It can be replayed here, and the \
-                  terminal command decode reads it.",
-    extensions: &["csv"],
-};
-
-/// A file that the user opens in the Live view.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LiveFile {
-    /// A network to decode with.
-    Network,
-    /// Frames to replay.
-    Frames,
-}
-
-impl LiveFile {
-    /// Returns the label of its button.
-    pub fn button(self) -> &'static str {
-        match self {
-            Self::Network => "Open network file…",
-            Self::Frames => "Choose file…",
-        }
-    }
-
-    /// Returns its description.
-    pub fn words(self) -> FileWords {
-        match self {
-            Self::Network => NETWORK,
-            Self::Frames => FRAMES,
-        }
-    }
-
-    /// Asks for its path, which is sent to `chosen`.
-    pub fn choose(self, chosen: Sender<PathBuf>) -> FileTask {
-        let suggestion = match self {
-            Self::Network => "network.json",
-            Self::Frames => "recording.csv",
-        };
-        FileTask {
-            words: self.words(),
-            suggestion: suggestion.to_owned(),
-            purpose: Purpose::Choose(chosen),
-        }
+        rows: all.all().iter().map(row).collect(),
     }
 }
 
@@ -315,11 +269,7 @@ pub fn save_recording(recorded: &Recorded) -> FileTask {
     let from = recorded.path.clone();
     let write = move |path: &Path| -> Result<(), WriteError> {
         // The chosen path may be that of the recording itself.
-        let is_same = path
-            .canonicalize()
-            .ok()
-            .is_some_and(|path| from.canonicalize().ok() == Some(path));
-        if is_same {
+        if is_same(path, &from) {
             return Ok(());
         }
         atomic_write(path, |file| io::copy(&mut File::open(&from)?, file).map(drop))

@@ -1,20 +1,371 @@
-use eframe::egui::{RichText, Sense, Ui};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        mpsc::{Receiver, Sender, channel},
+    },
+    time::Instant,
+};
+
+use decoupler_core::{live::FaultEvent, scene::Noise, text::counted};
+use decoupler_files::{
+    export::{NetworkFile, atomic_write},
+    live::{Input, LiveArray, RecordingFile, Replay, Session, SessionPlan, SourcePlan, Unit, Watched},
+};
+use eframe::egui::{Color32, RichText, Ui};
 
 use super::{
-    LiveView,
-    cards::{invitation_ui, readings_ui, surfaces_ui},
-    figures_card::figures_ui,
-    source_form,
-    targets_card::targets_ui,
-    tools::{self, REPLAY_BAR_HEIGHT, live_exports, replay_bar_ui},
+    cards,
+    engine::{Command, Evidence, LiveEvent, Snapshot, run},
+    form::{LiveFile, Loaded, NetworkChoice, SourceForm, SourceKind, form_ui},
+    tools,
 };
 use crate::window::{
-    shared::{Effect, Export, FileInUse, Offers, Shared, View},
-    theme::{Theme, space, type_size},
-    widgets::{card_ui, scrolled_ui, state_ui},
+    job::{Background, Wake},
+    shared::{Effect, Export, FileInUse, Matter, Notice, Offers, Shared, View},
+    theme::{Palette, Theme, type_size},
+    widgets::state_ui,
 };
-use decoupler_core::{live::FaultEvent, text::counted};
-use decoupler_files::live::{SourcePlan, Watched};
+
+/// The Live view.
+#[derive(Debug)]
+pub struct LiveView {
+    /// The latest state of the session, which stays on the screen after its end.
+    pub shown: Snapshot,
+    /// Decoding under way. It is dropped before the job, which then ends at once.
+    pub running: Option<Running>,
+    pub(super) network: NetworkChoice,
+    pub(super) source: SourceForm,
+    /// The node under the pointer, marked on all surfaces.
+    pub(super) node: Option<usize>,
+    /// Path of the file that the user is asked for.
+    pub(super) chosen: Option<(LiveFile, Receiver<PathBuf>)>,
+    /// The stream that has ended by itself.
+    ended: Option<SourcePlan>,
+    /// True if the window has received a snapshot and not yet reported to the thread that it was drawn.
+    is_to_be_drawn: bool,
+    loading: Background<Result<Loaded, String>>,
+    job: Background<LiveEvent>,
+}
+
+/// Decoding under way.
+#[derive(Debug)]
+pub struct Running {
+    /// Name of the network.
+    pub network: String,
+    /// Source of the frames.
+    pub source: SourcePlan,
+    commands: Sender<Command>,
+}
+
+impl LiveView {
+    /// Creates the view without frames; `wake` is called when there are events.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            shown: Snapshot::default(),
+            running: None,
+            network: NetworkChoice::default(),
+            source: SourceForm::default(),
+            node: None,
+            chosen: None,
+            ended: None,
+            is_to_be_drawn: false,
+            loading: Background::prompt("network file", Arc::clone(&wake)),
+            job: Background::prompt("live", wake),
+        }
+    }
+
+    /// Returns the name of the chosen network, and the plan for the current settings.
+    ///
+    /// # Errors
+    /// If there is no network or a setting is missing, with what to do.
+    pub(super) fn plan(&self, shared: &Shared) -> Result<(String, SessionPlan), String> {
+        let network = self.network.network(&shared.runs);
+        let (name, network) = network.ok_or("Train a network, or open a network file.")?;
+        let simulation = network.problem.sensor.as_ref();
+        let noise = simulation.map(|simulation| Noise {
+            relative: self.source.noise(simulation),
+            ..simulation.scene.noise.in_test()
+        });
+        let plan = SessionPlan {
+            network: Arc::clone(network),
+            source: self.source.plan(simulation.is_some())?,
+            noise: noise.unwrap_or_default(),
+            zero: self.shown.zero.clone(),
+            unit: Unit::Frames,
+        };
+        Ok((name.to_owned(), plan))
+    }
+
+    /// Returns true if the network is that of an array, whose sensor model simulates, re-zeroes and finds faults.
+    pub(super) fn has_sensor(&self, shared: &Shared) -> bool {
+        let network = self.network.network(&shared.runs);
+        network.is_none_or(|(_, file)| file.problem.sensor.is_some())
+    }
+
+    /// Returns true while frames are recorded.
+    pub(super) fn is_recording(&self) -> bool {
+        self.running.is_some() && self.shown.is_recording
+    }
+
+    /// Begins to decode.
+    pub(super) fn start(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        let Ok((network, plan)) = self.plan(shared) else {
+            return;
+        };
+        effects.push(Effect::Settle(Matter::Live));
+        self.begin(network, plan, false);
+    }
+
+    /// Restarts with the network that is chosen now if a source is running, from the current position of a replay.
+    pub(super) fn restart(&mut self, shared: &Shared) {
+        let Ok((network, plan)) = self.plan(shared) else { return };
+        if self.running.is_none() {
+            return;
+        }
+        let replay = self.shown.replay;
+        self.begin(network, plan, replay.is_some());
+        if let Some(replay) = replay {
+            self.control(move |control, now| {
+                control.seek(replay.at_s, now);
+                control.play(replay.is_playing, now);
+            });
+        }
+    }
+
+    fn begin(&mut self, network: String, plan: SessionPlan, keeps_answer: bool) {
+        let before = std::mem::take(&mut self.shown);
+        self.shown = match keeps_answer {
+            true => Snapshot {
+                is_recording: false,
+                ..before
+            },
+            false => Snapshot {
+                recorded: before.recorded,
+                zero: before.zero,
+                ..Snapshot::default()
+            },
+        };
+        (self.node, self.ended, self.is_to_be_drawn) = (None, None, false);
+        let (commands, incoming) = channel();
+        self.running = Some(Running {
+            network,
+            source: plan.source.clone(),
+            commands,
+        });
+        self.move_indenter();
+        let speed = self.source.speed;
+        self.control(move |replay, now| replay.set_speed(speed, now));
+        let shown = self.shown.clone();
+        self.job.start(
+            move |report| run(plan, shown, &incoming, report),
+            |ended| LiveEvent::Ended(ended.unwrap_or_else(|error| Err(error.to_string()))),
+        );
+    }
+
+    /// Stops decoding; the last frame stays on the screen.
+    pub(super) fn stop(&mut self) {
+        // The thread ends once the sender of its commands is dropped.
+        self.running = None;
+    }
+
+    fn command(&self, command: Command) {
+        if let Some(running) = &self.running {
+            // A thread that has just ended ignores commands.
+            let _ = running.commands.send(command);
+        }
+    }
+
+    /// Changes the session on its thread, if it is running; the reason of a failure is shown.
+    pub(super) fn change(&self, change: impl FnOnce(&mut Session) -> Result<(), String> + Send + 'static) {
+        self.command(Command::Change(Box::new(change)));
+    }
+
+    /// Changes the replay, if there is one.
+    pub(super) fn control(&self, change: impl FnOnce(&mut Replay, Instant) + Send + 'static) {
+        self.change(|session| {
+            if let Input::Replay(replay) = &mut session.input {
+                change(replay, Instant::now());
+            }
+            Ok(())
+        });
+    }
+
+    /// Moves the indenter of a simulated source as in the form.
+    pub(super) fn move_indenter(&self) {
+        let motion = self.source.motion;
+        self.change(move |session| {
+            if let Input::Simulated(simulated, _) = &mut session.input {
+                simulated.motion = motion;
+            }
+            Ok(())
+        });
+    }
+
+    /// Takes the latest frames as the unloaded state.
+    pub(super) fn re_zero(&self) {
+        self.change(|session| {
+            let taken = session.array.as_mut().map(LiveArray::take_zero).transpose();
+            taken.map(drop).map_err(|error| format!("Not re-zeroed: {error}."))
+        });
+    }
+
+    /// Stops dividing readings by gains.
+    pub(super) fn clear_zero(&mut self) {
+        self.shown.zero = None;
+        self.change(|session| {
+            session.array.iter_mut().for_each(|array| array.zero = None);
+            Ok(())
+        });
+    }
+
+    /// Begins a recording, or ends it.
+    pub(super) fn record(&self, shared: &Shared) {
+        let (folder, begins) = (folder(shared).join("recordings"), !self.is_recording());
+        self.change(move |session| {
+            session.recording = match &session.array {
+                Some(array) if begins => {
+                    let columns = array.sensor.scale.columns();
+                    Some(RecordingFile::create(&folder, &array.rows, columns)?)
+                }
+                _ => None,
+            };
+            Ok(())
+        });
+    }
+
+    /// Plays a file.
+    pub(super) fn replay(&mut self, path: &Path, shared: &Shared, effects: &mut Vec<Effect>) {
+        self.source.kind = SourceKind::Replay;
+        self.source.path = path.display().to_string();
+        self.start(shared, effects);
+    }
+
+    /// Returns true if a stream has ended by itself and is still the chosen source.
+    pub fn can_retry(&self, shared: &Shared) -> bool {
+        let is_same = |ended: &SourcePlan| self.plan(shared).is_ok_and(|(_, plan)| plan.source == *ended);
+        self.running.is_none() && self.ended.as_ref().is_some_and(is_same)
+    }
+
+    /// Connects again to the stream that has ended.
+    pub fn retry(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        if self.can_retry(shared) {
+            self.start(shared, effects);
+        }
+    }
+
+    /// Reads a network in the background.
+    pub(super) fn load(&mut self, read: impl FnOnce() -> Result<Loaded, String> + Send + 'static) {
+        self.loading.start(
+            move |_| read(),
+            |read| read.unwrap_or_else(|error| Err(error.to_string())),
+        );
+    }
+
+    /// Writes the sample recording and its network to files, to be played as soon as they are ready.
+    pub(super) fn play_sample(&mut self, shared: &Shared) {
+        let folder = folder(shared).join("samples");
+        self.load(move || write_sample(&folder));
+    }
+
+    /// Takes the file that the user has chosen.
+    fn take_chosen(&mut self) {
+        let Some((file, Ok(path))) = self.chosen.as_ref().map(|(file, paths)| (*file, paths.try_recv())) else {
+            return;
+        };
+        self.chosen = None;
+        match file {
+            LiveFile::Frames => self.source.path = path.display().to_string(),
+            LiveFile::Network => self.load(move || {
+                let file = NetworkFile::load(&path).map_err(|error| error.to_string())?;
+                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+                Ok(Loaded::File(name.into_owned(), Arc::new(file)))
+            }),
+        }
+    }
+
+    /// Decodes with a network that was read.
+    fn take_loaded(&mut self, loaded: Loaded, shared: &Shared, effects: &mut Vec<Effect>) {
+        match loaded {
+            Loaded::Run(id, file) => self.network.take_run(id, file),
+            Loaded::File(name, file) => self.network.take_file(name, file),
+            Loaded::Sample(file, recording) => {
+                self.network.take_file(NETWORK.0.to_owned(), file);
+                return self.replay(&recording, shared, effects);
+            }
+        }
+        self.restart(shared);
+    }
+
+    /// Takes an event of the thread; returns a notice for the user.
+    fn take(&mut self, event: LiveEvent) -> Option<Notice> {
+        match event {
+            LiveEvent::Shown(shown) => {
+                self.shown = *shown;
+                self.is_to_be_drawn = true;
+                None
+            }
+            LiveEvent::Failed(reason) => Some(Notice::Failed(reason)),
+            LiveEvent::Ended(end) => {
+                let running = self.running.take()?;
+                let is_stream = self.shown.replay.is_none() && !matches!(running.source, SourcePlan::Simulated(_));
+                self.ended = is_stream.then_some(running.source);
+                Some(match end {
+                    Err(reason) => Notice::Failed(reason),
+                    Ok(()) => Notice::Done("The source has ended.".to_owned()),
+                })
+            }
+        }
+    }
+
+    /// Returns the state of the stream, with its colour.
+    fn status(&self, palette: &Palette) -> (Color32, String) {
+        let counts = &self.shown.counts;
+        let Some(running) = &self.running else {
+            let text = match counts.decoded {
+                0 => "Ready: press Start".to_owned(),
+                decoded => format!("Stopped after {}", counted(decoded, "frame")),
+            };
+            return (palette.dim, text);
+        };
+        let watched = self.shown.answer.as_ref().map(|answer| match &answer.evidence {
+            Evidence::Array { watched, .. } => Some(watched),
+            Evidence::Targets { .. } => None,
+        });
+        let (colour, text) = match (watched, &running.source, self.shown.replay) {
+            (None, ..) => (palette.accent, "Waiting for the first frame"),
+            _ if counts.is_waiting => (palette.warning, "No frame for two seconds"),
+            (Some(Some(Watched::Checked(FaultEvent::Named { wire, .. }))), ..) => {
+                return (palette.warning, format!("Fault: {wire}"));
+            }
+            (Some(Some(Watched::Checked(FaultEvent::Unexplained))), ..) => {
+                (palette.warning, "The readings contradict Eq. (2)")
+            }
+            (.., Some(replay)) if !replay.is_playing => (palette.dim, "Replay paused"),
+            (.., Some(_)) => (palette.good, "Replaying"),
+            _ => (palette.good, "Live"),
+        };
+        (colour, text.to_owned())
+    }
+
+    /// Returns what the status line adds: the network and its source, and the rate.
+    fn status_notes(&self) -> Vec<String> {
+        let Some(running) = &self.running else {
+            return Vec::new();
+        };
+        let source = match &running.source {
+            SourcePlan::Simulated(_) => "simulated".to_owned(),
+            SourcePlan::Replay(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            SourcePlan::Stream(source) => source.to_string(),
+        };
+        let counts = &self.shown.counts;
+        let rate = (counts.decoded > 0).then(|| format!("{:.0} frames per second", counts.frames_per_second));
+        std::iter::once(format!("{}, {source}", running.network))
+            .chain(rate)
+            .collect()
+    }
+}
 
 impl View for LiveView {
     fn name(&self) -> &'static str {
@@ -22,12 +373,16 @@ impl View for LiveView {
     }
 
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        self.follow(effects);
-        if self.network.take_events() && self.running.is_some() {
-            self.restart(shared);
+        while let Some(event) = self.job.next_event() {
+            let notice = self.take(event);
+            effects.extend(notice.map(|notice| Effect::Notify(Matter::Live, notice)));
         }
-        self.source.take_events();
-        self.take_sample(shared, effects);
+        self.take_chosen();
+        match self.loading.next_event() {
+            Some(Ok(loaded)) => self.take_loaded(loaded, shared, effects),
+            Some(Err(reason)) => effects.push(Effect::Notify(Matter::Live, Notice::Failed(reason))),
+            None => {}
+        }
     }
 
     fn is_working(&self) -> bool {
@@ -39,7 +394,8 @@ impl View for LiveView {
             SourcePlan::Replay(path) => Some(FileInUse::Recording(path.clone())),
             _ => None,
         });
-        let recorded = self.recording.clone().map(FileInUse::Recorded);
+        let recorded = self.shown.recorded.as_ref().filter(|_| self.is_recording());
+        let recorded = recorded.map(|recorded| FileInUse::Recorded(recorded.path.clone()));
         replayed.into_iter().chain(recorded).collect()
     }
 
@@ -52,100 +408,63 @@ impl View for LiveView {
     }
 
     fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        live_exports(self, shared)
+        tools::exports(self, shared)
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        source_form::form_ui(ui, self, shared, effects);
+        form_ui(ui, self, shared, effects);
     }
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        live_ui(ui, self, shared, effects);
-        self.report_drawn();
+        cards::body_ui(ui, self, shared, effects);
+        // The thread may send the next snapshot.
+        if std::mem::take(&mut self.is_to_be_drawn) {
+            self.command(Command::Drawn);
+        }
     }
 
     fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
-        status_ui(ui, self);
-    }
-}
-
-/// Shows the surfaces above, readings and figures below, and the replay bar at the bottom.
-fn live_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
-    let whole = ui.available_rect_before_wrap();
-    if !view.shown.has_answer() {
-        card_ui(ui, whole, |ui| invitation_ui(ui, view, shared, effects));
-        ui.allocate_rect(whole, Sense::hover());
-        return;
-    }
-    let gap = space(2);
-    let mut cards = whole;
-    if view.shown.replay.is_some() {
-        let (rest, bar) = whole.split_top_bottom_at_y(whole.bottom() - REPLAY_BAR_HEIGHT);
-        card_ui(ui, bar, |ui| replay_bar_ui(ui, view));
-        cards = rest.with_max_y(rest.bottom() - gap);
-    }
-    if view.shown.targets.is_some() {
-        targets_ui(ui, cards, view, shared, effects);
-        ui.allocate_rect(whole, Sense::hover());
-        return;
-    }
-    let lower_height = (0.46 * cards.height()).clamp(space(60), space(100));
-    let (upper, lower) = cards.split_top_bottom_at_y(cards.bottom() - lower_height);
-    surfaces_ui(ui, upper.with_max_y(upper.bottom() - gap), view, shared, effects);
-    let figures_width = (0.42 * lower.width()).clamp(space(75), space(110));
-    let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
-    card_ui(ui, left.with_max_x(left.right() - gap), |ui| {
-        readings_ui(ui, view, shared.look.colours);
-    });
-    card_ui(ui, right, |ui| {
-        scrolled_ui(ui, "live figures", |ui| figures_ui(ui, view, shared, effects));
-    });
-    ui.allocate_rect(whole, Sense::hover());
-}
-
-/// Shows the state of the stream in the line at the bottom.
-fn status_ui(ui: &mut Ui, view: &LiveView) {
-    let palette = Theme::of(ui).palette;
-    let counts = &view.shown.counts;
-    let watched = view.shown.frame.as_ref().map(|frame| &frame.watched);
-    let (colour, text) = match (&view.running, watched) {
-        (None, _) if counts.decoded > 0 => (
-            palette.dim,
-            format!("Stopped after {}", counted(counts.decoded, "frame")),
-        ),
-        (None, _) => (palette.dim, "Ready: press Start".to_owned()),
-        (Some(_), _) if !view.shown.has_answer() => (palette.accent, "Waiting for the first frame".to_owned()),
-        (Some(_), _) if counts.is_waiting => (palette.warning, "No frame for two seconds".to_owned()),
-        (Some(_), Some(Watched::Checked(FaultEvent::Named { wire, .. }))) => {
-            (palette.warning, format!("Fault: {wire}"))
-        }
-        (Some(_), Some(Watched::Checked(FaultEvent::Unexplained))) => {
-            (palette.warning, "The readings contradict Eq. (2)".to_owned())
-        }
-        (Some(running), _) => match (&running.source, view.shown.replay) {
-            (SourcePlan::Replay(_), Some(replay)) if !replay.is_playing => (palette.dim, "Replay paused".to_owned()),
-            (SourcePlan::Replay(_), _) => (palette.good, "Replaying".to_owned()),
-            _ => (palette.good, "Live".to_owned()),
-        },
-    };
-    ui.horizontal_centered(|ui| {
-        state_ui(ui, colour, &text);
-        let dim = |ui: &mut Ui, text: String| ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
-        if let Some(running) = &view.running {
-            let source = match &running.source {
-                SourcePlan::Simulated(_) => "simulated".to_owned(),
-                SourcePlan::Replay(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-                SourcePlan::Stream(source) => source.to_string(),
-            };
-            dim(ui, format!("{}, {source}", running.network));
-            if counts.decoded > 0 {
-                dim(ui, format!("{:.0} frames per second", counts.frames_per_second));
+        let palette = Theme::of(ui).palette;
+        let (colour, text) = self.status(&palette);
+        ui.horizontal_centered(|ui| {
+            state_ui(ui, colour, &text);
+            for note in self.status_notes() {
+                ui.label(RichText::new(note).size(type_size().note).color(palette.dim));
             }
-        }
-        if let Some(recorded) = view.shown.recording.as_ref().filter(|_| view.recording.is_some()) {
-            let frames = counted(recorded.frames, "frame");
-            let text = format!("● Recording: {frames}, {:.1} s", recorded.seconds);
-            ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
-        }
-    });
+            if let Some(recorded) = self.shown.recorded.as_ref().filter(|_| self.is_recording()) {
+                let frames = counted(recorded.frames, "frame");
+                let text = format!("● Recording: {frames}, {:.1} s", recorded.seconds);
+                ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
+            }
+        });
+    }
+}
+
+/// Returns the folder for files of this view: next to the runs, or a temporary one.
+fn folder(shared: &Shared) -> PathBuf {
+    let parent = shared.runs.path.as_ref().and_then(|runs| runs.parent());
+    parent.map_or_else(std::env::temp_dir, PathBuf::from)
+}
+
+const NETWORK: (&str, &str) = (
+    "sample network.json",
+    include_str!("../../../../assets/samples/network.json"),
+);
+const RECORDING: (&str, &str) = (
+    "sample recording.csv",
+    include_str!("../../../../assets/samples/recording.csv"),
+);
+
+/// Writes the sample recording, and the network that decodes it, to files.
+fn write_sample(folder: &Path) -> Result<Loaded, String> {
+    let refused = |error: &dyn std::fmt::Display| format!("the sample cannot be written: {error}");
+    fs::create_dir_all(folder).map_err(|error| refused(&error))?;
+    let write = |(name, text): (&str, &str)| {
+        let path = folder.join(name);
+        let written = atomic_write(&path, |file| file.write_all(text.as_bytes()));
+        written.map(|()| path).map_err(|error| refused(&error))
+    };
+    let (network, recording) = (write(NETWORK)?, write(RECORDING)?);
+    let network = NetworkFile::load(&network).map_err(|error| error.to_string())?;
+    Ok(Loaded::Sample(Arc::new(network), recording))
 }
