@@ -1,26 +1,22 @@
 //! The cards in the middle: the decoded surfaces, the readings or the values over time, and the figures of the stream.
 
-use decoupler_core::{
-    live::{FaultEvent, FaultyWire, ZeroGains},
-    text::{capitalised, counted},
-};
+use decoupler_core::{live::ZeroGains, text::counted};
 use decoupler_files::{
-    export::{format_duration, format_number, format_percent},
+    export::{format_duration, format_number},
     figure::{
-        SequentialMap,
+        HeatMap,
         surface::{Quantity, Surface, SurfaceFigure},
     },
-    live::{SourcePlan, Tally, Watched},
+    live::{SourcePlan, Tally},
 };
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, Vec2};
 
 use super::{
     LiveView,
-    engine::{Answered, Evidence},
+    snapshot::{Answered, Fact},
     tools::{REPLAY_BAR_HEIGHT, replay_bar_ui, save_recording},
 };
 use crate::window::{
-    glossary,
     plotting::{cells_ui, titled_plots_ui},
     shared::{Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
@@ -55,21 +51,22 @@ pub fn body_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         upper.with_max_y(upper.bottom() - gap),
         left.with_max_x(left.right() - gap),
     );
-    match &answer.evidence {
-        Evidence::Array { .. } => card_ui(ui, left, |ui| readings_ui(ui, &answer, shared.look.colours)),
-        Evidence::Targets { chart, .. } => {
-            let (surface, beside) = upper.split_left_right_at_x(upper.center().x);
-            let place = if answer.surfaces.is_empty() { upper } else { beside };
-            let title = match answer.network.intervals {
-                Some(_) => "Decoded values with their 90 % intervals",
-                None => "Decoded values",
-            };
-            card_ui(ui, place, |ui| titled_plots_ui(ui, title, chart));
-            card_ui(ui, left, |ui| {
-                scrolled_ui(ui, "live targets", |ui| values_ui(ui, &answer))
-            });
-            upper = surface;
-        }
+    if let Some(readings) = &answer.readings {
+        let readings = readings.clone().coloured(shared.look.colours);
+        card_ui(ui, left, |ui| readings_ui(ui, &readings, &answer.faulty));
+    }
+    if let Some(chart) = &answer.chart {
+        let (surface, beside) = upper.split_left_right_at_x(upper.center().x);
+        let place = if answer.surfaces.is_empty() { upper } else { beside };
+        let title = match answer.network.intervals {
+            Some(_) => "Decoded values with their 90 % intervals",
+            None => "Decoded values",
+        };
+        card_ui(ui, place, |ui| titled_plots_ui(ui, title, chart));
+        card_ui(ui, left, |ui| {
+            scrolled_ui(ui, "live targets", |ui| values_ui(ui, &answer))
+        });
+        upper = surface;
     }
     surfaces_ui(ui, upper, &answer, &mut view.node, shared.look, effects);
     card_ui(ui, right, |ui| {
@@ -246,35 +243,19 @@ fn invitation(view: &LiveView, shared: &Shared) -> (String, String, Option<&'sta
 }
 
 /// Shows the readings of an array as a map of rows and columns, with the faulty wires marked.
-fn readings_ui(ui: &mut Ui, answer: &Answered, colours: SequentialMap) {
-    let Evidence::Array {
-        rows,
-        readings,
-        watched,
-        ..
-    } = &answer.evidence
-    else {
-        return;
-    };
+fn readings_ui(ui: &mut Ui, readings: &HeatMap, [rows, columns]: &[Vec<usize>; 2]) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(7));
         ui.label(RichText::new("Readings").font(semibold(type_size().title)));
     });
-    let (mut faulty_rows, mut faulty_columns) = (Vec::new(), Vec::new());
-    if let Some(wire) = watched.wire() {
-        faulty_rows.extend((0..rows.len()).filter(|&place| wire == FaultyWire::Row(rows[place])));
-        faulty_columns.extend(wire.columns());
+    let marks = (&**rows, &**columns, Theme::of(ui).palette.warning);
+    if let Some(([row, column], cell)) = cells_ui(ui, "Live readings", readings, marks) {
+        let drop_percent = format_number(readings.values[[row, column]]);
+        let (row, column) = (&readings.rows[row], &readings.columns[column]);
+        cell.on_hover_text_at_pointer(format!(
+            "Row-wire {row}, column-wire {column}\ndrop from unloaded: {drop_percent} %"
+        ));
     }
-    let marks = (&*faulty_rows, &*faulty_columns, Theme::of(ui).palette.warning);
-    let map = readings.clone().coloured(colours);
-    let Some(([row, column], cell)) = cells_ui(ui, "Live readings", &map, marks) else {
-        return;
-    };
-    let drop_percent = format_number(map.values[[row, column]]);
-    let (row, column) = (rows.get(row).map_or(0, |row| row + 1), column + 1);
-    cell.on_hover_text_at_pointer(format!(
-        "Row-wire {row}, column-wire {column}\ndrop from unloaded: {drop_percent} %"
-    ));
 }
 
 /// Shows the latest value of each target, with its uncertainty.
@@ -283,153 +264,39 @@ fn values_ui(ui: &mut Ui, answer: &Answered) {
     let intervals = answer.network.intervals.as_ref();
     for (index, (target, &value)) in answer.network.problem.targets.iter().zip(&answer.values).enumerate() {
         let half_width = intervals.and_then(|intervals| intervals.half_width(index, value));
-        let (hint, uncertainty) = match half_width {
-            Some(half_width) => (
-                "Latest decoded value ± half-width of its 90 % prediction interval.",
-                format!(" ± {}", format_number(half_width)),
-            ),
-            None => ("Latest decoded value.", String::new()),
-        };
-        fact_ui(
-            ui,
-            &target.title(),
-            hint,
-            &format!("{}{uncertainty}", format_number(value)),
-        );
+        let half_width = half_width.map(|half_width| format!(" ± {}", format_number(half_width)));
+        let hint = "Latest decoded value, ± half-width of its 90 % prediction interval if the network has one.";
+        let value = format!("{}{}", format_number(value), half_width.unwrap_or_default());
+        fact_ui(ui, &target.title(), hint, &value);
     }
 }
 
 /// Shows confidence, the stream, and of an array the unloaded state and the recording; warnings above everything else.
 fn figures_ui(ui: &mut Ui, view: &mut LiveView, answer: &Answered, shared: &Shared, effects: &mut Vec<Effect>) {
-    let is_array = matches!(answer.evidence, Evidence::Array { .. });
-    if let Evidence::Array { watched, .. } = &answer.evidence {
-        warning_ui(ui, watched);
+    if let Some((_, consequence)) = &answer.fault {
+        note_ui(ui, consequence);
     }
     section_heading_ui(ui, "Confidence");
-    confidence_ui(ui, answer, &view.shown.counts);
+    let palette = Theme::of(ui).palette;
+    for Fact {
+        name,
+        hint,
+        value,
+        warns,
+    } in &answer.confidence
+    {
+        let colour = if *warns { palette.warning } else { palette.text };
+        coloured_fact_ui(ui, name, hint, value, colour);
+    }
     section_heading_ui(ui, "Stream");
     stream_ui(ui, &view.shown.counts);
-    if is_array {
+    if answer.readings.is_some() {
         section_heading_ui(ui, "Zero");
         zero_ui(ui, view);
         section_heading_ui(ui, "Recording");
         recording_ui(ui, view, shared, effects);
     }
     ui.add_space(space(2));
-}
-
-fn warning_ui(ui: &mut Ui, watched: &Watched) {
-    let Watched::Checked(event) = watched else { return };
-    let text = match event {
-        FaultEvent::Named { wire, .. } => {
-            let its = match wire {
-                FaultyWire::Row(_) | FaultyWire::Column(_) => "Its",
-                FaultyWire::Columns(_) => "Their",
-            };
-            let event = capitalised(&event.to_string());
-            format!("{event}. {its} readings are left out, and the others decoded by Gauss-Newton steps on Eq. (2).")
-        }
-        FaultEvent::Unexplained => {
-            "The readings contradict Eq. (2), and no fault of a single wire explains them: the answers may be wrong. Check the \
-             wiring, the geometry, the order of the rows, and the relative noise on the left."
-                .to_owned()
-        }
-        FaultEvent::Recovered => return,
-    };
-    note_ui(ui, &text);
-}
-
-fn confidence_ui(ui: &mut Ui, answer: &Answered, counts: &Tally) {
-    match &answer.evidence {
-        Evidence::Array {
-            readings,
-            watched,
-            residual,
-            noise,
-            ..
-        } => {
-            let mut value = format_percent(100.0 * residual);
-            if *noise > 0.0 && residual.is_finite() {
-                value += &format!(" ({} × noise)", format_number(residual / noise));
-            }
-            let hint = format!(
-                "{}\n\nIt is as small as the noise of a reading if the answer explains the readings.",
-                glossary::RESIDUAL.hint
-            );
-            fact_ui(ui, "Residual of Eq. (2)", &hint, &value);
-            let hint = "Readings beyond the range seen in training by more than a tenth of it, and coordinates beyond by more \
-                        than all of it. There the network extrapolates: check these readings, or train with a scene that \
-                        covers them, for the simulated source with an indenter as the loading.";
-            outside_ui(ui, answer.outside, readings.values.len(), "coordinate", hint);
-            fault_ui(ui, watched);
-            if answer.surfaces.len() > 1 {
-                let hint =
-                    "Mean |error| of z over all nodes, compared with the simulated truth, over the latest frames.";
-                let error = counts.error_mm.map(|mm| format!("{} mm", format_number(mm)));
-                fact_ui(ui, "Error", hint, &error.unwrap_or_else(|| format_number(None)));
-            }
-        }
-        Evidence::Targets { drift, .. } => {
-            let hint = "Readings beyond the range seen in training by more than a tenth of it, and targets beyond by more than \
-                        all of it. There the network extrapolates: check these readings, or train on a recording that covers \
-                        them.";
-            let problem = &answer.network.problem;
-            outside_ui(ui, answer.outside, problem.feature_count(), "target", hint);
-            let palette = Theme::of(ui).palette;
-            let (hint, value, colour) = match drift {
-                Err(reason) => (
-                    format!("Drift is not monitored: {reason}."),
-                    "not monitored".to_owned(),
-                    palette.dim,
-                ),
-                Ok(None) => (DRIFT.to_owned(), "none".to_owned(), palette.text),
-                Ok(Some(drift)) => (
-                    DRIFT.to_owned(),
-                    capitalised(&drift.describe(&problem.inputs)),
-                    palette.warning,
-                ),
-            };
-            coloured_fact_ui(ui, "Drift of the readings", &hint, &value, colour);
-        }
-    }
-}
-
-const DRIFT: &str = "Readings that do not look like those of the training: prediction intervals do not hold. Check the sensor and \
-                     its connection, re-zero it, or train with recent samples. The warning ends when the readings are back to \
-                     normal. In readings like those of the training, a false alarm occurs on average at most once in 10 000 \
-                     blocks of readings, each at least five times as long as neighbouring readings are correlated.";
-
-/// Shows how many of `of` readings, and of the targets, are outside the range seen in training.
-fn outside_ui(ui: &mut Ui, (readings, targets): (Option<usize>, usize), of: usize, target: &str, hint: &str) {
-    let mut value = match readings {
-        None => "readings not known".to_owned(),
-        Some(0) if targets == 0 => "none".to_owned(),
-        Some(readings) => format!("{} of {of}", counted(readings, "reading")),
-    };
-    if targets > 0 {
-        value += &format!(", {}", counted(targets, target));
-    }
-    let palette = Theme::of(ui).palette;
-    let is_outside = readings.unwrap_or(0) + targets > 0;
-    let colour = if is_outside { palette.warning } else { palette.text };
-    coloured_fact_ui(ui, "Outside training", hint, &value, colour);
-}
-
-fn fault_ui(ui: &mut Ui, watched: &Watched) {
-    let value = match watched {
-        Watched::NoNoise | Watched::TooLarge => {
-            let reason = match watched {
-                Watched::NoNoise => "without noise, deviations cannot be judged; give the noise of a reading",
-                _ => "the array is too large to check every frame",
-            };
-            dim_ui(ui, &format!("Faults of wires are not looked for: {reason}."));
-            return;
-        }
-        Watched::Checked(FaultEvent::Recovered) => "none".to_owned(),
-        Watched::Checked(FaultEvent::Unexplained) => "not a single-wire fault".to_owned(),
-        Watched::Checked(FaultEvent::Named { wire, .. }) => wire.to_string(),
-    };
-    fact_ui(ui, "Fault", glossary::WIRE_FAULT.hint, &value);
 }
 
 /// Shows rate, latency and losses of the stream.

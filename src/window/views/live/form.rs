@@ -1,18 +1,14 @@
 //! The form on the left: the network that decodes, and the source of what it decodes.
 
 use std::{
-    ops::RangeInclusive,
     path::PathBuf,
-    sync::{
-        Arc,
-        mpsc::{Sender, channel},
-    },
+    sync::{Arc, mpsc::channel},
 };
 
 use decoupler_core::{dataset::Simulation, scene::Rows};
 use decoupler_files::{
     export::{NetworkFile, format_percent},
-    live::{Motion, Source, SourcePlan},
+    live::{Motion, Source, SourceError, SourcePlan},
 };
 use eframe::egui::{ComboBox, TextEdit, Ui, vec2};
 
@@ -59,19 +55,6 @@ pub enum SourceKind {
     Tcp,
 }
 
-/// Value of a field, which the user changes.
-enum Value<'a> {
-    Text(&'a mut String),
-    Count(&'a mut usize, RangeInclusive<usize>),
-    Quantity(&'a mut f64, RangeInclusive<f64>, &'static str),
-}
-
-/// Default noise of a reading of a real source if the network's scene has none.
-const USUAL_NOISE: f64 = 1e-3;
-/// Default noise of the simulated source if the network's scene has none: networks trained without noise amplify noise
-/// strongly.
-const SLIGHT_NOISE: f64 = 1e-5;
-
 impl Default for SourceForm {
     fn default() -> Self {
         Self {
@@ -94,8 +77,9 @@ impl SourceForm {
         let noise = simulation.scene.noise.in_test();
         let of_scene = match self.kind {
             _ if !noise.is_none() => noise.relative,
-            SourceKind::Simulated => SLIGHT_NOISE,
-            SourceKind::Replay | SourceKind::Serial | SourceKind::Tcp => USUAL_NOISE,
+            // Networks trained without noise amplify noise strongly.
+            SourceKind::Simulated => 1e-5,
+            SourceKind::Replay | SourceKind::Serial | SourceKind::Tcp => 1e-3,
         };
         self.noise.unwrap_or(of_scene)
     }
@@ -105,85 +89,57 @@ impl SourceForm {
     /// # Errors
     /// If a field is empty or invalid, or there is no sensor to simulate, with what to do.
     pub fn plan(&self, has_sensor: bool) -> Result<SourcePlan, String> {
-        let filled = |text: &str, todo: &str| match text.trim() {
-            "" => Err(todo.to_owned()),
-            text => Ok(text.to_owned()),
-        };
         Ok(match self.kind {
-            SourceKind::Simulated if !has_sensor => {
+            SourceKind::Simulated if has_sensor => SourcePlan::Simulated(self.frames_per_second),
+            SourceKind::Simulated => {
                 let reason = "A network of a recording decodes a file, a serial port or a TCP address: there is no sensor \
                               model to simulate. Choose one of them as the source.";
                 return Err(reason.to_owned());
             }
-            SourceKind::Simulated => SourcePlan::Simulated(self.frames_per_second),
-            SourceKind::Replay => {
-                SourcePlan::Replay(filled(&self.path, "Choose a file of frames, or record one.")?.into())
+            SourceKind::Replay if self.path.trim().is_empty() => {
+                return Err("Choose a file of frames, or record one.".to_owned());
             }
+            SourceKind::Replay => SourcePlan::Replay(self.path.trim().into()),
             SourceKind::Serial => {
-                let todo = "Give the name of the serial port, for example /dev/ttyUSB0 or COM3.";
                 let baud = u32::try_from(self.baud).unwrap_or(u32::MAX);
-                SourcePlan::Stream(Source::Serial(filled(&self.port, todo)?, baud))
+                SourcePlan::Stream(Source::Serial(self.port.trim().to_owned(), baud))
             }
             SourceKind::Tcp => {
-                let todo = "Give the address as HOST:PORT, for example localhost:5000.";
-                let source = format!("tcp:{}", filled(&self.address, todo)?).parse();
-                SourcePlan::Stream(source.map_err(|error: <Source as std::str::FromStr>::Err| error.to_string())?)
+                let source = format!("tcp:{}", self.address.trim()).parse();
+                SourcePlan::Stream(source.map_err(|error: SourceError| error.to_string())?)
             }
         })
     }
 
-    /// Returns the fields of the chosen kind with their hints, and a note on what it sends.
-    fn fields(&mut self, has_sensor: bool) -> (Vec<(&'static str, &'static str, Value<'_>)>, &'static str) {
-        let either = |array, recording| if has_sensor { array } else { recording };
-        let lines = either(
-            "Lines of CSV: the number of the row-wire and its resistances in ohm, or a whole snapshot in one line, row by row.",
-            "Lines of CSV: the inputs of the network in their order, after the number of the row-wire if there is a network for \
-             each, or under their names in a header.",
-        );
+    /// Shows the fields of the chosen kind.
+    fn fields_ui(&mut self, ui: &mut Ui) {
+        let lines = "Lines of CSV. Of an array: the number of the row-wire and its resistances in ohm, or a whole snapshot in \
+                     one line, row by row. Of another sensor: the inputs of the network in their order, or under their names \
+                     in a header.";
         match self.kind {
             SourceKind::Simulated => {
-                let rate = Value::Quantity(&mut self.frames_per_second, 0.1..=10_000.0, "Hz");
-                let hint = "Rate at which the simulated array is read.";
-                (vec![("Frames per second", hint, rate)], "")
+                let (hint, rate) = ("Rate at which the simulated array is read.", &mut self.frames_per_second);
+                quantity_ui(ui, "Frames per second", hint, rate, 0.1..=10_000.0, "Hz");
             }
-            SourceKind::Replay => {
-                let hint = either(
-                    "CSV of frames: a recording made here, or lines of resistances in ohm as the terminal command decode \
-                     reads them.",
-                    "File with the inputs of the network under their names, such as the recording that it was trained on.",
-                );
-                let note = either(
-                    "Frames without a column time_s are replayed at 50 per second.",
-                    "Samples are replayed at their times or, without a time column, at 50 per second.",
-                );
-                (vec![("Frames", hint, Value::Text(&mut self.path))], note)
-            }
+            SourceKind::Replay => text_ui(ui, "Frames", FRAMES.description, &mut self.path),
             SourceKind::Serial => {
-                let port = "Name of the port: /dev/ttyUSB0, /dev/ttyACM0, COM3.";
-                let baud = "Bits per second, as set in the device: 8 data bits, no parity, 1 stop bit.";
-                let fields = vec![
-                    ("Port", port, Value::Text(&mut self.port)),
-                    ("Baud", baud, Value::Count(&mut self.baud, 1..=100_000_000)),
-                ];
-                (fields, lines)
+                let hint = "Name of the port: /dev/ttyUSB0, /dev/ttyACM0, COM3.";
+                text_ui(ui, "Port", hint, &mut self.port);
+                let hint = "Bits per second, as set in the device: 8 data bits, no parity, 1 stop bit.";
+                count_ui(ui, "Baud", hint, &mut self.baud, 1..=100_000_000);
+                dim_ui(ui, lines);
             }
             SourceKind::Tcp => {
                 let hint = "Host and port of the sender, as HOST:PORT.";
-                (vec![("Address", hint, Value::Text(&mut self.address))], lines)
+                text_ui(ui, "Address", hint, &mut self.address);
+                dim_ui(ui, lines);
             }
         }
     }
 
     fn noise_ui(&mut self, ui: &mut Ui, simulation: &Simulation) {
-        let hint = match self.kind {
-            SourceKind::Simulated => {
-                "Noise of a simulated reading, relative to the reading (standard deviation). Fault detection uses it."
-            }
-            _ => {
-                "Noise of a reading of your device, relative to the reading (standard deviation). Fault and contact \
-                 detection use it: too small a value causes false alarms."
-            }
-        };
+        let hint = "Noise of a reading, simulated or of your device, relative to the reading (standard deviation). Fault and \
+                    contact detection use it: too small a value causes false alarms.";
         let before = self.noise(simulation);
         let mut noise = before;
         quantity_ui(ui, "Relative noise", hint, &mut noise, 0.0..=1.0, "");
@@ -193,18 +149,12 @@ impl SourceForm {
     }
 }
 
-fn value_ui(ui: &mut Ui, (name, hint, value): (&str, &str, Value<'_>)) {
-    match value {
-        Value::Count(count, range) => drop(count_ui(ui, name, hint, count, range)),
-        Value::Quantity(quantity, range, unit) => drop(quantity_ui(ui, name, hint, quantity, range, unit)),
-        Value::Text(text) => {
-            let label = ui.label(name).on_hover_text(hint);
-            let edit = TextEdit::singleline(text)
-                .desired_width(f32::INFINITY)
-                .margin(vec2(space(2), space(1)));
-            ui.add(edit).labelled_by(label.id).on_hover_text(hint);
-        }
-    }
+fn text_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
+    let label = ui.label(name).on_hover_text(hint);
+    let edit = TextEdit::singleline(text)
+        .desired_width(f32::INFINITY)
+        .margin(vec2(space(2), space(1)));
+    ui.add(edit).labelled_by(label.id).on_hover_text(hint);
 }
 
 /// Shows the network and the source. Only the motion of the indenter can be changed while a source is running.
@@ -214,7 +164,7 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         network_ui(ui, view, shared, effects);
         section_heading_ui(ui, "Source");
         let simulation = view.network.network(&shared.runs).map(|(_, file)| file.problem.sensor);
-        let has_sensor = simulation.is_none_or(|simulation| simulation.is_some());
+        let has_sensor = view.has_sensor(shared);
         ui.add_enabled_ui(view.running.is_none(), |ui| {
             let kinds = [
                 (SourceKind::Simulated, "Simulated"),
@@ -223,18 +173,15 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
                 (SourceKind::Tcp, "TCP"),
             ];
             let kinds = if has_sensor { &kinds[..] } else { &kinds[1..] };
-            let source = &mut view.source;
-            source.kind = segmented_ui(ui, "Source", kinds, source.kind, false).unwrap_or(source.kind);
+            let kind = view.source.kind;
+            view.source.kind = segmented_ui(ui, "Source", kinds, kind, false).unwrap_or(kind);
             ui.add_space(space(1));
-            let (fields, note) = source.fields(has_sensor);
-            fields.into_iter().for_each(|field| value_ui(ui, field));
+            view.source.fields_ui(ui);
             if view.source.kind == SourceKind::Replay {
-                open_ui(ui, view, LiveFile::Frames, effects);
+                open_ui(ui, view, "Choose file…", FRAMES, effects);
+                dim_ui(ui, "Frames and samples without times are replayed at 50 per second.");
             }
-            if !note.is_empty() {
-                dim_ui(ui, note);
-            }
-            if let Some(Some(simulation)) = &simulation {
+            if let Some(simulation) = simulation.as_ref().and_then(Option::as_ref) {
                 view.source.noise_ui(ui, simulation);
             }
         });
@@ -247,10 +194,10 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
             ui.label("Indenter");
             if let Some(motion) = segmented_ui(ui, "Indenter", &motions, view.source.motion, true) {
                 view.source.motion = motion;
-                view.move_indenter();
+                view.steer();
             }
         }
-        if let (Err(obstacle), true) = (view.plan(shared), simulation.is_some()) {
+        if let (Err(obstacle), Some(_)) = (view.plan(shared), simulation) {
             ui.add_space(space(1));
             note_ui(ui, &obstacle);
         }
@@ -261,11 +208,12 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
 /// The network that decodes.
 #[derive(Debug, Default)]
 pub struct NetworkChoice {
-    pick: Pick,
+    /// Its place.
+    pub pick: Pick,
     /// The picked run.
-    run: Option<Arc<NetworkFile>>,
+    pub run: Option<Arc<NetworkFile>>,
     /// The file that was opened last, and its name.
-    file: Option<(String, Arc<NetworkFile>)>,
+    pub file: Option<(String, Arc<NetworkFile>)>,
 }
 
 /// Place of the network.
@@ -285,10 +233,8 @@ pub enum Pick {
 pub enum Loaded {
     /// Of the run with this number.
     Run(u64, Arc<NetworkFile>),
-    /// From a file of this name.
-    File(String, Arc<NetworkFile>),
-    /// That of the sample, with its recording.
-    Sample(Arc<NetworkFile>, PathBuf),
+    /// From a file of this name; that of the sample with its recording.
+    File(String, Arc<NetworkFile>, Option<PathBuf>),
 }
 
 impl NetworkChoice {
@@ -303,29 +249,14 @@ impl NetworkChoice {
         picked.or_else(|| runs.newest().map(|run| (run.name, run.file)))
     }
 
-    /// Decodes with this network of a run.
-    pub fn take_run(&mut self, id: u64, file: Arc<NetworkFile>) {
-        (self.pick, self.run) = (Pick::Run(id), Some(file));
-    }
-
-    /// Decodes with this network, which does not belong to a run.
-    pub fn take_file(&mut self, name: String, file: Arc<NetworkFile>) {
-        (self.pick, self.file) = (Pick::File, Some((name, file)));
-    }
-
     /// Returns the networks that can be picked, with their texts.
     fn picks(&self, runs: &RunList) -> Vec<(Pick, String)> {
         let newest = runs.workspace.runs.last();
         let newest = newest.map_or_else(|| "no run yet".to_owned(), |run| format!("Newest run: {}", run.name));
-        let file = self
-            .file
-            .as_ref()
-            .map(|(name, _)| (Pick::File, format!("File: {name}")));
+        let file = self.file.as_ref().map(|(name, _)| (Pick::File, format!("File: {name}")));
         let runs = runs.workspace.runs.iter().rev();
-        std::iter::once((Pick::Newest, newest))
-            .chain(runs.map(|run| (Pick::Run(run.id), run.name.clone())))
-            .chain(file)
-            .collect()
+        let runs = runs.map(|run| (Pick::Run(run.id), run.name.clone()));
+        std::iter::once((Pick::Newest, newest)).chain(runs).chain(file).collect()
     }
 }
 
@@ -333,28 +264,35 @@ impl NetworkChoice {
 fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let runs = &shared.runs;
     let (picks, mut pick) = (view.network.picks(runs), view.network.pick);
-    let shown = picks.iter().find(|(of, _)| *of == pick).unwrap_or(&picks[0]).1.clone();
+    let shown = picks.iter().find(|(of, _)| *of == pick).unwrap_or(&picks[0]);
     let width = ui.available_width();
     let label = ui.label("Decode with");
     let combo = ComboBox::from_id_salt("live network")
-        .selected_text(shown)
+        .selected_text(&shown.1)
         .width(width)
         .truncate();
     let combo = combo.show_ui(ui, |ui| {
-        for (of, text) in picks {
-            ui.selectable_value(&mut pick, of, text);
+        for (of, text) in &picks {
+            ui.selectable_value(&mut pick, *of, text);
         }
     });
     let hint = "The network that decodes the frames: a finished run, or a network file. A replay is decoded again as soon as \
                 another one is chosen.";
     combo.response.labelled_by(label.id).on_hover_text(hint);
-    if let Some((_, network)) = view.network.network(runs) {
-        for line in describe(network) {
-            dim_ui(ui, &line);
-        }
+    if let Some((_, file)) = view.network.network(runs) {
+        let rows = file.problem.sensor.as_ref().map(|simulation| match simulation.scene.rows {
+            Rows::All => ", all rows".to_owned(),
+            Rows::Known => ", known rows".to_owned(),
+            Rows::One(row) => format!(", row {} alone", row + 1),
+        });
+        let (source, hidden) = (file.source_name(), file.settings.hidden);
+        dim_ui(ui, &format!("{source}, {hidden} hidden{}", rows.unwrap_or_default()));
+        let name = if file.problem.has_nodes() { "Z error" } else { "Error" };
+        let error = format_percent(file.scores.network.percent());
+        dim_ui(ui, &format!("{name} on its test set {error}"));
     }
     ui.add_space(space(1));
-    open_ui(ui, view, LiveFile::Network, effects);
+    open_ui(ui, view, "Open network file…", NETWORK, effects);
     match pick {
         _ if pick == view.network.pick => {}
         Pick::Run(id) => {
@@ -371,72 +309,30 @@ fn network_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut V
     }
 }
 
-/// Describes a network in two lines: its array and rows, and its error.
-fn describe(file: &NetworkFile) -> [String; 2] {
-    let sensor = file.problem.sensor.as_ref();
-    let rows = sensor.map(|simulation| match simulation.scene.rows {
-        Rows::All => ", all rows".to_owned(),
-        Rows::Known => ", known rows".to_owned(),
-        Rows::One(row) => format!(", row {} alone", row + 1),
-    });
-    let (source, hidden) = (file.source_name(), file.settings.hidden);
-    let error = format_percent(file.scores.network.percent());
-    let name = if file.problem.has_nodes() { "Z error" } else { "Error" };
-    [
-        format!("{source}, {hidden} hidden{}", rows.unwrap_or_default()),
-        format!("{name} on its test set {error}"),
-    ]
-}
+/// A network to decode with.
+pub const NETWORK: FileWords = FileWords {
+    kind: "network",
+    description: "A network saved by the Train view or by train --out in a terminal.",
+    extensions: &["json"],
+};
 
-/// A file that the user opens in the Live view.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LiveFile {
-    /// A network to decode with.
-    Network,
-    /// Frames to replay.
-    Frames,
-}
-
-impl LiveFile {
-    /// Asks for its path, which is sent to `chosen`.
-    fn choose(self, chosen: Sender<PathBuf>) -> FileTask {
-        let (words, suggestion) = match self {
-            Self::Network => {
-                let words = FileWords {
-                    kind: "network",
-                    description: "A network saved by the Train view or by train --out in a terminal.",
-                    extensions: &["json"],
-                };
-                (words, "network.json")
-            }
-            Self::Frames => {
-                let words = FileWords {
-                    kind: "frames",
-                    description: "A recording made here, or lines of resistances in ohm as the terminal command decode reads them.",
-                    extensions: &["csv"],
-                };
-                (words, "recording.csv")
-            }
-        };
-        FileTask {
-            words,
-            suggestion: suggestion.to_owned(),
-            purpose: Purpose::Choose(chosen),
-        }
-    }
-}
+/// Frames to replay.
+const FRAMES: FileWords = FileWords {
+    kind: "frames",
+    description: "A recording made here, lines of resistances in ohm as the terminal command decode reads them, or for a network \
+                  of a recording a file with its inputs under their names.",
+    extensions: &["csv"],
+};
 
 /// Shows the button that opens a file.
-fn open_ui(ui: &mut Ui, view: &mut LiveView, file: LiveFile, effects: &mut Vec<Effect>) {
-    let text = match file {
-        LiveFile::Network => "Open network file…",
-        LiveFile::Frames => "Choose file…",
-    };
-    let (send, chosen) = channel();
-    let task = file.choose(send);
-    let button = ui.add(ghost_button(text));
-    if button.on_hover_text(task.words.description).clicked() {
-        view.chosen = Some((file, chosen));
-        effects.push(Effect::ChooseFile(task));
+fn open_ui(ui: &mut Ui, view: &mut LiveView, text: &str, words: FileWords, effects: &mut Vec<Effect>) {
+    if ui.add(ghost_button(text)).on_hover_text(words.description).clicked() {
+        let (send, chosen) = channel();
+        view.chosen = Some((words, chosen));
+        effects.push(Effect::ChooseFile(FileTask {
+            words,
+            suggestion: words.file_name(words.kind),
+            purpose: Purpose::Choose(send),
+        }));
     }
 }

@@ -6,15 +6,11 @@ use decoupler_core::problem::Channel;
 use decoupler_files::{
     export::{Cell, Table, TableColumn, WriteError, atomic_write, is_same},
     figure::Figure,
-    live::{History, Recorded},
+    live::Recorded,
 };
 use eframe::egui::{Align, Key, Label, Layout, Modifiers, RichText, Slider, Ui, Widget, WidgetInfo};
 
-use super::{
-    LiveView,
-    cards::surface_figure,
-    engine::{Answered, Evidence},
-};
+use super::{LiveView, cards::surface_figure, snapshot::Answered};
 use crate::window::{
     glossary,
     shared::{
@@ -192,7 +188,7 @@ fn speed_ui(ui: &mut Ui, view: &mut LiveView) {
     slider.on_hover_text("Recorded seconds per second, from 0.1 to 10. A double click sets it to 1.");
     if speed != before {
         view.source.speed = speed;
-        view.control(move |control, now| control.set_speed(speed, now));
+        view.steer();
     }
     dim_ui(ui, "Speed");
 }
@@ -205,9 +201,9 @@ pub fn exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a>> {
         .clone()
         .map(|answer| move || Figure::from(surface_figure(answer, None, shared.look)));
     if let Ok(answer) = answer
-        && let Evidence::Targets { chart, all, .. } = &answer.evidence
+        && let Some(chart) = &answer.chart
     {
-        let values = Ok(move || values_table(answer, all));
+        let values = Ok(move || values_table(answer));
         let chart = Ok(move || Figure::from(chart.clone()));
         let surface = picture_exports("Surface", "live-surface".to_owned(), surface);
         return picture_exports("Decoded values", "live-values".to_owned(), chart)
@@ -215,11 +211,17 @@ pub fn exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a>> {
             .chain([csv_export("Decoded values", VALUES, "live-values".to_owned(), values)])
             .collect();
     }
-    let readings = answer.and_then(|answer| match &answer.evidence {
-        Evidence::Array { readings, .. } => Ok(readings),
-        Evidence::Targets { .. } => Err(String::new()),
+    let readings = answer.map(|answer| {
+        move || {
+            Figure::from(
+                answer
+                    .readings
+                    .clone()
+                    .unwrap_or_default()
+                    .coloured(shared.look.colours),
+            )
+        }
     });
-    let readings = readings.map(|readings| move || Figure::from(readings.clone().coloured(shared.look.colours)));
     let recorded = view.shown.recorded.as_ref().map(save_recording);
     let recorded = recorded.map(|task| -> Ask<'a> { Box::new(move || Effect::ChooseFile(task)) });
     let recording = Export {
@@ -249,7 +251,7 @@ const RECORDING: FileWords = FileWords {
     extensions: &["csv"],
 };
 
-fn values_table(answer: &Answered, all: &History) -> Table {
+fn values_table(answer: &Answered) -> Table {
     let names = answer.network.problem.targets.iter().map(Channel::title);
     let row = |(time_s, values): &(f64, Arc<[f64]>)| {
         let values = std::iter::once(time_s).chain(values.iter());
@@ -260,7 +262,7 @@ fn values_table(answer: &Answered, all: &History) -> Table {
             .chain(names)
             .map(TableColumn::field)
             .collect(),
-        rows: all.all().iter().map(row).collect(),
+        rows: answer.history.all().iter().map(row).collect(),
     }
 }
 

@@ -8,22 +8,23 @@ use std::{
     time::Instant,
 };
 
-use decoupler_core::{live::FaultEvent, scene::Noise, text::counted};
+use decoupler_core::{scene::Noise, text::counted};
 use decoupler_files::{
     export::{NetworkFile, atomic_write},
-    live::{Input, LiveArray, RecordingFile, Replay, Session, SessionPlan, SourcePlan, Unit, Watched},
+    live::{Input, LiveArray, RecordingFile, Replay, ReplayState, Session, SessionPlan, SourcePlan, Unit},
 };
 use eframe::egui::{Color32, RichText, Ui};
 
 use super::{
     cards,
-    engine::{Command, Evidence, LiveEvent, Snapshot, run},
-    form::{LiveFile, Loaded, NetworkChoice, SourceForm, SourceKind, form_ui},
+    engine::{Command, LiveEvent, run},
+    form::{Loaded, NETWORK, NetworkChoice, Pick, SourceForm, SourceKind, form_ui},
+    snapshot::Snapshot,
     tools,
 };
 use crate::window::{
     job::{Background, Wake},
-    shared::{Effect, Export, FileInUse, Matter, Notice, Offers, Shared, View},
+    shared::{Effect, Export, FileInUse, FileWords, Matter, Notice, Offers, Shared, View},
     theme::{Palette, Theme, type_size},
     widgets::state_ui,
 };
@@ -40,7 +41,7 @@ pub struct LiveView {
     /// The node under the pointer, marked on all surfaces.
     pub(super) node: Option<usize>,
     /// Path of the file that the user is asked for.
-    pub(super) chosen: Option<(LiveFile, Receiver<PathBuf>)>,
+    pub(super) chosen: Option<(FileWords, Receiver<PathBuf>)>,
     /// The stream that has ended by itself.
     ended: Option<SourcePlan>,
     /// True if the window has received a snapshot and not yet reported to the thread that it was drawn.
@@ -111,41 +112,27 @@ impl LiveView {
 
     /// Begins to decode.
     pub(super) fn start(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        let Ok((network, plan)) = self.plan(shared) else {
-            return;
-        };
         effects.push(Effect::Settle(Matter::Live));
-        self.begin(network, plan, false);
+        self.begin(shared, None);
     }
 
     /// Restarts with the network that is chosen now if a source is running, from the current position of a replay.
     pub(super) fn restart(&mut self, shared: &Shared) {
-        let Ok((network, plan)) = self.plan(shared) else { return };
-        if self.running.is_none() {
-            return;
-        }
-        let replay = self.shown.replay;
-        self.begin(network, plan, replay.is_some());
-        if let Some(replay) = replay {
-            self.control(move |control, now| {
-                control.seek(replay.at_s, now);
-                control.play(replay.is_playing, now);
-            });
+        if self.running.is_some() {
+            self.begin(shared, self.shown.replay);
         }
     }
 
-    fn begin(&mut self, network: String, plan: SessionPlan, keeps_answer: bool) {
+    fn begin(&mut self, shared: &Shared, replay: Option<ReplayState>) {
+        let Ok((network, plan)) = self.plan(shared) else { return };
         let before = std::mem::take(&mut self.shown);
-        self.shown = match keeps_answer {
-            true => Snapshot {
-                is_recording: false,
-                ..before
-            },
-            false => Snapshot {
-                recorded: before.recorded,
-                zero: before.zero,
-                ..Snapshot::default()
-            },
+        self.shown = Snapshot {
+            // A replay continues without a gap on the screen.
+            answer: before.answer.filter(|_| replay.is_some()),
+            recorded: before.recorded,
+            zero: before.zero,
+            replay,
+            ..Snapshot::default()
         };
         (self.node, self.ended, self.is_to_be_drawn) = (None, None, false);
         let (commands, incoming) = channel();
@@ -154,9 +141,13 @@ impl LiveView {
             source: plan.source.clone(),
             commands,
         });
-        self.move_indenter();
-        let speed = self.source.speed;
-        self.control(move |replay, now| replay.set_speed(speed, now));
+        self.steer();
+        if let Some(replay) = replay {
+            self.control(move |control, now| {
+                control.seek(replay.at_s, now);
+                control.play(replay.is_playing, now);
+            });
+        }
         let shown = self.shown.clone();
         self.job.start(
             move |report| run(plan, shown, &incoming, report),
@@ -192,12 +183,14 @@ impl LiveView {
         });
     }
 
-    /// Moves the indenter of a simulated source as in the form.
-    pub(super) fn move_indenter(&self) {
-        let motion = self.source.motion;
+    /// Applies the motion of the indenter and the speed of the replay to the source.
+    pub(super) fn steer(&self) {
+        let (motion, speed) = (self.source.motion, self.source.speed);
         self.change(move |session| {
-            if let Input::Simulated(simulated, _) = &mut session.input {
-                simulated.motion = motion;
+            match &mut session.input {
+                Input::Simulated(simulated, _) => simulated.motion = motion,
+                Input::Replay(replay) => replay.set_speed(speed, Instant::now()),
+                Input::Lines(_) => {}
             }
             Ok(())
         });
@@ -271,28 +264,30 @@ impl LiveView {
 
     /// Takes the file that the user has chosen.
     fn take_chosen(&mut self) {
-        let Some((file, Ok(path))) = self.chosen.as_ref().map(|(file, paths)| (*file, paths.try_recv())) else {
+        let Some((words, Ok(path))) = self.chosen.as_ref().map(|(words, paths)| (*words, paths.try_recv())) else {
             return;
         };
         self.chosen = None;
-        match file {
-            LiveFile::Frames => self.source.path = path.display().to_string(),
-            LiveFile::Network => self.load(move || {
-                let file = NetworkFile::load(&path).map_err(|error| error.to_string())?;
-                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-                Ok(Loaded::File(name.into_owned(), Arc::new(file)))
-            }),
+        if words != NETWORK {
+            self.source.path = path.display().to_string();
+            return;
         }
+        self.load(move || {
+            let file = NetworkFile::load(&path).map_err(|error| error.to_string())?;
+            let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+            Ok(Loaded::File(name.into_owned(), Arc::new(file), None))
+        });
     }
 
     /// Decodes with a network that was read.
     fn take_loaded(&mut self, loaded: Loaded, shared: &Shared, effects: &mut Vec<Effect>) {
         match loaded {
-            Loaded::Run(id, file) => self.network.take_run(id, file),
-            Loaded::File(name, file) => self.network.take_file(name, file),
-            Loaded::Sample(file, recording) => {
-                self.network.take_file(NETWORK.0.to_owned(), file);
-                return self.replay(&recording, shared, effects);
+            Loaded::Run(id, file) => (self.network.pick, self.network.run) = (Pick::Run(id), Some(file)),
+            Loaded::File(name, file, sample) => {
+                (self.network.pick, self.network.file) = (Pick::File, Some((name, file)));
+                if let Some(recording) = sample {
+                    return self.replay(&recording, shared, effects);
+                }
             }
         }
         self.restart(shared);
@@ -322,29 +317,21 @@ impl LiveView {
     /// Returns the state of the stream, with its colour.
     fn status(&self, palette: &Palette) -> (Color32, String) {
         let counts = &self.shown.counts;
-        let Some(running) = &self.running else {
+        if self.running.is_none() {
             let text = match counts.decoded {
                 0 => "Ready: press Start".to_owned(),
                 decoded => format!("Stopped after {}", counted(decoded, "frame")),
             };
             return (palette.dim, text);
-        };
-        let watched = self.shown.answer.as_ref().map(|answer| match &answer.evidence {
-            Evidence::Array { watched, .. } => Some(watched),
-            Evidence::Targets { .. } => None,
-        });
-        let (colour, text) = match (watched, &running.source, self.shown.replay) {
-            (None, ..) => (palette.accent, "Waiting for the first frame"),
+        }
+        let fault = self.shown.answer.as_ref().map(|answer| &answer.fault);
+        let (colour, text) = match (fault, self.shown.replay) {
+            (None, _) => (palette.accent, "Waiting for the first frame"),
             _ if counts.is_waiting => (palette.warning, "No frame for two seconds"),
-            (Some(Some(Watched::Checked(FaultEvent::Named { wire, .. }))), ..) => {
-                return (palette.warning, format!("Fault: {wire}"));
-            }
-            (Some(Some(Watched::Checked(FaultEvent::Unexplained))), ..) => {
-                (palette.warning, "The readings contradict Eq. (2)")
-            }
-            (.., Some(replay)) if !replay.is_playing => (palette.dim, "Replay paused"),
-            (.., Some(_)) => (palette.good, "Replaying"),
-            _ => (palette.good, "Live"),
+            (Some(Some((fault, _))), _) => return (palette.warning, format!("Fault: {fault}")),
+            (_, Some(replay)) if !replay.is_playing => (palette.dim, "Replay paused"),
+            (_, Some(_)) => (palette.good, "Replaying"),
+            (_, None) => (palette.good, "Live"),
         };
         (colour, text.to_owned())
     }
@@ -446,25 +433,21 @@ fn folder(shared: &Shared) -> PathBuf {
     parent.map_or_else(std::env::temp_dir, PathBuf::from)
 }
 
-const NETWORK: (&str, &str) = (
-    "sample network.json",
-    include_str!("../../../../assets/samples/network.json"),
-);
-const RECORDING: (&str, &str) = (
-    "sample recording.csv",
-    include_str!("../../../../assets/samples/recording.csv"),
-);
-
 /// Writes the sample recording, and the network that decodes it, to files.
 fn write_sample(folder: &Path) -> Result<Loaded, String> {
-    let refused = |error: &dyn std::fmt::Display| format!("the sample cannot be written: {error}");
-    fs::create_dir_all(folder).map_err(|error| refused(&error))?;
-    let write = |(name, text): (&str, &str)| {
+    let failed = |error: &dyn std::fmt::Display| format!("the sample cannot be written: {error}");
+    fs::create_dir_all(folder).map_err(|error| failed(&error))?;
+    let write = |name: &str, text: &str| {
         let path = folder.join(name);
         let written = atomic_write(&path, |file| file.write_all(text.as_bytes()));
-        written.map(|()| path).map_err(|error| refused(&error))
+        written.map(|()| path).map_err(|error| failed(&error))
     };
-    let (network, recording) = (write(NETWORK)?, write(RECORDING)?);
+    let name = "sample network.json";
+    let network = write(name, include_str!("../../../../assets/samples/network.json"))?;
+    let recording = write(
+        "sample recording.csv",
+        include_str!("../../../../assets/samples/recording.csv"),
+    )?;
     let network = NetworkFile::load(&network).map_err(|error| error.to_string())?;
-    Ok(Loaded::Sample(Arc::new(network), recording))
+    Ok(Loaded::File(name.to_owned(), Arc::new(network), Some(recording)))
 }
